@@ -1,0 +1,37 @@
+"""Files of a design: the printable STL and the lattice's node coordinates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..files import write_bytes
+from .anchors import anchors
+from .lattice import body_centred
+from .parameters import Unit
+from .solid import Solid
+from .surface import stl_bytes
+
+
+def write_stl(solid: Solid, path: str | Path) -> None:
+    """Write the solid as binary STL in mm, whole or not at all; equal solids give equal files."""
+    write_bytes(Path(path), stl_bytes(solid.vertices, solid.triangles))
+
+
+def write_nodes(unit: Unit, path: str | Path) -> None:
+    """Write every lattice node as text: `#` header lines, then id, kind and x, y, z in mm, split by spaces.
+
+    The id counts from 0; kind is `centre` or `corner` of a cell, or `P1`, `P2`, ... for the anchors.
+    """
+    lattice = body_centred(unit.dimensions)
+    kinds = ["centre" if centre else "corner" for centre in lattice.is_centre]
+    for number, anchor in enumerate(anchors(unit), 1):
+        kinds[int(abs(lattice.nodes - anchor).sum(axis=1).argmin())] = f"P{number}"
+    lines = [
+        f"# lattice nodes of {unit.name} at scale {unit.scale:g}",
+        f"# {len(kinds)} nodes; kind: centre or corner of a cell, P1 .. P{unit.chambers.count} the anchors",
+        "# frame: z from the inlet to the tip, x = 0 the bending plane, +y the side with more lattice",
+        "# id kind x_mm y_mm z_mm",
+    ]
+    for index, (kind, (x, y, z)) in enumerate(zip(kinds, lattice.nodes, strict=True)):
+        lines.append(f"{index} {kind} {x:.6f} {y:.6f} {z:.6f}")
+    write_bytes(Path(path), ("\n".join(lines) + "\n").encode())

@@ -1,0 +1,118 @@
+"""Gates of a printable solid: numbers that must come out exactly, each the sign of a different mistake."""
+
+from __future__ import annotations
+
+from typing import Any, NoReturn
+
+import attrs
+
+from ..errors import MuError
+from .surface import Triangles, Vertices, area, bad_edges, genus, stl_bytes, stl_surface, volume
+
+CAVITY_TOLERANCE = 0.01
+"""Relative difference allowed between the cavity found in the solid and its analytic volume."""
+
+
+class GateError(MuError):
+    """A solid that must not be printed; it names the gate that failed."""
+
+    status = 6
+
+
+@attrs.frozen
+class Gates:
+    """What was measured on a solid, next to what it had to be."""
+
+    lattice_genus: int
+    lattice_genus_expected: int
+    lattice_components: int
+    components: int
+    bad_edges: int
+    bad_edges_after_stl: int
+    inner_shells: int
+    inner_volume_mm3: float
+    inner_volume_expected_mm3: float
+    genus: int
+    volume_mm3: float
+    area_mm2: float
+    vertices: int
+    triangles: int
+
+    @property
+    def inner_volume_error(self) -> float:
+        """Relative difference of the cavity's volume from the analytic one."""
+        return self.inner_volume_mm3 / self.inner_volume_expected_mm3 - 1.0
+
+
+def check_solid(
+    vertices: Vertices,
+    triangles: Triangles,
+    plug: Any,
+    sealed_volume: float,
+    lattice: tuple[int, int],
+    lattice_cycles: int,
+) -> Gates:
+    """Gates of a surface; GateError names the first that fails.
+
+    `plug` is a Manifold that stops the inlet and `sealed_volume` (mm3) what it seals off; `lattice` is the
+    bare lattice's measured (genus, components), `lattice_cycles` the E - V + 1 of its graph.
+    """
+    import manifold3d
+
+    solid = manifold3d.Manifold(manifold3d.Mesh64(vertices, triangles.astype("uint64")))
+    if solid.status() != manifold3d.Error.NoError:
+        _fail("closed surface", f"the surface is no manifold: {solid.status().name}")
+    inner = [shell.volume() for shell in (solid + plug).decompose() if shell.volume() < 0.0]
+    reread = stl_surface(stl_bytes(vertices, triangles))[1]
+    gates = Gates(
+        lattice_genus=lattice[0],
+        lattice_genus_expected=lattice_cycles,
+        lattice_components=lattice[1],
+        components=len(solid.decompose()),
+        bad_edges=bad_edges(triangles),
+        bad_edges_after_stl=bad_edges(reread),
+        inner_shells=len(inner),
+        inner_volume_mm3=-sum(inner),
+        inner_volume_expected_mm3=sealed_volume,
+        genus=genus(vertices, triangles),
+        volume_mm3=volume(vertices, triangles),
+        area_mm2=area(vertices, triangles),
+        vertices=len(vertices),
+        triangles=len(triangles),
+    )
+    require(gates)
+    return gates
+
+
+def require(gates: Gates) -> None:
+    """Raise GateError for the first gate that is not passed."""
+    g = gates
+    if g.lattice_components != 1:
+        _fail("lattice in one piece", f"the bare lattice falls into {g.lattice_components} pieces")
+    if g.lattice_genus != g.lattice_genus_expected:
+        _fail(
+            "lattice genus",
+            f"the bare lattice has genus {g.lattice_genus}, E - V + 1 is {g.lattice_genus_expected}",
+        )
+    if g.components != 1:
+        _fail("one component", f"the surface has {g.components} pieces: loose bodies or sealed voids")
+    if g.bad_edges:
+        _fail("closed surface", f"{g.bad_edges} edges are not shared by two triangles")
+    if g.bad_edges_after_stl:
+        _fail("watertight STL", f"{g.bad_edges_after_stl} edges are open once the STL is read back")
+    if g.inner_shells != 1:
+        _fail(
+            "one cavity",
+            f"with the inlet plugged there are {g.inner_shells} inner shells, not one: a leak or voids",
+        )
+    if abs(g.inner_volume_error) > CAVITY_TOLERANCE:
+        _fail(
+            "cavity volume",
+            f"the cavity holds {g.inner_volume_mm3:.1f} mm3 and not {g.inner_volume_expected_mm3:.1f} mm3",
+        )
+
+
+def _fail(gate: str, what: str) -> NoReturn:
+    raise GateError(
+        f"{what} (gate: {gate})", "printable solid", "try the other quality or slightly different diameters"
+    )

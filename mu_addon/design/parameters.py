@@ -1,0 +1,453 @@
+"""The parameters of a Monolithic Unit, at scale 1, and the dimensions that follow from them."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+
+import attrs
+
+from ..errors import InputError
+from ..files import write_bytes
+from . import rules, toml_text
+from .assets import asset_root
+from .quantity import PAPER, describe, quantity
+
+FORMAT = 1
+
+
+@attrs.frozen
+class Chambers:
+    """The pneumatic actuator: a bellows of parabolic bladders and necks around the z axis."""
+
+    section: ClassVar[str] = "chambers"
+
+    count: int = quantity(6, "", 3, 24, "number of chambers in series", PAPER)
+    cell_mm: float = quantity(12.5, "mm", 4.0, 60.0, "lattice cell U, which is also the chamber pitch", PAPER)
+    bladder_diameter_mm: float = quantity(
+        25.0, "mm", 8.0, 120.0, "outer diameter at a bladder's apex, 2U by rule", PAPER
+    )
+    neck_diameter_mm: float = quantity(
+        12.5,
+        "mm",
+        1.0,
+        100.0,
+        "outer diameter at a neck",
+        "assumed: the paper prints none; one cell, half the bladder, "
+        "leaves the corner nodes around the axis (at U/sqrt(2)) outside the membrane",
+    )
+    bladder_share: float = quantity(
+        0.6,
+        "",
+        0.1,
+        0.9,
+        "share of the pitch that is bladder, the rest is neck",
+        "assumed: the paper prints none; a bladder slightly longer than its neck",
+    )
+    wall_mm: float = quantity(
+        0.6,
+        "mm",
+        0.1,
+        6.0,
+        "membrane thickness along the surface normal",
+        "assumed: the paper prints none; the thinnest unsupported wall of common SLA guidelines",
+    )
+    base_cap_mm: float = quantity(
+        1.5,
+        "mm",
+        0.2,
+        20.0,
+        "thickness of the flat end at the inlet",
+        "assumed: the paper prints none; the minimum strut, stiff against the wall",
+    )
+    tip_cap_mm: float = quantity(
+        5.0,
+        "mm",
+        0.2,
+        20.0,
+        "thickness of the flat end at the tip",
+        "assumed: the paper prints none; a free end of 1.5 mm snaps inward below 4 kPa of vacuum, 5 mm holds",
+    )
+    inlet_diameter_mm: float = quantity(
+        4.0,
+        "mm",
+        0.5,
+        40.0,
+        "bore of the inlet",
+        "assumed: the paper prints none; takes a 4 mm tube and drains uncured resin",
+    )
+    inlet_length_mm: float = quantity(
+        6.0,
+        "mm",
+        0.5,
+        60.0,
+        "length of the inlet boss below z = 0",
+        "assumed: the paper prints none; a seat for the tube, one and a half bores long",
+    )
+    inlet_wall_mm: float = quantity(
+        1.5,
+        "mm",
+        0.2,
+        20.0,
+        "wall of the inlet boss",
+        "assumed: the paper prints none; the minimum strut",
+    )
+
+
+@attrs.frozen
+class Envelope:
+    """The body-centred lattice envelope around the actuator."""
+
+    section: ClassVar[str] = "lattice"
+
+    cells_x: int = quantity(
+        3,
+        "",
+        3,
+        15,
+        "cells across x, odd",
+        "assumed: the paper prints none; the fewest that put nodes on both apices",
+    )
+    cells_y_minus: int = quantity(
+        1,
+        "",
+        1,
+        7,
+        "cells on the -y side of the axis cell",
+        "assumed: the paper prints none; the fewest that put a node on the apex",
+    )
+    cells_y_plus: int = quantity(
+        2,
+        "",
+        1,
+        7,
+        "cells on the +y side of the axis cell",
+        "assumed: the paper prints none; one more than on -y, so that the unit bends",
+    )
+    allow_symmetric: bool = quantity(
+        False,
+        "",
+        0,
+        1,
+        "accept as many cells on -y as on +y: a unit that extends and does not bend",
+        "assumed: the paper's units bend",
+    )
+    junction_diameter_mm: float = quantity(
+        1.5, "mm", 0.2, 20.0, "strut diameter at a junction, the minimum", PAPER
+    )
+    midspan_diameter_mm: float = quantity(
+        2.0,
+        "mm",
+        0.2,
+        20.0,
+        "strut diameter at mid-span, the maximum",
+        "assumed: the paper says wider than the junction and prints none; a third wider",
+    )
+
+
+@attrs.frozen
+class Waveguide:
+    """The optical waveguide along the anchors; its lengths are the same at every scale."""
+
+    section: ClassVar[str] = "waveguide"
+
+    row: int = quantity(
+        2,
+        "",
+        -7,
+        7,
+        "lattice row j of the anchors, at y = jU",
+        "assumed: the paper prints none; the outermost row on the wider side, clear of the bladders",
+    )
+    section_mm: float = quantity(1.5, "mm", 0.5, 6.0, "side of the square section", PAPER, fixed=True)
+    well_width_mm: float = quantity(1.0, "mm", 0.1, 6.0, "width of a well along the path", PAPER, fixed=True)
+    well_depth_mm: float = quantity(0.65, "mm", 0.05, 6.0, "depth of a well", PAPER, fixed=True)
+    well_pitch_mm: float = quantity(
+        3.125,
+        "mm",
+        0.2,
+        20.0,
+        "distance between wells",
+        "assumed: the paper prints none; it divides U at 0.75x, 1.0x and 1.5x alike, "
+        "so that every junction lies midway between two wells",
+        fixed=True,
+    )
+    end_mm: float = quantity(
+        2.5,
+        "mm",
+        0.0,
+        20.0,
+        "length beyond each end anchor",
+        "assumed: the paper prints none; carries the end faces clear of the junction, "
+        "where light source and detector sit",
+        fixed=True,
+    )
+    inclusion_radius_mm: float = quantity(
+        1.0, "mm", 0.1, 6.0, "radius r_s of the virtual inclusion", PAPER, fixed=True
+    )
+
+
+@attrs.frozen
+class Material:
+    """Elastic constants of the small-strain limit."""
+
+    section: ClassVar[str] = "material"
+
+    lattice_modulus_kPa: float = quantity(
+        18.34,
+        "kPa",
+        0.1,
+        10000.0,
+        "effective Young's modulus of the lattice",
+        "paper: measured 21.70, 18.34 and 16.38 kPa at 0.75x, 1.0x and 1.5x",
+    )
+    lattice_poisson: float = quantity(
+        0.3,
+        "",
+        0.0,
+        0.495,
+        "effective Poisson's ratio of the lattice",
+        "assumed: the paper prints none; a customary value for an open-cell foam",
+    )
+    membrane_modulus_kPa: float = quantity(
+        2500.0,
+        "kPa",
+        10.0,
+        1e6,
+        "Young's modulus of the membrane",
+        "assumed: the paper says nominal and prints none; published Elastic 50A data give 1900 to 2700 kPa",
+    )
+    membrane_poisson: float = quantity(
+        0.45,
+        "",
+        0.0,
+        0.495,
+        "Poisson's ratio of the membrane",
+        "assumed: the paper prints none; nearly incompressible, yet free of volumetric locking",
+    )
+    sensor_modulus_kPa: float = quantity(
+        2500.0,
+        "kPa",
+        10.0,
+        1e6,
+        "Young's modulus E_sens of a virtual inclusion",
+        "assumed: the paper says bulk-like and prints none; that of the membrane",
+    )
+
+
+@attrs.frozen
+class Dimensions:
+    """True lengths in mm at scale: U = `cell`, apex and neck radii R and r, arc half-lengths a and b."""
+
+    scale: float
+    cell: float
+    count: int
+    R: float
+    r: float
+    a: float
+    b: float
+    wall: float
+    base_cap: float
+    tip_cap: float
+    inlet_radius: float
+    inlet_length: float
+    inlet_wall: float
+    cells_x: int
+    cells_y_minus: int
+    cells_y_plus: int
+    junction_diameter: float
+    midspan_diameter: float
+    row: int
+    waveguide_section: float
+    waveguide_end: float
+    well_width: float
+    well_depth: float
+    well_pitch: float
+    inclusion_radius: float
+
+    @property
+    def height(self) -> float:
+        """Length of the unit along z without the inlet boss."""
+        return self.count * self.cell
+
+    @property
+    def joint_radius(self) -> float:
+        """Radius where bladder and neck meet with one slope."""
+        return (self.R * self.b + self.r * self.a) / (self.a + self.b)
+
+    @property
+    def apex_curvature_radius(self) -> float:
+        """Radius of curvature of the profile at an apex: the thickest wall before the inner offset folds."""
+        return self.a * (self.a + self.b) / (2.0 * (self.R - self.r))
+
+    @property
+    def bounds(self) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
+        """Box of the lattice envelope as (low, high) for x, y and z."""
+        x = self.cell * self.cells_x / 2.0
+        return (
+            (-x, x),
+            (-self.cell * (self.cells_y_minus + 0.5), self.cell * (self.cells_y_plus + 0.5)),
+            (0.0, self.height),
+        )
+
+
+def _printable(unit: Any, field: Any, value: Any) -> None:
+    if not (isinstance(value, str) and value and len(value) <= 80 and value.isprintable()):
+        raise InputError(
+            f"name = {value!r} is not a name",
+            "name",
+            "give one line of 1 to 80 printable characters, in quotes",
+        )
+
+
+@attrs.frozen
+class Unit:
+    """All parameters of one Monolithic Unit; InputError names the co-design rule that a unit breaks."""
+
+    section: ClassVar[str] = ""
+
+    name: str = attrs.field(default="custom", validator=_printable)
+    scale: float = quantity(1.0, "", 0.2, 5.0, "factor on every length that is not fixed", PAPER)
+    chambers: Chambers = Chambers()
+    lattice: Envelope = Envelope()
+    waveguide: Waveguide = Waveguide()
+    material: Material = Material()
+
+    def __attrs_post_init__(self) -> None:
+        rules.check(self.dimensions, self.lattice.allow_symmetric)
+
+    @cached_property
+    def dimensions(self) -> Dimensions:
+        """True lengths in mm at this unit's scale."""
+        c, t, w, s = self.chambers, self.lattice, self.waveguide, self.scale
+        half_pitch = s * c.cell_mm / 2.0
+        a = c.bladder_share * half_pitch
+        return Dimensions(
+            scale=s,
+            cell=s * c.cell_mm,
+            count=c.count,
+            R=s * c.bladder_diameter_mm / 2.0,
+            r=s * c.neck_diameter_mm / 2.0,
+            a=a,
+            b=half_pitch - a,
+            wall=s * c.wall_mm,
+            base_cap=s * c.base_cap_mm,
+            tip_cap=s * c.tip_cap_mm,
+            inlet_radius=s * c.inlet_diameter_mm / 2.0,
+            inlet_length=s * c.inlet_length_mm,
+            inlet_wall=s * c.inlet_wall_mm,
+            cells_x=t.cells_x,
+            cells_y_minus=t.cells_y_minus,
+            cells_y_plus=t.cells_y_plus,
+            junction_diameter=s * t.junction_diameter_mm,
+            midspan_diameter=s * t.midspan_diameter_mm,
+            row=w.row,
+            waveguide_section=w.section_mm,
+            waveguide_end=w.end_mm,
+            well_width=w.well_width_mm,
+            well_depth=w.well_depth_mm,
+            well_pitch=w.well_pitch_mm,
+            inclusion_radius=w.inclusion_radius_mm,
+        )
+
+    def hash(self) -> str:
+        """SHA-256 of the unit's canonical TOML, in hexadecimal."""
+        return hashlib.sha256(to_toml(self, comments=False).encode()).hexdigest()
+
+
+SECTIONS: tuple[type, ...] = (Chambers, Envelope, Waveguide, Material)
+
+
+class Assumption(NamedTuple):
+    """One value that the source paper does not print."""
+
+    path: str
+    value: Any
+    unit: str
+    reason: str
+
+
+def assumed(unit: Unit) -> list[Assumption]:
+    """Every value of the unit that is not the paper's: path `section.name`, value, unit, reason."""
+    found = []
+    for section in SECTIONS:
+        values = getattr(unit, _attribute(section))
+        for d in describe(section):
+            value = getattr(values, d.name)
+            if d.assumed:
+                reason = d.source.removeprefix("assumed: ")
+                if value != d.default:
+                    reason = f"chosen by the user (default {d.default!r}: {reason})"
+                found.append(Assumption(f"{_attribute(section)}.{d.name}", value, d.unit, reason))
+    return found
+
+
+def to_toml(unit: Unit, comments: bool = True) -> str:
+    """The unit as TOML, in one canonical order; with comments that give unit, meaning and source."""
+    tables = {
+        _attribute(s): [(d, getattr(getattr(unit, _attribute(s)), d.name)) for d in describe(s)]
+        for s in SECTIONS
+    }
+    head = {"format": FORMAT, "name": unit.name, "scale": unit.scale}
+    return toml_text.compose(head, tables, comments)
+
+
+def from_toml(text: str, origin: str = "") -> Unit:
+    """Unit read from TOML; keys left out keep their defaults, InputError gives file and line."""
+    head = {"format": int, "name": str, **{d.name: d.type for d in describe(Unit)}}
+    keys = {"": list(head)} | {_attribute(s): [d.name for d in describe(s)] for s in SECTIONS}
+    document = toml_text.parse(text, keys, origin)
+    with toml_text.located(text, origin):
+        if document.get("format") != FORMAT:
+            raise InputError(
+                f"format = {document.get('format', 'missing')} is not known here",
+                "format",
+                f"write format = {FORMAT}, the only one so far",
+            )
+        sections = {_attribute(s): s(**document.get(_attribute(s), {})) for s in SECTIONS}
+        rest = {key: document[key] for key in ("name", "scale") if key in document}
+        return Unit(**rest, **sections)
+
+
+def read_unit(path: str | Path) -> Unit:
+    """Unit in a TOML file; InputError gives file, line and remedy."""
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(
+            f"cannot read the unit: {error.strerror or error}",
+            str(path),
+            "give the path of a unit's TOML file",
+        ) from error
+    except UnicodeDecodeError as error:
+        raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
+    return from_toml(text, str(path))
+
+
+def write_unit(unit: Unit, path: str | Path) -> None:
+    """Write the unit as commented TOML, whole or not at all."""
+    write_bytes(Path(path), to_toml(unit).encode())
+
+
+def preset_names() -> list[str]:
+    """Names of the shipped presets, sorted."""
+    return sorted(path.stem for path in (asset_root() / "presets").glob("*.toml"))
+
+
+def load_preset(name: str) -> Unit:
+    """The shipped unit of that name; InputError lists the names there are."""
+    names = preset_names()
+    if name not in names:
+        raise InputError(
+            f"there is no preset {name!r}{toml_text.nearest(name, names)}",
+            "preset",
+            f"choose one of {', '.join(names)}, or give the path of a TOML file",
+        )
+    return read_unit(asset_root() / "presets" / f"{name}.toml")
+
+
+def _attribute(section: Any) -> str:
+    return str(section.section)

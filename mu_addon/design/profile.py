@@ -1,0 +1,224 @@
+"""The actuator's profile: parabola arcs for bladders and necks, and the cavity inside a constant wall.
+
+One period of length U = 2 (a + b): a bladder arc of half-length a about its apex (radius R), a neck arc
+of half-length b about its minimum (radius r); equal slopes where they meet give the joint radius
+(R b + r a)/(a + b). The cavity is the offset of that curve by the wall along its normal, cut flat by the
+two end caps.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from .parameters import Dimensions
+
+Array = NDArray[np.float64]
+
+OFFSET_TOLERANCE = 5e-4
+"""Largest distance in mm between the cubic arcs of the cavity and the exact offset curve."""
+
+
+def outer_radius(d: Dimensions, z: ArrayLike) -> Array:
+    """Radius (mm) of the outer profile at heights z (mm, any shape)."""
+    return _outer(d, np.asarray(z, dtype=float))[0]
+
+
+def outer_slope(d: Dimensions, z: ArrayLike) -> Array:
+    """Slope d(radius)/dz of the outer profile at heights z (mm, any shape)."""
+    return _outer(d, np.asarray(z, dtype=float))[1]
+
+
+def cavity_radius(d: Dimensions, z: ArrayLike) -> Array:
+    """Radius (mm) of the cavity at heights z (mm, any shape) between the end caps, without the caps' cut."""
+    return _inner(d, _foot(d, np.asarray(z, dtype=float)))[0]
+
+
+def outer_arcs(d: Dimensions) -> list[Array]:
+    """Outer profile as exact quadratic Bezier arcs, (3, 2) poles (radius, z) each, from z = 0 to the top."""
+    poles = []
+    for low, high in _spans(d, _splits(d)):
+        radius, slope, _ = _outer(d, np.array([low, high]))
+        middle = radius[0] + slope[0] * (high - low) / 2.0
+        poles.append(np.array([[radius[0], low], [middle, (low + high) / 2.0], [radius[1], high]]))
+    return poles
+
+
+def inner_arcs(d: Dimensions) -> list[Array]:
+    """Offset of each outer arc by the wall as a cubic Bezier arc, (4, 2) poles (radius, z).
+
+    Ends and end tangents are those of the exact offset, and the arc passes through the offset of its
+    middle; arcs are halved, inner and outer alike, until they keep within OFFSET_TOLERANCE of the curve.
+    """
+    return _offset_arcs(d, _splits(d))
+
+
+def cavity_arcs(d: Dimensions) -> list[Array]:
+    """The inner arcs between the end caps, the first and last cut exactly at the caps; (4, 2) poles each."""
+    low, high = d.base_cap, d.height - d.tip_cap
+    near = 1e-6 * d.cell  # a cap that meets an arc's end leaves no sliver of that arc
+    kept = [arc for arc in inner_arcs(d) if arc[3, 1] > low + near and arc[0, 1] < high - near]
+    kept[0] = _piece(kept[0], _parameter_at(kept[0], low), 1.0)
+    kept[-1] = _piece(kept[-1], 0.0, _parameter_at(kept[-1], high))
+    kept[0][0, 1], kept[-1][3, 1] = low, high
+    return kept
+
+
+def outer_polygon(d: Dimensions, per_arc: int) -> Array:
+    """Half section of the actuator without its cavity, counter-clockwise (n, 2) points (radius, z) in mm."""
+    s = _samples(d, 0.0, d.height, per_arc)
+    return _closed(np.stack([outer_radius(d, s), s], axis=1))
+
+
+def cavity_polygon(d: Dimensions, per_arc: int) -> Array:
+    """Half section of the cavity between the end caps, counter-clockwise (n, 2) points (radius, z) in mm."""
+    low, high = d.base_cap, d.height - d.tip_cap
+    ends = _foot(d, np.array([low, high]))
+    radius, z, _ = _inner(d, _samples(d, ends[0], ends[1], per_arc))
+    z[[0, -1]] = low, high
+    return _closed(np.stack([radius, z], axis=1))
+
+
+def cavity_volume(d: Dimensions) -> float:
+    """Volume (mm3) of the cavity between the end caps: Gauss quadrature of the exact offset, to 1e-10."""
+    ends = _foot(d, np.array([d.base_cap, d.height - d.tip_cap]))
+    knots = np.unique(np.clip(_knots(d), ends[0], ends[1]))
+    x, weight = np.polynomial.legendre.leggauss(32)
+    half = np.diff(knots)[:, None] / 2.0
+    s = knots[:-1, None] + half * (1.0 + x)
+    radius, _, stretch = _inner(d, s)
+    return float(np.sum(half * weight * np.pi * radius**2 * stretch))
+
+
+def outer_volume(d: Dimensions) -> float:
+    """Volume (mm3) inside the outer profile between z = 0 and the height, in closed form."""
+    rise = d.joint_radius - d.r
+    neck = d.b * (d.r**2 + 2.0 / 3.0 * d.r * rise + rise**2 / 5.0)
+    fall = d.joint_radius - d.R
+    bladder = d.a * (d.R**2 + 2.0 / 3.0 * d.R * fall + fall**2 / 5.0)
+    return float(2.0 * d.count * np.pi * (neck + bladder))
+
+
+def membrane_volume(d: Dimensions) -> float:
+    """Volume (mm3) between outer profile and cavity, both end caps included, without the inlet's bore."""
+    return outer_volume(d) - cavity_volume(d)
+
+
+def _outer(d: Dimensions, s: Array) -> tuple[Array, Array, Array]:
+    """Radius, slope and second derivative of the outer profile at heights s."""
+    u = np.mod(s, d.cell) - d.cell / 2.0
+    from_apex = np.abs(u)
+    from_neck = d.cell / 2.0 - from_apex
+    drop = (d.R - d.r) / (d.a + d.b)
+    bladder = from_apex <= d.a
+    radius = np.where(bladder, d.R - drop / d.a * from_apex**2, d.r + drop / d.b * from_neck**2)
+    slope = -np.sign(u) * 2.0 * drop * np.where(bladder, from_apex / d.a, from_neck / d.b)
+    bend = 2.0 * drop * np.where(bladder, -1.0 / d.a, 1.0 / d.b)
+    return radius, slope, bend
+
+
+def _inner(d: Dimensions, s: Array) -> tuple[Array, Array, Array]:
+    """Offset point (radius, z) of the outer point at height s, and dz/ds = 1 - wall * curvature."""
+    radius, slope, bend = _outer(d, s)
+    length = np.sqrt(1.0 + slope**2)
+    return radius - d.wall / length, s + d.wall * slope / length, 1.0 + d.wall * bend / length**3
+
+
+def _foot(d: Dimensions, z: Array) -> Array:
+    """Height s on the outer profile whose offset lies at z, by bisection: dz/ds > 0 where the wall fits."""
+    low, high = z - d.wall, z + d.wall
+    for _ in range(60):
+        middle = (low + high) / 2.0
+        beyond = _inner(d, middle)[1] > z
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    return (low + high) / 2.0
+
+
+def _knots(d: Dimensions) -> Array:
+    """Heights where arcs meet: neck, joint, apex, joint of each chamber, and the last neck."""
+    chamber = np.array([0.0, d.b, d.cell / 2.0, d.cell - d.b])
+    return np.append((np.arange(d.count)[:, None] * d.cell + chamber).ravel(), d.height)
+
+
+def _samples(d: Dimensions, low: float, high: float, per_arc: int) -> Array:
+    """Heights from low to high that include the knots and cut every quarter chamber `per_arc` times."""
+    knots = _knots(d)
+    inner = (knots[:-1, None] + np.diff(knots)[:, None] * np.arange(per_arc) / per_arc).ravel()
+    near = 1e-3 * d.cell / per_arc  # no sliver beside an end
+    return np.concatenate([[low], inner[(inner > low + near) & (inner < high - near)], [high]])
+
+
+def _closed(curve: Array) -> Array:
+    """Polygon between the z axis and a curve (n, 2) of rising z."""
+    return np.concatenate([[[0.0, curve[0, 1]]], curve, [[0.0, curve[-1, 1]]]])
+
+
+def _spans(d: Dimensions, splits: int) -> list[tuple[float, float]]:
+    """Heights (low, high) of the arcs, every quarter of a chamber halved into `splits` equal parts."""
+    knots = _knots(d)
+    parts = knots[:-1, None] + np.diff(knots)[:, None] * np.arange(splits) / splits
+    ends = np.append(parts.ravel(), d.height)
+    return list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
+
+
+def _offset_arcs(d: Dimensions, splits: int) -> list[Array]:
+    arcs = []
+    for low, high in _spans(d, splits):
+        s = np.array([low, (low + high) / 2.0, high])
+        radius, z, _ = _inner(d, s)
+        slope = _outer(d, s)[1]
+        start, middle, end = np.stack([radius, z], axis=1)
+        tangents = np.array([[slope[0], 1.0], [slope[2], 1.0]])
+        # B(1/2) = (start + end)/2 + 3/8 (p t0 - q t1): two equations for the two pole lengths p and q.
+        p, q = np.linalg.solve(
+            0.375 * np.stack([tangents[0], -tangents[1]], axis=1), middle - (start + end) / 2.0
+        )
+        arcs.append(np.array([start, start + p * tangents[0], end - q * tangents[1], end]))
+    return arcs
+
+
+def _splits(d: Dimensions) -> int:
+    """Fewest equal parts of a quarter chamber, a power of two, whose cubic offsets rise and keep close."""
+    t = np.linspace(0.0, 1.0, 17)[1:-1]
+    splits = 1
+    while splits < 64:
+        first = np.array(_offset_arcs(d, splits)[: 2 * splits])  # the other quarters are mirror images
+        points = _bezier(first, t)
+        s = _foot(d, points[..., 1])
+        off = np.abs(points[..., 0] - _inner(d, s)[0]) / np.sqrt(1.0 + _outer(d, s)[1] ** 2)
+        rising = (np.diff(first[..., 1], axis=1) >= 0.0).all()  # else the arc folds, near the thickest wall
+        if off.max() < OFFSET_TOLERANCE and rising:
+            break
+        splits *= 2
+    return splits
+
+
+def _bezier(poles: Array, t: Array) -> Array:
+    """Points (..., len(t), 2) at parameters t of cubic arcs (..., 4, 2)."""
+    basis = np.stack([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3], axis=1)
+    return np.asarray(basis @ poles)
+
+
+def _parameter_at(arc: Array, z: float) -> float:
+    """Parameter where the cubic arc, whose z increases, reaches z."""
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        middle = (low + high) / 2.0
+        low, high = (low, middle) if _bezier(arc, np.array([middle]))[0, 1] > z else (middle, high)
+    return (low + high) / 2.0
+
+
+def _piece(arc: Array, first: float, last: float) -> Array:
+    """Poles of the arc's part between two parameters, by blossoming."""
+
+    def blossom(u: float, v: float, w: float) -> Array:
+        points = arc
+        for t in (u, v, w):
+            points = (1.0 - t) * points[:-1] + t * points[1:]
+        return np.asarray(points[0])
+
+    a, b = first, last
+    return np.array([blossom(a, a, a), blossom(a, a, b), blossom(a, b, b), blossom(b, b, b)])

@@ -1,0 +1,101 @@
+"""Parameters that carry their unit, bounds, meaning and source, for panels, files and reports alike."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import attrs
+
+from ..errors import InputError
+
+PAPER = "paper"
+
+
+class Description(NamedTuple):
+    """What one parameter is; bounds are closed, `fixed` marks a length that is the same at every scale."""
+
+    name: str
+    type: type
+    default: Any
+    unit: str
+    low: float
+    high: float
+    text: str
+    source: str
+    fixed: bool
+
+    @property
+    def assumed(self) -> bool:
+        """True where the source paper prints no value."""
+        return self.source.startswith("assumed")
+
+
+def quantity(
+    default: Any, unit: str, low: float, high: float, text: str, source: str, fixed: bool = False
+) -> Any:
+    """attrs field of a parameter, its fields as in Description; `unit` is "" for numbers and flags."""
+    kind = type(default)
+    metadata = {
+        "type": kind,
+        "unit": unit,
+        "low": low,
+        "high": high,
+        "text": text,
+        "source": source,
+        "fixed": fixed,
+    }
+    return attrs.field(
+        default=default, metadata=metadata, converter=_real if kind is float else None, validator=_check
+    )
+
+
+def describe(section: type) -> Iterator[Description]:
+    """Descriptions of the parameters of an attrs class, in their order."""
+    for field in attrs.fields(section):
+        if "source" in field.metadata:
+            m = field.metadata
+            yield Description(
+                field.name,
+                m["type"],
+                field.default,
+                m["unit"],
+                m["low"],
+                m["high"],
+                m["text"],
+                m["source"],
+                m["fixed"],
+            )
+
+
+def where(instance: Any, name: str) -> str:
+    """Name of a parameter as it is written in a file: `[section] name`."""
+    section = getattr(type(instance), "section", "")
+    return f"[{section}] {name}" if section else name
+
+
+def _real(value: Any) -> Any:
+    """Accept 12 and numpy's numbers as floats; anything else is left for the validator to refuse."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return value
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def _check(instance: Any, field: Any, value: Any) -> None:
+    m = field.metadata
+    kind, unit = m["type"], f" {m['unit']}" if m["unit"] else ""
+    if type(value) is not kind:
+        named = {bool: "true or false", int: "a whole number", float: "a number"}[kind]
+        raise InputError(f"{field.name} = {value!r} is not {named}", where(instance, field.name), m["text"])
+    if kind is bool:
+        return
+    if not (math.isfinite(value) and m["low"] <= value <= m["high"]):
+        raise InputError(
+            f"{field.name} = {value:g}{unit} is out of bounds",
+            where(instance, field.name),
+            f"choose a value from {m['low']:g} to {m['high']:g}{unit}",
+        )

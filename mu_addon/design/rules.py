@@ -1,0 +1,212 @@
+"""The co-design rules of a Monolithic Unit: each refuses what breaks it, by name and with what would fit."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NoReturn
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    from .parameters import Dimensions
+
+
+def check(d: Dimensions, allow_symmetric: bool = False) -> None:
+    """Raise InputError for the first rule broken; lengths that scale are told in mm at scale 1."""
+    _node_apex_alignment(d)
+    _profile(d)
+    _sagittal_symmetry(d)
+    _asymmetry(d, allow_symmetric)
+    _wall(d)
+    _ends(d)
+    _struts(d)
+    _waveguide(d)
+
+
+def _refuse(rule: str, what: str, where: str, remedy: str) -> NoReturn:
+    raise InputError(f"{what} (rule: {rule})", where, remedy)
+
+
+def _node_apex_alignment(d: Dimensions) -> None:
+    if not math.isclose(d.R, d.cell, rel_tol=1e-9):
+        s = d.scale
+        _refuse(
+            "node-apex alignment",
+            f"the bladder diameter {2 * d.R / s:g} mm is not twice the cell, 2U = {2 * d.cell / s:g} mm, "
+            "so the lattice nodes miss the bladder apices",
+            "[chambers] bladder_diameter_mm",
+            f"set bladder_diameter_mm = {2 * d.cell / s:g}, or cell_mm = {d.R / s:g}",
+        )
+
+
+def _profile(d: Dimensions) -> None:
+    if d.r >= d.R:
+        _refuse(
+            "bladder and neck",
+            f"the neck diameter {2 * d.r / d.scale:g} mm is not below the bladder's {2 * d.R / d.scale:g} mm",
+            "[chambers] neck_diameter_mm",
+            "a chamber narrows at its necks: choose a smaller neck",
+        )
+
+
+def _sagittal_symmetry(d: Dimensions) -> None:
+    if d.cells_x % 2 == 0:
+        _refuse(
+            "sagittal plane through cell centres",
+            f"{d.cells_x} cells across x put the bending plane x = 0 between the cells, "
+            "so no column of nodes lies on it and none meets the apices",
+            "[lattice] cells_x",
+            f"choose an odd count: {d.cells_x - 1} or {d.cells_x + 1}",
+        )
+
+
+def _asymmetry(d: Dimensions, allow_symmetric: bool) -> None:
+    if d.cells_y_plus < d.cells_y_minus:
+        _refuse(
+            "lattice wider toward +y",
+            f"{d.cells_y_minus} cells on -y and {d.cells_y_plus} on +y make the unit bend the other way",
+            "[lattice] cells_y_plus",
+            "+y is by definition the side with more lattice: exchange the two counts",
+        )
+    if d.cells_y_plus == d.cells_y_minus and not allow_symmetric:
+        _refuse(
+            "lattice wider toward +y",
+            f"{d.cells_y_plus} cells on either side of the axis: such a unit extends and does not bend",
+            "[lattice] cells_y_plus",
+            f"set cells_y_plus = {d.cells_y_minus + 1}, or allow_symmetric = true if it is to extend",
+        )
+
+
+def _wall(d: Dimensions) -> None:
+    s = d.scale
+    limits = {
+        "wall within the apex's radius of curvature": (
+            d.apex_curvature_radius,
+            "the inner offset folds there",
+        ),
+        "a bore through every neck": (d.r, "no bore is left through the necks"),
+    }
+    rule, (limit, why) = min(limits.items(), key=lambda item: item[1][0])
+    if d.wall >= limit:
+        fits = min(limit, d.r - d.inlet_radius) if d.inlet_radius < d.r else limit
+        _refuse(
+            rule,
+            f"a wall of {d.wall / s:g} mm is too thick: {why} from {limit / s:.4g} mm on",
+            "[chambers] wall_mm",
+            f"the largest wall that fits is {_below(fits / s):g} mm",
+        )
+
+
+def _ends(d: Dimensions) -> None:
+    s, half = d.scale, d.cell / 2.0
+    for cap, key in ((d.base_cap, "base_cap_mm"), (d.tip_cap, "tip_cap_mm")):
+        if cap >= half:
+            _refuse(
+                "a cavity in every chamber",
+                f"an end cap of {cap / s:g} mm fills its chamber up to the apex, at {half / s:g} mm",
+                f"[chambers] {key}",
+                f"the largest cap that fits is {_below(half / s):g} mm",
+            )
+    bore = d.r - d.wall
+    if d.inlet_radius >= bore:
+        _refuse(
+            "inlet within the neck's bore",
+            f"an inlet of {2 * d.inlet_radius / s:g} mm opens beside the cavity, "
+            f"whose first neck is {2 * bore / s:.4g} mm wide inside",
+            "[chambers] inlet_diameter_mm",
+            f"the largest inlet that fits is {_below(2 * bore / s):g} mm",
+        )
+    if d.inlet_radius + d.inlet_wall > d.r * (1.0 + 1e-12):
+        _refuse(
+            "inlet boss on the base",
+            f"the inlet boss is {2 * (d.inlet_radius + d.inlet_wall) / s:g} mm wide, "
+            f"wider than the neck of {2 * d.r / s:g} mm it stands on",
+            "[chambers] inlet_wall_mm",
+            f"the largest inlet wall that fits is {_at_most((d.r - d.inlet_radius) / s):g} mm",
+        )
+
+
+def _struts(d: Dimensions) -> None:
+    s = d.scale
+    if d.junction_diameter > d.midspan_diameter:
+        _refuse(
+            "struts narrow at junctions",
+            f"the struts are {d.junction_diameter / s:g} mm wide at the junctions "
+            f"and {d.midspan_diameter / s:g} mm at mid-span",
+            "[lattice] midspan_diameter_mm",
+            f"choose at least {d.junction_diameter / s:g} mm at mid-span",
+        )
+    # Two opposite sides of the rhombus between two centres and two corners lie sqrt(2/3) U apart.
+    opening = math.sqrt(2.0 / 3.0) * d.cell
+    if d.midspan_diameter >= opening:
+        _refuse(
+            "open cells",
+            f"struts of {d.midspan_diameter / s:g} mm close the cell's openings, {opening / s:.4g} mm across",
+            "[lattice] midspan_diameter_mm",
+            f"the thickest strut that fits is {_below(opening / s):g} mm",
+        )
+
+
+def _waveguide(d: Dimensions) -> None:
+    half = d.waveguide_section / 2.0
+    if d.row == 0 or not -d.cells_y_minus <= d.row <= d.cells_y_plus:
+        rows = [j for j in range(-d.cells_y_minus, d.cells_y_plus + 1) if j]
+        why = "runs through the cavity" if d.row == 0 else "lies outside the lattice"
+        _refuse(
+            "anchors are lattice nodes outside the cavity",
+            f"anchor row {d.row} {why}",
+            "[waveguide] row",
+            f"choose one of {', '.join(map(str, rows))}",
+        )
+    if d.waveguide_section >= d.cell:
+        _refuse(
+            "waveguide inside the lattice",
+            f"a waveguide section of {d.waveguide_section:g} mm fills the cell of {d.cell:g} mm",
+            "[waveguide] section_mm",
+            f"choose a section below {d.cell:g} mm",
+        )
+    if d.waveguide_end > d.cell / 2.0:
+        _refuse(
+            "waveguide inside the lattice",
+            f"the waveguide ends {d.waveguide_end:g} mm beyond its last anchor, outside the lattice",
+            "[waveguide] end_mm",
+            f"the longest end that fits is {_at_most(d.cell / 2.0):g} mm at this scale",
+        )
+    if d.well_depth >= d.waveguide_section:
+        _refuse(
+            "wells within the waveguide",
+            f"wells {d.well_depth:g} mm deep cut through a waveguide of {d.waveguide_section:g} mm",
+            "[waveguide] well_depth_mm",
+            f"choose a depth below {d.waveguide_section:g} mm",
+        )
+    if abs(d.row) * d.cell + half - d.well_depth < d.R:
+        _refuse(
+            "wells clear of the membrane",
+            f"wells {d.well_depth:g} mm deep cut into the bladder apices beside row {d.row}",
+            "[waveguide] well_depth_mm",
+            f"choose a depth of at most {half:g} mm, or the next row outward",
+        )
+    if d.well_width >= d.well_pitch:
+        _refuse(
+            "separate wells",
+            f"wells {d.well_width:g} mm wide at a pitch of {d.well_pitch:g} mm run into each other",
+            "[waveguide] well_width_mm",
+            f"choose a width below {d.well_pitch:g} mm",
+        )
+    if d.inclusion_radius >= d.cell / 2.0:
+        _refuse(
+            "inclusion within its cells",
+            f"an inclusion of radius {d.inclusion_radius:g} mm is wider than the cell of {d.cell:g} mm",
+            "[waveguide] inclusion_radius_mm",
+            f"choose a radius below {d.cell / 2.0:g} mm",
+        )
+
+
+def _below(limit: float) -> float:
+    """Largest length in whole micrometres strictly below the limit, in mm."""
+    return (math.ceil(limit * 1000.0 - 1e-9) - 1) / 1000.0
+
+
+def _at_most(limit: float) -> float:
+    """Largest length in whole micrometres not above the limit, in mm."""
+    return math.floor(limit * 1000.0 + 1e-9) / 1000.0

@@ -1,0 +1,122 @@
+"""TOML with line numbers in every complaint, and a writer for flat tables of described values."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import re
+import textwrap
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from ..errors import InputError
+from .quantity import Description
+
+
+def parse(text: str, keys: Mapping[str, Sequence[str]], origin: str) -> dict[str, Any]:
+    """Document whose tables and keys are all among `keys` (table "" is the top level); else InputError."""
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        what, line = _located_syntax(str(error), text)
+        raise InputError(f"this is not TOML: {what}", place(origin, line), "correct that line") from error
+    for key, value in document.items():
+        if isinstance(value, dict) and key in keys:
+            for inner in value:
+                if inner not in keys[key]:
+                    raise _unknown(f"[{key}] {inner}", inner, keys[key], keys, text, origin)
+        elif key in keys or isinstance(value, dict):
+            if key in keys:
+                remedy = f"write it as a table, [{key}]"
+                raise InputError(f"{key} is not a table", place(origin, line_of(text, key)), remedy)
+            raise _unknown(f"[{key}]", key, [k for k in keys if k], keys, text, origin)
+        elif key not in keys[""]:
+            raise _unknown(key, key, keys[""], keys, text, origin)
+    return document
+
+
+def compose(
+    head: Mapping[str, Any], tables: Mapping[str, Sequence[tuple[Description, Any]]], comments: bool
+) -> str:
+    """TOML text of the top-level values and of one table a name, with the descriptions as comments."""
+    lines = [f"{key} = {_value(value)}" for key, value in head.items()]
+    for name, rows in tables.items():
+        lines += ["", f"[{name}]"]
+        for d, value in rows:
+            if comments:
+                default = "" if value == d.default else f" (of the default, {_value(d.default)})"
+                note = f"{d.text}{f', in {d.unit}' if d.unit else ''}; {d.source}{default}"
+                lines += textwrap.wrap(note, 100, initial_indent="# ", subsequent_indent="#   ")
+            lines.append(f"{d.name} = {_value(value)}")
+    return "\n".join(lines) + "\n"
+
+
+@contextmanager
+def located(text: str, origin: str) -> Iterator[None]:
+    """Add file and line to the `where` of an InputError that names a key as `[section] key`."""
+    try:
+        yield
+    except InputError as error:
+        line = line_of(text, error.where)
+        raise InputError(error.what, f"{place(origin, line)}, {error.where}", error.remedy) from error
+
+
+def line_of(text: str, where: str) -> int | None:
+    """Line of `[section] key`, `[section]` or `key` in the text, None where it is not written out."""
+    match = re.fullmatch(r"(?:\[(\w+)\])?\s*(.*)", where)
+    wanted, key = (match[1] or "", match[2]) if match else ("", where)
+    section = ""
+    for number, line in enumerate(text.splitlines(), 1):
+        header = re.match(r"\s*\[\s*([\w.-]+)\s*\]", line)
+        if header:
+            section = header[1]
+            if section == wanted and not key:
+                return number
+        elif key and section == wanted and re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*=", line):
+            return number
+    return None
+
+
+def place(origin: str, line: int | None) -> str:
+    """`file, line n`, as far as both are known."""
+    parts = [part for part in (origin, f"line {line}" if line else "") if part]
+    return ", ".join(parts) or "TOML text"
+
+
+def nearest(name: str, names: Sequence[str]) -> str:
+    """`; did you mean x?` or nothing."""
+    close = difflib.get_close_matches(name, names, n=1)
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def _unknown(
+    where: str, key: str, here: Sequence[str], keys: Mapping[str, Sequence[str]], text: str, origin: str
+) -> InputError:
+    elsewhere = [table for table, names in keys.items() if key in names]
+    if elsewhere:
+        hint = f"; it belongs {f'in [{elsewhere[0]}]' if elsewhere[0] else 'at the top level'}"
+    else:
+        hint = nearest(key, here)
+    return InputError(
+        f"unknown key {key!r}{hint}",
+        f"{place(origin, line_of(text, where))}, {where}",
+        f"known here: {', '.join(here)}",
+    )
+
+
+def _located_syntax(message: str, text: str) -> tuple[str, int | None]:
+    match = re.search(r"\s*\(at (?:line (\d+), column \d+|end of document)\)", message)
+    if not match:
+        return message, None
+    line = int(match[1]) if match[1] else max(1, len(text.splitlines()))
+    return message[: match.start()], line
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    return repr(value)

@@ -1,0 +1,47 @@
+"""Errors a user can act on: what happened, where, and what to do."""
+
+from __future__ import annotations
+
+
+class MuError(Exception):
+    """A failure told as `what`, `where` and `remedy`; `status` is the exit status it ends a run with."""
+
+    status = 1
+
+    def __init__(self, what: str, where: str = "", remedy: str = "") -> None:
+        super().__init__(what, where, remedy)
+        self.what = what
+        self.where = where
+        self.remedy = remedy
+
+    def __str__(self) -> str:
+        parts = [self.what]
+        if self.where:
+            parts.append(f"where: {self.where}")
+        if self.remedy:
+            parts.append(f"what to do: {self.remedy}")
+        return "\n  ".join(parts)
+
+
+class InputError(MuError):
+    """A parameter, file or argument that cannot be used."""
+
+    status = 2
+
+
+class MeshingError(MuError):
+    """A geometry that no mesher here could turn into valid tetrahedra."""
+
+    status = 3
+
+
+class ConvergenceError(MuError):
+    """An equilibrium that could not be found; nothing computed from it may be reported."""
+
+    status = 4
+
+
+class OutputError(MuError):
+    """A result that could not be written."""
+
+    status = 5

@@ -1,0 +1,1 @@
+"""Quasi-static finite elements: tetrahedra, materials and follower pressure to an equilibrium path."""

@@ -1,0 +1,110 @@
+"""Tetrahedra and triangles of order 1 and 2: shape functions, quadrature, reference gradients."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import MeshingError
+from ..meshing.mesh import TET_EDGES, TRIANGLE_EDGES
+
+Array = np.ndarray[Any, Any]
+
+
+def _lagrange(barycentric: Array, edges: Array, order: int) -> Array:
+    """Lagrange shape functions, (q, nodes), at barycentric points (q, corners)."""
+    if order == 1:
+        return barycentric
+    corners = barycentric * (2 * barycentric - 1)
+    middles = 4 * barycentric[:, edges[:, 0]] * barycentric[:, edges[:, 1]]
+    return np.hstack([corners, middles])
+
+
+def _lagrange_gradient(barycentric: Array, edges: Array, order: int) -> Array:
+    """Derivatives, (q, nodes, d), by the d reference coordinates, which are barycentrics 1..d."""
+    d = barycentric.shape[1] - 1
+    corner = np.vstack([-np.ones(d), np.eye(d)])
+    if order == 1:
+        return np.broadcast_to(corner, (len(barycentric), d + 1, d)).copy()
+    corners = (4 * barycentric - 1)[:, :, None] * corner
+    i, j = edges.T
+    middles = 4 * (barycentric[:, i, None] * corner[j] + barycentric[:, j, None] * corner[i])
+    return np.concatenate([corners, middles], axis=1)
+
+
+def tet_quadrature(order: int) -> tuple[Array, Array]:
+    """Barycentric points (q, 4) and weights (q,), summing to 1/6: degree 1 for order 1, 2 for order 2.
+
+    Four points integrate the stiffness of a straight-sided quadratic tetrahedron exactly.
+    """
+    if order == 1:
+        return np.full((1, 4), 0.25), np.array([1 / 6])
+    b = (5 - np.sqrt(5)) / 20
+    return np.full((4, 4), b) + np.eye(4) * (1 - 4 * b), np.full(4, 1 / 24)
+
+
+def triangle_quadrature(order: int) -> tuple[Array, Array]:
+    """Barycentric points (q, 3) and weights (q,), summing to 1/2: degree 2 for order 1, 4 for order 2.
+
+    These degrees integrate the enclosed volume of a (curved) face and its derivatives exactly, which
+    is what keeps the assembled pressure stiffness of a closed cavity symmetric. Source of the
+    six-point rule: Dunavant, Int. J. Numer. Methods Eng. 21 (1985) 1129.
+    """
+    if order == 1:
+        return np.full((3, 3), 1 / 6) + np.eye(3) * 0.5, np.full(3, 1 / 6)
+    a, wa = 0.445948490915965, 0.223381589678011
+    b, wb = 0.091576213509771, 0.109951743655322
+    points = np.vstack([np.full((3, 3), s) + np.eye(3) * (1 - 3 * s) for s in (a, b)])
+    return points, np.repeat([wa, wb], 3) / 2
+
+
+def triangle_shapes(order: int) -> tuple[Array, Array, Array]:
+    """Shape functions (q, n), their reference derivatives (q, n, 2) and weights (q,) of a face."""
+    points, weights = triangle_quadrature(order)
+    return (
+        _lagrange(points, TRIANGLE_EDGES, order),
+        _lagrange_gradient(points, TRIANGLE_EDGES, order),
+        weights,
+    )
+
+
+@attrs.frozen(eq=False)
+class ReferenceGradients:
+    """Shape gradients by reference coordinates in mm, (m, q, n, 3), and volumes in mm3, (m, q)."""
+
+    gradients: Array
+    volumes: Array
+
+
+def reference_gradients(nodes: Array, tets: Array) -> ReferenceGradients:
+    """Gradients of the shape functions at the quadrature points of the undeformed tetrahedra.
+
+    nodes (n, 3) mm; tets (m, 4 or 10). Raises MeshingError where an element is inverted.
+    """
+    order = 1 if tets.shape[1] == 4 else 2
+    points, weights = tet_quadrature(order)
+    dn = _lagrange_gradient(points, TET_EDGES, order)
+    jacobian = np.einsum("mni,qnj->mqij", nodes[tets], dn)
+    det = np.linalg.det(jacobian)
+    if (det <= 0).any():
+        bad = np.unique(np.nonzero(det <= 0)[0])
+        centre = nodes[tets[bad[0]]].mean(axis=0).round(2)
+        raise MeshingError(
+            f"{len(bad)} of {len(tets)} elements are inverted",
+            f"the first is element {bad[0]} near {tuple(centre)} mm",
+            "refine the mesh or smooth the surface there",
+        )
+    gradients = np.einsum("qnj,mqji->mqni", dn, np.linalg.inv(jacobian))
+    return ReferenceGradients(np.ascontiguousarray(gradients), det * weights)
+
+
+def shape_functions(barycentric: Array, order: int) -> Array:
+    """Shape functions of a tetrahedron, (q, n), at barycentric points (q, 4)."""
+    return _lagrange(barycentric, TET_EDGES, order)
+
+
+def shape_gradients(barycentric: Array, order: int) -> Array:
+    """Derivatives (q, n, 3) of a tetrahedron's shape functions by its reference coordinates."""
+    return _lagrange_gradient(barycentric, TET_EDGES, order)

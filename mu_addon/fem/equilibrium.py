@@ -1,0 +1,213 @@
+"""Newton's method along a pressure path: adaptive steps, line search, and failures that are named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import ConvergenceError
+from ..meshing.mesh import Mesh
+from .factor import Cholesky, IndefiniteError, SuperLU, make_factor
+from .model import Materials, Model
+
+Array = np.ndarray[Any, Any]
+
+
+@attrs.frozen
+class NewtonSettings:
+    """When a state counts as converged, and how far the solver goes to get there."""
+
+    tolerance: float = 1e-9  # residual over the root sum of squares of all element forces
+    max_iterations: int = 60
+    max_factorisations: int = 12
+    # A factor is kept while each step with it shrinks the residual by at least this much: on a chamber
+    # of 35k unknowns a factorisation costs as much as ten solves and residuals.
+    keep_factor: float = 0.3
+    max_step_MPa: float = 0.01
+    min_step_MPa: float = 1e-4
+    max_backtracks: int = 6
+    # Shares of the undeformed body's tangent added, in turn, to one that is not definite.
+    regularisation: tuple[float, ...] = (0.03, 0.3)
+    # A state may lie this much of the predicted move away from its prediction.
+    surprise: float = 0.5
+
+
+@attrs.frozen(eq=False)
+class State:
+    """A converged equilibrium: pressure in MPa, displacement (n, 3) in mm, relative residual, cost."""
+
+    pressure_MPa: float
+    u: Array
+    residual: float = 0.0
+    iterations: int = 0
+    factorisations: int = 0
+
+
+class Equilibrium:
+    """Finds equilibria of one body with one set of materials, reusing the symbolic factorisation."""
+
+    def __init__(self, model: Model, materials: Materials, settings: NewtonSettings | None = None) -> None:
+        self.model = model
+        self.settings = settings or NewtonSettings()
+        self.parameters = model.parameters(materials)
+        pattern = model.pattern
+        self.factor: Cholesky | SuperLU = make_factor(pattern.indptr, pattern.indices, pattern.order)
+
+    @cached_property
+    def _rest_tangent(self) -> Array:
+        """Tangent of the undeformed body: positive definite, of the same pattern, and about as stiff."""
+        return self.model.tangent(rest(self.model.mesh).u, 0.0, self.parameters)
+
+    def _factorise(self, u: Array, pressure: float) -> bool:
+        """Factorise the tangent; where it is indefinite, with a share of the undeformed body's added.
+
+        Away from equilibrium a thin wall easily carries more compression than it can, without any
+        instability at the equilibrium itself. Returns whether the tangent was definite as it is.
+        """
+        values = self.model.tangent(u, pressure, self.parameters)
+        for share in (0.0, *self.settings.regularisation):
+            try:
+                self.factor.factor(values + share * self._rest_tangent if share else values)
+                return share == 0.0
+            except IndefiniteError:
+                continue
+        raise ConvergenceError("the tangent is far from definite")
+
+    def newton(self, u: Array, pressure: float, reach_mm: float = np.inf) -> State:
+        """Stable equilibrium at a pressure in MPa, from a start (n, 3) that obeys the supports.
+
+        Raises ConvergenceError where elements invert, progress stops, the equilibrium found is
+        unstable, or it lies farther from the start than `reach_mm`.
+        """
+        s, model, m = self.settings, self.model, self.parameters
+        start = u
+        force, scale = self._out_of_balance(u, pressure)
+        level = np.linalg.norm(force)
+        potential = model.potential(u, pressure, m)
+        if not np.isfinite(potential):
+            raise ConvergenceError("the predicted state inverts an element")
+        factorisations, stale, definite = 0, True, True
+        for iteration in range(s.max_iterations + 1):
+            if level <= s.tolerance * scale:
+                if np.abs(u - start).max() > reach_mm:
+                    raise ConvergenceError("the unit snaps to a distant equilibrium (limit point)")
+                if not definite and not self._factorise(u, pressure):
+                    raise ConvergenceError("the equilibrium is unstable (limit point or buckling)")
+                relative = level / scale if scale else 0.0
+                return State(pressure, u, float(relative), iteration, factorisations)
+            if stale:
+                if factorisations == s.max_factorisations:
+                    break
+                definite = self._factorise(u, pressure)
+                factorisations += 1
+            step = self.factor.solve(-force)
+            slope = float(force @ step)
+            length = 1.0
+            for _ in range(s.max_backtracks):
+                trial = u.copy()
+                trial.ravel()[model.free] += length * step
+                energy = model.potential(trial, pressure, m)
+                if np.isfinite(energy):
+                    force_t, scale_t = self._out_of_balance(trial, pressure)
+                    level_t = np.linalg.norm(force_t)
+                    # Near the solution the energy's change drowns in rounding; the residual does not.
+                    if energy <= potential + 1e-4 * length * slope or level_t < 0.5 * level:
+                        break
+                length /= 2
+            else:
+                raise ConvergenceError("the line search found no lower energy")
+            stale = not definite or level_t > s.keep_factor * level
+            u, force, scale, level, potential = trial, force_t, scale_t, level_t, energy
+        raise ConvergenceError(f"no convergence with {factorisations} factorisations")
+
+    def _out_of_balance(self, u: Array, pressure: float) -> tuple[Array, float]:
+        force = self.model.residual(u, pressure, self.parameters).ravel()[self.model.free]
+        return force, self.model.force_scale()
+
+    def reach(self, target: float, history: Sequence[State]) -> State:
+        """The state at a pressure in MPa, from converged states before it, the last of them the nearest.
+
+        Steps are predicted and halved until they converge to where they were predicted, so that no
+        snap to another branch passes for the path. Raises ConvergenceError naming pressure, place and
+        cause where the smallest step fails.
+        """
+        s = self.settings
+        history = list(history[-3:])
+        step = np.clip(target - history[-1].pressure_MPa, -s.max_step_MPa, s.max_step_MPa)
+        while history[-1].pressure_MPa != target:
+            last = history[-1]
+            if abs(target - last.pressure_MPa) <= abs(step) * (1 + 1e-9):
+                step = target - last.pressure_MPa
+            pressure = target if step == target - last.pressure_MPa else last.pressure_MPa + step
+            try:
+                guess = self._predict(history, pressure)
+                state = self.newton(guess, pressure, s.surprise * np.abs(guess - last.u).max())
+            except ConvergenceError as why:
+                if abs(step) / 2 < s.min_step_MPa:
+                    raise self._failure(last, pressure, why.what) from None
+                step /= 2
+                continue
+            history = [*history[-2:], state]
+            step = np.clip(2 * step, -s.max_step_MPa, s.max_step_MPa)
+        return history[-1]
+
+    def _predict(self, history: Sequence[State], pressure: float) -> Array:
+        """Start at another pressure: along the tangent from one state, by extrapolation from several."""
+        last = history[-1]
+        if len(history) > 1:
+            return extrapolate(history, pressure)
+        if not self._factorise(last.u, last.pressure_MPa):
+            raise ConvergenceError("the state to start from is unstable")
+        with_, without = (
+            self.model.residual(last.u, p, self.parameters).ravel()[self.model.free]
+            for p in (pressure, last.pressure_MPa)
+        )
+        guess = last.u.copy()
+        guess.ravel()[self.model.free] += self.factor.solve(without - with_)
+        return guess
+
+    def path(
+        self,
+        pressures_MPa: Iterable[float],
+        start: State,
+        on_state: Callable[[State], None] | None = None,
+    ) -> list[State]:
+        """States at the given pressures, visited in order from a converged start; see `reach`."""
+        found = [start]
+        for target in pressures_MPa:
+            found.append(self.reach(target, found))
+            if on_state:
+                on_state(found[-1])
+        return found[1:]
+
+    def _failure(self, last: State, pressure: float, why: str) -> ConvergenceError:
+        least, element = self.model.smallest_jacobian(last.u, self.parameters)
+        nodes = self.model.mesh.tets[element]
+        place = (self.model.mesh.nodes[nodes] + last.u[nodes]).mean(axis=0)
+        return ConvergenceError(
+            f"no equilibrium at {pressure * 1e3:.4g} kPa: {why}",
+            f"the last converged state is {last.pressure_MPa * 1e3:.4g} kPa; its most distorted element is "
+            f"{element} near ({place[0]:.1f}, {place[1]:.1f}, {place[2]:.1f}) mm with det F = {least:.3g}",
+            "lower the pressure, thicken the wall or stiffen the material",
+        )
+
+
+def extrapolate(points: Sequence[State], pressure: float) -> Array:
+    """Displacement (n, 3) at another pressure of the polynomial through some states."""
+    u = np.zeros_like(points[-1].u)
+    for a in points:
+        weight = 1.0
+        for b in points:
+            if a is not b:
+                weight *= (pressure - b.pressure_MPa) / (a.pressure_MPa - b.pressure_MPa)
+        u += weight * a.u
+    return u
+
+
+def rest(mesh: Mesh) -> State:
+    """The undeformed, unloaded state of a mesh."""
+    return State(0.0, np.zeros_like(mesh.nodes))

@@ -1,0 +1,249 @@
+"""Warp kernels: element energies, forces and stiffness blocks, follower pressure, and the gathers."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import attrs
+import warp as wp
+
+from .laws import mat33, parameters
+
+vec3 = wp.vec3d
+f64 = wp.float64
+
+wp.config.log_level = wp.LOG_WARNING
+wp.config.enable_backward = False
+
+
+@wp.func
+def deformation_gradient(
+    u: wp.array(dtype=vec3), tets: wp.array2d(dtype=int), G: wp.array3d(dtype=vec3), e: int, q: int
+) -> mat33:
+    F = wp.identity(3, dtype=f64)
+    for a in range(tets.shape[1]):
+        F += wp.outer(u[tets[e, a]], G[e, q, a])
+    return F
+
+
+@attrs.frozen
+class LawKernels:
+    """The three element kernels of one material law."""
+
+    energy: Any
+    force: Any
+    stiffness: Any
+
+
+@cache
+def law_kernels(law: Any) -> LawKernels:
+    """Compile the element kernels of a law (see laws.NeoHooke for what a law gives)."""
+    energy_of, stress_of, tangent_of = law.energy, law.stress, law.tangent
+
+    @wp.kernel(module="unique")
+    def energy(
+        first: int,
+        u: wp.array(dtype=vec3),
+        tets: wp.array2d(dtype=int),
+        G: wp.array3d(dtype=vec3),
+        dV: wp.array2d(dtype=f64),
+        m: wp.array(dtype=parameters),
+        out: wp.array(dtype=f64),
+        smallest_J: wp.array(dtype=f64),
+    ):
+        e = first + wp.tid()
+        total = f64(0.0)
+        least = f64(1.0e30)
+        for q in range(dV.shape[1]):
+            F = deformation_gradient(u, tets, G, e, q)
+            J = wp.determinant(F)
+            least = wp.min(least, J)
+            if f64(0.0) < J:
+                total += dV[e, q] * energy_of(F, m[e])
+        out[e] = total
+        smallest_J[e] = least
+
+    @wp.kernel(module="unique")
+    def force(
+        first: int,
+        u: wp.array(dtype=vec3),
+        tets: wp.array2d(dtype=int),
+        G: wp.array3d(dtype=vec3),
+        dV: wp.array2d(dtype=f64),
+        m: wp.array(dtype=parameters),
+        out: wp.array2d(dtype=vec3),
+    ):
+        e = first + wp.tid()
+        for a in range(tets.shape[1]):
+            out[e, a] = vec3()
+        for q in range(dV.shape[1]):
+            P = dV[e, q] * stress_of(deformation_gradient(u, tets, G, e, q), m[e])
+            for a in range(tets.shape[1]):
+                out[e, a] = out[e, a] + P * G[e, q, a]
+
+    @wp.kernel(module="unique")
+    def stiffness(
+        first: int,
+        u: wp.array(dtype=vec3),
+        tets: wp.array2d(dtype=int),
+        G: wp.array3d(dtype=vec3),
+        dV: wp.array2d(dtype=f64),
+        m: wp.array(dtype=parameters),
+        out: wp.array(dtype=mat33),
+    ):
+        # Blocks of node pairs a <= b, row by row; the others are their transposes.
+        e = first + wp.tid()
+        n = tets.shape[1]
+        start = e * ((n * (n + 1)) // 2)
+        for q in range(dV.shape[1]):
+            A = dV[e, q] * tangent_of(deformation_gradient(u, tets, G, e, q), m[e])
+            for b in range(n):
+                g = G[e, q, b]
+                # T[i, 3 J + k] = sum_L A[iJ, kL] g_L
+                T0 = mat33()
+                T1 = mat33()
+                T2 = mat33()
+                for J in range(3):
+                    for k in range(3):
+                        c = 3 * k
+                        T0[J, k] = A[J, c] * g[0] + A[J, c + 1] * g[1] + A[J, c + 2] * g[2]
+                        T1[J, k] = A[3 + J, c] * g[0] + A[3 + J, c + 1] * g[1] + A[3 + J, c + 2] * g[2]
+                        T2[J, k] = A[6 + J, c] * g[0] + A[6 + J, c + 1] * g[1] + A[6 + J, c + 2] * g[2]
+                for a in range(b + 1):
+                    h = G[e, q, a]
+                    block = wp.matrix_from_rows(h * T0, h * T1, h * T2)
+                    at = start + a * n - (a * (a - 1)) // 2 + (b - a)
+                    if q == 0:
+                        out[at] = block
+                    else:
+                        out[at] = out[at] + block
+
+    return LawKernels(energy, force, stiffness)
+
+
+@wp.kernel
+def enclosed_volume(
+    x: wp.array(dtype=vec3),
+    faces: wp.array2d(dtype=int),
+    dN: wp.array3d(dtype=f64),
+    N: wp.array2d(dtype=f64),
+    weight: wp.array(dtype=f64),
+    out: wp.array(dtype=f64),
+):
+    """Cavity volume a face: normals point out of the solid, into the cavity, hence the sign."""
+    f = wp.tid()
+    total = f64(0.0)
+    for q in range(N.shape[0]):
+        r = vec3()
+        s = vec3()
+        t = vec3()
+        for a in range(faces.shape[1]):
+            p = x[faces[f, a]]
+            r += N[q, a] * p
+            s += dN[q, a, 0] * p
+            t += dN[q, a, 1] * p
+        total -= weight[q] * wp.dot(r, wp.cross(s, t)) / f64(3.0)
+    out[f] = total
+
+
+@wp.kernel
+def pressure_force(
+    pressure: f64,
+    x: wp.array(dtype=vec3),
+    faces: wp.array2d(dtype=int),
+    dN: wp.array3d(dtype=f64),
+    N: wp.array2d(dtype=f64),
+    weight: wp.array(dtype=f64),
+    first: int,
+    out: wp.array2d(dtype=vec3),
+):
+    """Internal-minus-external force of a follower pressure: + p n da on every node of a face."""
+    f = wp.tid()
+    for a in range(faces.shape[1]):
+        out[first + f, a] = vec3()
+    for q in range(N.shape[0]):
+        s = vec3()
+        t = vec3()
+        for a in range(faces.shape[1]):
+            p = x[faces[f, a]]
+            s += dN[q, a, 0] * p
+            t += dN[q, a, 1] * p
+        area = pressure * weight[q] * wp.cross(s, t)
+        for a in range(faces.shape[1]):
+            out[first + f, a] = out[first + f, a] + N[q, a] * area
+
+
+@wp.kernel
+def pressure_stiffness(
+    pressure: f64,
+    x: wp.array(dtype=vec3),
+    faces: wp.array2d(dtype=int),
+    dN: wp.array3d(dtype=f64),
+    N: wp.array2d(dtype=f64),
+    weight: wp.array(dtype=f64),
+    first: int,
+    out: wp.array(dtype=mat33),
+):
+    """Tangent of `pressure_force`, symmetrised a face.
+
+    On a closed cavity (or one closed by symmetry planes) the assembled tangent is symmetric, because
+    a uniform pressure has the potential -p V; taking each face's symmetric part leaves the sum as it is.
+    """
+    f = wp.tid()
+    n = faces.shape[1]
+    start = first + f * ((n * (n + 1)) // 2)
+    for q in range(N.shape[0]):
+        s = vec3()
+        t = vec3()
+        for a in range(n):
+            p = x[faces[f, a]]
+            s += dN[q, a, 0] * p
+            t += dN[q, a, 1] * p
+        w = pressure * weight[q]
+        for a in range(n):
+            for b in range(a, n):
+                # N_a d(s x t) by node b, and the other way round.
+                ab = N[q, a] * (dN[q, b, 1] * wp.skew(s) - dN[q, b, 0] * wp.skew(t))
+                ba = N[q, b] * (dN[q, a, 1] * wp.skew(s) - dN[q, a, 0] * wp.skew(t))
+                block = w * f64(0.5) * (ab + wp.transpose(ba))
+                at = start + a * n - (a * (a - 1)) // 2 + (b - a)
+                if q == 0:
+                    out[at] = block
+                else:
+                    out[at] = out[at] + block
+
+
+@wp.kernel
+def gather_vectors(
+    parts: wp.array(dtype=vec3),
+    start: wp.array(dtype=int),
+    index: wp.array(dtype=int),
+    out: wp.array(dtype=vec3),
+):
+    """Sum each node's contributions in a fixed order, so that the answer does not depend on timing."""
+    i = wp.tid()
+    total = vec3()
+    for k in range(start[i], start[i + 1]):
+        total += parts[index[k]]
+    out[i] = total
+
+
+@wp.kernel
+def gather_blocks(
+    first: int,
+    parts: wp.array(dtype=mat33),
+    start: wp.array(dtype=int),
+    index: wp.array(dtype=int),
+    out: wp.array(dtype=mat33),
+):
+    """Sum each matrix block's contributions; a negative index -k-1 takes part k transposed."""
+    i = first + wp.tid()
+    total = mat33()
+    for k in range(start[i], start[i + 1]):
+        j = index[k]
+        if j >= 0:
+            total += parts[j]
+        else:
+            total += wp.transpose(parts[-j - 1])
+    out[i] = total

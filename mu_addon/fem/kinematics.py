@@ -1,0 +1,113 @@
+"""What is read off a deformed mesh: displacements at points, the bending angle of the tip."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+from ..meshing.mesh import TET_EDGES, Mesh, boundary_faces
+from .elements import shape_functions, shape_gradients
+
+Array = np.ndarray[Any, Any]
+
+
+@attrs.frozen(eq=False)
+class Probe:
+    """Points fixed in the material: their element's nodes (p, n) and shape functions (p, n)."""
+
+    nodes: Array
+    weights: Array
+
+    def displacement(self, u: Array) -> Array:
+        """Displacements (p, 3) in mm at the points, of nodal displacements (n, 3)."""
+        return np.einsum("pn,pni->pi", self.weights, u[self.nodes])
+
+
+def probe(mesh: Mesh, points: Array, tolerance: float = 1e-6) -> Probe:
+    """Locate points (p, 3), in mm, in a mesh; curved elements are inverted by Newton's method.
+
+    Raises InputError for a point that lies in no element.
+    """
+    corners = mesh.nodes[mesh.corners]
+    low, high = mesh.nodes[mesh.tets].min(axis=1), mesh.nodes[mesh.tets].max(axis=1)
+    found, weights = [], []
+    for point in np.atleast_2d(points):
+        near = np.nonzero(((point >= low - tolerance) & (point <= high + tolerance)).all(axis=1))[0]
+        if len(near) == 0:
+            raise _outside(point)
+        edges = (corners[near, 1:] - corners[near, :1]).transpose(0, 2, 1)
+        local = np.linalg.solve(edges, (point - corners[near, 0])[:, :, None])[:, :, 0]
+        if mesh.order == 2:
+            local = _invert(mesh.nodes[mesh.tets[near]], point, local)
+        bary = np.column_stack([1 - local.sum(axis=1), local])
+        best = int(np.argmax(bary.min(axis=1)))
+        if not bary[best].min() >= -1e-4:
+            raise _outside(point)
+        found.append(mesh.tets[near[best]])
+        weights.append(shape_functions(bary[best : best + 1], mesh.order)[0])
+    return Probe(np.array(found), np.array(weights))
+
+
+def _invert(nodes: Array, point: Array, local: Array) -> Array:
+    """Reference coordinates (e, 3) of one point in curved elements with nodes (e, 10, 3)."""
+    for _ in range(8):
+        bary = np.column_stack([1 - local.sum(axis=1), local])
+        x = np.einsum("en,eni->ei", shape_functions(bary, 2), nodes)
+        jacobian = np.einsum("eni,enj->eij", nodes, shape_gradients(bary, 2))
+        # A point far outside an element may meet a singular map; such an element is not its home.
+        good = np.abs(np.linalg.det(jacobian)) > 1e-12
+        local[~good] = -1.0
+        step = np.linalg.solve(jacobian[good], (point - x[good])[:, :, None])[:, :, 0]
+        local[good] += np.clip(step, -1, 1)
+    return local
+
+
+def _outside(point: Array) -> InputError:
+    place = tuple(float(c) for c in np.round(point, 3))
+    return InputError(
+        "a monitored point lies outside the mesh", f"{place} mm", "move the anchor row inside the envelope"
+    )
+
+
+def bending_angle_deg(mesh: Mesh, u: Array) -> float:
+    """Rotation of the tip's cross-section against the fixed base, positive toward +y, in degrees.
+
+    Area-weighted best-fit rotation of the end plane in the sagittal (y, z) plane. Toward +y because
+    that is how the unit bends when pressure grows; as a right-hand rotation about x it is negative.
+    """
+    nodes, area = _tip_areas(mesh)
+    before = mesh.nodes[nodes, 1:]
+    after = before + u[nodes, 1:]
+    before = before - np.average(before, axis=0, weights=area)
+    after = after - np.average(after, axis=0, weights=area)
+    sine = (area * (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])).sum()
+    cosine = (area[:, None] * before * after).sum()
+    return float(-np.degrees(np.arctan2(sine, cosine)))
+
+
+def _tip_areas(mesh: Mesh) -> tuple[Array, Array]:
+    """Tip nodes with weights that integrate over the end plane, a third of a triangle a node.
+
+    On quadratic triangles these nodes are the mid-edge ones, which makes the rule exact to degree 2.
+    """
+    height = mesh.nodes[mesh.tip[0], 2]
+    faces, owner = boundary_faces(mesh.tets)
+    on_tip = (mesh.nodes[faces][:, :, 2] == height).all(axis=1)
+    faces, owner = faces[on_tip], owner[on_tip]
+    a, b, c = (mesh.nodes[faces[:, i]] for i in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    if mesh.order == 2:
+        faces = np.array([_middles(mesh.tets[e], face) for e, face in zip(owner, faces, strict=True)])
+    weight = np.zeros(len(mesh.nodes))
+    np.add.at(weight, faces, area[:, None] / 3)
+    nodes = np.nonzero(weight)[0]
+    return nodes, weight[nodes]
+
+
+def _middles(tet: Array, face: Array) -> Array:
+    """Mid-edge nodes (3,) of a face of one ten-node tetrahedron."""
+    inside = np.isin(tet[TET_EDGES], face).all(axis=1)
+    return tet[4:][inside]

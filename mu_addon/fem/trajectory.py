@@ -1,0 +1,111 @@
+"""A pressure protocol's quasi-static motion: one equilibrium a pressure, read at every instant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import ConvergenceError
+from .equilibrium import Equilibrium, State, extrapolate, rest
+
+Array = np.ndarray[Any, Any]
+
+
+@attrs.frozen(eq=False)
+class Trajectory:
+    """States (s,) of distinct pressures and, for each of k instants, which of them holds."""
+
+    time_s: Array
+    pressure_kPa: Array
+    states: tuple[State, ...]
+    index: Array
+
+    def of_time(self, values: Array) -> Array:
+        """Values (k, ...) at every instant of values (s, ...) at every state."""
+        return np.asarray(values)[self.index]
+
+
+def branches(pressure_kPa: Array) -> tuple[Array, list[Array]]:
+    """Distinct pressures ascending, and the order to visit them: outward from 0 to either side.
+
+    An elastic body under pressure alone has no memory: as long as its path is stable, the state
+    depends on the pressure only, so that a pressure met twice is solved once.
+    """
+    distinct = np.unique(pressure_kPa)
+    sides = [distinct[distinct < 0][::-1], distinct[distinct > 0]]
+    return distinct, [side for side in sides if len(side)]
+
+
+def simulate(
+    equilibrium: Equilibrium,
+    time_s: Array,
+    pressure_kPa: Array,
+    on_state: Callable[[State], None] | None = None,
+    load: Callable[[float], State | None] = lambda pressure_MPa: None,
+    store: Callable[[State], None] = lambda state: None,
+) -> Trajectory:
+    """Equilibria of a protocol sampled at k instants, time in s and pressure in kPa.
+
+    `load` gives a state of an earlier run at a pressure in MPa, if it kept one with `store`; a resumed
+    run finds the same states to the last digit, since each starts from those before it alone. Raises
+    ConvergenceError where a pressure cannot be reached; `on_state` has then seen all before it.
+    """
+    distinct, sides = branches(pressure_kPa)
+    found = {0.0: rest(equilibrium.model.mesh)}
+    for side in sides:
+        history = [found[0.0]]
+        for pressure in side:
+            state = load(pressure / 1e3)
+            if state is None:
+                state = equilibrium.reach(pressure / 1e3, history)
+                store(state)
+            history.append(state)
+            found[pressure] = state
+            if on_state:
+                on_state(state)
+    return _assemble(time_s, pressure_kPa, distinct, found)
+
+
+def simulate_near(
+    equilibrium: Equilibrium,
+    baseline: Trajectory,
+    on_state: Callable[[State], None] | None = None,
+) -> Trajectory:
+    """The same protocol for a slightly different body, each state started near the baseline's.
+
+    The start is the baseline's displacement plus the extrapolated difference, so that whole load steps
+    are taken at once; where that fails the pressure is approached by `Equilibrium.path` instead.
+    """
+    distinct, sides = branches(baseline.pressure_kPa)
+    origin = rest(equilibrium.model.mesh)
+    known = {0.0: origin, **dict(zip(distinct, baseline.states, strict=True))}
+    found = {0.0: origin}
+    for side in sides:
+        history: list[State] = [origin]
+        for pressure in side:
+            near = known[pressure]
+            guess = near.u + _extrapolate_difference(history, known, near.pressure_MPa)
+            try:
+                expected = equilibrium.settings.surprise * np.abs(guess - history[-1].u).max()
+                state = equilibrium.newton(guess, near.pressure_MPa, expected)
+            except ConvergenceError:
+                state = equilibrium.reach(near.pressure_MPa, history)
+            found[pressure] = state
+            history.append(state)
+            if on_state:
+                on_state(state)
+    return _assemble(baseline.time_s, baseline.pressure_kPa, distinct, found)
+
+
+def _extrapolate_difference(history: Sequence[State], known: dict[float, State], pressure: float) -> Array:
+    near = {state.pressure_MPa: state for state in known.values()}
+    difference = [attrs.evolve(s, u=s.u - near[s.pressure_MPa].u) for s in history[-3:]]
+    return extrapolate(difference, pressure)
+
+
+def _assemble(time_s: Array, pressure_kPa: Array, distinct: Array, found: dict[float, State]) -> Trajectory:
+    states = tuple(found[p] for p in distinct)
+    return Trajectory(time_s, pressure_kPa, states, np.searchsorted(distinct, pressure_kPa))

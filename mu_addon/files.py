@@ -1,0 +1,130 @@
+"""Files that are whole or not there: written beside their place, flushed to disk, then renamed into it."""
+
+from __future__ import annotations
+
+import csv
+import errno
+import io
+import json
+import math
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .errors import OutputError
+
+_REMEDY = {
+    errno.ENOSPC: "free some space on that disk, or choose another folder",
+    errno.EDQUOT: "free some of your quota, or choose another folder",
+    errno.EACCES: "choose a folder you may write to, or change its permissions",
+    errno.EPERM: "choose a folder you may write to, or change its permissions",
+    errno.EROFS: "that disk is read-only: choose another folder",
+    errno.ENOENT: "create the folder first, or correct its name",
+    errno.ENOTDIR: "a part of that path is a file: choose another folder",
+    errno.EEXIST: "a file of that name is in the way: remove it or choose another folder",
+    errno.EISDIR: "a folder of that name is in the way: remove it or choose another name",
+    errno.ENAMETOOLONG: "choose a shorter folder name",
+    errno.EIO: "the disk reports a fault: try another one",
+}
+
+
+def output_error(error: OSError, path: Path) -> OutputError:
+    """`error`, met while writing `path`, as an OutputError that says what to do about it."""
+    reason = (error.strerror or str(error)).lower()
+    return OutputError(
+        f"{path.name} could not be written: {reason}",
+        where=str(path),
+        remedy=_REMEDY.get(error.errno or 0, "check the disk and the folder"),
+    )
+
+
+def make_folder(path: Path) -> Path:
+    """Create `path` and its parents where they are missing; raises OutputError."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise output_error(error, path) from error
+    return path
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A path beside `path`, of the same suffix, to be written by the body; it then becomes `path`.
+
+    Missing folders are made. If the body fails, `path` stays as it was. An OSError becomes an OutputError.
+    """
+    beside = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield beside
+        with beside.open("rb+") as stream:
+            os.fsync(stream.fileno())
+        beside.replace(path)
+        _sync_folder(path.parent)
+    except OSError as error:
+        raise output_error(error, path) from error
+    finally:
+        with suppress(OSError):
+            beside.unlink(missing_ok=True)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Flush the rename itself, on systems that can open a folder."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write `data` to `path`; raises OutputError."""
+    with replacing(path) as beside:
+        beside.write_bytes(data)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write `text` to `path` as UTF-8 with \\n line ends; raises OutputError."""
+    write_bytes(path, text.encode())
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write `value` to `path` as indented JSON, see `plain`; raises OutputError."""
+    write_text(path, json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a header line and `rows` to `path`, floats to their last digit; raises OutputError."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(rows)
+    write_text(path, stream.getvalue())
+
+
+def write_npz(path: Path, arrays: Mapping[str, Any]) -> None:
+    """Write named `arrays`, compressed, to `path`; equal arrays make equal bytes; raises OutputError."""
+    with replacing(path) as beside, beside.open("wb") as stream:
+        np.savez_compressed(stream, **arrays)
+
+
+def plain(value: Any) -> Any:
+    """`value` in JSON's terms: arrays as lists, numpy numbers as numbers, paths as text, nan as null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple | set | frozenset):
+        return [plain(item) for item in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, str | int) or value is None:
+        return value
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"{type(value).__name__} has no JSON form")

@@ -1,0 +1,192 @@
+"""The membrane and its two caps as a revolved structured grid, curved exactly where it is second order.
+
+A wall of 0.6 mm beside arcs that rise 0.9 mm over their chord leaves no room for straight diagonals, so
+its elements and all their mid-edge nodes are placed by one map from the profile, not by a mesher.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import attrs
+import numpy as np
+
+from ..design.parameters import Dimensions
+from ..design.profile import outer_radius, outer_slope
+from ..errors import InputError
+from .mesh import Array, boundary_faces, edges_of, oriented
+
+# A cube split in five, in the two mirror images that alternate so that diagonals of neighbours meet;
+# a corner is numbered 4 i + 2 j + k.
+_FIVE_EVEN = np.array([[0, 6, 5, 3], [4, 0, 6, 5], [2, 0, 6, 3], [1, 0, 5, 3], [7, 6, 5, 3]])
+_FIVE_ODD = np.array([[4, 2, 1, 7], [0, 4, 2, 1], [6, 4, 2, 7], [5, 4, 1, 7], [3, 2, 1, 7]])
+
+# Angle in radians by which the profile may bend away from the lattice within one element.
+_LARGEST_TURN = math.radians(40)
+
+
+@attrs.frozen(eq=False)
+class Meridian:
+    """The half plane (radius, z) of a unit's membrane: every point of the solid from two coordinates.
+
+    p is the height, in mm, of the point of the outer profile that a wall normal starts from; q runs from
+    0 on the profile to 1 on the cavity and, inside the caps only, on to 2 on the axis. `cuts` are the two
+    heights p whose normals meet the cavity's rims.
+    """
+
+    d: Dimensions
+    cuts: tuple[float, float]
+
+    @classmethod
+    def of(cls, d: Dimensions) -> Meridian:
+        """From a unit's dimensions; raises InputError where the caps leave no cavity."""
+        top = d.height
+        cuts = _foot(d, d.base_cap), _foot(d, top - d.tip_cap)
+        if not 0 < cuts[0] < cuts[1] < top:
+            raise InputError(
+                "the end caps leave no cavity",
+                f"base cap {d.base_cap:g} mm and tip cap {d.tip_cap:g} mm of {top:g} mm",
+                "make the caps thinner than a chamber and thicker than the wall is steep there",
+            )
+        return cls(d, cuts)
+
+    def point(self, p: Array, q: Array) -> Array:
+        """Points (n, 2) of the solid, (radius, z) in mm, from coordinates p and q, (n,) each."""
+        d = self.d
+        found = under_profile(d, p, np.minimum(q, 1.0))
+        for end, cut, cap in ((0.0, self.cuts[0], d.base_cap), (d.height, self.cuts[1], -d.tip_cap)):
+            in_cap = p <= cut if cap > 0 else p >= cut
+            share = (p[in_cap] - end) / (cut - end)
+            depth = q[in_cap, None]
+            profile = np.column_stack([outer_radius(d, p[in_cap]), p[in_cap]])
+            # The core's flank: from the cavity's rim to a foot about half a cap inside the end's edge.
+            rim = under_profile(d, np.array([cut]), np.array([1.0]))[0, 0]
+            edge = float(outer_radius(d, np.array(end)))
+            foot = edge - min(max(d.wall, 0.5 * abs(cap)), 0.5 * edge)
+            flank = np.column_stack([foot + share * (rim - foot), end + share * cap])
+            axis = flank * [0.0, 1.0]
+            ring = profile + np.minimum(depth, 1.0) * (flank - profile)
+            found[in_cap] = np.where(depth > 1.0, flank + (depth - 1.0) * (axis - flank), ring)
+        return found
+
+
+def under_profile(d: Dimensions, p: Array, q: Array) -> Array:
+    """Points (n, 2), (radius, z) in mm, a share q of the wall below the profile along its normal at p."""
+    slope = outer_slope(d, p)
+    depth = q * d.wall / np.hypot(1.0, slope)
+    return np.column_stack([outer_radius(d, p) - depth, p + depth * slope])
+
+
+def _foot(d: Dimensions, z: float) -> float:
+    """Height on the profile whose normal meets the cavity at height z, by bisection."""
+    low, high = z - d.wall, z + d.wall
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        below = under_profile(d, np.array([middle]), np.array([1.0]))[0, 1] < z
+        low, high = (middle, high) if below else (low, middle)
+    return 0.5 * (low + high)
+
+
+def stations(meridian: Meridian, edge_mm: float) -> Array:
+    """Heights p on the profile that divide every arc, cut at the caps, into lengths near edge_mm."""
+    d, (low, high) = meridian.d, meridian.cuts
+    joints = np.array([0.0, d.b, d.cell / 2, d.cell - d.b])
+    ends = (np.arange(d.count)[:, None] * d.cell + joints).ravel()[1:]
+    # An arc end closer to a cut than this would leave a sliver; the arcs join smoothly, so it may go.
+    gap = 0.25 * min(edge_mm, d.a, d.b)
+    ends = ends[(np.abs(ends - low) > gap) & (np.abs(ends - high) > gap)]
+    breaks = np.sort(np.concatenate([[0.0, low, high, d.height], ends]))
+    pieces = []
+    for start, end in pairwise(breaks):
+        z = np.linspace(start, end, 17)
+        length = np.hypot(np.diff(z), np.diff(outer_radius(d, z))).sum()
+        # The lattice around a bladder has straight edges: one element an arc would cut through them.
+        turned = float(np.arctan(outer_slope(d, start)) - np.arctan(outer_slope(d, end)))
+        parts = max(division(length, edge_mm), math.ceil(turned / _LARGEST_TURN))
+        pieces.append(np.linspace(start, end, parts + 1)[:-1])
+    return np.append(np.concatenate(pieces), d.height)
+
+
+def division(length: float, edge: float) -> int:
+    """Number of equal parts of a length that come nearest to an edge, at least 1."""
+    return max(1, int(length / edge + 0.5))
+
+
+@attrs.frozen(eq=False)
+class Membrane:
+    """Tetrahedra of the membrane: nodes (n, 3), tets (m, 4), triangles of the outer surface towards the
+    lattice and of the cavity (both (f, 3), normals out of the solid), and the true middle (e, 3) of each
+    of its `edges_of`."""
+
+    nodes: Array
+    tets: Array
+    outside: Array
+    cavity: Array
+    middles: Array
+
+
+def membrane_mesh(
+    meridian: Meridian, turn: float, p: Array, sectors: int, layers: int, rings: int
+) -> Membrane:
+    """Revolve the grid of stations p over an angle `turn` (pi/2 or pi, from +y towards +x).
+
+    `sectors` elements around, `layers` through the wall, `rings` from wall to axis in the caps.
+    """
+    low, high = meridian.cuts
+    q = np.concatenate([np.linspace(0, 1, layers + 1), 1 + np.arange(1, rings + 1) / rings])
+    angle = np.linspace(0, turn, sectors + 1)
+    at_cap = (p <= low) | (p >= high)
+    ids = np.full((len(p), sectors + 1, len(q)), -1)
+    exists = np.broadcast_to(((q <= 1)[None, :] | at_cap[:, None])[:, None, :], ids.shape).copy()
+    exists[:, 1:, -1] = False
+    ids[exists] = np.arange(np.count_nonzero(exists))
+    ids[:, 1:, -1] = ids[:, :1, -1]
+    i, j, k = np.nonzero(exists)
+    coordinates = np.column_stack([p[i], angle[j], q[k]])
+    nodes = _revolved(meridian, coordinates, turn)
+
+    capped = (p[1:] <= low) | (p[:-1] >= high)
+    tets = oriented(nodes, _five_each(ids, capped[:, None] | (q[1:] <= 1)[None, :]))
+
+    edges, _ = edges_of(tets)
+    ends = coordinates[edges]
+    # On the axis the angle means nothing: an edge that starts there runs in the plane of its other end.
+    axial = ends[..., 2] == 2.0
+    ends[..., 1] = np.where(axial & ~axial[:, ::-1], ends[:, ::-1, 1], ends[..., 1])
+    middles = _revolved(meridian, ends.mean(axis=1), turn)
+
+    faces, _ = boundary_faces(tets)
+    depth, height = coordinates[:, 2], coordinates[:, 0]
+    on_cavity = (depth == 1.0) & ~((height < low) | (height > high))
+    on_cavity |= (depth > 1.0) & ((height == low) | (height == high))
+    outside = faces[np.all(depth[faces] == 0.0, axis=1)]
+    return Membrane(nodes, tets, outside, faces[np.all(on_cavity[faces], axis=1)], middles)
+
+
+def _five_each(ids: Array, solid: Array) -> Array:
+    """Tetrahedra (m, 4) of a grid of hexahedra, five for each with solid[i, k]; on the axis, where the
+    hexahedra collapse to prisms, the two without volume are dropped."""
+    ni, nj, nk = (n - 1 for n in ids.shape)
+    i, j, k = np.indices((ni, nj, nk)).reshape(3, -1)
+    corner = np.stack([ids[i + a, j + b, k + c] for a in (0, 1) for b in (0, 1) for c in (0, 1)], axis=1)
+    filled, even = solid[i, k], (i + j + k) % 2 == 0
+    tets = np.vstack(
+        [
+            corner[filled & even][:, _FIVE_EVEN].reshape(-1, 4),
+            corner[filled & ~even][:, _FIVE_ODD].reshape(-1, 4),
+        ]
+    )
+    ordered = np.sort(tets, axis=1)
+    return tets[np.all(np.diff(ordered, axis=1) > 0, axis=1)]
+
+
+def _revolved(meridian: Meridian, coordinates: Array, turn: float) -> Array:
+    """Points (n, 3) in mm from (p, angle, q), exactly on the mirror planes at both ends of the turn."""
+    p, angle, q = coordinates.T
+    radius, z = meridian.point(p, q).T
+    x, y = radius * np.sin(angle), radius * np.cos(angle)
+    x[(angle == 0) | (angle == np.pi)] = 0.0
+    if turn < np.pi:
+        y[angle == turn] = 0.0
+    return np.column_stack([x, y, z])

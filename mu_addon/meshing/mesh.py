@@ -1,0 +1,166 @@
+"""A labelled tetrahedral mesh: plain arrays, their edges and faces, and its mirror image."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import MeshingError
+
+Array = np.ndarray[Any, Any]
+
+MEMBRANE, LATTICE = 1, 2
+AXES = ("x", "y", "z")
+
+# Mid-edge nodes follow the corners in VTK's order; faces are listed with normals out of the element.
+TET_EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
+TET_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+TRIANGLE_EDGES = np.array([[0, 1], [1, 2], [2, 0]])
+
+# A reflection turns an element inside out; exchanging its first two corners turns it back.
+FLIPPED_TET = np.array([1, 0, 2, 3, 4, 6, 5, 8, 7, 9])
+FLIPPED_TRIANGLE = np.array([1, 0, 2, 3, 5, 4])
+
+
+def _float64(array: Any) -> Array:
+    return np.ascontiguousarray(array, np.float64)
+
+
+def _int32(array: Any) -> Array:
+    return np.ascontiguousarray(array, np.int32)
+
+
+def _int8(array: Any) -> Array:
+    return np.ascontiguousarray(array, np.int8)
+
+
+@attrs.frozen(eq=False)
+class Mesh:
+    """Tetrahedra of order 1 or 2 with regions and the surfaces loads act on.
+
+    nodes (n, 3) float64 in mm; tets (m, 4 | 10) int32, positively oriented, mid-edge nodes in VTK's
+    order; region (m,) int8, MEMBRANE or LATTICE; cavity (f, 3 | 6) int32, triangles whose normals
+    point out of the solid, into the cavity; base and tip, int32 nodes of the two end planes; symmetry,
+    the axes whose zero plane is a mirror of the body.
+    """
+
+    nodes: Array = attrs.field(converter=_float64)
+    tets: Array = attrs.field(converter=_int32)
+    region: Array = attrs.field(converter=_int8)
+    cavity: Array = attrs.field(converter=_int32)
+    base: Array = attrs.field(converter=_int32)
+    tip: Array = attrs.field(converter=_int32)
+    symmetry: tuple[str, ...] = ()
+
+    @property
+    def order(self) -> int:
+        """Polynomial order of the elements, 1 or 2."""
+        return 1 if self.tets.shape[1] == 4 else 2
+
+    @property
+    def corners(self) -> Array:
+        """Corner nodes of the tetrahedra, (m, 4)."""
+        return self.tets[:, :4]
+
+    @property
+    def cavity_corners(self) -> Array:
+        """Corner nodes of the cavity triangles, (f, 3)."""
+        return self.cavity[:, :3]
+
+    def symmetry_nodes(self, axis: str) -> Array:
+        """Nodes on the mirror plane of an axis, (k,) int32; raises MeshingError if it is none."""
+        if axis not in self.symmetry:
+            raise MeshingError(
+                f"the mesh has no mirror plane {axis} = 0", f"its mirror planes: {self.symmetry or 'none'}"
+            )
+        return np.flatnonzero(self.nodes[:, AXES.index(axis)] == 0.0).astype(np.int32)
+
+    def hash(self) -> str:
+        """SHA-256 of every array and the symmetry, equal only for identical meshes."""
+        digest = hashlib.sha256(repr(self.symmetry).encode())
+        for array in (self.nodes, self.tets, self.region, self.cavity, self.base, self.tip):
+            digest.update(repr((array.shape, array.dtype.str)).encode())
+            digest.update(array.tobytes())
+        return digest.hexdigest()
+
+
+def mirror(mesh: Mesh, axis: str) -> Mesh:
+    """The whole body from the part on one side of its mirror plane `axis` = 0.
+
+    Nodes on the plane are shared, every other node gains an exact image. Raises MeshingError where
+    the plane is not a mirror of the mesh.
+    """
+    column = AXES.index(axis)
+    on_plane = np.zeros(len(mesh.nodes), bool)
+    on_plane[mesh.symmetry_nodes(axis)] = True
+    side = np.sign(mesh.nodes[~on_plane, column])
+    if len(np.unique(side)) > 1:
+        raise MeshingError("a mesh must lie on one side of its mirror plane", f"plane {axis} = 0")
+    image = np.arange(len(mesh.nodes))
+    image[~on_plane] = len(mesh.nodes) + np.arange(np.count_nonzero(~on_plane))
+    reflected = mesh.nodes[~on_plane].copy()
+    reflected[:, column] *= -1
+    tets = image[mesh.tets][:, FLIPPED_TET[: mesh.tets.shape[1]]]
+    cavity = image[mesh.cavity][:, FLIPPED_TRIANGLE[: mesh.cavity.shape[1]]]
+    return Mesh(
+        nodes=np.vstack([mesh.nodes, reflected]),
+        tets=np.vstack([mesh.tets, tets]),
+        region=np.concatenate([mesh.region, mesh.region]),
+        cavity=np.vstack([mesh.cavity, cavity]),
+        base=np.unique(np.concatenate([mesh.base, image[mesh.base]])),
+        tip=np.unique(np.concatenate([mesh.tip, image[mesh.tip]])),
+        symmetry=tuple(a for a in mesh.symmetry if a != axis),
+    )
+
+
+def oriented(nodes: Array, tets: Array) -> Array:
+    """Linear tets (m, 4) with those of negative volume turned positive."""
+    volume = np.linalg.det(nodes[tets[:, 1:]] - nodes[tets[:, :1]])
+    return np.where((volume < 0)[:, None], tets[:, [1, 0, 2, 3]], tets)
+
+
+def edges_of(tets: Array) -> tuple[Array, Array]:
+    """Unique edges (e, 2), ends ascending, and the six edges of each tetrahedron (m, 6) in VTK's order."""
+    pairs = np.sort(tets[:, :4][:, TET_EDGES].reshape(-1, 2), axis=1)
+    edges, inverse = np.unique(pairs, axis=0, return_inverse=True)
+    return edges, np.reshape(inverse, (-1, 6))
+
+
+def boundary_faces(tets: Array) -> tuple[Array, Array]:
+    """Faces that belong to one tetrahedron only, (f, 3) with normals outward, and that tetrahedron, (f,)."""
+    faces = tets[:, :4][:, TET_FACES].reshape(-1, 3)
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    single = np.sort(first[count == 1])
+    return faces[single], single // 4
+
+
+def edge_keys(edges: Array, count: int) -> Array:
+    """One number for each edge (e, 2), ends ascending, of a mesh of `count` nodes; ordered as edges are."""
+    return np.asarray(edges[:, 0].astype(np.int64) * count + edges[:, 1])
+
+
+def second_order(nodes: Array, tets: Array, triangles: Array, middles: Array) -> tuple[Array, Array, Array]:
+    """Nodes, tets (m, 10) and triangles (f, 6) of order 2; middles (e, 3) are those of `edges_of(tets)`."""
+    edges, of_tet = edges_of(tets)
+    ends = np.sort(triangles[:, TRIANGLE_EDGES].reshape(-1, 2), axis=1)
+    of_triangle = np.searchsorted(edge_keys(edges, len(nodes)), edge_keys(ends, len(nodes)))
+    return (
+        np.vstack([nodes, middles]),
+        np.hstack([tets, len(nodes) + of_tet]),
+        np.hstack([triangles, len(nodes) + of_triangle.reshape(-1, 3)]),
+    )
+
+
+def bisected(nodes: Array, tets: Array, edges: Array) -> tuple[Array, Array]:
+    """Linear tets with edges (k, 2), no two of them in one element, halved together with all around them."""
+    for a, b in edges:
+        around = (tets == a).any(axis=1) & (tets == b).any(axis=1)
+        first, second = tets[around].copy(), tets[around].copy()
+        first[first == b] = len(nodes)
+        second[second == a] = len(nodes)
+        nodes = np.vstack([nodes, nodes[[a, b]].mean(axis=0)])
+        tets = np.vstack([tets[~around], first, second])
+    return nodes, tets

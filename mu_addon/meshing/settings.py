@@ -1,0 +1,52 @@
+"""How fine an analysis mesh is; sizes belong to a cell of 12.5 mm and grow with the unit's."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+
+from ..errors import InputError
+
+FRACTIONS = ("half", "quarter", "full")
+CELL_MM = 12.5
+"""The cell, in mm, that the element sizes are given for."""
+
+
+def _one_of(*allowed: Any) -> Any:
+    def check(_: object, field: attrs.Attribute[Any], value: Any) -> None:
+        if value not in allowed:
+            names = ", ".join(map(str, allowed))
+            raise InputError(f"{field.name} = {value!r} is not offered", "mesh settings", f"one of: {names}")
+
+    return check
+
+
+def _between(low: float, high: float) -> Any:
+    def check(_: object, field: attrs.Attribute[Any], value: Any) -> None:
+        if not low <= value <= high:
+            raise InputError(
+                f"{field.name} = {value!r} is out of bounds", "mesh settings", f"{low:g} to {high:g}"
+            )
+
+    return check
+
+
+@attrs.frozen
+class MeshSettings:
+    """Order, mirror fraction and element sizes; raises InputError.
+
+    fraction: "half" (x >= 0), "quarter" (also y >= 0) or "full" (the half and its mirror image).
+    refine divides every size and multiplies through_wall. Sizes in mm: along the meridian of the membrane
+    and around its apex, at the anchors' column and at the envelope of the lattice. through_wall: elements
+    across the membrane.
+    """
+
+    order: int = attrs.field(default=2, validator=_one_of(1, 2))
+    fraction: str = attrs.field(default="half", validator=_one_of(*FRACTIONS))
+    refine: float = attrs.field(default=1.0, validator=_between(0.2, 8.0))
+    meridian_mm: float = attrs.field(default=2.2, validator=_between(0.1, 100.0))
+    hoop_mm: float = attrs.field(default=4.0, validator=_between(0.1, 100.0))
+    through_wall: int = attrs.field(default=1, validator=_between(1, 8))
+    anchor_mm: float = attrs.field(default=4.0, validator=_between(0.1, 100.0))
+    envelope_mm: float = attrs.field(default=9.0, validator=_between(0.1, 100.0))

@@ -1,0 +1,208 @@
+"""The labelled analysis mesh of a parametric unit."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from ..design.parameters import Dimensions, Unit
+from ..errors import InputError, MeshingError
+from .curving import relieved
+from .lattice import GmshUnavailable, Sizes, lattice_mesh
+from .membrane import Membrane, Meridian, division, membrane_mesh, stations
+from .mesh import (
+    LATTICE,
+    MEMBRANE,
+    Array,
+    Mesh,
+    bisected,
+    edge_keys,
+    edges_of,
+    mirror,
+    oriented,
+    second_order,
+)
+from .quality import check_positive, folded_corners
+from .revolved import region_at, unit_surfaces
+from .settings import CELL_MM, MeshSettings
+from .surface import mesh_surface
+
+Progress = Callable[[str, float], None]
+
+MESHERS = ("auto", "gmsh", "pytetwild")
+
+# Corners flatter than this, as a share of the element's largest det J, open to nearly 180 degrees.
+_FLAT = 0.05
+
+
+class MeshingWarning(UserWarning):
+    """A mesh that could be made, but not in the way that was asked for."""
+
+
+def mesh_unit(
+    unit: Unit,
+    settings: MeshSettings | None = None,
+    progress: Progress | None = None,
+    mesher: str = "auto",
+    cache: Path | None = None,
+) -> Mesh:
+    """The analysis mesh of a unit; `progress` is told a stage and the share done.
+
+    The membrane is a revolved grid; gmsh fills the lattice region around it. mesher "pytetwild" meshes
+    the whole from surfaces instead, straight-sided, coarser in shape and slower, and keeps it in the
+    folder `cache`; "auto" does so, with a MeshingWarning, only where gmsh cannot be loaded. The inlet
+    is left out: the base is clamped. Raises InputError and MeshingError.
+    """
+    settings = settings or MeshSettings()
+    say = progress or (lambda stage, share: None)
+    if mesher not in MESHERS:
+        raise InputError(f"mesher {mesher!r} is not known", "mesher", f"one of: {', '.join(MESHERS)}")
+    d = unit.dimensions
+    _, (y0, y1), _ = d.bounds
+    if settings.fraction == "quarter" and y0 != -y1:
+        raise InputError(
+            "a quarter needs an envelope that is symmetric in y",
+            f"y from {y0:g} to {y1:g} mm",
+            'use fraction "half"',
+        )
+    if mesher == "pytetwild":
+        mesh = _from_surfaces(d, settings, say, cache)
+    else:
+        try:
+            mesh = _structured(d, settings, say)
+        except GmshUnavailable as error:
+            if mesher == "gmsh":
+                raise
+            warnings.warn(
+                f"{error.what}. pytetwild meshes the unit instead: slower, with more elements and a less "
+                f"exact wall. To have gmsh: {error.remedy}",
+                MeshingWarning,
+                stacklevel=2,
+            )
+            mesh = _from_surfaces(d, settings, say, cache)
+    check_positive(mesh)
+    if settings.fraction == "full":
+        mesh = mirror(mesh, "x")
+    say("mesh", 1.0)
+    return mesh
+
+
+def _structured(d: Dimensions, settings: MeshSettings, say: Progress) -> Mesh:
+    """Half or quarter mesh: a revolved membrane in a lattice region filled by gmsh."""
+    size = d.cell / CELL_MM / settings.refine
+    quarter = settings.fraction == "quarter"
+    quarters, symmetry = (1, ("x", "y")) if quarter else (2, ("x",))
+    meridian = Meridian.of(d)
+    say("mesh of the membrane", 0.0)
+    membrane = membrane_mesh(
+        meridian,
+        turn=quarters * math.pi / 2,
+        p=stations(meridian, settings.meridian_mm * size),
+        # Alternating diagonals mirror each other about y = 0 only if both quarters have as many sectors.
+        sectors=quarters * division(d.R * math.pi / 2, settings.hoop_mm * size),
+        layers=max(1, int(settings.through_wall * settings.refine + 0.5)),
+        rings=division(d.r, settings.hoop_mm * size),
+    )
+    say("mesh of the lattice", 0.2)
+    added, tets = _lattice(d, settings, membrane)
+    nodes = np.vstack([membrane.nodes, added])
+    for column, planes in enumerate(d.bounds):
+        for plane in (0.0, *planes):
+            nodes[np.abs(nodes[:, column] - plane) < 1e-7 * d.cell, column] = plane
+    say("mesh of the lattice", 0.9)
+    mesh = _joined(membrane, nodes, oriented(nodes, tets), d.height, symmetry, settings.order)
+    for _ in range(3):
+        chords = _flattening_chords(mesh, membrane.outside)
+        if not len(chords):
+            break
+        nodes, tets = bisected(nodes, tets, chords)
+        mesh = _joined(membrane, nodes, oriented(nodes, tets), d.height, symmetry, settings.order)
+    return relieved(mesh, d.bounds)
+
+
+def _lattice(d: Dimensions, settings: MeshSettings, membrane: Membrane) -> tuple[Array, Array]:
+    """Nodes (a, 3) and tets of the lattice region, as `lattice_mesh` gives them."""
+    # A mesher's decisions hang on the last digit: told in one cell's size and rounded, a unit gets the
+    # same mesh at every scale, so that scales compare without its noise.
+    to_cell = CELL_MM / d.cell
+    (_, x1), (y0, y1), (_, height) = np.round(np.array(d.bounds) * to_cell, 9).tolist()
+    quarter = settings.fraction == "quarter"
+    plan = np.array([[0.0, y1], [x1, y1]] + ([[x1, 0.0]] if quarter else [[x1, y0], [0.0, y0]]))
+    sizes = Sizes(
+        envelope=settings.envelope_mm / settings.refine,
+        anchor=settings.anchor_mm / settings.refine,
+        row=d.row * CELL_MM,
+        neck=settings.meridian_mm / settings.refine,
+        neck_radius=round(d.r * to_cell, 9),
+    )
+    surface = np.round(membrane.nodes * to_cell, 9)
+    added, tets = lattice_mesh(surface, membrane.outside, plan, height, sizes)
+    return added / to_cell, tets
+
+
+def _joined(
+    membrane: Membrane, nodes: Array, lattice: Array, height: float, symmetry: tuple[str, ...], order: int
+) -> Mesh:
+    """One mesh from the membrane and the linear lattice tets around it, curved where they meet."""
+    region = np.repeat([MEMBRANE, LATTICE], [len(membrane.tets), len(lattice)])
+    tets, cavity = np.vstack([membrane.tets, lattice]), membrane.cavity
+    if order == 2:
+        edges, _ = edges_of(tets)
+        middles = nodes[edges].mean(axis=1)
+        curved, _ = edges_of(membrane.tets)
+        rows = np.searchsorted(edge_keys(edges, len(nodes)), edge_keys(curved, len(nodes)))
+        middles[rows] = membrane.middles
+        nodes, tets, cavity = second_order(nodes, tets, cavity, middles)
+    base, tip = (np.flatnonzero(nodes[:, 2] == z) for z in (0.0, height))
+    return Mesh(nodes, tets, region, cavity, base, tip, symmetry)
+
+
+def _flattening_chords(mesh: Mesh, outside: Array) -> Array:
+    """Straight edges (k, 2) between profile nodes, in lattice elements that the curved profile flattens.
+
+    An element with two sides on the smooth profile opens to 180 degrees between them; halving the edge
+    that joins their far ends gives it two elements of half the angle. No two chords share an element.
+    """
+    flat = np.flatnonzero((folded_corners(mesh) < _FLAT) & (mesh.region == LATTICE))
+    on_profile = np.zeros(len(mesh.nodes), bool)
+    on_profile[outside] = True
+    sides = np.sort(outside[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
+    of_profile = set(map(tuple, sides.tolist()))
+    edges, of_tet = edges_of(mesh.tets)
+    chosen: list[int] = []
+    taken = np.zeros(len(mesh.tets), bool)
+    for tet in flat:
+        for edge in of_tet[tet]:
+            ends = edges[edge]
+            around = (of_tet == edge).any(axis=1)
+            if on_profile[ends].all() and tuple(ends.tolist()) not in of_profile and not taken[around].any():
+                chosen.append(edge)
+                taken |= around
+    return edges[chosen]
+
+
+def _from_surfaces(d: Dimensions, settings: MeshSettings, say: Progress, cache: Path | None) -> Mesh:
+    """Half or quarter mesh by pytetwild, tagged by the exact profile."""
+    size = d.cell / CELL_MM / settings.refine
+    quarter = settings.fraction == "quarter"
+    turn = math.pi / 2 if quarter else math.pi
+    envelope, profile, cavity = unit_surfaces(d, turn, settings.meridian_mm * size)
+    say("mesh by pytetwild", 0.0)
+    mesh = mesh_surface(
+        envelope.vertices,
+        envelope.triangles,
+        settings.envelope_mm * size,
+        inside=(profile, cavity),
+        classify=lambda points: region_at(d, points),
+        epsilon_mm=d.wall / 5,
+        order=settings.order,
+        symmetry=("x", "y") if quarter else ("x",),
+        cache=cache,
+    )
+    if set(np.unique(mesh.region)) != {MEMBRANE, LATTICE}:
+        raise MeshingError("pytetwild lost a region of the unit", "membrane or lattice", "install gmsh")
+    return mesh

@@ -1,0 +1,1 @@
+"""Where to thread the waveguide: candidates, inclusions, deviation from the baseline, ranking."""

@@ -1,0 +1,79 @@
+"""Deviation of a sensorised unit's backbone from the baseline's, as in the paper's Algorithm 1."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+Array = np.ndarray[Any, Any]
+
+
+def centreline(points: Array, stations: int) -> Array:
+    """Positions (k, j, 3) at j uniform normalised arc lengths of polylines (k, N, 3) in mm.
+
+    Cubic splines (not-a-knot) through the monitored nodes, by chord length normalised to [0, 1],
+    which is the usual stand-in for arc length before the curve is known.
+    """
+    from scipy.interpolate import CubicSpline
+
+    at = np.linspace(0.0, 1.0, stations)
+    curves = np.empty((len(points), stations, 3))
+    for m, polyline in enumerate(points):
+        chord = np.linalg.norm(np.diff(polyline, axis=0), axis=1)
+        length = np.concatenate([[0.0], np.cumsum(chord)])
+        spline = CubicSpline(length / length[-1], polyline)
+        curves[m] = spline(_arc_length_parameters(spline, at))
+    return curves
+
+
+def _arc_length_parameters(spline: Any, at: Array) -> Array:
+    """Spline parameters at which the normalised arc length of the curve itself equals `at`."""
+    t = np.linspace(0.0, 1.0, 401)
+    speed = np.linalg.norm(spline(t, 1), axis=1)
+    length = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
+    return np.interp(at, length / length[-1], t)
+
+
+@attrs.frozen(eq=False)
+class Deviation:
+    """Delta (k, j) in mm at k times and j stations, with its marginal means and objectives in mm.
+
+    Delta is the paper's eq. for ||r_alpha - r_A||; over_time (k,) its mean over length, over_length
+    (j,) its mean over time, J_hat its mean, J_cont the root mean square by trapezoidal integration.
+    """
+
+    delta: Array
+    over_time: Array
+    over_length: Array
+    J_hat: float
+    J_cont: float
+
+
+def deviation(candidate: Array, baseline: Array) -> Deviation:
+    """Compare two centrelines (k, j, 3) in mm on the same times and stations."""
+    return deviation_of(np.linalg.norm(candidate - baseline, axis=2))
+
+
+def deviation_of(delta: Array) -> Deviation:
+    """Marginal means and objectives of a matrix Delta (k, j) in mm."""
+    from scipy.integrate import trapezoid
+
+    k, j = delta.shape
+    square = trapezoid(trapezoid(delta**2, np.linspace(0, 1, j), axis=1), np.linspace(0, 1, k))
+    return Deviation(
+        delta=delta,
+        over_time=delta.mean(axis=1),
+        over_length=delta.mean(axis=0),
+        J_hat=float(delta.mean()),
+        J_cont=float(np.sqrt(square)),
+    )
+
+
+def rank(J_hat: Array) -> Array:
+    """Rank (n,) of each candidate, 1 for the smallest J_hat; equal values keep their order."""
+    order = np.argsort(J_hat, kind="stable")
+    ranks = np.empty(len(J_hat), dtype=int)
+    ranks[order] = np.arange(1, len(J_hat) + 1)
+    return ranks

@@ -1,0 +1,198 @@
+"""The command line: what each subcommand takes, and how it ends."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .study import Study
+
+EXAMPLE = "example: run.py place --preset mu-1.0x --out out/mu-1.0x"
+STATUSES = (
+    "exit status: 0 done, 2 wrong input, 3 no mesh, 4 no equilibrium, 5 cannot write, 6 not printable, "
+    "70 fault of this program, 130 Ctrl-C"
+)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, and where help is."""
+
+    def error(self, message: str) -> None:  # type: ignore[override]
+        self.exit(2, f"error: {message}\n  what to do: {self.prog} --help lists what there is\n")
+
+
+def parser() -> argparse.ArgumentParser:
+    """The parser of the whole command line."""
+    top = _Parser(
+        "run.py", description="Monolithic Units: design, simulate, place the sensor.", epilog=STATUSES
+    )
+    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+
+    presets = commands.add_parser("presets", help="list the presets that come with the package")
+    presets.set_defaults(stages=())
+
+    design = commands.add_parser("design", help="printable solid, STL and lattice nodes", epilog=EXAMPLE)
+    _add_unit(design)
+    _add_solid(design)
+    design.add_argument(
+        "--path", metavar="NAME", help="also the unit with a waveguide along this path, alpha1 .."
+    )
+    design.set_defaults(stages=("design",))
+
+    simulate = commands.add_parser(
+        "simulate", help="... and its motion under a pressure protocol", epilog=EXAMPLE
+    )
+    _add_unit(simulate)
+    _add_solid(simulate)
+    _add_simulation(simulate)
+    simulate.set_defaults(stages=("design", "simulate"))
+
+    place = commands.add_parser(
+        "place", help="... and the ranking of sensor paths (the main job)", epilog=EXAMPLE
+    )
+    _add_unit(place)
+    _add_solid(place)
+    _add_simulation(place)
+    place.add_argument(
+        "--stations", type=int, default=51, metavar="J", help="stations along the backbone (51)"
+    )
+    place.add_argument(
+        "--rule",
+        choices=("both", "intersect", "volume_fraction"),
+        default="both",
+        help="how an inclusion stiffens the elements it touches (both)",
+    )
+    place.add_argument("--workers", type=int, default=2, metavar="N", help="processes for the candidates (2)")
+    place.add_argument(
+        "--no-mesh-check",
+        dest="mesh_check",
+        action="store_false",
+        help="leave out the second mesh that tells how far the mesh moves the ranking",
+    )
+    place.set_defaults(stages=("design", "simulate", "place"))
+    return top
+
+
+def _add_unit(command: argparse.ArgumentParser) -> None:
+    which = command.add_mutually_exclusive_group(required=True)
+    which.add_argument("--preset", metavar="NAME", help="a preset: mu-0.75x, mu-1.0x, mu-1.5x")
+    which.add_argument("--unit", metavar="FILE", help="a unit's parameters, TOML")
+    command.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
+    command.add_argument("--json", action="store_true", help="one JSON message a line on standard output")
+
+
+def _add_solid(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--quality",
+        choices=("interactive", "export"),
+        default="interactive",
+        help="facets of the STL (interactive)",
+    )
+
+
+def _add_simulation(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--protocol", metavar="CSV", help="time_s,pressure_kPa (the grasp that comes with it)"
+    )
+    command.add_argument("--order", type=int, choices=(1, 2), default=2, help="order of the elements (2)")
+    command.add_argument(
+        "--refine", type=float, default=1.0, metavar="F", help="divides every element size (1)"
+    )
+    command.add_argument("--times", type=int, default=25, metavar="K", help="samples of the protocol (25)")
+    command.add_argument(
+        "--mesher", choices=("auto", "gmsh", "pytetwild"), default="auto", help="who makes the mesh (auto)"
+    )
+
+
+def main(arguments: list[str]) -> int:
+    """Run one command line; returns its exit status and never raises."""
+    options = parser().parse_args(arguments)
+    if options.command == "presets":
+        return _presets()
+
+    # Only now, so that --help answers at once.
+    from .ending import run_to_end
+    from .progress import Progress, json_lines, terminal
+
+    progress = Progress([json_lines(sys.stdout) if options.json else terminal(sys.stderr)])
+    with run_to_end(progress) as ending:
+        study = _open(options, progress, ending)
+        from .publish import publish
+
+        ending.on_stop = lambda reason: publish(study, reason["what"])
+        _run(study, options)
+    if ending.status == 0 and not options.json:
+        sys.stdout.write(_answer(ending.summary, ending.folder) + "\n")
+    return ending.status
+
+
+def _presets() -> int:
+    from ..design.parameters import load_preset, preset_names
+
+    for name in preset_names():
+        d = load_preset(name).dimensions
+        sys.stdout.write(f"{name:12s} cell {d.cell:g} mm, {d.count} chambers, {d.height:g} mm long\n")
+    return 0
+
+
+def _open(options: argparse.Namespace, progress: object, ending: object) -> Study:
+    from ..design.parameters import load_preset, read_unit
+    from ..meshing.settings import MeshSettings
+    from .job import Job, protocol_of
+    from .study import Study
+
+    unit = load_preset(options.preset) if options.preset else read_unit(options.unit)
+    extra = {}
+    if "simulate" in options.stages:
+        extra = {
+            "mesh": MeshSettings(order=options.order, refine=options.refine),
+            "times": options.times,
+            "mesher": options.mesher,
+        }
+    if "place" in options.stages:
+        rules = ("intersect", "volume_fraction") if options.rule == "both" else (options.rule,)
+        extra |= {
+            "stations": options.stations,
+            "rules": rules,
+            "workers": options.workers,
+            "mesh_check": options.mesh_check,
+        }
+    protocol = protocol_of(getattr(options, "protocol", None))
+    job = Job(unit=unit, protocol=protocol, quality=options.quality, **extra)
+    return Study.open(job, Path(options.out), progress, ending)  # type: ignore[arg-type]
+
+
+def _run(study: Study, options: argparse.Namespace) -> None:
+    from ..design.anchors import window
+    from .publish import publish
+
+    # An unknown path is found out before an hour's work, not after.
+    path = window(study.job.unit, options.path) if getattr(options, "path", None) else None
+    study.design()
+    if path is not None:
+        study.design(path)
+    if "simulate" in options.stages:
+        study.make_mesh()
+        study.simulate()
+    if "place" in options.stages:
+        chosen = study.place()
+        study.design(window(study.job.unit, chosen[study.headline_rule]))
+    publish(study)
+
+
+def _answer(summary: dict[str, object], folder: Path | None) -> str:
+    lines = [f"results: {folder}"]
+    angles = summary.get("angle_deg")
+    if isinstance(angles, dict):
+        ends = sorted((float(p), a) for p, a in angles.items())
+        lines.append("angle: " + ", ".join(f"{a:+.1f} deg at {p:g} kPa" for p, a in (ends[0], ends[-1])))
+    chosen = summary.get("chosen")
+    if isinstance(chosen, dict):
+        J, tied = summary["J_hat_mm"], summary["tied_with_chosen"]
+        for rule, name in chosen.items():
+            equal = f", tied with {', '.join(tied[rule])}" if tied[rule] else ""  # type: ignore[index]
+            lines.append(f"{rule}: {name}, J_hat {J[rule][name]:.4f} mm{equal}")  # type: ignore[index]
+    return "\n".join(lines)

@@ -1,0 +1,162 @@
+"""How a run ends: well, in part or interrupted; always with a message, an exit status and a summary.json."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import attrs
+
+from ..errors import MuError
+from ..files import make_folder, write_json
+from .progress import Progress, log_file
+
+DONE, UNEXPECTED, INTERRUPTED, TERMINATED = 0, 70, 130, 143
+
+
+class _Stopped(MuError):
+    """The user or the parent process asked the run to stop."""
+
+
+class _Interrupted(_Stopped):
+    status = INTERRUPTED
+
+
+class _Terminated(_Stopped):
+    status = TERMINATED
+
+
+class _Unexpected(MuError):
+    """A fault of this program."""
+
+    status = UNEXPECTED
+
+
+@attrs.define
+class Ending:
+    """What a run leaves: its exit status, and the `summary` that its body fills and its folder keeps."""
+
+    progress: Progress
+    folder: Path | None = None
+    summary: dict[str, Any] = attrs.field(factory=dict)
+    status: int = DONE
+    # Called with the reason when a run stops early, to save what there is: a partial report, say.
+    on_stop: Callable[[dict[str, str]], None] | None = None
+
+    def open_folder(self, folder: Path) -> Path:
+        """Make `folder` the run's: log.ndjson starts there, and summary.json says "running" until the end.
+
+        So a run that was killed, or overtaken by a new one, never passes for complete. Raises OutputError.
+        """
+        make_folder(folder)
+        self.progress.sinks.append(log_file(folder / "log.ndjson"))
+        write_json(folder / "summary.json", {"status": "running"})
+        self.folder = folder
+        return folder
+
+
+@contextmanager
+def run_to_end(progress: Progress) -> Iterator[Ending]:
+    """Run the body; whatever stops it becomes a message and `Ending.status`, never a traceback.
+
+    A body that ends well leaves summary.json with "status": "complete". Any other leaves what it has
+    written, and summary.json with "status": "partial" and the reason. Exit status: 0, a MuError's own,
+    130 after Ctrl-C, 143 after SIGTERM, 70 for a fault of this program, whose traceback goes to log.ndjson.
+    """
+    ending = Ending(progress)
+    # Blender replaces Python's handler of Ctrl-C, and leaves SIGTERM to kill the process where it stands.
+    with _signals_raise():
+        try:
+            yield ending
+            _write_summary(ending, {"status": "complete"})
+            progress.result({"folder": ending.folder, "summary": ending.summary})
+        except KeyboardInterrupt:
+            _stop(ending, _Interrupted("stopped by Ctrl-C", remedy=_kept(ending)))
+        except MuError as error:
+            _stop(ending, error)
+        except Exception as error:  # noqa: BLE001 - the last resort: told, logged and turned into exit status 70
+            _log_traceback(ending, error)
+            fault = _Unexpected(
+                f"this program failed: {type(error).__name__}: {error}",
+                remedy="report it with log.ndjson, which holds the details" if ending.folder else "report it",
+            )
+            _stop(ending, fault)
+
+
+def _kept(ending: Ending) -> str:
+    return f"what was finished is in {ending.folder}" if ending.folder else ""
+
+
+def _stop(ending: Ending, error: MuError) -> None:
+    """The last words of a run that ends early: summary.json, what `on_stop` saves, and the error message."""
+    _set_signals(signal.SIG_IGN)
+    ending.status = error.status
+    reason = {"what": error.what, "where": error.where, "what_to_do": error.remedy}
+    partial = {"status": "partial", "reason": reason}
+    # The reason for stopping may be that nothing can be written any more.
+    with suppress(MuError):
+        _write_summary(ending, partial)
+    if ending.on_stop is not None:
+        # What takes long can be cut short by a second Ctrl-C; a failure here would only hide the first one.
+        _set_signals(signal.default_int_handler)
+        with suppress(Exception, KeyboardInterrupt):
+            ending.on_stop(reason)
+        _set_signals(signal.SIG_IGN)
+        with suppress(MuError):
+            _write_summary(ending, partial)
+    ending.progress.error(error)
+
+
+def _write_summary(ending: Ending, state: dict[str, Any]) -> None:
+    seconds = {"seconds": {**ending.progress.seconds}}
+    # Twice, so that the state is read first and yet overrides an older one.
+    ending.summary = {**state, **ending.summary, **state, **seconds}
+    if ending.folder is not None:
+        write_json(ending.folder / "summary.json", ending.summary)
+
+
+def _log_traceback(ending: Ending, error: Exception) -> None:
+    if ending.folder is None:
+        return
+    with suppress(MuError):
+        trace = "".join(traceback.format_exception(error))
+        log_file(ending.folder / "log.ndjson")({"type": "traceback", "text": trace})
+
+
+@contextmanager
+def _signals_raise() -> Iterator[None]:
+    """While the body runs, Ctrl-C raises KeyboardInterrupt and SIGTERM _Terminated."""
+    if not _may_set_signals():
+        yield
+        return
+    before = {
+        signal.SIGINT: signal.signal(signal.SIGINT, signal.default_int_handler),
+        signal.SIGTERM: signal.signal(signal.SIGTERM, _raise_terminated),
+    }
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            # None: a handler that Python did not set and cannot put back.
+            signal.signal(number, handler if handler is not None else signal.SIG_DFL)
+
+
+def _set_signals(handler: Any) -> None:
+    """`handler` for Ctrl-C and SIGTERM, until `_signals_raise` puts back what was there before."""
+    if _may_set_signals():
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, handler)
+
+
+def _may_set_signals() -> bool:
+    return threading.current_thread() is threading.main_thread()
+
+
+def _raise_terminated(number: int, frame: FrameType | None) -> None:
+    raise _Terminated("stopped by the process that started it")

@@ -1,0 +1,85 @@
+"""What a study is asked to do: its inputs, and the text that stands for them in study.toml."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from ..design.assets import asset_root
+from ..design.parameters import Unit, to_toml
+from ..errors import InputError
+from ..fem.protocol import Protocol, read_protocol
+from ..meshing.settings import MeshSettings
+from ..placement.inclusion import RULES
+
+GRASP = "protocols/grasp.csv"
+
+
+def _whole(low: int, high: int, what: str) -> Any:
+    def check(_: object, field: attrs.Attribute[int], value: int) -> None:
+        if not low <= value <= high:
+            raise InputError(f"{what} is {value}", field.name, f"give a whole number from {low} to {high}")
+
+    return check
+
+
+@attrs.frozen
+class Job:
+    """Inputs of a study. times: samples k of the protocol; stations: j along the backbone.
+
+    The 25 samples of the grasp protocol are 0.5 s or 5 kPa apart and meet each of its corners.
+    """
+
+    unit: Unit
+    protocol: Protocol
+    mesh: MeshSettings = attrs.field(factory=MeshSettings)
+    mesher: str = "auto"
+    times: int = attrs.field(default=25, validator=_whole(2, 10_001, "the number of time samples"))
+    stations: int = attrs.field(default=51, validator=_whole(2, 10_001, "the number of stations"))
+    rules: tuple[str, ...] = RULES
+    quality: str = "interactive"
+    workers: int = attrs.field(default=2, validator=_whole(1, 256, "the number of workers"))
+    # Whether a second, coarser mesh is solved to tell how far the mesh moves a ranking.
+    mesh_check: bool = True
+
+    def text(self) -> str:
+        """study.toml: everything that decides the results (not `workers`, which does not)."""
+        rules = ", ".join(f'"{rule}"' for rule in self.rules)
+        mesh = attrs.asdict(self.mesh)
+        lines = [
+            "# The inputs of this study; unit.toml and protocol.csv beside it belong to them.",
+            "format = 1",
+            'unit = "unit.toml"',
+            'protocol = "protocol.csv"',
+            f"times = {self.times}",
+            f"stations = {self.stations}",
+            f"rules = [{rules}]",
+            f'quality = "{self.quality}"',
+            f'mesher = "{self.mesher}"',
+            f"mesh_check = {str(self.mesh_check).lower()}",
+            "",
+            "[mesh]",
+            *(f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {v}" for k, v in mesh.items()),
+        ]
+        return "\n".join(lines) + "\n"
+
+    def unit_text(self) -> str:
+        """unit.toml: the unit's parameters with units, meaning and source."""
+        return to_toml(self.unit)
+
+    def protocol_text(self) -> str:
+        """protocol.csv: corner points of the pressure protocol."""
+        rows = zip(self.protocol.time_s, self.protocol.pressure_kPa, strict=True)
+        return "time_s,pressure_kPa\n" + "".join(f"{t:g},{p:g}\n" for t, p in rows)
+
+
+def grasp() -> Protocol:
+    """The protocol that comes with the package."""
+    return read_protocol(asset_root() / GRASP)
+
+
+def protocol_of(path: str | Path | None) -> Protocol:
+    """The protocol in a CSV file, or the one that comes with the package. Raises InputError."""
+    return grasp() if path is None else read_protocol(Path(path))

@@ -1,0 +1,294 @@
+"""The charts of a report as SVG text: narrow enough for a phone, and never told by colour alone."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .results import Floats, Path, RuleResult, SideView
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Okabe and Ito's palette: told apart by readers with any kind of colour vision.
+CHOSEN = "#D55E00"
+BY_LENGTH = ("#0072B2", "#009E73", "#CC79A7", "#56B4E9")
+BY_START = ("-", "--", ":", "-.")
+INK, QUIET, GRID = "#222222", "#8A8F98", "#E3E6EA"
+WIDTH = 4.0  # inches: at a phone's width the text is still 10 pixels high
+MAP = "viridis"  # perceptually uniform, and monotone in grey
+
+_STYLE: Any = {
+    "axes.axisbelow": True,
+    "axes.edgecolor": QUIET,
+    "axes.grid": True,
+    "axes.labelcolor": INK,
+    "axes.labelsize": 9,
+    "axes.linewidth": 0.8,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": 9,
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "grid.color": GRID,
+    "grid.linewidth": 0.8,
+    "legend.fontsize": 8,
+    "legend.frameon": False,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "mu_addon",  # equal data make equal bytes
+    "xtick.color": QUIET,
+    "xtick.labelcolor": INK,
+    "xtick.labelsize": 8,
+    "ytick.color": QUIET,
+    "ytick.labelcolor": INK,
+    "ytick.labelsize": 8,
+}
+
+
+def label(name: str) -> str:
+    """A path's name as it is read: alpha10 as "α10" with its number lowered."""
+    match = re.fullmatch(r"alpha(\d+)", name)
+    if match is None:
+        return name
+    return "α" + match[1].translate(str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉"))
+
+
+def signed(text: str) -> str:
+    """`text` with true minus signs in front of its numbers."""
+    return re.sub(r"(?<![\w-])-(?=[\d.])", "−", text)
+
+
+def line_style(path: Path) -> dict[str, Any]:
+    """Colour by a path's length, dashes by its start: every window of six anchors looks different."""
+    return {
+        "color": BY_LENGTH[(path.length - 3) % len(BY_LENGTH)],
+        "linestyle": BY_START[(path.start - 1) % len(BY_START)],
+    }
+
+
+def unit_with_paths(view: SideView, paths: Sequence[Path], chosen: str, j_hat: Floats | None = None) -> str:
+    """The unit's section, and beside it every path as a lane at its true height, the chosen one in colour."""
+    left, right, bottom, top = view.extent
+    width, wide = 4.2, 1.85  # inches, of which the section's
+    high = wide * (top - bottom) / (right - left)
+    whole = high + 0.35  # a line below for the scale bar
+    with _figure(width, whole) as (figure, svg):
+        below, height = 0.30 / whole, high / whole
+        picture = figure.add_axes((0.0, below, wide / width, height))
+        picture.imshow(view.image, extent=view.extent, interpolation="lanczos", aspect="auto")
+        picture.axis("off")
+        middle = 0.5 * (left + right)
+        _scale_bar(picture, middle, bottom - 0.06 * (top - bottom), 10.0 * round((right - left) / 30.0))
+        lanes = figure.add_axes((wide / width, below, 1.0 - wide / width, height))
+        lanes.set(xlim=(-1.7, len(paths) - 0.4), ylim=(bottom, top))
+        lanes.axis("off")
+        for number, z in enumerate(view.anchors[:, 1], 1):
+            lanes.plot([-0.75, len(paths) - 0.4], [z, z], color=GRID, linewidth=0.8, zorder=0)
+            lanes.text(-0.85, z, f"P{number}", ha="right", va="center", fontsize=8, fontweight="bold")
+        for x, path in enumerate(paths):
+            z = view.anchors[path.start - 1 : path.start - 1 + path.length, 1]
+            best = path.name == chosen
+            lanes.plot(
+                [x] * len(z),
+                z,
+                color=CHOSEN if best else QUIET,
+                linewidth=5 if best else 2.5,
+                marker="o",
+                markersize=8 if best else 4.5,
+                solid_capstyle="round",
+            )
+            words: Any = {
+                "color": CHOSEN if best else INK,
+                "fontweight": "bold" if best else "normal",
+                "textcoords": "offset points",
+                "ha": "center",
+            }
+            lanes.annotate(label(path.name), (x, z[-1]), (0, 7), fontsize=8, **words)
+            if j_hat is not None:
+                value = f"{j_hat[x]:.3f}"
+                lanes.annotate(value, (x, z[0]), (0, -8), va="top", rotation=90, fontsize=7.5, **words)
+    return svg()
+
+
+def _scale_bar(axes: Any, middle: float, z: float, length: float) -> None:
+    """A bar of `length` mm below the section."""
+    ends = [middle - 0.5 * length, middle + 0.5 * length]
+    axes.plot(ends, [z, z], color=INK, linewidth=1.6, solid_capstyle="butt", clip_on=False)
+    axes.annotate(
+        f"{length:g} mm",
+        (middle, z),
+        (0, -3),
+        textcoords="offset points",
+        ha="center",
+        va="top",
+        fontsize=7.5,
+    )
+
+
+def angle_against_pressure(pressure_kPa: Floats, angle_deg: Floats) -> str:
+    """Bending angle against pressure, in the order the states were computed."""
+    with _figure(WIDTH, 3.1) as (figure, svg):
+        axes = figure.add_axes((0.14, 0.16, 0.82, 0.78))
+        axes.axhline(0, color=QUIET, linewidth=0.8)
+        axes.axvline(0, color=QUIET, linewidth=0.8)
+        axes.plot(pressure_kPa, angle_deg, "-o", color=BY_LENGTH[0], markersize=3.5, linewidth=1.6)
+        for i, aside in ((int(np.argmin(pressure_kPa)), 8), (int(np.argmax(pressure_kPa)), -8)):
+            axes.annotate(
+                signed(f"{angle_deg[i]:.1f}° at {pressure_kPa[i]:g} kPa"),
+                (pressure_kPa[i], angle_deg[i]),
+                (aside, 0),
+                textcoords="offset points",
+                ha="left" if aside > 0 else "right",
+                va="center",
+                fontsize=8,
+            )
+        axes.set(xlabel="pressure [kPa]", ylabel="bending angle [deg]")
+    return svg()
+
+
+def protocol(time_s: Floats, pressure_kPa: Floats) -> str:
+    """Pressure against time."""
+    with _figure(WIDTH, 2.3) as (figure, svg):
+        axes = figure.add_axes((0.14, 0.21, 0.82, 0.72))
+        axes.axhline(0, color=QUIET, linewidth=0.8)
+        axes.plot(time_s, pressure_kPa, "-", color=INK, linewidth=1.6)
+        axes.plot(time_s, pressure_kPa, "o", color=BY_LENGTH[0], markersize=3)
+        axes.set(xlabel="time [s]", ylabel="pressure [kPa]")
+    return svg()
+
+
+def heatmap(delta: Floats, top: float, chosen: bool = False) -> str:
+    """One path's deviation (k times, j stations), 0..`top` mm: length to the right, time upward."""
+    with _figure(1.75, 1.75) as (figure, svg):
+        axes = figure.add_axes((0.20, 0.18, 0.74, 0.76))
+        axes.imshow(
+            delta,
+            origin="lower",
+            extent=(0, 100, 0, 100),
+            aspect="auto",
+            cmap=MAP,
+            vmin=0.0,
+            vmax=top,
+            interpolation="nearest",
+        )
+        axes.grid(False)
+        axes.set(xticks=(0, 50, 100), yticks=(0, 50, 100))
+        axes.tick_params(labelsize=7, length=2)
+        for spine in axes.spines.values():
+            spine.set_visible(True)
+            spine.set(color=CHOSEN if chosen else QUIET, linewidth=2.5 if chosen else 0.8)
+    return svg()
+
+
+def color_bar(top: float) -> str:
+    """The scale 0..`top` mm that a rule's heatmaps share."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    with _figure(WIDTH, 0.62) as (figure, svg):
+        axes = figure.add_axes((0.04, 0.68, 0.92, 0.26))
+        mappable = ScalarMappable(Normalize(0.0, top), MAP)
+        bar = figure.colorbar(mappable, cax=axes, orientation="horizontal")
+        bar.set_label("deviation Δ [mm]", fontsize=8, labelpad=2)
+        bar.outline.set_linewidth(0.6)
+    return svg()
+
+
+def marginal(values: Floats, paths: Sequence[Path], chosen: str, along: str) -> str:
+    """One line a path of `values` (paths, n) in mm; `along` is "length" or "time"."""
+    with _figure(WIDTH, 3.3) as (figure, svg):
+        axes = figure.add_axes((0.14, 0.14, 0.66, 0.82))
+        percent = np.linspace(0.0, 100.0, values.shape[1])
+        for path, row in zip(paths, values, strict=True):
+            best = path.name == chosen
+            style = {"color": CHOSEN, "linewidth": 3.0, "zorder": 3} if best else line_style(path)
+            axes.plot(percent, row, **{"linewidth": 1.4, **style}, label=label(path.name))
+        axes.set(xlim=(0, 100), ylim=(0, None), xticks=(0, 25, 50, 75, 100))
+        axes.set(xlabel=f"{along} [%]", ylabel="mean deviation [mm]")
+        # The legend in the order of the lines, highest first.
+        handles, labels = axes.get_legend_handles_labels()
+        order = np.argsort(-values.mean(axis=1), kind="stable")
+        axes.legend(
+            [handles[i] for i in order],
+            [labels[i] for i in order],
+            loc="upper left",
+            bbox_to_anchor=(1.01, 1.02),
+            handlelength=2.2,
+            labelspacing=0.7,
+        )
+    return svg()
+
+
+def ranking(result: RuleResult, paths: Sequence[Path]) -> str:
+    """J_hat of every path as a bar, best first; the chosen one in colour, those tied with it hatched."""
+    order = np.argsort(np.asarray(result.rank), kind="stable")
+    names = [paths[i].name for i in order]
+    values = np.asarray(result.j_hat)[order]
+    with _figure(WIDTH, 0.6 + 0.27 * len(names)) as (figure, svg):
+        high = 0.6 + 0.27 * len(names)
+        axes = figure.add_axes((0.11, 0.45 / high, 0.85, 1.0 - 0.5 / high))
+        rows = np.arange(len(names))
+        bars = axes.barh(rows, values, height=0.68, color="#B9C3CF")
+        for bar, name in zip(bars, names, strict=True):
+            if name == result.chosen:
+                bar.set_color(CHOSEN)
+            elif name in result.tied:
+                bar.set(facecolor="#F3C9A8", edgecolor=CHOSEN, hatch="///", linewidth=0.0)
+        if result.uncertainty_mm is not None:
+            axes.errorbar(
+                values, rows, xerr=result.uncertainty_mm, fmt="none", ecolor=INK, elinewidth=1, capsize=2
+            )
+        clear = (result.uncertainty_mm or 0.0) + 0.015 * values.max()
+        for row, value in zip(rows, values, strict=True):
+            axes.text(value + clear, row, f"{value:.3f}", va="center", fontsize=8, color=INK)
+        axes.set_yticks(rows, [label(name) for name in names], fontsize=9)
+        axes.tick_params(axis="y", length=0)
+        axes.invert_yaxis()
+        axes.grid(False, axis="y")
+        axes.set(xlim=(0, values.max() + clear + 0.13 * values.max()), xlabel="mean deviation Ĵ [mm]")
+    return svg()
+
+
+def seconds(stages: Mapping[str, float]) -> str:
+    """How long each stage took, in the order they ran."""
+    names, values = list(stages), np.array(list(stages.values()))
+    high = 0.55 + 0.24 * len(names)
+    with _figure(WIDTH, high) as (figure, svg):
+        left = (0.15 + 0.075 * max(map(len, names))) / WIDTH
+        axes = figure.add_axes((left, 0.42 / high, 0.92 - left, 1.0 - 0.47 / high))
+        rows = np.arange(len(names))
+        axes.barh(rows, values, height=0.66, color="#B9C3CF")
+        for row, value in zip(rows, values, strict=True):
+            axes.text(value + 0.02 * values.max(), row, f"{value:.1f}", va="center", fontsize=8)
+        axes.set_yticks(rows, names)
+        axes.tick_params(axis="y", length=0)
+        axes.invert_yaxis()
+        axes.grid(False, axis="y")
+        axes.set(xlim=(0, 1.15 * values.max()), xlabel="seconds")
+    return svg()
+
+
+@contextmanager
+def _figure(width: float, height: float) -> Iterator[tuple[Figure, Callable[[], str]]]:
+    """A figure of that many inches, and a function that gives its SVG text once the body has drawn it."""
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
+    stream = io.StringIO()
+
+    def svg() -> str:
+        # Without the prolog, which names a DTD on the network.
+        text = stream.getvalue()
+        return text[text.index("<svg") :]
+
+    with rc_context(_STYLE):
+        figure = Figure(figsize=(width, height))
+        FigureCanvasSVG(figure)
+        yield figure, svg
+        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)

@@ -1,0 +1,253 @@
+"""What a run says while it runs: stages with time left, warnings, one result or one error.
+
+A `Progress` makes messages, plain dictionaries with a `type`, and hands each to its sinks:
+
+- progress: stage, state ("start" | "run" | "end"), fraction (0..1 or None), seconds, seconds_left (or None)
+- warning: what, where, what_to_do
+- result: whatever the run found; the last message of a run that succeeded
+- error: what, where, what_to_do, status; the last message of a run that did not
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, TextIO
+
+from ..errors import MuError
+from ..files import output_error, plain
+
+Message = dict[str, Any]
+Sink = Callable[[Message], None]
+Clock = Callable[[], float]
+
+
+class Progress:
+    """The stages of one run, told to `sinks`; `seconds` keeps how long each stage took, in order."""
+
+    def __init__(self, sinks: Sequence[Sink] = (), clock: Clock = time.perf_counter) -> None:
+        self.sinks = list(sinks)
+        self.seconds: dict[str, float] = {}
+        self._clock = clock
+        self._stage = ""
+        self._start = 0.0
+        self._expected: float | None = None
+
+    @contextmanager
+    def stage(self, name: str, expected_s: float | None = None) -> Iterator[None]:
+        """Time the body as stage `name`; `expected_s` gives a time left until the first `update`.
+
+        Stages do not nest. One that is left by an exception keeps its seconds and is not told as ended.
+        """
+        if self._stage:
+            raise ValueError(f"stage {name!r} inside stage {self._stage!r}")
+        self._stage, self._start, self._expected = name, self._clock(), expected_s
+        try:
+            self._tell("start", 0.0 if expected_s else None)
+            yield
+            self._tell("end", 1.0)
+        finally:
+            elapsed = self._clock() - self._start
+            self.seconds[name] = self.seconds.get(name, 0.0) + elapsed
+            self._stage = ""
+
+    def update(self, fraction: float) -> None:
+        """Tell that `fraction` (0..1) of the present stage is done; outside a stage, nothing is told."""
+        if self._stage:
+            self._tell("run", min(max(float(fraction), 0.0), 1.0))
+
+    def warning(self, what: str, where: str = "", what_to_do: str = "") -> None:
+        """Tell something the user should know that does not end the run."""
+        self.emit({"type": "warning", "what": what, "where": where, "what_to_do": what_to_do})
+
+    def result(self, found: Mapping[str, Any]) -> None:
+        """Tell what the run found: the terminal message of a run that succeeded."""
+        self.emit({**found, "type": "result"})
+
+    def error(self, error: MuError) -> None:
+        """Tell what ended the run: the terminal message of a run that did not succeed.
+
+        A sink that fails is passed over: the others should still hear why.
+        """
+        message = {
+            "type": "error",
+            "what": error.what,
+            "where": error.where,
+            "what_to_do": error.remedy,
+            "status": error.status,
+        }
+        for sink in self.sinks:
+            with suppress(OSError, MuError):
+                sink(message)
+
+    def emit(self, message: Message) -> None:
+        """Hand `message` to every sink."""
+        for sink in self.sinks:
+            sink(message)
+
+    def _tell(self, state: str, fraction: float | None) -> None:
+        elapsed = self._clock() - self._start
+        self.emit(
+            {
+                "type": "progress",
+                "stage": self._stage,
+                "state": state,
+                "fraction": fraction,
+                "seconds": elapsed,
+                "seconds_left": _seconds_left(elapsed, fraction, self._expected),
+            }
+        )
+
+
+def _seconds_left(elapsed: float, fraction: float | None, expected: float | None) -> float | None:
+    """By the share done where it is known, else by what was expected."""
+    if fraction:
+        return elapsed * (1.0 - fraction) / fraction
+    return max(expected - elapsed, 0.0) if expected is not None else None
+
+
+def terminal(stream: TextIO = sys.stderr, clock: Clock = time.perf_counter) -> Sink:
+    """A sink for people: one live line a stage on a tty, else plain lines at start, end and every 5 s."""
+    return _LiveLine(stream, clock) if stream.isatty() else _PlainLines(stream, clock)
+
+
+class _Lines:
+    """What both terminal sinks say in the same words."""
+
+    def __init__(self, stream: TextIO, clock: Clock) -> None:
+        self.stream = stream
+        self.clock = clock
+        self.last = 0.0
+
+    def __call__(self, message: Message) -> None:
+        if message["type"] == "progress":
+            self.progress(message)
+        elif message["type"] in ("warning", "error"):
+            self.write(_told(message) + "\n")
+
+    def progress(self, message: Message) -> None:
+        raise NotImplementedError
+
+    def write(self, text: str) -> None:
+        self.stream.write(text)
+        self.stream.flush()
+
+    def due(self, every_s: float) -> bool:
+        if self.clock() - self.last < every_s:
+            return False
+        self.last = self.clock()
+        return True
+
+
+class _LiveLine(_Lines):
+    """One line a stage, redrawn in place at most ten times a second."""
+
+    bar = 24
+    open = False
+
+    def progress(self, message: Message) -> None:
+        ended = message["state"] == "end"
+        if message["state"] == "run" and not self.due(0.1):
+            return
+        line = f"{message['stage']:<28} "
+        if message["fraction"] is None:
+            line += "..."
+        else:
+            full = round(self.bar * message["fraction"])
+            line += "[" + "#" * full + "." * (self.bar - full) + f"] {100 * message['fraction']:3.0f} %"
+        if ended:
+            line += f"  {spell(message['seconds'])}"
+        elif message["seconds_left"] is not None:
+            line += f"  {spell(message['seconds_left'])} left"
+        self.stream.write("\r" + line + "\x1b[K" + ("\n" if ended else ""))
+        self.stream.flush()
+        self.open = not ended
+
+    def write(self, text: str) -> None:
+        super().write("\n" + text if self.open else text)
+        self.open = False
+
+
+class _PlainLines(_Lines):
+    """For pipes and logs: no line is ever redrawn."""
+
+    def progress(self, message: Message) -> None:
+        if message["state"] == "start":
+            self.last = self.clock()
+            self.write(f"{message['stage']} ...\n")
+        elif message["state"] == "end":
+            self.write(f"{message['stage']}: done in {spell(message['seconds'])}\n")
+        elif self.due(5.0):
+            self.write(
+                f"{message['stage']}: {100 * message['fraction']:.0f} %"
+                + (f", {spell(message['seconds_left'])} left" if message["seconds_left"] is not None else "")
+                + "\n"
+            )
+
+
+def _told(message: Message) -> str:
+    lines = [f"{message['type']}: {message['what']}"]
+    if message["where"]:
+        lines.append(f"  where: {message['where']}")
+    if message["what_to_do"]:
+        lines.append(f"  what to do: {message['what_to_do']}")
+    return "\n".join(lines)
+
+
+def spell(seconds: float) -> str:
+    """`seconds` as a person would say it: "0.4 s", "12 s", "3 min 05 s", "2 h 10 min"."""
+    if seconds < 9.95:
+        return f"{seconds:.1f} s"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+
+
+def json_lines(stream: TextIO = sys.stdout, clock: Clock = time.perf_counter) -> Sink:
+    """A sink for programs: every message as one line of JSON, running fractions at most five a second."""
+    last = -1.0
+
+    def sink(message: Message) -> None:
+        nonlocal last
+        if message.get("state") == "run":
+            if clock() - last < 0.2:
+                return
+            last = clock()
+        stream.write(json.dumps(plain(message), ensure_ascii=False) + "\n")
+        stream.flush()
+
+    return sink
+
+
+def log_file(path: Path, clock: Clock = time.perf_counter) -> Sink:
+    """A sink that adds to `path` (log.ndjson): messages with the time of day, running fractions every 5 s.
+
+    Raises OutputError where the file cannot be written, at once and later.
+    """
+    last = -5.0
+
+    def sink(message: Message) -> None:
+        nonlocal last
+        if message.get("state") == "run":
+            if clock() - last < 5.0:
+                return
+            last = clock()
+        stamped = {"time": time.strftime("%Y-%m-%dT%H:%M:%S%z"), **plain(message)}
+        try:
+            with path.open("a", encoding="utf-8") as stream:
+                stream.write(json.dumps(stamped, ensure_ascii=False) + "\n")
+        except OSError as error:
+            raise output_error(error, path) from error
+
+    try:
+        path.open("a").close()
+    except OSError as error:
+        raise output_error(error, path) from error
+    return sink

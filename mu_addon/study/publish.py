@@ -1,0 +1,200 @@
+"""The report of a study, as far as the study came."""
+
+from __future__ import annotations
+
+import platform
+from importlib import metadata
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from ..design.parameters import SECTIONS
+from ..design.quantity import describe
+from ..fem.kinematics import bending_angle_deg
+from ..files import write_bytes
+from .results import Gate, Parameter, Path, Picture, ReportData, RuleResult, SideView
+
+if TYPE_CHECKING:
+    from .study import Study
+
+PACKAGES = ("numpy", "scipy", "warp-lang", "cvxopt", "pymetis", "manifold3d", "gmsh", "pytetwild", "meshio")
+FILES = {
+    "study.toml": "inputs of this run",
+    "unit.toml": "parameters of the unit",
+    "protocol.csv": "pressure protocol",
+    "unit.stl": "printable unit without a sensor, mm",
+    "anchors.txt": "lattice nodes and anchors, mm",
+    "mesh.vtu": "analysis mesh with regions and moduli",
+    "model_a.pvd": "motion without a sensor, a state a sample (ParaView)",
+    "angle.csv": "bending angle of every converged pressure",
+    "deviation.csv": "deviation and rank of every path and rule",
+    "delta.npz": "deviation over time and length of every path and rule, mm",
+    "summary.json": "every figure of this run",
+    "log.ndjson": "what was said while it ran",
+}
+
+
+def publish(study: Study, stopped: str = "") -> None:
+    """Write report.html (and unit.png); `stopped` says why a study that is not complete stopped."""
+    from .report import write_report
+
+    with study.progress.stage("report"):
+        versions = _versions()
+        study.ending.summary["versions"] = versions
+        view, pictures = _pictures(study)
+        if pictures:
+            write_bytes(study.folder / "unit.png", pictures[0].png)
+        data = report_data(study, view, pictures, versions, stopped)
+        write_report(study.folder / "report.html", data)
+
+
+def report_data(
+    study: Study,
+    view: SideView | None,
+    pictures: list[Picture],
+    versions: dict[str, str],
+    stopped: str = "",
+) -> ReportData:
+    """What the report shows of a study, complete or stopped early for a reason."""
+    job, d = study.job, study.job.unit.dimensions
+    windows = study.windows
+    complete = all((w.name, rule) in study.evaluations for w in windows for rule in job.rules)
+    time, pressure = job.protocol.sample(job.times)
+    states = study.trajectory.states if study.trajectory else tuple(study.states)
+    states = tuple(sorted(states, key=lambda s: s.pressure_MPa))
+    rules = {rule: _rule_result(study, rule) for rule in job.rules} if complete else {}
+    return ReportData(
+        title=f"Sensor path for {job.unit.name}" if rules else f"Monolithic Unit {job.unit.name}",
+        unit=f"Monolithic Unit, scale {d.scale:g}, cell {d.cell:g} mm, {d.count} chambers",
+        status="partial" if stopped else "complete",
+        reason=stopped,
+        warnings=tuple(study.warnings),
+        view=view,
+        pictures=tuple(pictures),
+        paths=tuple(Path(w.name, w.start, w.length) for w in windows),
+        rules=rules,
+        headline_rule=study.headline_rule,
+        pressure_kPa=np.array([s.pressure_MPa * 1e3 for s in states]),
+        angle_deg=np.array([bending_angle_deg(study.mesh, s.u) for s in states if study.mesh]),
+        protocol_s=time if states else np.zeros(0),
+        protocol_kPa=pressure if states else np.zeros(0),
+        parameters=_parameters(study),
+        mesh=_mesh_figures(study),
+        solver={name.replace("_", " "): value for name, value in study.solver.items()},
+        gates=_gates(study),
+        seconds=study.progress.seconds,
+        versions=versions,
+        files={n: what for n, what in _files(study).items() if (study.folder / n).exists()},
+    )
+
+
+def _rule_result(study: Study, rule: str) -> RuleResult:
+    from ..placement.deviation import rank
+
+    found = [study.evaluations[w.name, rule] for w in study.windows]
+    j_hat = np.array([e.deviation.J_hat for e in found])
+    chosen = found[int(np.argmin(j_hat))].name
+    return RuleResult(
+        delta=np.array([e.deviation.delta for e in found]),
+        j_hat=j_hat,
+        j_cont=np.array([e.deviation.J_cont for e in found]),
+        rank=[int(r) for r in rank(j_hat)],
+        stiffened_mm3=np.array([e.stiffened_mm3 for e in found]),
+        cylinder_mm3=np.array([e.cylinder_mm3 for e in found]),
+        chosen=chosen,
+        tied=study.tied(rule, chosen),
+        uncertainty_mm=study.uncertainty_mm.get(rule),
+    )
+
+
+def _parameters(study: Study) -> list[Parameter]:
+    unit = study.job.unit
+    rows = [Parameter("scale", unit.scale, "", "paper")]
+    for section in SECTIONS:
+        # Each section class names its table; the unit holds its values under the same name.
+        values = getattr(unit, section.section)  # type: ignore[attr-defined]
+        for d in describe(section):
+            value = getattr(values, d.name)
+            source = d.source.removeprefix("assumed: ")
+            rows.append(Parameter(f"{section.section}.{d.name}", value, d.unit, source, d.assumed))  # type: ignore[attr-defined]
+    m, k, j = study.job.mesh, study.job.times, study.job.stations
+    rows += [
+        Parameter("study.times", k, "", "samples of the protocol; the paper prints none", True),
+        Parameter("study.stations", j, "", "stations along the backbone; the paper prints none", True),
+        Parameter("mesh.order", m.order, "", "quadratic tetrahedra do not lock in thin walls"),
+        Parameter("mesh.refine", m.refine, "", "divides every element size"),
+        Parameter("protocol", "piecewise linear", "", "returns to 0 kPa and rates are not printed", True),
+    ]
+    return rows
+
+
+def _gates(study: Study) -> list[Gate]:
+    if study.solid is None:
+        return []
+    # A solid exists only if every gate passed; see design.gates.
+    g = study.solid.gates
+    return [
+        Gate("genus of the bare lattice", g.lattice_genus, f"E − V + 1 = {g.lattice_genus_expected}", True),
+        Gate("components", g.components, "1", True),
+        Gate("open edges after reading the STL back", g.bad_edges_after_stl, "0", True),
+        Gate("inner shells with the inlet plugged", g.inner_shells, "1", True),
+        Gate(
+            "cavity's volume against its formula [%]", round(100 * g.inner_volume_error, 3), "within 1", True
+        ),
+        Gate("volume of resin [mm³]", round(g.volume_mm3, 1), "reported", True),
+    ]
+
+
+def _mesh_figures(study: Study) -> dict[str, Any]:
+    if study.quality is None:
+        return {}
+    return {name.replace("_", " "): value for name, value in attrs.asdict(study.quality).items()}
+
+
+def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
+    from .pictures import motion, portrait, side_view, unit_parts
+    from .render import png
+
+    if study.solid is None:
+        return None, []
+    d = study.job.unit.dimensions
+    parts = unit_parts(d, study.solid.vertices, study.solid.triangles)
+    name = study.ending.summary.get("chosen", {}).get(study.headline_rule)
+    window = next((w for w in study.windows if w.name == name), None)
+    path = study.anchors[list(window.indices)] if window else study.anchors[:0]
+    radius = max(d.inclusion_radius, d.waveguide_section / 2)
+    with_sensor = f", with the sensor along {name}" if window else ""
+    pictures = [
+        Picture(
+            png(portrait(parts, study.anchors, path, radius)),
+            f"The printable unit cut open{with_sensor}.",
+            "Bellows of six chambers inside a lattice of struts, cut along the plane of bending.",
+        )
+    ]
+    if study.trajectory is not None and study.mesh is not None:
+        states = study.trajectory.states
+        shown = [states[0], min(states, key=lambda s: abs(s.pressure_MPa)), states[-1]]
+        texts = []
+        for state in shown:
+            words = f"{state.pressure_MPa * 1e3:g} kPa: {bending_angle_deg(study.mesh, state.u):.1f}°"
+            texts.append((state.u, words, f"The analysis mesh at {words}."))
+        pictures += motion(study.mesh, texts)
+    return side_view(parts, study.anchors, path, radius), pictures
+
+
+def _files(study: Study) -> dict[str, str]:
+    solids = sorted(p.name for p in study.folder.glob("unit_*.stl"))
+    return FILES | dict.fromkeys(solids, "printable unit with that waveguide, mm")
+
+
+def _versions() -> dict[str, str]:
+    versions = {"mu_addon": _version("mu_addon"), "Python": platform.python_version()}
+    return versions | {name: _version(name) for name in PACKAGES}
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "not installed as a package"

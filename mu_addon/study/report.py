@@ -1,0 +1,417 @@
+"""One run as one HTML file: styles and pictures are inside, it runs no script and asks no server.
+
+It answers first (which path), then shows why, and ends with what the answer rests on.
+"""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from pathlib import Path as File
+from typing import Any
+
+import numpy as np
+
+from ..files import write_text
+from . import plots
+from .plots import label, signed
+from .progress import spell
+from .results import Picture, ReportData, RuleResult
+
+RULE = {
+    "volume_fraction": "volume fraction",
+    "intersect": "intersect",
+}
+RULE_MEANS = {
+    "volume_fraction": "E blended by the share of each element inside the sensor; converges with the mesh",
+    "intersect": "The paper's: every element the sensor touches gets the sensor's E; depends on the mesh",
+}
+
+
+def write_report(path: File, results: ReportData) -> None:
+    """Write `results` to `path` as a self-contained HTML file; raises OutputError."""
+    write_text(path, report_html(results))
+
+
+def report_html(results: ReportData) -> str:
+    """The whole report as HTML text."""
+    css = (File(__file__).parent / "report.css").read_text(encoding="utf-8")
+    sections = [section for section in _sections(results) if section[2]]
+    contents = "".join(f'<li><a href="#{key}">{escape(title)}</a></li>' for key, title, _ in sections)
+    body = "".join(
+        f'<section id="{key}" aria-labelledby="{key}-title">'
+        f'<h2 id="{key}-title">{escape(title)}</h2>{html}</section>'
+        for key, title, html in sections
+    )
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        # A browser asks a server for an icon unless the page brings one.
+        '<link rel="icon" href="data:,">\n'
+        f"<title>{escape(results.title)}</title>\n<style>\n{css}</style>\n</head>\n<body>\n"
+        f'<header><h1>{escape(results.title)}</h1><p class="sub">{escape(results.unit)}</p>'
+        f"{_notes(results)}</header>\n<main>\n{_answer(results)}"
+        f'<nav aria-label="Contents"><ul>{contents}</ul></nav>\n{body}</main>\n</body>\n</html>\n'
+    )
+
+
+def _sections(r: ReportData) -> list[tuple[str, str, str]]:
+    return [
+        ("ranking", "Ranking of the paths", _ranking(r)),
+        ("motion", "How the unit moves", _motion(r)),
+        ("where", "Where and when each path disturbs the motion", _heatmaps(r)),
+        ("marginals", "Along the unit, and over time", _marginals(r)),
+        ("mesh", "Solid, mesh and solver", _mesh(r)),
+        ("assumed", "What was assumed", _assumed(r)),
+        ("parameters", "All parameters", _parameters(r)),
+        ("time", "How long each stage took", _time(r)),
+        ("files", "Files of this run", _facts_table("file", "what it holds", r.files)),
+        ("versions", "Versions", _facts_table("program", "version", r.versions)),
+    ]
+
+
+def _notes(r: ReportData) -> str:
+    html = ""
+    if r.status != "complete":
+        html += (
+            '<div class="note" role="alert"><p><strong>This run is partial.</strong> '
+            f"{escape(r.reason or 'It stopped before its end.')}</p>"
+            "<p>What is shown was finished before it stopped; the rest is missing, not zero.</p></div>"
+        )
+    if r.warnings:
+        html += (
+            '<div class="note">' + "".join(f"<p>{escape(warning)}</p>" for warning in r.warnings) + "</div>"
+        )
+    return html
+
+
+def _answer(r: ReportData) -> str:
+    rule = r.rules.get(r.headline_rule)
+    if rule is None:
+        if r.view is None:
+            return ""
+        return _figure(
+            plots.unit_with_paths(r.view, r.paths, ""),
+            "The unit cut open along its sagittal plane, and the candidate paths beside it.",
+            "Section of the unit with its anchors.",
+            "one",
+        )
+    best = _index(r, rule.chosen)
+    path = r.paths[best]
+    html = (
+        f'<p class="answer">Put the sensor along <strong>{_name(path.name)}</strong>, anchors '
+        f"{path.anchors}: of "
+        f"{len(r.paths)} candidates it disturbs the motion least, by {rule.j_hat[best]:.3f}&nbsp;mm on "
+        "average.</p>"
+    )
+    html += f"<p>{_caveat(r, rule)}</p>{_key_figures(r, rule)}"
+    if r.view is not None:
+        html += '<div class="lead">' + _figure(
+            plots.unit_with_paths(r.view, r.paths, rule.chosen, rule.j_hat),
+            "Left: the unit cut open along its sagittal plane, inlet below, with anchors P1 to "
+            f"P{len(r.view.anchors)} and the sensor along {_name(path.name)}. Right: every candidate path at "
+            "its true height, with its mean deviation.",
+            f"Section of the unit; the chosen path {path.name} runs through anchors {path.anchors}.",
+            "",
+        )
+        html += "".join(_picture(picture) for picture in r.pictures[:1]) + "</div>"
+    else:
+        html += "".join(_picture(picture) for picture in r.pictures[:1])
+    return html
+
+
+def _caveat(r: ReportData, rule: RuleResult) -> str:
+    """What qualifies the answer: ties within the mesh's uncertainty, and what the other rule says."""
+    words = []
+    if rule.tied:
+        names = _listed([_name(name) for name in rule.tied])
+        within = f" ({rule.uncertainty_mm:.3f} mm)" if rule.uncertainty_mm is not None else ""
+        words.append(
+            f"On this mesh it is tied with {names}: they differ by less than the mesh's uncertainty{within}."
+        )
+    for name, other in r.rules.items():
+        if name == r.headline_rule:
+            continue
+        same = other.chosen == rule.chosen
+        words.append(
+            f"This is by the rule “{_rule(r.headline_rule)}”; by “{_rule(name)}” "
+            + ("the same path is best." if same else f"{_name(other.chosen)} would be best.")
+        )
+    return " ".join(words)
+
+
+def _key_figures(r: ReportData, rule: RuleResult) -> str:
+    order = np.argsort(np.asarray(rule.rank), kind="stable")
+    facts = [("mean deviation Ĵ", f"{rule.j_hat[order[0]]:.3f} mm")]
+    if len(order) > 1:
+        second = order[1]
+        facts.append(("runner-up", f"{_name(r.paths[second].name)}, {rule.j_hat[second]:.3f} mm"))
+        worst = order[-1]
+        facts.append(("worst", f"{_name(r.paths[worst].name)}, {rule.j_hat[worst]:.3f} mm"))
+    if len(r.angle_deg):
+        low, high = int(np.argmin(r.pressure_kPa)), int(np.argmax(r.pressure_kPa))
+        for i in (low, high):
+            facts.append((f"bends at {r.pressure_kPa[i]:g} kPa", f"{r.angle_deg[i]:.1f}°"))
+    cards = "".join(f"<div><dt>{signed(what)}</dt><dd>{signed(value)}</dd></div>" for what, value in facts)
+    return f'<dl class="facts">{cards}</dl>'
+
+
+def _ranking(r: ReportData) -> str:
+    if not r.rules:
+        return ""
+    html = (
+        "<p>Ĵ is the distance between the unit with the sensor and the unit without, averaged over the line "
+        "of anchors and over the whole pressure cycle. Less is better.</p>"
+    )
+    html += '<div class="pair">'
+    for name, rule in r.rules.items():
+        title = _rule(name)
+        tied = f" Hatched: tied with {_name(rule.chosen)}." if rule.tied else ""
+        bars = (
+            f" Whiskers: ± {rule.uncertainty_mm:.3f} mm by the mesh."
+            if rule.uncertainty_mm is not None
+            else ""
+        )
+        html += (
+            f"<div><h3>Rule “{title}”</h3><p>{escape(RULE_MEANS.get(name, ''))}.</p>"
+            + _figure(
+                plots.ranking(rule, r.paths),
+                f"Mean deviation of every path, best first.{tied}{bars}",
+                f"Bar chart of the mean deviation by the rule {title}; {rule.chosen} is best.",
+            )
+            + "</div>"
+        )
+    html += "</div>"
+    head = [("path", ""), ("anchors", "line")]
+    groups = [("", 2)]
+    for name in r.rules:
+        groups.append((f"rule “{RULE.get(name, name)}”", 4))
+        head += [("rank", "n first"), ("Ĵ [mm]", "n"), ("J cont [mm]", "n"), ("volume ratio", "n")]
+    rows = []
+    headline = r.rules.get(r.headline_rule)
+    for i, path in enumerate(r.paths):
+        cells: list[Any] = [label(path.name), path.anchors]
+        for rule in r.rules.values():
+            cells += [
+                rule.rank[i],
+                f"{rule.j_hat[i]:.4f}",
+                f"{rule.j_cont[i]:.4f}",
+                f"{rule.stiffened_mm3[i] / rule.cylinder_mm3[i]:.2f}",
+            ]
+        rows.append((cells, headline is not None and path.name == headline.chosen))
+    caption = (
+        "Every path by every rule. J cont: root mean square instead of mean. Volume ratio: what was "
+        "stiffened over the sensor's own volume."
+    )
+    html += _table(caption, head, rows, groups)
+    return html
+
+
+def _motion(r: ReportData) -> str:
+    html = ""
+    if len(r.angle_deg):
+        low, high = float(r.pressure_kPa.min()), float(r.pressure_kPa.max())
+        html += _figure(
+            plots.angle_against_pressure(r.pressure_kPa, r.angle_deg),
+            "Bending angle of the tip against the base, without a sensor; each dot is a converged state.",
+            f"Bending angle against pressure from {low:g} to {high:g} kPa.",
+        )
+    if len(r.protocol_s):
+        html += _figure(
+            plots.protocol(r.protocol_s, r.protocol_kPa),
+            "The pressure cycle; each dot is a time at which the paths are compared.",
+            "Pressure against time.",
+        )
+    html = f'<div class="pair">{html}</div>' if html else ""
+    if r.pictures[1:]:
+        html += '<div class="triple">' + "".join(_picture(picture) for picture in r.pictures[1:]) + "</div>"
+    return html
+
+
+def _heatmaps(r: ReportData) -> str:
+    html = ""
+    for name, rule in r.rules.items():
+        top = float(np.max(rule.delta))
+        maps = "".join(
+            _figure(
+                plots.heatmap(rule.delta[i], top, path.name == rule.chosen),
+                f"{_name(path.name)}: {rule.j_hat[i]:.3f} mm",
+                f"Deviation of {path.name} over length and time, at most {np.max(rule.delta[i]):.2f} mm.",
+                "best" if path.name == rule.chosen else "",
+            )
+            for i, path in enumerate(r.paths)
+        )
+        bar = _figure(plots.color_bar(top), "", f"Colour scale from 0 to {top:.2f} mm.", "bar")
+        html += f"<h3>Rule “{_rule(name)}”</h3>{bar}<div class='many'>{maps}</div>"
+    if not html:
+        return ""
+    return (
+        "<p>Each square is one path. To the right: length [%], from the inlet to the tip. Upward: time [%] "
+        "in the pressure cycle. The squares of a rule share one colour scale; its choice is framed.</p>"
+        + html
+    )
+
+
+def _marginals(r: ReportData) -> str:
+    html = ""
+    for name, rule in r.rules.items():
+        html += f"<h3>Rule “{_rule(name)}”</h3><div class='pair'>"
+        for values, along, averaged in (
+            (rule.delta.mean(axis=1), "length", "time"),
+            (rule.delta.mean(axis=2), "time", "length"),
+        ):
+            html += _figure(
+                plots.marginal(values, r.paths, rule.chosen, along),
+                f"Deviation along the {along}, averaged over {averaged}."
+                if along == "length"
+                else f"Deviation over time, averaged over the {averaged}.",
+                f"Mean deviation of every path against {along}.",
+            )
+        html += "</div>"
+    if not html:
+        return ""
+    return (
+        "<p>Colour tells how many anchors a path has, dashes at which anchor it starts; the thick orange "
+        "line is the rule's choice.</p>" + html
+    )
+
+
+def _mesh(r: ReportData) -> str:
+    html = ""
+    if r.gates:
+        head = [("check", "text"), ("found", "n"), ("asked", "ask"), ("result", "")]
+        rows = [
+            ([gate.name, _number(gate.value), gate.limit, "passed" if gate.passed else "FAILED"], False)
+            for gate in r.gates
+        ]
+        html += _table(
+            "The printable solid, checked after it was read back from its file.", head, rows, css="stack"
+        )
+    if r.mesh:
+        html += _facts_table("mesh", "", r.mesh)
+    if r.solver:
+        html += _facts_table("solver", "", r.solver)
+    return html
+
+
+def _assumed(r: ReportData) -> str:
+    rows = [([p.path, _number(p.value), p.unit, p.source], False) for p in r.parameters if p.assumed]
+    if not rows:
+        return ""
+    head = [("parameter", ""), ("value", "n"), ("unit", ""), ("why", "text")]
+    return "<p>The source paper does not print these. The answer rests on them.</p>" + _table(
+        "", head, rows, css="stack"
+    )
+
+
+def _parameters(r: ReportData) -> str:
+    if not r.parameters:
+        return ""
+    head = [("parameter", ""), ("value", "n"), ("unit", ""), ("source", "text")]
+    rows = [
+        ([p.path, _number(p.value), p.unit, "assumed" if p.assumed else p.source], False)
+        for p in r.parameters
+    ]
+    return _table("", head, rows, css="stack")
+
+
+def _time(r: ReportData) -> str:
+    if not r.seconds:
+        return ""
+    whole = sum(r.seconds.values())
+    return _figure(
+        plots.seconds(r.seconds),
+        f"Seconds a stage; {spell(whole)} in all.",
+        "Bar chart of seconds a stage.",
+        "chart",
+    )
+
+
+def _facts_table(left: str, right: str, facts: Mapping[str, Any]) -> str:
+    if not facts:
+        return ""
+    head = [(left, ""), (right, "" if right else "n")]
+    return _table("", head, [([key, _number(value)], False) for key, value in facts.items()])
+
+
+def _table(
+    caption: str,
+    head: Sequence[tuple[str, str]],
+    rows: Iterable[tuple[Sequence[Any], bool]],
+    groups: Sequence[tuple[str, int]] = (),
+    css: str = "",
+) -> str:
+    """A table that scrolls sideways by itself; `head` gives each column its title and class.
+
+    `groups` are titles over so many columns each; `css` "stack" folds each row up on a phone.
+    """
+
+    def cell(tag: str, text: Any, kind: str, scope: str = "") -> str:
+        kind = "fail" if text == "FAILED" else kind
+        kind = f' class="{kind}"' if kind else ""
+        return f"<{tag}{scope}{kind}>{escape(str(text))}</{tag}>"
+
+    top = "".join(cell("th", title, kind, " scope=col") for title, kind in head)
+    top = f"<tr>{top}</tr>"
+    if groups:
+        above = "".join(
+            cell("th", title, "group" if title else "", f" colspan={span} scope=colgroup")
+            for title, span in groups
+        )
+        top = f"<tr>{above}</tr>{top}"
+    body = ""
+    for cells, best in rows:
+        first = cell("th", cells[0], head[0][1], " scope=row")
+        rest = "".join(cell("td", text, kind) for text, (_, kind) in zip(cells[1:], head[1:], strict=True))
+        body += f"<tr{' class=best' if best else ''}>{first}{rest}</tr>"
+    words = f'<p class="caption">{escape(caption)}</p>' if caption else ""
+    name = escape(caption or head[0][0], quote=True)
+    css = f' class="{css}"' if css else ""
+    return (
+        f'{words}<div class="scroll" role="region" tabindex="0" aria-label="{name}"><table{css}>'
+        f"<thead>{top}</thead><tbody>{body}</tbody></table></div>"
+    )
+
+
+def _figure(svg: str, caption: str, alt: str, kind: str = "") -> str:
+    """A chart; `caption` is HTML."""
+    return _image("image/svg+xml", svg.encode(), caption, alt, kind)
+
+
+def _picture(picture: Picture) -> str:
+    return _image("image/png", picture.png, escape(picture.caption), picture.alt, "")
+
+
+def _image(kind: str, data: bytes, caption: str, alt: str, css: str) -> str:
+    source = f"data:{kind};base64,{b64encode(data).decode()}"
+    words = f"<figcaption>{caption}</figcaption>" if caption else ""
+    css = f' class="{css}"' if css else ""
+    return f'<figure{css}><img src="{source}" alt="{escape(alt, quote=True)}">{words}</figure>'
+
+
+def _name(path: str) -> str:
+    return escape(label(path))
+
+
+def _rule(name: str) -> str:
+    return escape(RULE.get(name, name))
+
+
+def _index(r: ReportData, name: str) -> int:
+    return next(i for i, path in enumerate(r.paths) if path.name == name)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
+
+
+def _number(value: Any) -> str:
+    """Floats to six figures, the rest as it is."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int | np.integer):
+        return f"{int(value):,}".replace(",", "\u202f")
+    if isinstance(value, float | np.floating):
+        return signed(f"{float(value):.6g}")
+    return str(value)

@@ -1,0 +1,395 @@
+"""One study from a unit to a ranked sensor path, stage by stage, in one folder."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..design.anchors import Window, anchors, windows
+from ..design.export import write_nodes, write_stl
+from ..design.solid import Solid, build_solid
+from ..fem.equilibrium import Equilibrium, NewtonSettings, State, rest
+from ..fem.kinematics import bending_angle_deg
+from ..fem.model import Materials, Model
+from ..fem.trajectory import Trajectory, branches, simulate
+from ..files import make_folder, write_csv, write_npz, write_text
+from ..meshing.mesh import LATTICE, Mesh
+from ..meshing.quality import Quality, quality
+from ..meshing.settings import MeshSettings
+from ..meshing.unit import mesh_unit
+from ..placement.candidates import Candidate, Evaluation, candidates
+from ..placement.deviation import deviation_of, rank
+from .cache import Cache, key
+from .ending import Ending
+from .job import Job
+from .parallel import Setting, evaluate_all
+from .progress import Progress
+from .vtk_out import write_mesh, write_trajectory
+
+Array = np.ndarray[Any, Any]
+
+INPUTS = ("study.toml", "unit.toml", "protocol.csv")
+RESULTS = (
+    "unit.stl",
+    "anchors.txt",
+    "mesh.vtu",
+    "model_a.pvd",
+    "angle.csv",
+    "deviation.csv",
+    "delta.npz",
+    "report.html",
+)
+# A coarser twin of the mesh, to tell how far the mesh moves a ranking.
+COARSER = 0.75
+TWIN_PRESSURES_KPA = 3
+
+
+def materials_of(job: Job, mesh: Mesh) -> Materials:
+    """Young's modulus and Poisson's ratio of every element of a unit's mesh."""
+    m = job.unit.material
+    lattice = mesh.region == LATTICE
+    return Materials(
+        np.where(lattice, m.lattice_modulus_kPa, m.membrane_modulus_kPa) / 1e3,
+        np.where(lattice, m.lattice_poisson, m.membrane_poisson),
+    )
+
+
+@attrs.define
+class Study:
+    """A study under way: what has been found so far is here, and in `folder` as soon as it is whole."""
+
+    job: Job
+    folder: Path
+    progress: Progress
+    ending: Ending
+    solid: Solid | None = None
+    mesh: Mesh | None = None
+    quality: Quality | None = None
+    trajectory: Trajectory | None = None
+    states: list[State] = attrs.field(factory=list)
+    evaluations: dict[tuple[str, str], Evaluation] = attrs.field(factory=dict)
+    uncertainty_mm: dict[str, float] = attrs.field(factory=dict)
+    warnings: list[str] = attrs.field(factory=list)
+    solver: dict[str, Any] = attrs.field(factory=dict)
+
+    @classmethod
+    def open(cls, job: Job, folder: Path, progress: Progress, ending: Ending) -> Study:
+        """Make the folder a study's; results of other inputs are moved to stale/, never shown as current."""
+        make_folder(folder)
+        texts = dict(zip(INPUTS, (job.text(), job.unit_text(), job.protocol_text()), strict=True))
+        if any((folder / name).is_file() and _read(folder / name) != texts[name] for name in INPUTS):
+            _set_aside(folder)
+        ending.open_folder(folder)
+        study = cls(job, folder, progress, ending)
+        for name, text in texts.items():
+            write_text(folder / name, text)
+        ending.summary["parameters"] = attrs.asdict(job.unit)
+        return study
+
+    @property
+    def cache(self) -> Cache:
+        """Finished work, so that a killed run resumes."""
+        return Cache(self.folder / "cache")
+
+    @property
+    def anchors(self) -> Array:
+        """P1..Pn in mm, (n, 3)."""
+        return anchors(self.job.unit)
+
+    @property
+    def windows(self) -> list[Window]:
+        """The candidate paths' windows of anchors."""
+        return windows(len(self.anchors))
+
+    @property
+    def headline_rule(self) -> str:
+        """The rule whose best path is the answer: the one that converges with the mesh, if asked for."""
+        return "volume_fraction" if "volume_fraction" in self.job.rules else self.job.rules[0]
+
+    # Stages, in the order they need each other.
+
+    def design(self, window: Window | None = None) -> Solid:
+        """Printable solid, its STL and the lattice nodes; with a window, the unit with that waveguide."""
+        name = "unit.stl" if window is None else f"unit_{window.name}.stl"
+        with self.progress.stage("solid" if window is None else f"solid with {window.name}"):
+            solid = build_solid(self.job.unit, window, self.job.quality)
+            write_stl(solid, self.folder / name)
+            write_nodes(self.job.unit, self.folder / "anchors.txt")
+        gates = {**attrs.asdict(solid.gates), "inner_volume_error": solid.gates.inner_volume_error}
+        self.ending.summary.setdefault("gates", {})[name] = gates
+        if window is None:
+            self.solid = solid
+        return solid
+
+    def make_mesh(self) -> Mesh:
+        """Analysis mesh and its quality; kept, since one of its meshers is not repeatable."""
+        with self.progress.stage("mesh"):
+            self.mesh = self._mesh(self.job.mesh)
+            self.quality = quality(self.mesh, self.job.unit)
+            write_mesh(self.folder / "mesh.vtu", self.mesh, materials_of(self.job, self.mesh).modulus_MPa)
+        self.ending.summary["mesh"] = {**attrs.asdict(self.quality), "hash": self.mesh.hash()}
+        return self.mesh
+
+    def _mesh(self, settings: MeshSettings) -> Mesh:
+        name = key(self.job.unit.hash(), attrs.astuple(settings), self.job.mesher)
+        found = self.cache.get("mesh", name)
+        fields = [f.name for f in attrs.fields(Mesh)]
+        if found is not None and set(found) == set(fields):
+            symmetry = tuple(str(axis) for axis in found.pop("symmetry"))
+            return Mesh(**found, symmetry=symmetry)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            mesh = mesh_unit(
+                self.job.unit,
+                settings,
+                lambda _, share: self.progress.update(share),
+                self.job.mesher,
+                self.cache.folder,
+            )
+        for warning in caught:
+            self.warn(str(warning.message))
+        arrays = {f: getattr(mesh, f) for f in fields}
+        self.cache.put("mesh", name, {**arrays, "symmetry": np.array(mesh.symmetry, dtype="U1")})
+        return mesh
+
+    def simulate(self) -> Trajectory:
+        """Model A: the unit without a sensor through the pressure protocol."""
+        assert self.mesh is not None
+        time, pressure = self.job.protocol.sample(self.job.times)
+        with self.progress.stage("Model A"):
+            model = Model(self.mesh)
+            try:
+                self.trajectory = self._model_a(model, time, pressure, self.states.append)
+            except BaseException:
+                self._keep_partial_motion()
+                raise
+            self._write_motion(self.trajectory.states)
+        states = [s for s in self.trajectory.states if s.pressure_MPa]
+        self.solver = {
+            "unknowns": len(model.free),
+            "states": len(states),
+            "newton_iterations": sum(s.iterations for s in states),
+            "factorisations": sum(s.factorisations for s in states),
+            "largest_relative_residual": max((s.residual for s in states), default=0.0),
+        }
+        self.ending.summary["solver"] = self.solver
+        return self.trajectory
+
+    def _model_a(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
+        """Model A's trajectory on a model's mesh, load step by load step from the cache where it is there."""
+        materials = materials_of(self.job, model.mesh)
+        name = key(model.mesh.hash(), materials.modulus_MPa, materials.poisson, NewtonSettings())
+        total = len(branches(pressure)[0])
+        done = 0
+
+        def keep(state: State) -> None:
+            nonlocal done
+            done += 1
+            self.progress.update(done / total)
+            on_state(state)
+
+        return simulate(
+            Equilibrium(model, materials),
+            time,
+            pressure,
+            keep,
+            load=lambda p: self._stored(name, p, model),
+            store=lambda state: self.cache.put(
+                "state", key(name, state.pressure_MPa), attrs.asdict(state, recurse=False)
+            ),
+        )
+
+    def _stored(self, name: str, pressure_MPa: float, model: Model) -> State | None:
+        found = self.cache.get("state", key(name, pressure_MPa))
+        if found is None or found.get("u", np.empty(0)).shape != model.mesh.nodes.shape:
+            return None
+        return State(
+            float(found["pressure_MPa"]),
+            found["u"],
+            float(found["residual"]),
+            int(found["iterations"]),
+            int(found["factorisations"]),
+        )
+
+    def _write_motion(self, states: Any) -> None:
+        assert self.mesh is not None
+        ordered = sorted(states, key=lambda s: s.pressure_MPa)
+        angles = [bending_angle_deg(self.mesh, s.u) for s in ordered]
+        pressures = [s.pressure_MPa * 1e3 for s in ordered]
+        write_csv(
+            self.folder / "angle.csv",
+            ["pressure_kPa", "angle_deg"],
+            [(f"{p:.6g}", f"{a:.6g}") for p, a in zip(pressures, angles, strict=True)],
+        )
+        self.ending.summary["angle_deg"] = {f"{p:.6g}": a for p, a in zip(pressures, angles, strict=True)}
+        by_pressure = {round(s.pressure_MPa * 1e3, 9): s for s in ordered}
+        time, pressure = self.job.protocol.sample(self.job.times)
+        reached = [(t, by_pressure[p]) for t, p in zip(time, pressure, strict=True) if p in by_pressure]
+        write_trajectory(self.folder / "model_a.pvd", self.mesh, reached)
+
+    def _keep_partial_motion(self) -> None:
+        """What was found before a failure is kept; summary.json says that it is partial."""
+        if self.mesh is not None and self.states:
+            self._write_motion([rest(self.mesh), *self.states])
+
+    def place(self) -> dict[str, str]:
+        """Every candidate under every rule against Model A; returns the chosen path of each rule."""
+        assert self.mesh is not None
+        assert self.trajectory is not None
+        every = candidates(self.anchors, self.windows)
+        jobs = [(c, rule) for rule in self.job.rules for c in every]
+        setting = self._setting(self.mesh, self.trajectory)
+        with self.progress.stage("candidates"):
+            for number, found in self._evaluate(setting, jobs):
+                self.evaluations[jobs[number][0].name, jobs[number][1]] = found
+                self.progress.update(len(self.evaluations) / len(jobs))
+        if self.job.mesh_check:
+            self._compare_meshes(jobs)
+        return self._write_ranking(every)
+
+    def _setting(self, mesh: Mesh, trajectory: Trajectory) -> Setting:
+        return Setting(
+            mesh,
+            materials_of(self.job, mesh),
+            trajectory,
+            self.anchors,
+            self.job.unit.dimensions.inclusion_radius,
+            self.job.unit.material.sensor_modulus_kPa / 1e3,
+            self.job.stations,
+        )
+
+    def _evaluate(self, setting: Setting, jobs: list[tuple[Candidate, str]]) -> Any:
+        """Number and evaluation of each job, from the cache where it is there."""
+        m, t = setting.materials, setting.baseline
+        shared = key(
+            setting.mesh.hash(),
+            m.modulus_MPa,
+            m.poisson,
+            t.pressure_kPa,
+            NewtonSettings(),
+            setting.anchors,
+            setting.radius_mm,
+            setting.sensor_MPa,
+            setting.stations,
+        )
+        missing = []
+        for number, (candidate, rule) in enumerate(jobs):
+            kept = self.cache.get("candidate", key(shared, candidate.points, rule))
+            if kept is None:
+                missing.append(number)
+            else:
+                volumes = float(kept["stiffened_mm3"]), float(kept["cylinder_mm3"])
+                yield number, Evaluation(candidate.name, rule, deviation_of(kept["delta"]), *volumes)
+        todo = [jobs[number] for number in missing]
+        for position, found in evaluate_all(setting, todo, self.job.workers):
+            number = missing[position]
+            candidate, rule = jobs[number]
+            self.cache.put(
+                "candidate",
+                key(shared, candidate.points, rule),
+                {
+                    "delta": found.deviation.delta,
+                    "stiffened_mm3": found.stiffened_mm3,
+                    "cylinder_mm3": found.cylinder_mm3,
+                },
+            )
+            yield number, found
+
+    def _compare_meshes(self, jobs: list[tuple[Candidate, str]]) -> None:
+        """How far a coarser mesh moves each J_hat: the most of any path, by rule.
+
+        Both meshes are compared at the protocol's extreme pressures and one between, where the means
+        over these instants stand for the means over all.
+        """
+        assert self.trajectory is not None
+        coarse = attrs.evolve(self.job.mesh, refine=self.job.mesh.refine * COARSER)
+        _, pressure = self.job.protocol.sample(self.job.times)
+        chosen = telling_pressures(pressure)
+        instants = [int(np.flatnonzero(pressure == p)[0]) for p in chosen]
+        with self.progress.stage("mesh check"):
+            mesh = self._mesh(coarse)
+            model = Model(mesh)
+            trajectory = self._model_a(model, np.arange(len(chosen), dtype=float), chosen, lambda _: None)
+            setting = self._setting(mesh, trajectory)
+            ratio: dict[str, list[float]] = {rule: [] for rule in self.job.rules}
+            for done, (number, found) in enumerate(self._evaluate(setting, jobs), 1):
+                candidate, rule = jobs[number]
+                fine = self.evaluations[candidate.name, rule].deviation
+                same = fine.delta[instants].mean()
+                ratio[rule].append(abs(found.deviation.J_hat - same) * fine.J_hat / same)
+                self.progress.update(done / len(jobs))
+        self.uncertainty_mm = {rule: max(values) for rule, values in ratio.items()}
+
+    def _write_ranking(self, every: list[Candidate]) -> dict[str, str]:
+        chosen, rows, arrays = {}, [], {}
+        summary: dict[str, Any] = {"J_hat_mm": {}, "J_cont_mm": {}}
+        for rule in self.job.rules:
+            found = [self.evaluations[c.name, rule] for c in every]
+            ranks = rank(np.array([e.deviation.J_hat for e in found]))
+            chosen[rule] = found[int(np.argmin(ranks))].name
+            for c, e, r in zip(every, found, ranks, strict=True):
+                d = e.deviation
+                rows.append((c.name, c.start, c.length, rule, f"{d.J_hat:.9g}", f"{d.J_cont:.9g}", int(r)))
+            arrays[f"delta_{rule}_mm"] = np.array([e.deviation.delta for e in found])
+            summary["J_hat_mm"][rule] = {e.name: e.deviation.J_hat for e in found}
+            summary["J_cont_mm"][rule] = {e.name: e.deviation.J_cont for e in found}
+        columns = ["path", "start", "length", "rule", "J_hat_mm", "J_cont_mm", "rank"]
+        write_csv(self.folder / "deviation.csv", columns, rows)
+        time, pressure = self.job.protocol.sample(self.job.times)
+        arrays |= {
+            "path": np.array([c.name for c in every]),
+            "time_s": time,
+            "pressure_kPa": pressure,
+            "station": np.linspace(0, 1, self.job.stations),
+        }
+        write_npz(self.folder / "delta.npz", arrays)
+        summary |= {"chosen": chosen, "mesh_uncertainty_mm": self.uncertainty_mm}
+        summary["tied_with_chosen"] = {rule: self.tied(rule, chosen[rule]) for rule in self.job.rules}
+        self.ending.summary |= summary
+        return chosen
+
+    def tied(self, rule: str, chosen: str) -> list[str]:
+        """Paths whose J_hat is closer to the chosen one's than the mesh moves it."""
+        J = {name: e.deviation.J_hat for (name, r), e in self.evaluations.items() if r == rule}
+        limit = self.uncertainty_mm.get(rule, 0.0)
+        return [name for name, value in J.items() if name != chosen and value - J[chosen] < limit]
+
+    def warn(self, text: str) -> None:
+        """Tell something that the user should know, now and in the report."""
+        if text not in self.warnings:
+            self.warnings.append(text)
+            self.progress.warning(text)
+
+
+def telling_pressures(pressure_kPa: Array) -> Array:
+    """A few pressures, ascending, that stand for a protocol: its extremes and half the larger one."""
+    distinct = np.unique(pressure_kPa)
+    low, high = distinct[0], distinct[-1]
+    middle = distinct[np.argmin(np.abs(distinct - (high if high > -low else low) / 2))]
+    found = np.unique([low, middle, high])
+    return found[found != 0]
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return ""
+
+
+def _set_aside(folder: Path) -> None:
+    """Move an earlier run's inputs and results to stale/, replacing what was set aside before."""
+    import shutil
+
+    stale = make_folder(folder / "stale")
+    solids = [p.name for p in folder.glob("unit_*.stl")]
+    for name in (*INPUTS, *RESULTS, *solids, "summary.json", "log.ndjson", "model_a"):
+        if (folder / name).exists():
+            target = stale / name
+            if target.is_dir():
+                shutil.rmtree(target, ignore_errors=True)
+            (folder / name).replace(target)

@@ -1,0 +1,72 @@
+"""Meshes and motions as VTK files: a .vtu a state, and a .pvd that gives each its time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from ..fem.equilibrium import State
+from ..files import make_folder, replacing, write_text
+from ..meshing.mesh import Mesh
+
+Array = np.ndarray[Any, Any]
+
+_CELL = {4: "tetra", 10: "tetra10"}
+
+
+def write_mesh(path: Path, mesh: Mesh, modulus_MPa: Array, displacement: Array | None = None) -> None:
+    """Write `mesh` with region (m,), E_MPa (m,) and displacement_mm (n, 3) to a compressed binary .vtu.
+
+    Raises OutputError.
+    """
+    cells: dict[str, Array] = {
+        "region": mesh.region.astype(np.int32),
+        "E_MPa": np.asarray(modulus_MPa, np.float64),
+    }
+    moved = np.zeros_like(mesh.nodes) if displacement is None else displacement
+    _write(path, mesh, {"displacement_mm": np.asarray(moved, np.float64)}, cells)
+
+
+def write_trajectory(path: Path, mesh: Mesh, states: Sequence[tuple[float, State]]) -> None:
+    """Write `states`, each with its time in s, to the .pvd `path` and one .vtu a pressure beside it.
+
+    They lie in a folder of the .pvd's name; an earlier run's are removed. Raises OutputError.
+    """
+    folder = make_folder(path.with_suffix(""))
+    files: dict[float, str] = {}
+    lines = []
+    for time, state in states:
+        # A protocol passes the same pressure several times, and an elastic unit the same state with it.
+        if state.pressure_MPa not in files:
+            name = files[state.pressure_MPa] = f"{len(files):04d}.vtu"
+            moved = {"displacement_mm": state.u.astype(np.float32)}
+            _write(folder / name, mesh, moved, {"region": mesh.region.astype(np.int32)})
+        file = quoteattr(f"{folder.name}/{files[state.pressure_MPa]}")
+        pressure = f"{state.pressure_MPa * 1e3:.9g} kPa"
+        lines.append(f'    <DataSet timestep="{time:.9g}" name="{pressure}" file={file}/>')
+    write_text(
+        path,
+        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
+        "  <Collection>\n" + "\n".join(lines) + "\n  </Collection>\n</VTKFile>\n",
+    )
+    for old in set(folder.glob("*.vtu")) - {folder / name for name in files.values()}:
+        with suppress(OSError):
+            old.unlink()
+
+
+def _write(path: Path, mesh: Mesh, point_data: dict[str, Array], cell_data: dict[str, Array]) -> None:
+    import meshio
+
+    whole = meshio.Mesh(
+        mesh.nodes,
+        [(_CELL[mesh.tets.shape[1]], mesh.tets)],
+        point_data=point_data,
+        cell_data={name: [values] for name, values in cell_data.items()},
+    )
+    with replacing(path) as beside:
+        whole.write(beside, file_format="vtu", binary=True, compression="zlib")

@@ -1,0 +1,243 @@
+"""The solver against closed forms and against its own derivatives."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import brentq
+
+from mu_addon.errors import ConvergenceError
+from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, rest
+from mu_addon.fem.factor import Cholesky, IndefiniteError, SuperLU
+from mu_addon.fem.model import Materials, Model
+
+from . import bodies
+
+E, NU = 0.6, 0.4
+
+
+def uniform(mesh, modulus=E, poisson=NU):
+    return Materials(np.full(len(mesh.tets), modulus), np.full(len(mesh.tets), poisson))
+
+
+def unconstrained(mesh):
+    """Model and parameters for a body whose unknowns the test prescribes itself."""
+    model = Model(mesh)
+    return model, model.parameters(uniform(mesh))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_patch(order):
+    """An affine boundary displacement on a distorted patch is reproduced inside to 1e-10."""
+    mesh = bodies.box((3, 3, 3), order=order, jiggle=0.25)
+    model, m = unconstrained(mesh)
+    F = np.array([[1.1, 0.05, -0.02], [0.03, 0.93, 0.08], [-0.04, 0.02, 1.06]])
+    exact = mesh.nodes @ (F - np.eye(3)).T
+    boundary = ((mesh.nodes < 1e-9) | (mesh.nodes > 1 - 1e-9)).any(axis=1)
+    inside = np.nonzero(~np.repeat(boundary, 3))[0]
+    u = np.where(boundary[:, None], exact, 0.0)
+    for _ in range(8):
+        K = model.matrix(model.tangent(u, 0.0, m)).tocsc()[inside][:, inside]
+        u.ravel()[inside] -= np.linalg.solve(K.toarray(), model.residual(u, 0.0, m).ravel()[inside])
+    assert np.abs(u - exact).max() < 1e-10
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("pressure", [0.0, 0.03])
+def test_tangent_is_the_derivative_of_the_residual(order, pressure):
+    mesh = bodies.hollow_box(order, clamp=False)
+    model, m = unconstrained(mesh)
+    rng = np.random.default_rng(0)
+    u, d = 0.03 * rng.standard_normal((2, *mesh.nodes.shape))
+    K = model.matrix(model.tangent(u, pressure, m))
+    h = 1e-5
+    # Fourth-order difference: its truncation is far below the bound, its rounding about 1e-10.
+    r = {s: model.residual(u + s * h * d, pressure, m) for s in (-2, -1, 1, 2)}
+    difference = (8 * (r[1] - r[-1]) - (r[2] - r[-2])) / (12 * h)
+    product = (K @ d.ravel()).reshape(-1, 3)
+    assert np.abs(difference - product).max() / np.abs(product).max() < 1e-8
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_residual_is_the_derivative_of_the_potential(order):
+    mesh = bodies.hollow_box(order, clamp=False)
+    model, m = unconstrained(mesh)
+    u, d = 0.03 * np.random.default_rng(1).standard_normal((2, *mesh.nodes.shape))
+    h = 1e-4
+    e = {s: model.potential(u + s * h * d, 0.03, m) for s in (-2, -1, 1, 2)}
+    difference = (8 * (e[1] - e[-1]) - (e[2] - e[-2])) / (12 * h)
+    assert difference == pytest.approx((model.residual(u, 0.03, m) * d).sum(), rel=1e-8)
+
+
+def test_pressure_stiffness_of_a_closed_cavity_is_symmetric_as_it_is():
+    """The symmetrised face blocks add up to the true derivative, so nothing was thrown away."""
+    mesh = bodies.hollow_box(2, clamp=False)
+    model, m = unconstrained(mesh)
+    n = mesh.nodes.size
+    u = 0.02 * np.random.default_rng(2).standard_normal(mesh.nodes.shape)
+    with_p = model.matrix(model.tangent(u, 1.0, m)) - model.matrix(model.tangent(u, 0.0, m))
+    columns = np.random.default_rng(3).choice(n, 12, replace=False)
+    for c in columns:
+        d = np.zeros(n)
+        d[c] = 1e-3
+        d = d.reshape(-1, 3)
+        force = (model.residual(u + d, 1.0, m) - model.residual(u + d, 0.0, m)) - (
+            model.residual(u - d, 1.0, m) - model.residual(u - d, 0.0, m)
+        )
+        np.testing.assert_allclose(force.ravel() / 2e-3, with_p[:, [c]].toarray().ravel(), atol=1e-8)
+
+
+def test_uniaxial_tension_matches_its_closed_form():
+    """Stretch a bar by 60 %: P = mu J^(-2/3) (lambda - I1/(3 lambda)) + kappa (J - 1) J / lambda."""
+    mesh = bodies.box((2, 2, 2), order=2, symmetry=("x", "y", "z"))
+    model, m = unconstrained(mesh)
+    top = np.nonzero(mesh.nodes[:, 2] == 1)[0]
+    mu, kappa = E / (2 * (1 + NU)), E / (3 * (1 - 2 * NU))
+    number = np.full(mesh.nodes.size, -1)
+    number[model.free] = np.arange(len(model.free))
+    pulled = number[3 * top + 2]
+    rest_of = np.setdiff1d(np.arange(len(model.free)), pulled)
+    u = np.zeros_like(mesh.nodes)
+    for stretch in np.linspace(1, 1.6, 7)[1:]:
+        u[:, 2] = mesh.nodes[:, 2] * (stretch - 1)
+        for _ in range(12):
+            K = model.matrix(model.tangent(u, 0.0, m)).tocsc()[rest_of][:, rest_of]
+            force = model.residual(u, 0.0, m).ravel()[model.free][rest_of]
+            u.ravel()[model.free[rest_of]] -= np.linalg.solve(K.toarray(), force)
+
+    def stresses(side):
+        J, I1 = stretch * side**2, stretch**2 + 2 * side**2
+        c = mu * J ** (-2 / 3)
+        along = c * (stretch - I1 / (3 * stretch)) + kappa * (J - 1) * J / stretch
+        across = c * (side - I1 / (3 * side)) + kappa * (J - 1) * J / side
+        return along, across
+
+    side = brentq(lambda s: stresses(s)[1], 0.5, 1.0, xtol=1e-14)
+    force = model.residual(u, 0.0, m)[top, 2].sum()
+    assert force == pytest.approx(stresses(side)[0], rel=1e-9)
+    np.testing.assert_allclose(u[:, 0], mesh.nodes[:, 0] * (side - 1), atol=1e-9)
+
+
+def pressurise(mesh, pressure, modulus, poisson, **options):
+    model = Model(mesh)
+    equilibrium = Equilibrium(model, uniform(mesh, modulus, poisson), NewtonSettings(**options))
+    return model, equilibrium.path([pressure], rest(mesh))[-1]
+
+
+def test_thick_sphere_under_pressure_converges_to_the_incompressible_closed_form():
+    """p = 2 mu [(1/b + 1/(4 b^4)) - (1/a + 1/(4 a^4))], b^3 = 1 + (a^3 - 1)(A/B)^3, for a = 1.1."""
+    A, B, a, nu = 10.0, 12.0, 1.1, 0.4999
+    b = (1 + (a**3 - 1) * (A / B) ** 3) ** (1 / 3)
+    pressure = 2 * ((1 / b + 1 / (4 * b**4)) - (1 / a + 1 / (4 * a**4)))
+    errors = []
+    for around in (3, 6):
+        mesh = bodies.sphere_octant(A, B, around, through=max(1, around // 3))
+        _, state = pressurise(mesh, pressure, 2 * (1 + nu), nu, max_step_MPa=0.05)
+        inner = np.abs(np.linalg.norm(mesh.nodes, axis=1) - A) < 1e-6
+        found = np.linalg.norm((mesh.nodes + state.u)[inner], axis=1).mean() / A
+        errors.append(abs(found - a) / (a - 1))
+    assert errors[1] < 0.004
+    assert errors[1] < 0.5 * errors[0]
+
+
+def test_thick_cylinder_under_pressure_in_plane_strain():
+    """p = mu [ln(a/b) + (b^-2 - a^-2)/2], b^2 = 1 + (a^2 - 1)(A/B)^2, for a = 1.15."""
+    A, B, a, nu = 10.0, 12.0, 1.15, 0.4999
+    b = np.sqrt(1 + (a**2 - 1) * (A / B) ** 2)
+    pressure = np.log(a / b) + (b**-2 - a**-2) / 2
+    mesh = bodies.cylinder_quarter(A, B, around=10, through=2)
+    # Both ends are held in z: one by its mirror plane, the other here.
+    held = np.zeros(mesh.nodes.shape, bool)
+    held[:, 2] = mesh.nodes[:, 2] == mesh.nodes[:, 2].max()
+    model = Model(mesh, held=held)
+    settings_ = NewtonSettings(max_step_MPa=0.05)
+    equilibrium = Equilibrium(model, uniform(mesh, 2 * (1 + nu), nu), settings_)
+    state = equilibrium.path([pressure], rest(mesh))[-1]
+    radius = np.linalg.norm(mesh.nodes[:, :2], axis=1)
+    inner = np.abs(radius - A) < 1e-6
+    found = np.linalg.norm((mesh.nodes + state.u)[inner, :2], axis=1).mean() / A
+    assert found == pytest.approx(a, abs=0.003 * (a - 1) + 1e-4)
+
+
+def test_cavity_volume_of_the_undeformed_sphere():
+    mesh = bodies.sphere_octant(10, 12, 4)
+    model = Model(mesh)
+    exact = 4 / 3 * np.pi * 10**3 / 8
+    assert model.cavity_volume(np.zeros_like(mesh.nodes)) == pytest.approx(exact, rel=1e-3)
+
+
+def test_a_balloon_past_its_limit_is_refused_by_name():
+    mesh = bodies.sphere_octant(10, 11, 3)
+    with pytest.raises(ConvergenceError, match="limit point") as caught:
+        pressurise(mesh, 1.0, 2.0, 0.45, max_step_MPa=0.05, min_step_MPa=1e-3)
+    assert "kPa" in str(caught.value)
+    assert "mm" in caught.value.where
+
+
+def test_vacuum_and_pressure_move_apart():
+    mesh = bodies.hollow_box(2)
+    _, blown = pressurise(mesh, 0.01, E, NU)
+    model, sucked = pressurise(mesh, -0.01, E, NU)
+    none = model.cavity_volume(np.zeros_like(mesh.nodes))
+    assert model.cavity_volume(sucked.u) < none < model.cavity_volume(blown.u)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_rigid_motions_make_no_stress(seed):
+    mesh = bodies.box((1, 1, 1), order=2)
+    model, m = unconstrained(mesh)
+    rng = np.random.default_rng(seed)
+    q, r = np.linalg.qr(rng.standard_normal((3, 3)))
+    q = q * np.sign(np.diag(r))
+    q[:, 0] *= np.linalg.det(q)
+    u = mesh.nodes @ (q - np.eye(3)).T + rng.uniform(-5, 5, 3)
+    assert abs(model.potential(u, 0.0, m)) < 1e-12
+    assert np.abs(model.residual(u, 0.0, m)).max() < 1e-12
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_numbering_changes_nothing(seed):
+    """Permuting nodes and elements permutes the residual and leaves the energy."""
+    mesh = bodies.hollow_box(1, n=3, clamp=False)
+    rng = np.random.default_rng(seed)
+    nodes, elements = rng.permutation(len(mesh.nodes)), rng.permutation(len(mesh.tets))
+    new = np.argsort(nodes)
+    moved = type(mesh)(
+        mesh.nodes[nodes], new[mesh.tets[elements]], mesh.region[elements], new[mesh.cavity], [], []
+    )
+    u = 0.03 * rng.standard_normal(mesh.nodes.shape)
+    model, m = unconstrained(mesh)
+    other, n = unconstrained(moved)
+    assert other.potential(u[nodes], 0.02, n) == pytest.approx(model.potential(u, 0.02, m), rel=1e-12)
+    np.testing.assert_allclose(
+        other.residual(u[nodes], 0.02, n), model.residual(u, 0.02, m)[nodes], atol=1e-13
+    )
+
+
+def test_twice_as_stiff_under_twice_the_pressure_moves_the_same():
+    mesh = bodies.hollow_box(2)
+    _, a = pressurise(mesh, 0.02, E, NU)
+    _, b = pressurise(mesh, 0.04, 2 * E, NU, max_step_MPa=0.02)
+    np.testing.assert_allclose(a.u, b.u, atol=1e-9)
+
+
+def test_both_factorisations_agree_and_see_indefiniteness():
+    mesh = bodies.hollow_box(2)
+    model = Model(mesh)
+    m = model.parameters(uniform(mesh))
+    values = model.tangent(np.zeros_like(mesh.nodes), 0.0, m)
+    pattern = model.pattern
+    b = np.random.default_rng(0).standard_normal((len(model.free), 3))
+    solutions = []
+    for kind in (Cholesky, SuperLU):
+        factor = kind(pattern.indptr, pattern.indices, pattern.order)
+        solutions.append(factor.factor(values).solve(b))
+        np.testing.assert_allclose(factor.solve(b[:, 0]), solutions[-1][:, 0], rtol=1e-9)
+        broken = values.copy()
+        broken[pattern.indptr[:-1]] *= -1
+        with pytest.raises(IndefiniteError):
+            factor.factor(broken)
+    np.testing.assert_allclose(*solutions, rtol=1e-9)
+    np.testing.assert_allclose(model.matrix(values) @ solutions[0], b, atol=1e-9)

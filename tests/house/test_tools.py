@@ -1,0 +1,71 @@
+"""The house's own rules, kept by tools: lint, format, types, and which package may import which."""
+
+import ast
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def run(*command, cwd=ROOT):
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+def tool(name):
+    """A console script beside this Python, whatever the PATH says."""
+    return str(Path(sys.executable).with_name(name))
+
+
+@pytest.mark.parametrize(
+    "command",
+    [("ruff", "check", "."), ("ruff", "format", "--check", "."), ("mypy",), ("lint-imports", "--no-cache")],
+    ids=" ".join,
+)
+def test_tool_is_content(command):
+    status, said = run(tool(command[0]), *command[1:])
+    assert status == 0, said
+
+
+@pytest.mark.parametrize(
+    ("module", "line", "contract"),
+    [
+        ("design", "from ..study import report", "imports run downward"),
+        ("fem", "import bpy", "only mu_addon.blender knows Blender"),
+        ("placement", "import headless", "only mu_addon.blender knows Blender"),
+        ("novelty", "", "imports run downward"),
+    ],
+)
+def test_the_import_contracts_can_fail(tmp_path, module, line, contract):
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    for name in ("", "design", "fem", "placement", "study", module):
+        folder = tmp_path / "mu_addon" / name
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "__init__.py").write_text("")
+    for name in ("errors.py", "files.py", "study/report.py"):
+        (tmp_path / "mu_addon" / name).write_text("")
+    (tmp_path / "mu_addon" / module / "new.py").write_text(line + "\n")
+    status, said = run(tool("lint-imports"), "--no-cache", cwd=tmp_path)
+    assert status == 1
+    broken = [text for text in said.splitlines() if "BROKEN" in text]
+    assert len(broken) == 1, said
+    assert contract in broken[0]
+
+
+def test_the_core_imports_itself_relatively():
+    """In Blender the package has another name, so that an absolute import would find another copy or none."""
+    absolute = []
+    for path in (ROOT / "mu_addon").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                names = [node.module or ""]
+            else:
+                continue
+            absolute += [f"{path}:{node.lineno}" for name in names if name.split(".")[0] == "mu_addon"]
+    assert absolute == []

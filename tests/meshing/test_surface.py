@@ -1,0 +1,123 @@
+"""Any closed surface by pytetwild: regions, cavity, cache, and what is refused."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from mu_addon.errors import InputError, MeshingError
+from mu_addon.meshing import LATTICE, MEMBRANE, VOID, Surface, mesh_surface
+from mu_addon.meshing.mesh import boundary_faces
+from mu_addon.meshing.quality import cavity_enclosed, element_volumes
+from mu_addon.meshing.surface import winding_number
+
+
+def sphere(radius: float, subdivisions: int = 2) -> trimesh.Trimesh:
+    return trimesh.creation.icosphere(subdivisions, radius)
+
+
+def surface(body: trimesh.Trimesh, region: int = VOID) -> Surface:
+    return Surface(np.asarray(body.vertices), np.asarray(body.faces), region)
+
+
+def test_a_ball() -> None:
+    ball = sphere(10.0)
+    mesh = mesh_surface(ball.vertices, ball.faces, 4.0)
+    assert mesh.order == 1
+    assert len(mesh.cavity) == 0
+    assert set(mesh.region) == {LATTICE}
+    assert element_volumes(mesh).min() > 0
+    assert element_volumes(mesh).sum() == pytest.approx(ball.volume, rel=0.02)
+
+
+def test_nested_spheres_are_told_apart() -> None:
+    outer, middle, inner = sphere(10.0), sphere(7.0), sphere(4.0)
+    mesh = mesh_surface(
+        outer.vertices,
+        outer.faces,
+        4.0,
+        inside=[surface(middle, MEMBRANE), surface(inner)],
+        order=2,
+    )
+    volumes = element_volumes(mesh)
+    assert mesh.order == 2
+    assert volumes.min() > 0
+    assert volumes[mesh.region == MEMBRANE].sum() == pytest.approx(middle.volume - inner.volume, rel=0.04)
+    assert volumes[mesh.region == LATTICE].sum() == pytest.approx(outer.volume - middle.volume, rel=0.04)
+    assert cavity_enclosed(mesh) == pytest.approx(inner.volume, rel=0.04)
+    assert np.linalg.norm(mesh.nodes[mesh.cavity_corners], axis=2) == pytest.approx(4.0, abs=0.3)
+    # The cavity is closed, and no face of the outside is among its faces.
+    directed = mesh.cavity_corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    assert len(np.unique(np.vstack([directed, directed[:, ::-1]]), axis=0)) == len(directed)
+    faces, _ = boundary_faces(mesh.tets)
+    assert len(faces) > len(mesh.cavity)
+
+
+def test_a_box_has_flat_ends_and_a_classifier_tags_it() -> None:
+    box = trimesh.creation.box((8.0, 6.0, 10.0))
+    mesh = mesh_surface(
+        box.vertices,
+        box.faces,
+        3.0,
+        classify=lambda points: np.where(points[:, 0] > 0, MEMBRANE, LATTICE),
+    )
+    assert np.all(mesh.nodes[mesh.base, 2] == -5.0)
+    assert np.all(mesh.nodes[mesh.tip, 2] == 5.0)
+    assert element_volumes(mesh).sum() == pytest.approx(480.0, rel=2e-3)
+    centroids = mesh.nodes[mesh.corners].mean(axis=1)
+    assert np.array_equal(mesh.region == MEMBRANE, centroids[:, 0] > 0)
+
+
+def test_the_cache_makes_it_repeatable(tmp_path: Path) -> None:
+    ball = sphere(5.0, 1)
+    first = mesh_surface(ball.vertices, ball.faces, 3.0, cache=tmp_path)
+    again = mesh_surface(ball.vertices, ball.faces, 3.0, cache=tmp_path)
+    assert first.hash() == again.hash()
+    (stored,) = tmp_path.iterdir()
+    # A file torn by a full disk is made anew.
+    stored.write_bytes(stored.read_bytes()[:100])
+    assert len(mesh_surface(ball.vertices, ball.faces, 3.0, cache=tmp_path).tets)
+    mesh_surface(ball.vertices, ball.faces, 6.0, cache=tmp_path)
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_nothing_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    ball = sphere(5.0, 1)
+    mesh_surface(ball.vertices, ball.faces, 3.0)
+    assert os.getcwd() == str(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+    assert "pyvista" not in sys.modules
+
+
+def test_an_open_surface_is_refused() -> None:
+    ball = sphere(5.0)
+    with pytest.raises(InputError, match="not closed"):
+        mesh_surface(ball.vertices, ball.faces[1:], 2.0)
+    with pytest.raises(InputError, match="not closed"):
+        mesh_surface(ball.vertices, np.vstack([ball.faces[:1, ::-1], ball.faces[1:]]), 2.0)
+
+
+def test_a_missing_pytetwild_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pytetwild", None)
+    ball = sphere(5.0, 1)
+    with pytest.raises(MeshingError, match="pytetwild cannot be loaded"):
+        mesh_surface(ball.vertices, ball.faces, 2.0)
+
+
+@settings(max_examples=30, deadline=None)
+@given(arrays(float, (5, 3), elements=st.floats(-9, 9)))
+def test_winding_number_counts_inside_once(points: np.ndarray) -> None:
+    ball = sphere(5.0)
+    radius = np.linalg.norm(points, axis=1)
+    points = points[np.abs(radius - 5) > 0.3]
+    expected = np.linalg.norm(points, axis=1) < 5
+    assert np.allclose(winding_number(surface(ball), points), expected, atol=1e-9)
