@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import attrs
@@ -11,8 +12,10 @@ Array = np.ndarray[Any, Any]
 
 RULES = ("intersect", "volume_fraction")
 
-# Gauss points a slab between two vertex heights: the slice area is smooth but for tangency kinks.
-_GAUSS = np.polynomial.legendre.leggauss(16)
+# Between two vertex heights the slice area is smooth but where an edge meets the circle: many short
+# Gauss rules lose less at such a kink than one long one.
+_PIECES = 16
+_GAUSS = np.polynomial.legendre.leggauss(6)
 
 
 def _disc_polygon_area(polygon: Array, radius: float) -> Array:
@@ -70,7 +73,7 @@ def cylinder_overlap(corners: Array, start: Array, end: Array, radius: float) ->
     """Volume (m,) in mm3 of straight tetrahedra (m, 4, 3) inside a flat-ended cylinder, all in mm.
 
     Exact slice areas (disc with polygon), Gauss quadrature along the cylinder's axis between the
-    vertices' heights; the elements of a mesh add up to the cylinder within about 2e-5.
+    vertices' heights; the elements of a mesh add up to the cylinder within about 1e-6.
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
     length = float(np.linalg.norm(end - start))
@@ -92,13 +95,14 @@ def cylinder_overlap(corners: Array, start: Array, end: Array, radius: float) ->
     near = np.nonzero(reach)[0]
     tets = local[near]
     heights = np.clip(np.sort(tets[:, :, 2], axis=1), 0.0, length)
-    points, weights = _GAUSS
+    starts = np.arange(_PIECES)[:, None]
+    at = ((starts + (1 + _GAUSS[0]) / 2) / _PIECES).ravel()
+    weights = np.tile(_GAUSS[1] / 2 / _PIECES, _PIECES)
     total = np.zeros(len(near))
-    for lower, upper in zip(heights.T[:-1], heights.T[1:], strict=True):
-        half = (upper - lower) / 2
-        for x, w in zip(points, weights, strict=True):
-            z = lower + half * (1 + x)
-            total += w * half * _disc_polygon_area(_slices(tets, z), radius)
+    for lower, upper in itertools.pairwise(heights.T):
+        for t, w in zip(at, weights, strict=True):
+            z = lower + t * (upper - lower)
+            total += w * (upper - lower) * _disc_polygon_area(_slices(tets, z), radius)
     overlap[near] = total
     return overlap
 

@@ -59,7 +59,8 @@ def label(name: str) -> str:
 
 
 def signed(text: str) -> str:
-    """`text` with true minus signs in front of its numbers."""
+    """`text` with true minus signs in front of its numbers, and none in front of zeros."""
+    text = re.sub(r"(?<![\w-])-(?=0(?:\.0+)?(?![\d.]))", "", text)
     return re.sub(r"(?<![\w-])-(?=[\d.])", "−", text)
 
 
@@ -164,6 +165,8 @@ def protocol(time_s: Floats, pressure_kPa: Floats) -> str:
 
 def heatmap(delta: Floats, top: float, chosen: bool = False) -> str:
     """One path's deviation (k times, j stations), 0..`top` mm: length to the right, time upward."""
+    from matplotlib.colors import PowerNorm
+
     with _figure(1.75, 1.75) as (figure, svg):
         axes = figure.add_axes((0.20, 0.18, 0.74, 0.76))
         axes.imshow(
@@ -172,8 +175,7 @@ def heatmap(delta: Floats, top: float, chosen: bool = False) -> str:
             extent=(0, 100, 0, 100),
             aspect="auto",
             cmap=MAP,
-            vmin=0.0,
-            vmax=top,
+            norm=PowerNorm(0.5, 0.0, top),
             interpolation="nearest",
         )
         axes.grid(False)
@@ -186,14 +188,16 @@ def heatmap(delta: Floats, top: float, chosen: bool = False) -> str:
 
 
 def color_bar(top: float) -> str:
-    """The scale 0..`top` mm that a rule's heatmaps share."""
+    """The scale 0..`top` mm that a rule's heatmaps share; by square root, or the worst hides the rest."""
     from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
+    from matplotlib.colors import PowerNorm
 
     with _figure(WIDTH, 0.62) as (figure, svg):
         axes = figure.add_axes((0.04, 0.68, 0.92, 0.26))
-        mappable = ScalarMappable(Normalize(0.0, top), MAP)
-        bar = figure.colorbar(mappable, cax=axes, orientation="horizontal")
+        mappable = ScalarMappable(PowerNorm(0.5, 0.0, top), MAP)
+        series = np.outer(10.0 ** np.arange(-6, 6), [1.0, 2.0, 5.0]).ravel()
+        ticks = [0.0, *series[(series > 0.01 * top) & (series <= top)]]
+        bar = figure.colorbar(mappable, cax=axes, orientation="horizontal", ticks=ticks, format="%g")
         bar.set_label("deviation Δ [mm]", fontsize=8, labelpad=2)
         bar.outline.set_linewidth(0.6)
     return svg()

@@ -5,12 +5,14 @@ It answers first (which path), then shows why, and ends with what the answer res
 
 from __future__ import annotations
 
+import re
 from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path as File
 from typing import Any
 
+import attrs
 import numpy as np
 
 from ..files import write_text
@@ -35,7 +37,9 @@ def write_report(path: File, results: ReportData) -> None:
 
 
 def report_html(results: ReportData) -> str:
-    """The whole report as HTML text."""
+    """The whole report as HTML text; the headline's rule comes before any other."""
+    first = sorted(results.rules.items(), key=lambda item: item[0] != results.headline_rule)
+    results = attrs.evolve(results, rules=dict(first))
     css = (File(__file__).parent / "report.css").read_text(encoding="utf-8")
     sections = [section for section in _sections(results) if section[2]]
     contents = "".join(f'<li><a href="#{key}">{escape(title)}</a></li>' for key, title, _ in sections)
@@ -88,37 +92,29 @@ def _notes(r: ReportData) -> str:
 
 def _answer(r: ReportData) -> str:
     rule = r.rules.get(r.headline_rule)
-    if rule is None:
-        if r.view is None:
-            return ""
-        return _figure(
-            plots.unit_with_paths(r.view, r.paths, ""),
-            "The unit cut open along its sagittal plane, and the candidate paths beside it.",
-            "Section of the unit with its anchors.",
-            "one",
+    html = ""
+    if rule is not None:
+        best = _index(r, rule.chosen)
+        path = r.paths[best]
+        html += (
+            f'<p class="answer">Put the sensor along <strong>{_name(path.name)}</strong>, anchors '
+            f"{path.anchors}: of {len(r.paths)} candidates it disturbs the motion least, by "
+            f"{rule.j_hat[best]:.3f}&nbsp;mm on average.</p><p>{_caveat(r, rule)}</p>{_key_figures(r, rule)}"
         )
-    best = _index(r, rule.chosen)
-    path = r.paths[best]
-    html = (
-        f'<p class="answer">Put the sensor along <strong>{_name(path.name)}</strong>, anchors '
-        f"{path.anchors}: of "
-        f"{len(r.paths)} candidates it disturbs the motion least, by {rule.j_hat[best]:.3f}&nbsp;mm on "
-        "average.</p>"
+    pictures = "".join(_picture(picture) for picture in r.pictures[:1])
+    if r.view is None:
+        return html + pictures
+    chosen = rule.chosen if rule is not None else ""
+    sensor = f" and the sensor along {_name(chosen)}" if chosen else ""
+    section = _figure(
+        plots.unit_with_paths(r.view, r.paths, chosen, rule.j_hat if rule is not None else None),
+        "Left: the unit cut open along its sagittal plane, inlet below, with anchors P1 to "
+        f"P{len(r.view.anchors)}{sensor}. Right: every candidate path at its true height"
+        + (", with its mean deviation in mm." if rule is not None else "."),
+        "Section of the unit, and the candidate paths beside it"
+        + (f"; the chosen path {chosen} runs through anchors {path.anchors}." if chosen else "."),
     )
-    html += f"<p>{_caveat(r, rule)}</p>{_key_figures(r, rule)}"
-    if r.view is not None:
-        html += '<div class="lead">' + _figure(
-            plots.unit_with_paths(r.view, r.paths, rule.chosen, rule.j_hat),
-            "Left: the unit cut open along its sagittal plane, inlet below, with anchors P1 to "
-            f"P{len(r.view.anchors)} and the sensor along {_name(path.name)}. Right: every candidate path at "
-            "its true height, with its mean deviation.",
-            f"Section of the unit; the chosen path {path.name} runs through anchors {path.anchors}.",
-            "",
-        )
-        html += "".join(_picture(picture) for picture in r.pictures[:1]) + "</div>"
-    else:
-        html += "".join(_picture(picture) for picture in r.pictures[:1])
-    return html
+    return f'{html}<div class="lead">{section}{pictures}</div>'
 
 
 def _caveat(r: ReportData, rule: RuleResult) -> str:
@@ -248,8 +244,8 @@ def _heatmaps(r: ReportData) -> str:
         return ""
     return (
         "<p>Each square is one path. To the right: length [%], from the inlet to the tip. Upward: time [%] "
-        "in the pressure cycle. The squares of a rule share one colour scale; its choice is framed.</p>"
-        + html
+        "in the pressure cycle. The squares of a rule share one colour scale, by the square root of Δ; its "
+        "choice is framed.</p>" + html
     )
 
 
@@ -380,7 +376,8 @@ def _figure(svg: str, caption: str, alt: str, kind: str = "") -> str:
 
 
 def _picture(picture: Picture) -> str:
-    return _image("image/png", picture.png, escape(picture.caption), picture.alt, "")
+    caption = re.sub(r"\balpha\d+\b", lambda name: label(name[0]), signed(picture.caption))
+    return _image("image/png", picture.png, escape(caption), picture.alt, "")
 
 
 def _image(kind: str, data: bytes, caption: str, alt: str, css: str) -> str:

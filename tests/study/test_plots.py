@@ -65,4 +65,5 @@ def test_any_number_of_paths():
 def test_words():
     assert plots.label("alpha10") == "α₁₀"
     assert plots.label("free path") == "free path"
+    assert plots.signed("-0.0° at 0 kPa, -0, -0.05 mm") == "0.0° at 0 kPa, 0, −0.05 mm"
     assert plots.signed("-42.0° at -20 kPa, 1e-09, mu-1.0x") == "−42.0° at −20 kPa, 1e-09, mu-1.0x"

@@ -9,9 +9,9 @@ import pytest
 
 from mu_addon.errors import OutputError
 from mu_addon.study.report import report_html, write_report
-from mu_addon.study.results import Gate, Parameter, ReportData
+from mu_addon.study.results import Gate, Parameter, Picture, ReportData
 
-from .report_data import results
+from .report_data import png, results
 
 VOID = {"meta", "link", "img", "br", "hr"}
 
@@ -90,6 +90,17 @@ def test_disagreement_of_the_rules_is_told():
     assert "by “intersect” α₂ would be best" in words
 
 
+def test_the_headline_rule_comes_first():
+    data = results()
+    html = report_html(brief(rules=dict(reversed(data.rules.items()))))
+    assert 0 < html.index("Rule “volume fraction”") < html.index("Rule “intersect”")
+
+
+def test_captions_are_set_in_type():
+    html = report_html(brief(pictures=(Picture(png(), "alpha4 at -20 kPa: -0.0°", "a picture"),)))
+    assert "α₄ at −20 kPa: 0.0°" in html
+
+
 def test_asks_nothing_of_any_server(html, page):
     assert not page.all("script")
     for image in page.all("img"):
@@ -127,7 +138,8 @@ def test_partial_says_so_at_the_top(page):
 def test_a_run_that_stopped_early_shows_what_it_has():
     page = Page(report_html(ReportData("t", "u", status="partial", seconds={"solid": 1.0})))
     assert page.headings == ["How long each stage took"]
-    page = Page(report_html(results(status="partial", rules={}, pictures=())))
+    page = Page(report_html(results(status="partial", rules={})))
+    assert len(page.all("img")) == 1 + 4 + 2 + 1
     assert "Put the sensor" not in page.words
     assert "Ranking of the paths" not in page.headings
     assert "How the unit moves" in page.headings
