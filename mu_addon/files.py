@@ -28,15 +28,15 @@ _REMEDY = {
     errno.EEXIST: "a file of that name is in the way: remove it or choose another folder",
     errno.EISDIR: "a folder of that name is in the way: remove it or choose another name",
     errno.ENAMETOOLONG: "choose a shorter folder name",
+    errno.EFBIG: "raise the limit on the size of a file, or choose another disk",
     errno.EIO: "the disk reports a fault: try another one",
 }
 
 
 def output_error(error: OSError, path: Path) -> OutputError:
     """`error`, met while writing `path`, as an OutputError that says what to do about it."""
-    reason = (error.strerror or str(error)).lower()
     return OutputError(
-        f"{path.name} could not be written: {reason}",
+        f"cannot write {path.name}: {error.strerror or error}",
         where=str(path),
         remedy=_REMEDY.get(error.errno or 0, "check the disk and the folder"),
     )

@@ -1,6 +1,6 @@
 """The membrane and its two caps as a revolved structured grid, curved exactly where it is second order.
 
-A wall of 0.6 mm beside arcs that rise 0.9 mm over their chord leaves no room for straight diagonals, so
+A wall of 0.6 mm beside arcs that rise by up to 0.9 mm leaves no room for straight diagonals, so
 its elements and all their mid-edge nodes are placed by one map from the profile, not by a mesher.
 """
 

@@ -76,6 +76,15 @@ def _work(number: int, candidate: Candidate, rule: str) -> tuple[int, Evaluation
     return number, _evaluator(candidate, rule)
 
 
+def _survive_broken_pipes() -> None:
+    """Writing to a process that has ended must be an error, as Python has it, not the end of this one.
+
+    The compiler inside Warp resets what Python had set when it starts.
+    """
+    if hasattr(signal, "SIGPIPE"):
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+
+
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
     """Children inherit these: with a process a core, more threads a process only get in each other's way."""
@@ -106,6 +115,7 @@ def evaluate_all(
         return
     context = multiprocessing.get_context("spawn")
     with _one_thread_each():
+        _survive_broken_pipes()
         pool = ProcessPoolExecutor(min(workers, len(jobs)), context, _start, (setting,))
         try:
             waiting = [pool.submit(_work, n, *job) for n, job in enumerate(jobs)]
@@ -118,6 +128,9 @@ def evaluate_all(
                 "run again, it resumes; if memory is short give --workers 1",
             ) from None
         finally:
-            for process in list((pool._processes or {}).values()):
+            # Whoever stops early should not wait for work that nobody will read.
+            processes = list((pool._processes or {}).values())
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in processes:
                 process.terminate()
-            pool.shutdown(wait=True, cancel_futures=True)
+                process.join()

@@ -69,7 +69,8 @@ def test_intersect_stiffens_more_than_the_sensor_and_disturbs_more(half, monitor
     touched = run(half, monitored, "alpha4", "intersect")
     blended = run(half, monitored, "alpha4", "volume_fraction")
     assert touched.cylinder_mm3 == pytest.approx(np.pi * 25.0)
-    assert blended.stiffened_mm3 == pytest.approx(blended.cylinder_mm3, rel=1e-3)
+    # Shares are those of the straight element; on so coarse a mesh the sensor meets curved ones.
+    assert blended.stiffened_mm3 == pytest.approx(blended.cylinder_mm3, rel=2e-3)
     assert touched.stiffened_mm3 > 5 * touched.cylinder_mm3
     assert touched.deviation.J_hat > blended.deviation.J_hat
 

@@ -31,7 +31,7 @@ def test_stations_on_an_arc_are_evenly_spaced_in_arc_length():
 def test_deviation_of_a_shift_and_of_a_shear():
     k, j = 5, 11
     base = np.zeros((k, j, 3))
-    shifted = base + [0.0, 0.3, 0.4]
+    shifted = base + np.array([0.0, 0.3, 0.4])
     found = deviation(shifted, base)
     assert found.J_hat == pytest.approx(0.5)
     assert found.J_cont == pytest.approx(0.5)

@@ -22,6 +22,14 @@ def test_writes_and_replaces(tmp_path):
     assert os.listdir(path.parent) == ["a.txt"]
 
 
+def test_a_reader_never_sees_half(tmp_path):
+    path = tmp_path / "a.txt"
+    files.write_text(path, "old and whole")
+    with path.open() as reader:
+        files.write_text(path, "new")
+        assert reader.read() == "old and whole"
+
+
 @pytest.mark.parametrize(
     ("number", "advice"),
     [
@@ -42,7 +50,7 @@ def test_failure_says_what_where_and_what_to_do(tmp_path, monkeypatch, number, a
     monkeypatch.setattr(os, "fsync", fail)
     with pytest.raises(OutputError) as caught:
         files.write_csv(path, ["x"], [(1,)])
-    assert "a.csv could not be written" in caught.value.what
+    assert "cannot write a.csv: " + os.strerror(number) == caught.value.what
     assert caught.value.where == str(path)
     assert advice in caught.value.remedy
     assert path.read_text() == "old"

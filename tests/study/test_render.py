@@ -96,6 +96,16 @@ def test_where_cut_parts_touch_each_shows_its_own_section():
         assert hue(picture(parts, camera, cut=ahead)[32, 28]) == 0
 
 
+@pytest.mark.parametrize("distance", [None, 6.0])
+def test_a_veil_is_seen_before_a_section_and_not_behind_it(distance):
+    camera = Camera((0, 0, 0), (1, 0, 0), (0, 0, 1), 4.0, distance=distance)
+    solid, cut = box((-1.5, -1, -1), (1.5, 1, 1), RED), Cut((0.5, 0, 0), (1, 0, 0))
+    for x, seen in ((0.8, True), (0.2, False)):
+        veil = box((x, -0.5, -0.5), (x + 0.01, 0.5, 0.5), BLUE, opacity=0.6, whole=True)
+        pixel = picture([solid, veil], camera, cut=cut)[32, 32]
+        assert (pixel[2] > 100) == seen
+
+
 def test_an_oblique_cut_in_perspective_stays_in_its_plane():
     solid = box((-1, -1, -1), (1, 1, 1), GREEN)
     camera = Camera((0, 0, 0), (1, 0.4, 0.3), (0, 0, 1), 5.0, distance=9.0)

@@ -1,0 +1,33 @@
+"""The command line as a user runs it: a process of its own."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+RUN = ROOT / "headless" / "run.py"
+# The main job, small: coarse elements, seven instants, two processes.
+COARSE = ("--refine", "0.5", "--times", "7", "--stations", "11")
+
+
+def command(*arguments):
+    """The words of one command line."""
+    return [sys.executable, str(RUN), *map(str, arguments)]
+
+
+def run(*arguments, **options):
+    """Run to the end; output as text."""
+    return subprocess.run(
+        command(*arguments), capture_output=True, text=True, timeout=600, stdin=subprocess.DEVNULL, **options
+    )
+
+
+def assert_clear_failure(done, status, *words):
+    """It ended with `status`, said every word, and showed no traceback."""
+    text = done.stdout + done.stderr
+    assert done.returncode == status, text
+    assert "Traceback" not in text
+    for word in words:
+        assert word in text, f"{word!r} not in:\n{text}"

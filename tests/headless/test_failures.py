@@ -1,0 +1,159 @@
+"""What goes wrong, and how it is told: message, exit status, what is kept."""
+
+import json
+import resource
+
+import pytest
+
+from mu_addon.design.parameters import load_preset, to_toml
+
+from .processes import assert_clear_failure, command, run
+
+
+def test_help_names_every_command():
+    done = run("--help")
+    for name in ("design", "simulate", "place", "presets"):
+        assert name in done.stdout
+        assert run(name, "--help").returncode == 0
+
+
+def test_help_loads_nothing_heavy():
+    import subprocess
+    import sys
+
+    words = [sys.executable, "-X", "importtime", *command("place", "--help")[1:]]
+    loaded = subprocess.run(words, capture_output=True, text=True).stderr
+    for package in ("warp", "gmsh", "scipy", "matplotlib", "manifold3d"):
+        assert f" {package}\n" not in loaded, package
+
+
+def test_presets_are_listed():
+    assert [line.split()[0] for line in run("presets").stdout.splitlines()] == [
+        "mu-0.75x",
+        "mu-1.0x",
+        "mu-1.5x",
+    ]
+
+
+def test_unknown_preset(tmp_path):
+    done = run("place", "--preset", "mu-2.0x", "--out", tmp_path / "out")
+    assert_clear_failure(done, 2, "mu-2.0x", "mu-1.0x", "what to do")
+
+
+def test_unknown_option(tmp_path):
+    assert_clear_failure(run("place", "--presett", "mu-1.0x", "--out", tmp_path), 2, "what to do", "--help")
+
+
+def test_malformed_toml_names_its_line(tmp_path):
+    file = tmp_path / "unit.toml"
+    file.write_text('format = 1\nname = "x"\nscale = = 2\n')
+    assert_clear_failure(run("design", "--unit", file, "--out", tmp_path / "out"), 2, "unit.toml", "line 3")
+
+
+def test_misspelt_parameter_names_its_line_and_the_right_word(tmp_path):
+    file = tmp_path / "unit.toml"
+    file.write_text("format = 1\nscale = 1.0\n\n[chambers]\nwal_mm = 0.7\n")
+    assert_clear_failure(run("design", "--unit", file, "--out", tmp_path / "out"), 2, "line 5", "wall_mm")
+
+
+def test_impossible_geometry_names_the_largest_wall(tmp_path):
+    file = tmp_path / "unit.toml"
+    file.write_text(
+        to_toml(load_preset("mu-1.0x"), comments=False).replace("wall_mm = 0.6", "wall_mm = 2.5", 1)
+    )
+    done = run("design", "--unit", file, "--out", tmp_path / "out")
+    # a (a + b) / (2 (R - r)) = 3.75 x 6.25 / 12.5 mm
+    assert_clear_failure(done, 2, "wall", "1.87", "curvature")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("time_s,pressure_kPa\n0,0\n1,abc\n", ("line 3", "not a number")),
+        ("time_s,pressure_kPa\n0,0\n1,5\n1,6\n", ("line 4", "time does not increase")),
+        ("time_s,pressure_Pa\n0,0\n1,5\n", ("pressure_kPa", "line 1")),
+        ("time_s,pressure_kPa\n0,0\n1,nan\n", ("line 3", "not finite")),
+        ("time_s,pressure_kPa\n0,5\n1,6\n", ("0 kPa",)),
+        ("", ("empty",)),
+    ],
+)
+def test_unreadable_protocol_names_its_line(tmp_path, text, words):
+    file = tmp_path / "protocol.csv"
+    file.write_text(text)
+    done = run("simulate", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--protocol", file)
+    assert_clear_failure(done, 2, "protocol", *words)
+
+
+def test_missing_and_binary_protocols(tmp_path):
+    base = ("simulate", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--protocol")
+    assert_clear_failure(run(*base, tmp_path / "none.csv"), 2, "none.csv")
+    binary = tmp_path / "binary.csv"
+    binary.write_bytes(bytes(range(256)))
+    assert_clear_failure(run(*base, binary), 2, "not a text file")
+
+
+@pytest.mark.parametrize(("option", "value"), [("--times", "1"), ("--refine", "0"), ("--refine", "nan")])
+def test_numbers_out_of_range(tmp_path, option, value):
+    done = run("simulate", "--preset", "mu-1.0x", "--out", tmp_path / "out", option, value)
+    assert_clear_failure(done, 2, "what to do")
+
+
+def test_a_protocol_that_bursts_the_unit_keeps_the_states_before(tmp_path):
+    file = tmp_path / "burst.csv"
+    file.write_text("time_s,pressure_kPa\n0,0\n1,1000\n")
+    out = tmp_path / "out"
+    done = run(
+        "simulate",
+        "--preset",
+        "mu-1.0x",
+        "--out",
+        out,
+        "--protocol",
+        file,
+        "--refine",
+        "0.5",
+        "--times",
+        "51",
+    )
+    assert_clear_failure(done, 4, "no equilibrium at", "kPa", "mm", "what to do")
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["status"] == "partial"
+    assert len(summary["angle_deg"]) > 1
+    assert "This run is partial" in (out / "report.html").read_text()
+    assert (out / "model_a.pvd").exists()
+
+
+def test_a_full_disk_is_told_and_leaves_no_half_file(tmp_path):
+    """A limit on file size stands for the disk: writes fail in the same place, with an OSError."""
+    out = tmp_path / "out"
+
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
+
+    done = run("design", "--preset", "mu-1.0x", "--out", out, preexec_fn=limit)
+    assert_clear_failure(done, 5, "unit.stl", "cannot write", "what to do")
+    assert not (out / "unit.stl").exists()
+    assert not list(out.glob(".*"))
+    assert json.loads((out / "summary.json").read_text())["status"] == "partial"
+
+
+def test_a_folder_in_the_way_of_a_file(tmp_path):
+    (tmp_path / "file").write_text("mine")
+    done = run("design", "--preset", "mu-1.0x", "--out", tmp_path / "file")
+    assert_clear_failure(done, 5, "what to do")
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_an_unknown_path_is_refused_before_any_work(tmp_path):
+    done = run("design", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--path", "alpha11")
+    assert_clear_failure(done, 2, "alpha11", "alpha10")
+    assert not (tmp_path / "out" / "unit.stl").exists()
+
+
+def test_json_messages_end_with_one_terminal_message(tmp_path):
+    good = run("design", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--json")
+    messages = [json.loads(line) for line in good.stdout.splitlines()]
+    assert {m["type"] for m in messages[:-1]} == {"progress"}
+    assert messages[-1]["type"] == "result"
+    bad = run("design", "--preset", "nothing", "--out", tmp_path / "out", "--json")
+    assert json.loads(bad.stdout.splitlines()[-1])["type"] == "error"

@@ -1,0 +1,181 @@
+"""The main job on a coarse mesh: through plain Python, through bpy, interrupted and resumed."""
+
+import csv
+import json
+import signal
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as ET
+
+import meshio
+import numpy as np
+import pytest
+
+from mu_addon.design.parameters import load_preset, read_unit
+
+from .processes import COARSE, ROOT, RUN, command, run
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("place") / "out"
+    done = run("place", "--preset", "mu-1.0x", "--out", folder, *COARSE)
+    assert done.returncode == 0, done.stderr
+    return folder, done
+
+
+def rows(folder):
+    with (folder / "deviation.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_every_file_is_there(finished):
+    folder, _ = finished
+    summary = json.loads((folder / "summary.json").read_text())
+    chosen = summary["chosen"]["volume_fraction"]
+    for name in (
+        "unit.stl",
+        f"unit_{chosen}.stl",
+        "anchors.txt",
+        "mesh.vtu",
+        "model_a.pvd",
+        "angle.csv",
+        "deviation.csv",
+        "delta.npz",
+        "summary.json",
+        "report.html",
+        "study.toml",
+        "unit.toml",
+        "protocol.csv",
+        "log.ndjson",
+    ):
+        assert (folder / name).stat().st_size > 0, name
+    assert not list(folder.rglob("*.part*"))
+
+
+def test_the_terminal_shows_each_stage_and_the_answer(finished):
+    _, done = finished
+    for words in ("solid", "mesh", "Model A", "candidates: done in", "report", "volume_fraction: alpha"):
+        assert words in done.stdout + done.stderr
+
+
+def test_deviation_has_a_row_a_path_and_rule(finished):
+    folder, _ = finished
+    found = rows(folder)
+    assert list(found[0]) == ["path", "start", "length", "rule", "J_hat_mm", "J_cont_mm", "rank"]
+    assert len(found) == 20
+    for rule in ("intersect", "volume_fraction"):
+        of_rule = [row for row in found if row["rule"] == rule]
+        assert [row["path"] for row in of_rule] == [f"alpha{i}" for i in range(1, 11)]
+        J = np.array([float(row["J_hat_mm"]) for row in of_rule])
+        assert (J > 0).all()
+        assert [int(row["rank"]) for row in of_rule] == list(np.argsort(np.argsort(J)) + 1)
+
+
+def test_delta_agrees_with_the_table(finished):
+    folder, _ = finished
+    with np.load(folder / "delta.npz", allow_pickle=False) as stored:
+        delta, pressure = stored["delta_intersect_mm"], stored["pressure_kPa"]
+        assert delta.shape == (10, 7, 11)
+        np.testing.assert_allclose(pressure, [0, -20, 0, 20, 40, 20, 0])
+    J = [float(row["J_hat_mm"]) for row in rows(folder) if row["rule"] == "intersect"]
+    np.testing.assert_allclose(delta.mean(axis=(1, 2)), J, rtol=1e-8)
+
+
+def test_summary_tells_what_a_reader_needs(finished):
+    folder, _ = finished
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["status"] == "complete"
+    angle = {float(p): a for p, a in summary["angle_deg"].items()}
+    assert list(angle) == sorted(angle)
+    assert angle[-20.0] < 0 == angle[0.0] < angle[20.0] < angle[40.0]
+    for name in ("parameters", "mesh", "solver", "J_hat_mm", "J_cont_mm", "seconds", "versions", "gates"):
+        assert summary[name], name
+    assert set(summary["mesh_uncertainty_mm"]) == {"intersect", "volume_fraction"}
+    assert summary["mesh"]["inverted"] == 0
+    assert summary["solver"]["largest_relative_residual"] < 1e-8
+
+
+def test_mesh_and_motion_open_in_meshio(finished):
+    folder, _ = finished
+    mesh = meshio.read(folder / "mesh.vtu")
+    assert {block.type for block in mesh.cells} == {"tetra10"}
+    steps = ET.parse(folder / "model_a.pvd").getroot().findall("Collection/DataSet")
+    assert len(steps) == 7
+    last = meshio.read(folder / steps[4].get("file"))
+    assert np.abs(last.point_data["displacement_mm"]).max() > 1
+
+
+def test_the_folder_says_how_to_repeat_it(finished):
+    folder, _ = finished
+    assert read_unit(folder / "unit.toml") == load_preset("mu-1.0x")
+
+
+def test_the_same_run_again_takes_what_is_there(finished):
+    folder, _ = finished
+    before = (folder / "deviation.csv").read_bytes()
+    start = time.monotonic()
+    done = run("place", "--preset", "mu-1.0x", "--out", folder, *COARSE)
+    assert done.returncode == 0
+    assert (folder / "deviation.csv").read_bytes() == before
+    seconds = json.loads((folder / "summary.json").read_text())["seconds"]
+    # Not a race: nothing was computed, so the candidates take no time worth the name.
+    assert seconds["candidates"] < 0.2 * (time.monotonic() - start)
+
+
+def test_other_inputs_set_old_results_aside(finished, tmp_path):
+    folder = tmp_path / "out"
+    assert run("design", "--preset", "mu-1.0x", "--out", folder).returncode == 0
+    assert run("design", "--preset", "mu-0.75x", "--out", folder).returncode == 0
+    assert read_unit(folder / "unit.toml").scale == 0.75
+    assert read_unit(folder / "stale" / "unit.toml").scale == 1.0
+    assert (folder / "stale" / "unit.stl").exists()
+
+
+def test_one_worker_finds_the_same(finished, tmp_path):
+    folder, _ = finished
+    arguments = ("--rule", "volume_fraction", "--no-mesh-check", "--workers", "1")
+    done = run("place", "--preset", "mu-1.0x", "--out", tmp_path / "one", *COARSE, *arguments)
+    assert done.returncode == 0
+    expected = [row["J_hat_mm"] for row in rows(folder) if row["rule"] == "volume_fraction"]
+    assert [row["J_hat_mm"] for row in rows(tmp_path / "one")] == expected
+
+
+def test_interrupted_it_keeps_what_it_has_and_resumes_to_the_same_digits(finished, tmp_path):
+    folder, _ = finished
+    out = tmp_path / "out"
+    words = command("place", "--preset", "mu-1.0x", "--out", out, *COARSE)
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 300
+    while not list((out / "cache").glob("candidate-*")) and time.monotonic() < deadline:
+        assert process.poll() is None, "it ended before it could be interrupted"
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=120)
+    assert process.returncode == 130, errors
+    assert "Traceback" not in output + errors
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["status"] == "partial"
+    assert "Ctrl-C" in summary["reason"]["what"]
+    assert "This run is partial" in (out / "report.html").read_text()
+    assert (out / "unit.stl").exists()
+    assert run("place", "--preset", "mu-1.0x", "--out", out, *COARSE).returncode == 0
+    assert (out / "deviation.csv").read_bytes() == (folder / "deviation.csv").read_bytes()
+
+
+def test_it_is_the_same_inside_bpy(finished, tmp_path):
+    pytest.importorskip("bpy", reason="the bpy wheel is for Python 3.11 only")
+    folder, _ = finished
+    out = tmp_path / "out"
+    script = f"""
+import bpy, runpy, sys
+sys.argv = ["blender", "-b", "-P", {str(RUN)!r}, "--", "place", "--preset", "mu-1.0x", "--out", {str(out)!r}]
+sys.argv += {list(COARSE)!r}
+runpy.run_path({str(RUN)!r}, run_name="__main__")
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=600, cwd=ROOT.parent
+    )
+    assert done.returncode == 0, done.stderr
+    assert (out / "deviation.csv").read_bytes() == (folder / "deviation.csv").read_bytes()
