@@ -60,11 +60,13 @@ class Meridian:
             share = (p[in_cap] - end) / (cut - end)
             depth = q[in_cap, None]
             profile = np.column_stack([outer_radius(d, p[in_cap]), p[in_cap]])
-            # The core's flank: from the cavity's rim to a foot about half a cap inside the end's edge.
+            # The core's flank follows the profile, from the cavity's rim to about half a cap inside the
+            # end's edge: a straight one would cross a neck's profile under a thick cap.
+            edge = outer_radius(d, np.array([end, cut]))
             rim = under_profile(d, np.array([cut]), np.array([1.0]))[0, 0]
-            edge = float(outer_radius(d, np.array(end)))
-            foot = edge - min(max(d.wall, 0.5 * abs(cap)), 0.5 * edge)
-            flank = np.column_stack([foot + share * (rim - foot), end + share * cap])
+            widths = min(max(d.wall, 0.5 * abs(cap)), 0.5 * edge[0]), edge[1] - rim
+            width = widths[0] + share * (widths[1] - widths[0])
+            flank = np.column_stack([profile[:, 0] - width, end + share * cap])
             axis = flank * [0.0, 1.0]
             ring = profile + np.minimum(depth, 1.0) * (flank - profile)
             found[in_cap] = np.where(depth > 1.0, flank + (depth - 1.0) * (axis - flank), ring)

@@ -12,6 +12,7 @@ import numpy as np
 from ..design.anchors import Window, anchors, windows
 from ..design.export import write_nodes, write_stl
 from ..design.solid import Solid, build_solid
+from ..fem.contact import self_contact
 from ..fem.equilibrium import Equilibrium, NewtonSettings, State, rest
 from ..fem.kinematics import bending_angle_deg
 from ..fem.model import Materials, Model
@@ -168,6 +169,7 @@ class Study:
                 self._keep_partial_motion()
                 raise
             self._write_motion(self.trajectory.states)
+            self._look_for_contact(self.trajectory.states)
         states = [s for s in self.trajectory.states if s.pressure_MPa]
         self.solver = {
             "unknowns": len(model.free),
@@ -230,6 +232,30 @@ class Study:
         time, pressure = self.job.protocol.sample(self.job.times)
         reached = [(t, by_pressure[p]) for t, p in zip(time, pressure, strict=True) if p in by_pressure]
         write_trajectory(self.folder / "model_a.pvd", self.mesh, reached)
+
+    def _look_for_contact(self, states: tuple[State, ...]) -> None:
+        """Name the first pressure, on either side, at which walls have passed through each other.
+
+        Going inward from the extremes, where nearly all of it happens, as far as there is any.
+        """
+        assert self.mesh is not None
+        found: dict[str, Any] = {}
+        for side in (states, states[::-1]):
+            touching = None
+            for state in side:
+                contact = self_contact(self.mesh, state.u)
+                if contact.place is None or state.pressure_MPa == 0:
+                    break
+                touching = state, contact
+                found[f"{state.pressure_MPa * 1e3:.6g}"] = contact.share
+            if touching is not None:
+                state, contact = touching
+                place = ", ".join(f"{c:.0f}" for c in contact.place)
+                self.warn(
+                    f"From {state.pressure_MPa * 1e3:.4g} kPa on, walls of the chambers pass through each "
+                    f"other, first near ({place}) mm: nothing here resists contact, so these states are wrong."
+                )
+        self.ending.summary["self_contact_share"] = found
 
     def _keep_partial_motion(self) -> None:
         """What was found before a failure is kept; summary.json says that it is partial."""

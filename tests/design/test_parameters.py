@@ -127,7 +127,7 @@ def test_assumptions_are_listed_with_their_reasons():
     assert "chambers.cell_mm" not in listed
     changed = {a.path: a for a in assumed(Unit(chambers=Chambers(wall_mm=0.8)))}
     assert changed["chambers.wall_mm"].value == 0.8
-    assert changed["chambers.wall_mm"].reason.startswith("chosen by the user (default 0.6:")
+    assert changed["chambers.wall_mm"].reason.startswith("chosen by the user (default 0.9:")
 
 
 HEAD = "format = 1\nscale = 1.0\n"

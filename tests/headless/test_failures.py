@@ -59,7 +59,7 @@ def test_misspelt_parameter_names_its_line_and_the_right_word(tmp_path):
 def test_impossible_geometry_names_the_largest_wall(tmp_path):
     file = tmp_path / "unit.toml"
     file.write_text(
-        to_toml(load_preset("mu-1.0x"), comments=False).replace("wall_mm = 0.6", "wall_mm = 2.5", 1)
+        to_toml(load_preset("mu-1.0x"), comments=False).replace("wall_mm = 0.9", "wall_mm = 2.5", 1)
     )
     done = run("design", "--unit", file, "--out", tmp_path / "out")
     # a (a + b) / (2 (R - r)) = 3.75 x 6.25 / 12.5 mm
