@@ -110,18 +110,24 @@ class Equilibrium:
             for _ in range(s.max_backtracks):
                 trial = u.copy()
                 trial.ravel()[model.free] += length * step
+                force_t, scale_t = self._out_of_balance(trial, pressure)
+                level_t = np.linalg.norm(force_t)
+                # A residual that shrinks fast needs no other proof (it is not a number where an element
+                # is inverted), and near the solution the energy's change drowns in rounding.
+                if level_t < 0.5 * level:
+                    potential = np.nan
+                    break
+                if np.isnan(potential):
+                    potential = model.potential(u, pressure, m)
                 energy = model.potential(trial, pressure, m)
-                if np.isfinite(energy):
-                    force_t, scale_t = self._out_of_balance(trial, pressure)
-                    level_t = np.linalg.norm(force_t)
-                    # Near the solution the energy's change drowns in rounding; the residual does not.
-                    if energy <= potential + 1e-4 * length * slope or level_t < 0.5 * level:
-                        break
+                if energy <= potential + 1e-4 * length * slope:
+                    potential = energy
+                    break
                 length /= 2
             else:
                 raise ConvergenceError("the line search found no lower energy")
             stale = not definite or level_t > s.keep_factor * level
-            u, force, scale, level, potential = trial, force_t, scale_t, level_t, energy
+            u, force, scale, level = trial, force_t, scale_t, level_t
         raise ConvergenceError(f"no convergence with {factorisations} factorisations")
 
     def _out_of_balance(self, u: Array, pressure: float) -> tuple[Array, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,9 @@ class Cholesky:
     """Cholesky factor of a symmetric positive definite matrix whose lower triangle keeps one pattern."""
 
     def __init__(self, indptr: Array, indices: Array, order: Array) -> None:
+        # Read when cvxopt loads its own OpenBLAS. Its threads spin while they wait for each other on
+        # the small dense blocks here: two made Model A four times slower than one.
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         from cvxopt import cholmod, matrix, spmatrix
 
         n = len(indptr) - 1

@@ -244,16 +244,16 @@ class Study:
             touching = None
             for state in side:
                 contact = self_contact(self.mesh, state.u)
-                if contact.place is None or state.pressure_MPa == 0:
+                if not contact.share or state.pressure_MPa == 0:
                     break
                 touching = state, contact
                 found[f"{state.pressure_MPa * 1e3:.6g}"] = contact.share
             if touching is not None:
                 state, contact = touching
-                place = ", ".join(f"{c:.0f}" for c in contact.place)
                 self.warn(
                     f"From {state.pressure_MPa * 1e3:.4g} kPa on, walls of the chambers pass through each "
-                    f"other, first near ({place}) mm: nothing here resists contact, so these states are wrong."
+                    f"other, first near {contact.where} mm: nothing here resists contact, and these states "
+                    "are wrong. Thicken the wall, or keep the protocol short of this pressure."
                 )
         self.ending.summary["self_contact_share"] = found
 

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from mu_addon.errors import ConvergenceError
+from mu_addon.fem.contact import self_contact
 from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, rest
 from mu_addon.fem.factor import Cholesky, IndefiniteError, SuperLU
 from mu_addon.fem.model import Materials, Model
@@ -241,3 +242,16 @@ def test_both_factorisations_agree_and_see_indefiniteness():
             factor.factor(broken)
     np.testing.assert_allclose(*solutions, rtol=1e-9)
     np.testing.assert_allclose(model.matrix(values) @ solutions[0], b, atol=1e-9)
+
+
+def test_walls_that_pass_through_each_other_are_found():
+    """Squeeze a sphere's opposite walls toward, then past each other."""
+    mesh = bodies.sphere_octant(10, 12, 4)
+    for squeeze, expected in ((0.5, False), (0.95, False), (1.3, True)):
+        # The inner surface moves along z; at 1 it is flat, beyond it has turned inside out.
+        u = np.zeros_like(mesh.nodes)
+        u[:, 2] = -squeeze * mesh.nodes[:, 2]
+        found = self_contact(mesh, u)
+        assert (found.share > 0) == expected
+    assert found.share == pytest.approx(1.0)
+    assert np.abs(found.place).max() < 12
