@@ -101,7 +101,7 @@ def _add_simulation(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--refine", type=float, default=1.0, metavar="F", help="divides every element size (1)"
     )
-    command.add_argument("--times", type=int, default=25, metavar="K", help="samples of the protocol (25)")
+    command.add_argument("--times", type=int, default=13, metavar="K", help="samples of the protocol (13)")
     command.add_argument(
         "--mesher", choices=("auto", "gmsh", "pytetwild"), default="auto", help="who makes the mesh (auto)"
     )

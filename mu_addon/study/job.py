@@ -29,14 +29,14 @@ def _whole(low: int, high: int, what: str) -> Any:
 class Job:
     """Inputs of a study. times: samples k of the protocol; stations: j along the backbone.
 
-    The 25 samples of the grasp protocol are 0.5 s or 5 kPa apart and meet each of its corners.
+    The 13 samples of the grasp protocol are 1 s or 10 kPa apart and meet each of its corners.
     """
 
     unit: Unit
     protocol: Protocol
     mesh: MeshSettings = attrs.field(factory=MeshSettings)
     mesher: str = "auto"
-    times: int = attrs.field(default=25, validator=_whole(2, 10_001, "the number of time samples"))
+    times: int = attrs.field(default=13, validator=_whole(2, 10_001, "the number of time samples"))
     stations: int = attrs.field(default=51, validator=_whole(2, 10_001, "the number of stations"))
     rules: tuple[str, ...] = RULES
     quality: str = "interactive"
