@@ -44,6 +44,11 @@ def load_gmsh() -> Any:
             remedy="on Debian and Ubuntu: apt install libglu1-mesa (libGLU.so.1); then also "
             "libxft2, libxcursor1, libxinerama1 if it names those",
         ) from error
+    # Where its wheel was unpacked without the library, gmsh imports all the same and only warns.
+    if not hasattr(gmsh.lib, "gmshInitialize"):
+        raise GmshUnavailable(
+            "gmsh is installed without its library", remedy="install gmsh by pip into an environment of its own"
+        )
     return gmsh
 
 
