@@ -415,7 +415,7 @@ def read_unit(path: str | Path) -> Unit:
     """Unit in a TOML file; InputError gives file, line and remedy."""
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise InputError(
             f"cannot read the unit: {error.strerror or error}",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from functools import cache
 from typing import Any
 
@@ -15,6 +17,25 @@ f64 = wp.float64
 
 wp.config.log_level = wp.LOG_WARNING
 wp.config.enable_backward = False
+
+
+def start_warp() -> None:
+    """Start Warp without its notice that this machine has no NVIDIA driver, which is no fault of a run's.
+
+    The notice is written by native code straight to the process's standard error.
+    """
+    sys.stderr.flush()
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        wp.init()
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
+start_warp()
 
 
 @wp.func

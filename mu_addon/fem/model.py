@@ -11,6 +11,7 @@ import numpy as np
 import warp as wp
 from scipy import sparse
 
+from ..meshing.mesh import AXES
 from . import kernels
 from .elements import reference_gradients, triangle_shapes
 from .factor import nested_dissection
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
 
 Array = np.ndarray[Any, Any]
-
-AXES = {"x": 0, "y": 1, "z": 2}
 
 
 @attrs.frozen(eq=False)
@@ -65,7 +64,6 @@ class Model:
         device: str = "cpu",
         threads: int = 2,
     ) -> None:
-        wp.init()
         self.mesh = mesh
         self.law = law
         self.device = device
@@ -105,7 +103,7 @@ class Model:
         fixed = np.zeros((n, 3), dtype=bool) if held is None else held.copy()
         fixed[mesh.base] = True
         for axis in mesh.symmetry:
-            fixed[mesh.symmetry_nodes(axis), AXES[axis]] = True
+            fixed[mesh.symmetry_nodes(axis), AXES.index(axis)] = True
         self.free = np.nonzero(~fixed.ravel())[0]
         self._build_pattern(fixed, put)
 

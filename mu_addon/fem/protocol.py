@@ -45,7 +45,7 @@ def read_protocol(path: Path) -> Protocol:
     rows = [(i, line) for i, line in enumerate(lines, 1) if line.split("#")[0].strip()]
     if not rows:
         raise InputError("the protocol is empty", str(path), f"give the columns {', '.join(COLUMNS)}")
-    header = [name.strip() for name in next(csv.reader([rows[0][1]]))]
+    header = [name.strip() for name in next(csv.reader([rows[0][1].split("#")[0]]))]
     missing = [name for name in COLUMNS if name not in header]
     if missing:
         raise InputError(

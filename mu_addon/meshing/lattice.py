@@ -47,7 +47,8 @@ def load_gmsh() -> Any:
     # Where its wheel was unpacked without the library, gmsh imports all the same and only warns.
     if not hasattr(gmsh.lib, "gmshInitialize"):
         raise GmshUnavailable(
-            "gmsh is installed without its library", remedy="install gmsh by pip into an environment of its own"
+            "gmsh is installed without its library",
+            remedy="install gmsh by pip into an environment of its own",
         )
     return gmsh
 

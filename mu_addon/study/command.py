@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 EXAMPLE = "example: run.py place --preset mu-1.0x --out out/mu-1.0x"
 STATUSES = (
     "exit status: 0 done, 2 wrong input, 3 no mesh, 4 no equilibrium, 5 cannot write, 6 not printable, "
-    "70 fault of this program, 130 Ctrl-C"
+    "70 fault of this program, 130 Ctrl-C, 143 terminated"
 )
 
 
@@ -140,11 +140,14 @@ def _presets() -> int:
 
 def _open(options: argparse.Namespace, progress: object, ending: object) -> Study:
     from ..design.parameters import load_preset, read_unit
+    from ..errors import InputError
     from ..meshing.settings import MeshSettings
     from .job import Job, protocol_of
     from .study import Study
 
-    unit = load_preset(options.preset) if options.preset else read_unit(options.unit)
+    if not options.out.strip():
+        raise InputError("no folder was named", "--out", "give a folder for the results")
+    unit = load_preset(options.preset) if options.preset is not None else read_unit(options.unit)
     extra = {}
     if "simulate" in options.stages:
         extra = {
@@ -170,7 +173,7 @@ def _run(study: Study, options: argparse.Namespace) -> None:
     from .publish import publish
 
     # An unknown path is found out before an hour's work, not after.
-    path = window(study.job.unit, options.path) if getattr(options, "path", None) else None
+    path = window(study.job.unit, options.path) if getattr(options, "path", None) is not None else None
     study.design()
     if path is not None:
         study.design(path)

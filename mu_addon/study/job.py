@@ -15,6 +15,8 @@ from ..meshing.settings import MeshSettings
 from ..placement.inclusion import RULES
 
 GRASP = "protocols/grasp.csv"
+# The first line of study.toml, by which a study's folder is known.
+HEADER = "# The inputs of this study; unit.toml and protocol.csv beside it belong to them."
 
 
 def _whole(low: int, high: int, what: str) -> Any:
@@ -36,7 +38,7 @@ class Job:
     protocol: Protocol
     mesh: MeshSettings = attrs.field(factory=MeshSettings)
     mesher: str = "auto"
-    times: int = attrs.field(default=13, validator=_whole(2, 10_001, "the number of time samples"))
+    times: int = attrs.field(default=13, validator=_whole(2, 1001, "the number of time samples"))
     stations: int = attrs.field(default=51, validator=_whole(2, 10_001, "the number of stations"))
     rules: tuple[str, ...] = RULES
     quality: str = "interactive"
@@ -44,12 +46,21 @@ class Job:
     # Whether a second, coarser mesh is solved to tell how far the mesh moves a ranking.
     mesh_check: bool = True
 
+    def __attrs_post_init__(self) -> None:
+        _, pressure = self.protocol.sample(self.times)
+        if not pressure.any():
+            raise InputError(
+                f"none of the {self.times} samples of the protocol has any pressure",
+                "times",
+                "give more samples, or a protocol that leaves 0 kPa",
+            )
+
     def text(self) -> str:
         """study.toml: everything that decides the results (not `workers`, which does not)."""
         rules = ", ".join(f'"{rule}"' for rule in self.rules)
         mesh = attrs.asdict(self.mesh)
         lines = [
-            "# The inputs of this study; unit.toml and protocol.csv beside it belong to them.",
+            HEADER,
             "format = 1",
             'unit = "unit.toml"',
             'protocol = "protocol.csv"',
@@ -72,7 +83,7 @@ class Job:
     def protocol_text(self) -> str:
         """protocol.csv: corner points of the pressure protocol."""
         rows = zip(self.protocol.time_s, self.protocol.pressure_kPa, strict=True)
-        return "time_s,pressure_kPa\n" + "".join(f"{t:g},{p:g}\n" for t, p in rows)
+        return "time_s,pressure_kPa\n" + "".join(f"{float(t)!r},{float(p)!r}\n" for t, p in rows)
 
 
 def grasp() -> Protocol:

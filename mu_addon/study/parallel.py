@@ -1,10 +1,11 @@
-"""Many candidates on several cores: processes that share one mesh and one baseline by file."""
+"""Many candidates on several cores: processes that are each given the mesh and the baseline once."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -66,9 +67,16 @@ _evaluator: Evaluator | None = None
 
 def _start(setting: Setting) -> None:
     global _evaluator
-    # Ctrl-C reaches every process of the terminal; the parent decides what happens then.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # A parent that was killed cannot end its workers.
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     _evaluator = Evaluator(setting, threads=1)
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _work(number: int, candidate: Candidate, rule: str) -> tuple[int, Evaluation]:
@@ -83,6 +91,19 @@ def _survive_broken_pipes() -> None:
     """
     if hasattr(signal, "SIGPIPE"):
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+
+
+@contextmanager
+def _ctrl_c_ignored() -> Iterator[None]:
+    """Children born inside inherit this: Ctrl-C reaches a terminal's every process, and one decides."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before if before is not None else signal.SIG_DFL)
 
 
 @contextmanager
@@ -118,7 +139,8 @@ def evaluate_all(
         _survive_broken_pipes()
         pool = ProcessPoolExecutor(min(workers, len(jobs)), context, _start, (setting,))
         try:
-            waiting = [pool.submit(_work, n, *job) for n, job in enumerate(jobs)]
+            with _ctrl_c_ignored():
+                waiting = [pool.submit(_work, n, *job) for n, job in enumerate(jobs)]
             for done in as_completed(waiting):
                 yield done.result()
         except BrokenProcessPool:

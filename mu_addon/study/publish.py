@@ -39,7 +39,7 @@ def publish(study: Study, stopped: str = "") -> None:
     """Write report.html (and unit.png); `stopped` says why a study that is not complete stopped."""
     from .report import write_report
 
-    with study.progress.stage("report"):
+    with study.progress.stage("report", expected_s=15.0):
         versions = _versions()
         study.ending.summary["versions"] = versions
         view, pictures = _pictures(study)
@@ -175,9 +175,11 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
     if study.trajectory is not None and study.mesh is not None:
         states = study.trajectory.states
         shown = [states[0], min(states, key=lambda s: abs(s.pressure_MPa)), states[-1]]
+        shown = list({state.pressure_MPa: state for state in shown}.values())
         texts = []
         for state in shown:
-            words = f"{state.pressure_MPa * 1e3:g} kPa: {bending_angle_deg(study.mesh, state.u):.1f}°"
+            angle = bending_angle_deg(study.mesh, state.u) + 0.0
+            words = f"{state.pressure_MPa * 1e3:g} kPa: {angle:.1f}°"
             texts.append((state.u, words, f"The analysis mesh at {words}."))
         pictures += motion(study.mesh, texts)
     return side_view(parts, study.anchors, path, radius), pictures

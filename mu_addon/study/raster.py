@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import warp as wp
 
+from ..fem.kernels import start_warp
+
+start_warp()
 wp.set_module_options({"enable_backward": False})
 
 

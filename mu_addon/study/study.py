@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 import warnings
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -12,21 +14,22 @@ import numpy as np
 from ..design.anchors import Window, anchors, windows
 from ..design.export import write_nodes, write_stl
 from ..design.solid import Solid, build_solid
+from ..errors import ConvergenceError, InputError, MeshingError
 from ..fem.contact import self_contact
 from ..fem.equilibrium import Equilibrium, NewtonSettings, State, rest
 from ..fem.kinematics import bending_angle_deg
 from ..fem.model import Materials, Model
 from ..fem.trajectory import Trajectory, branches, simulate
-from ..files import make_folder, write_csv, write_npz, write_text
+from ..files import make_folder, output_error, write_csv, write_npz, write_text
 from ..meshing.mesh import LATTICE, Mesh
 from ..meshing.quality import Quality, quality
 from ..meshing.settings import MeshSettings
-from ..meshing.unit import mesh_unit
+from ..meshing.unit import MeshingWarning, mesh_unit
 from ..placement.candidates import Candidate, Evaluation, candidates
 from ..placement.deviation import deviation_of, rank
 from .cache import Cache, key
 from .ending import Ending
-from .job import Job
+from .job import HEADER, Job
 from .parallel import Setting, evaluate_all
 from .progress import Progress
 from .vtk_out import write_mesh, write_trajectory
@@ -43,10 +46,10 @@ RESULTS = (
     "deviation.csv",
     "delta.npz",
     "report.html",
+    "unit.png",
 )
 # A coarser twin of the mesh, to tell how far the mesh moves a ranking.
 COARSER = 0.75
-TWIN_PRESSURES_KPA = 3
 
 
 def materials_of(job: Job, mesh: Mesh) -> Materials:
@@ -81,6 +84,7 @@ class Study:
     def open(cls, job: Job, folder: Path, progress: Progress, ending: Ending) -> Study:
         """Make the folder a study's; results of other inputs are moved to stale/, never shown as current."""
         make_folder(folder)
+        _refuse_foreign(folder)
         texts = dict(zip(INPUTS, (job.text(), job.unit_text(), job.protocol_text()), strict=True))
         if any((folder / name).is_file() and _read(folder / name) != texts[name] for name in INPUTS):
             _set_aside(folder)
@@ -89,6 +93,9 @@ class Study:
         for name, text in texts.items():
             write_text(folder / name, text)
         ending.summary["parameters"] = attrs.asdict(job.unit)
+        ending.summary["study"] = {"times": job.times, "stations": job.stations, "rules": job.rules}
+        ending.summary["study"] |= {"mesh": attrs.asdict(job.mesh), "mesher": job.mesher}
+        study._warn_of_missed_corners()
         return study
 
     @property
@@ -116,7 +123,7 @@ class Study:
     def design(self, window: Window | None = None) -> Solid:
         """Printable solid, its STL and the lattice nodes; with a window, the unit with that waveguide."""
         name = "unit.stl" if window is None else f"unit_{window.name}.stl"
-        with self.progress.stage("solid" if window is None else f"solid with {window.name}"):
+        with self.progress.stage("solid" if window is None else f"solid with {window.name}", 3.0):
             solid = build_solid(self.job.unit, window, self.job.quality)
             write_stl(solid, self.folder / name)
             write_nodes(self.job.unit, self.folder / "anchors.txt")
@@ -151,10 +158,13 @@ class Study:
                 self.job.mesher,
                 self.cache.folder,
             )
-        for warning in caught:
+        fallback = [w for w in caught if issubclass(w.category, MeshingWarning)]
+        for warning in fallback:
             self.warn(str(warning.message))
-        arrays = {f: getattr(mesh, f) for f in fields}
-        self.cache.put("mesh", name, {**arrays, "symmetry": np.array(mesh.symmetry, dtype="U1")})
+        # A stand-in's mesh is kept by its mesher; here it would pass for the one asked for.
+        if not fallback:
+            arrays = {f: getattr(mesh, f) for f in fields}
+            self.cache.put("mesh", name, {**arrays, "symmetry": np.array(mesh.symmetry, dtype="U1")})
         return mesh
 
     def simulate(self) -> Trajectory:
@@ -184,7 +194,9 @@ class Study:
     def _model_a(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
         """Model A's trajectory on a model's mesh, load step by load step from the cache where it is there."""
         materials = materials_of(self.job, model.mesh)
-        name = key(model.mesh.hash(), materials.modulus_MPa, materials.poisson, NewtonSettings())
+        # A state's last digits depend on the pressures visited before it.
+        visited = np.unique(pressure)
+        name = key(model.mesh.hash(), materials.modulus_MPa, materials.poisson, visited, NewtonSettings())
         total = len(branches(pressure)[0])
         done = 0
 
@@ -270,12 +282,17 @@ class Study:
         jobs = [(c, rule) for rule in self.job.rules for c in every]
         setting = self._setting(self.mesh, self.trajectory)
         with self.progress.stage("candidates"):
-            for number, found in self._evaluate(setting, jobs):
+            for number, found in self._closing(setting, jobs):
                 self.evaluations[jobs[number][0].name, jobs[number][1]] = found
                 self.progress.update(len(self.evaluations) / len(jobs))
+        chosen = self._write_ranking(every)
         if self.job.mesh_check:
-            self._compare_meshes(jobs)
-        return self._write_ranking(every)
+            try:
+                self._compare_meshes(jobs)
+            except (ConvergenceError, MeshingError) as error:
+                self.warn(f"The mesh's uncertainty is not known: on a coarser mesh, {error.what}.")
+            chosen = self._write_ranking(every)
+        return chosen
 
     def _setting(self, mesh: Mesh, trajectory: Trajectory) -> Setting:
         return Setting(
@@ -287,6 +304,11 @@ class Study:
             self.job.unit.material.sensor_modulus_kPa / 1e3,
             self.job.stations,
         )
+
+    def _closing(self, setting: Setting, jobs: list[tuple[Candidate, str]]) -> Any:
+        """`_evaluate`, whose processes end with the loop over it, however it ends."""
+        with closing(self._evaluate(setting, jobs)) as found:
+            yield from found
 
     def _evaluate(self, setting: Setting, jobs: list[tuple[Candidate, str]]) -> Any:
         """Number and evaluation of each job, from the cache where it is there."""
@@ -342,11 +364,13 @@ class Study:
             trajectory = self._model_a(model, np.arange(len(chosen), dtype=float), chosen, lambda _: None)
             setting = self._setting(mesh, trajectory)
             ratio: dict[str, list[float]] = {rule: [] for rule in self.job.rules}
-            for done, (number, found) in enumerate(self._evaluate(setting, jobs), 1):
+            for done, (number, found) in enumerate(self._closing(setting, jobs), 1):
                 candidate, rule = jobs[number]
                 fine = self.evaluations[candidate.name, rule].deviation
                 same = fine.delta[instants].mean()
-                ratio[rule].append(abs(found.deviation.J_hat - same) * fine.J_hat / same)
+                # A sensor as soft as the lattice disturbs nothing, on any mesh.
+                scale = fine.J_hat / same if same else 0.0
+                ratio[rule].append(abs(found.deviation.J_hat - same) * scale)
                 self.progress.update(done / len(jobs))
         self.uncertainty_mm = {rule: max(values) for rule, values in ratio.items()}
 
@@ -376,6 +400,7 @@ class Study:
         summary |= {"chosen": chosen, "mesh_uncertainty_mm": self.uncertainty_mm}
         summary["tied_with_chosen"] = {rule: self.tied(rule, chosen[rule]) for rule in self.job.rules}
         self.ending.summary |= summary
+        self.ending.summary["warnings"] = self.warnings
         return chosen
 
     def tied(self, rule: str, chosen: str) -> list[str]:
@@ -383,6 +408,17 @@ class Study:
         J = {name: e.deviation.J_hat for (name, r), e in self.evaluations.items() if r == rule}
         limit = self.uncertainty_mm.get(rule, 0.0)
         return [name for name, value in J.items() if name != chosen and value - J[chosen] < limit]
+
+    def _warn_of_missed_corners(self) -> None:
+        """Say where uniform samples miss the protocol's extremes."""
+        corners = self.job.protocol.pressure_kPa
+        _, samples = self.job.protocol.sample(self.job.times)
+        for extreme, met in ((corners.min(), samples.min()), (corners.max(), samples.max())):
+            if abs(extreme - met) > 1e-6:
+                self.warn(
+                    f"The protocol goes to {extreme:g} kPa, but its {self.job.times} samples only to "
+                    f"{met:g} kPa: give a number of samples that meets its corners."
+                )
 
     def warn(self, text: str) -> None:
         """Tell something that the user should know, now and in the report."""
@@ -407,15 +443,29 @@ def _read(path: Path) -> str:
         return ""
 
 
-def _set_aside(folder: Path) -> None:
-    """Move an earlier run's inputs and results to stale/, replacing what was set aside before."""
-    import shutil
+def _refuse_foreign(folder: Path) -> None:
+    """Refuse a folder that holds files under our names and is no study's: they are somebody's work."""
+    if _read(folder / "study.toml").startswith(HEADER):
+        return
+    ours = [name for name in (*INPUTS, *RESULTS) if (folder / name).exists()]
+    if ours:
+        raise InputError(
+            f"the folder holds a file that is not this program's: {ours[0]}",
+            str(folder),
+            "choose a new or empty folder for the results",
+        )
 
-    stale = make_folder(folder / "stale")
-    solids = [p.name for p in folder.glob("unit_*.stl")]
-    for name in (*INPUTS, *RESULTS, *solids, "summary.json", "log.ndjson", "model_a"):
-        if (folder / name).exists():
-            target = stale / name
-            if target.is_dir():
-                shutil.rmtree(target, ignore_errors=True)
-            (folder / name).replace(target)
+
+def _set_aside(folder: Path) -> None:
+    """Move an earlier run's inputs and results to stale/, in place of what was set aside before."""
+    stale = folder / "stale"
+    solids = [p.name for p in folder.glob("unit_alpha[0-9]*.stl")]
+    try:
+        if stale.is_dir():
+            shutil.rmtree(stale)
+        stale.mkdir()
+        for name in (*INPUTS, *RESULTS, *solids, "summary.json", "log.ndjson", "model_a"):
+            if (folder / name).exists():
+                (folder / name).replace(stale / name)
+    except OSError as error:
+        raise output_error(error, stale) from error

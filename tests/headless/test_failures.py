@@ -157,3 +157,27 @@ def test_json_messages_end_with_one_terminal_message(tmp_path):
     assert messages[-1]["type"] == "result"
     bad = run("design", "--preset", "nothing", "--out", tmp_path / "out", "--json")
     assert json.loads(bad.stdout.splitlines()[-1])["type"] == "error"
+
+
+def test_a_folder_with_somebody_elses_files_is_left_alone(tmp_path):
+    (tmp_path / "unit.stl").write_text("mine")
+    assert_clear_failure(run("design", "--preset", "mu-1.0x", "--out", tmp_path), 2, "unit.stl", "what to do")
+    assert (tmp_path / "unit.stl").read_text() == "mine"
+    assert not (tmp_path / "summary.json").exists()
+
+
+@pytest.mark.parametrize("words", [("--preset", "", "--out", "x"), ("--preset", "mu-1.0x", "--out", "")])
+def test_empty_words(tmp_path, words):
+    assert_clear_failure(run("design", *words, cwd=tmp_path), 2, "what to do")
+    assert not list(tmp_path.iterdir())
+
+
+def test_samples_without_any_pressure_are_refused(tmp_path):
+    done = run("place", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--times", "2")
+    assert_clear_failure(done, 2, "none of the 2 samples")
+
+
+def test_files_from_a_windows_editor_are_read(tmp_path):
+    file = tmp_path / "unit.toml"
+    file.write_bytes(b"\xef\xbb\xbf" + to_toml(load_preset("mu-1.0x")).replace("\n", "\r\n").encode())
+    assert run("design", "--unit", file, "--out", tmp_path / "out").returncode == 0

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import pytest
 
 from mu_addon.design.parameters import load_preset, read_unit
 
+from ..study.browser import EXECUTABLE, Browser, complaints, requests
 from .processes import COARSE, ROOT, RUN, command, run
 
 
@@ -124,6 +126,19 @@ def test_the_same_run_again_takes_what_is_there(finished):
     assert seconds["candidates"] < 0.2 * (time.monotonic() - start)
 
 
+@pytest.mark.skipif(EXECUTABLE is None, reason="no chromium here")
+def test_the_report_of_a_real_run_opens_whole_in_a_browser(finished):
+    folder, _ = finished
+    with Browser() as browser:
+        browser.screen(390, 844, True)
+        browser.open(folder / "report.html")
+        images = browser.evaluate("[...document.images].map(i => i.complete && i.naturalWidth > 0)")
+        assert len(images) > 30
+        assert all(images)
+        assert complaints(browser) == []
+        assert requests(browser) == []
+
+
 def test_other_inputs_set_old_results_aside(finished, tmp_path):
     folder = tmp_path / "out"
     assert run("design", "--preset", "mu-1.0x", "--out", folder).returncode == 0
@@ -142,16 +157,49 @@ def test_one_worker_finds_the_same(finished, tmp_path):
     assert [row["J_hat_mm"] for row in rows(tmp_path / "one")] == expected
 
 
+def started(out):
+    words = command("place", "--preset", "mu-1.0x", "--out", out, *COARSE)
+    return subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+
+
+def wait_for_a_candidate(process, out):
+    deadline = time.monotonic() + 300
+    while not list((out / "cache").glob("candidate-*")) and time.monotonic() < deadline:
+        assert process.poll() is None, "it ended before it could be stopped"
+        time.sleep(0.05)
+
+
+def alive(group):
+    """Whether any process of a group still runs."""
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_killed_it_leaves_no_process_behind_and_does_not_pass_for_complete(tmp_path):
+    out = tmp_path / "out"
+    process = started(out)
+    wait_for_a_candidate(process, out)
+    process.kill()
+    process.communicate(timeout=60)
+    deadline = time.monotonic() + 60
+    while alive(process.pid) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert not alive(process.pid)
+    assert json.loads((out / "summary.json").read_text())["status"] == "running"
+
+
 def test_interrupted_it_keeps_what_it_has_and_resumes_to_the_same_digits(finished, tmp_path):
     folder, _ = finished
     out = tmp_path / "out"
-    words = command("place", "--preset", "mu-1.0x", "--out", out, *COARSE)
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 300
-    while not list((out / "cache").glob("candidate-*")) and time.monotonic() < deadline:
-        assert process.poll() is None, "it ended before it could be interrupted"
-        time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
+    process = started(out)
+    wait_for_a_candidate(process, out)
+    # As a terminal does it: to every process of the group.
+    os.killpg(process.pid, signal.SIGINT)
     output, errors = process.communicate(timeout=120)
     assert process.returncode == 130, errors
     assert "Traceback" not in output + errors
@@ -161,7 +209,13 @@ def test_interrupted_it_keeps_what_it_has_and_resumes_to_the_same_digits(finishe
     assert "This run is partial" in (out / "report.html").read_text()
     assert (out / "unit.stl").exists()
     assert run("place", "--preset", "mu-1.0x", "--out", out, *COARSE).returncode == 0
-    assert (out / "deviation.csv").read_bytes() == (folder / "deviation.csv").read_bytes()
+    assert same_delta(out, folder)
+
+
+def same_delta(one, other):
+    """Whether two runs found the same, to the last digit."""
+    with np.load(one / "delta.npz") as a, np.load(other / "delta.npz") as b:
+        return set(a.files) == set(b.files) and all(np.array_equal(a[n], b[n]) for n in a.files)
 
 
 def test_it_is_the_same_inside_bpy(finished, tmp_path):
@@ -178,4 +232,4 @@ runpy.run_path({str(RUN)!r}, run_name="__main__")
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=600, cwd=ROOT.parent
     )
     assert done.returncode == 0, done.stderr
-    assert (out / "deviation.csv").read_bytes() == (folder / "deviation.csv").read_bytes()
+    assert same_delta(out, folder)

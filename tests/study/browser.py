@@ -110,3 +110,17 @@ class Browser:
         return base64.b64decode(
             self.call("Page.printToPDF", preferCSSPageSize=True, printBackground=True)["data"]
         )
+
+
+def complaints(browser):
+    """Console messages, log entries and exceptions of the page."""
+    kinds = ("Runtime.consoleAPICalled", "Runtime.exceptionThrown", "Log.entryAdded")
+    return [event for event in browser.events if event["method"] in kinds]
+
+
+def requests(browser):
+    """Addresses asked for other than the page and what lies inside it."""
+    asked = [
+        e["params"]["request"]["url"] for e in browser.events if e["method"] == "Network.requestWillBeSent"
+    ]
+    return [url for url in asked[1:] if not url.startswith("data:")]

@@ -4,7 +4,7 @@ import pytest
 
 from mu_addon.study.report import write_report
 
-from .browser import EXECUTABLE, Browser
+from .browser import EXECUTABLE, Browser, complaints, requests
 from .report_data import results
 
 pytestmark = pytest.mark.skipif(EXECUTABLE is None, reason="no chromium here")
@@ -21,20 +21,6 @@ def report(tmp_path_factory):
 def browser():
     with Browser() as browser:
         yield browser
-
-
-def complaints(browser):
-    """Console messages, log entries and exceptions of the page."""
-    kinds = ("Runtime.consoleAPICalled", "Runtime.exceptionThrown", "Log.entryAdded")
-    return [event for event in browser.events if event["method"] in kinds]
-
-
-def requests(browser):
-    """Addresses asked for other than the page and what lies inside it."""
-    asked = [
-        e["params"]["request"]["url"] for e in browser.events if e["method"] == "Network.requestWillBeSent"
-    ]
-    return [url for url in asked[1:] if not url.startswith("data:")]
 
 
 @pytest.mark.parametrize(("width", "phone"), [(390, True), (1280, False)], ids=["phone", "desktop"])
