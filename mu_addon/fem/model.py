@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -14,7 +15,7 @@ from scipy import sparse
 from ..meshing.mesh import AXES
 from . import kernels
 from .elements import reference_gradients, triangle_shapes
-from .factor import nested_dissection
+from .factor import Cholesky, SuperLU, make_factor, nested_dissection
 from .laws import NeoHooke, mat33, parameters
 
 if TYPE_CHECKING:
@@ -146,6 +147,11 @@ class Model:
         by_node = free_nodes[nested_dissection(graph[free_nodes][:, free_nodes])]
         unknowns = number[(3 * by_node[:, None] + np.arange(3)).ravel()]
         self.pattern = Pattern(indptr, row[sorting], unknowns[unknowns >= 0])
+
+    @cached_property
+    def factor(self) -> Cholesky | SuperLU:
+        """The factorisation for tangents of this pattern, analysed once; it holds one factor at a time."""
+        return make_factor(self.pattern.indptr, self.pattern.indices, self.pattern.order)
 
     def parameters(self, materials: Materials) -> wp.array:
         """Law parameters of every element on the device."""
