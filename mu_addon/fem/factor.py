@@ -80,7 +80,10 @@ class SuperLU:
         full = lower + sparse.tril(lower, -1).T
         permuted = sparse.csc_matrix(full)[self._order][:, self._order]
         options = {"SymmetricMode": True}
-        self._lu = splu(permuted.tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options)
+        try:
+            self._lu = splu(permuted.tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options)
+        except RuntimeError as error:
+            raise IndefiniteError(str(error)) from None
         if (self._lu.U.diagonal() <= 0).any():
             raise IndefiniteError("a pivot is not positive")
         return self

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from ..design.parameters import SECTIONS
+from ..design.parameters import SECTIONS, assumed
 from ..design.quantity import describe
 from ..fem.kinematics import bending_angle_deg
 from ..files import write_bytes
@@ -110,21 +110,24 @@ def _rule_result(study: Study, rule: str) -> RuleResult:
 
 def _parameters(study: Study) -> list[Parameter]:
     unit = study.job.unit
+    reasons = {a.path: a.reason for a in assumed(unit)}
     rows = [Parameter("scale", unit.scale, "", "paper")]
     for section in SECTIONS:
         # Each section class names its table; the unit holds its values under the same name.
         values = getattr(unit, section.section)  # type: ignore[attr-defined]
         for d in describe(section):
             value = getattr(values, d.name)
-            source = d.source.removeprefix("assumed: ")
-            rows.append(Parameter(f"{section.section}.{d.name}", value, d.unit, source, d.assumed))  # type: ignore[attr-defined]
+            path = f"{section.section}.{d.name}"  # type: ignore[attr-defined]
+            rows.append(Parameter(path, value, d.unit, reasons.get(path, d.source), d.assumed))
     m, k, j = study.job.mesh, study.job.times, study.job.stations
     rows += [
         Parameter("study.times", k, "", "samples of the protocol; the paper prints none", True),
         Parameter("study.stations", j, "", "stations along the backbone; the paper prints none", True),
-        Parameter("mesh.order", m.order, "", "quadratic tetrahedra do not lock in thin walls"),
+        Parameter("mesh.order", m.order, "", "1: linear elements, which lock in thin walls; 2: quadratic"),
         Parameter("mesh.refine", m.refine, "", "divides every element size"),
-        Parameter("protocol", "piecewise linear", "", "returns to 0 kPa and rates are not printed", True),
+        Parameter(
+            "protocol", "protocol.csv", "", "between the paper's pressures, times are not printed", True
+        ),
     ]
     return rows
 

@@ -96,6 +96,8 @@ class Study:
         ending.summary["study"] = {"times": job.times, "stations": job.stations, "rules": job.rules}
         ending.summary["study"] |= {"mesh": attrs.asdict(job.mesh), "mesher": job.mesher}
         study._warn_of_missed_corners()
+        if job.mesh.order == 1:
+            study.warn("Linear elements lock in thin walls: these answers are for a quick look only.")
         return study
 
     @property

@@ -1,0 +1,59 @@
+"""Answers against the mesh: the figures that docs/mechanics.md and docs/placement.md give in full."""
+
+import numpy as np
+import pytest
+
+from mu_addon.design.anchors import anchors, windows
+from mu_addon.design.parameters import load_preset
+from mu_addon.fem.equilibrium import Equilibrium
+from mu_addon.fem.kinematics import bending_angle_deg
+from mu_addon.fem.model import Materials, Model
+from mu_addon.fem.trajectory import simulate
+from mu_addon.meshing.mesh import LATTICE
+from mu_addon.meshing.quality import element_volumes
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.unit import mesh_unit
+from mu_addon.placement.candidates import candidates, roi
+from mu_addon.placement.inclusion import stiffened_volume_mm3
+
+UNIT = load_preset("mu-1.0x")
+REFINEMENTS = (0.7, 1.0, 1.4)
+
+
+@pytest.fixture(scope="module")
+def meshes():
+    return [mesh_unit(UNIT, MeshSettings(refine=refine)) for refine in REFINEMENTS]
+
+
+@pytest.mark.slow
+def test_the_default_mesh_is_within_three_percent_of_the_finest(meshes):
+    """Tip angle at -20, 20 and 40 kPa on three refinements; the default is the middle one."""
+    found = []
+    m = UNIT.material
+    for mesh in meshes:
+        lattice = mesh.region == LATTICE
+        materials = Materials(
+            np.where(lattice, m.lattice_modulus_kPa, m.membrane_modulus_kPa) / 1e3,
+            np.where(lattice, m.lattice_poisson, m.membrane_poisson),
+        )
+        pressure = np.array([0.0, -10, -20, 0, 10, 20, 30, 40])
+        path = simulate(Equilibrium(Model(mesh), materials), np.arange(8.0), pressure)
+        angle = {round(s.pressure_MPa * 1e3): bending_angle_deg(mesh, s.u) for s in path.states}
+        found.append([angle[p] for p in (-20, 20, 40)])
+    coarse, default, fine = np.array(found)
+    assert (np.abs(default / fine - 1) < 0.03).all()
+    assert (np.abs(default - fine) < np.abs(coarse - fine)).all()
+
+
+def test_one_rule_keeps_the_sensors_volume_on_any_mesh(meshes):
+    """And the other stiffens many times as much, by an amount that is the mesh's."""
+    longest = candidates(anchors(UNIT), windows(6))[-1]
+    ratios = {"intersect": [], "volume_fraction": []}
+    for mesh in meshes:
+        volumes = element_volumes(mesh)
+        found = roi(mesh, longest, 1.0)
+        for rule, values in ratios.items():
+            values.append(2 * stiffened_volume_mm3(rule, found, volumes) / found.cylinder_volume_mm3)
+    np.testing.assert_allclose(ratios["volume_fraction"], 1.0, rtol=1e-3)
+    assert min(ratios["intersect"]) > 4
+    assert ratios["intersect"][0] > ratios["intersect"][1] > ratios["intersect"][2]
