@@ -127,7 +127,7 @@ def test_a_leak_is_caught(monkeypatch):
 
     def swollen(d, per_arc):
         polygon = cavity_polygon(d, per_arc)
-        return polygon * np.where(np.abs(polygon[:, 1:] - d.cell / 2) < 1.0, [1.06, 1.0], [1.0, 1.0])
+        return polygon * np.where(np.abs(polygon[:, 1:] - d.cell / 2) < 1.0, [1.1, 1.0], [1.0, 1.0])
 
     with pytest.raises(gates.GateError, match="gate: one cavity"):
         rebuilt(monkeypatch, cavity_polygon=swollen)
@@ -137,7 +137,7 @@ def test_a_wrong_cavity_is_caught(monkeypatch):
     from mu_addon.design.profile import cavity_polygon
 
     with pytest.raises(gates.GateError, match="gate: cavity volume"):
-        rebuilt(monkeypatch, cavity_polygon=lambda d, n: cavity_polygon(attrs.evolve(d, wall=0.9), n))
+        rebuilt(monkeypatch, cavity_polygon=lambda d, n: cavity_polygon(attrs.evolve(d, wall=0.6), n))
 
 
 def test_a_missing_strut_is_caught(monkeypatch):
