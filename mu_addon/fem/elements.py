@@ -9,29 +9,9 @@ import numpy as np
 
 from ..errors import MeshingError
 from ..meshing.mesh import TET_EDGES, TRIANGLE_EDGES
+from ..meshing.quality import shapes
 
 Array = np.ndarray[Any, Any]
-
-
-def _lagrange(barycentric: Array, edges: Array, order: int) -> Array:
-    """Lagrange shape functions, (q, nodes), at barycentric points (q, corners)."""
-    if order == 1:
-        return barycentric
-    corners = barycentric * (2 * barycentric - 1)
-    middles = 4 * barycentric[:, edges[:, 0]] * barycentric[:, edges[:, 1]]
-    return np.hstack([corners, middles])
-
-
-def _lagrange_gradient(barycentric: Array, edges: Array, order: int) -> Array:
-    """Derivatives, (q, nodes, d), by the d reference coordinates, which are barycentrics 1..d."""
-    d = barycentric.shape[1] - 1
-    corner = np.vstack([-np.ones(d), np.eye(d)])
-    if order == 1:
-        return np.broadcast_to(corner, (len(barycentric), d + 1, d)).copy()
-    corners = (4 * barycentric - 1)[:, :, None] * corner
-    i, j = edges.T
-    middles = 4 * (barycentric[:, i, None] * corner[j] + barycentric[:, j, None] * corner[i])
-    return np.concatenate([corners, middles], axis=1)
 
 
 def tet_quadrature(order: int) -> tuple[Array, Array]:
@@ -64,8 +44,7 @@ def triangle_shapes(order: int) -> tuple[Array, Array, Array]:
     """Shape functions (q, n), their reference derivatives (q, n, 2) and weights (q,) of a face."""
     points, weights = triangle_quadrature(order)
     return (
-        _lagrange(points, TRIANGLE_EDGES, order),
-        _lagrange_gradient(points, TRIANGLE_EDGES, order),
+        *shapes(points, TRIANGLE_EDGES, order),
         weights,
     )
 
@@ -85,7 +64,7 @@ def reference_gradients(nodes: Array, tets: Array) -> ReferenceGradients:
     """
     order = 1 if tets.shape[1] == 4 else 2
     points, weights = tet_quadrature(order)
-    dn = _lagrange_gradient(points, TET_EDGES, order)
+    _, dn = shapes(points, TET_EDGES, order)
     jacobian = np.einsum("mni,qnj->mqij", nodes[tets], dn)
     det = np.linalg.det(jacobian)
     if (det <= 0).any():
@@ -102,9 +81,9 @@ def reference_gradients(nodes: Array, tets: Array) -> ReferenceGradients:
 
 def shape_functions(barycentric: Array, order: int) -> Array:
     """Shape functions of a tetrahedron, (q, n), at barycentric points (q, 4)."""
-    return _lagrange(barycentric, TET_EDGES, order)
+    return shapes(barycentric, TET_EDGES, order)[0]
 
 
 def shape_gradients(barycentric: Array, order: int) -> Array:
     """Derivatives (q, n, 3) of a tetrahedron's shape functions by its reference coordinates."""
-    return _lagrange_gradient(barycentric, TET_EDGES, order)
+    return shapes(barycentric, TET_EDGES, order)[1]
