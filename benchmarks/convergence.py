@@ -20,11 +20,12 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg
 from mu_addon.fem.model import Model
 from mu_addon.fem.trajectory import simulate
+from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.study.ending import run_to_end
 from mu_addon.study.job import Job, grasp
 from mu_addon.study.progress import Progress
-from mu_addon.study.study import Study, materials_of
+from mu_addon.study.study import Study
 
 PRESSURES = np.array([0.0, -10.0, -20.0, 0.0, 10.0, 20.0, 30.0, 40.0])
 
@@ -43,7 +44,7 @@ def angles(preset, refines):
             mesh = Study(job, Path(folder), ending.progress, ending).make_mesh()
         start = time.perf_counter()
         model = Model(mesh)
-        path = simulate(Equilibrium(model, materials_of(job, mesh)), np.arange(8.0), PRESSURES)
+        path = simulate(Equilibrium(model, materials_of(job.unit, mesh)), np.arange(8.0), PRESSURES)
         found = {round(s.pressure_MPa * 1e3): bending_angle_deg(mesh, s.u) for s in path.states}
         row = " | ".join(f"{found[p]:.3f}" for p in (-20, 20, 40))
         seconds = time.perf_counter() - start

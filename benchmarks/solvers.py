@@ -17,7 +17,8 @@ from scipy import sparse
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.factor import Cholesky, SuperLU
-from mu_addon.fem.model import Materials, Model
+from mu_addon.fem.materials import Materials
+from mu_addon.fem.model import Model
 from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
@@ -32,7 +33,7 @@ def system(refine):
     lattice = mesh.region == LATTICE
     modulus = np.where(lattice, m.lattice_modulus_kPa, m.membrane_modulus_kPa) / 1e3
     poisson = np.where(lattice, m.lattice_poisson, m.membrane_poisson)
-    parameters = model.parameters(Materials(modulus, poisson))
+    parameters = model.parameters(Materials.neo_hooke(modulus, poisson))
     return model, model.tangent(np.zeros_like(mesh.nodes), 1e-3, parameters)
 
 

@@ -1,58 +1,21 @@
-"""Where the walls of a deformed cavity have passed through each other, which no contact here prevents."""
+"""Where walls of a deformed body have passed through each other, which no contact here prevents."""
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 
-from ..meshing.mesh import Mesh, mirror
-from ..meshing.surface import Surface, winding_number
+from ..meshing.mesh import TET_EDGES, Mesh, boundary_faces, mirror
+from .equilibrium import State
 
 Array = np.ndarray[Any, Any]
 
-# Probe points lie this far inside the cavity, as a share of the size of their facet: the face itself, or
-# the one between its mid-edge nodes.
-_INSIDE = 0.02
-
-
-@attrs.frozen(eq=False)
-class SelfContact:
-    """Share of the cavity surface that has penetrated another part of it, and where in mm (3,), or None."""
-
-    share: float
-    place: Array | None
-
-    @property
-    def where(self) -> str:
-        """The place as text, in whole mm."""
-        return "" if self.place is None else "(" + ", ".join(f"{c:.0f}" for c in self.place) + ")"
-
-
-def self_contact(mesh: Mesh, u: Array) -> SelfContact:
-    """Find penetrated parts of the cavity surface of a mesh displaced by u (n, 3) in mm.
-
-    A point just inside the cavity, next to its wall, is wound once by the closed cavity surface;
-    next to walls that have passed through each other it is wound twice, or not at all.
-    """
-    count = len(mesh.cavity)
-    for axis in mesh.symmetry:
-        u = _mirrored(mesh, u, axis)
-        mesh = mirror(mesh, axis)
-    x = mesh.nodes + u
-    # One point a face, and on one side of each mirror plane only: the images answer alike.
-    corners = x[mesh.cavity[:count, -3:]]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    twice_area = np.linalg.norm(normal, axis=1)
-    points = corners.mean(axis=1) + _INSIDE * normal / np.sqrt(twice_area)[:, None]
-    # Cavity normals point into it; a surface that winds once around its inside has them outward.
-    winding = winding_number(Surface(x, _facets(mesh.cavity)[:, ::-1]), points)
-    wrong = np.abs(winding - 1) > 0.5
-    if not wrong.any():
-        return SelfContact(0.0, None)
-    share = twice_area[wrong].sum() / twice_area.sum()
-    return SelfContact(float(share), np.average(points[wrong], axis=0, weights=twice_area[wrong]))
+# A segment in a triangle's plane, to rounding: this share of a box of their edges.
+_FLAT = 1e-9
 
 
 def _mirrored(mesh: Mesh, u: Array, axis: str) -> Array:
@@ -70,3 +33,179 @@ def _facets(faces: Array) -> Array:
     if faces.shape[1] == 3:
         return faces
     return np.vstack([faces[:, [0, 3, 5]], faces[:, [3, 1, 4]], faces[:, [5, 4, 2]], faces[:, [3, 4, 5]]])
+
+
+@attrs.frozen(eq=False)
+class Crossing:
+    """Two pieces of a body's surface that cut each other.
+
+    place (3,): where, deformed, in mm. walls (2, 3): the middle of either piece in the undeformed body.
+    inner: whether each is a wall of the cavity. facets: how many pairs of facets cut each other.
+    """
+
+    place: Array
+    walls: Array
+    inner: tuple[bool, bool]
+    facets: int
+
+    def __str__(self) -> str:
+        names = ["inner" if i else "outer" for i in self.inner]
+        one, other = (f"the {n} wall that was at {_text(w)}" for n, w in zip(names, self.walls, strict=True))
+        return f"{one} cuts {other}, near {_text(self.place)} mm"
+
+
+def _text(place: Array) -> str:
+    return "(" + ", ".join(f"{c + 0.0:.1f}" for c in place) + ")"
+
+
+@attrs.frozen(eq=False)
+class FirstContact:
+    """The pressure in MPa at which walls first meet, between two states of a path, and where they do.
+
+    Between the states the body is taken to move along a straight line; `crossings` are those at the
+    second, `pressure_MPa` is where the first of them begins.
+    """
+
+    pressure_MPa: float
+    before_MPa: float
+    after_MPa: float
+    crossings: tuple[Crossing, ...]
+
+
+def first_contact(mesh: Mesh, states: Sequence[State]) -> FirstContact | None:
+    """The first contact of walls along a path of states, or None. The first state must be free of it."""
+    surface = _Boundary(mesh)
+    for before, after in itertools.pairwise(states):
+        found = surface.crossings(after.u)
+        if not found:
+            continue
+        low, high = 0.0, 1.0
+        while high - low > 1e-3:
+            middle = (low + high) / 2
+            if surface.crossings(before.u + middle * (after.u - before.u)):
+                high = middle
+            else:
+                low = middle
+        first = surface.crossings(before.u + high * (after.u - before.u))
+        pressure = before.pressure_MPa + high * (after.pressure_MPa - before.pressure_MPa)
+        return FirstContact(pressure, before.pressure_MPa, after.pressure_MPa, first)
+    return None
+
+
+def crossings(mesh: Mesh, u: Array) -> tuple[Crossing, ...]:
+    """Pieces of the surface, cavity and outside, of a mesh displaced by u (n, 3) in mm that cut each other.
+
+    Mirror images count. The deepest cut, that of most facets, comes first. Facets that share a node are
+    not tested against each other.
+    """
+    return _Boundary(mesh).crossings(u)
+
+
+class _Boundary:
+    """The facets of a whole body's surface, its mirror images included."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._part = mesh
+        whole = mesh
+        for axis in mesh.symmetry:
+            whole = mirror(whole, axis)
+        faces, owner = boundary_faces(whole.tets)
+        cavity = {tuple(f) for f in np.sort(whole.cavity_corners, axis=1).tolist()}
+        inner = np.array([tuple(f) in cavity for f in np.sort(faces, axis=1).tolist()])
+        own = owner < len(mesh.tets)
+        if mesh.order == 2:
+            faces = _with_middles(faces, whole.tets[owner])
+        self.facets = _facets(faces)
+        repeats = len(self.facets) // len(faces)
+        self._inner, self._own = np.tile(inner, repeats), np.tile(own, repeats)
+        self._rest = whole.nodes
+
+    def crossings(self, u: Array) -> tuple[Crossing, ...]:
+        """See the module's `crossings`."""
+        mesh = self._part
+        for axis in mesh.symmetry:
+            u = _mirrored(mesh, u, axis)
+            mesh = mirror(mesh, axis)
+        corners = (self._rest + u)[self.facets]
+        pairs = self._near(corners)
+        pairs = pairs[_cut(corners[pairs[:, 0]], corners[pairs[:, 1]])]
+        return tuple(self._crossing(corners, group) for group in self._groups(pairs))
+
+    def _near(self, corners: Array) -> Array:
+        """Pairs (p, 2) of facets with overlapping boxes and no common node, not both of them images."""
+        from scipy.spatial import cKDTree
+
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        radius = np.linalg.norm(high - low, axis=1).max() / 2
+        pairs = cKDTree((low + high) / 2).query_pairs(2 * radius, output_type="ndarray")
+        a, b = pairs.T
+        keep = (
+            (self._own[a] | self._own[b]) & (low[a] <= high[b]).all(axis=1) & (low[b] <= high[a]).all(axis=1)
+        )
+        a, b = pairs[keep].T
+        common = (self.facets[a][:, :, None] == self.facets[b][:, None, :]).any(axis=(1, 2))
+        return pairs[keep][~common]
+
+    def _groups(self, pairs: Array) -> list[Array]:
+        """Pairs (p, 2) of facets in groups, those whose facets share nodes together, the largest first."""
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+
+        if not len(pairs):
+            return []
+        nodes = self.facets[pairs].reshape(len(pairs), -1)
+        pair = np.repeat(np.arange(len(pairs)), nodes.shape[1])
+        graph = coo_matrix(
+            (np.ones(nodes.size), (pair, len(pairs) + nodes.ravel())),
+            shape=(len(pairs) + len(self._rest),) * 2,
+        )
+        _, label = connected_components(graph, directed=False)
+        groups = [pairs[label[: len(pairs)] == g] for g in np.unique(label[: len(pairs)])]
+        return sorted(groups, key=len, reverse=True)
+
+    def _crossing(self, corners: Array, pairs: Array) -> Crossing:
+        # The surface is cut along a curve; walls are told from the pair of facets nearest its middle.
+        middles = corners[pairs].mean(axis=(1, 2))
+        place = middles.mean(axis=0)
+        nearest = pairs[np.linalg.norm(middles - place, axis=1).argmin()]
+        walls = self._rest[self.facets[nearest]].mean(axis=1)
+        one, other = self._inner[nearest]
+        return Crossing(place, walls, (bool(one), bool(other)), len(pairs))
+
+
+def _with_middles(faces: Array, tets: Array) -> Array:
+    """Faces (f, 6) with their mid-edge nodes, of corner faces (f, 3) and their elements (f, 10)."""
+    number = np.zeros((4, 4), int)
+    for k, (a, b) in enumerate(TET_EDGES):
+        number[a, b] = number[b, a] = 4 + k
+    local = (tets[:, None, :4] == faces[:, :, None]).argmax(axis=2)
+    middles = number[local, np.roll(local, -1, axis=1)]
+    return np.hstack([faces, np.take_along_axis(tets, middles, axis=1)])
+
+
+def _cut(a: Array, b: Array) -> Array:
+    """Which triangles of two lists (p, 3, 3) cut each other: an edge of one goes through the other."""
+    cut = np.zeros(len(a), bool)
+    for one, other in ((a, b), (b, a)):
+        for k in range(3):
+            cut |= _pierced(one[:, k], one[:, (k + 1) % 3], other)
+    return cut
+
+
+def _pierced(start: Array, end: Array, triangle: Array) -> Array:
+    """Which segments (p, 3) to (p, 3) go through their triangle (p, 3, 3); those in its plane do not.
+
+    Source: Moeller and Trumbore, J. Graphics Tools 2 (1997) 21.
+    """
+    origin, first, second = triangle[:, 0], triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
+    along, offset = end - start, start - origin
+    across = np.cross(along, second)
+    determinant = np.einsum("pi,pi->p", first, across)
+    size = np.prod([np.linalg.norm(v, axis=1) for v in (along, first, second)], axis=0)
+    flat = np.abs(determinant) <= _FLAT * size
+    determinant = np.where(flat, 1.0, determinant)
+    s = np.einsum("pi,pi->p", offset, across) / determinant
+    turned = np.cross(offset, first)
+    t = np.einsum("pi,pi->p", along, turned) / determinant
+    share = np.einsum("pi,pi->p", second, turned) / determinant
+    return ~flat & (s >= 0) & (t >= 0) & (s + t <= 1) & (share >= 0) & (share <= 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from typing import Any
@@ -11,29 +12,12 @@ import numpy as np
 
 from ..errors import ConvergenceError
 from ..meshing.mesh import Mesh
+from .descent import Descent, NewtonSettings
 from .factor import IndefiniteError
-from .model import Materials, Model
+from .materials import Materials
+from .model import Model
 
 Array = np.ndarray[Any, Any]
-
-
-@attrs.frozen
-class NewtonSettings:
-    """When a state counts as converged, and how far the solver goes to get there."""
-
-    tolerance: float = 1e-9  # residual over the root sum of squares of all element forces
-    max_iterations: int = 60
-    max_factorisations: int = 12
-    # A factor is kept while each step with it shrinks the residual by at least this much: at 50k unknowns
-    # a factorisation costs as much as eight steps.
-    keep_factor: float = 0.7
-    max_step_MPa: float = 0.01
-    min_step_MPa: float = 1e-4
-    max_backtracks: int = 6
-    # Shares of the undeformed body's tangent added, in turn, to one that is not definite.
-    regularisation: tuple[float, ...] = (0.03, 0.3)
-    # A state may lie this much of the predicted move away from its prediction.
-    surprise: float = 0.5
 
 
 @attrs.frozen(eq=False)
@@ -82,75 +66,25 @@ class Equilibrium:
         Raises ConvergenceError where elements invert, progress stops, the equilibrium found is
         unstable, or it lies farther from the start than `reach_mm`.
         """
-        s, model, m = self.settings, self.model, self.parameters
-        start = u
-        force, scale = self._out_of_balance(u, pressure)
-        level = np.linalg.norm(force)
-        potential = model.potential(u, pressure, m)
-        if not np.isfinite(potential):
-            raise ConvergenceError("the predicted state inverts an element")
+        s = self.settings
+        search = Descent(self.model, self.parameters, pressure, u, s)
         factorisations, stale, definite = 0, True, True
-        secants: list[tuple[Array, Array]] = []
         for iteration in range(s.max_iterations + 1):
-            if level <= s.tolerance * scale:
-                if np.abs(u - start).max() > reach_mm:
+            if search.converged:
+                if np.abs(search.u - u).max() > reach_mm:
                     raise ConvergenceError("the unit snaps to a distant equilibrium (limit point)")
-                if not definite and not self._factorise(u, pressure):
+                if not definite and not self._factorise(search.u, pressure):
                     raise ConvergenceError("the equilibrium is unstable (limit point or buckling)")
-                relative = level / scale if scale else 0.0
-                return State(pressure, u, float(relative), iteration, factorisations)
+                return State(pressure, search.u, search.residual, iteration, factorisations)
             if stale:
                 if factorisations == s.max_factorisations:
                     break
-                definite = self._factorise(u, pressure)
+                definite = self._factorise(search.u, pressure)
                 factorisations += 1
-                secants = []
-            step = self._quasi_newton(force, secants)
-            slope = float(force @ step)
-            length = 1.0
-            for _ in range(s.max_backtracks):
-                trial = u.copy()
-                trial.ravel()[model.free] += length * step
-                force_t, scale_t = self._out_of_balance(trial, pressure)
-                level_t = np.linalg.norm(force_t)
-                # A residual that shrinks fast needs no other proof (it is not a number where an element
-                # is inverted), and near the solution the energy's change drowns in rounding.
-                if level_t < 0.5 * level:
-                    potential = np.nan
-                    break
-                if np.isnan(potential):
-                    potential = model.potential(u, pressure, m)
-                energy = model.potential(trial, pressure, m)
-                if energy <= potential + 1e-4 * length * slope:
-                    potential = energy
-                    break
-                length /= 2
-            else:
-                raise ConvergenceError("the line search found no lower energy")
-            stale = not definite or level_t > s.keep_factor * level
-            secants.append((length * step, force_t - force))
-            u, force, scale, level = trial, force_t, scale_t, level_t
+                search.forget()
+            shrunk = search.move(search.direction(self.factor.solve))
+            stale = not definite or shrunk > s.keep_factor
         raise ConvergenceError(f"no convergence with {factorisations} factorisations")
-
-    def _quasi_newton(self, force: Array, secants: Sequence[tuple[Array, Array]]) -> Array:
-        """Step (free unknowns) of the BFGS method from the last factor and the steps taken with it.
-
-        secants: (step, change of force) each. Source: Nocedal, Math. Comp. 35 (1980) 773.
-        """
-        usable = [(s, y, 1.0 / (s @ y)) for s, y in secants if s @ y > 0]
-        force = force.copy()
-        shares = []
-        for s, y, r in reversed(usable):
-            shares.append(r * (s @ force))
-            force -= shares[-1] * y
-        step = self.factor.solve(force)
-        for (s, y, r), share in zip(usable, reversed(shares), strict=True):
-            step += s * (share - r * (y @ step))
-        return -step
-
-    def _out_of_balance(self, u: Array, pressure: float) -> tuple[Array, float]:
-        force = self.model.residual(u, pressure, self.parameters).ravel()[self.model.free]
-        return force, self.model.force_scale()
 
     def reach(self, target: float, history: Sequence[State]) -> State:
         """The state at a pressure in MPa, from converged states before it, the last of them the nearest.
@@ -209,6 +143,13 @@ class Equilibrium:
         return found[1:]
 
     def _failure(self, last: State, pressure: float, why: str) -> ConvergenceError:
+        # It follows the branch with this module's classes.
+        from .continuation import limit_pressure
+
+        # Load steps may give up a little before the limit.
+        ahead = last.pressure_MPa + 8 * (pressure - last.pressure_MPa)
+        with contextlib.suppress(ConvergenceError):
+            why = str(limit_pressure(self, last, ahead) or why)
         least, element = self.model.smallest_jacobian(last.u, self.parameters)
         nodes = self.model.mesh.tets[element]
         place = (self.model.mesh.nodes[nodes] + last.u[nodes]).mean(axis=0)

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
+from .triangular import Lower
+
 Array = np.ndarray[Any, Any]
 
 
@@ -40,8 +42,11 @@ class Cholesky:
         n = len(indptr) - 1
         columns = np.repeat(np.arange(n), np.diff(indptr))
         cholmod.options["supernodal"] = 2
+        # Only the order given, not the best of several.
+        cholmod.options["nmethods"] = 1
         self._matrix = spmatrix(1.0, matrix(indices.astype(np.int64)), matrix(columns), (n, n))
-        self._factor = cholmod.symbolic(self._matrix, p=matrix(order.astype(np.int64)))
+        self._order = matrix(order.astype(np.int64))
+        self._factor = cholmod.symbolic(self._matrix, p=self._order)
         self.size = n
 
     def factor(self, values: Array) -> Cholesky:
@@ -62,6 +67,20 @@ class Cholesky:
         x = matrix(np.asfortranarray(b if b.ndim == 2 else b[:, None]))
         cholmod.solve(self._factor, x)
         return np.array(x).reshape(b.shape) if b.ndim == 1 else np.array(x)
+
+    def lower(self) -> Lower:
+        """Hand over the factor; it must be made anew before `solve` is called again."""
+        from cvxopt import cholmod, matrix
+
+        places = matrix(np.arange(self.size, dtype=float))
+        cholmod.solve(self._factor, places, sys=7)
+        order = np.array(places).ravel().astype(np.int64)
+        # Through a memoryview, which keeps the memory that cvxopt's matrices lend.
+        columns = cholmod.getfactor(self._factor).CCS
+        indptr, indices, values = (np.asarray(memoryview(a)).ravel() for a in columns)
+        # What it leaves behind would be factorised column by column, without dense blocks.
+        self._factor = cholmod.symbolic(self._matrix, p=self._order)
+        return Lower(order, indptr, indices.astype(np.int32), values)
 
 
 class SuperLU:
@@ -92,6 +111,64 @@ class SuperLU:
         """Solve for one (n,) or several (n, k) right-hand sides."""
         x = np.empty_like(b)
         x[self._order] = self._lu.solve(np.ascontiguousarray(b[self._order]))
+        return x
+
+    def lower(self) -> Lower:
+        """The Cholesky factor that the LU of a symmetric matrix holds."""
+        order = np.empty(self.size, dtype=np.int64)
+        order[self._lu.perm_r] = self._order
+        scaled = sparse.csc_matrix(self._lu.L @ sparse.diags(np.sqrt(self._lu.U.diagonal())))
+        scaled.sort_indices()
+        return Lower(order, scaled.indptr.astype(np.int64), scaled.indices, scaled.data)
+
+
+class LDL:
+    """L D L^T of a symmetric matrix, definite or not, and how many of its eigenvalues are negative.
+
+    An LU without row exchanges of a symmetric matrix is its L D L^T, D being U's diagonal; scipy's took
+    half the time of CHOLMOD's simplicial L D L^T. Without exchanges rounding can grow, so that each
+    solution is refined against the matrix.
+    """
+
+    refinements = 3
+    tolerance = 1e-13
+
+    def __init__(self, indptr: Array, indices: Array, order: Array) -> None:
+        self._indptr, self._indices, self._order = indptr, indices, order
+        self.size = len(indptr) - 1
+        self.negative = 0
+
+    def factor(self, values: Array) -> LDL:
+        """Factorise for the values (nnz,) of the lower triangle by columns. Raises ArithmeticError."""
+        from scipy.sparse.linalg import splu
+
+        lower = sparse.csc_matrix((values, self._indices, self._indptr), shape=(self.size, self.size))
+        self._matrix = sparse.csr_matrix(lower + sparse.tril(lower, -1).T)[self._order][:, self._order]
+        try:
+            self._lu = splu(
+                self._matrix.tocsc(),
+                permc_spec="NATURAL",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError as error:
+            raise ArithmeticError(f"no L D L^T: {error}") from None
+        if not np.array_equal(self._lu.perm_r, self._lu.perm_c):
+            raise ArithmeticError("no L D L^T: a pivot vanishes")
+        self.negative = int((self._lu.U.diagonal() < 0).sum())
+        return self
+
+    def solve(self, b: Array) -> Array:
+        """Solve for one (n,) or several (n, k) right-hand sides."""
+        b = np.ascontiguousarray(b[self._order])
+        y = self._lu.solve(b)
+        for _ in range(self.refinements):
+            left = b - self._matrix @ y
+            if np.linalg.norm(left) <= self.tolerance * np.linalg.norm(b):
+                break
+            y += self._lu.solve(left)
+        x = np.empty_like(y)
+        x[self._order] = y
         return x
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 import warp as wp
 
-from .laws import mat33, parameters
+from .laws.tensors import add_dyad, add_swapped, mat33
 
 vec3 = wp.vec3d
 f64 = wp.float64
@@ -48,77 +48,186 @@ def deformation_gradient(
     return F
 
 
+@wp.kernel
+def mean_dilatation(
+    first: int,
+    u: wp.array(dtype=vec3),
+    tets: wp.array2d(dtype=int),
+    G: wp.array3d(dtype=vec3),
+    dV: wp.array2d(dtype=f64),
+    mean_J: wp.array(dtype=f64),
+    slope: wp.array2d(dtype=vec3),
+):
+    """Mean of det F over an element, and its derivatives by the nodes' displacements."""
+    e = first + wp.tid()
+    total = f64(0.0)
+    swept = f64(0.0)
+    for a in range(tets.shape[1]):
+        slope[e, a] = vec3()
+    for q in range(dV.shape[1]):
+        F = deformation_gradient(u, tets, G, e, q)
+        total += dV[e, q]
+        swept += dV[e, q] * wp.determinant(F)
+        cofactor = (dV[e, q] * wp.determinant(F)) * wp.transpose(wp.inverse(F))
+        for a in range(tets.shape[1]):
+            slope[e, a] = slope[e, a] + cofactor * G[e, q, a]
+    mean_J[e] = swept / total
+    for a in range(tets.shape[1]):
+        slope[e, a] = slope[e, a] / total
+
+
 @attrs.frozen
 class LawKernels:
-    """The three element kernels of one material law."""
+    """The element kernels of one material law; `advance` is None where it keeps no history."""
 
     energy: Any
     force: Any
     stiffness: Any
+    advance: Any
 
 
 @cache
-def law_kernels(law: Any) -> LawKernels:
-    """Compile the element kernels of a law (see laws.NeoHooke for what a law gives)."""
-    energy_of, stress_of, tangent_of = law.energy, law.stress, law.tangent
+def law_kernels(law: Any, mean: bool = False) -> LawKernels:
+    """Compile the element kernels of a law (see laws.Law for what a law gives).
+
+    Each runs over the rows of one layer; an element's first layer sets its output, later ones add to it.
+    mean: of the law's kappa/2 (J - 1)^2, the part mean_kappa (k,) takes the mean J of the element, which is
+    the three-field principle with constant pressure and dilatation, both eliminated. Source: Simo, Taylor
+    and Pister, Comput. Methods Appl. Mech. Eng. 51 (1985) 177.
+    """
+    energy_of, stress_of, tangent_of, advance_of = law.energy, law.stress, law.tangent, law.advance
+    count, history_count = len(law.parameter_names), law.history
+    size = count + history_count + 1 if history_count else count
+    vector = wp.types.vector(length=size, dtype=wp.float64)
+    bulk = law.bulk if mean else None
+
+    @wp.func
+    def parameters_at(
+        rows: wp.array2d(dtype=f64),
+        mean_kappa: wp.array(dtype=f64),
+        history: wp.array3d(dtype=f64),
+        dt: f64,
+        r: int,
+        q: int,
+    ) -> vector:
+        m = vector()
+        for i in range(wp.static(count)):
+            m[i] = rows[r, i]
+        if wp.static(history_count > 0):
+            for i in range(wp.static(history_count)):
+                m[wp.static(count) + i] = history[r, q, i]
+            m[wp.static(size - 1)] = dt
+        if wp.static(bulk is not None):
+            m[wp.static(bulk or 0)] -= mean_kappa[r]
+        return m
 
     @wp.kernel(module="unique")
     def energy(
         first: int,
+        elements: wp.array(dtype=int),
+        rows: wp.array2d(dtype=f64),
+        mean_kappa: wp.array(dtype=f64),
+        history: wp.array3d(dtype=f64),
+        weight: wp.array(dtype=f64),
+        adds: wp.array(dtype=int),
+        dt: f64,
         u: wp.array(dtype=vec3),
         tets: wp.array2d(dtype=int),
         G: wp.array3d(dtype=vec3),
         dV: wp.array2d(dtype=f64),
-        m: wp.array(dtype=parameters),
+        mean_J: wp.array(dtype=f64),
         out: wp.array(dtype=f64),
         smallest_J: wp.array(dtype=f64),
     ):
-        e = first + wp.tid()
+        r = first + wp.tid()
+        e = elements[r]
         total = f64(0.0)
+        volume = f64(0.0)
         least = f64(1.0e30)
         for q in range(dV.shape[1]):
             F = deformation_gradient(u, tets, G, e, q)
             J = wp.determinant(F)
             least = wp.min(least, J)
+            volume += dV[e, q]
             if f64(0.0) < J:
-                total += dV[e, q] * energy_of(F, m[e])
+                total += dV[e, q] * energy_of(F, parameters_at(rows, mean_kappa, history, dt, r, q))
+        if wp.static(bulk is not None):
+            growth = mean_J[e] - f64(1.0)
+            total += f64(0.5) * mean_kappa[r] * growth * growth * volume
+        total *= weight[r]
+        if adds[r] == 1:
+            total += out[e]
         out[e] = total
         smallest_J[e] = least
 
     @wp.kernel(module="unique")
     def force(
         first: int,
+        elements: wp.array(dtype=int),
+        rows: wp.array2d(dtype=f64),
+        mean_kappa: wp.array(dtype=f64),
+        history: wp.array3d(dtype=f64),
+        weight: wp.array(dtype=f64),
+        adds: wp.array(dtype=int),
+        dt: f64,
         u: wp.array(dtype=vec3),
         tets: wp.array2d(dtype=int),
         G: wp.array3d(dtype=vec3),
         dV: wp.array2d(dtype=f64),
-        m: wp.array(dtype=parameters),
+        mean_J: wp.array(dtype=f64),
+        slope: wp.array2d(dtype=vec3),
         out: wp.array2d(dtype=vec3),
     ):
-        e = first + wp.tid()
-        for a in range(tets.shape[1]):
-            out[e, a] = vec3()
+        r = first + wp.tid()
+        e = elements[r]
+        if adds[r] == 0:
+            for a in range(tets.shape[1]):
+                out[e, a] = vec3()
+        volume = f64(0.0)
         for q in range(dV.shape[1]):
-            P = dV[e, q] * stress_of(deformation_gradient(u, tets, G, e, q), m[e])
+            m = parameters_at(rows, mean_kappa, history, dt, r, q)
+            P = (weight[r] * dV[e, q]) * stress_of(deformation_gradient(u, tets, G, e, q), m)
+            volume += dV[e, q]
             for a in range(tets.shape[1]):
                 out[e, a] = out[e, a] + P * G[e, q, a]
+        if wp.static(bulk is not None):
+            pressure = mean_kappa[r] * (mean_J[e] - f64(1.0))
+            for a in range(tets.shape[1]):
+                out[e, a] = out[e, a] + (weight[r] * pressure * volume) * slope[e, a]
 
     @wp.kernel(module="unique")
     def stiffness(
         first: int,
+        elements: wp.array(dtype=int),
+        rows: wp.array2d(dtype=f64),
+        mean_kappa: wp.array(dtype=f64),
+        history: wp.array3d(dtype=f64),
+        weight: wp.array(dtype=f64),
+        adds: wp.array(dtype=int),
+        dt: f64,
         u: wp.array(dtype=vec3),
         tets: wp.array2d(dtype=int),
         G: wp.array3d(dtype=vec3),
         dV: wp.array2d(dtype=f64),
-        m: wp.array(dtype=parameters),
+        mean_J: wp.array(dtype=f64),
+        slope: wp.array2d(dtype=vec3),
         out: wp.array(dtype=mat33),
     ):
         # Blocks of node pairs a <= b, row by row; the others are their transposes.
-        e = first + wp.tid()
+        r = first + wp.tid()
+        e = elements[r]
         n = tets.shape[1]
         start = e * ((n * (n + 1)) // 2)
+        volume = f64(0.0)
         for q in range(dV.shape[1]):
-            A = dV[e, q] * tangent_of(deformation_gradient(u, tets, G, e, q), m[e])
+            volume += dV[e, q]
+            F = deformation_gradient(u, tets, G, e, q)
+            A = tangent_of(F, parameters_at(rows, mean_kappa, history, dt, r, q))
+            if wp.static(bulk is not None):
+                B = wp.transpose(wp.inverse(F))
+                pressure = mean_kappa[r] * (mean_J[e] - f64(1.0)) * wp.determinant(F)
+                A = add_swapped(add_dyad(A, pressure, B, B), -pressure, B, B)
+            A *= weight[r] * dV[e, q]
             for b in range(n):
                 g = G[e, q, b]
                 # T[i, 3 J + k] = sum_L A[iJ, kL] g_L
@@ -135,12 +244,40 @@ def law_kernels(law: Any) -> LawKernels:
                     h = G[e, q, a]
                     block = wp.matrix_from_rows(h * T0, h * T1, h * T2)
                     at = start + a * n - (a * (a - 1)) // 2 + (b - a)
-                    if q == 0:
+                    if q == 0 and adds[r] == 0:
                         out[at] = block
                     else:
                         out[at] = out[at] + block
+        if wp.static(bulk is not None):
+            for a in range(n):
+                for b in range(a, n):
+                    block = (weight[r] * mean_kappa[r] * volume) * wp.outer(slope[e, a], slope[e, b])
+                    at = start + a * n - (a * (a - 1)) // 2 + (b - a)
+                    out[at] = out[at] + block
 
-    return LawKernels(energy, force, stiffness)
+    if not history_count:
+        return LawKernels(energy, force, stiffness, None)
+
+    @wp.kernel(module="unique")
+    def advance(
+        first: int,
+        elements: wp.array(dtype=int),
+        rows: wp.array2d(dtype=f64),
+        mean_kappa: wp.array(dtype=f64),
+        history: wp.array3d(dtype=f64),
+        dt: f64,
+        u: wp.array(dtype=vec3),
+        tets: wp.array2d(dtype=int),
+        G: wp.array3d(dtype=vec3),
+    ):
+        r = first + wp.tid()
+        for q in range(history.shape[1]):
+            F = deformation_gradient(u, tets, G, elements[r], q)
+            found = advance_of(F, parameters_at(rows, mean_kappa, history, dt, r, q))
+            for i in range(wp.static(history_count)):
+                history[r, q, i] = found[i]
+
+    return LawKernels(energy, force, stiffness, advance)
 
 
 @wp.kernel

@@ -12,24 +12,57 @@ import numpy as np
 import warp as wp
 from scipy import sparse
 
+from ..errors import InputError
 from ..meshing.mesh import AXES
 from . import kernels
+from .conjugate_gradients import ConjugateGradients
 from .elements import reference_gradients, triangle_shapes
 from .factor import Cholesky, SuperLU, make_factor, nested_dissection
-from .laws import NeoHooke, mat33, parameters
+from .laws.tensors import mat33
+from .materials import Layer, Materials
 
 if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
 
 Array = np.ndarray[Any, Any]
 
+LEAST_STRAIN = 1e-5
+# With mean_dilatation, a bulk modulus up to this many shear moduli still acts point by point. Without it, a
+# wall one element thick bends 40 % too easily: one face grows, the other shrinks, and the mean sees neither.
+# Chosen by the tables in docs/locking.md.
+POINTWISE_BULK = 5.0
+
 
 @attrs.frozen(eq=False)
-class Materials:
-    """Small-strain Young's modulus in MPa and Poisson's ratio of every element, (m,) each."""
+class LayerData:
+    """A layer of materials on the device: its kernels, rows and weights, and history (k, q, h)."""
 
-    modulus_MPa: Array
-    poisson: Array
+    kernels: kernels.LawKernels
+    elements: wp.array
+    rows: wp.array
+    mean_kappa: wp.array
+    history: wp.array
+    weight: wp.array
+    adds: wp.array
+
+
+@attrs.define(eq=False)
+class MaterialData:
+    """A body's materials on the device, layer by layer, with their history.
+
+    dt_s is the step's length. least_force_N: root sum of squares of the element forces of a body strained
+    by LEAST_STRAIN, roughly; below it forces drown in the rounding of stresses.
+    """
+
+    layers: tuple[LayerData, ...]
+    least_force_N: float = 0.0
+    dt_s: float = 0.0
+
+    def forget(self) -> None:
+        """Take the materials back to the start, without history."""
+        self.dt_s = 0.0
+        for layer in self.layers:
+            layer.history.zero_()
 
 
 @attrs.frozen(eq=False)
@@ -52,30 +85,31 @@ def _lists(target: Array, count: int) -> tuple[Array, Array]:
 class Model:
     """Total Lagrangian body under follower pressure on its cavity; base fixed, mirror planes kept.
 
-    mesh: tetrahedra of order 1 or 2 in mm. law: see laws.NeoHooke. held: further supports, (n, 3) bool.
-    Displacements are (n, 3) in mm,
-    pressure in MPa, energy in mJ (N mm), forces in N. Free unknowns are numbered as in `free`.
+    mesh: tetrahedra of order 1 or 2 in mm. held: further supports, (n, 3) bool. load: dead forces on
+    the nodes, (n, 3) in N, or None. mean_dilatation, against locking of nearly incompressible bodies: the
+    part of each bulk modulus above POINTWISE_BULK shear moduli acts on the mean J of an element; every law
+    must then split the volume off. Displacements are (n, 3) in mm, pressure in MPa, energy in mJ (N mm),
+    forces in N. Free unknowns are numbered as in `free`.
     """
 
     def __init__(
         self,
         mesh: Mesh,
-        law: Any = NeoHooke,
         held: Array | None = None,
         device: str = "cpu",
         threads: int = 2,
+        mean_dilatation: bool = False,
     ) -> None:
         self.mesh = mesh
-        self.law = law
         self.device = device
         self.threads = threads
-        self._kernels = kernels.law_kernels(law)
+        self.mean_dilatation = mean_dilatation
+        self.direct = device == "cpu"
+        self.load: Array | None = None
+        self._least_force = 0.0
         reference = reference_gradients(mesh.nodes, mesh.tets)
         self.volumes = reference.volumes.sum(axis=1)
-
-        def put(a: Array, dtype: Any) -> wp.array:
-            return wp.array(np.ascontiguousarray(a), dtype=dtype, device=device)
-
+        put = self._put
         n, m, f = len(mesh.nodes), len(mesh.tets), len(mesh.cavity)
         k, kf = mesh.tets.shape[1], mesh.cavity.shape[1]
         self._tets = put(mesh.tets.astype(np.int32), int)
@@ -90,6 +124,9 @@ class Model:
         )
         self._energy = wp.empty(m, dtype=wp.float64, device=device)
         self._smallest_J = wp.empty(m, dtype=wp.float64, device=device)
+        means = m if mean_dilatation else 0
+        self._mean_J = wp.empty(means, dtype=wp.float64, device=device)
+        self._mean_slope = wp.empty((means, k), dtype=wp.vec3d, device=device)
         self._face_volume = wp.zeros(f, dtype=wp.float64, device=device)
         self._x = wp.empty(n, dtype=wp.vec3d, device=device)
         self._u = wp.empty(n, dtype=wp.vec3d, device=device)
@@ -106,9 +143,12 @@ class Model:
         for axis in mesh.symmetry:
             fixed[mesh.symmetry_nodes(axis), AXES.index(axis)] = True
         self.free = np.nonzero(~fixed.ravel())[0]
-        self._build_pattern(fixed, put)
+        self._build_pattern(fixed)
 
-    def _build_pattern(self, fixed: Array, put: Any) -> None:
+    def _put(self, a: Array, dtype: Any) -> wp.array:
+        return wp.array(np.ascontiguousarray(a), dtype=dtype, device=self.device)
+
+    def _build_pattern(self, fixed: Array) -> None:
         mesh = self.mesh
         n = len(mesh.nodes)
         ends = []
@@ -123,7 +163,7 @@ class Model:
         keys, target = np.unique(columns * n + rows, return_inverse=True)
         start, index = _lists(target, len(keys))
         index = np.where(flipped[index], -index - 1, index).astype(np.int32)
-        self._block_lists = put(start, int), put(index, int)
+        self._block_lists = self._put(start, int), self._put(index, int)
         self._block_parts = wp.zeros(len(pairs), dtype=mat33, device=self.device)
         self._blocks = wp.empty(len(keys), dtype=mat33, device=self.device)
         block_rows, block_columns = keys % n, keys // n
@@ -149,14 +189,80 @@ class Model:
         self.pattern = Pattern(indptr, row[sorting], unknowns[unknowns >= 0])
 
     @cached_property
-    def factor(self) -> Cholesky | SuperLU:
-        """The factorisation for tangents of this pattern, analysed once; it holds one factor at a time."""
-        return make_factor(self.pattern.indptr, self.pattern.indices, self.pattern.order)
+    def factor(self) -> Cholesky | SuperLU | ConjugateGradients:
+        """The solver for tangents of this pattern, analysed once; it holds one tangent at a time.
 
-    def parameters(self, materials: Materials) -> wp.array:
-        """Law parameters of every element on the device."""
-        values = self.law.parameters(materials.modulus_MPa, materials.poisson)
-        return wp.array(values, dtype=parameters, device=self.device)
+        A factorisation on the CPU, conjugate gradients on another device, or where `direct` is unset.
+        """
+        pattern = self.pattern
+        if not self.direct:
+            return ConjugateGradients(pattern.indptr, pattern.indices, pattern.order, self.device)
+        return make_factor(pattern.indptr, pattern.indices, pattern.order)
+
+    def parameters(self, materials: Materials) -> MaterialData:
+        """A body's materials on the device, without history; raises InputError where an element has none."""
+        covered = np.zeros(len(self.mesh.tets), dtype=np.int32)
+        stiffness = np.zeros(len(self.mesh.tets))
+        points = self._dV.shape[1]
+        layers = []
+        for layer in materials.layers:
+            law, k = layer.law, len(layer.elements)
+            if self.mean_dilatation and not law.split_volume:
+                raise InputError(
+                    f"{law.name}: has no volumetric part to take the mean of",
+                    "a model with mean_dilatation",
+                    "use a law of the kind W_iso + kappa/2 (J - 1)^2, or a model without",
+                )
+            layers.append(
+                LayerData(
+                    kernels.law_kernels(law, self.mean_dilatation),
+                    self._put(layer.elements, int),
+                    self._put(layer.parameters, wp.float64),
+                    self._put(self._mean_kappa(layer), wp.float64),
+                    wp.zeros((k, points, law.history), dtype=wp.float64, device=self.device),
+                    self._put(layer.weight, wp.float64),
+                    self._put(covered[layer.elements], int),
+                )
+            )
+            covered[layer.elements] = 1
+            stiffness[layer.elements] += layer.weight * law.small_strain(layer.parameters).sum(axis=1)
+        bare = np.flatnonzero(covered == 0)
+        if len(bare):
+            place = self.mesh.nodes[self.mesh.corners[bare[0]]].mean(axis=0).round(2)
+            raise InputError(
+                f"{len(bare)} of {len(covered)} elements have no material",
+                f"the first is element {bare[0]} near {tuple(place)} mm",
+                "add a layer that covers them",
+            )
+        least = LEAST_STRAIN * np.linalg.norm(stiffness * self.volumes ** (2 / 3))
+        return MaterialData(tuple(layers), float(least))
+
+    def _mean_kappa(self, layer: Layer) -> Array:
+        """Bulk modulus (k,) in MPa of a layer that acts on the mean J, 0 without mean_dilatation."""
+        if not self.mean_dilatation or layer.law.bulk is None:
+            return np.zeros(len(layer.elements))
+        mu, kappa = layer.law.small_strain(layer.parameters).T
+        return np.maximum(kappa - POINTWISE_BULK * mu, 0.0)
+
+    def commit(self, u: Array, m: MaterialData) -> None:
+        """Make a converged state, `m.dt_s` after the one before, part of the materials' history."""
+        self._place(u)
+        for layer in m.layers:
+            if layer.kernels.advance:
+                inputs = [layer.elements, layer.rows, layer.mean_kappa, layer.history, m.dt_s]
+                inputs += [self._u, self._tets, self._gradients]
+                self._launch(layer.kernels.advance, len(layer.elements), inputs)
+
+    def _launch_layers(self, kind: str, m: MaterialData, outputs: list[Any]) -> None:
+        """Run one kind of element kernel over every layer; the first to cover an element sets its output."""
+        body = [self._u, self._tets, self._gradients, self._dV]
+        if self.mean_dilatation:
+            inputs = [*body, self._mean_J, self._mean_slope]
+            self._launch(kernels.mean_dilatation, len(self.mesh.tets), inputs)
+        for layer in m.layers:
+            inputs = [layer.elements, layer.rows, layer.mean_kappa, layer.history, layer.weight, layer.adds]
+            inputs += [m.dt_s, *body, self._mean_J, *outputs]
+            self._launch(getattr(layer.kernels, kind), len(layer.elements), inputs)
 
     def _launch(self, kernel: Any, dim: int, inputs: list[Any]) -> None:
         # A CPU launch runs on one core but releases the interpreter, so slices run side by side.
@@ -176,14 +282,16 @@ class Model:
         self._u.assign(np.ascontiguousarray(u))
         self._x.assign(self.mesh.nodes + u)
 
-    def potential(self, u: Array, pressure: float, m: wp.array) -> float:
-        """Strain energy minus pressure times cavity volume, in mJ; infinite where J <= 0."""
+    def potential(self, u: Array, pressure: float, m: MaterialData) -> float:
+        """Strain energy minus the work of pressure and load, in mJ; infinite where J <= 0."""
         self._place(u)
-        inputs = [self._u, self._tets, self._gradients, self._dV, m, self._energy, self._smallest_J]
-        self._launch(self._kernels.energy, len(self.mesh.tets), inputs)
+        self._launch_layers("energy", m, [self._energy, self._smallest_J])
         if self._smallest_J.numpy().min() <= 0:
             return float("inf")
-        return float(self._energy.numpy().sum() - pressure * self._volume())
+        work = pressure * self._volume()
+        if self.load is not None:
+            work += np.einsum("ij,ij->", self.load, u)
+        return float(self._energy.numpy().sum() - work)
 
     def _volume(self) -> float:
         if len(self.mesh.cavity) == 0:
@@ -197,34 +305,37 @@ class Model:
         self._place(u)
         return self._volume()
 
-    def smallest_jacobian(self, u: Array, m: wp.array) -> tuple[float, int]:
+    def smallest_jacobian(self, u: Array, m: MaterialData) -> tuple[float, int]:
         """The smallest det F at any quadrature point, and its element."""
         self.potential(u, 0.0, m)
         values = self._smallest_J.numpy()
         return float(values.min()), int(values.argmin())
 
-    def residual(self, u: Array, pressure: float, m: wp.array) -> Array:
+    def residual(self, u: Array, pressure: float, m: MaterialData) -> Array:
         """Internal minus external forces in N, (n, 3), supports included."""
         self._place(u)
-        inputs = [self._u, self._tets, self._gradients, self._dV, m, self._element_force]
-        self._launch(self._kernels.force, len(self.mesh.tets), inputs)
+        self._least_force = m.least_force_N
+        self._launch_layers("force", m, [self._mean_slope, self._element_force])
         if len(self.mesh.cavity):
             inputs = [pressure, self._x, self._faces, *self._face_rule, 0, self._face_force]
             wp.launch(kernels.pressure_force, len(self.mesh.cavity), inputs, device=self.device)
         inputs = [self._parts, *self._node_lists, self._residual]
         wp.launch(kernels.gather_vectors, len(self.mesh.nodes), inputs, device=self.device)
-        return self._residual.numpy().copy()
+        residual: Array = self._residual.numpy().copy()
+        return residual if self.load is None else residual - self.load
 
     def force_scale(self) -> float:
-        """Root sum of squares of all element and face forces of the last residual, in N."""
-        parts = self._parts.numpy()
-        return float(np.sqrt(np.einsum("ij,ij->", parts, parts)))
+        """Root sum of squares of all element and face forces of the last residual, in N.
 
-    def tangent(self, u: Array, pressure: float, m: wp.array) -> Array:
+        Never below the materials' `least_force_N`, so that a body without load can be in equilibrium.
+        """
+        parts = self._parts.numpy()
+        return max(float(np.sqrt(np.einsum("ij,ij->", parts, parts))), self._least_force)
+
+    def tangent(self, u: Array, pressure: float, m: MaterialData) -> Array:
         """Values (nnz,) of the tangent's lower triangle by columns, in N/mm, as in `pattern`."""
         self._place(u)
-        inputs = [self._u, self._tets, self._gradients, self._dV, m, self._block_parts]
-        self._launch(self._kernels.stiffness, len(self.mesh.tets), inputs)
+        self._launch_layers("stiffness", m, [self._mean_slope, self._block_parts])
         if len(self.mesh.cavity):
             inputs = [pressure, self._x, self._faces, *self._face_rule]
             inputs += [self._element_blocks, self._block_parts]

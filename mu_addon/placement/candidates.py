@@ -7,20 +7,24 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..fem.elements import reference_gradients
 from ..fem.equilibrium import Equilibrium
 from ..fem.kinematics import Probe
-from ..fem.model import Materials, Model
-from ..fem.trajectory import Trajectory, simulate_near
+from ..fem.laws import NeoHooke
+from ..fem.materials import Materials
+from ..fem.model import Model
+from ..fem.trajectory import Trajectory, simulate
 from ..meshing.mesh import LATTICE, Mesh
 from .deviation import Deviation, centreline, deviation
-from .inclusion import Inclusion, inclusion, modulus, stiffened_volume_mm3
+from .inclusion import Inclusion, sensor_share, stiffened_volume_mm3
+from .polyline import polyline_inclusion
 
 Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)
 class Candidate:
-    """A straight run of anchors: `points` (h, 3) in mm from anchor number `start` (from 1)."""
+    """A path through `points` (h, 3) in mm; `start` is the number of its first anchor, 0 for other nodes."""
 
     name: str
     start: int
@@ -39,19 +43,23 @@ def candidates(anchors: Array, windows: Any) -> list[Candidate]:
 
 def roi(mesh: Mesh, candidate: Candidate, radius_mm: float) -> Inclusion:
     """The candidate's region of interest among the lattice elements of a mesh."""
-    return inclusion(
-        mesh.nodes[mesh.corners],
-        mesh.region == LATTICE,
-        candidate.points[0],
-        candidate.points[-1],
-        radius_mm,
-    )
+    corners, lattice = mesh.nodes[mesh.corners], mesh.region == LATTICE
+    return polyline_inclusion(corners, lattice, candidate.points, radius_mm)
 
 
-def backbone(points: Array, monitor: Probe, trajectory: Trajectory, stations: int) -> Array:
-    """Centreline (k, j, 3) in mm through the monitored points (p, 3) of a trajectory."""
-    moved = np.array([points + monitor.displacement(state.u) for state in trajectory.states])
-    return trajectory.of_time(centreline(moved, stations))
+def with_sensor(materials: Materials, share: Array, sensor_MPa: float) -> Materials:
+    """Materials with a neo-Hookean sensor in a share (m,) of every element.
+
+    Poisson's ratio stays the element's own, so that only Young's modulus differs.
+    """
+    _, poisson = materials.small_strain(len(share))
+    return materials.blended(share, NeoHooke, NeoHooke.parameters(sensor_MPa, poisson))
+
+
+def moved_points(monitored: tuple[Array, Probe], trajectory: Trajectory) -> Array:
+    """Monitored points (k, p, 3) in mm at the k instants of a trajectory."""
+    points, monitor = monitored
+    return trajectory.of_time(np.array([points + monitor.displacement(s.u) for s in trajectory.states]))
 
 
 @attrs.frozen(eq=False)
@@ -65,6 +73,29 @@ class Evaluation:
     cylinder_mm3: float
 
 
+def evaluation(
+    mesh: Mesh,
+    candidate: Candidate,
+    rule: str,
+    radius_mm: float,
+    moved: Array,
+    baseline: Array,
+    stations: int,
+) -> Evaluation:
+    """Deviation of one candidate's monitored points (k, p, 3) in mm from Model A's at the same k instants."""
+    found = roi(mesh, candidate, radius_mm)
+    # A mesh of one half holds half of the cylinder and of what it stiffens.
+    whole = 2 ** len(mesh.symmetry)
+    volumes = reference_gradients(mesh.nodes, mesh.tets).volumes.sum(axis=1)
+    return Evaluation(
+        candidate.name,
+        rule,
+        deviation(centreline(moved, stations), centreline(baseline, stations)),
+        whole * stiffened_volume_mm3(rule, found, volumes),
+        found.cylinder_volume_mm3,
+    )
+
+
 def evaluate(
     model: Model,
     materials: Materials,
@@ -76,22 +107,13 @@ def evaluate(
     sensor_MPa: float,
     stations: int,
 ) -> Evaluation:
-    """Model alpha of one candidate against Model A: same mesh, same loads, only E(x) differs.
+    """Model alpha of one candidate against Model A, alone and along its whole path from rest.
 
-    monitored: the points (p, 3) in mm of the backbone and their probe. Raises ConvergenceError.
+    This is what `sweep` must agree with, at the cost of one Model A a candidate. monitored: the points
+    (p, 3) in mm of the backbone and their probe. Raises ConvergenceError.
     """
     found = roi(model.mesh, candidate, radius_mm)
-    stiff = attrs.evolve(materials, modulus_MPa=modulus(rule, found, materials.modulus_MPa, sensor_MPa))
-    trajectory = simulate_near(Equilibrium(model, stiff), baseline)
-    difference = deviation(
-        backbone(*monitored, trajectory, stations), backbone(*monitored, baseline, stations)
-    )
-    # A mesh of one half holds half of the cylinder and of what it stiffens.
-    whole = 2 ** len(model.mesh.symmetry)
-    return Evaluation(
-        candidate.name,
-        rule,
-        difference,
-        whole * stiffened_volume_mm3(rule, found, model.volumes),
-        found.cylinder_volume_mm3,
-    )
+    stiff = with_sensor(materials, sensor_share(rule, found), sensor_MPa)
+    trajectory = simulate(Equilibrium(model, stiff), baseline.time_s, baseline.pressure_kPa)
+    moved, still = (moved_points(monitored, t) for t in (trajectory, baseline))
+    return evaluation(model.mesh, candidate, rule, radius_mm, moved, still, stations)

@@ -100,9 +100,10 @@ def cylinder_overlap(corners: Array, start: Array, end: Array, radius: float) ->
     weights = np.tile(_GAUSS[1] / 2 / _PIECES, _PIECES)
     total = np.zeros(len(near))
     for lower, upper in itertools.pairwise(heights.T):
-        for t, w in zip(at, weights, strict=True):
-            z = lower + t * (upper - lower)
-            total += w * (upper - lower) * _disc_polygon_area(_slices(tets, z), radius)
+        z = lower + at[:, None] * (upper - lower)
+        every = np.broadcast_to(tets, (len(at), *tets.shape)).reshape(-1, 4, 3)
+        area = _disc_polygon_area(_slices(every, z.ravel()), radius).reshape(z.shape)
+        total += (upper - lower) * (weights @ area)
     overlap[near] = total
     return overlap
 
@@ -142,20 +143,19 @@ def inclusion(
     return Inclusion(np.minimum(share, 1.0), radius, length)
 
 
-def modulus(rule: str, found: Inclusion, base_MPa: Array, sensor_MPa: float) -> Array:
-    """Young's modulus (m,) in MPa of every element under an inclusion rule.
+def sensor_share(rule: str, found: Inclusion) -> Array:
+    """Share (m,) of every element that becomes the sensor's material under an inclusion rule.
 
-    `intersect` (the paper's): every touched element gets E_sens. `volume_fraction`: E is blended by
-    the share of the element inside the cylinder (Voigt's upper bound).
+    `intersect` (the paper's): the whole of every touched element. `volume_fraction`: what lies inside
+    the cylinder, beside the lattice's own (Voigt's upper bound).
     """
     if rule == "intersect":
-        return np.where(found.touched, sensor_MPa, base_MPa)
+        return found.touched.astype(float)
     if rule == "volume_fraction":
-        return base_MPa + found.share * (sensor_MPa - base_MPa)
+        return found.share
     raise ValueError(f"unknown inclusion rule {rule!r}; use one of {', '.join(RULES)}")
 
 
 def stiffened_volume_mm3(rule: str, found: Inclusion, volumes: Array) -> float:
-    """Volume in mm3 that a rule gives the sensor's modulus to, blended elements by their share."""
-    weight = found.touched if rule == "intersect" else found.share
-    return float((weight * volumes).sum())
+    """Volume in mm3 that a rule gives the sensor's material to, blended elements by their share."""
+    return float((sensor_share(rule, found) * volumes).sum())

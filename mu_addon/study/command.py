@@ -72,6 +72,23 @@ def parser() -> argparse.ArgumentParser:
         action="store_false",
         help="leave out the second mesh that tells how far the mesh moves the ranking",
     )
+    place.add_argument(
+        "--paths",
+        choices=("windows", "graph"),
+        default="windows",
+        help="graph: search the whole lattice for the best path, bent ones too (windows)",
+    )
+    search = place.add_argument_group("limits of --paths graph")
+    search.add_argument(
+        "--shortest-cells", type=float, default=2.0, metavar="C", help="shortest path, in cells (2)"
+    )
+    search.add_argument(
+        "--longest-cells", type=float, default=float("inf"), metavar="C", help="longest path, in cells (any)"
+    )
+    search.add_argument("--bend-deg", type=float, default=75.0, metavar="A", help="sharpest bend (75)")
+    search.add_argument(
+        "--checks", type=int, default=100, metavar="N", help="paths solved exactly at most (100)"
+    )
     place.set_defaults(stages=("design", "simulate", "place"))
     return top
 
@@ -142,6 +159,7 @@ def _open(options: argparse.Namespace, progress: object, ending: object) -> Stud
     from ..design.parameters import load_preset, read_unit
     from ..errors import InputError
     from ..meshing.settings import MeshSettings
+    from ..placement.graph import Limits
     from .job import Job, protocol_of
     from .study import Study
 
@@ -162,6 +180,9 @@ def _open(options: argparse.Namespace, progress: object, ending: object) -> Stud
             "rules": rules,
             "workers": options.workers,
             "mesh_check": options.mesh_check,
+            "paths": options.paths,
+            "limits": Limits(options.shortest_cells, options.longest_cells, options.bend_deg),
+            "most_checks": options.checks,
         }
     protocol = protocol_of(getattr(options, "protocol", None))
     job = Job(unit=unit, protocol=protocol, quality=options.quality, **extra)
@@ -181,7 +202,12 @@ def _run(study: Study, options: argparse.Namespace) -> None:
         study.make_mesh()
         study.simulate()
     if "place" in options.stages:
+        from .graph_search import search_graph, sensitivity_map
+
         chosen = study.place()
+        sensitivity_map(study)
+        if study.job.paths == "graph":
+            search_graph(study)
         study.design(window(study.job.unit, chosen[study.headline_rule]))
     publish(study)
 
@@ -198,4 +224,11 @@ def _answer(summary: dict[str, object], folder: Path | None) -> str:
         for rule, name in chosen.items():
             equal = f", tied with {', '.join(tied[rule])}" if tied[rule] else ""  # type: ignore[index]
             lines.append(f"{rule}: {name}, J_hat {J[rule][name]:.4f} mm{equal}")  # type: ignore[index]
+    search = summary.get("search")
+    if isinstance(search, dict):
+        best = search["best"]
+        lines.append(
+            f"whole lattice, {search['rule']}: {best['name']}, J_hat {best['J_hat_mm']:.4f} mm, "
+            f"{best['length_mm']:.1f} mm long; {search['checked']} of {search['paths']} paths were solved"
+        )
     return "\n".join(lines)

@@ -12,6 +12,7 @@ from ..design.parameters import Unit, to_toml
 from ..errors import InputError
 from ..fem.protocol import Protocol, read_protocol
 from ..meshing.settings import MeshSettings
+from ..placement.graph import Limits
 from ..placement.inclusion import RULES
 
 GRASP = "protocols/grasp.csv"
@@ -45,6 +46,10 @@ class Job:
     workers: int = attrs.field(default=2, validator=_whole(1, 256, "the number of workers"))
     # Whether a second, coarser mesh is solved to tell how far the mesh moves a ranking.
     mesh_check: bool = True
+    # Which paths: the windows of anchors alone, or the whole lattice graph besides.
+    paths: str = attrs.field(default="windows", validator=attrs.validators.in_(("windows", "graph")))
+    limits: Limits = attrs.field(factory=Limits)
+    most_checks: int = attrs.field(default=100, validator=_whole(2, 100_000, "the number of checks"))
 
     def __attrs_post_init__(self) -> None:
         _, pressure = self.protocol.sample(self.times)
@@ -70,10 +75,14 @@ class Job:
             f'quality = "{self.quality}"',
             f'mesher = "{self.mesher}"',
             f"mesh_check = {str(self.mesh_check).lower()}",
+            f'paths = "{self.paths}"',
             "",
             "[mesh]",
             *(f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {v}" for k, v in mesh.items()),
         ]
+        if self.paths == "graph":
+            limits = attrs.asdict(self.limits) | {"most_checks": self.most_checks}
+            lines += ["", "[search]", *(f"{k} = {v}" for k, v in limits.items())]
         return "\n".join(lines) + "\n"
 
     def unit_text(self) -> str:

@@ -16,50 +16,46 @@ import attrs
 import numpy as np
 
 from ..errors import MuError
+from ..fem.equilibrium import State
 from ..fem.kinematics import probe
-from ..fem.model import Materials, Model
-from ..fem.trajectory import Trajectory
+from ..fem.materials import Materials
+from ..fem.model import Model
 from ..meshing.mesh import Mesh
-from ..placement.candidates import Candidate, Evaluation, evaluate
+from ..placement.candidates import Candidate, roi
+from ..placement.inclusion import sensor_share
+from ..placement.sweep import Sweep
 
 Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)
 class Setting:
-    """What all candidates of one mesh share; plain data, so that it travels to another process."""
+    """What a sweep is about; plain data, so that it travels to another process.
+
+    jobs: candidates and the inclusion rule of each; anchors (p, 3) in mm are the monitored points.
+    """
 
     mesh: Mesh
     materials: Materials
-    baseline: Trajectory
     anchors: Array
+    jobs: tuple[tuple[Candidate, str], ...]
     radius_mm: float
     sensor_MPa: float
-    stations: int
 
 
 class Evaluator:
-    """Evaluates candidates of one setting, building its model once."""
+    """Solves all jobs of a setting at one state of Model A, having built its model once."""
 
     def __init__(self, setting: Setting, threads: int) -> None:
-        self.setting = setting
-        self.model = Model(setting.mesh, threads=threads)
-        self.monitored = setting.anchors, probe(setting.mesh, setting.anchors)
+        s = setting
+        found = {c.name: roi(s.mesh, c, s.radius_mm) for c, _ in s.jobs}
+        shares = [sensor_share(rule, found[c.name]) for c, rule in s.jobs]
+        monitored = s.anchors, probe(s.mesh, s.anchors)
+        self._sweep = Sweep(Model(s.mesh, threads=threads), s.materials, monitored, shares, s.sensor_MPa)
 
-    def __call__(self, candidate: Candidate, rule: str) -> Evaluation:
-        """Evaluate one candidate under one inclusion rule. Raises ConvergenceError."""
-        s = self.setting
-        return evaluate(
-            self.model,
-            s.materials,
-            s.baseline,
-            self.monitored,
-            candidate,
-            rule,
-            s.radius_mm,
-            s.sensor_MPa,
-            s.stations,
-        )
+    def __call__(self, state: State) -> Array:
+        """Moved anchors (jobs, p, 3) in mm. Raises ConvergenceError."""
+        return self._sweep.at(state)
 
 
 _evaluator: Evaluator | None = None
@@ -79,9 +75,9 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _work(number: int, candidate: Candidate, rule: str) -> tuple[int, Evaluation]:
+def _work(number: int, state: State) -> tuple[int, Array]:
     assert _evaluator is not None
-    return number, _evaluator(candidate, rule)
+    return number, _evaluator(state)
 
 
 def _survive_broken_pipes() -> None:
@@ -122,25 +118,35 @@ def _one_thread_each() -> Iterator[None]:
                 os.environ[name] = value
 
 
-def evaluate_all(
-    setting: Setting, jobs: Sequence[tuple[Candidate, str]], workers: int
-) -> Iterator[tuple[int, Evaluation]]:
-    """Number and evaluation of each (candidate, rule) as it is finished, the same for any `workers`.
+class Sweeper:
+    """Processes that solve a setting's jobs at states of Model A; started when first needed, until closed."""
 
-    Raises the first ConvergenceError of any, and ends the other processes when the caller stops early.
-    """
-    if workers == 1 or len(jobs) < 2:
-        evaluator = Evaluator(setting, threads=1)
-        for number, (candidate, rule) in enumerate(jobs):
-            yield number, evaluator(candidate, rule)
-        return
-    context = multiprocessing.get_context("spawn")
-    with _one_thread_each():
-        _survive_broken_pipes()
-        pool = ProcessPoolExecutor(min(workers, len(jobs)), context, _start, (setting,))
+    def __init__(self, setting: Setting, workers: int) -> None:
+        self.setting, self.workers = setting, workers
+        self._alone: Evaluator | None = None
+        self._pool: ProcessPoolExecutor | None = None
+
+    def solve(self, states: Sequence[State]) -> Iterator[tuple[int, Array]]:
+        """Number of each state as it is done, and the anchors (jobs, p, 3) in mm that all jobs move there.
+
+        The same for any `workers`. Raises the first ConvergenceError of any.
+        """
+        if not states:
+            return
+        if self.workers == 1:
+            self._alone = self._alone or Evaluator(self.setting, threads=1)
+            for number, state in enumerate(states):
+                yield number, self._alone(state)
+            return
+        if self._pool is None:
+            context = multiprocessing.get_context("spawn")
+            self._pool = ProcessPoolExecutor(self.workers, context, _start, (self.setting,))
+        pool = self._pool
         try:
-            with _ctrl_c_ignored():
-                waiting = [pool.submit(_work, n, *job) for n, job in enumerate(jobs)]
+            with _one_thread_each():
+                _survive_broken_pipes()
+                with _ctrl_c_ignored():
+                    waiting = [pool.submit(_work, n, state) for n, state in enumerate(states)]
             for done in as_completed(waiting):
                 yield done.result()
         except BrokenProcessPool:
@@ -149,10 +155,13 @@ def evaluate_all(
                 "candidates",
                 "run again, it resumes; if memory is short give --workers 1",
             ) from None
-        finally:
-            # Whoever stops early should not wait for work that nobody will read.
-            processes = list((pool._processes or {}).values())
-            pool.shutdown(wait=False, cancel_futures=True)
-            for process in processes:
-                process.terminate()
-                process.join()
+
+    def close(self) -> None:
+        """End the processes, at once: whoever stops early does not wait for what nobody will read."""
+        if self._pool is None:
+            return
+        processes = list((self._pool._processes or {}).values())
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.terminate()
+            process.join()

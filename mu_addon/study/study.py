@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import warnings
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -15,22 +16,25 @@ from ..design.anchors import Window, anchors, windows
 from ..design.export import write_nodes, write_stl
 from ..design.solid import Solid, build_solid
 from ..errors import ConvergenceError, InputError, MeshingError
-from ..fem.contact import self_contact
-from ..fem.equilibrium import Equilibrium, NewtonSettings, State, rest
-from ..fem.kinematics import bending_angle_deg
-from ..fem.model import Materials, Model
+from ..fem.contact import first_contact
+from ..fem.descent import NewtonSettings
+from ..fem.equilibrium import Equilibrium, State, rest
+from ..fem.kinematics import bending_angle_deg, probe
+from ..fem.model import Model
 from ..fem.trajectory import Trajectory, branches, simulate
+from ..fem.unit import materials_of
 from ..files import make_folder, output_error, write_csv, write_npz, write_text
-from ..meshing.mesh import LATTICE, Mesh
+from ..meshing.mesh import Mesh
 from ..meshing.quality import Quality, quality
 from ..meshing.settings import MeshSettings
 from ..meshing.unit import MeshingWarning, mesh_unit
-from ..placement.candidates import Candidate, Evaluation, candidates
-from ..placement.deviation import deviation_of, rank
+from ..placement.candidates import Candidate, Evaluation, candidates, evaluation
+from ..placement.deviation import rank
+from ..placement.sampling import between, estimate, rounds
 from .cache import Cache, key
 from .ending import Ending
 from .job import HEADER, Job
-from .parallel import Setting, evaluate_all
+from .parallel import Setting, Sweeper
 from .progress import Progress
 from .vtk_out import write_mesh, write_trajectory
 
@@ -45,21 +49,15 @@ RESULTS = (
     "angle.csv",
     "deviation.csv",
     "delta.npz",
+    "sensitivity.vtu",
+    "paths.csv",
     "report.html",
     "unit.png",
 )
 # A coarser twin of the mesh, to tell how far the mesh moves a ranking.
 COARSER = 0.7
-
-
-def materials_of(job: Job, mesh: Mesh) -> Materials:
-    """Young's modulus and Poisson's ratio of every element of a unit's mesh."""
-    m = job.unit.material
-    lattice = mesh.region == LATTICE
-    return Materials(
-        np.where(lattice, m.lattice_modulus_kPa, m.membrane_modulus_kPa) / 1e3,
-        np.where(lattice, m.lattice_poisson, m.membrane_poisson),
-    )
+# Pressures between those solved are interpolated where that changes no path's J_hat by more than this.
+SAMPLING_ERROR = 0.02
 
 
 @attrs.define
@@ -140,7 +138,8 @@ class Study:
         with self.progress.stage("mesh"):
             self.mesh = self._mesh(self.job.mesh)
             self.quality = quality(self.mesh, self.job.unit)
-            write_mesh(self.folder / "mesh.vtu", self.mesh, materials_of(self.job, self.mesh).modulus_MPa)
+            modulus, _ = materials_of(self.job.unit, self.mesh).small_strain(len(self.mesh.tets))
+            write_mesh(self.folder / "mesh.vtu", self.mesh, modulus)
         self.ending.summary["mesh"] = {**attrs.asdict(self.quality), "hash": self.mesh.hash()}
         return self.mesh
 
@@ -195,10 +194,10 @@ class Study:
 
     def _model_a(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
         """Model A's trajectory on a model's mesh, load step by load step from the cache where it is there."""
-        materials = materials_of(self.job, model.mesh)
+        materials = materials_of(self.job.unit, model.mesh)
         # A state's last digits depend on the pressures visited before it.
         visited = np.unique(pressure)
-        name = key(model.mesh.hash(), materials.modulus_MPa, materials.poisson, visited, NewtonSettings())
+        name = key(model.mesh.hash(), materials.hash(), visited, NewtonSettings())
         total = len(branches(pressure)[0])
         done = 0
 
@@ -248,28 +247,24 @@ class Study:
         write_trajectory(self.folder / "model_a.pvd", self.mesh, reached)
 
     def _look_for_contact(self, states: tuple[State, ...]) -> None:
-        """Name the first pressure, on either side, at which walls have passed through each other.
-
-        Going inward from the extremes, where nearly all of it happens, as far as there is any.
-        """
+        """Name the first pressure, on either side, at which walls pass through each other, and which."""
         assert self.mesh is not None
         found: dict[str, Any] = {}
-        for side in (states, states[::-1]):
-            touching = None
-            for state in side:
-                contact = self_contact(self.mesh, state.u)
-                if not contact.share or state.pressure_MPa == 0:
-                    break
-                touching = state, contact
-                found[f"{state.pressure_MPa * 1e3:.6g}"] = contact.share
-            if touching is not None:
-                state, contact = touching
-                self.warn(
-                    f"From {state.pressure_MPa * 1e3:.4g} kPa on, walls of the chambers pass through each "
-                    f"other, first near {contact.where} mm: nothing here resists contact, and these states "
-                    "are wrong. Thicken the wall, or keep the protocol short of this pressure."
-                )
-        self.ending.summary["self_contact_share"] = found
+        for sign in (-1, 1):
+            outward = sorted(
+                (s for s in states if s.pressure_MPa * sign > 0), key=lambda s: abs(s.pressure_MPa)
+            )
+            contact = first_contact(self.mesh, [rest(self.mesh), *outward])
+            if contact is None:
+                continue
+            pressure = f"{contact.pressure_MPa * 1e3:.4g}"
+            found[pressure] = [str(c) for c in contact.crossings]
+            self.warn(
+                f"From {pressure} kPa on, walls pass through each other: {contact.crossings[0]}. Nothing "
+                "here resists contact, and the states beyond are wrong. Thicken the wall, or keep the "
+                "protocol short of this pressure."
+            )
+        self.ending.summary["walls_cross_at_kPa"] = found
 
     def _keep_partial_motion(self) -> None:
         """What was found before a failure is kept; summary.json says that it is partial."""
@@ -282,11 +277,9 @@ class Study:
         assert self.trajectory is not None
         every = candidates(self.anchors, self.windows)
         jobs = [(c, rule) for rule in self.job.rules for c in every]
-        setting = self._setting(self.mesh, self.trajectory)
         with self.progress.stage("candidates"):
-            for number, found in self._closing(setting, jobs):
-                self.evaluations[jobs[number][0].name, jobs[number][1]] = found
-                self.progress.update(len(self.evaluations) / len(jobs))
+            found = self.sweep(self.mesh, self.trajectory, jobs)
+        self.evaluations = {(e.name, e.rule): e for e in found}
         chosen = self._write_ranking(every)
         if self.job.mesh_check:
             try:
@@ -296,58 +289,70 @@ class Study:
             chosen = self._write_ranking(every)
         return chosen
 
-    def _setting(self, mesh: Mesh, trajectory: Trajectory) -> Setting:
-        return Setting(
-            mesh,
-            materials_of(self.job, mesh),
-            trajectory,
-            self.anchors,
-            self.job.unit.dimensions.inclusion_radius,
-            self.job.unit.material.sensor_modulus_kPa / 1e3,
-            self.job.stations,
-        )
-
-    def _closing(self, setting: Setting, jobs: list[tuple[Candidate, str]]) -> Any:
-        """`_evaluate`, whose processes end with the loop over it, however it ends."""
-        with closing(self._evaluate(setting, jobs)) as found:
-            yield from found
-
-    def _evaluate(self, setting: Setting, jobs: list[tuple[Candidate, str]]) -> Any:
-        """Number and evaluation of each job, from the cache where it is there."""
-        m, t = setting.materials, setting.baseline
+    def sweep(
+        self, mesh: Mesh, trajectory: Trajectory, jobs: list[tuple[Candidate, str]]
+    ) -> list[Evaluation]:
+        """Evaluation of every (candidate, rule) on a mesh against Model A, state by state from the cache."""
+        unit = self.job.unit
+        sensor = unit.material.sensor_modulus_kPa / 1e3
+        radius = unit.dimensions.inclusion_radius
+        setting = Setting(mesh, materials_of(self.job.unit, mesh), self.anchors, tuple(jobs), radius, sensor)
         shared = key(
-            setting.mesh.hash(),
-            m.modulus_MPa,
-            m.poisson,
-            t.pressure_kPa,
+            mesh.hash(),
+            setting.materials.hash(),
+            trajectory.pressure_kPa,
             NewtonSettings(),
-            setting.anchors,
-            setting.radius_mm,
-            setting.sensor_MPa,
-            setting.stations,
+            self.anchors,
+            *(part for candidate, rule in jobs for part in (candidate.points, rule)),
+            radius,
+            sensor,
         )
+        distinct = np.array([s.pressure_MPa for s in trajectory.states])
+        weight = np.bincount(trajectory.index, minlength=len(distinct))
+        monitored = self.anchors, probe(mesh, self.anchors)
+        still = np.array([self.anchors + monitored[1].displacement(s.u) for s in trajectory.states])
+        known: dict[int, Array] = {}
+        difference = np.zeros((len(distinct), len(jobs), *self.anchors.shape))
+        error = 0.0
+        with closing(Sweeper(setting, self.job.workers)) as sweeper:
+            for pair in rounds(distinct):
+                for number, points in self._solved(sweeper, shared, trajectory, pair):
+                    known[number] = points - still[number]
+                    self.progress.update(len(known) / np.count_nonzero(distinct))
+                before, difference = difference, between(distinct, known)
+                error = (
+                    estimate(difference, before, weight) if len(known) < np.count_nonzero(distinct) else 0.0
+                )
+                if error <= SAMPLING_ERROR:
+                    break
+        self.ending.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = {
+            "pressures_solved_kPa": sorted(float(distinct[n]) * 1e3 for n in known),
+            "relative_error_of_J_between": error,
+        }
+        baseline = trajectory.of_time(still)
+        every = trajectory.of_time(difference)
+        return [
+            evaluation(
+                mesh, candidate, rule, radius, baseline + every[:, number], baseline, self.job.stations
+            )
+            for number, (candidate, rule) in enumerate(jobs)
+        ]
+
+    def _solved(
+        self, sweeper: Sweeper, shared: str, trajectory: Trajectory, numbers: list[int]
+    ) -> Iterator[tuple[int, Array]]:
+        """Number of each of some states and the anchors moved by every job, from the cache where there."""
+        names = {n: key(shared, trajectory.states[n].pressure_MPa) for n in numbers}
         missing = []
-        for number, (candidate, rule) in enumerate(jobs):
-            kept = self.cache.get("candidate", key(shared, candidate.points, rule))
+        for number, name in names.items():
+            kept = self.cache.get("sweep", name)
             if kept is None:
                 missing.append(number)
             else:
-                volumes = float(kept["stiffened_mm3"]), float(kept["cylinder_mm3"])
-                yield number, Evaluation(candidate.name, rule, deviation_of(kept["delta"]), *volumes)
-        todo = [jobs[number] for number in missing]
-        for position, found in evaluate_all(setting, todo, self.job.workers):
-            number = missing[position]
-            candidate, rule = jobs[number]
-            self.cache.put(
-                "candidate",
-                key(shared, candidate.points, rule),
-                {
-                    "delta": found.deviation.delta,
-                    "stiffened_mm3": found.stiffened_mm3,
-                    "cylinder_mm3": found.cylinder_mm3,
-                },
-            )
-            yield number, found
+                yield number, kept["moved_mm"]
+        for position, points in sweeper.solve([trajectory.states[n] for n in missing]):
+            self.cache.put("sweep", names[missing[position]], {"moved_mm": points})
+            yield missing[position], points
 
     def _compare_meshes(self, jobs: list[tuple[Candidate, str]]) -> None:
         """How far a coarser mesh moves each J_hat: the most of any path, by rule.
@@ -358,22 +363,19 @@ class Study:
         assert self.trajectory is not None
         coarse = attrs.evolve(self.job.mesh, refine=self.job.mesh.refine * COARSER)
         _, pressure = self.job.protocol.sample(self.job.times)
-        chosen = telling_pressures(pressure)
+        chosen = extremes(pressure)
         instants = [int(np.flatnonzero(pressure == p)[0]) for p in chosen]
         with self.progress.stage("mesh check"):
             mesh = self._mesh(coarse)
             model = Model(mesh)
             trajectory = self._model_a(model, np.arange(len(chosen), dtype=float), chosen, lambda _: None)
-            setting = self._setting(mesh, trajectory)
             ratio: dict[str, list[float]] = {rule: [] for rule in self.job.rules}
-            for done, (number, found) in enumerate(self._closing(setting, jobs), 1):
-                candidate, rule = jobs[number]
-                fine = self.evaluations[candidate.name, rule].deviation
+            for found in self.sweep(mesh, trajectory, jobs):
+                fine = self.evaluations[found.name, found.rule].deviation
                 same = fine.delta[instants].mean()
                 # A sensor as soft as the lattice disturbs nothing, on any mesh.
                 scale = fine.J_hat / same if same else 0.0
-                ratio[rule].append(abs(found.deviation.J_hat - same) * scale)
-                self.progress.update(done / len(jobs))
+                ratio[found.rule].append(abs(found.deviation.J_hat - same) * scale)
         self.uncertainty_mm = {rule: max(values) for rule, values in ratio.items()}
 
     def _write_ranking(self, every: list[Candidate]) -> dict[str, str]:
@@ -429,7 +431,7 @@ class Study:
             self.progress.warning(text)
 
 
-def telling_pressures(pressure_kPa: Array) -> Array:
+def extremes(pressure_kPa: Array) -> Array:
     """The pressures, ascending, that stand for a protocol: its extremes, without 0."""
     found = np.unique([pressure_kPa.min(), pressure_kPa.max()])
     return found[found != 0]

@@ -32,6 +32,12 @@ def write_mesh(path: Path, mesh: Mesh, modulus_MPa: Array, displacement: Array |
     _write(path, mesh, {"displacement_mm": np.asarray(moved, np.float64)}, cells)
 
 
+def write_fields(path: Path, mesh: Mesh, fields: dict[str, Array]) -> None:
+    """Write `mesh` with its region and values (m,) an element, in single precision. Raises OutputError."""
+    cells = {name: np.asarray(values, np.float32) for name, values in fields.items()}
+    _write(path, mesh, {}, {"region": mesh.region.astype(np.int32), **cells})
+
+
 def write_trajectory(path: Path, mesh: Mesh, states: Sequence[tuple[float, State]]) -> None:
     """Write `states`, each with its time in s, to the .pvd `path` and one .vtu a pressure beside it.
 

@@ -1,11 +1,13 @@
-"""Small meshes with known answers: boxes, a hollow box, sphere octants and a quarter cylinder."""
+"""Small meshes with known answers: boxes, spheres, tubes, Cook's panel, Land's beam and ellipsoid."""
 
 from __future__ import annotations
 
 import itertools
 
+import attrs
 import numpy as np
 
+from mu_addon.fem.materials import Layer, Materials
 from mu_addon.meshing.mesh import MEMBRANE, Mesh, boundary_faces, edges_of, second_order
 
 
@@ -121,3 +123,53 @@ def cylinder_quarter(inner=10.0, outer=12.0, height=1.0, around=6, through=1, or
     faces, _ = boundary_faces(tets)
     cavity = faces[(nodes[faces][:, :, 0] == 0).all(axis=1)]
     return make(points, tets, order, cavity, symmetry=("x", "y", "z"), onto=lambda m, e: middles)
+
+
+def cook(n=8, order=2):
+    """Cook's tapered panel, 48 wide, 44 to 16 high, one cell thick; its `cavity` is the loaded edge."""
+    nodes, tets = _grid((n, n, 1), (1, 1, 1))
+    s, t, w = nodes.T
+    points = np.stack([48 * s, 44 * s + t * (44 - 28 * s), w * 48 / n], axis=1)
+    faces, _ = boundary_faces(tets)
+    loaded = faces[(s[faces] == 1).all(axis=1)]
+    return make(points, tets, order, loaded, (lambda p: p[0] == 0,))
+
+
+def cantilever(counts=(20, 1, 2), size=(10.0, 0.5, 1.0), order=2):
+    """The half y >= 0 of a beam clamped at x = 0 and pressed on its lower face z = 0."""
+    nodes, tets = _grid(counts, size)
+    faces, _ = boundary_faces(tets)
+    pressed = faces[(nodes[faces][:, :, 2] == 0).all(axis=1)]
+    return make(nodes, tets, order, pressed, (lambda p: p[0] == 0,), symmetry=("y",))
+
+
+def ventricle_quarter(around=4, through=1, order=2):
+    """A quarter of Land's truncated ellipsoid (inner half axes 7 and 17, outer 10 and 20), cut at z = 5.
+
+    A sphere octant bent: its polar angle becomes the ellipsoid's, from the apex at -z to the cut.
+    """
+    octant = sphere_octant(1.0, 2.0, around, through, order)
+    x, y, z = octant.nodes.T
+    depth = np.linalg.norm(octant.nodes, axis=1) - 1.0
+    share = np.arctan2(np.hypot(x, y), z) / (np.pi / 2)
+    short, long = 7 + 3 * depth, 17 + 3 * depth
+    polar = np.pi - share * (np.pi - np.arccos(5 / long))
+    across = np.maximum(np.hypot(x, y), 1e-30)
+    # x and y change places, for the turned z axis would otherwise turn the elements inside out.
+    nodes = np.stack(
+        [short * np.sin(polar) * y / across, short * np.sin(polar) * x / across, long * np.cos(polar)], axis=1
+    )
+    nodes[share == 0, :2] = 0.0
+    return attrs.evolve(octant, nodes=nodes, base=np.flatnonzero(z == 0), symmetry=("x", "y"))
+
+
+def uniform(mesh, modulus, poisson):
+    """One neo-Hookean material everywhere."""
+    count = len(mesh.tets)
+    return Materials.neo_hooke(np.full(count, modulus), np.full(count, poisson))
+
+
+def everywhere(mesh, law, *parameters):
+    """One law with the same parameters in every element."""
+    count = len(mesh.tets)
+    return Materials((Layer(law, np.arange(count), np.tile(np.array(parameters, float), (count, 1))),))

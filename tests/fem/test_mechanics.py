@@ -2,15 +2,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from mu_addon.errors import ConvergenceError
-from mu_addon.fem.contact import self_contact
 from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, rest
 from mu_addon.fem.factor import Cholesky, IndefiniteError, SuperLU
-from mu_addon.fem.model import Materials, Model
+from mu_addon.fem.materials import Materials
+from mu_addon.fem.model import Model
 
 from . import bodies
 
@@ -18,7 +16,7 @@ E, NU = 0.6, 0.4
 
 
 def uniform(mesh, modulus=E, poisson=NU):
-    return Materials(np.full(len(mesh.tets), modulus), np.full(len(mesh.tets), poisson))
+    return Materials.neo_hooke(np.full(len(mesh.tets), modulus), np.full(len(mesh.tets), poisson))
 
 
 def unconstrained(mesh):
@@ -125,41 +123,6 @@ def pressurise(mesh, pressure, modulus, poisson, **options):
     return model, equilibrium.path([pressure], rest(mesh))[-1]
 
 
-def test_thick_sphere_under_pressure_converges_to_the_incompressible_closed_form():
-    """p = 2 mu [(1/b + 1/(4 b^4)) - (1/a + 1/(4 a^4))], b^3 = 1 + (a^3 - 1)(A/B)^3, for a = 1.1."""
-    A, B, a, nu = 10.0, 12.0, 1.1, 0.4999
-    b = (1 + (a**3 - 1) * (A / B) ** 3) ** (1 / 3)
-    pressure = 2 * ((1 / b + 1 / (4 * b**4)) - (1 / a + 1 / (4 * a**4)))
-    errors = []
-    for around in (3, 6):
-        mesh = bodies.sphere_octant(A, B, around, through=max(1, around // 3))
-        _, state = pressurise(mesh, pressure, 2 * (1 + nu), nu, max_step_MPa=0.05)
-        inner = np.abs(np.linalg.norm(mesh.nodes, axis=1) - A) < 1e-6
-        found = np.linalg.norm((mesh.nodes + state.u)[inner], axis=1).mean() / A
-        errors.append(abs(found - a) / (a - 1))
-    assert errors[1] < 0.004
-    assert errors[1] < 0.5 * errors[0]
-
-
-def test_thick_cylinder_under_pressure_in_plane_strain():
-    """p = mu [ln(a/b) + (b^-2 - a^-2)/2], b^2 = 1 + (a^2 - 1)(A/B)^2, for a = 1.15."""
-    A, B, a, nu = 10.0, 12.0, 1.15, 0.4999
-    b = np.sqrt(1 + (a**2 - 1) * (A / B) ** 2)
-    pressure = np.log(a / b) + (b**-2 - a**-2) / 2
-    mesh = bodies.cylinder_quarter(A, B, around=10, through=2)
-    # Both ends are held in z: one by its mirror plane, the other here.
-    held = np.zeros(mesh.nodes.shape, bool)
-    held[:, 2] = mesh.nodes[:, 2] == mesh.nodes[:, 2].max()
-    model = Model(mesh, held=held)
-    settings_ = NewtonSettings(max_step_MPa=0.05)
-    equilibrium = Equilibrium(model, uniform(mesh, 2 * (1 + nu), nu), settings_)
-    state = equilibrium.path([pressure], rest(mesh))[-1]
-    radius = np.linalg.norm(mesh.nodes[:, :2], axis=1)
-    inner = np.abs(radius - A) < 1e-6
-    found = np.linalg.norm((mesh.nodes + state.u)[inner, :2], axis=1).mean() / A
-    assert found == pytest.approx(a, abs=0.003 * (a - 1) + 1e-4)
-
-
 def test_cavity_volume_of_the_undeformed_sphere():
     mesh = bodies.sphere_octant(10, 12, 4)
     model = Model(mesh)
@@ -183,47 +146,6 @@ def test_vacuum_and_pressure_move_apart():
     assert model.cavity_volume(sucked.u) < none < model.cavity_volume(blown.u)
 
 
-@settings(max_examples=10, deadline=None)
-@given(st.integers(0, 2**32 - 1))
-def test_rigid_motions_make_no_stress(seed):
-    mesh = bodies.box((1, 1, 1), order=2)
-    model, m = unconstrained(mesh)
-    rng = np.random.default_rng(seed)
-    q, r = np.linalg.qr(rng.standard_normal((3, 3)))
-    q = q * np.sign(np.diag(r))
-    q[:, 0] *= np.linalg.det(q)
-    u = mesh.nodes @ (q - np.eye(3)).T + rng.uniform(-5, 5, 3)
-    assert abs(model.potential(u, 0.0, m)) < 1e-12
-    assert np.abs(model.residual(u, 0.0, m)).max() < 1e-12
-
-
-@settings(max_examples=10, deadline=None)
-@given(st.integers(0, 2**32 - 1))
-def test_numbering_changes_nothing(seed):
-    """Permuting nodes and elements permutes the residual and leaves the energy."""
-    mesh = bodies.hollow_box(1, n=3, clamp=False)
-    rng = np.random.default_rng(seed)
-    nodes, elements = rng.permutation(len(mesh.nodes)), rng.permutation(len(mesh.tets))
-    new = np.argsort(nodes)
-    moved = type(mesh)(
-        mesh.nodes[nodes], new[mesh.tets[elements]], mesh.region[elements], new[mesh.cavity], [], []
-    )
-    u = 0.03 * rng.standard_normal(mesh.nodes.shape)
-    model, m = unconstrained(mesh)
-    other, n = unconstrained(moved)
-    assert other.potential(u[nodes], 0.02, n) == pytest.approx(model.potential(u, 0.02, m), rel=1e-12)
-    np.testing.assert_allclose(
-        other.residual(u[nodes], 0.02, n), model.residual(u, 0.02, m)[nodes], atol=1e-13
-    )
-
-
-def test_twice_as_stiff_under_twice_the_pressure_moves_the_same():
-    mesh = bodies.hollow_box(2)
-    _, a = pressurise(mesh, 0.02, E, NU)
-    _, b = pressurise(mesh, 0.04, 2 * E, NU, max_step_MPa=0.02)
-    np.testing.assert_allclose(a.u, b.u, atol=1e-9)
-
-
 def test_both_factorisations_agree_and_see_indefiniteness():
     mesh = bodies.hollow_box(2)
     model = Model(mesh)
@@ -242,16 +164,3 @@ def test_both_factorisations_agree_and_see_indefiniteness():
             factor.factor(broken)
     np.testing.assert_allclose(*solutions, rtol=1e-9)
     np.testing.assert_allclose(model.matrix(values) @ solutions[0], b, atol=1e-9)
-
-
-def test_walls_that_pass_through_each_other_are_found():
-    """Squeeze a sphere's opposite walls toward, then past each other."""
-    mesh = bodies.sphere_octant(10, 12, 4)
-    for squeeze, expected in ((0.5, False), (0.95, False), (1.3, True)):
-        # The inner surface moves along z; at 1 it is flat, beyond it has turned inside out.
-        u = np.zeros_like(mesh.nodes)
-        u[:, 2] = -squeeze * mesh.nodes[:, 2]
-        found = self_contact(mesh, u)
-        assert (found.share > 0) == expected
-    assert found.share == pytest.approx(1.0)
-    assert np.abs(found.place).max() < 12

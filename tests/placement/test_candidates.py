@@ -3,7 +3,6 @@
 import subprocess
 import sys
 
-import attrs
 import numpy as np
 import pytest
 
@@ -11,13 +10,15 @@ from mu_addon.design.anchors import anchors, windows
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg, probe
-from mu_addon.fem.model import Materials, Model
-from mu_addon.fem.trajectory import simulate, simulate_near
+from mu_addon.fem.materials import Materials
+from mu_addon.fem.model import Model
+from mu_addon.fem.trajectory import simulate
 from mu_addon.meshing.mesh import LATTICE, mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.placement.candidates import candidates, evaluate, roi
-from mu_addon.placement.inclusion import modulus
+from mu_addon.placement.candidates import candidates, evaluate, evaluation, moved_points, roi
+from mu_addon.placement.inclusion import RULES, sensor_share
+from mu_addon.placement.sweep import Sweep
 
 UNIT = load_preset("mu-1.0x")
 COARSE = MeshSettings(refine=0.5)
@@ -27,7 +28,7 @@ PRESSURES = np.array([0.0, -10.0, 0.0, 20.0])
 def materials(mesh):
     lattice = mesh.region == LATTICE
     m = UNIT.material
-    return Materials(
+    return Materials.neo_hooke(
         np.where(lattice, m.lattice_modulus_kPa, m.membrane_modulus_kPa) / 1e3,
         np.where(lattice, m.lattice_poisson, m.membrane_poisson),
     )
@@ -47,27 +48,43 @@ def monitored(half):
     return points, probe(half[0], points)
 
 
-def run(half, monitored, name, rule, sensor=2.5):
-    mesh, model, baseline = half
+JOBS = [(name, rule) for rule in RULES for name in ("alpha1", "alpha2", "alpha4", "alpha6", "alpha10")]
+
+
+def sensors(mesh, jobs):
     every = {c.name: c for c in candidates(anchors(UNIT), windows(6))}
-    return evaluate(model, materials(mesh), baseline, monitored, every[name], rule, 1.0, sensor, 21)
+    return [sensor_share(rule, roi(mesh, every[name], 1.0)) for name, rule in jobs]
+
+
+@pytest.fixture(scope="module")
+def swept(half, monitored):
+    """Evaluations of some candidates, all solved in lockstep."""
+    mesh, model, baseline = half
+    sweep = Sweep(model, materials(mesh), monitored, sensors(mesh, JOBS), 2.5)
+    moved = baseline.of_time(np.array([sweep.at(s) for s in baseline.states]))
+    still = moved_points(monitored, baseline)
+    every = {c.name: c for c in candidates(anchors(UNIT), windows(6))}
+    return {
+        (name, rule): evaluation(mesh, every[name], rule, 1.0, moved[:, i], still, 21)
+        for i, (name, rule) in enumerate(JOBS)
+    }
 
 
 def test_a_sensor_as_soft_as_the_lattice_changes_nothing(half, monitored):
-    found = run(half, monitored, "alpha2", "intersect", UNIT.material.lattice_modulus_kPa / 1e3)
-    assert found.deviation.delta.max() < 1e-6
+    mesh, model, baseline = half
+    soft = UNIT.material.lattice_modulus_kPa / 1e3
+    sweep = Sweep(model, materials(mesh), monitored, sensors(mesh, [("alpha2", "intersect")]), soft)
+    moved = sweep.at(baseline.states[-1])[0]
+    assert np.abs(moved - moved_points(monitored, baseline)[-1]).max() < 1e-6
 
 
-def test_a_longer_window_disturbs_more_than_the_shorter_one_inside_it(half, monitored):
-    J = {
-        n: run(half, monitored, n, "volume_fraction").deviation.J_hat for n in ("alpha2", "alpha6", "alpha10")
-    }
+def test_a_longer_window_disturbs_more_than_the_shorter_one_inside_it(swept):
+    J = {n: swept[n, "volume_fraction"].deviation.J_hat for n in ("alpha2", "alpha6", "alpha10")}
     assert 0 < J["alpha2"] < J["alpha6"] < J["alpha10"]
 
 
-def test_intersect_stiffens_more_than_the_sensor_and_disturbs_more(half, monitored):
-    touched = run(half, monitored, "alpha4", "intersect")
-    blended = run(half, monitored, "alpha4", "volume_fraction")
+def test_intersect_stiffens_more_than_the_sensor_and_disturbs_more(swept):
+    touched, blended = swept["alpha4", "intersect"], swept["alpha4", "volume_fraction"]
     assert touched.cylinder_mm3 == pytest.approx(np.pi * 25.0)
     # Shares are those of the straight element; on so coarse a mesh the sensor meets curved ones.
     assert blended.stiffened_mm3 == pytest.approx(blended.cylinder_mm3, rel=2e-3)
@@ -75,24 +92,21 @@ def test_intersect_stiffens_more_than_the_sensor_and_disturbs_more(half, monitor
     assert touched.deviation.J_hat > blended.deviation.J_hat
 
 
-def test_nothing_deviates_without_pressure(half, monitored):
-    found = run(half, monitored, "alpha1", "intersect").deviation
+def test_nothing_deviates_without_pressure(swept):
+    found = swept["alpha1", "intersect"].deviation
     assert found.over_time[PRESSURES == 0].max() == 0
     assert found.over_time[PRESSURES != 0].min() > 0
 
 
-def test_starting_near_the_baseline_finds_what_the_whole_path_finds(half):
-    """The guard of path independence: cold, step by step from rest, against the jump."""
+@pytest.mark.parametrize("rule", RULES)
+def test_lockstep_finds_what_each_finds_alone_along_its_whole_path(half, monitored, swept, rule):
+    """The guard of path independence: cold, step by step from rest, against the jump that all share."""
     mesh, model, baseline = half
-    candidate = candidates(anchors(UNIT), windows(6))[9]
-    base = materials(mesh)
-    stiff = attrs.evolve(
-        base, modulus_MPa=modulus("intersect", roi(mesh, candidate, 1.0), base.modulus_MPa, 2.5)
-    )
-    near = simulate_near(Equilibrium(model, stiff), baseline)
-    cold = simulate(Equilibrium(model, stiff), np.arange(4.0), PRESSURES)
-    for a, b in zip(near.states, cold.states, strict=True):
-        assert np.abs(a.u - b.u).max() < 1e-6
+    every = {c.name: c for c in candidates(anchors(UNIT), windows(6))}
+    alone = evaluate(model, materials(mesh), baseline, monitored, every["alpha10"], rule, 1.0, 2.5, 21)
+    together = swept["alpha10", rule]
+    assert np.abs(alone.deviation.delta - together.deviation.delta).max() < 1e-6
+    assert alone.stiffened_mm3 == together.stiffened_mm3
 
 
 def test_the_angle_grows_with_pressure_and_changes_sign_with_it(half):
@@ -120,10 +134,9 @@ model = Model(mesh)
 baseline = simulate(Equilibrium(model, materials(mesh)), np.arange(2.0), PRESSURES[2:])
 points = anchors(UNIT)
 every = candidates(points, windows(6))
-found = evaluate(
-    model, materials(mesh), baseline, (points, probe(mesh, points)), every[3], "intersect", 1.0, 2.5, 21
-)
-sys.stdout.write(mesh.hash() + " " + found.deviation.J_hat.hex())
+sweep = Sweep(model, materials(mesh), (points, probe(mesh, points)), sensors(mesh, JOBS[2:4]), 2.5)
+moved = sweep.at(baseline.states[-1])
+sys.stdout.write(mesh.hash() + " " + moved.tobytes().hex())
 """
     answers = [
         subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout

@@ -7,7 +7,8 @@ from mu_addon.design.anchors import anchors, windows
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg
-from mu_addon.fem.model import Materials, Model
+from mu_addon.fem.materials import Materials
+from mu_addon.fem.model import Model
 from mu_addon.fem.trajectory import simulate
 from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.quality import element_volumes
@@ -32,7 +33,7 @@ def test_the_default_mesh_is_within_three_percent_of_the_finest(meshes):
     m = UNIT.material
     for mesh in meshes:
         lattice = mesh.region == LATTICE
-        materials = Materials(
+        materials = Materials.neo_hooke(
             np.where(lattice, m.lattice_modulus_kPa, m.membrane_modulus_kPa) / 1e3,
             np.where(lattice, m.lattice_poisson, m.membrane_poisson),
         )

@@ -1,0 +1,101 @@
+"""Ten and a hundred candidate paths and the sensitivity map, in units of one Model A: one table, one run.
+
+    python benchmarks/sweep.py [--refine 1.0] [--workers 2] [--alone 1]
+
+A hundred paths: every straight run along the anchors' column between 16 stations a third of a cell
+apart or so. `--alone N` also solves N candidates each for itself along its whole path, the way without
+lockstep, and says how far the answers are apart.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import time
+from contextlib import closing
+
+import numpy as np
+from circumstances import circumstances
+
+from mu_addon.design.anchors import anchors, windows
+from mu_addon.design.assets import asset_root
+from mu_addon.design.parameters import load_preset
+from mu_addon.fem.equilibrium import Equilibrium
+from mu_addon.fem.kinematics import probe
+from mu_addon.fem.model import Model
+from mu_addon.fem.protocol import read_protocol
+from mu_addon.fem.trajectory import simulate
+from mu_addon.fem.unit import materials_of
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.unit import mesh_unit
+from mu_addon.placement.candidates import Candidate, candidates, moved_points, roi, with_sensor
+from mu_addon.placement.inclusion import sensor_share
+from mu_addon.placement.influence import influence, telling_pressures
+from mu_addon.study.parallel import Setting, Sweeper
+
+RADIUS_MM, SENSOR_MPA, RULE = 1.0, 2.5, "volume_fraction"
+
+
+def hundred(points):
+    """Straight runs of the anchors' column, as candidates of two ends each."""
+    along = np.linspace(0.0, 1.0, 16)[:, None]
+    stations = points[0] + along * (points[-1] - points[0])
+    pairs = [(a, b) for a, b in itertools.combinations(range(16), 2) if b - a > 1]
+    return [Candidate(f"run{a}-{b}", a + 1, stations[[a, b]]) for a, b in pairs][:100]
+
+
+def seconds(call):
+    start = time.perf_counter()
+    found = call()
+    return time.perf_counter() - start, found
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--refine", type=float, default=1.0)
+    options.add_argument("--workers", type=int, default=2)
+    options.add_argument("--alone", type=int, default=1)
+    given = options.parse_args()
+    print(circumstances())
+    unit = load_preset("mu-1.0x")
+    mesh = mesh_unit(unit, MeshSettings(refine=given.refine))
+    materials = materials_of(unit, mesh)
+    points = anchors(unit)
+    monitored = points, probe(mesh, points)
+    times, pressure = read_protocol(asset_root() / "protocols" / "grasp.csv").sample(13)
+    model = Model(mesh)
+    warm = Equilibrium(model, materials)
+    warm.reach(1e-4, [simulate(warm, np.zeros(1), np.zeros(1)).states[0]])
+    baseline_s, baseline = seconds(lambda: simulate(Equilibrium(model, materials), times, pressure))
+    states = [s for s in baseline.states if s.pressure_MPa]
+    print(f"{len(model.free)} unknowns, {len(states)} pressures\n")
+    print(f"| what | s | Model A |\n| --- | --- | --- |\n| Model A | {baseline_s:.1f} | 1 |", flush=True)
+
+    def row(name, took):
+        print(f"| {name} | {took:.1f} | {took / baseline_s:.2f} |", flush=True)
+
+    swept = {}
+    for name, every in (("ten", candidates(points, windows(6))), ("a hundred", hundred(points))):
+        jobs = tuple((c, RULE) for c in every)
+        setting = Setting(mesh, materials, points, jobs, RADIUS_MM, SENSOR_MPA)
+        with closing(Sweeper(setting, given.workers)) as sweeper:
+            took, found = seconds(lambda s=sweeper: dict(s.solve(states)))
+        swept[name] = found
+        row(f"{name} paths, {given.workers} processes, their start included", took)
+    took, _ = seconds(
+        lambda: influence(model, materials, baseline, monitored[1], telling_pressures(baseline))
+    )
+    row("map of every element, in three of its states", took)
+    for candidate in candidates(points, windows(6))[: given.alone]:
+        share = sensor_share(RULE, roi(mesh, candidate, RADIUS_MM))
+        stiff = with_sensor(materials, share, SENSOR_MPA)
+        took, alone = seconds(lambda b=stiff: simulate(Equilibrium(model, b), times, pressure))
+        still = moved_points(monitored, alone)
+        number = int(candidate.name.removeprefix("alpha")) - 1
+        at = [int(np.flatnonzero(pressure == s.pressure_MPa * 1e3)[0]) for s in states]
+        apart = max(np.abs(swept["ten"][i][number] - still[k]).max() for i, k in enumerate(at))
+        row(f"{candidate.name} alone along its whole path (differs by {apart:.0e} mm)", took)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,254 @@
+"""One step along a branch of equilibria: displacement and pressure corrected together.
+
+Lengths along the branch are measured as ds^2 = |du|^2/n + (c dp)^2, in mm: n free unknowns, and c the root
+mean square of du/dp where the branch starts, so that both move it alike there. A point is fixed by the
+plane at a length along the tangent (Keller, in: Applications of Bifurcation Theory, 1977; Riks, J. Appl.
+Mech. 39 (1972) 1060), or by its pressure, or by its cavity's volume.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import ConvergenceError
+from .equilibrium import Equilibrium, State
+from .inertia import Inertia
+
+Array = np.ndarray[Any, Any]
+
+
+@attrs.frozen
+class ContinuationSettings:
+    """How long the steps along a branch are, and how exactly its critical points are found."""
+
+    first_step_MPa: float = 0.002
+    max_points: int = 100
+    max_iterations: int = 15
+    # A factor is kept while each step with it shrinks the residual by at least this much.
+    keep_factor: float = 0.6
+    # The branch's direction shall turn by about this angle, in rad, from point to point.
+    turn: float = 0.25
+    # A point may lie this share of the step away from its prediction.
+    surprise: float = 0.3
+    # The smallest step, as a share of the first.
+    min_step: float = 1e-3
+    # Relative accuracy of the pressure of a critical point.
+    accuracy: float = 1e-6
+
+
+@attrs.frozen(eq=False)
+class Point:
+    """A converged equilibrium on a branch.
+
+    volume_mm3: of the cavity. negative: negative eigenvalues of the tangent, 0 where the point is stable
+    at its pressure. slope: change of pressure along the branch, in MPa/mm; compliance: of volume with
+    pressure, in mm3/MPa.
+    """
+
+    state: State
+    volume_mm3: float
+    negative: int
+    slope: float
+    compliance: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether the point is stable at its pressure."""
+        return self.negative == 0
+
+    @property
+    def stable_at_volume(self) -> bool:
+        """Whether it is stable where not pressure but volume is held, by an incompressible filling."""
+        return self.negative == int(self.compliance < 0)
+
+
+@attrs.frozen(eq=False)
+class Node:
+    """A point as z, the free displacements and then the pressure; the branch's unit direction and bend there.
+
+    bend: change of direction with length, (n + 1,).
+    """
+
+    point: Point
+    z: Array
+    direction: Array
+    bend: Array
+
+    def reversed(self) -> Node:
+        """The same, on the way back."""
+        point = attrs.evolve(self.point, slope=-self.point.slope)
+        return attrs.evolve(self, point=point, direction=-self.direction)
+
+
+# What fixes a point: its gap and the gradient (n + 1,) of that, of z and the residual's slope in pressure.
+Condition = Callable[[Array, Array], tuple[float, Array]]
+
+
+class Arc:
+    """Finds the points of one branch, of a body and materials, that begins at a converged state."""
+
+    def __init__(self, equilibrium: Equilibrium, start: State, settings: ContinuationSettings) -> None:
+        self.model, self.parameters = equilibrium.model, equilibrium.parameters
+        self.tolerance = equilibrium.settings.tolerance
+        self.settings = settings
+        self.inertia = Inertia(self.model)
+        self._start = start
+        self._linear = False
+        self._size = len(self.model.free)
+        self._metric = np.full(self._size + 1, 1 / self._size)
+
+    def begin(self) -> Node:
+        """The start, on the way to higher pressure. Raises ConvergenceError where it is no equilibrium."""
+        z = np.append(self._start.u.ravel()[self.model.free], self._start.pressure_MPa)
+        force, scale = self._force(z)
+        if np.linalg.norm(force) > self.tolerance * scale:
+            raise ConvergenceError("a branch can only be followed from a converged state")
+        self._linearise(z)
+        per_MPa = self._per_MPa
+        # Where pressure moves nothing, any weight does.
+        self._metric[-1] = (per_MPa @ per_MPa) / self._size or 1.0
+        return self._node(z, np.append(per_MPa, 1.0), self._start.residual, 0, 1)
+
+    def advance(self, node: Node, length: float) -> Node:
+        """The point a length in mm ahead. Raises ConvergenceError where it is not where it is expected."""
+        predicted = node.z + length * node.direction + length**2 / 2 * node.bend
+        row = self._metric * node.direction
+
+        def condition(z: Array, _: Array) -> tuple[float, Array]:
+            return float(row @ (z - predicted)), row
+
+        new = self._correct(predicted, condition, node)
+        off = new.z - predicted
+        if np.sqrt(self.product(off, off)) > self.settings.surprise * length:
+            raise ConvergenceError("the branch bends away, or another one is near")
+        return attrs.evolve(new, bend=(new.direction - node.direction) / length)
+
+    def at_pressure(self, before: Node, after: Node, pressure: float) -> Node:
+        """The point of a pressure in MPa between two nodes. Raises ConvergenceError."""
+        ends = before.z[-1], after.z[-1]
+        row = np.append(np.zeros(self._size), 1.0)
+        guess = _between(before, after, ends, pressure)
+        return self._correct(guess, lambda z, _: (z[-1] - pressure, row), after)
+
+    def at_volume(self, before: Node, after: Node, volume: float) -> Node:
+        """The point of a cavity volume in mm3 between two nodes. Raises ConvergenceError."""
+        ends = before.point.volume_mm3, after.point.volume_mm3
+
+        def condition(z: Array, force_per_MPa: Array) -> tuple[float, Array]:
+            # The residual's slope in pressure is minus the volume's in displacement: both are the
+            # mixed derivative of the potential.
+            gap = self.model.cavity_volume(self._displacement(z)) - volume
+            return gap, np.append(-force_per_MPa, 0.0)
+
+        return self._correct(_between(before, after, ends, volume), condition, after)
+
+    def product(self, a: Array, b: Array) -> float:
+        """Inner product of two changes of z."""
+        return float((self._metric * a) @ b)
+
+    def softest(self, z: Array) -> tuple[float, Array]:
+        """The eigenvalue of the tangent nearest zero, in N/mm, and its vector (n, 3), the largest move 1."""
+        self._factor(z)
+        try:
+            stiffness, modes = self.inertia.modes(1)
+        except ArithmeticError as why:
+            raise ConvergenceError(str(why)) from None
+        mode = np.zeros_like(self._start.u)
+        mode.ravel()[self.model.free] = modes[:, 0]
+        return float(stiffness[0]), mode / np.linalg.norm(mode, axis=1).max()
+
+    def _displacement(self, z: Array) -> Array:
+        u = self._start.u.copy()
+        u.ravel()[self.model.free] = z[:-1]
+        return u
+
+    def _force(self, z: Array) -> tuple[Array, float]:
+        force = self.model.residual(self._displacement(z), z[-1], self.parameters).ravel()[self.model.free]
+        return force, self.model.force_scale()
+
+    def _factor(self, z: Array, thorough: bool = True) -> None:
+        self._linear = False
+        try:
+            tangent = self.model.tangent(self._displacement(z), z[-1], self.parameters)
+            self.inertia.factor(tangent, thorough)
+        except ArithmeticError as why:
+            raise ConvergenceError(str(why)) from None
+
+    def _linearise(self, z: Array, thorough: bool = True) -> None:
+        """Factorise at z; what a unit of pressure does to the residual and to the displacement there."""
+        self._factor(z, thorough)
+        # The residual is affine in pressure.
+        unit = np.append(np.zeros(self._size), 1.0)
+        self._force_per_MPa = self._force(z + unit)[0] - self._force(z)[0]
+        self._per_MPa = self.inertia.solve(-self._force_per_MPa)
+        self.inertia.suspect(self._per_MPa)
+        self._linear = True
+
+    def _correct(self, z: Array, condition: Condition, near: Node) -> Node:
+        """The point that meets a condition, from a prediction z, by Broyden's method.
+
+        One factor serves while that pays, first that of the last equilibrium found: a tangent away from
+        equilibrium may be far from definite. Sources: block elimination of the bordered system, Crisfield,
+        Comput. Struct. 13 (1981) 55; Broyden's steps from each other, Kelley, Iterative Methods for Linear
+        and Nonlinear Equations (SIAM 1995), algorithm brsola.
+        """
+        s = self.settings
+        begun, before = self.inertia.factorisations, np.inf
+        if not self._linear:
+            self._linearise(near.z)
+        # Whatever stops this must not leave a factor of some state in between.
+        self._linear = False
+        steps: list[Array] = []
+        for iteration in range(s.max_iterations):
+            force, scale = self._force(z)
+            level = float(np.linalg.norm(force))
+            if not np.isfinite(level):
+                raise ConvergenceError("an element inverts")
+            converged = level <= self.tolerance * scale
+            if iteration and not converged and level > s.keep_factor * before:
+                self._linearise(z, thorough=False)
+                self._linear, steps = False, []
+            gap, row = condition(z, self._force_per_MPa)
+            if converged and abs(gap) <= 1e-9 * np.linalg.norm(row) * np.linalg.norm(z):
+                self._linearise(z)
+                cost = self.inertia.factorisations - begun
+                return self._node(z, near.direction, level / scale if scale else 0.0, iteration, cost)
+            by_force = self.inertia.solve(-force)
+            along = float(row[:-1] @ self._per_MPa + row[-1])
+            pressure = -(gap + row[:-1] @ by_force) / along
+            step = np.append(by_force + pressure * self._per_MPa, pressure)
+            for a, b in itertools.pairwise(steps):
+                step += b * (self.product(a, step) / self.product(a, a))
+            if steps:
+                last = steps[-1]
+                step /= 1 - self.product(last, step) / self.product(last, last)
+            steps.append(step)
+            z, before = z + step, level
+        raise ConvergenceError("no convergence")
+
+    def _node(self, z: Array, ahead: Array, residual: float, iterations: int, factorisations: int) -> Node:
+        """The node at z, where the tangent has just been factorised; its direction is the one `ahead`."""
+        u, pressure = self._displacement(z), float(z[-1])
+        if not np.isfinite(self.model.potential(u, pressure, self.parameters)):
+            raise ConvergenceError("an element inverts")
+        direction = np.append(self._per_MPa, 1.0)
+        direction /= np.sqrt(self.product(direction, direction))
+        direction *= np.sign(self.product(direction, ahead)) or 1.0
+        point = Point(
+            State(pressure, u, residual, iterations, factorisations),
+            self.model.cavity_volume(u),
+            self.inertia.negative,
+            float(direction[-1]),
+            -float(self._force_per_MPa @ self._per_MPa),
+        )
+        return Node(point, z, direction, np.zeros_like(z))
+
+
+def _between(before: Node, after: Node, ends: tuple[float, float], target: float) -> Array:
+    share = (target - ends[0]) / (ends[1] - ends[0])
+    return np.asarray(before.z + share * (after.z - before.z))

@@ -1,0 +1,75 @@
+"""Laws of the Green-Lagrange strain E = (F^T F - 1)/2."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import warp as wp
+
+from .tensors import add_left, f64, mat33, mat99, vec3
+
+
+def of_green_strain(energy: Any, stress: Any, stiffness: Any) -> tuple[Any, Any, Any]:
+    """Energy, stress and tangent by F of W(E), of functions (E, m) for W, S = dW/dE and dS/dE.
+
+    dS/dE (mat99) has the minor symmetries. dP_iJ/dF_kL = delta_ik S_JL + F_iM F_kN dS_MJ/dE_NL.
+    """
+
+    @wp.func
+    def green_energy(F: mat33, m: Any) -> wp.float64:
+        return energy(green_strain(F), m)
+
+    @wp.func
+    def green_stress(F: mat33, m: Any) -> mat33:
+        return F * stress(green_strain(F), m)
+
+    @wp.func
+    def green_tangent(F: mat33, m: Any) -> mat99:
+        E = green_strain(F)
+        D = stiffness(E, m)
+        half = mat99()
+        for i in range(3):
+            for j in range(3):
+                for c in range(9):
+                    half[3 * i + j, c] = F[i, 0] * D[j, c] + F[i, 1] * D[3 + j, c] + F[i, 2] * D[6 + j, c]
+        A = mat99()
+        for r in range(9):
+            for k in range(3):
+                for n in range(3):
+                    A[r, 3 * k + n] = (
+                        F[k, 0] * half[r, n] + F[k, 1] * half[r, 3 + n] + F[k, 2] * half[r, 6 + n]
+                    )
+        return add_left(A, stress(E, m))
+
+    return green_energy, green_stress, green_tangent
+
+
+@wp.func
+def green_strain(F: mat33) -> mat33:
+    return f64(0.5) * (wp.transpose(F) * F - wp.identity(3, dtype=f64))
+
+
+@wp.func
+def symmetric_identity(factor: wp.float64) -> mat99:
+    """factor times dE/dE of a symmetric E."""
+    A = mat99()
+    for i in range(3):
+        for j in range(3):
+            A[3 * i + j, 3 * i + j] += f64(0.5) * factor
+            A[3 * i + j, 3 * j + i] += f64(0.5) * factor
+    return A
+
+
+@wp.func
+def add_fibre_shear(A: mat99, factor: wp.float64, f: vec3) -> mat99:
+    """A + factor times the second derivative of |E f|^2 by a symmetric E."""
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                x = f64(0.5) * factor * f[i] * f[k]
+                y = f64(0.5) * factor * f[j] * f[k]
+                A[3 * i + j, 3 * k + j] += x
+                A[3 * i + j, 3 * j + k] += x
+                A[3 * i + j, 3 * k + i] += y
+                A[3 * i + j, 3 * i + k] += y
+    return A

@@ -1,0 +1,45 @@
+"""What every law gives."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, Any]
+
+
+class Law:
+    """A material law, never instantiated: strain energy a volume, its derivatives by F, its parameters.
+
+    energy, stress and tangent are Warp functions of F (mat33) and m, the parameters in the order and
+    units of `parameter_names`: energy in MPa, first Piola-Kirchhoff stress (mat33) and dP/dF (mat99,
+    rows and columns 3 i + J). They may ask for J > 0.
+
+    A law with `history` > 0 numbers at a point finds them in m behind its parameters, and behind those
+    the time step in s; its energy is the incremental potential of the step, and `advance` (of F and m
+    too) gives the numbers at the step's end. All start from 0.
+
+    split_volume: whether W = W_iso(J^(-1/3) F) + kappa/2 (J - 1)^2, with kappa the parameter number
+    `bulk`, or without that second term where `bulk` is None.
+    """
+
+    name: str
+    parameter_names: tuple[str, ...]
+    energy: Any
+    stress: Any
+    tangent: Any
+    history = 0
+    advance: Any = None
+    split_volume = False
+    bulk: int | None = None
+
+    @staticmethod
+    def small_strain(parameters: Array) -> Array:
+        """Shear and bulk modulus (k, 2) in MPa at small strain, averaged over directions (Voigt)."""
+        raise NotImplementedError
+
+    @staticmethod
+    def valid(parameters: Array) -> None:
+        """Raise InputError unless parameters (k, count) are admissible."""
+        raise NotImplementedError

@@ -1,0 +1,99 @@
+"""Ogden-Roxburgh softening of a Yeoh law: rubber is softer below the largest strain it has seen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from .isochoric import split
+from .law import Array, Law
+from .tensors import add_dyad, f64, isochoric, mat33, mat99
+from .valid import require, require_positive
+from .yeoh import Yeoh, yeoh_parts
+
+_ROOT_PI = wp.constant(f64(np.sqrt(np.pi)))
+
+_history = wp.types.vector(length=1, dtype=wp.float64)
+_yeoh_energy, _yeoh_stress, _yeoh_tangent = yeoh_parts
+
+
+@wp.func
+def _error_integral(x: wp.float64) -> wp.float64:
+    return x * wp.erf(x) + wp.exp(-x * x) / _ROOT_PI
+
+
+@wp.func
+def roxburgh_energy(F: mat33, m: Any) -> wp.float64:
+    """The integral of eta dW from rest, with eta = 1 beyond the largest energy so far."""
+    W = _yeoh_energy(F, m)
+    largest = m[7]
+    width = m[5] + m[6] * largest
+    within = wp.min(W, largest)
+    saved = _error_integral(largest / width) - _error_integral((largest - within) / width)
+    return W - width / m[4] * saved
+
+
+@wp.func
+def _eta(W: wp.float64, m: Any) -> wp.float64:
+    if m[7] <= W:
+        return f64(1.0)
+    return f64(1.0) - wp.erf((m[7] - W) / (m[5] + m[6] * m[7])) / m[4]
+
+
+@wp.func
+def roxburgh_stress(F: mat33, m: Any) -> mat33:
+    return _eta(_yeoh_energy(F, m), m) * _yeoh_stress(F, m)
+
+
+@wp.func
+def roxburgh_tangent(F: mat33, m: Any) -> mat99:
+    W = _yeoh_energy(F, m)
+    A = _eta(W, m) * _yeoh_tangent(F, m)
+    if m[7] > W:
+        width = m[5] + m[6] * m[7]
+        x = (m[7] - W) / width
+        P = _yeoh_stress(F, m)
+        A = add_dyad(A, f64(2.0) * wp.exp(-x * x) / (_ROOT_PI * m[4] * width), P, P)
+    return A
+
+
+@wp.func
+def roxburgh_advance(F: mat33, m: Any) -> _history:
+    return _history(wp.max(m[7], _yeoh_energy(isochoric(F), m)))
+
+
+class OgdenRoxburgh(Law):
+    """Yeoh law whose isochoric stress is eta times its own below the largest energy W_m so far (Mullins).
+
+    eta = 1 - erf((W_m - W)/(m + beta W_m))/r. Larger r: less softening; m, in MPa, keeps small strains
+    as they were; beta widens the return. No set remains at rest and reloading retraces unloading. Stress is
+    continuous; the tangent jumps where W passes W_m. Source: Ogden and Roxburgh, Proc. R. Soc. A 455
+    (1999) 2861, with beta as commonly added.
+    """
+
+    name = "Ogden-Roxburgh"
+    parameter_names = (*Yeoh.parameter_names, "r", "m_MPa", "beta")
+    history = 1
+    split_volume = True
+    bulk = 3
+    energy, stress, tangent = map(
+        staticmethod, split(roxburgh_energy, roxburgh_stress, roxburgh_tangent, bulk)
+    )
+    advance = staticmethod(roxburgh_advance)
+
+    @staticmethod
+    def small_strain(parameters: Array) -> Array:
+        """Shear modulus of the virgin material and kappa (k, 2) in MPa."""
+        return Yeoh.small_strain(parameters)
+
+    @staticmethod
+    def valid(parameters: Array) -> None:
+        """Raise InputError unless the Yeoh law is valid, r is 1 or more, m positive and beta not negative."""
+        law = OgdenRoxburgh
+        Yeoh.valid(parameters[:, :4])
+        require_positive(law, parameters, "m_MPa")
+        r, beta = parameters[:, 4], parameters[:, 6]
+        require(r >= 1, law, "r", r, "1 or more", "with less, the softened stress turns against the strain")
+        require(beta >= 0, law, "beta", beta, "0 or more", "give 0 for the law of two parameters")

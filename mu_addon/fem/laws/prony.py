@@ -1,0 +1,122 @@
+"""Finite linear viscoelasticity: a Yeoh law with three relaxing branches."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import warp as wp
+
+from .isochoric import split
+from .law import Array, Law
+from .tensors import THIRD, add_left, f64, isochoric, mat33, mat99, put_symmetric, symmetric_at
+from .valid import require, require_positive
+from .yeoh import Yeoh, yeoh_parts, yeoh_slope
+
+_BRANCHES = 3
+_COUNT = 4 + 2 * _BRANCHES
+_HISTORY = 6 * (_BRANCHES + 1)
+_FIRST = wp.constant(_COUNT)
+_DT = wp.constant(_COUNT + _HISTORY)
+
+_history = wp.types.vector(length=_HISTORY, dtype=wp.float64)
+
+
+_yeoh_energy, _yeoh_stress, _yeoh_tangent = yeoh_parts
+
+
+@wp.func
+def _decay(branch: int, m: Any) -> wp.float64:
+    return wp.exp(-m[_DT] / m[5 + 2 * branch])
+
+
+@wp.func
+def _gain(branch: int, m: Any) -> wp.float64:
+    """What a branch keeps of a stress that grew evenly over the step: beta (1 - e^-x)/x, x = dt/tau."""
+    x = m[_DT] / m[5 + 2 * branch]
+    share = f64(1.0)
+    if x > f64(1.0):
+        share = (f64(1.0) - wp.exp(-x)) / x
+    elif x > f64(0.0):
+        # The same, without its cancellation for short steps.
+        share = wp.exp(-f64(0.5) * x) * wp.sinh(f64(0.5) * x) / (f64(0.5) * x)
+    return m[4 + 2 * branch] * share
+
+
+@wp.func
+def _instant(m: Any) -> wp.float64:
+    """The step's stiffness over the long-term one."""
+    total = f64(1.0)
+    for i in range(wp.static(_BRANCHES)):
+        total += _gain(i, m)
+    return total
+
+
+@wp.func
+def _remembered(m: Any) -> mat33:
+    """The branches' second Piola-Kirchhoff stress if the elastic one went back to none in this step."""
+    H = mat33()
+    for i in range(wp.static(_BRANCHES)):
+        H += _decay(i, m) * symmetric_at(m, _FIRST + 6 + 6 * i) - _gain(i, m) * symmetric_at(m, _FIRST)
+    return H
+
+
+@wp.func
+def prony_energy(F: mat33, m: Any) -> wp.float64:
+    strain = f64(0.5) * (wp.transpose(F) * F - wp.identity(3, dtype=f64))
+    return _instant(m) * _yeoh_energy(F, m) + wp.ddot(_remembered(m), strain)
+
+
+@wp.func
+def prony_stress(F: mat33, m: Any) -> mat33:
+    return _instant(m) * _yeoh_stress(F, m) + F * _remembered(m)
+
+
+@wp.func
+def prony_tangent(F: mat33, m: Any) -> mat99:
+    return add_left(_instant(m) * _yeoh_tangent(F, m), _remembered(m))
+
+
+@wp.func
+def prony_advance(F: mat33, m: Any) -> _history:
+    C = wp.transpose(isochoric(F)) * isochoric(F)
+    slope = yeoh_slope(wp.trace(C), f64(0.0), m)
+    S = (f64(2.0) * slope[0]) * (wp.identity(3, dtype=f64) - (THIRD * wp.trace(C)) * wp.inverse(C))
+    out = put_symmetric(_history(), 0, S)
+    for i in range(wp.static(_BRANCHES)):
+        Q = _decay(i, m) * symmetric_at(m, _FIRST + 6 + 6 * i)
+        out = put_symmetric(out, 6 + 6 * i, Q + _gain(i, m) * (S - symmetric_at(m, _FIRST)))
+    return out
+
+
+class Prony(Law):
+    """Viscoelastic law: a Yeoh law for slow loading, and branches that relax with times tau_i in s.
+
+    Each branch carries an isochoric second Piola-Kirchhoff stress Q with dQ/dt + Q/tau = beta dS/dt, S the
+    Yeoh law's own, so that at once a step is 1 + sum of beta_i times as stiff as in the long run; beta is
+    g/(1 - sum of g) of relative moduli g. Stress taken as linear in time within a step, which makes
+    any step stable. A branch that is not wanted has beta 0. Branches are linear in stress: meant for
+    stretches where the Yeoh law's own shape does not depend on the rate. Volume change is elastic.
+    Source: Simo, Comput. Methods Appl. Mech. Eng. 60 (1987) 153.
+    """
+
+    name = "Prony"
+    parameter_names = (*Yeoh.parameter_names, "beta1", "tau1_s", "beta2", "tau2_s", "beta3", "tau3_s")
+    history = _HISTORY
+    split_volume = True
+    bulk = 3
+    energy, stress, tangent = map(staticmethod, split(prony_energy, prony_stress, prony_tangent, bulk))
+    advance = staticmethod(prony_advance)
+
+    @staticmethod
+    def small_strain(parameters: Array) -> Array:
+        """Long-term shear modulus and kappa (k, 2) in MPa."""
+        return Yeoh.small_strain(parameters)
+
+    @staticmethod
+    def valid(parameters: Array) -> None:
+        """Raise InputError unless the Yeoh law is valid, all tau are positive and no beta is negative."""
+        Yeoh.valid(parameters[:, :4])
+        require_positive(Prony, parameters, "tau1_s", "tau2_s", "tau3_s")
+        for name in ("beta1", "beta2", "beta3"):
+            beta = parameters[:, Prony.parameter_names.index(name)]
+            require(beta >= 0, Prony, name, beta, "0 or more", "give 0 for a branch that is not wanted")

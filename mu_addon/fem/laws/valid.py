@@ -1,0 +1,43 @@
+"""What parameters a law admits: errors that name the parameter, its value and what to do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+
+Array = np.ndarray[Any, Any]
+
+
+def require(good: Array, law: Any, name: str, values: Array, wanted: str, remedy: str) -> None:
+    """Raise InputError unless `good` (k,) holds for all values (k,) of a law's parameter `name`."""
+    bad = np.flatnonzero(~np.asarray(good))
+    if len(bad):
+        raise InputError(
+            f"{law.name}: {name} = {values[bad[0]]:.6g} must be {wanted}",
+            f"{len(bad)} of {len(good)} elements, the first in row {bad[0]} of the layer",
+            remedy,
+        )
+
+
+def require_positive(law: Any, parameters: Array, *names: str) -> None:
+    """Raise InputError unless the named columns of parameters (k, count) are finite and positive."""
+    for name in names:
+        values = parameters[:, law.parameter_names.index(name)]
+        good = np.isfinite(values) & (values > 0)
+        require(good, law, name, values, "positive and finite", f"give a {name} above 0")
+
+
+def shear_and_bulk(law: Any, modulus_MPa: Any, poisson: Any) -> tuple[Array, Array]:
+    """Shear and bulk modulus (k,) in MPa of Young's modulus and Poisson's ratio, numbers or (k,).
+
+    Raises InputError where the modulus is not positive or the ratio not between -1 and 0.5.
+    """
+    modulus, ratio = (np.array(a, float) for a in np.broadcast_arrays(*np.atleast_1d(modulus_MPa, poisson)))
+    good = np.isfinite(modulus) & (modulus > 0)
+    require(good, law, "Young's modulus", modulus, "positive and finite", "give a modulus above 0")
+    remedy = "for a nearly incompressible body give 0.499 and a model with mean_dilatation"
+    require((ratio > -1) & (ratio < 0.5), law, "Poisson's ratio", ratio, "above -1 and below 0.5", remedy)
+    return modulus / (2 * (1 + ratio)), modulus / (3 * (1 - 2 * ratio))

@@ -1,0 +1,58 @@
+"""Yeoh law."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from .invariants import of_invariants, slopes
+from .isochoric import split
+from .law import Array, Law
+from .tensors import f64
+from .valid import require, require_positive
+
+
+@wp.func
+def yeoh_energy(I1: wp.float64, I2: wp.float64, m: Any) -> wp.float64:
+    x = I1 - f64(3.0)
+    return x * (m[0] + x * (m[1] + x * m[2]))
+
+
+@wp.func
+def yeoh_slope(I1: wp.float64, I2: wp.float64, m: Any) -> slopes:
+    x = I1 - f64(3.0)
+    first = m[0] + x * (f64(2.0) * m[1] + f64(3.0) * x * m[2])
+    return slopes(first, f64(0.0), f64(2.0) * m[1] + f64(6.0) * x * m[2], f64(0.0), f64(0.0))
+
+
+# Energy, stress and tangent without the split, for laws that build on this one.
+yeoh_parts = of_invariants(yeoh_energy, yeoh_slope)
+
+
+class Yeoh(Law):
+    """Yeoh law, W = sum of c_i (I1 - 3)^i, i = 1..3, + kappa/2 (J - 1)^2 with I1 at constant volume.
+
+    Filled rubber follows it as far as it was fitted, up to stretches of 3 to 4. It is stable where
+    dW/dI1 grows fast enough with I1, which c2 < 0 can spoil at large stretches: a matter of the fit, not
+    looked for here. Source: Yeoh, Rubber Chem. Technol. 66 (1993) 754.
+    """
+
+    name = "Yeoh"
+    parameter_names = ("c1_MPa", "c2_MPa", "c3_MPa", "kappa_MPa")
+    split_volume = True
+    bulk = 3
+    energy, stress, tangent = map(staticmethod, split(*yeoh_parts, bulk))
+
+    @staticmethod
+    def small_strain(parameters: Array) -> Array:
+        """Shear modulus 2 c1 and kappa (k, 2) in MPa."""
+        return np.stack([2 * parameters[:, 0], parameters[:, 3]], axis=1)
+
+    @staticmethod
+    def valid(parameters: Array) -> None:
+        """Raise InputError unless c1 and kappa are positive and c3 is not negative."""
+        require_positive(Yeoh, parameters, "c1_MPa", "kappa_MPa")
+        c3 = parameters[:, 2]
+        require(c3 >= 0, Yeoh, "c3_MPa", c3, "0 or more", "with less, a large stretch has no energy minimum")

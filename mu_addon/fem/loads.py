@@ -1,0 +1,46 @@
+"""Dead loads as nodal forces, for `Model.load`: weight and tractions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..meshing.mesh import Mesh
+from .elements import reference_gradients, shape_functions, tet_quadrature, triangle_shapes
+
+Array = np.ndarray[Any, Any]
+
+STANDARD_GRAVITY = 9806.65  # mm/s2
+
+
+def gravity(
+    mesh: Mesh,
+    density_tonne_per_mm3: float | Array,
+    direction: Array,
+    g_mm_per_s2: float = STANDARD_GRAVITY,
+) -> Array:
+    """Weight as consistent nodal forces (n, 3) in N.
+
+    density: of the undeformed body, one number or one an element (m,); direction: (3,) of any length,
+    the way things fall.
+    """
+    points, _ = tet_quadrature(mesh.order)
+    shape = shape_functions(points, mesh.order)
+    volumes = reference_gradients(mesh.nodes, mesh.tets).volumes
+    mass = np.broadcast_to(density_tonne_per_mm3, len(mesh.tets))[:, None] * (volumes @ shape)
+    of_node = np.bincount(mesh.tets.ravel(), mass.ravel(), len(mesh.nodes))
+    down = np.asarray(direction, float)
+    return of_node[:, None] * (g_mm_per_s2 * down / np.linalg.norm(down))
+
+
+def traction(mesh: Mesh, faces: Array, traction_MPa: Array) -> Array:
+    """A traction (3,) in MPa of the undeformed faces (f, 3 | 6) as consistent nodal forces (n, 3) in N.
+
+    The traction keeps its direction and its force as the body deforms.
+    """
+    shape, derivative, weight = triangle_shapes(mesh.order)
+    tangents = np.einsum("fni,qnk->kfqi", mesh.nodes[faces], derivative)
+    area = np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=-1) * weight
+    of_node = np.bincount(np.ravel(faces), (area @ shape).ravel(), len(mesh.nodes))
+    return of_node[:, None] * np.asarray(traction_MPa, float)

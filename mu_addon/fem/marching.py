@@ -1,0 +1,124 @@
+"""Motion of a body that remembers: instants visited in order, each step made part of its history."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import ConvergenceError, InputError
+from .equilibrium import Equilibrium, State, rest
+from .factor import IndefiniteError
+from .trajectory import Trajectory
+
+Array = np.ndarray[Any, Any]
+
+# A state may lie this many predicted moves from its prediction: sliding and softening set in at once and
+# change the stiffness by far more than elasticity does over a step.
+LEAP = 4.0
+# Below this share of an interval a step is not halved again.
+SMALLEST = 1e-4
+
+
+@attrs.frozen(eq=False)
+class _Instant:
+    """A converged state, when it holds in s, and the rate in mm/s at which it was reached, if any."""
+
+    time_s: float
+    state: State
+    rate: Array | None = None
+
+
+def march(
+    equilibrium: Equilibrium,
+    time_s: Array,
+    pressure_kPa: Array,
+    on_state: Callable[[State], None] | None = None,
+    max_step_s: float = np.inf,
+) -> Trajectory:
+    """Equilibria of a body with history at k instants, time in s ascending and pressure in kPa.
+
+    The body starts at rest without history; the first instant's pressure comes at once. Pressure is
+    linear between instants, in steps of at most `max_step_s` and the settings' largest pressure step, halved
+    where they do not converge. Raises ConvergenceError naming instant and cause.
+    """
+    time, pressure = np.asarray(time_s, float), np.asarray(pressure_kPa, float) / 1e3
+    if (np.diff(time) < 0).any():
+        raise InputError(
+            "time runs backward", f"instant {int(np.argmax(np.diff(time) < 0)) + 1} of the protocol"
+        )
+    equilibrium.parameters.forget()
+    last = _Instant(time[0], rest(equilibrium.model.mesh))
+    states = []
+    for t, p in zip(time, pressure, strict=True):
+        last = _interval(equilibrium, last, t, p, max_step_s)
+        states.append(last.state)
+        if on_state:
+            on_state(last.state)
+    return Trajectory(time, np.asarray(pressure_kPa, float), tuple(states), np.arange(len(states)))
+
+
+def _interval(eq: Equilibrium, start: _Instant, time: float, pressure: float, max_step_s: float) -> _Instant:
+    """March to an instant, in equal shares of the interval where one step is too much."""
+    span, rise = time - start.time_s, pressure - start.state.pressure_MPa
+    if span == 0 and rise == 0:
+        return start
+    largest = 1 / max(1.0, np.ceil(span / max_step_s), np.ceil(abs(rise) / eq.settings.max_step_MPa - 1e-9))
+    last, done, step = start, 0.0, largest
+    while done < 1:
+        step = min(step, 1 - done)
+        # The last share ends on the instant itself, whatever rounding has left.
+        share = 1.0 if 1 - done - step < SMALLEST / 2 else done + step
+        target = pressure if share == 1 else start.state.pressure_MPa + share * rise
+        try:
+            last = _step(eq, last, start.time_s + share * span, target)
+        except ConvergenceError as why:
+            step /= 2
+            if step < SMALLEST:
+                instant = start.time_s + share * span
+                raise ConvergenceError(
+                    f"no equilibrium at {instant:.6g} s, {target * 1e3:.4g} kPa: {why.what}",
+                    f"the last converged state is at {last.time_s:.6g} s, "
+                    f"{last.state.pressure_MPa * 1e3:.4g} kPa",
+                    "lower the pressure or its rate, thicken the wall or stiffen the material",
+                ) from None
+            continue
+        done, step = share, min(2 * step, largest)
+    return last
+
+
+def _step(eq: Equilibrium, last: _Instant, time: float, pressure: float) -> _Instant:
+    """One step, committed to the materials' history when it has converged."""
+    m, u = eq.parameters, last.state.u
+    m.dt_s = time - last.time_s
+    if last.rate is not None and m.dt_s > 0:
+        guess = u + m.dt_s * last.rate
+    else:
+        guess = _along_tangent(eq, u, pressure)
+    try:
+        state = eq.newton(guess, pressure, LEAP * float(np.abs(guess - u).max()))
+    except ConvergenceError:
+        if last.rate is None:
+            raise
+        # Pressure may have turned round: the rate so far says nothing of what comes.
+        guess = _along_tangent(eq, u, pressure)
+        state = eq.newton(guess, pressure, LEAP * float(np.abs(guess - u).max()))
+    eq.model.commit(state.u, m)
+    rate = (state.u - u) / m.dt_s if m.dt_s > 0 else None
+    return _Instant(time, state, rate)
+
+
+def _along_tangent(eq: Equilibrium, u: Array, pressure: float) -> Array:
+    """One Newton step from the last state, whose tangent must be definite."""
+    model = eq.model
+    try:
+        eq.factor.factor(model.tangent(u, pressure, eq.parameters))
+    except IndefiniteError:
+        raise ConvergenceError("the state to start from is unstable") from None
+    guess = u.copy()
+    guess.ravel()[model.free] -= eq.factor.solve(
+        model.residual(u, pressure, eq.parameters).ravel()[model.free]
+    )
+    return guess

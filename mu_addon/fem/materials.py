@@ -1,0 +1,105 @@
+"""What a body is made of: laws in layers, each over some elements, side by side where they overlap."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+from .laws import NeoHooke
+
+Array = np.ndarray[Any, Any]
+
+
+def _integers(values: Any) -> Array:
+    return np.ascontiguousarray(values, np.int32)
+
+
+def _rows(values: Any) -> Array:
+    return np.ascontiguousarray(values, np.float64)
+
+
+@attrs.frozen(eq=False)
+class Layer:
+    """One law in some elements: elements (k,), parameters (k, count) as the law names them.
+
+    weight, a number or (k,): the share of an element's volume that this law fills; laws that share an
+    element act in parallel, under the same strain (Voigt).
+    """
+
+    law: Any
+    elements: Array = attrs.field(converter=_integers)
+    parameters: Array = attrs.field(converter=_rows)
+    weight: Array = attrs.field(default=1.0, converter=_rows)
+
+    def __attrs_post_init__(self) -> None:
+        k = len(self.elements)
+        object.__setattr__(self, "weight", np.broadcast_to(self.weight, k))
+        expected = (k, len(self.law.parameter_names))
+        if self.parameters.shape != expected:
+            raise InputError(
+                f"{self.law.name}: parameters of shape {self.parameters.shape}, expected {expected}",
+                "a layer of a body's materials",
+                f"give one row an element, with {', '.join(self.law.parameter_names)}",
+            )
+        if len(np.unique(self.elements)) < k:
+            raise InputError(f"{self.law.name}: an element is listed twice in one layer")
+        self.law.valid(self.parameters)
+
+    def kept(self, rows: Array, weight: Array) -> Layer:
+        """The rows (r,) of this layer, under new weights (r,)."""
+        return Layer(self.law, self.elements[rows], self.parameters[rows], weight)
+
+
+@attrs.frozen(eq=False)
+class Materials:
+    """The layers that fill a body."""
+
+    layers: tuple[Layer, ...]
+
+    @classmethod
+    def neo_hooke(cls, modulus_MPa: Array, poisson: Array) -> Materials:
+        """Neo-Hookean material in every element, of small-strain Young's moduli and Poisson's ratios (m,)."""
+        parameters = NeoHooke.parameters(modulus_MPa, poisson)
+        return cls((Layer(NeoHooke, np.arange(len(parameters)), parameters),))
+
+    def blended(self, share: Array, law: Any, parameters: Array) -> Materials:
+        """These materials with another law in a share (m,) of every element, and as much less of themselves.
+
+        parameters: (m, count) or one row for all. Elements of which a layer keeps nothing leave it.
+        """
+        share = np.asarray(share, float)
+        if not ((share >= 0) & (share <= 1)).all():
+            worst = share[np.argmax(np.abs(share - 0.5))]
+            raise InputError(f"a share of an element is {worst:.6g}", remedy="give shares from 0 to 1")
+        layers = []
+        for layer in self.layers:
+            weight = layer.weight * (1 - share[layer.elements])
+            rows = np.flatnonzero(weight)
+            if len(rows):
+                layers.append(layer.kept(rows, weight[rows]))
+        touched = np.flatnonzero(share)
+        if len(touched):
+            rows = np.broadcast_to(parameters, (len(share), len(law.parameter_names)))[touched]
+            layers.append(Layer(law, touched, rows, share[touched]))
+        return Materials(tuple(layers))
+
+    def small_strain(self, count: int) -> tuple[Array, Array]:
+        """Young's modulus in MPa and Poisson's ratio, (m,) each, of a body of `count` isotropic elements."""
+        moduli = np.zeros((count, 2))
+        for layer in self.layers:
+            moduli[layer.elements] += layer.weight[:, None] * layer.law.small_strain(layer.parameters)
+        mu, kappa = moduli.T
+        return 9 * kappa * mu / (3 * kappa + mu), (3 * kappa - 2 * mu) / (6 * kappa + 2 * mu)
+
+    def hash(self) -> str:
+        """SHA-256 of every law's name and every array, equal only for identical materials."""
+        digest = hashlib.sha256()
+        for layer in self.layers:
+            digest.update(repr((layer.law.name, layer.law.parameter_names, len(layer.elements))).encode())
+            for array in (layer.elements, layer.parameters, layer.weight):
+                digest.update(np.ascontiguousarray(array).tobytes())
+        return digest.hexdigest()

@@ -1,0 +1,113 @@
+"""Many right-hand sides with one Cholesky factor: blocked substitution, and a block of unknowns kept last."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import attrs
+import numpy as np
+import warp as wp
+
+from .substitution import COLUMNS, substitution_kernels
+
+Array = np.ndarray[Any, Any]
+
+# Right-hand sides that one thread carries through the factor together: the factor is read from memory
+# once for all of them.
+WIDTHS = (8, 16)
+
+
+@attrs.frozen(eq=False)
+class Lower:
+    """L of P A P^T = L L^T by columns, diagonal first: row i of P A P^T is row order[i] of A."""
+
+    order: Array
+    indptr: Array
+    indices: Array
+    values: Array
+
+
+def column_blocks(lower: Lower, last: int) -> Array:
+    """First columns (b,) of blocks of up to four columns with the same rows below; `last` starts one."""
+    count = np.diff(lower.indptr)
+    inner = np.minimum(lower.indptr[:-1] + 1, len(lower.indices) - 1)
+    n = len(count)
+    follows = np.zeros(n, dtype=bool)
+    follows[1:] = (count[1:] == count[:-1] - 1) & (lower.indices[inner[:-1]] == np.arange(1, n))
+    follows[last:] = False
+    starts, size = [], int(COLUMNS)
+    for j, joined in enumerate(follows):
+        if joined and size < COLUMNS:
+            size += 1
+        else:
+            starts.append(j)
+            size = 1
+    return np.array(starts, dtype=np.int32)
+
+
+class Triangular:
+    """Solves with one factor for many right-hand sides at once.
+
+    The last `trailing` unknowns of the factor's order are left to the caller: `schur` is the matrix
+    (t, t) that remains for them when all others are eliminated.
+    """
+
+    def __init__(self, lower: Lower, trailing: int = 0, threads: int = 2) -> None:
+        self.order, self.threads = lower.order, threads
+        n = len(lower.order)
+        self.inner = n - trailing
+        starts = column_blocks(lower, self.inner)
+        blocks = np.append(starts[starts < self.inner], self.inner).astype(np.int32)
+        end = lower.indptr[self.inner]
+        self._inputs = [
+            wp.array(blocks, dtype=int, device="cpu"),
+            wp.array(lower.indptr, dtype=wp.int64, device="cpu"),
+            wp.array(lower.indices[:end], dtype=int, device="cpu"),
+            wp.array(lower.values[:end], dtype=wp.float64, device="cpu"),
+        ]
+        corner = np.zeros((trailing, trailing))
+        column = np.repeat(np.arange(self.inner, n), np.diff(lower.indptr[self.inner :]))
+        corner[lower.indices[end:] - self.inner, column - self.inner] = lower.values[end:]
+        self.schur = corner @ corner.T
+
+    def solve(self, b: Array, solve_trailing: Callable[[Array], Array] | None = None) -> Array:
+        """Solutions (k, n) for right-hand sides (k, n).
+
+        solve_trailing: solves the remaining system for (k, t) of right-hand sides; needed when there are
+        trailing unknowns.
+        """
+        width = next((w for w in WIDTHS if len(b) <= w * self.threads), WIDTHS[-1])
+        groups = []
+        for first in range(0, len(b), width):
+            part = b[first : first + width]
+            x = np.zeros((len(self.order), width), dtype=np.float64)
+            x[:, : len(part)] = part[:, self.order].T
+            groups.append(x)
+        forward, backward = substitution_kernels(width)
+        vector = wp.types.vector(length=width, dtype=wp.float64)
+        arrays = [wp.array(x, dtype=vector, device="cpu", copy=False) for x in groups]
+        self._run(forward, arrays)
+        if self.inner < len(self.order):
+            assert solve_trailing is not None
+            rest = np.concatenate([x[self.inner :].T for x in groups])[: len(b)]
+            solved = solve_trailing(rest.astype(float))
+            for x, first in zip(groups, range(0, len(b), width), strict=True):
+                part = solved[first : first + width]
+                x[self.inner :, : len(part)] = part.T
+        self._run(backward, arrays)
+        solution = np.empty(b.shape)
+        for x, first in zip(groups, range(0, len(b), width), strict=True):
+            part = solution[first : first + width]
+            part[:, self.order] = x[:, : len(part)].T
+        return solution
+
+    def _run(self, kernel: Any, arrays: list[wp.array]) -> None:
+        def launch(x: wp.array) -> None:
+            wp.launch(kernel, 1, [*self._inputs, x], device="cpu")
+
+        if self.threads == 1 or len(arrays) == 1:
+            for x in arrays:
+                launch(x)
+            return
+        with ThreadPoolExecutor(self.threads) as pool:
+            list(pool.map(launch, arrays))

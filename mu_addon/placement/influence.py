@@ -1,0 +1,193 @@
+"""How much every element's stiffness moves the monitored points: the adjoint map of a whole trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import MeshingError
+from ..fem.elementwise import element_forces
+from ..fem.equilibrium import State
+from ..fem.kinematics import Probe
+from ..fem.materials import Materials
+from ..fem.model import Model
+from ..fem.trajectory import Trajectory
+from ..meshing.mesh import Mesh
+from .deviation import centreline
+
+Array = np.ndarray[Any, Any]
+
+# Step in mm for the centreline's derivative by its points; the spline is smooth, so that the error is
+# of the order of its square.
+_STEP = 1e-4
+
+
+@attrs.frozen(eq=False)
+class Parity:
+    """One half of the responses of a body with a mirror plane x = 0: those even in x, or those odd.
+
+    components: of the displacement of points on the plane, those that this half carries.
+    """
+
+    model: Model
+    components: tuple[int, ...]
+    odd: bool
+
+
+def parities(model: Model) -> list[Parity]:
+    """The responses of a whole body about a state of its model, which may be of one half.
+
+    A load on one side of a half's mirror plane is half an even load and half an odd one; the tangents
+    of both are those of the half mesh, under different supports on the plane. Raises MeshingError for a
+    mesh with other mirror planes.
+    """
+    mesh = model.mesh
+    if not mesh.symmetry:
+        return [Parity(model, (0, 1, 2), False)]
+    if mesh.symmetry != ("x",):
+        raise MeshingError("paths off the plane need a half or a whole mesh", f"mirrors: {mesh.symmetry}")
+    held = np.zeros((len(mesh.nodes), 3), bool)
+    held[mesh.symmetry_nodes("x"), 1:] = True
+    whole = attrs.evolve(mesh, symmetry=())
+    other = Model(whole, held=held, device=model.device, threads=model.threads)
+    return [Parity(model, (1, 2), False), Parity(other, (0,), True)]
+
+
+def probe_loads(mesh: Mesh, monitor: Probe, components: Sequence[int]) -> Array:
+    """Nodal loads (3 n, p, c) whose work is the displacement of each monitored point along each component."""
+    points = len(monitor.nodes)
+    loads = np.zeros((3 * len(mesh.nodes), points, len(components)))
+    for i in range(points):
+        for c, component in enumerate(components):
+            np.add.at(loads[:, i, c], 3 * monitor.nodes[i] + component, monitor.weights[i])
+    return loads
+
+
+def loaded(trajectory: Trajectory, pressures_MPa: Array | None = None) -> list[State]:
+    """States of a trajectory under pressure, or those at some pressures: at rest nothing deviates."""
+    states = [state for state in trajectory.states if state.pressure_MPa]
+    if pressures_MPa is None:
+        return states
+    return [s for s in states if np.isclose(s.pressure_MPa, pressures_MPa, rtol=1e-9).any()]
+
+
+def telling_pressures(trajectory: Trajectory) -> Array:
+    """Three of a trajectory's pressures in MPa that stand for all: the extremes, and one between.
+
+    Over the grasp protocol J_hat by `polynomials` through these was within 0.4 % of that with each
+    pressure solved for.
+    """
+    pressures = np.array([state.pressure_MPa for state in loaded(trajectory)])
+    low, high = pressures.min(), pressures.max()
+    middle = pressures[np.argmin(np.abs(pressures - (low + 2 * high) / 3))]
+    return np.unique([low, middle, high])
+
+
+def polynomials(known: Array, wanted: Array) -> Array:
+    """Weights (t, s) of values known at s pressures, and 0 at none, in their polynomial at t others."""
+    weights = np.empty((len(wanted), len(known)))
+    for i, here in enumerate(known):
+        others = np.append(0.0, np.delete(known, i))
+        weights[:, i] = np.prod((np.asarray(wanted)[:, None] - others) / (here - others), axis=1)
+    return weights
+
+
+@attrs.frozen(eq=False)
+class Influence:
+    """The map: displacement (s, p, 3, m) in mm of p points in s states by each element's stiffening.
+
+    Values are first-order, for one element of the whole body made stiffer by the factor 1 + e, divided
+    by e; one of a half mesh stands for itself without its mirror image.
+    """
+
+    pressure_MPa: Array
+    displacement: Array
+
+    def at(self, pressures_MPa: Array) -> Influence:
+        """The map at other pressures (t,) in MPa, by `polynomials` through its own."""
+        weights = polynomials(self.pressure_MPa, pressures_MPa)
+        return Influence(np.asarray(pressures_MPa), np.tensordot(weights, self.displacement, axes=1))
+
+    def of_modulus(self, modulus_MPa: Array) -> Array:
+        """The map (s, p, 3, m) in mm/MPa by each element's Young's modulus (m,) in MPa."""
+        return self.displacement / modulus_MPa
+
+
+def influence(
+    model: Model,
+    materials: Materials,
+    trajectory: Trajectory,
+    monitor: Probe,
+    pressures_MPa: Array | None = None,
+    sides: list[Parity] | None = None,
+) -> Influence:
+    """Adjoint map of every element over a whole trajectory of Model A.
+
+    In each state K lambda = probe for every monitored point and component; an element's force f then
+    moves the point by - lambda f, since the state stays in equilibrium. Linear in the weights of the
+    element's laws, whatever those are. pressures_MPa: the states to take, by default all under pressure.
+    Raises IndefiniteError at an unstable state.
+    """
+    mesh = model.mesh
+    sides = parities(model) if sides is None else sides
+    states = loaded(trajectory, pressures_MPa)
+    data = model.parameters(materials)
+    found = np.zeros((len(states), len(monitor.nodes), 3, len(mesh.tets)))
+    for s, state in enumerate(states):
+        forces = element_forces(model, state.u, data).reshape(len(mesh.tets), -1)
+        for side in sides:
+            free = side.model.free
+            loads = probe_loads(mesh, monitor, side.components)
+            tangent = side.model.tangent(state.u, state.pressure_MPa, data)
+            solved = np.zeros((loads.shape[0], loads[0].size))
+            solved[free] = side.model.factor.factor(tangent).solve(loads[free].reshape(len(free), -1))
+            adjoint = solved.reshape(len(mesh.nodes), 3, -1)[mesh.tets].reshape(*forces.shape, -1)
+            moved = np.einsum("ei,eic->ce", forces, adjoint).reshape(*loads.shape[1:], -1)
+            found[s][:, list(side.components)] = -moved / len(sides)
+    return Influence(np.array([state.pressure_MPa for state in states]), found)
+
+
+def centreline_gradient(points: Array, stations: int) -> Array:
+    """Derivative (j, 3, p, 3) of the centreline by the points (p, 3) in mm it goes through."""
+    shifts = _STEP * np.eye(points.size).reshape(-1, *points.shape)
+    ahead, behind = (centreline(points + sign * shifts, stations) for sign in (1, -1))
+    return np.asarray((ahead - behind) / (2 * _STEP)).transpose(1, 2, 0).reshape(stations, 3, *points.shape)
+
+
+def mean_deviation(gradients: Array, moved: Array, weights: Array) -> Array:
+    """J_hat (...,) in mm, to first order, of displacements (..., s, p, 3) of the monitored points.
+
+    gradients (s, j, 3, p, 3) of the centreline in every state; weights (s,) the share of the instants
+    at which each state holds.
+    """
+    total = np.zeros(moved.shape[:-3])
+    # State by state, for there are as many displacements as elements or paths.
+    for s, (gradient, weight) in enumerate(zip(gradients, weights, strict=True)):
+        delta = np.tensordot(moved[..., s, :, :], gradient, axes=((-2, -1), (2, 3)))
+        total += weight * np.linalg.norm(delta, axis=-1).mean(axis=-1)
+    return total
+
+
+def shares_of_time(trajectory: Trajectory) -> Array:
+    """Share (s,) of the instants at which each loaded state holds."""
+    count = np.bincount(trajectory.index, minlength=len(trajectory.states)) / len(trajectory.index)
+    return count[[bool(state.pressure_MPa) for state in trajectory.states]]
+
+
+def gradients_of(trajectory: Trajectory, points: Array, monitor: Probe, stations: int) -> Array:
+    """`centreline_gradient` (s, j, 3, p, 3) about the baseline's monitored points in every loaded state."""
+    return np.array(
+        [centreline_gradient(points + monitor.displacement(s.u), stations) for s in loaded(trajectory)]
+    )
+
+
+def deviation_map(found: Influence, gradients: Array, weights: Array) -> Array:
+    """dJ_hat (m,) in mm by each element's relative stiffening, alone and from Model A on.
+
+    J_hat is a mean of distances and has a kink at Model A, where all of them are 0: this is its slope
+    on the side of stiffening, and never negative.
+    """
+    return mean_deviation(gradients, np.moveaxis(found.displacement, -1, 0), weights)

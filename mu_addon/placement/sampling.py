@@ -1,0 +1,58 @@
+"""Deviations at a few pressures for all: where to solve, what lies between, and how far that may be off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, Any]
+
+
+def rounds(pressure: Array) -> list[list[int]]:
+    """In which order to solve distinct pressures (s,): two at a time, the extremes first.
+
+    Each later pressure is the one farthest from those before it and from 0, where nothing deviates.
+    """
+    pressure = np.asarray(pressure, float)
+    left = [i for i, p in enumerate(pressure) if p]
+    order = [i for i in (int(np.argmin(pressure)), int(np.argmax(pressure))) if i in left]
+    order = list(dict.fromkeys(order))
+    while len(order) < len(left):
+        known = np.append(pressure[order], 0.0)
+        rest = [i for i in left if i not in order]
+        order.append(rest[int(np.argmax([np.abs(pressure[i] - known).min() for i in rest]))])
+    return [order[i : i + 2] for i in range(0, len(order), 2)]
+
+
+def between(pressure: Array, known: Mapping[int, Array]) -> Array:
+    """Differences (s, ...) at all pressures (s,) of those known at some, by number.
+
+    The polynomial through them and through 0 at 0 pressure; what is known stays as it is.
+    """
+    from scipy.interpolate import BarycentricInterpolator
+
+    pressure = np.asarray(pressure, float)
+    numbers = [i for i in known if pressure[i]]
+    shape = next(iter(known.values())).shape
+    values = np.array([known[i] for i in numbers] + [np.zeros(shape)])
+    found: Array = BarycentricInterpolator(np.append(pressure[numbers], 0.0), values)(pressure)
+    for i, value in known.items():
+        found[i] = value
+    return found
+
+
+def estimate(fuller: Array, sparser: Array, weight: Array) -> float:
+    """Error of the sparser of two sets of differences (s, jobs, p, 3), relative to the job's mean deviation.
+
+    weight (s,): instants at each pressure. The largest of any job; by the triangle inequality a bound of
+    how far the mean deviations of the two lie apart.
+    """
+
+    def mean(values: Array) -> Array:
+        return np.einsum("sjp,s->j", np.linalg.norm(values, axis=3), weight)
+
+    size = mean(fuller)
+    apart = mean(fuller - sparser)
+    return float(np.divide(apart, size, out=np.zeros_like(apart), where=size > 0).max())

@@ -1,0 +1,46 @@
+"""Every candidate on one mesh at once: Model A's states, each with all sensors in lockstep."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..fem.equilibrium import State
+from ..fem.kinematics import Probe
+from ..fem.laws import NeoHooke
+from ..fem.lockstep import Lockstep, Variant
+from ..fem.materials import Materials
+from ..fem.model import Model
+
+Array = np.ndarray[Any, Any]
+
+
+class Sweep:
+    """Many sensors in one unit: where each moves the monitored points at a state of Model A.
+
+    shares: the part (m,) of every element that each sensor fills (see inclusion.sensor_share).
+    monitored: points (p, 3) in mm of the backbone and their probe.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        materials: Materials,
+        monitored: tuple[Array, Probe],
+        shares: Sequence[Array],
+        sensor_MPa: float,
+    ) -> None:
+        _, poisson = materials.small_strain(len(model.mesh.tets))
+        stiff = NeoHooke.parameters(np.full(len(poisson), sensor_MPa), poisson)
+        self._points, self._probe = monitored
+        self._lockstep = Lockstep(model, materials, [Variant(s, NeoHooke, stiff) for s in shares])
+
+    def at(self, state: State) -> Array:
+        """Monitored points (sensors, p, 3) in mm, at the pressure of one of Model A's states.
+
+        Raises ConvergenceError where a sensor's unit has no equilibrium that continues Model A's.
+        """
+        states = self._lockstep.at(state)
+        return np.array([self._points + self._probe.displacement(s.u) for s in states])

@@ -1,0 +1,103 @@
+"""A law at single points: energy, stress and tangent of given deformation gradients and parameters."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import warp as wp
+
+from mu_addon.fem import kernels  # noqa: F401 (sets Warp up)
+from mu_addon.fem.laws.tensors import mat33, mat99
+
+f64 = wp.float64
+
+
+@cache
+def _kernel(law, count):
+    energy_of, stress_of, tangent_of = law.energy, law.stress, law.tangent
+    vector = wp.types.vector(length=count, dtype=f64)
+
+    @wp.kernel(module="unique")
+    def kernel(
+        F: wp.array(dtype=mat33),
+        rows: wp.array2d(dtype=f64),
+        W: wp.array(dtype=f64),
+        P: wp.array(dtype=mat33),
+        A: wp.array(dtype=mat99),
+    ):
+        i = wp.tid()
+        m = vector()
+        for k in range(wp.static(count)):
+            m[k] = rows[i, k]
+        W[i] = energy_of(F[i], m)
+        P[i] = stress_of(F[i], m)
+        A[i] = tangent_of(F[i], m)
+
+    return kernel
+
+
+@cache
+def _advance_kernel(law, count):
+    advance_of = law.advance
+    vector = wp.types.vector(length=count, dtype=f64)
+
+    @wp.kernel(module="unique")
+    def kernel(F: wp.array(dtype=mat33), rows: wp.array2d(dtype=f64), out: wp.array2d(dtype=f64)):
+        i = wp.tid()
+        m = vector()
+        for k in range(wp.static(count)):
+            m[k] = rows[i, k]
+        found = advance_of(F[i], m)
+        for k in range(wp.static(law.history)):
+            out[i, k] = found[k]
+
+    return kernel
+
+
+def evaluate(law, F, rows):
+    """Energy (n,), stress (n, 3, 3) and tangent (n, 9, 9) at F (n, 3, 3), of rows (n, count) or one row.
+
+    A row holds the parameters and, for a law with history, its numbers and the time step.
+    """
+    inputs, n, count = _inputs(F, rows)
+    outputs = [wp.zeros(n, dtype=d, device="cpu") for d in (f64, mat33, mat99)]
+    wp.launch(_kernel(law, count), n, [*inputs, *outputs], device="cpu")
+    return tuple(o.numpy() for o in outputs)
+
+
+def _inputs(F, rows):
+    F = np.ascontiguousarray(F, float).reshape(-1, 3, 3)
+    n, count = len(F), np.shape(rows)[-1]
+    rows = np.broadcast_to(rows, (n, count)).astype(float).copy()
+    inputs = [wp.array(F, dtype=mat33, device="cpu"), wp.array(rows, dtype=f64, device="cpu")]
+    return inputs, n, count
+
+
+def drive(law, parameters, F, time):
+    """Energy (n,) and stress (n, 3, 3) of one point taken through F (n, 3, 3) at times (n,), from rest."""
+    history = np.zeros(law.history)
+    energies, stresses = [], []
+    before = time[0]
+    for now, at in zip(time, F, strict=True):
+        row = np.concatenate([parameters, history, [now - before]])
+        W, P, _ = evaluate(law, at, row)
+        inputs, _, count = _inputs(at, row)
+        out = wp.zeros((1, law.history), dtype=f64, device="cpu")
+        wp.launch(_advance_kernel(law, count), 1, [*inputs, out], device="cpu")
+        history, before = out.numpy()[0], now
+        energies.append(W[0])
+        stresses.append(P[0])
+    return np.array(energies), np.array(stresses)
+
+
+def difference(values, F, h):
+    """Derivative of values(F) -> (n, ...) by F (n, 3, 3), of the fourth order in h: (n, ..., 9)."""
+    columns = []
+    for c in range(9):
+        d = np.zeros(9)
+        d[c] = h
+        d = d.reshape(3, 3)
+        v = {s: values(F + s * d) for s in (-2, -1, 1, 2)}
+        columns.append((8 * (v[1] - v[-1]) - (v[2] - v[-2])) / (12 * h))
+    return np.stack(columns, axis=-1)

@@ -1,0 +1,312 @@
+"""Every law against its own derivatives, closed forms, linear elasticity and change of frame."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mu_addon.errors import InputError
+from mu_addon.fem.laws import (
+    Cubic,
+    Foam,
+    Friction,
+    Guccione,
+    MooneyRivlin,
+    NeoHooke,
+    Ogden,
+    OgdenRoxburgh,
+    Prony,
+    TransverselyIsotropic,
+    Yeoh,
+)
+from mu_addon.fem.materials import Layer, Materials
+from mu_addon.fem.model import Model
+
+from . import bodies
+from .points import difference, evaluate
+
+FIBRE = [1.0, 2.0, -1.0]
+ROWS = {
+    NeoHooke: NeoHooke.parameters(0.6, 0.4)[0],
+    MooneyRivlin: np.array([0.3, 0.1, 5.0]),
+    Yeoh: np.array([0.3, -0.02, 0.004, 5.0]),
+    Ogden: np.array([0.6, 1.3, 0.02, 5.0, -0.1, -2.0, 7.0]),
+    Foam: np.array([0.4, 3.0, 0.25, 12.0, 0.3, 2.0]),
+    Guccione: Guccione.parameters(2.0, 8.0, 2.0, 4.0, 100.0, FIBRE)[0],
+    TransverselyIsotropic: TransverselyIsotropic.parameters(20.0, 2.0, 0.3, 0.4, 1.5, FIBRE)[0],
+    Cubic: Cubic.parameters(3.0, 0.25, 0.4, FIBRE, [0, 1, 1])[0],
+    Prony: np.array([0.3, -0.02, 0.004, 5.0, 0.5, 1.0, 0.3, 10.0, 0.0, 1.0]),
+    OgdenRoxburgh: np.array([0.3, -0.02, 0.004, 5.0, 1.5, 0.05, 0.1]),
+    Friction: np.array([0.4, 0.1]),
+}
+ISOTROPIC = [law for law in ROWS if law not in (Guccione, TransverselyIsotropic, Cubic)]
+LAWS = pytest.mark.parametrize("law", ROWS, ids=lambda law: law.__name__)
+rotations = st.integers(0, 2**32 - 1).map(
+    lambda seed: np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
+)
+
+
+def row_of(law, remembered=True):
+    """Parameters of a law; with history, some of it too, and a step of 0.7 s."""
+    if not law.history:
+        return ROWS[law]
+    history = np.zeros(law.history)
+    if remembered and law is OgdenRoxburgh:
+        history[:] = 0.08
+    elif remembered:
+        tensors = 0.05 * np.random.default_rng(5).standard_normal((law.history // 6, 6))
+        tensors[:, :3] -= tensors[:, :3].mean(axis=1, keepdims=True)
+        history[:] = tensors.ravel()
+    return np.concatenate([ROWS[law], history, [0.7]])
+
+
+def gradients(seed=0, size=0.15, count=30):
+    F = np.eye(3) + size * np.random.default_rng(seed).standard_normal((count, 3, 3))
+    return F[np.linalg.det(F) > 0.5]
+
+
+@LAWS
+def test_stress_and_tangent_are_derivatives(law):
+    F, row = gradients(), row_of(law)
+    law.valid(ROWS[law][None])
+    _, P, A = evaluate(law, F, row)
+    by_energy = difference(lambda X: evaluate(law, X, row)[0], F, 2e-4).reshape(-1, 3, 3)
+    by_stress = difference(lambda X: evaluate(law, X, row)[1].reshape(-1, 9), F, 2e-4)
+    assert np.abs(by_energy - P).max() < 1e-9 * np.abs(P).max()
+    # Some tangents jump where sliding or softening sets in; no point of these lies within a step of that.
+    assert np.abs(by_stress - A).max() < 1e-9 * np.abs(A).max()
+    np.testing.assert_allclose(A, A.transpose(0, 2, 1), atol=1e-14 * np.abs(A).max())
+
+
+@LAWS
+@settings(max_examples=20, deadline=None)
+@given(Q=rotations, seed=st.integers(0, 2**32 - 1))
+def test_a_turned_body_has_the_same_energy_and_its_stress_turns(law, Q, seed):
+    Q = Q * np.linalg.det(Q)
+    F, row = gradients(seed, 0.1, 2), row_of(law)
+    W, P, _ = evaluate(law, F, row)
+    W_turned, P_turned, _ = evaluate(law, Q @ F, row)
+    np.testing.assert_allclose(W_turned, W, rtol=1e-10, atol=1e-14)
+    np.testing.assert_allclose(P_turned, Q @ P, atol=1e-11 * max(1, np.abs(P).max()))
+    W_rigid, P_rigid, _ = evaluate(law, Q, row_of(law, remembered=False))
+    assert abs(W_rigid[0]) < 1e-14 * np.abs(row).max()
+    assert np.abs(P_rigid).max() < 1e-13 * np.abs(row).max()
+
+
+@pytest.mark.parametrize("law", ISOTROPIC, ids=lambda law: law.__name__)
+def test_a_body_turned_before_loading_makes_no_difference_where_the_law_is_isotropic(law):
+    Q = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))[0]
+    F, row = gradients(), row_of(law, remembered=False)
+    np.testing.assert_allclose(evaluate(law, F @ Q.T, row)[1], evaluate(law, F, row)[1] @ Q.T, atol=1e-11)
+
+
+def isotropic_stiffness(mu, kappa):
+    one = np.eye(3)
+    identity = (np.einsum("ik,jl->ijkl", one, one) + np.einsum("il,jk->ijkl", one, one)) / 2
+    volume = np.einsum("ij,kl->ijkl", one, one)
+    return (2 * mu * (identity - volume / 3) + kappa * volume).reshape(9, 9)
+
+
+@pytest.mark.parametrize("law", ISOTROPIC, ids=lambda law: law.__name__)
+def test_small_strain_is_linear_elasticity_of_the_stated_moduli(law):
+    row = row_of(law, remembered=False).copy()
+    if law.history:
+        row[-1] = 1e9
+    if law is Foam:
+        row[2] = row[0]
+    mu, kappa = law.small_strain(row[None, : len(law.parameter_names)])[0]
+    tangent = evaluate(law, np.eye(3), row)[2][0]
+    np.testing.assert_allclose(tangent, isotropic_stiffness(mu, kappa), atol=1e-8 * kappa + 1e-14)
+
+
+def test_youngs_modulus_and_poissons_ratio_are_as_asked():
+    for law, row in ((NeoHooke, NeoHooke.parameters(0.6, 0.4)), (Foam, Foam.parameters(0.6, 0.2, 4.0, 9.0))):
+        mu, kappa = law.small_strain(row)[0]
+        E, nu = 9 * kappa * mu / (3 * kappa + mu), (3 * kappa - 2 * mu) / (6 * kappa + 2 * mu)
+        assert (E, nu) == pytest.approx((0.6, 0.4 if law is NeoHooke else 0.2))
+
+
+def compliance_in_frame(law, row, frame):
+    """6 x 6 compliance, tensor components, in a frame whose axes are the columns."""
+    C = evaluate(law, np.eye(3), row)[2][0].reshape(3, 3, 3, 3)
+    C = np.einsum("ijkl,ia,jb,kc,ld->abcd", C, *[frame] * 4)
+    pairs = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
+    factor = np.array([1, 1, 1, 2, 2, 2]) ** 0.5
+    mandel = np.array([[C[(*a, *b)] for b in pairs] for a in pairs]) * np.outer(factor, factor)
+    return np.linalg.inv(mandel)
+
+
+def test_transverse_isotropy_has_the_engineering_constants_asked_for():
+    f = np.array(FIBRE) / np.linalg.norm(FIBRE)
+    across = np.cross(f, [1.0, 0, 0])
+    across /= np.linalg.norm(across)
+    S = compliance_in_frame(
+        TransverselyIsotropic, ROWS[TransverselyIsotropic], np.stack([f, across, np.cross(f, across)], axis=1)
+    )
+    assert (1 / S[0, 0], 1 / S[1, 1], 1 / S[2, 2]) == pytest.approx((20.0, 2.0, 2.0))
+    assert (-S[1, 0] / S[0, 0], -S[2, 1] / S[1, 1]) == pytest.approx((0.3, 0.4))
+    assert (1 / (2 * S[4, 4]), 1 / (2 * S[5, 5])) == pytest.approx((1.5, 1.5))
+    assert 1 / (2 * S[3, 3]) == pytest.approx(2.0 / (2 * 1.4))
+
+
+def test_cubic_symmetry_has_the_engineering_constants_asked_for():
+    row = ROWS[Cubic]
+    S = compliance_in_frame(Cubic, row, np.stack([row[3:6], row[6:9], np.cross(row[3:6], row[6:9])], axis=1))
+    assert 1 / np.diag(S)[:3] == pytest.approx([3.0] * 3)
+    assert -S[1, 0] / S[0, 0] == pytest.approx(0.25)
+    assert 1 / (2 * np.diag(S)[3:]) == pytest.approx([0.4] * 3)
+
+
+@pytest.mark.parametrize("law", [Guccione, TransverselyIsotropic, Cubic], ids=lambda law: law.__name__)
+def test_stated_moduli_are_the_average_over_directions(law):
+    row = ROWS[law]
+    C = evaluate(law, np.eye(3), row)[2][0].reshape(3, 3, 3, 3)
+    whole, pressure = np.einsum("ijij", C), np.einsum("iijj", C)
+    # C from F has minor symmetry at rest, so its traces are those of the stiffness.
+    np.testing.assert_allclose(law.small_strain(row[None])[0], [(3 * whole - pressure) / 30, pressure / 9])
+
+
+MODES = {
+    "uniaxial": lambda s: np.array([s, s**-0.5, s**-0.5]),
+    "equibiaxial": lambda s: np.array([s, s, s**-2]),
+    "pure shear": lambda s: np.array([s, 1.0, 1 / s]),
+}
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("law", [NeoHooke, MooneyRivlin, Yeoh, Ogden], ids=lambda law: law.__name__)
+def test_stress_differences_of_incompressible_rubber(law, mode):
+    """s_a - s_c = 2 (a^2 - c^2)(W1 + b^2 W2), and for Ogden the sum of mu_p (a^alpha_p - c^alpha_p)."""
+    row = ROWS[law]
+    for stretch in (0.5, 0.9, 1.4, 2.5):
+        a, b, c = MODES[mode](stretch)
+        P = evaluate(law, np.diag([a, b, c]), row)[1][0]
+        found = a * P[0, 0] - c * P[2, 2]
+        if law is Ogden:
+            expected = sum(mu * (a**n - c**n) for mu, n in zip(row[0:6:2], row[1:6:2], strict=True))
+        else:
+            x = a * a + b * b + c * c - 3
+            W1 = row[0] / 2 if law is NeoHooke else row[0]
+            if law is Yeoh:
+                W1 += 2 * row[1] * x + 3 * row[2] * x * x
+            W2 = row[1] if law is MooneyRivlin else 0.0
+            expected = 2 * (a * a - c * c) * (W1 + b * b * W2)
+        assert found == pytest.approx(expected, rel=1e-10)
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-14, 1e-9, 1e-6, 1e-4, 1.01e-3, 0.1])
+@pytest.mark.parametrize("third", [1.0, 0.8], ids=["three", "two"])
+def test_ogden_with_equal_stretches_is_mooney_rivlin_to_rounding(gap, third):
+    """With exponents 2 and -2 they are one law, whose tangent knows nothing of principal directions."""
+    c1, c2, kappa = ROWS[MooneyRivlin]
+    Q = np.linalg.qr(np.random.default_rng(4).standard_normal((3, 3)))[0]
+    F = Q @ np.diag([1.2, 1.2 * (1 + gap), 1.2 * third * (1 + 2 * gap)]) @ Q.T
+    ogden = evaluate(Ogden, F, [2 * c1, 2.0, -2 * c2, -2.0, 0.0, 1.0, kappa])
+    for found, expected in zip(ogden, evaluate(MooneyRivlin, F, ROWS[MooneyRivlin]), strict=True):
+        np.testing.assert_allclose(found, expected, atol=2e-12)
+
+
+@pytest.mark.parametrize("law", [Ogden, Foam], ids=lambda law: law.__name__)
+def test_the_tangent_stays_a_derivative_where_stretches_are_equal(law):
+    row = ROWS[law].copy()
+    Q = np.linalg.qr(np.random.default_rng(4).standard_normal((3, 3)))[0]
+    F = np.stack([Q @ np.diag(d) @ Q.T for d in ([1.3, 1.3, 0.9], [1.3, 1.3, 1.3], [0.8, 0.8 + 1e-7, 0.8])])
+    A = evaluate(law, F, row)[2]
+    found = difference(lambda X: evaluate(law, X, row)[1].reshape(-1, 9), F, 2e-4)
+    assert np.abs(found - A).max() < 1e-9 * np.abs(A).max()
+
+
+def test_foam_without_lateral_strain_follows_its_closed_form_on_either_side():
+    """P = 2 mu/alpha (s^(alpha - 1) - 1/s), with the modulus and exponent of the side of 1 that s is on."""
+    row = ROWS[Foam].copy()
+    row[4] = 0.0
+    for stretch in (0.4, 0.7, 0.999, 1.001, 1.5):
+        mu, alpha = row[:2] if stretch > 1 else row[2:4]
+        P = evaluate(Foam, np.diag([stretch, 1.0, 1.0]), row)[1][0]
+        expected = 2 * mu / alpha * (stretch ** (alpha - 1) - 1 / stretch)
+        np.testing.assert_allclose(P, np.diag([expected, 0, 0]), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("law", "column", "value", "message"),
+    [
+        (NeoHooke, 1, -1.0, "kappa_MPa"),
+        (NeoHooke, 0, np.nan, "mu_MPa"),
+        (MooneyRivlin, 1, -0.5, "c1_MPa"),
+        (Yeoh, 2, -0.1, "c3_MPa"),
+        (Ogden, 3, 0.0, "alpha2"),
+        (Ogden, 0, -9.0, "mu_p"),
+        (Foam, 4, -1.0, "lambda_MPa"),
+        (Foam, 1, 0.0, "alpha_tension"),
+        (Guccione, 5, 3.0, "fibre"),
+        (TransverselyIsotropic, 2, -60.0, "stiffness"),
+        (Cubic, 1, 9.0, "C11 - C12"),
+        (Cubic, 6, 0.9, "length"),
+        (Prony, 4, -0.1, "beta1"),
+        (Prony, 5, 0.0, "tau1_s"),
+        (OgdenRoxburgh, 4, 0.5, "r = 0.5"),
+        (Friction, 1, 0.0, "yield_MPa"),
+    ],
+)
+def test_inadmissible_parameters_are_named(law, column, value, message):
+    rows = np.stack([ROWS[law]] * 3)
+    rows[1, column] = value
+    with pytest.raises(InputError, match=message):
+        Layer(law, [4, 5, 6], rows)
+
+
+@pytest.mark.parametrize("poisson", [0.5, -1.0, np.nan])
+def test_a_poissons_ratio_beyond_its_range_is_named(poisson):
+    with pytest.raises(InputError, match="Poisson's ratio"):
+        NeoHooke.parameters(1.0, poisson)
+
+
+def test_layers_act_side_by_side_and_miss_no_element():
+    """Half of one law and half of another, in two layers, is one law of the mean parameters."""
+    mesh = bodies.hollow_box(2, n=3)
+    count = len(mesh.tets)
+    soft, stiff = NeoHooke.parameters(0.1, 0.3), NeoHooke.parameters(2.0, 0.3)
+    share = np.linspace(0, 1, count)
+    blended = Materials.neo_hooke(np.full(count, 0.1), np.full(count, 0.3)).blended(share, NeoHooke, stiff)
+    assert [len(layer.elements) for layer in blended.layers] == [count - 1, count - 1]
+    rows = (1 - share)[:, None] * soft + share[:, None] * stiff
+    mixed = Materials((Layer(NeoHooke, np.arange(count), rows),))
+    np.testing.assert_allclose(blended.small_strain(count), mixed.small_strain(count), rtol=1e-12)
+    model = Model(mesh)
+    u = 0.02 * np.random.default_rng(0).standard_normal(mesh.nodes.shape)
+    a, b = (model.parameters(materials) for materials in (blended, mixed))
+    assert model.potential(u, 0.01, a) == pytest.approx(model.potential(u, 0.01, b), rel=1e-13)
+    np.testing.assert_allclose(model.residual(u, 0.01, a), model.residual(u, 0.01, b), atol=1e-13)
+    np.testing.assert_allclose(model.tangent(u, 0.01, a), model.tangent(u, 0.01, b), atol=1e-12)
+    assert blended.hash() != mixed.hash()
+    with pytest.raises(InputError, match=f"1 of {count} elements have no material"):
+        model.parameters(Materials((blended.layers[0],)))
+    with pytest.raises(InputError, match="listed twice"):
+        Layer(NeoHooke, [0, 0], np.repeat(soft, 2, axis=0))
+    with pytest.raises(InputError, match="shape"):
+        Layer(NeoHooke, [0, 1], soft)
+    with pytest.raises(InputError, match="share"):
+        blended.blended(share + 0.1, NeoHooke, soft)
+
+
+def test_an_assembled_body_of_all_laws_has_a_potential_and_a_symmetric_tangent():
+    """Every law in every element at once, those with history after a step they remember."""
+    mesh = bodies.hollow_box(2, n=3, clamp=False)
+    elements = np.arange(len(mesh.tets))
+    layers = [Layer(law, elements, np.tile(row, (len(elements), 1)), 0.1) for law, row in ROWS.items()]
+    model = Model(mesh)
+    m = model.parameters(Materials(tuple(layers)))
+    rng = np.random.default_rng(0)
+    m.dt_s = 0.5
+    model.commit(0.02 * rng.standard_normal(mesh.nodes.shape), m)
+    u, d = 0.02 * rng.standard_normal((2, *mesh.nodes.shape))
+    h = 1e-5
+    steps = (-2, -1, 1, 2)
+    e = {s: model.potential(u + 10 * s * h * d, 0.03, m) for s in steps}
+    r = {s: model.residual(u + s * h * d, 0.03, m) for s in steps}
+    slope = (8 * (e[1] - e[-1]) - (e[2] - e[-2])) / (120 * h)
+    assert slope == pytest.approx((model.residual(u, 0.03, m) * d).sum(), rel=1e-8)
+    change = (8 * (r[1] - r[-1]) - (r[2] - r[-2])) / (12 * h)
+    # `matrix` mirrors one triangle: that it is the derivative shows that nothing unsymmetric was dropped.
+    product = (model.matrix(model.tangent(u, 0.03, m)) @ d.ravel()).reshape(-1, 3)
+    assert np.abs(change - product).max() < 1e-7 * np.abs(product).max()

@@ -1,0 +1,118 @@
+"""Weight and tractions against closed forms."""
+
+import numpy as np
+import pytest
+
+from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, rest
+from mu_addon.fem.loads import STANDARD_GRAVITY, gravity, traction
+from mu_addon.fem.materials import Materials
+from mu_addon.fem.model import Model
+from mu_addon.meshing.mesh import MEMBRANE, Mesh, boundary_faces
+
+from . import bodies
+
+DENSITY = 1.1e-9  # tonne/mm3, silicone
+
+
+def uniform(mesh, modulus, poisson=0.0):
+    count = len(mesh.tets)
+    return Materials.neo_hooke(np.full(count, modulus), np.full(count, poisson))
+
+
+def loaded(model, materials, load):
+    model.load = load
+    return Equilibrium(model, materials, NewtonSettings()).newton(rest(model.mesh).u, 0.0).u
+
+
+def linear(model, materials, load):
+    """The linearised answer."""
+    u = rest(model.mesh).u
+    model.factor.factor(model.tangent(u, 0.0, model.parameters(materials)))
+    u.ravel()[model.free] = model.factor.solve(load.ravel()[model.free])
+    return u
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_weight_adds_up_and_balances_about_the_centre_of_mass(order):
+    mesh = bodies.sphere_octant(order=order)
+    density = np.linspace(1, 3, len(mesh.tets)) * DENSITY
+    load = gravity(mesh, density, [0, -2, 0])
+    reference = Model(mesh).volumes
+    assert load.sum(axis=0) == pytest.approx([0, -(density * reference).sum() * STANDARD_GRAVITY, 0])
+    box = bodies.box((2, 3, 2), (2.0, 4.0, 6.0), order=order)
+    load = gravity(box, DENSITY, [1, 0, 0], g_mm_per_s2=1.0)
+    moment = np.cross(box.nodes - [1.0, 2.0, 3.0], load).sum(axis=0)
+    np.testing.assert_allclose(moment, 0.0, atol=1e-12 * load.sum())
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_hanging_bar_grows_by_rho_g_L2_over_2E(order):
+    mesh = bodies.box((1, 1, 6), (2.0, 2.0, 30.0), order=order)
+    held = mesh.nodes[:, 2:] == 30.0
+    model = Model(mesh, held=np.repeat(held, 3, axis=1))
+    load = gravity(mesh, DENSITY, [0, 0, -1])
+    expected = -DENSITY * STANDARD_GRAVITY * 30.0**2 / (2 * 0.5)
+    u = linear(model, uniform(mesh, 0.5), load)
+    bottom = mesh.nodes[:, 2] == 0
+    if order == 2:
+        np.testing.assert_allclose(u[bottom, 2], expected, rtol=1e-9)
+    # Linear elements share a section's weight unevenly among its nodes: only their mean is right.
+    assert u[bottom, 2].mean() == pytest.approx(expected, rel=1e-3)
+    assert loaded(model, uniform(mesh, 0.5), load)[bottom, 2].mean() == pytest.approx(expected, rel=0.02)
+
+
+def test_a_heavy_beam_sags_by_its_closed_form():
+    """rho g A L^4/(8 E I) by bending, and rho g L^2/(2 G 5/6) by shear, of a square section, nu = 0."""
+    length, side, modulus = 40.0, 4.0, 2.0
+    mesh = bodies.box((2, 2, 12), (side, side, length), clamp=True)
+    model = Model(mesh)
+    load = gravity(mesh, DENSITY, [0, -1, 0])
+    weight = DENSITY * STANDARD_GRAVITY
+    bending = weight * length**4 / (8 * modulus * side**2 / 12)
+    shear = weight * length**2 / (2 * (modulus / 2) * 5 / 6)
+    tip = mesh.nodes[:, 2] == length
+    sag = -linear(model, uniform(mesh, modulus), load)[tip, 1].mean()
+    assert sag == pytest.approx(bending + shear, rel=5e-3)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_traction_pulls_a_bar_evenly(order):
+    mesh = bodies.box((2, 2, 3), (1.0, 2.0, 3.0), order=order, symmetry=("x", "y", "z"), jiggle=0.2)
+    faces, _ = boundary_faces(mesh.tets)
+    top = faces[(mesh.nodes[faces][:, :, 2] == 3).all(axis=1)]
+    if order == 2:
+        top = with_middles(mesh, top)
+    load = traction(mesh, top, [0.0, 0.0, 1e-3])
+    assert load.sum(axis=0) == pytest.approx([0, 0, 2e-3])
+    u = linear(Model(mesh), uniform(mesh, 0.5, 0.3), load)
+    np.testing.assert_allclose(u, mesh.nodes * [-0.3 * 2e-3, -0.3 * 2e-3, 2e-3], atol=1e-12)
+
+
+def with_middles(mesh, faces):
+    """Faces (f, 3) of a quadratic mesh with their mid-edge nodes, found by place."""
+    ends = mesh.nodes[faces]
+    middles = (ends + np.roll(ends, -1, axis=1)) / 2
+    distance = np.linalg.norm(mesh.nodes[None, None] - middles[:, :, None], axis=-1)
+    return np.hstack([faces, distance.argmin(axis=2)])
+
+
+def test_the_residual_is_the_derivative_of_the_potential_with_a_load_too():
+    mesh = bodies.hollow_box(2, n=3, clamp=False)
+    model = Model(mesh)
+    m = model.parameters(uniform(mesh, 0.5, 0.3))
+    model.load = np.random.default_rng(0).standard_normal(mesh.nodes.shape)
+    u, d = 0.03 * np.random.default_rng(1).standard_normal((2, *mesh.nodes.shape))
+    h = 1e-4
+    e = {s: model.potential(u + s * h * d, 0.01, m) for s in (-2, -1, 1, 2)}
+    slope = (8 * (e[1] - e[-1]) - (e[2] - e[-2])) / (12 * h)
+    assert slope == pytest.approx((model.residual(u, 0.01, m) * d).sum(), rel=1e-8)
+
+
+def test_weight_of_half_a_body_is_half_the_weight():
+    half = bodies.box((2, 2, 2), symmetry=("x",))
+    nodes = np.vstack([half.nodes, half.nodes * [-1, 1, 1]])
+    other = half.tets[:, [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]] + len(half.nodes)
+    tets = np.vstack([half.tets, other])
+    whole = Mesh(nodes, tets, np.full(len(tets), MEMBRANE), np.empty((0, 6), int), [], [])
+    load = gravity(whole, DENSITY, [0, 0, -1])
+    np.testing.assert_allclose(load[: len(half.nodes)], gravity(half, DENSITY, [0, 0, -1]))

@@ -1,0 +1,202 @@
+"""The adjoint map against real solutions with one element stiffened."""
+
+import attrs
+import numpy as np
+import pytest
+
+from mu_addon.design.anchors import anchors
+from mu_addon.design.parameters import load_preset
+from mu_addon.errors import MeshingError
+from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings
+from mu_addon.fem.kinematics import probe
+from mu_addon.fem.materials import Materials
+from mu_addon.fem.model import Model
+from mu_addon.fem.trajectory import simulate
+from mu_addon.meshing.mesh import LATTICE, mirror
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.unit import mesh_unit
+from mu_addon.placement.deviation import centreline, deviation
+from mu_addon.placement.influence import (
+    centreline_gradient,
+    deviation_map,
+    gradients_of,
+    influence,
+    loaded,
+    mean_deviation,
+    parities,
+    shares_of_time,
+    telling_pressures,
+)
+from mu_addon.placement.whole import whole_body
+
+UNIT = load_preset("mu-1.0x")
+POINTS = anchors(UNIT)
+TIGHT = NewtonSettings(tolerance=1e-12)
+PRESSURES = np.array([0.0, -10.0, 20.0, 20.0])
+
+
+def moduli(mesh):
+    m = UNIT.material
+    lattice = mesh.region == LATTICE
+    modulus = np.where(lattice, m.lattice_modulus_kPa, m.membrane_modulus_kPa) / 1e3
+    return modulus, np.where(lattice, m.lattice_poisson, m.membrane_poisson)
+
+
+def solve(mesh, model, factor=None):
+    modulus, poisson = moduli(mesh)
+    if factor is not None:
+        modulus = modulus * factor
+    solver = Equilibrium(model, Materials.neo_hooke(modulus, poisson), TIGHT)
+    return simulate(solver, np.arange(4.0), PRESSURES)
+
+
+@pytest.fixture(scope="module")
+def half():
+    mesh = mesh_unit(UNIT, MeshSettings(refine=0.5, order=1))
+    model = Model(mesh)
+    return mesh, model, solve(mesh, model)
+
+
+@pytest.fixture(scope="module")
+def found(half):
+    mesh, model, baseline = half
+    return influence(model, Materials.neo_hooke(*moduli(mesh)), baseline, probe(mesh, POINTS))
+
+
+def moved(mesh, trajectory):
+    monitor = probe(mesh, POINTS)
+    return np.array([monitor.displacement(state.u) for state in loaded(trajectory)])
+
+
+@pytest.fixture(scope="module")
+def elements(half):
+    """One element of the lattice beside the anchors and one of the membrane, both off the mirror plane."""
+    mesh = half[0]
+    centre = mesh.nodes[mesh.corners].mean(axis=1)
+    off_plane = mesh.nodes[mesh.corners][:, :, 0].min(axis=1) > 0.5
+    near = np.linalg.norm(centre - [4.0, 22.0, 40.0], axis=1) + np.where(off_plane, 0, 1e3)
+    apex = np.linalg.norm(centre - [12.0, 3.0, 30.0], axis=1) + np.where(off_plane, 0, 1e3)
+    return (
+        int(np.argmin(np.where(mesh.region == LATTICE, near, np.inf))),
+        int(np.argmin(np.where(mesh.region == LATTICE, np.inf, apex))),
+    )
+
+
+def test_one_element_of_the_whole_body_made_stiffer_moves_the_points_as_the_map_says(half, found, elements):
+    """Central differences of whole-mesh solutions; the map comes from the half mesh's two parities."""
+    whole = mirror(half[0], "x")
+    model = Model(whole)
+    step = 0.02
+    for element in elements:
+        factor = np.ones(len(whole.tets))
+        ends = []
+        for sign in (1, -1):
+            factor[element] = 1 + sign * step
+            ends.append(moved(whole, solve(whole, model, factor)))
+        slope = (ends[0] - ends[1]) / (2 * step)
+        expected = found.displacement[..., element]
+        assert np.abs(expected[:, :, 0]).max() > 1e-2 * np.abs(expected).max()
+        np.testing.assert_allclose(slope, expected, atol=2e-4 * np.abs(expected).max())
+
+
+def test_a_whole_mesh_gives_the_map_of_its_half(half, found):
+    mesh, _, _ = half
+    whole = mirror(mesh, "x")
+    model = Model(whole)
+    baseline = solve(whole, model)
+    same = influence(model, Materials.neo_hooke(*moduli(whole)), baseline, probe(whole, POINTS))
+    m = len(mesh.tets)
+    scale = np.abs(found.displacement).max()
+    np.testing.assert_allclose(same.displacement[..., :m], found.displacement, atol=1e-6 * scale)
+    mirrored = found.displacement * np.array([-1.0, 1, 1])[:, None]
+    np.testing.assert_allclose(same.displacement[..., m:], mirrored, atol=1e-6 * scale)
+
+
+def test_stiffening_everything_and_raising_the_pressure_alike_changes_nothing(half, found):
+    """Stresses scale with the modulus: the map summed over all elements is minus the slope by ln p."""
+    mesh, model, baseline = half
+    total = 2 * found.displacement.sum(axis=-1)[:, :, 1:]
+    solver = Equilibrium(model, Materials.neo_hooke(*moduli(mesh)), TIGHT)
+    monitor = probe(mesh, POINTS)
+    for s, state in enumerate(loaded(baseline)):
+        ends = [
+            monitor.displacement(solver.newton(state.u, state.pressure_MPa * f).u)[:, 1:]
+            for f in (1.01, 0.99)
+        ]
+        slope = (ends[0] - ends[1]) / 0.02
+        np.testing.assert_allclose(total[s], -slope, atol=1e-3 * np.abs(slope).max())
+
+
+def test_the_deviation_of_a_slightly_stiffer_element_is_the_map_times_its_stiffening(half, found, elements):
+    """J_hat has a kink at Model A: the one-sided slope, both mirror images stiffened."""
+    mesh, model, baseline = half
+    monitor = probe(mesh, POINTS)
+    gradients = gradients_of(baseline, POINTS, monitor, 21)
+    step = 1e-3
+    for element in elements:
+        factor = np.ones(len(mesh.tets))
+        factor[element] += step
+        stiffer = solve(mesh, model, factor)
+        curves = [
+            t.of_time(centreline(np.array([POINTS + monitor.displacement(s.u) for s in t.states]), 21))
+            for t in (stiffer, baseline)
+        ]
+        J = deviation(*curves).J_hat
+        both = attrs.evolve(found, displacement=2 * found.displacement * np.array([0.0, 1, 1])[:, None])
+        slope = deviation_map(both, gradients, shares_of_time(baseline))[element]
+        assert J / step == pytest.approx(slope, rel=5e-3)
+
+
+def test_the_map_is_nowhere_negative_and_a_soft_lattice_element_matters_less_than_a_wall(half, found):
+    mesh, _, baseline = half
+    gradients = gradients_of(baseline, POINTS, probe(mesh, POINTS), 21)
+    J = deviation_map(found, gradients, shares_of_time(baseline))
+    assert J.min() >= 0
+    assert J[mesh.region == LATTICE].mean() < J[mesh.region != LATTICE].mean()
+    modulus, _ = moduli(mesh)
+    np.testing.assert_allclose(found.of_modulus(modulus) * modulus, found.displacement)
+
+
+def test_shares_of_time_leave_out_rest(half):
+    np.testing.assert_allclose(shares_of_time(half[2]), [0.25, 0.5])
+
+
+def test_the_centreline_moves_with_its_points():
+    gradient = centreline_gradient(POINTS + np.arange(6)[:, None] ** 2 * [0, 0.1, 0], 11)
+    # A translation of all points moves every station alike.
+    np.testing.assert_allclose(gradient.sum(axis=2), np.broadcast_to(np.eye(3), (11, 3, 3)), atol=1e-6)
+    moved = np.zeros((1, 6, 3))
+    moved[:, :, 0] = 0.3
+    assert mean_deviation(gradient[None], moved, np.array([0.5])) == pytest.approx(0.15, rel=1e-6)
+
+
+def test_the_mirrored_trajectory_is_in_equilibrium(half):
+    mesh, _, baseline = half
+    whole, states = whole_body(mesh, baseline)
+    assert whole.symmetry == ()
+    solver = Equilibrium(Model(whole), Materials.neo_hooke(*moduli(whole)))
+    for state in loaded(states):
+        again = solver.newton(state.u, state.pressure_MPa)
+        assert again.iterations == 0
+        assert again.residual < 1e-9
+
+
+def test_telling_pressures_stand_for_all(half):
+    """A state that was left out, from the polynomial through the others."""
+    mesh, model, _ = half
+    made = Materials.neo_hooke(*moduli(mesh))
+    pressure = np.array([0.0, -20.0, -10.0, 10.0, 20.0, 30.0])
+    baseline = simulate(Equilibrium(model, made), np.arange(6.0), pressure)
+    assert telling_pressures(baseline).tolist() == [-0.02, 0.01, 0.03]
+    monitor = probe(mesh, POINTS)
+    every = influence(model, made, baseline, monitor)
+    few = influence(model, made, baseline, monitor, telling_pressures(baseline)).at(every.pressure_MPa)
+    gradients, weights = gradients_of(baseline, POINTS, monitor, 21), shares_of_time(baseline)
+    one, other = (deviation_map(found, gradients, weights) for found in (every, few))
+    assert np.abs(one - other).max() < 0.02 * one.max()
+
+
+def test_other_mirror_planes_are_refused(half):
+    mesh = attrs.evolve(half[0], symmetry=("x", "y"))
+    with pytest.raises(MeshingError, match="off the plane"):
+        parities(attrs.make_class("Body", {"mesh": attrs.field()})(mesh))
