@@ -195,6 +195,10 @@ def _run(study: Study, options: argparse.Namespace) -> None:
 
     # An unknown path is found out before an hour's work, not after.
     path = window(study.job.unit, options.path) if getattr(options, "path", None) is not None else None
+    if study.job.paths == "graph":
+        from .graph_search import chains_within
+
+        chains_within(study.job)
     study.design()
     if path is not None:
         study.design(path)

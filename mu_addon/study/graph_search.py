@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any
 
-import attrs
 import numpy as np
 
 from ..errors import InputError
@@ -12,8 +12,8 @@ from ..fem.kinematics import probe
 from ..fem.model import Model
 from ..fem.unit import materials_of
 from ..files import write_csv
-from ..placement.candidates import Candidate, Evaluation
-from ..placement.graph import lattice_graph
+from ..placement.candidates import Candidate
+from ..placement.graph import Graph, lattice_graph
 from ..placement.influence import (
     deviation_map,
     gradients_of,
@@ -26,15 +26,19 @@ from ..placement.influence import (
 from ..placement.response import response
 from ..placement.search import SearchSettings, front, search
 from ..placement.whole import whole_body
+from .results import LatticePath, LatticeSearch
 from .vtk_out import write_fields
 
 if TYPE_CHECKING:
+    from .job import Job
     from .study import Study
 
 Array = np.ndarray[Any, Any]
 
 MAP = "sensitivity.vtu"
 PATHS = "paths.csv"
+# Beyond this their list alone takes gigabytes.
+MOST_PATHS = 200_000
 
 
 def sensitivity_map(study: Study) -> Array:
@@ -61,18 +65,27 @@ def sensitivity_map(study: Study) -> Array:
     return dJ
 
 
-@attrs.frozen(eq=False)
-class FoundPath:
-    """A path of the lattice graph: its points (h, 3) and length in mm, predicted and exact J_hat in mm."""
+def chains_within(job: Job) -> tuple[Graph, list[tuple[int, ...]]]:
+    """The lattice graph and its chains within a job's limits; raises InputError for none or too many."""
+    graph = lattice_graph(job.unit.dimensions)
+    chains = list(itertools.islice(graph.chains(job.limits), MOST_PATHS + 1))
+    options = "--shortest-cells, --longest-cells, --bend-deg"
+    if not chains:
+        raise InputError(
+            "no path of the lattice is within the limits",
+            options,
+            "admit shorter or longer paths, or sharper bends",
+        )
+    if len(chains) > MOST_PATHS:
+        raise InputError(
+            f"more than {MOST_PATHS} paths of the lattice are within the limits",
+            options,
+            "shorten the longest path or forbid sharper bends",
+        )
+    return graph, chains
 
-    name: str
-    points: Array
-    length_mm: float
-    predicted_mm: float
-    evaluation: Evaluation
 
-
-def search_graph(study: Study) -> FoundPath:
+def search_graph(study: Study) -> LatticeSearch:
     """The path of the whole lattice graph that disturbs Model A least, within the study's limits.
 
     All chains are ranked by a reduced response; the best are then solved on the whole body, until no
@@ -81,25 +94,15 @@ def search_graph(study: Study) -> FoundPath:
     assert study.mesh is not None
     assert study.trajectory is not None
     job, rule = study.job, study.headline_rule
-    graph = lattice_graph(job.unit.dimensions)
-    chains = list(graph.chains(job.limits))
-    if not chains:
-        raise InputError(
-            "no path of the lattice is within the limits",
-            "--shortest-cells, --longest-cells, --bend-deg",
-            "admit shorter or longer paths, or sharper bends",
-        )
+    graph, chains = chains_within(job)
     lengths = np.array([graph.lengths[graph.steps_of(c)].sum() for c in chains])
     with study.progress.stage("ranking of the lattice's paths"):
-        predicted = _predicted(study, chains, rule)
+        predicted = _predicted(study, graph, chains, rule)
     mesh, trajectory = whole_body(study.mesh, study.trajectory)
-    found: dict[int, Evaluation] = {}
 
     def check(numbers: Array) -> Array:
         jobs = [(Candidate(f"path{n}", 0, graph.nodes[list(chains[n])]), rule) for n in numbers]
-        for n, evaluation in zip(numbers, study.sweep(mesh, trajectory, jobs), strict=True):
-            found[int(n)] = evaluation
-        return np.array([found[int(n)].deviation.J_hat for n in numbers])
+        return np.array([e.deviation.J_hat for e in study.sweep(mesh, trajectory, jobs)])
 
     with study.progress.stage("check of the best paths"):
         outcome = search(predicted, check, SearchSettings(most=job.most_checks))
@@ -108,26 +111,40 @@ def search_graph(study: Study) -> FoundPath:
             f"After {job.most_checks} checks an unchecked path may still be better than the best one, with a "
             f"probability of up to {outcome.risk:.0%}: give more checks (--checks)."
         )
-    _write(study, chains, lengths, outcome, graph.nodes)
-    best = outcome.best
+    best = set(front(lengths, outcome.exact_mm).tolist())
+    known = np.isfinite(outcome.exact_mm)
+    order = np.lexsort((predicted, np.where(known, outcome.exact_mm, np.inf))).tolist()
+    every = [
+        LatticePath(
+            f"path{n}",
+            graph.nodes[list(chains[n])],
+            float(lengths[n]),
+            float(predicted[n]),
+            float(outcome.exact_mm[n]),
+            n in best,
+        )
+        for n in order
+    ]
+    _write(study, every)
+    study.search = LatticeSearch(rule, every[: len(outcome.checked)], len(chains), outcome.risk)
+    first = every[0]
     study.ending.summary["search"] = {
         "rule": rule,
         "paths": len(chains),
         "checked": len(outcome.checked),
         "risk_that_an_unchecked_one_is_better": outcome.risk,
         "best": {
-            "name": f"path{best}",
-            "points_mm": graph.nodes[list(chains[best])].tolist(),
-            "length_mm": float(lengths[best]),
-            "J_hat_mm": float(outcome.exact_mm[best]),
-            "predicted_J_hat_mm": float(predicted[best]),
+            "name": first.name,
+            "points_mm": first.points.tolist(),
+            "length_mm": first.length_mm,
+            "J_hat_mm": first.j_hat,
+            "predicted_J_hat_mm": first.predicted_mm,
         },
     }
-    points = graph.nodes[list(chains[best])]
-    return FoundPath(f"path{best}", points, float(lengths[best]), float(predicted[best]), found[best])
+    return study.search
 
 
-def _predicted(study: Study, chains: list[tuple[int, ...]], rule: str) -> Array:
+def _predicted(study: Study, graph: Graph, chains: list[tuple[int, ...]], rule: str) -> Array:
     """Predicted J_hat (n,) in mm of every chain."""
     assert study.mesh is not None
     assert study.trajectory is not None
@@ -140,7 +157,7 @@ def _predicted(study: Study, chains: list[tuple[int, ...]], rule: str) -> Array:
         unit.material.sensor_modulus_kPa / 1e3,
         study.trajectory,
         monitor,
-        lattice_graph(unit.dimensions),
+        graph,
         rule,
         unit.dimensions.inclusion_radius,
     )
@@ -154,21 +171,18 @@ def _predicted(study: Study, chains: list[tuple[int, ...]], rule: str) -> Array:
     )
 
 
-def _write(study: Study, chains: list[tuple[int, ...]], lengths: Array, outcome: Any, nodes: Array) -> None:
-    """paths.csv: every path, in the order of its exact or else its predicted J_hat."""
-    known = np.isfinite(outcome.exact_mm)
-    best = set(front(lengths, np.where(known, outcome.exact_mm, np.nan)).tolist())
-    order = np.lexsort((outcome.predicted_mm, np.where(known, outcome.exact_mm, np.inf)))
+def _write(study: Study, paths: list[LatticePath]) -> None:
+    """paths.csv: every path, the solved ones first, by J_hat or else by its prediction."""
     rows = [
         (
-            f"path{n}",
-            f"{lengths[n]:.6g}",
-            f"{outcome.predicted_mm[n]:.6g}",
-            f"{outcome.exact_mm[n]:.9g}" if known[n] else "",
-            "yes" if n in best else "no",
-            "; ".join(" ".join(f"{c:.6g}" for c in point) for point in nodes[list(chains[n])]),
+            p.name,
+            f"{p.length_mm:.6g}",
+            f"{p.predicted_mm:.6g}",
+            f"{p.j_hat:.9g}" if np.isfinite(p.j_hat) else "",
+            "yes" if p.on_front else "no",
+            "; ".join(" ".join(f"{c:.6g}" for c in point) for point in p.points),
         )
-        for n in order.tolist()
+        for p in paths
     ]
     columns = ["path", "length_mm", "predicted_J_hat_mm", "J_hat_mm", "on_front", "points_mm"]
     write_csv(study.folder / PATHS, columns, rows)

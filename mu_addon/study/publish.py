@@ -30,6 +30,8 @@ FILES = {
     "angle.csv": "bending angle of every converged pressure",
     "deviation.csv": "deviation and rank of every path and rule",
     "delta.npz": "deviation over time and length of every path and rule, mm",
+    "sensitivity.vtu": "how much stiffening each element alone would disturb the motion, mm (ParaView)",
+    "paths.csv": "every path of the lattice: length, predicted and, where it was solved, exact deviation",
     "summary.json": "every figure of this run",
     "log.ndjson": "what was said while it ran",
 }
@@ -45,7 +47,7 @@ def publish(study: Study, stopped: str = "") -> None:
         view, pictures = _pictures(study)
         if pictures:
             write_bytes(study.folder / "unit.png", pictures[0].png)
-        data = report_data(study, view, pictures, versions, stopped)
+        data = report_data(study, view, pictures, versions, stopped, _search_picture(study))
         write_report(study.folder / "report.html", data)
 
 
@@ -55,6 +57,7 @@ def report_data(
     pictures: list[Picture],
     versions: dict[str, str],
     stopped: str = "",
+    search_picture: Picture | None = None,
 ) -> ReportData:
     """What the report shows of a study, complete or stopped early for a reason."""
     job, d = study.job, study.job.unit.dimensions
@@ -75,6 +78,8 @@ def report_data(
         paths=tuple(Path(w.name, w.start, w.length) for w in windows),
         rules=rules,
         headline_rule=study.headline_rule,
+        search=study.search,
+        search_picture=search_picture,
         pressure_kPa=np.array([s.pressure_MPa * 1e3 for s in states]),
         angle_deg=np.array([bending_angle_deg(study.mesh, s.u) for s in states if study.mesh]),
         protocol_s=time if states else np.zeros(0),
@@ -186,6 +191,25 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
             texts.append((state.u, words, f"The analysis mesh at {words}."))
         pictures += motion(study.mesh, texts)
     return side_view(parts, study.anchors, path, radius), pictures
+
+
+def _search_picture(study: Study) -> Picture | None:
+    """The best path of the whole lattice in the unit cut open, on the side where it is in view."""
+    from .pictures import portrait, unit_parts
+    from .render import png
+
+    if study.search is None or study.solid is None:
+        return None
+    d = study.job.unit.dimensions
+    best = study.search.solved[0]
+    side = -1.0 if best.points[:, 0].sum() < 0 else 1.0
+    parts = unit_parts(d, study.solid.vertices, study.solid.triangles)
+    radius = max(d.inclusion_radius, d.waveguide_section / 2)
+    return Picture(
+        png(portrait(parts, study.anchors, best.points * [side, 1.0, 1.0], radius)),
+        f"The best path of the lattice, {best.name}, before the unit cut open; its mirror image is as good.",
+        "The unit cut along its plane of bending, and the path of the sensor through its lattice.",
+    )
 
 
 def _files(study: Study) -> dict[str, str]:

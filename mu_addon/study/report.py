@@ -63,6 +63,7 @@ def report_html(results: ReportData) -> str:
 def _sections(r: ReportData) -> list[tuple[str, str, str]]:
     return [
         ("ranking", "Ranking of the paths", _ranking(r)),
+        ("search", "The whole lattice", _search(r)),
         ("motion", "How the unit moves", _motion(r)),
         ("where", "Where and when each path disturbs the motion", _heatmaps(r)),
         ("marginals", "Along the unit, and over time", _marginals(r)),
@@ -202,6 +203,42 @@ def _ranking(r: ReportData) -> str:
     )
     html += _table(caption, head, rows, groups)
     return html
+
+
+def _search(r: ReportData) -> str:
+    if r.search is None:
+        return ""
+    s = r.search
+    best = s.solved[0]
+    certain = f"less than {max(s.risk, 1e-3):.1%}" if s.risk < 0.5 else f"up to {s.risk:.0%}"
+    html = (
+        f"<p>Of {s.paths} paths through nodes of the lattice, bent ones too, <strong>{escape(best.name)}"
+        f"</strong> disturbs the motion least: {best.j_hat:.3f}&nbsp;mm by the rule “{_rule(s.rule)}”. "
+        f"All were ranked by a reduced model, and the {len(s.solved)} below solved exactly; the chance that "
+        f"another is better is {certain}, as far as the others are predicted as well as these. Paths marked "
+        "as best for their length are beaten by no longer one.</p>"
+    )
+    if r.search_picture is not None:
+        html += f'<div class="triple">{_picture(r.search_picture)}</div>'
+    head = [
+        ("path", ""), ("length [mm]", "n"), ("Ĵ [mm]", "n"), ("predicted [mm]", "n"),
+        ("best for its length", ""), ("nodes (x y z) [mm]", ""),
+    ]  # fmt: skip
+    rows = [
+        (
+            [
+                p.name,
+                f"{p.length_mm:.1f}",
+                f"{p.j_hat:.4f}",
+                f"{p.predicted_mm:.4f}",
+                "yes" if p.on_front else "",
+                "; ".join(" ".join(f"{c:g}" for c in np.round(point, 2)) for point in p.points),
+            ],
+            i == 0,
+        )
+        for i, p in enumerate(s.solved)
+    ]
+    return html + _table("Paths that were solved", head, rows)
 
 
 def _motion(r: ReportData) -> str:

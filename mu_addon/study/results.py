@@ -63,6 +63,28 @@ class RuleResult:
 
 
 @attrs.frozen(eq=False)
+class LatticePath:
+    """A path of the lattice that was solved exactly: points (h, 3) and length in mm, J_hat in mm."""
+
+    name: str
+    points: Floats
+    length_mm: float
+    predicted_mm: float
+    j_hat: float
+    on_front: bool  # no solved path is both longer and less disturbing
+
+
+@attrs.frozen(eq=False)
+class LatticeSearch:
+    """The search of the whole lattice: solved paths, best first, out of so many, and the risk left."""
+
+    rule: str
+    solved: Sequence[LatticePath]
+    paths: int
+    risk: float  # probability, at most, that an unsolved path is better
+
+
+@attrs.frozen(eq=False)
 class Picture:
     """An image with the words that go with it."""
 
@@ -94,6 +116,8 @@ class ReportData:
     paths: Sequence[Path] = ()
     rules: Mapping[str, RuleResult] = attrs.field(factory=dict)  # "volume_fraction", "intersect"
     headline_rule: str = "volume_fraction"  # whose chosen path is the answer
+    search: LatticeSearch | None = None
+    search_picture: Picture | None = None
     pressure_kPa: Floats = attrs.field(factory=lambda: np.zeros(0))  # per converged state
     angle_deg: Floats = attrs.field(factory=lambda: np.zeros(0))
     protocol_s: Floats = attrs.field(factory=lambda: np.zeros(0))

@@ -36,6 +36,7 @@ from .ending import Ending
 from .job import HEADER, Job
 from .parallel import Setting, Sweeper
 from .progress import Progress
+from .results import LatticeSearch
 from .vtk_out import write_mesh, write_trajectory
 
 Array = np.ndarray[Any, Any]
@@ -77,6 +78,7 @@ class Study:
     uncertainty_mm: dict[str, float] = attrs.field(factory=dict)
     warnings: list[str] = attrs.field(factory=list)
     solver: dict[str, Any] = attrs.field(factory=dict)
+    search: LatticeSearch | None = None
 
     @classmethod
     def open(cls, job: Job, folder: Path, progress: Progress, ending: Ending) -> Study:

@@ -13,6 +13,7 @@ import meshio
 import numpy as np
 import pytest
 
+from mu_addon.design.anchors import anchors
 from mu_addon.design.parameters import load_preset, read_unit
 
 from ..study.browser import EXECUTABLE, Browser, complaints, requests
@@ -45,6 +46,7 @@ def test_every_file_is_there(finished):
         "angle.csv",
         "deviation.csv",
         "delta.npz",
+        "sensitivity.vtu",
         "summary.json",
         "report.html",
         "study.toml",
@@ -157,6 +159,52 @@ def test_one_worker_finds_the_same(finished, tmp_path):
     assert [row["J_hat_mm"] for row in rows(tmp_path / "one")] == expected
 
 
+@pytest.fixture(scope="module")
+def searched(finished, tmp_path_factory):
+    """A search of the whole lattice, with limits that leave few paths, after the same study's windows."""
+    folder = tmp_path_factory.mktemp("search") / "out"
+    limits = ("--paths", "graph", "--shortest-cells", "4.5", "--longest-cells", "5", "--bend-deg", "20")
+    arguments = ("--rule", "volume_fraction", "--no-mesh-check", *limits)
+    done = run("place", "--preset", "mu-1.0x", "--out", folder, *COARSE, *arguments)
+    assert done.returncode == 0, done.stderr
+    return folder, done
+
+
+def test_the_whole_lattice_is_searched_for_the_best_path(searched):
+    folder, done = searched
+    found = json.loads((folder / "summary.json").read_text())["search"]
+    with (folder / "paths.csv").open(newline="") as file:
+        paths = list(csv.DictReader(file))
+    assert len(paths) == found["paths"] > found["checked"] >= 2
+    solved = [float(p["J_hat_mm"]) for p in paths if p["J_hat_mm"]]
+    assert len(solved) == found["checked"]
+    assert paths[0]["path"] == found["best"]["name"]
+    assert solved[0] == pytest.approx(found["best"]["J_hat_mm"]) == min(solved)
+    assert found["best"]["name"] in done.stdout
+    low, high = 4.5 * 12.5, 5 * 12.5
+    assert all(low - 1e-6 <= float(p["length_mm"]) <= high + 1e-6 for p in paths)
+
+
+def test_a_window_of_anchors_is_one_of_the_lattices_paths(searched):
+    """The same path by two ways: the half mesh for windows, the whole one for the lattice's."""
+    folder, _ = searched
+    with (folder / "paths.csv").open(newline="") as file:
+        solved = {p["points_mm"]: p["J_hat_mm"] for p in csv.DictReader(file)}
+    with (folder / "anchors.txt").open() as file:
+        assert file.read()
+    every = {row["path"]: float(row["J_hat_mm"]) for row in rows(folder)}
+    points = anchors(load_preset("mu-1.0x"))
+    text = "; ".join(" ".join(f"{c:.6g}" for c in point) for point in points)
+    assert float(solved[text]) == pytest.approx(every["alpha10"], rel=2e-3)
+
+
+def test_limits_that_leave_no_path_are_refused(tmp_path):
+    limits = ("--paths", "graph", "--shortest-cells", "40")
+    done = run("place", "--preset", "mu-1.0x", "--out", tmp_path / "out", *COARSE, *limits)
+    assert done.returncode == 2
+    assert "no path of the lattice" in done.stderr
+
+
 def started(out):
     words = command("place", "--preset", "mu-1.0x", "--out", out, *COARSE)
     return subprocess.Popen(
@@ -164,9 +212,9 @@ def started(out):
     )
 
 
-def wait_for_a_candidate(process, out):
+def wait_for_a_state_swept(process, out):
     deadline = time.monotonic() + 300
-    while not list((out / "cache").glob("candidate-*")) and time.monotonic() < deadline:
+    while not list((out / "cache").glob("sweep-*")) and time.monotonic() < deadline:
         assert process.poll() is None, "it ended before it could be stopped"
         time.sleep(0.05)
 
@@ -183,7 +231,7 @@ def alive(group):
 def test_killed_it_leaves_no_process_behind_and_does_not_pass_for_complete(tmp_path):
     out = tmp_path / "out"
     process = started(out)
-    wait_for_a_candidate(process, out)
+    wait_for_a_state_swept(process, out)
     process.kill()
     process.communicate(timeout=60)
     deadline = time.monotonic() + 60
@@ -197,7 +245,7 @@ def test_interrupted_it_keeps_what_it_has_and_resumes_to_the_same_digits(finishe
     folder, _ = finished
     out = tmp_path / "out"
     process = started(out)
-    wait_for_a_candidate(process, out)
+    wait_for_a_state_swept(process, out)
     # As a terminal does it: to every process of the group.
     os.killpg(process.pid, signal.SIGINT)
     output, errors = process.communicate(timeout=120)
