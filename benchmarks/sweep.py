@@ -31,6 +31,7 @@ from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.candidates import Candidate, candidates, moved_points, roi, with_sensor
 from mu_addon.placement.inclusion import sensor_share
 from mu_addon.placement.influence import influence, telling_pressures
+from mu_addon.placement.sampling import rounds
 from mu_addon.study.parallel import Setting, Sweeper
 
 RADIUS_MM, SENSOR_MPA, RULE = 1.0, 2.5, "volume_fraction"
@@ -42,6 +43,17 @@ def hundred(points):
     stations = points[0] + along * (points[-1] - points[0])
     pairs = [(a, b) for a, b in itertools.combinations(range(16), 2) if b - a > 1]
     return [Candidate(f"run{a}-{b}", a + 1, stations[[a, b]]) for a, b in pairs][:100]
+
+
+def beside(sweeper, equilibrium, times, pressure, wanted):
+    """Model A, and the candidates at the wanted pressures in MPa as soon as it has reached them."""
+
+    def submit(state):
+        if state.pressure_MPa in wanted:
+            sweeper.submit(state)
+
+    found = simulate(equilibrium, times, pressure, submit)
+    return dict(sweeper.solve([s for s in found.states if s.pressure_MPa in wanted]))
 
 
 def seconds(call):
@@ -75,13 +87,23 @@ def main():
         print(f"| {name} | {took:.1f} | {took / baseline_s:.2f} |", flush=True)
 
     swept = {}
+
+    def equilibrium():
+        return Equilibrium(model, materials)
+
+    distinct = np.array([s.pressure_MPa for s in baseline.states])
+    few = [baseline.states[i] for pair in rounds(distinct)[:2] for i in pair]
+    wanted = {s.pressure_MPa for s in few}
     for name, every in (("ten", candidates(points, windows(6))), ("a hundred", hundred(points))):
         jobs = tuple((c, RULE) for c in every)
         setting = Setting(mesh, materials, points, jobs, RADIUS_MM, SENSOR_MPA)
         with closing(Sweeper(setting, given.workers)) as sweeper:
+            took, _ = seconds(lambda s=sweeper: beside(s, equilibrium(), times, pressure, wanted))
+        row(f"{name} paths at {len(few)} pressures, beside Model A: beyond it", took - baseline_s)
+        with closing(Sweeper(setting, given.workers)) as sweeper:
             took, found = seconds(lambda s=sweeper: dict(s.solve(states)))
+        row(f"{name} paths at every pressure, after Model A, the processes' start included", took)
         swept[name] = found
-        row(f"{name} paths, {given.workers} processes, their start included", took)
     took, _ = seconds(
         lambda: influence(model, materials, baseline, monitored[1], telling_pressures(baseline))
     )

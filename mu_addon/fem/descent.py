@@ -33,8 +33,10 @@ class NewtonSettings:
     regularisation: tuple[float, ...] = (0.03, 0.3, 3.0, 30.0)
     # A state may lie this much of the predicted move away from its prediction.
     surprise: float = 0.5
-    # Many bodies on one factorisation: steps after which a body goes on with its own.
-    max_shared_steps: int = 20
+    # Many bodies on one factorisation: their tolerance, which leaves less than 1e-6 mm on the unit, and the
+    # steps after which a body goes on with its own.
+    shared_tolerance: float = 2e-8
+    max_shared_steps: int = 40
 
 
 class Descent:

@@ -6,7 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .elements import reference_gradients
+
 if TYPE_CHECKING:
+    from ..meshing.mesh import Mesh
     from .model import MaterialData, Model
 
 Array = np.ndarray[Any, Any]
@@ -30,3 +33,12 @@ def element_stiffness(model: Model, u: Array, m: MaterialData, elements: Array) 
     whole[:, rows, :, columns, :] = blocks.transpose(1, 0, 2, 3)
     whole[:, columns, :, rows, :] = blocks.transpose(1, 0, 3, 2)
     return whole.reshape(len(elements), 3 * k, 3 * k)
+
+
+def rotations(mesh: Mesh, u: Array, elements: Array) -> Array:
+    """Rotation (e, 3, 3) of each element's mean deformation gradient: its nearest orthogonal matrix."""
+    reference = reference_gradients(mesh.nodes, mesh.tets[elements])
+    share = reference.volumes / reference.volumes.sum(axis=1)[:, None]
+    F = np.eye(3) + np.einsum("eai,eqaj,eq->eij", u[mesh.tets[elements]], reference.gradients, share)
+    left, _, right = np.linalg.svd(F)
+    return np.asarray(left @ right)

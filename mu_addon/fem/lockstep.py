@@ -7,10 +7,12 @@ from typing import Any
 
 import attrs
 import numpy as np
+from scipy import sparse
 
 from ..errors import ConvergenceError
 from ..meshing.mesh import Mesh
 from .descent import Descent, NewtonSettings
+from .elementwise import element_stiffness, rotations
 from .equilibrium import Equilibrium, State, rest
 from .factor import IndefiniteError
 from .materials import Layer, Materials
@@ -55,25 +57,8 @@ class Lockstep:
         self._base = model.parameters(materials)
         self._data = [model.parameters(v.of(materials)) for v in self.variants]
         touched = np.flatnonzero(np.any([v.share > 0 for v in self.variants], axis=0))
-        self._part = _Part(model, touched)
-        self._changes = [self._part.model.parameters(self._difference(v, touched)) for v in self.variants]
+        self._part = _Part(model, materials, self.variants, touched)
         self._shared = make_variants(model, self._part.unknowns)
-
-    def _difference(self, variant: Variant, touched: Array) -> Materials:
-        """What the variant adds to the body's materials and takes from them, element by element."""
-        share = variant.share[touched]
-        local = np.full(len(variant.share), -1)
-        local[touched] = np.arange(len(touched))
-        layers = []
-        for layer in self.materials.layers:
-            rows = np.flatnonzero(local[layer.elements] >= 0)
-            elements = local[layer.elements[rows]]
-            if len(rows):
-                weight = -layer.weight[rows] * share[elements]
-                layers.append(Layer(layer.law, elements, layer.parameters[rows], weight))
-        count = len(variant.law.parameter_names)
-        parameters = np.broadcast_to(variant.parameters, (len(variant.share), count))[touched]
-        return Materials((*layers, Layer(variant.law, np.arange(len(touched)), parameters, share)))
 
     def at(self, state: State) -> list[State]:
         """Every variant's stable equilibrium at the pressure of one of the body's states.
@@ -88,11 +73,13 @@ class Lockstep:
             self._shared.factor(self.model.tangent(state.u, state.pressure_MPa, self._base))
         except IndefiniteError:
             return [self._alone(i, state, None) for i in range(len(self.variants))]
-        bending = {}
+        shared = attrs.evolve(self.settings, tolerance=self.settings.shared_tolerance)
+        taken = {}
+        changes = self._part.changes(state.u)
         for i in range(len(self.variants)):
             try:
-                bending[i] = self._shared.take(self._part.change(self._changes[i], state.u))
-                searches[i] = Descent(self.model, self._data[i], state.pressure_MPa, state.u, self.settings)
+                taken[i] = self._shared.take(changes[i])
+                searches[i] = Descent(self.model, self._data[i], state.pressure_MPa, state.u, shared)
             except (ConvergenceError, IndefiniteError, np.linalg.LinAlgError):
                 searches.pop(i, None)
         for step in range(self.settings.max_shared_steps + 1):
@@ -104,7 +91,7 @@ class Lockstep:
                 break
             pulled = {i: search.pulled_back() for i, search in searches.items()}
             forces = np.array([force for force, _ in pulled.values()])
-            solved = self._shared.solve(forces, [bending[i] for i in searches])
+            solved = self._shared.solve(forces, [taken[i] for i in searches])
             for (i, search), x in zip(list(searches.items()), solved, strict=True):
                 if x is None:
                     del searches[i]
@@ -137,13 +124,20 @@ class Lockstep:
 
 
 class _Part:
-    """Some elements of a body as a model of their own; `unknowns` (c,) are its free ones in the body's."""
+    """The elements (e,) that variants change, as a model of their own; `unknowns` (c,) are its free ones.
 
-    def __init__(self, model: Model, elements: Array) -> None:
+    A variant's new law is taken at rest, turned with its elements: a stiff inclusion gives way little, so
+    that this is closer to its tangent where it will be than what the body's own strain would make of it,
+    which for a stiff law under compression need not even be definite.
+    """
+
+    def __init__(
+        self, model: Model, materials: Materials, variants: Sequence[Variant], elements: Array
+    ) -> None:
         mesh = model.mesh
         self._nodes, tets = np.unique(mesh.tets[elements], return_inverse=True)
         none = np.empty(0, dtype=np.int32)
-        part = Mesh(
+        self._mesh = Mesh(
             nodes=mesh.nodes[self._nodes],
             tets=tets.reshape(len(elements), -1),
             region=mesh.region[elements],
@@ -154,13 +148,55 @@ class _Part:
         number = np.full(mesh.nodes.size, -1)
         number[model.free] = np.arange(len(model.free))
         number = number.reshape(-1, 3)[self._nodes]
-        self.model = Model(part, number < 0, model.device, 1, model.mean_dilatation)
-        self.unknowns = number.ravel()[self.model.free]
+        self.unknowns = np.unique(number[number >= 0])
+        self._model = Model(self._mesh, number < 0, model.device, 1, model.mean_dilatation)
+        self._numbers = number[self._mesh.tets].reshape(len(elements), -1)
+        self._every = np.arange(len(elements))
+        self._shares = [v.share[elements] for v in variants]
+        self._base = self._model.parameters(_within(materials, elements, len(mesh.tets)))
+        at_rest = np.zeros_like(self._mesh.nodes)
+        # Variants mostly share a law and its parameters.
+        known: dict[tuple[int, int], Array] = {}
+        self._new = []
+        for v in variants:
+            kind = id(v.law), id(v.parameters)
+            if kind not in known:
+                count = len(v.law.parameter_names)
+                rows = np.broadcast_to(v.parameters, (len(v.share), count))[elements]
+                data = self._model.parameters(Materials((Layer(v.law, self._every, rows),)))
+                known[kind] = element_stiffness(self._model, at_rest, data, self._every)
+            self._new.append(known[kind])
 
-    def change(self, data: Any, u: Array) -> Change:
-        """What materials given as a difference change of the tangent, at the body's displacement (n, 3)."""
-        model = self.model
-        values = model.tangent(u[self._nodes], 0.0, data)
-        matrix = model.matrix(values)
-        used = np.flatnonzero(np.abs(matrix).sum(axis=0))
-        return Change(self.unknowns[used], matrix[used][:, used].tocsr())
+    def changes(self, u: Array) -> list[Change]:
+        """What every variant adds to the tangent at the body's displacement (n, 3) in mm."""
+        u = u[self._nodes]
+        old = element_stiffness(self._model, u, self._base, self._every)
+        turn = rotations(self._mesh, u, self._every)
+        k = self._mesh.tets.shape[1]
+        found = []
+        for share, new in zip(self._shares, self._new, strict=True):
+            mine = np.flatnonzero(share)
+            blocks = new[mine].reshape(len(mine), k, 3, k, 3)
+            turned = np.einsum("eij,eajbk,elk->eaibl", turn[mine], blocks, turn[mine], optimize=True)
+            matrix = share[mine, None, None] * (turned.reshape(len(mine), 3 * k, 3 * k) - old[mine])
+            numbers = self._numbers[mine]
+            free = (numbers[:, :, None] >= 0) & (numbers[:, None, :] >= 0)
+            used = np.unique(numbers[numbers >= 0])
+            place = np.searchsorted(used, numbers)
+            rows, columns = np.broadcast_arrays(place[:, :, None], place[:, None, :])
+            entries = matrix[free], (rows[free], columns[free])
+            found.append(Change(used, sparse.coo_matrix(entries, shape=(len(used), len(used))).tocsr()))
+        return found
+
+
+def _within(materials: Materials, elements: Array, count: int) -> Materials:
+    """Materials of some elements (e,) of `count`, numbered as they are listed."""
+    local = np.full(count, -1)
+    local[elements] = np.arange(len(elements))
+    layers = []
+    for layer in materials.layers:
+        rows = np.flatnonzero(local[layer.elements] >= 0)
+        if len(rows):
+            numbers = local[layer.elements[rows]]
+            layers.append(Layer(layer.law, numbers, layer.parameters[rows], layer.weight[rows]))
+    return Materials(tuple(layers))

@@ -11,19 +11,21 @@ COLUMNS = wp.constant(4)
 
 @cache
 def substitution_kernels(width: int) -> tuple[Any, Any]:
-    """Forward and backward substitution, in place, of `width` right-hand sides a launch: x (n,) of vectors.
+    """Forward and backward substitution in single precision, in place: `width` right-hand sides a launch.
+
+    x (n,): their values, a vector a row;
 
     block (b + 1,): first columns of blocks of up to COLUMNS columns that have the same rows below them;
     indptr, row, value: the factor by columns, the diagonal first.
     """
-    vector = wp.types.vector(length=width, dtype=wp.float64)
+    vector = wp.types.vector(length=width, dtype=wp.float32)
 
     @wp.kernel(module="unique")
     def forward(
         block: wp.array(dtype=int),
         indptr: wp.array(dtype=wp.int64),
         row: wp.array(dtype=int),
-        value: wp.array(dtype=wp.float64),
+        value: wp.array(dtype=wp.float32),
         x: wp.array(dtype=vector),
     ):
         for b in range(block.shape[0] - 1):
@@ -67,7 +69,7 @@ def substitution_kernels(width: int) -> tuple[Any, Any]:
         block: wp.array(dtype=int),
         indptr: wp.array(dtype=wp.int64),
         row: wp.array(dtype=int),
-        value: wp.array(dtype=wp.float64),
+        value: wp.array(dtype=wp.float32),
         x: wp.array(dtype=vector),
     ):
         for i in range(1, block.shape[0]):

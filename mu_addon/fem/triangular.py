@@ -14,7 +14,7 @@ Array = np.ndarray[Any, Any]
 
 # Right-hand sides that one thread carries through the factor together: the factor is read from memory
 # once for all of them.
-WIDTHS = (8, 16)
+WIDTHS = (8, 16, 32)
 
 
 @attrs.frozen(eq=False)
@@ -46,7 +46,10 @@ def column_blocks(lower: Lower, last: int) -> Array:
 
 
 class Triangular:
-    """Solves with one factor for many right-hand sides at once.
+    """Solves with one factor for many right-hand sides at once, to single precision.
+
+    That halves what is read, and is plenty for steps that are corrected by exact residuals: on the unit it
+    changes a step by 1e-5 of its energy norm.
 
     The last `trailing` unknowns of the factor's order are left to the caller: `schur` is the matrix
     (t, t) that remains for them when all others are eliminated.
@@ -63,7 +66,7 @@ class Triangular:
             wp.array(blocks, dtype=int, device="cpu"),
             wp.array(lower.indptr, dtype=wp.int64, device="cpu"),
             wp.array(lower.indices[:end], dtype=int, device="cpu"),
-            wp.array(lower.values[:end], dtype=wp.float64, device="cpu"),
+            wp.array(lower.values[:end].astype(np.float32), dtype=wp.float32, device="cpu"),
         ]
         corner = np.zeros((trailing, trailing))
         column = np.repeat(np.arange(self.inner, n), np.diff(lower.indptr[self.inner :]))
@@ -80,11 +83,11 @@ class Triangular:
         groups = []
         for first in range(0, len(b), width):
             part = b[first : first + width]
-            x = np.zeros((len(self.order), width), dtype=np.float64)
+            x = np.zeros((len(self.order), width), dtype=np.float32)
             x[:, : len(part)] = part[:, self.order].T
             groups.append(x)
         forward, backward = substitution_kernels(width)
-        vector = wp.types.vector(length=width, dtype=wp.float64)
+        vector = wp.types.vector(length=width, dtype=wp.float32)
         arrays = [wp.array(x, dtype=vector, device="cpu", copy=False) for x in groups]
         self._run(forward, arrays)
         if self.inner < len(self.order):

@@ -17,8 +17,7 @@ import numpy as np
 from scipy import sparse
 
 from ..errors import InputError
-from ..fem.elements import reference_gradients
-from ..fem.elementwise import element_stiffness
+from ..fem.elementwise import element_stiffness, rotations
 from ..fem.equilibrium import State
 from ..fem.factor import Cholesky, SuperLU
 from ..fem.kinematics import Probe
@@ -330,7 +329,7 @@ def _turned(
     The drive (r q,) is the work of each pattern's forces under Model A's own deformation of its elements.
     """
     elements = np.unique(np.concatenate([p.elements for p in patterns]))
-    turn = _rotations(mesh, state.u, elements)
+    turn = rotations(mesh, state.u, elements)
     rows, columns, values, drive = [], [], [], []
     first = 0
     for p, times in zip(patterns, whole, strict=True):
@@ -351,12 +350,3 @@ def _turned(
         first += q
     data = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
     return sparse.coo_matrix(data, shape=(mesh.nodes.size, first)).tocsr(), np.concatenate(drive)
-
-
-def _rotations(mesh: Mesh, u: Array, elements: Array) -> Array:
-    """Rotation (e, 3, 3) of each element's mean deformation gradient: its nearest orthogonal matrix."""
-    reference = reference_gradients(mesh.nodes, mesh.tets[elements])
-    share = reference.volumes / reference.volumes.sum(axis=1)[:, None]
-    F = np.eye(3) + np.einsum("eai,eqaj,eq->eij", u[mesh.tets[elements]], reference.gradients, share)
-    left, _, right = np.linalg.svd(F)
-    return np.asarray(left @ right)

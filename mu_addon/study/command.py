@@ -204,7 +204,7 @@ def _run(study: Study, options: argparse.Namespace) -> None:
         study.design(path)
     if "simulate" in options.stages:
         study.make_mesh()
-        study.simulate()
+        study.simulate(candidates_beside="place" in options.stages)
     if "place" in options.stages:
         from .graph_search import search_graph, sensitivity_map
 

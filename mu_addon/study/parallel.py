@@ -7,7 +7,7 @@ import os
 import signal
 import threading
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from typing import Any
@@ -75,9 +75,9 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _work(number: int, state: State) -> tuple[int, Array]:
+def _work(state: State) -> Array:
     assert _evaluator is not None
-    return number, _evaluator(state)
+    return _evaluator(state)
 
 
 def _survive_broken_pipes() -> None:
@@ -118,6 +118,18 @@ def _one_thread_each() -> Iterator[None]:
                 os.environ[name] = value
 
 
+@contextmanager
+def _worker_errors() -> Iterator[None]:
+    try:
+        yield
+    except BrokenProcessPool:
+        raise MuError(
+            "a worker process ended before its time",
+            "candidates",
+            "run again, it resumes; if memory is short give --workers 1",
+        ) from None
+
+
 class Sweeper:
     """Processes that solve a setting's jobs at states of Model A; started when first needed, until closed."""
 
@@ -125,36 +137,37 @@ class Sweeper:
         self.setting, self.workers = setting, workers
         self._alone: Evaluator | None = None
         self._pool: ProcessPoolExecutor | None = None
+        self._submitted: dict[float, Future[Array]] = {}
+
+    def submit(self, state: State) -> None:
+        """Have a process solve a state; needs two workers or more."""
+        if state.pressure_MPa in self._submitted:
+            return
+        with _one_thread_each():
+            _survive_broken_pipes()
+            if self._pool is None:
+                context = multiprocessing.get_context("spawn")
+                self._pool = ProcessPoolExecutor(self.workers, context, _start, (self.setting,))
+            with _ctrl_c_ignored(), _worker_errors():
+                self._submitted[state.pressure_MPa] = self._pool.submit(_work, state)
 
     def solve(self, states: Sequence[State]) -> Iterator[tuple[int, Array]]:
         """Number of each state as it is done, and the anchors (jobs, p, 3) in mm that all jobs move there.
 
         The same for any `workers`. Raises the first ConvergenceError of any.
         """
-        if not states:
-            return
         if self.workers == 1:
-            self._alone = self._alone or Evaluator(self.setting, threads=1)
             for number, state in enumerate(states):
+                self._alone = self._alone or Evaluator(self.setting, threads=1)
                 yield number, self._alone(state)
             return
-        if self._pool is None:
-            context = multiprocessing.get_context("spawn")
-            self._pool = ProcessPoolExecutor(self.workers, context, _start, (self.setting,))
-        pool = self._pool
-        try:
-            with _one_thread_each():
-                _survive_broken_pipes()
-                with _ctrl_c_ignored():
-                    waiting = [pool.submit(_work, n, state) for n, state in enumerate(states)]
-            for done in as_completed(waiting):
-                yield done.result()
-        except BrokenProcessPool:
-            raise MuError(
-                "a worker process ended before its time",
-                "candidates",
-                "run again, it resumes; if memory is short give --workers 1",
-            ) from None
+        for state in states:
+            self.submit(state)
+        numbers = {self._submitted[s.pressure_MPa]: n for n, s in enumerate(states)}
+        for done in as_completed(numbers):
+            with _worker_errors():
+                found = done.result()
+            yield numbers[done], found
 
     def close(self) -> None:
         """End the processes, at once: whoever stops early does not wait for what nobody will read."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import warnings
-from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ from ..errors import ConvergenceError, InputError, MeshingError
 from ..fem.contact import first_contact
 from ..fem.descent import NewtonSettings
 from ..fem.equilibrium import Equilibrium, State, rest
-from ..fem.kinematics import bending_angle_deg, probe
+from ..fem.kinematics import bending_angle_deg
 from ..fem.model import Model
 from ..fem.trajectory import Trajectory, branches, simulate
 from ..fem.unit import materials_of
@@ -28,15 +27,14 @@ from ..meshing.mesh import Mesh
 from ..meshing.quality import Quality, quality
 from ..meshing.settings import MeshSettings
 from ..meshing.unit import MeshingWarning, mesh_unit
-from ..placement.candidates import Candidate, Evaluation, candidates, evaluation
+from ..placement.candidates import Candidate, Evaluation, candidates
 from ..placement.deviation import rank
-from ..placement.sampling import between, estimate, rounds
 from .cache import Cache, key
 from .ending import Ending
 from .job import HEADER, Job
-from .parallel import Setting, Sweeper
 from .progress import Progress
 from .results import LatticeSearch
+from .sweeping import Sweep
 from .vtk_out import write_mesh, write_trajectory
 
 Array = np.ndarray[Any, Any]
@@ -57,8 +55,6 @@ RESULTS = (
 )
 # A coarser twin of the mesh, to tell how far the mesh moves a ranking.
 COARSER = 0.7
-# Pressures between those solved are interpolated where that changes no path's J_hat by more than this.
-SAMPLING_ERROR = 0.02
 
 
 @attrs.define
@@ -79,6 +75,7 @@ class Study:
     warnings: list[str] = attrs.field(factory=list)
     solver: dict[str, Any] = attrs.field(factory=dict)
     search: LatticeSearch | None = None
+    _ahead: Sweep | None = None
 
     @classmethod
     def open(cls, job: Job, folder: Path, progress: Progress, ending: Ending) -> Study:
@@ -170,15 +167,22 @@ class Study:
             self.cache.put("mesh", name, {**arrays, "symmetry": np.array(mesh.symmetry, dtype="U1")})
         return mesh
 
-    def simulate(self) -> Trajectory:
-        """Model A: the unit without a sensor through the pressure protocol."""
+    def simulate(self, candidates_beside: bool = False) -> Trajectory:
+        """Model A: the unit without a sensor through the pressure protocol.
+
+        candidates_beside: whether other processes go on with the candidates as soon as a state is there.
+        """
         assert self.mesh is not None
         time, pressure = self.job.protocol.sample(self.job.times)
         with self.progress.stage("Model A"):
             model = Model(self.mesh)
+            if candidates_beside and self.job.workers > 1:
+                self._ahead = Sweep(self.job, self.cache, self.mesh, self._jobs(), pressure)
             try:
-                self.trajectory = self._model_a(model, time, pressure, self.states.append)
+                self.trajectory = self._model_a(model, time, pressure, self._reached)
             except BaseException:
+                if self._ahead is not None:
+                    self._ahead.close()
                 self._keep_partial_motion()
                 raise
             self._write_motion(self.trajectory.states)
@@ -193,6 +197,11 @@ class Study:
         }
         self.ending.summary["solver"] = self.solver
         return self.trajectory
+
+    def _reached(self, state: State) -> None:
+        self.states.append(state)
+        if self._ahead is not None:
+            self._ahead.reached(state)
 
     def _model_a(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
         """Model A's trajectory on a model's mesh, load step by load step from the cache where it is there."""
@@ -273,15 +282,18 @@ class Study:
         if self.mesh is not None and self.states:
             self._write_motion([rest(self.mesh), *self.states])
 
+    def _jobs(self) -> list[tuple[Candidate, str]]:
+        return [(c, rule) for rule in self.job.rules for c in candidates(self.anchors, self.windows)]
+
     def place(self) -> dict[str, str]:
         """Every candidate under every rule against Model A; returns the chosen path of each rule."""
         assert self.mesh is not None
         assert self.trajectory is not None
-        every = candidates(self.anchors, self.windows)
-        jobs = [(c, rule) for rule in self.job.rules for c in every]
+        jobs = self._jobs()
         with self.progress.stage("candidates"):
-            found = self.sweep(self.mesh, self.trajectory, jobs)
+            found = self.sweep(self.mesh, self.trajectory, jobs, self._ahead)
         self.evaluations = {(e.name, e.rule): e for e in found}
+        every = candidates(self.anchors, self.windows)
         chosen = self._write_ranking(every)
         if self.job.mesh_check:
             try:
@@ -292,69 +304,21 @@ class Study:
         return chosen
 
     def sweep(
-        self, mesh: Mesh, trajectory: Trajectory, jobs: list[tuple[Candidate, str]]
+        self,
+        mesh: Mesh,
+        trajectory: Trajectory,
+        jobs: list[tuple[Candidate, str]],
+        under_way: Sweep | None = None,
     ) -> list[Evaluation]:
-        """Evaluation of every (candidate, rule) on a mesh against Model A, state by state from the cache."""
-        unit = self.job.unit
-        sensor = unit.material.sensor_modulus_kPa / 1e3
-        radius = unit.dimensions.inclusion_radius
-        setting = Setting(mesh, materials_of(self.job.unit, mesh), self.anchors, tuple(jobs), radius, sensor)
-        shared = key(
-            mesh.hash(),
-            setting.materials.hash(),
-            trajectory.pressure_kPa,
-            NewtonSettings(),
-            self.anchors,
-            *(part for candidate, rule in jobs for part in (candidate.points, rule)),
-            radius,
-            sensor,
-        )
-        distinct = np.array([s.pressure_MPa for s in trajectory.states])
-        weight = np.bincount(trajectory.index, minlength=len(distinct))
-        monitored = self.anchors, probe(mesh, self.anchors)
-        still = np.array([self.anchors + monitored[1].displacement(s.u) for s in trajectory.states])
-        known: dict[int, Array] = {}
-        difference = np.zeros((len(distinct), len(jobs), *self.anchors.shape))
-        error = 0.0
-        with closing(Sweeper(setting, self.job.workers)) as sweeper:
-            for pair in rounds(distinct):
-                for number, points in self._solved(sweeper, shared, trajectory, pair):
-                    known[number] = points - still[number]
-                    self.progress.update(len(known) / np.count_nonzero(distinct))
-                before, difference = difference, between(distinct, known)
-                error = (
-                    estimate(difference, before, weight) if len(known) < np.count_nonzero(distinct) else 0.0
-                )
-                if error <= SAMPLING_ERROR:
-                    break
+        """Evaluation of every (candidate, rule) on a mesh against its Model A; see `sweeping`."""
+        sweep = under_way or Sweep(self.job, self.cache, mesh, jobs, trajectory.pressure_kPa)
+        with closing(sweep):
+            found = sweep.evaluations(trajectory, self.progress.update)
         self.ending.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = {
-            "pressures_solved_kPa": sorted(float(distinct[n]) * 1e3 for n in known),
-            "relative_error_of_J_between": error,
+            "pressures_solved_kPa": sweep.solved_kPa,
+            "relative_error_between": sweep.error,
         }
-        baseline = trajectory.of_time(still)
-        every = trajectory.of_time(difference)
-        return [
-            evaluation(
-                mesh, candidate, rule, radius, baseline + every[:, number], baseline, self.job.stations
-            )
-            for number, (candidate, rule) in enumerate(jobs)
-        ]
-
-    def _solved(
-        self, sweeper: Sweeper, shared: str, trajectory: Trajectory, numbers: list[int]
-    ) -> Iterator[tuple[int, Array]]:
-        """Number of each of some states and the anchors moved by every job, from the cache where there."""
-        names = {n: key(shared, trajectory.states[n].pressure_MPa) for n in numbers}
-        missing = []
-        for number, name in names.items():
-            kept = self.cache.get("sweep", name)
-            if kept is None:
-                missing.append(number)
-            else:
-                yield number, kept["moved_mm"]
-        for position, points in sweeper.solve([trajectory.states[n] for n in missing]):
-            self.cache.put("sweep", names[missing[position]], {"moved_mm": points})
-            yield missing[position], points
+        return found
 
     def _compare_meshes(self, jobs: list[tuple[Candidate, str]]) -> None:
         """How far a coarser mesh moves each J_hat: the most of any path, by rule.

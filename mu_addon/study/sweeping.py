@@ -1,0 +1,116 @@
+"""A study's candidates on one mesh: solved state by state as Model A reaches them, and kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from ..design.anchors import anchors
+from ..fem.descent import NewtonSettings
+from ..fem.equilibrium import State
+from ..fem.kinematics import probe
+from ..fem.trajectory import Trajectory
+from ..fem.unit import materials_of
+from ..meshing.mesh import Mesh
+from ..placement.candidates import Candidate, Evaluation, evaluation
+from ..placement.sampling import between, estimate, rounds
+from .cache import Cache, key
+from .job import Job
+from .parallel import Setting, Sweeper
+
+Array = np.ndarray[Any, Any]
+
+# Pressures between those solved are interpolated where that changes no path's mean deviation by more.
+SAMPLING_ERROR = 0.02
+
+
+class Sweep:
+    """Candidates, each under an inclusion rule, through a protocol's distinct pressures (s,) in kPa.
+
+    What is solved is kept in the cache. Close it, also when Model A failed.
+    """
+
+    def __init__(
+        self, job: Job, cache: Cache, mesh: Mesh, jobs: list[tuple[Candidate, str]], pressure_kPa: Array
+    ) -> None:
+        self._job, self._cache, self._mesh, self._jobs = job, cache, mesh, jobs
+        unit = job.unit
+        self._anchors = anchors(unit)
+        self._radius = unit.dimensions.inclusion_radius
+        sensor = unit.material.sensor_modulus_kPa / 1e3
+        materials = materials_of(unit, mesh)
+        self._sweeper = Sweeper(
+            Setting(mesh, materials, self._anchors, tuple(jobs), self._radius, sensor), job.workers
+        )
+        self._key = key(
+            mesh.hash(),
+            materials.hash(),
+            pressure_kPa,
+            NewtonSettings(),
+            self._anchors,
+            *(part for candidate, rule in jobs for part in (candidate.points, rule)),
+            self._radius,
+            sensor,
+        )
+        distinct = np.unique(pressure_kPa) / 1e3
+        # What is solved whatever comes of it; the rest only where these do not tell enough.
+        self._certain = {float(distinct[i]) for pair in rounds(distinct)[:2] for i in pair}
+        self.solved_kPa: list[float] = []
+        self.error = 0.0
+
+    def _name(self, state: State) -> str:
+        return key(self._key, state.pressure_MPa)
+
+    def reached(self, state: State) -> None:
+        """Start on a state that Model A has just reached, beside Model A's next one."""
+        wanted = any(abs(state.pressure_MPa - p) < 1e-12 for p in self._certain)
+        if wanted and not self._cache.path("sweep", self._name(state)).exists():
+            self._sweeper.submit(state)
+
+    def evaluations(self, trajectory: Trajectory, on_progress: Callable[[float], None]) -> list[Evaluation]:
+        """Evaluation of every job against Model A's whole trajectory. Raises ConvergenceError."""
+        distinct = np.array([s.pressure_MPa for s in trajectory.states])
+        loaded = np.count_nonzero(distinct)
+        weight = np.bincount(trajectory.index, minlength=len(distinct))
+        monitor = probe(self._mesh, self._anchors)
+        still = np.array([self._anchors + monitor.displacement(s.u) for s in trajectory.states])
+        known: dict[int, Array] = {}
+        for pair in rounds(distinct):
+            for number, points in self._solved(trajectory, pair):
+                known[number] = points - still[number]
+                on_progress(len(known) / loaded)
+            self.error = 0.0
+            if len(known) < loaded:
+                without_last = {n: d for n, d in known.items() if n != pair[-1]}
+                full, sparse = between(distinct, known), between(distinct, without_last)
+                self.error = estimate(full, sparse, weight)
+            if self.error <= SAMPLING_ERROR:
+                break
+        self.solved_kPa = sorted(float(distinct[n]) * 1e3 for n in known)
+        difference = between(distinct, known) if known else np.zeros((len(distinct), len(self._jobs), 1, 3))
+        baseline = trajectory.of_time(still)
+        moved = baseline[:, None] + trajectory.of_time(difference)
+        return [
+            evaluation(self._mesh, candidate, rule, self._radius, moved[:, i], baseline, self._job.stations)
+            for i, (candidate, rule) in enumerate(self._jobs)
+        ]
+
+    def _solved(self, trajectory: Trajectory, numbers: list[int]) -> Iterator[tuple[int, Array]]:
+        """Number of each of some states and the anchors moved by every job, from the cache where there."""
+        missing = []
+        for number in numbers:
+            kept = self._cache.get("sweep", self._name(trajectory.states[number]))
+            if kept is None:
+                missing.append(number)
+            else:
+                yield number, kept["moved_mm"]
+        for position, points in self._sweeper.solve([trajectory.states[n] for n in missing]):
+            number = missing[position]
+            self._cache.put("sweep", self._name(trajectory.states[number]), {"moved_mm": points})
+            yield number, points
+
+    def close(self) -> None:
+        """End the processes."""
+        self._sweeper.close()
