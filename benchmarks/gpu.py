@@ -86,7 +86,7 @@ def run(unit, mesh, device, pressure_kPa, quiet=False):
     clock = Clock(device, quiet)
     model = Model(mesh, device=device)
     # On a CUDA device it is so from the start.
-    model.direct = False
+    model.solver = "conjugate gradients"
     clock.tell(f"model, {len(model.free)} unknowns, {len(mesh.tets)} elements")
     steps = int(np.ceil(abs(pressure_kPa) / STEP_KPA))
     pressures = np.linspace(0, pressure_kPa * 1e-3, steps + 1)[1:]

@@ -82,7 +82,11 @@ class Equilibrium:
                 definite = self._factorise(search.u, pressure)
                 factorisations += 1
                 search.forget()
-            shrunk = search.move(search.direction(self.factor.solve))
+            try:
+                shrunk = search.move(search.direction(self.factor.solve))
+            except IndefiniteError:
+                # Iterative solvers may find out only here.
+                raise ConvergenceError("the tangent is not definite") from None
             stale = not definite or shrunk > s.keep_factor
         raise ConvergenceError(f"no convergence with {factorisations} factorisations")
 

@@ -18,6 +18,7 @@ from . import kernels
 from .conjugate_gradients import ConjugateGradients
 from .elements import reference_gradients, triangle_shapes
 from .factor import Cholesky, SuperLU, make_factor, nested_dissection
+from .iterative import TwoLevel
 from .laws.tensors import mat33
 from .materials import Layer, Materials
 
@@ -104,7 +105,9 @@ class Model:
         self.device = device
         self.threads = threads
         self.mean_dilatation = mean_dilatation
-        self.direct = device == "cpu"
+        # Or "two levels" (iterative.TwoLevel): for quadratic meshes whose factor takes too much time or
+        # memory, from about 400k unknowns on (docs/performance.md).
+        self.solver = "factorisation" if device == "cpu" else "conjugate gradients"
         self.load: Array | None = None
         self._least_force = 0.0
         reference = reference_gradients(mesh.nodes, mesh.tets)
@@ -189,15 +192,18 @@ class Model:
         self.pattern = Pattern(indptr, row[sorting], unknowns[unknowns >= 0])
 
     @cached_property
-    def factor(self) -> Cholesky | SuperLU | ConjugateGradients:
+    def factor(self) -> Cholesky | SuperLU | ConjugateGradients | TwoLevel:
         """The solver for tangents of this pattern, analysed once; it holds one tangent at a time.
 
-        A factorisation on the CPU, conjugate gradients on another device, or where `direct` is unset.
+        A factorisation on the CPU, conjugate gradients on another device, unless `solver` was set.
         """
-        pattern = self.pattern
-        if not self.direct:
-            return ConjugateGradients(pattern.indptr, pattern.indices, pattern.order, self.device)
-        return make_factor(pattern.indptr, pattern.indices, pattern.order)
+        indptr, indices, order = self.pattern.indptr, self.pattern.indices, self.pattern.order
+        if self.solver == "conjugate gradients":
+            return ConjugateGradients(indptr, indices, order, self.device)
+        if self.solver == "two levels":
+            # Newton's tolerance of 1e-9 is relative to all forces, this one to what is left of them.
+            return TwoLevel(indptr, indices, self.mesh, self.free, self.threads)
+        return make_factor(indptr, indices, order)
 
     def parameters(self, materials: Materials) -> MaterialData:
         """A body's materials on the device, without history; raises InputError where an element has none."""

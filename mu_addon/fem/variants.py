@@ -113,7 +113,7 @@ class IterativeVariants:
 def make_variants(model: Model, changed: Array) -> SharedTangent:
     """What solves for a body's variants on its device; `changed` (c,) are the free unknowns they change."""
     # Not asked for where it is not used: a factorisation's analysis takes a while.
-    solver = None if model.direct else model.factor
+    solver = model.factor if model.solver == "conjugate gradients" else None
     if isinstance(solver, ConjugateGradients):
         return IterativeVariants(solver)
     return DirectVariants(model.pattern, changed, model.threads)

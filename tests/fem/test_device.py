@@ -35,7 +35,7 @@ MESH = hollow_box(n=3, size=3.0)
 def by_gradients(device):
     """A model that solves by conjugate gradients, whatever its device."""
     model = Model(MESH, device=device)
-    model.direct = False
+    model.solver = "conjugate gradients"
     return model
 
 
@@ -229,4 +229,4 @@ def test_kernels_compile_for_cuda_where_there_is_none(tmp_path):
 
 @pytest.mark.parametrize("device", CUDA)
 def test_a_model_on_a_device_solves_there(device):
-    assert not Model(MESH, device=device).direct
+    assert Model(MESH, device=device).solver == "conjugate gradients"

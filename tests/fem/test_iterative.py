@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import InputError
+from mu_addon.fem.equilibrium import Equilibrium, rest
 from mu_addon.fem.factor import IndefiniteError
 from mu_addon.fem.iterative import TwoLevel, interpolation
 from mu_addon.fem.materials import Materials
@@ -82,3 +83,15 @@ def test_linear_elements_are_refused():
     model, _, _ = system(hollow_box(order=1))
     with pytest.raises(InputError, match="quadratic"):
         two_level(model)
+
+
+def test_an_equilibrium_is_the_same_by_two_levels():
+    mesh = hollow_box(n=4, size=4.0)
+    states = []
+    for solver in ("factorisation", "two levels"):
+        model = Model(mesh)
+        model.solver = solver
+        materials = Materials.neo_hooke(np.full(len(mesh.tets), 0.05), np.full(len(mesh.tets), 0.45))
+        states.append(Equilibrium(model, materials).reach(2e-3, [rest(mesh)]))
+    assert np.abs(states[0].u).max() > 0.05
+    np.testing.assert_allclose(states[1].u, states[0].u, atol=1e-7)
