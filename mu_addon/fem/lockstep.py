@@ -107,9 +107,13 @@ class Lockstep:
                 found[i] = self._alone(i, state, None if unfinished is None else unfinished.u)
         return [one for one in found if one is not None]
 
+    def alone(self, i: int) -> Equilibrium:
+        """One variant by itself."""
+        return Equilibrium(self.model, self.variants[i].of(self.materials), self.settings)
+
     def _alone(self, i: int, state: State, near: Array | None) -> State:
         """A variant that the shared factor does not serve: with factors of its own, or along its path."""
-        alone = Equilibrium(self.model, self.variants[i].of(self.materials), self.settings)
+        alone = self.alone(i)
         limit = self.settings.surprise * np.abs(state.u).max()
         for start in (near, state.u):
             if start is None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..fem.equilibrium import State
+from ..fem.equilibrium import State, rest
 from ..fem.kinematics import Probe
 from ..fem.laws import NeoHooke
 from ..fem.lockstep import Lockstep, Variant
@@ -36,6 +36,15 @@ class Sweep:
         stiff = NeoHooke.parameters(np.full(len(poisson), sensor_MPa), poisson)
         self._points, self._probe = monitored
         self._lockstep = Lockstep(model, materials, [Variant(s, NeoHooke, stiff) for s in shares])
+
+    def alone(self, number: int, pressures_MPa: Array) -> Array:
+        """Monitored points (s, p, 3) in mm of one sensor's unit along its whole path through some pressures.
+
+        They are visited in order from rest. Raises ConvergenceError.
+        """
+        equilibrium = self._lockstep.alone(number)
+        states = equilibrium.path(pressures_MPa, rest(equilibrium.model.mesh))
+        return np.array([self._points + self._probe.displacement(s.u) for s in states])
 
     def at(self, state: State) -> Array:
         """Monitored points (sensors, p, 3) in mm, at the pressure of one of Model A's states.

@@ -57,6 +57,10 @@ class Evaluator:
         """Moved anchors (jobs, p, 3) in mm. Raises ConvergenceError."""
         return self._sweep.at(state)
 
+    def alone(self, job: int, pressures_MPa: Array) -> Array:
+        """Anchors (s, p, 3) in mm that a job moves along its path from rest. Raises ConvergenceError."""
+        return self._sweep.alone(job, pressures_MPa)
+
 
 _evaluator: Evaluator | None = None
 
@@ -78,6 +82,11 @@ def _end_with_parent() -> None:
 def _work(state: State) -> Array:
     assert _evaluator is not None
     return _evaluator(state)
+
+
+def _work_alone(job: int, pressures_MPa: Array) -> Array:
+    assert _evaluator is not None
+    return _evaluator.alone(job, pressures_MPa)
 
 
 def _survive_broken_pipes() -> None:
@@ -141,15 +150,26 @@ class Sweeper:
 
     def submit(self, state: State) -> None:
         """Have a process solve a state; needs two workers or more."""
-        if state.pressure_MPa in self._submitted:
-            return
+        if state.pressure_MPa not in self._submitted:
+            self._submitted[state.pressure_MPa] = self._submit(_work, state)
+
+    def _submit(self, work: Any, *arguments: Any) -> Future[Array]:
         with _one_thread_each():
             _survive_broken_pipes()
             if self._pool is None:
                 context = multiprocessing.get_context("spawn")
                 self._pool = ProcessPoolExecutor(self.workers, context, _start, (self.setting,))
             with _ctrl_c_ignored(), _worker_errors():
-                self._submitted[state.pressure_MPa] = self._pool.submit(_work, state)
+                return self._pool.submit(work, *arguments)
+
+    def alone(self, tasks: Sequence[tuple[int, Array]]) -> list[Array]:
+        """Anchors (s, p, 3) in mm that jobs, by number, move along their paths through pressures (s,)."""
+        if self.workers == 1:
+            self._alone = self._alone or Evaluator(self.setting, threads=1)
+            return [self._alone.alone(*task) for task in tasks]
+        waiting = [self._submit(_work_alone, *task) for task in tasks]
+        with _worker_errors():
+            return [done.result() for done in waiting]
 
     def solve(self, states: Sequence[State]) -> Iterator[tuple[int, Array]]:
         """Number of each state as it is done, and the anchors (jobs, p, 3) in mm that all jobs move there.

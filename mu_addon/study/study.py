@@ -34,7 +34,7 @@ from .ending import Ending
 from .job import HEADER, Job
 from .progress import Progress
 from .results import LatticeSearch
-from .sweeping import Sweep
+from .sweeping import PATH_DIFFERENCE_MM, Sweep
 from .vtk_out import write_mesh, write_trajectory
 
 Array = np.ndarray[Any, Any]
@@ -291,7 +291,7 @@ class Study:
         assert self.trajectory is not None
         jobs = self._jobs()
         with self.progress.stage("candidates"):
-            found = self.sweep(self.mesh, self.trajectory, jobs, self._ahead)
+            found = self.sweep(self.mesh, self.trajectory, jobs, self._ahead, verify=True)
         self.evaluations = {(e.name, e.rule): e for e in found}
         every = candidates(self.anchors, self.windows)
         chosen = self._write_ranking(every)
@@ -309,14 +309,21 @@ class Study:
         trajectory: Trajectory,
         jobs: list[tuple[Candidate, str]],
         under_way: Sweep | None = None,
+        verify: bool = False,
     ) -> list[Evaluation]:
         """Evaluation of every (candidate, rule) on a mesh against its Model A; see `sweeping`."""
         sweep = under_way or Sweep(self.job, self.cache, mesh, jobs, trajectory.pressure_kPa)
         with closing(sweep):
-            found = sweep.evaluations(trajectory, self.progress.update)
+            found = sweep.evaluations(trajectory, self.progress.update, verify)
+        if sweep.path_difference_mm > PATH_DIFFERENCE_MM:
+            self.warn(
+                "A candidate started from Model A's states was not where its own path from rest leads "
+                f"({sweep.path_difference_mm:.2g} mm apart), so every candidate was solved along its path."
+            )
         self.ending.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = {
             "pressures_solved_kPa": sweep.solved_kPa,
             "relative_error_between": sweep.error,
+            "path_difference_mm": sweep.path_difference_mm,
         }
         return found
 

@@ -24,6 +24,8 @@ Array = np.ndarray[Any, Any]
 
 # Pressures between those solved are interpolated where that changes no path's mean deviation by more.
 SAMPLING_ERROR = 0.02
+# A candidate along its whole path from rest and one that started from Model A's state agree to this.
+PATH_DIFFERENCE_MM = 1e-5
 
 
 class Sweep:
@@ -59,6 +61,7 @@ class Sweep:
         self._certain = {float(distinct[i]) for pair in rounds(distinct)[:2] for i in pair}
         self.solved_kPa: list[float] = []
         self.error = 0.0
+        self.path_difference_mm = 0.0
 
     def _name(self, state: State) -> str:
         return key(self._key, state.pressure_MPa)
@@ -69,8 +72,14 @@ class Sweep:
         if wanted and not self._cache.path("sweep", self._name(state)).exists():
             self._sweeper.submit(state)
 
-    def evaluations(self, trajectory: Trajectory, on_progress: Callable[[float], None]) -> list[Evaluation]:
-        """Evaluation of every job against Model A's whole trajectory. Raises ConvergenceError."""
+    def evaluations(
+        self, trajectory: Trajectory, on_progress: Callable[[float], None], verify: bool = False
+    ) -> list[Evaluation]:
+        """Evaluation of every job against Model A's whole trajectory. Raises ConvergenceError.
+
+        verify: whether one of them is also followed along its whole path from rest, and all of them should
+        that lead elsewhere.
+        """
         distinct = np.array([s.pressure_MPa for s in trajectory.states])
         loaded = np.count_nonzero(distinct)
         weight = np.bincount(trajectory.index, minlength=len(distinct))
@@ -88,6 +97,8 @@ class Sweep:
                 self.error = estimate(full, sparse, weight)
             if self.error <= SAMPLING_ERROR:
                 break
+        if verify and known and not self._independent_of_path(distinct, known, still):
+            known = self._along_paths(distinct, still)
         self.solved_kPa = sorted(float(distinct[n]) * 1e3 for n in known)
         difference = between(distinct, known) if known else np.zeros((len(distinct), len(self._jobs), 1, 3))
         baseline = trajectory.of_time(still)
@@ -96,6 +107,39 @@ class Sweep:
             evaluation(self._mesh, candidate, rule, self._radius, moved[:, i], baseline, self._job.stations)
             for i, (candidate, rule) in enumerate(self._jobs)
         ]
+
+    def _independent_of_path(self, distinct: Array, known: dict[int, Array], still: Array) -> bool:
+        """Whether the job that deviates most is, where it does, what its whole path from rest leads to.
+
+        An elastic body without limit points has one state a pressure, and candidates may start from Model
+        A's. Should this one have another, all are solved along their paths.
+        """
+        kept = self._cache.get("path", self._key)
+        if kept is not None:
+            self.path_difference_mm = float(kept["difference_mm"])
+            return self.path_difference_mm <= PATH_DIFFERENCE_MM
+        numbers = list(known)
+        size = np.array([np.linalg.norm(known[n], axis=2).max(axis=1) for n in numbers])
+        state, job = np.unravel_index(size.argmax(), size.shape)
+        number = numbers[int(state)]
+        way = _outward(distinct, distinct[number])
+        (moved,) = self._sweeper.alone([(int(job), distinct[way])])
+        self.path_difference_mm = float(np.abs(moved[-1] - still[number] - known[number][job]).max())
+        self._cache.put("path", self._key, {"difference_mm": self.path_difference_mm})
+        return self.path_difference_mm <= PATH_DIFFERENCE_MM
+
+    def _along_paths(self, distinct: Array, still: Array) -> dict[int, Array]:
+        """Differences (jobs, p, 3) in mm at every loaded pressure, each job along its whole path."""
+        sides = [_outward(distinct, p) for p in (distinct.min(), distinct.max())]
+        sides = [side for side in sides if len(side)]
+        tasks = [(job, distinct[side]) for job in range(len(self._jobs)) for side in sides]
+        moved = iter(self._sweeper.alone(tasks))
+        known = {int(n): np.zeros((len(self._jobs), *still.shape[1:])) for side in sides for n in side}
+        for job in range(len(self._jobs)):
+            for side in sides:
+                for n, points in zip(side.tolist(), next(moved), strict=True):
+                    known[n][job] = points - still[n]
+        return known
 
     def _solved(self, trajectory: Trajectory, numbers: list[int]) -> Iterator[tuple[int, Array]]:
         """Number of each of some states and the anchors moved by every job, from the cache where there."""
@@ -114,3 +158,10 @@ class Sweep:
     def close(self) -> None:
         """End the processes."""
         self._sweeper.close()
+
+
+def _outward(distinct: Array, target: float) -> Array:
+    """Numbers of the pressures (s,) from 0, without it, to a target on one side of it, in that order."""
+    between = (distinct * np.sign(target) > 0) & (np.abs(distinct) <= np.abs(target) * (1 + 1e-12))
+    numbers = np.flatnonzero(between)
+    return numbers[np.argsort(np.abs(distinct[numbers]))]
