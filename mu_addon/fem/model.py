@@ -105,8 +105,8 @@ class Model:
         self.device = device
         self.threads = threads
         self.mean_dilatation = mean_dilatation
-        # Or "two levels" (iterative.TwoLevel): for quadratic meshes whose factor takes too much time or
-        # memory, from about 400k unknowns on (docs/performance.md).
+        # Or "two levels" (iterative.TwoLevel): for quadratic meshes whose factor does not fit into memory; up
+        # to 436k unknowns a load step is faster with the factor (docs/performance.md).
         self.solver = "factorisation" if device == "cpu" else "conjugate gradients"
         self.load: Array | None = None
         self._least_force = 0.0
