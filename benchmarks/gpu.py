@@ -22,9 +22,8 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.fem.descent import NewtonSettings
 from mu_addon.fem.equilibrium import Equilibrium, rest
 from mu_addon.fem.kinematics import bending_angle_deg, probe
-from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.meshing.mesh import LATTICE
+from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.candidates import candidates, roi
@@ -78,11 +77,7 @@ class Clock:
 
 def run(unit, mesh, device, pressure_kPa, quiet=False):
     """Model A to a pressure in equal steps, then the ten candidates at each of its states."""
-    m, lattice = unit.material, mesh.region == LATTICE
-    materials = Materials.neo_hooke(
-        np.where(lattice, m.lattice_modulus_kPa, m.membrane_modulus_kPa) / 1e3,
-        np.where(lattice, m.lattice_poisson, m.membrane_poisson),
-    )
+    materials = materials_of(unit, mesh)
     clock = Clock(device, quiet)
     model = Model(mesh, device=device)
     # On a CUDA device it is so from the start.

@@ -17,9 +17,8 @@ from scipy import sparse
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.factor import Cholesky, SuperLU
-from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.meshing.mesh import LATTICE
+from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 
@@ -29,11 +28,7 @@ def system(refine):
     unit = load_preset("mu-1.0x")
     mesh = mesh_unit(unit, MeshSettings(refine=refine))
     model = Model(mesh)
-    m = unit.material
-    lattice = mesh.region == LATTICE
-    modulus = np.where(lattice, m.lattice_modulus_kPa, m.membrane_modulus_kPa) / 1e3
-    poisson = np.where(lattice, m.lattice_poisson, m.membrane_poisson)
-    parameters = model.parameters(Materials.neo_hooke(modulus, poisson))
+    parameters = model.parameters(materials_of(unit, mesh))
     return model, model.tangent(np.zeros_like(mesh.nodes), 1e-3, parameters)
 
 

@@ -9,23 +9,13 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..meshing.mesh import TET_EDGES, Mesh, boundary_faces, mirror
+from ..meshing.mesh import TET_EDGES, Mesh, boundary_faces, mirror, mirror_displacement
 from .equilibrium import State
 
 Array = np.ndarray[Any, Any]
 
 # A segment in a triangle's plane, to rounding: this share of a box of their edges.
 _FLAT = 1e-9
-
-
-def _mirrored(mesh: Mesh, u: Array, axis: str) -> Array:
-    """Displacement of `mirror(mesh, axis)`, of a displacement (n, 3) of the mesh."""
-    column = "xyz".index(axis)
-    off = np.ones(len(mesh.nodes), bool)
-    off[mesh.symmetry_nodes(axis)] = False
-    image = u[off].copy()
-    image[:, column] *= -1
-    return np.vstack([u, image])
 
 
 def _facets(faces: Array) -> Array:
@@ -124,7 +114,7 @@ class _Boundary:
         """See the module's `crossings`."""
         mesh = self._part
         for axis in mesh.symmetry:
-            u = _mirrored(mesh, u, axis)
+            u = mirror_displacement(mesh, u, axis)
             mesh = mirror(mesh, axis)
         corners = (self._rest + u)[self.facets]
         pairs = self._near(corners)

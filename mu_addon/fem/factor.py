@@ -42,12 +42,20 @@ class Cholesky:
         n = len(indptr) - 1
         columns = np.repeat(np.arange(n), np.diff(indptr))
         cholmod.options["supernodal"] = 2
-        # Only the order given, not the best of several.
-        cholmod.options["nmethods"] = 1
         self._matrix = spmatrix(1.0, matrix(indices.astype(np.int64)), matrix(columns), (n, n))
         self._order = matrix(order.astype(np.int64))
-        self._factor = cholmod.symbolic(self._matrix, p=self._order)
+        self._analyse()
         self.size = n
+
+    def _analyse(self) -> None:
+        from cvxopt import cholmod
+
+        # Only the order given, not the best of several; the options are the whole process's.
+        cholmod.options["nmethods"] = 1
+        try:
+            self._factor = cholmod.symbolic(self._matrix, p=self._order)
+        finally:
+            del cholmod.options["nmethods"]
 
     def factor(self, values: Array) -> Cholesky:
         """Factorise for the values (nnz,) of the lower triangle by columns. Raises IndefiniteError."""
@@ -79,7 +87,7 @@ class Cholesky:
         columns = cholmod.getfactor(self._factor).CCS
         indptr, indices, values = (np.asarray(memoryview(a)).ravel() for a in columns)
         # What it leaves behind would be factorised column by column, without dense blocks.
-        self._factor = cholmod.symbolic(self._matrix, p=self._order)
+        self._analyse()
         return Lower(order, indptr, indices.astype(np.int32), values)
 
 

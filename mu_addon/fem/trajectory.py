@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import attrs
 import numpy as np
 
-from ..errors import ConvergenceError
-from .equilibrium import Equilibrium, State, extrapolate, rest
+from .equilibrium import Equilibrium, State, rest
 
 Array = np.ndarray[Any, Any]
 
@@ -67,43 +66,6 @@ def simulate(
             if on_state:
                 on_state(state)
     return _assemble(time_s, pressure_kPa, distinct, found)
-
-
-def simulate_near(
-    equilibrium: Equilibrium,
-    baseline: Trajectory,
-    on_state: Callable[[State], None] | None = None,
-) -> Trajectory:
-    """The same protocol for a slightly different body, each state started near the baseline's.
-
-    The start is the baseline's displacement plus the extrapolated difference, so that whole load steps
-    are taken at once; where that fails the pressure is approached by `Equilibrium.path` instead.
-    """
-    distinct, sides = branches(baseline.pressure_kPa)
-    origin = rest(equilibrium.model.mesh)
-    known = {0.0: origin, **dict(zip(distinct, baseline.states, strict=True))}
-    found = {0.0: origin}
-    for side in sides:
-        history: list[State] = [origin]
-        for pressure in side:
-            near = known[pressure]
-            guess = near.u + _extrapolate_difference(history, known, near.pressure_MPa)
-            try:
-                expected = equilibrium.settings.surprise * np.abs(guess - history[-1].u).max()
-                state = equilibrium.newton(guess, near.pressure_MPa, expected)
-            except ConvergenceError:
-                state = equilibrium.reach(near.pressure_MPa, history)
-            found[pressure] = state
-            history.append(state)
-            if on_state:
-                on_state(state)
-    return _assemble(baseline.time_s, baseline.pressure_kPa, distinct, found)
-
-
-def _extrapolate_difference(history: Sequence[State], known: dict[float, State], pressure: float) -> Array:
-    near = {state.pressure_MPa: state for state in known.values()}
-    difference = [attrs.evolve(s, u=s.u - near[s.pressure_MPa].u) for s in history[-3:]]
-    return extrapolate(difference, pressure)
 
 
 def _assemble(time_s: Array, pressure_kPa: Array, distinct: Array, found: dict[float, State]) -> Trajectory:

@@ -116,6 +116,15 @@ def mirror(mesh: Mesh, axis: str) -> Mesh:
     )
 
 
+def mirror_displacement(mesh: Mesh, u: Array, axis: str) -> Array:
+    """Displacement of `mirror(mesh, axis)`, of a symmetric displacement (n, 3) of the mesh."""
+    off = np.ones(len(mesh.nodes), bool)
+    off[mesh.symmetry_nodes(axis)] = False
+    image = u[off].copy()
+    image[:, AXES.index(axis)] *= -1
+    return np.vstack([u, image])
+
+
 def oriented(nodes: Array, tets: Array) -> Array:
     """Linear tets (m, 4) with those of negative volume turned positive."""
     volume = np.linalg.det(nodes[tets[:, 1:]] - nodes[tets[:, :1]])

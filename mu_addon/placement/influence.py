@@ -17,6 +17,7 @@ from ..fem.model import Model
 from ..fem.trajectory import Trajectory
 from ..meshing.mesh import Mesh
 from .deviation import centreline
+from .sampling import polynomials
 
 Array = np.ndarray[Any, Any]
 
@@ -84,15 +85,6 @@ def telling_pressures(trajectory: Trajectory) -> Array:
     low, high = pressures.min(), pressures.max()
     middle = pressures[np.argmin(np.abs(pressures - (low + 2 * high) / 3))]
     return np.unique([low, middle, high])
-
-
-def polynomials(known: Array, wanted: Array) -> Array:
-    """Weights (t, s) of values known at s pressures, and 0 at none, in their polynomial at t others."""
-    weights = np.empty((len(wanted), len(known)))
-    for i, here in enumerate(known):
-        others = np.append(0.0, np.delete(known, i))
-        weights[:, i] = np.prod((np.asarray(wanted)[:, None] - others) / (here - others), axis=1)
-    return weights
 
 
 @attrs.frozen(eq=False)

@@ -29,7 +29,8 @@ from ..fem.triangular import Triangular
 from ..meshing.mesh import LATTICE, Mesh
 from .graph import Graph
 from .inclusion import Inclusion, inclusion, sensor_share
-from .influence import Parity, loaded, parities, polynomials, probe_loads, telling_pressures
+from .influence import Parity, loaded, parities, probe_loads, telling_pressures
+from .sampling import polynomials
 
 Array = np.ndarray[Any, Any]
 

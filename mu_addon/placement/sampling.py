@@ -26,18 +26,24 @@ def rounds(pressure: Array) -> list[list[int]]:
     return [order[i : i + 2] for i in range(0, len(order), 2)]
 
 
+def polynomials(known: Array, wanted: Array) -> Array:
+    """Weights (t, s) of values known at s pressures, and 0 at none, in their polynomial at t others."""
+    weights = np.empty((len(wanted), len(known)))
+    for i, here in enumerate(known):
+        others = np.append(0.0, np.delete(known, i))
+        weights[:, i] = np.prod((np.asarray(wanted)[:, None] - others) / (here - others), axis=1)
+    return weights
+
+
 def between(pressure: Array, known: Mapping[int, Array]) -> Array:
     """Differences (s, ...) at all pressures (s,) of those known at some, by number.
 
     The polynomial through them and through 0 at 0 pressure; what is known stays as it is.
     """
-    from scipy.interpolate import BarycentricInterpolator
-
     pressure = np.asarray(pressure, float)
     numbers = [i for i in known if pressure[i]]
-    shape = next(iter(known.values())).shape
-    values = np.array([known[i] for i in numbers] + [np.zeros(shape)])
-    found: Array = BarycentricInterpolator(np.append(pressure[numbers], 0.0), values)(pressure)
+    values = np.array([known[i] for i in numbers])
+    found: Array = np.tensordot(polynomials(pressure[numbers], pressure), values, axes=1)
     for i, value in known.items():
         found[i] = value
     return found

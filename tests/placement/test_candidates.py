@@ -10,10 +10,10 @@ from mu_addon.design.anchors import anchors, windows
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg, probe
-from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.trajectory import simulate
-from mu_addon.meshing.mesh import LATTICE, mirror
+from mu_addon.fem.unit import materials_of
+from mu_addon.meshing.mesh import mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.candidates import candidates, evaluate, evaluation, moved_points, roi
@@ -26,12 +26,7 @@ PRESSURES = np.array([0.0, -10.0, 0.0, 20.0])
 
 
 def materials(mesh):
-    lattice = mesh.region == LATTICE
-    m = UNIT.material
-    return Materials.neo_hooke(
-        np.where(lattice, m.lattice_modulus_kPa, m.membrane_modulus_kPa) / 1e3,
-        np.where(lattice, m.lattice_poisson, m.membrane_poisson),
-    )
+    return materials_of(UNIT, mesh)
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,9 @@ from mu_addon.design.anchors import anchors, windows
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg
-from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.trajectory import simulate
-from mu_addon.meshing.mesh import LATTICE
+from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.quality import element_volumes
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
@@ -30,13 +29,8 @@ def meshes():
 def test_the_default_mesh_is_within_three_percent_of_the_finest(meshes):
     """Tip angle at -20, 20 and 40 kPa on three refinements; the default is the middle one."""
     found = []
-    m = UNIT.material
     for mesh in meshes:
-        lattice = mesh.region == LATTICE
-        materials = Materials.neo_hooke(
-            np.where(lattice, m.lattice_modulus_kPa, m.membrane_modulus_kPa) / 1e3,
-            np.where(lattice, m.lattice_poisson, m.membrane_poisson),
-        )
+        materials = materials_of(UNIT, mesh)
         pressure = np.array([0.0, -10, -20, 0, 10, 20, 30, 40])
         path = simulate(Equilibrium(Model(mesh), materials), np.arange(8.0), pressure)
         angle = {round(s.pressure_MPa * 1e3): bending_angle_deg(mesh, s.u) for s in path.states}

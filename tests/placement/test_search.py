@@ -10,9 +10,9 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import probe
-from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.trajectory import simulate
+from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.mesh import LATTICE, mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
@@ -42,12 +42,7 @@ EVERY = [c for c in GRAPH.chains(Limits(1.7, 2.0)) if len(c) == 3]
 
 
 def materials(mesh):
-    m = UNIT.material
-    lattice = mesh.region == LATTICE
-    return Materials.neo_hooke(
-        np.where(lattice, m.lattice_modulus_kPa, m.membrane_modulus_kPa) / 1e3,
-        np.where(lattice, m.lattice_poisson, m.membrane_poisson),
-    )
+    return materials_of(UNIT, mesh)
 
 
 @pytest.fixture(scope="module")
