@@ -5,9 +5,7 @@ It answers first (which path), then shows why, and ends with what the answer res
 
 from __future__ import annotations
 
-import re
-from base64 import b64encode
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path as File
 from typing import Any
@@ -17,9 +15,10 @@ import numpy as np
 
 from ..files import write_text
 from . import plots
-from .plots import label, signed
+from .page import cards, facts_table, figure, note, number, page, picture_figure, table
+from .plots import label
 from .progress import spell
-from .results import Picture, ReportData, RuleResult
+from .results import ReportData, RuleResult
 
 RULE = {
     "volume_fraction": "volume fraction",
@@ -40,24 +39,7 @@ def report_html(results: ReportData) -> str:
     """The whole report as HTML text; the headline's rule comes before any other."""
     first = sorted(results.rules.items(), key=lambda item: item[0] != results.headline_rule)
     results = attrs.evolve(results, rules=dict(first))
-    css = (File(__file__).parent / "report.css").read_text(encoding="utf-8")
-    sections = [section for section in _sections(results) if section[2]]
-    contents = "".join(f'<li><a href="#{key}">{escape(title)}</a></li>' for key, title, _ in sections)
-    body = "".join(
-        f'<section id="{key}" aria-labelledby="{key}-title">'
-        f'<h2 id="{key}-title">{escape(title)}</h2>{html}</section>'
-        for key, title, html in sections
-    )
-    return (
-        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        # A browser asks a server for an icon unless the page brings one.
-        '<link rel="icon" href="data:,">\n'
-        f"<title>{escape(results.title)}</title>\n<style>\n{css}</style>\n</head>\n<body>\n"
-        f'<header><h1>{escape(results.title)}</h1><p class="sub">{escape(results.unit)}</p>'
-        f"{_notes(results)}</header>\n<main>\n{_answer(results)}"
-        f'<nav aria-label="Contents"><ul>{contents}</ul></nav>\n{body}</main>\n</body>\n</html>\n'
-    )
+    return page(results.title, results.unit, _notes(results), _answer(results), _sections(results))
 
 
 def _sections(r: ReportData) -> list[tuple[str, str, str]]:
@@ -71,8 +53,8 @@ def _sections(r: ReportData) -> list[tuple[str, str, str]]:
         ("assumed", "What was assumed", _assumed(r)),
         ("parameters", "All parameters", _parameters(r)),
         ("time", "How long each stage took", _time(r)),
-        ("files", "Files of this run", _facts_table("file", "what it holds", r.files)),
-        ("versions", "Versions", _facts_table("program", "version", r.versions)),
+        ("files", "Files of this run", facts_table("file", "what it holds", r.files)),
+        ("versions", "Versions", facts_table("program", "version", r.versions)),
     ]
 
 
@@ -84,11 +66,7 @@ def _notes(r: ReportData) -> str:
             f"{escape(r.reason or 'It stopped before its end.')}</p>"
             "<p>What is shown was finished before it stopped; the rest is missing, not zero.</p></div>"
         )
-    if r.warnings:
-        html += (
-            '<div class="note">' + "".join(f"<p>{escape(warning)}</p>" for warning in r.warnings) + "</div>"
-        )
-    return html
+    return html + note(r.warnings)
 
 
 def _answer(r: ReportData) -> str:
@@ -102,12 +80,12 @@ def _answer(r: ReportData) -> str:
             f"{path.anchors}: of {len(r.paths)} candidates it disturbs the motion least, by "
             f"{rule.j_hat[best]:.3f}&nbsp;mm on average.</p><p>{_caveat(r, rule)}</p>{_key_figures(r, rule)}"
         )
-    pictures = "".join(_picture(picture) for picture in r.pictures[:1])
+    pictures = "".join(picture_figure(picture) for picture in r.pictures[:1])
     if r.view is None:
         return html + pictures
     chosen = rule.chosen if rule is not None else ""
     sensor = f" and the sensor along {_name(chosen)}" if chosen else ""
-    section = _figure(
+    section = figure(
         plots.unit_with_paths(r.view, r.paths, chosen, rule.j_hat if rule is not None else None),
         "Left: the unit cut open along its sagittal plane, inlet below, with anchors P1 to "
         f"P{len(r.view.anchors)}{sensor}. Right: every candidate path at its true height"
@@ -150,8 +128,7 @@ def _key_figures(r: ReportData, rule: RuleResult) -> str:
         low, high = int(np.argmin(r.pressure_kPa)), int(np.argmax(r.pressure_kPa))
         for i in (low, high):
             facts.append((f"bends at {r.pressure_kPa[i]:g} kPa", f"{r.angle_deg[i]:.1f}°"))
-    cards = "".join(f"<div><dt>{signed(what)}</dt><dd>{signed(value)}</dd></div>" for what, value in facts)
-    return f'<dl class="facts">{cards}</dl>'
+    return cards(facts)
 
 
 def _ranking(r: ReportData) -> str:
@@ -172,7 +149,7 @@ def _ranking(r: ReportData) -> str:
         )
         html += (
             f"<div><h3>Rule “{title}”</h3><p>{escape(RULE_MEANS.get(name, ''))}.</p>"
-            + _figure(
+            + figure(
                 plots.ranking(rule, r.paths),
                 f"Mean deviation of every path, best first.{tied}{bars}",
                 f"Bar chart of the mean deviation by the rule {title}; {rule.chosen} is best.",
@@ -201,7 +178,7 @@ def _ranking(r: ReportData) -> str:
         "Every path by every rule. J cont: root mean square instead of mean. Volume ratio: what was "
         "stiffened over the sensor's own volume."
     )
-    html += _table(caption, head, rows, groups)
+    html += table(caption, head, rows, groups)
     return html
 
 
@@ -219,7 +196,7 @@ def _search(r: ReportData) -> str:
         "as best for their length are beaten by no longer one.</p>"
     )
     if r.search_picture is not None:
-        html += f'<div class="triple">{_picture(r.search_picture)}</div>'
+        html += f'<div class="triple">{picture_figure(r.search_picture)}</div>'
     head = [
         ("path", ""), ("length [mm]", "n"), ("Ĵ [mm]", "n"), ("predicted [mm]", "n"),
         ("best for its length", ""), ("nodes (x y z) [mm]", ""),
@@ -238,27 +215,29 @@ def _search(r: ReportData) -> str:
         )
         for i, p in enumerate(s.solved)
     ]
-    return html + _table("Paths that were solved", head, rows)
+    return html + table("Paths that were solved", head, rows)
 
 
 def _motion(r: ReportData) -> str:
     html = ""
     if len(r.angle_deg):
         low, high = float(r.pressure_kPa.min()), float(r.pressure_kPa.max())
-        html += _figure(
+        html += figure(
             plots.angle_against_pressure(r.pressure_kPa, r.angle_deg),
             "Bending angle of the tip against the base, without a sensor; each dot is a converged state.",
             f"Bending angle against pressure from {low:g} to {high:g} kPa.",
         )
     if len(r.protocol_s):
-        html += _figure(
+        html += figure(
             plots.protocol(r.protocol_s, r.protocol_kPa),
             "The pressure cycle; each dot is a time at which the paths are compared.",
             "Pressure against time.",
         )
     html = f'<div class="pair">{html}</div>' if html else ""
     if r.pictures[1:]:
-        html += '<div class="triple">' + "".join(_picture(picture) for picture in r.pictures[1:]) + "</div>"
+        html += (
+            '<div class="triple">' + "".join(picture_figure(picture) for picture in r.pictures[1:]) + "</div>"
+        )
     return html
 
 
@@ -267,7 +246,7 @@ def _heatmaps(r: ReportData) -> str:
     for name, rule in r.rules.items():
         top = float(np.max(rule.delta))
         maps = "".join(
-            _figure(
+            figure(
                 plots.heatmap(rule.delta[i], top, path.name == rule.chosen),
                 f"{_name(path.name)}: {rule.j_hat[i]:.3f} mm",
                 f"Deviation of {path.name} over length and time, at most {np.max(rule.delta[i]):.2f} mm.",
@@ -275,7 +254,7 @@ def _heatmaps(r: ReportData) -> str:
             )
             for i, path in enumerate(r.paths)
         )
-        bar = _figure(plots.color_bar(top), "", f"Colour scale from 0 to {top:.2f} mm.", "bar")
+        bar = figure(plots.color_bar(top), "", f"Colour scale from 0 to {top:.2f} mm.", "bar")
         html += f"<h3>Rule “{_rule(name)}”</h3>{bar}<div class='many'>{maps}</div>"
     if not html:
         return ""
@@ -294,7 +273,7 @@ def _marginals(r: ReportData) -> str:
             (rule.delta.mean(axis=1), "length", "time"),
             (rule.delta.mean(axis=2), "time", "length"),
         ):
-            html += _figure(
+            html += figure(
                 plots.marginal(values, r.paths, rule.chosen, along),
                 f"Deviation along the {along}, averaged over {averaged}."
                 if along == "length"
@@ -315,25 +294,25 @@ def _mesh(r: ReportData) -> str:
     if r.gates:
         head = [("check", "text"), ("found", "n"), ("asked", "ask"), ("result", "")]
         rows = [
-            ([gate.name, _number(gate.value), gate.limit, "passed" if gate.passed else "FAILED"], False)
+            ([gate.name, number(gate.value), gate.limit, "passed" if gate.passed else "FAILED"], False)
             for gate in r.gates
         ]
-        html += _table(
+        html += table(
             "The printable solid, checked after it was read back from its file.", head, rows, css="stack"
         )
     if r.mesh:
-        html += _facts_table("mesh", "", r.mesh)
+        html += facts_table("mesh", "", r.mesh)
     if r.solver:
-        html += _facts_table("solver", "", r.solver)
+        html += facts_table("solver", "", r.solver)
     return html
 
 
 def _assumed(r: ReportData) -> str:
-    rows = [([p.path, _number(p.value), p.unit, p.source], False) for p in r.parameters if p.assumed]
+    rows = [([p.path, number(p.value), p.unit, p.source], False) for p in r.parameters if p.assumed]
     if not rows:
         return ""
     head = [("parameter", ""), ("value", "n"), ("unit", ""), ("why", "text")]
-    return "<p>The source paper does not print these. The answer rests on them.</p>" + _table(
+    return "<p>The source paper does not print these. The answer rests on them.</p>" + table(
         "", head, rows, css="stack"
     )
 
@@ -343,85 +322,21 @@ def _parameters(r: ReportData) -> str:
         return ""
     head = [("parameter", ""), ("value", "n"), ("unit", ""), ("source", "text")]
     rows = [
-        ([p.path, _number(p.value), p.unit, "assumed" if p.assumed else p.source], False)
-        for p in r.parameters
+        ([p.path, number(p.value), p.unit, "assumed" if p.assumed else p.source], False) for p in r.parameters
     ]
-    return _table("", head, rows, css="stack")
+    return table("", head, rows, css="stack")
 
 
 def _time(r: ReportData) -> str:
     if not r.seconds:
         return ""
     whole = sum(r.seconds.values())
-    return _figure(
+    return figure(
         plots.seconds(r.seconds),
         f"Seconds a stage; {spell(whole)} in all.",
         "Bar chart of seconds a stage.",
         "chart",
     )
-
-
-def _facts_table(left: str, right: str, facts: Mapping[str, Any]) -> str:
-    if not facts:
-        return ""
-    head = [(left, ""), (right, "" if right else "n")]
-    return _table("", head, [([key, _number(value)], False) for key, value in facts.items()])
-
-
-def _table(
-    caption: str,
-    head: Sequence[tuple[str, str]],
-    rows: Iterable[tuple[Sequence[Any], bool]],
-    groups: Sequence[tuple[str, int]] = (),
-    css: str = "",
-) -> str:
-    """A table that scrolls sideways by itself; `head` gives each column its title and class.
-
-    `groups` are titles over so many columns each; `css` "stack" folds each row up on a phone.
-    """
-
-    def cell(tag: str, text: Any, kind: str, scope: str = "") -> str:
-        kind = "fail" if text == "FAILED" else kind
-        kind = f' class="{kind}"' if kind else ""
-        return f"<{tag}{scope}{kind}>{escape(str(text))}</{tag}>"
-
-    top = "".join(cell("th", title, kind, " scope=col") for title, kind in head)
-    top = f"<tr>{top}</tr>"
-    if groups:
-        above = "".join(
-            cell("th", title, "group" if title else "", f" colspan={span} scope=colgroup")
-            for title, span in groups
-        )
-        top = f"<tr>{above}</tr>{top}"
-    body = ""
-    for cells, best in rows:
-        first = cell("th", cells[0], head[0][1], " scope=row")
-        rest = "".join(cell("td", text, kind) for text, (_, kind) in zip(cells[1:], head[1:], strict=True))
-        body += f"<tr{' class=best' if best else ''}>{first}{rest}</tr>"
-    words = f'<p class="caption">{escape(caption)}</p>' if caption else ""
-    name = escape(caption or head[0][0], quote=True)
-    css = f' class="{css}"' if css else ""
-    return (
-        f'{words}<div class="scroll" role="region" tabindex="0" aria-label="{name}"><table{css}>'
-        f"<thead>{top}</thead><tbody>{body}</tbody></table></div>"
-    )
-
-
-def _figure(svg: str, caption: str, alt: str, kind: str = "") -> str:
-    """A chart; `caption` is HTML."""
-    return _image("image/svg+xml", svg.encode(), caption, alt, kind)
-
-
-def _picture(picture: Picture) -> str:
-    caption = re.sub(r"\balpha\d+\b", lambda name: label(name[0]), signed(picture.caption))
-    return _image("image/png", picture.png, escape(caption), picture.alt, "")
-
-
-def _image(kind: str, data: bytes, caption: str, alt: str, css: str) -> str:
-    source = f"data:{kind};base64,{b64encode(data).decode()}"
-    words = f"<figcaption>{caption}</figcaption>" if caption else ""
-    css = f' class="{css}"' if css else ""
-    return f'<figure{css}><img src="{source}" alt="{escape(alt, quote=True)}">{words}</figure>'
 
 
 def _name(path: str) -> str:
@@ -438,14 +353,3 @@ def _index(r: ReportData, name: str) -> int:
 
 def _listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
-
-
-def _number(value: Any) -> str:
-    """Floats to six figures, the rest as it is."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, int | np.integer):
-        return f"{int(value):,}".replace(",", "\u202f")
-    if isinstance(value, float | np.floating):
-        return signed(f"{float(value):.6g}")
-    return str(value)
