@@ -24,6 +24,9 @@ SCRIPTS = {
     "solvers": ["solvers.py"],
     "convergence": ["convergence.py", "angle"],
     "verification": ["verification.py"],
+    "cell": ["cell.py"],
+    "specimen": ["specimen.py", "size"],
+    "moduli": ["moduli.py"],
     "gpu": ["gpu.py"],
 }
 

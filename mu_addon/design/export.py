@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from ..files import write_bytes
 from .anchors import anchors
-from .lattice import body_centred
+from .lattice import lattice_of
 from .parameters import Unit
 from .solid import Solid
 from .surface import stl_bytes
@@ -20,12 +22,15 @@ def write_stl(solid: Solid, path: str | Path) -> None:
 def write_nodes(unit: Unit, path: str | Path) -> None:
     """Write every lattice node as text: `#` header lines, then id, kind and x, y, z in mm, split by spaces.
 
-    The id counts from 0; kind is `centre` or `corner` of a cell, or `P1`, `P2`, ... for the anchors.
+    The id counts from 0; kind is `centre` or `corner` of a cell, `node` for another, or `P1`, `P2`, ... for
+    those that are anchors.
     """
-    lattice = body_centred(unit.dimensions)
-    kinds = ["centre" if centre else "corner" for centre in lattice.is_centre]
+    lattice = lattice_of(unit.dimensions)
+    kinds = np.select([lattice.is_centre, lattice.is_corner], ["centre", "corner"], "node").tolist()
     for number, anchor in enumerate(anchors(unit), 1):
-        kinds[int(abs(lattice.nodes - anchor).sum(axis=1).argmin())] = f"P{number}"
+        gap = abs(lattice.nodes - anchor).sum(axis=1)
+        if gap.min() < 1e-6 * lattice.cell:
+            kinds[int(gap.argmin())] = f"P{number}"
     lines = [
         f"# lattice nodes of {unit.name} at scale {unit.scale:g}",
         f"# {len(kinds)} nodes; kind: centre or corner of a cell, P1 .. P{unit.chambers.count} the anchors",

@@ -1,30 +1,64 @@
-"""The body-centred lattice envelope as nodes and tapered struts."""
+"""The lattice envelope as nodes and struts, cells of one kind side by side."""
 
 from __future__ import annotations
 
-from itertools import product
 from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .lattices import LatticeKind
+
 if TYPE_CHECKING:
     from .parameters import Dimensions
-
-DIRECTIONS = np.array(list(product((-1, 1), repeat=3)))
-"""(8, 3) signs of the half-diagonals from a cell's centre to its corners."""
 
 
 @attrs.frozen(eq=False)
 class Lattice:
-    """Nodes (N, 3) in mm, centres first; struts (E, 2) from centre to corner; radii in mm."""
+    """Nodes (N, 3) in mm and struts (E, 2) between them; radii in mm.
 
-    nodes: NDArray[np.float64]
-    is_centre: NDArray[np.bool_]
+    grid (N, 3) and cells (C, 3), the cells' lower corners, are whole numbers of kind.divisions a cell. Nodes
+    inside a cell come first, cell by cell, then those on the cells' faces and corners.
+    """
+
+    kind: LatticeKind
+    cells: NDArray[np.int64]
+    grid: NDArray[np.int64]
     struts: NDArray[np.int64]
+    cell: float
     junction_radius: float
     midspan_radius: float
+
+    @property
+    def nodes(self) -> NDArray[np.float64]:
+        """Nodes (N, 3) in mm."""
+        return self.grid * (self.cell / self.kind.divisions)
+
+    @property
+    def is_centre(self) -> NDArray[np.bool_]:
+        """Whether a node (N,) is the centre of a cell."""
+        return self._at(self.kind.divisions // 2)
+
+    @property
+    def is_corner(self) -> NDArray[np.bool_]:
+        """Whether a node (N,) is a corner of a cell."""
+        return self._at(0)
+
+    @property
+    def inside(self) -> NDArray[np.bool_]:
+        """Whether a node (N,) lies inside a cell."""
+        return np.asarray(((self.grid - self.cells[0]) % self.kind.divisions != 0).all(axis=1))
+
+    @property
+    def on_face(self) -> NDArray[np.bool_]:
+        """Whether a strut (E,) lies in a face of a cell."""
+        first, second = (self.grid[self.struts[:, k]] for k in (0, 1))
+        level = (first - self.cells[0]) % self.kind.divisions == 0
+        return np.asarray(((first == second) & level).any(axis=1))
+
+    def _at(self, place: int) -> NDArray[np.bool_]:
+        return np.asarray(((self.grid - self.cells[0]) % self.kind.divisions == place).all(axis=1))
 
     @property
     def cycles(self) -> int:
@@ -32,34 +66,56 @@ class Lattice:
         return len(self.struts) - len(self.nodes) + 1
 
     def radius(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Strut radius (mm) at fractions t of its length: narrow at both junctions, widest at mid-span."""
-        swell = np.sin(np.pi * np.asarray(t, dtype=float)) ** 2
-        return self.junction_radius + (self.midspan_radius - self.junction_radius) * swell
+        """Strut radius (mm) at fractions t of its length, as the kind has it."""
+        return self.kind.radius(np.asarray(t, dtype=float), self.junction_radius, self.midspan_radius)
 
 
-def body_centred(d: Dimensions) -> Lattice:
-    """Lattice of all cells of the envelope: centres at (iU, jU, (k + 1/2)U), eight half-diagonals each."""
+def lattice_of(d: Dimensions) -> Lattice:
+    """Lattice of all cells of the envelope, their centres at (iU, jU, (k + 1/2)U)."""
     half_x = d.cells_x // 2
     i, j, k = (
         np.arange(-half_x, half_x + 1),
         np.arange(-d.cells_y_minus, d.cells_y_plus + 1),
         np.arange(d.count),
     )
-    # Twice the node coordinates in cells are integers, so corners shared by cells are found exactly.
-    centres = _grid(2 * i, 2 * j, 2 * k + 1)
-    reach = centres[:, None, :] + DIRECTIONS
-    corners, index = np.unique(reach.reshape(-1, 3)[:, ::-1], axis=0, return_inverse=True)
-    struts = np.stack([np.repeat(np.arange(len(centres)), 8), len(centres) + index.ravel()], axis=1)
+    whole, half = d.kind.divisions, d.kind.divisions // 2
+    cells = grid_points(whole * i - half, whole * j - half, whole * k)
+    return filled(d.kind, cells, d.cell, d.junction_diameter / 2.0, d.midspan_diameter / 2.0)
+
+
+def filled(
+    kind: LatticeKind,
+    cells: NDArray[np.int64],
+    cell: float,
+    junction_radius: float,
+    midspan_radius: float,
+) -> Lattice:
+    """Lattice of cells of `cell` mm, their lower corners (C, 3) in whole numbers of kind.divisions a cell.
+
+    Nodes and struts that cells share are there once.
+    """
+    n, m = len(cells), len(kind.nodes)
+    inside, own = kind.inside, int(np.count_nonzero(kind.inside))
+    # Whole numbers, so nodes shared by cells are found exactly.
+    every = cells[:, None, :] + kind.grid
+    shared, index = np.unique(every[:, ~inside].reshape(-1, 3)[:, ::-1], axis=0, return_inverse=True)
+    number = np.empty((n, m), np.int64)
+    number[:, inside] = np.arange(n * own).reshape(n, own)
+    number[:, ~inside] = n * own + index.reshape(n, m - own)
+    struts = number[:, kind.struts].reshape(-1, 2)
+    _, first = np.unique(np.sort(struts, axis=1), axis=0, return_index=True)
     return Lattice(
-        nodes=np.concatenate([centres, corners[:, ::-1]]) * (d.cell / 2.0),
-        is_centre=np.arange(len(centres) + len(corners)) < len(centres),
-        struts=struts,
-        junction_radius=d.junction_diameter / 2.0,
-        midspan_radius=d.midspan_diameter / 2.0,
+        kind=kind,
+        cells=cells,
+        grid=np.concatenate([every[:, inside].reshape(-1, 3), shared[:, ::-1]]),
+        struts=struts[np.sort(first)],
+        cell=cell,
+        junction_radius=junction_radius,
+        midspan_radius=midspan_radius,
     )
 
 
-def _grid(x: NDArray[np.int64], y: NDArray[np.int64], z: NDArray[np.int64]) -> NDArray[np.int64]:
+def grid_points(x: NDArray[np.int64], y: NDArray[np.int64], z: NDArray[np.int64]) -> NDArray[np.int64]:
     """Points (n, 3) of a grid, x running fastest and z slowest."""
     zz, yy, xx = np.meshgrid(z, y, x, indexing="ij")
     return np.stack([xx.ravel(), yy.ravel(), zz.ravel()], axis=1)

@@ -11,9 +11,10 @@ import attrs
 
 from ..errors import InputError
 from ..files import write_bytes
-from . import rules, toml_text
+from . import lattices, rules, toml_text
 from .assets import asset_root
-from .quantity import PAPER, describe, quantity
+from .printed import as_printed
+from .quantity import PAPER, choice, describe, quantity
 
 FORMAT = 1
 
@@ -98,10 +99,11 @@ class Chambers:
 
 @attrs.frozen
 class Envelope:
-    """The body-centred lattice envelope around the actuator."""
+    """The lattice envelope around the actuator."""
 
     section: ClassVar[str] = "lattice"
 
+    kind: str = choice("body-centred", lattices.names, "kind of lattice cell", PAPER)
     cells_x: int = quantity(
         3,
         "",
@@ -190,6 +192,49 @@ class Waveguide:
 
 
 @attrs.frozen
+class Printing:
+    """How the printed part differs from the drawing; its lengths are the same at every scale."""
+
+    section: ClassVar[str] = "print"
+
+    offset_xy_mm: float = quantity(
+        0.0,
+        "mm",
+        -0.3,
+        0.5,
+        "outward move of every surface in the plane when printed (overcure)",
+        "assumed: the paper prints none; nominal CAD unless a measurement says otherwise",
+        fixed=True,
+    )
+    offset_z_mm: float = quantity(
+        0.0,
+        "mm",
+        -0.3,
+        0.5,
+        "outward move of every surface along the build axis z when printed (overcure)",
+        "assumed: the paper prints none; nominal CAD unless a measurement says otherwise",
+        fixed=True,
+    )
+    skin_depth_mm: float = quantity(
+        0.0,
+        "mm",
+        0.0,
+        5.0,
+        "depth of the more cured skin below every surface",
+        "assumed: the paper prints none; no skin unless a measurement says otherwise",
+        fixed=True,
+    )
+    skin_factor: float = quantity(
+        1.0,
+        "",
+        0.1,
+        20.0,
+        "modulus of the skin over that of the core",
+        "assumed: the paper prints none; no skin unless a measurement says otherwise",
+    )
+
+
+@attrs.frozen
 class Material:
     """Elastic constants of the small-strain limit."""
 
@@ -239,7 +284,7 @@ class Material:
 
 @attrs.frozen
 class Dimensions:
-    """True lengths in mm at scale: U = `cell`, apex and neck radii R and r, arc half-lengths a and b."""
+    """Lengths in mm at scale: U = `cell`, apex and neck radii R and r, arc half-lengths a and b."""
 
     scale: float
     cell: float
@@ -257,6 +302,7 @@ class Dimensions:
     cells_x: int
     cells_y_minus: int
     cells_y_plus: int
+    kind: lattices.LatticeKind
     junction_diameter: float
     midspan_diameter: float
     row: int
@@ -313,14 +359,21 @@ class Unit:
     chambers: Chambers = Chambers()
     lattice: Envelope = Envelope()
     waveguide: Waveguide = Waveguide()
+    print: Printing = Printing()
     material: Material = Material()
 
     def __attrs_post_init__(self) -> None:
         rules.check(self.dimensions, self.lattice.allow_symmetric)
+        rules.check_printed(self.dimensions, self.print.offset_xy_mm, self.print.offset_z_mm)
+
+    @cached_property
+    def printed(self) -> Dimensions:
+        """True lengths in mm at this unit's scale as they are printed, see `as_printed`."""
+        return as_printed(self.dimensions, self.print.offset_xy_mm, self.print.offset_z_mm)
 
     @cached_property
     def dimensions(self) -> Dimensions:
-        """True lengths in mm at this unit's scale."""
+        """Nominal lengths in mm at this unit's scale, those of the files to print."""
         c, t, w, s = self.chambers, self.lattice, self.waveguide, self.scale
         half_pitch = s * c.cell_mm / 2.0
         a = c.bladder_share * half_pitch
@@ -341,6 +394,7 @@ class Unit:
             cells_x=t.cells_x,
             cells_y_minus=t.cells_y_minus,
             cells_y_plus=t.cells_y_plus,
+            kind=lattices.kind(t.kind),
             junction_diameter=s * t.junction_diameter_mm,
             midspan_diameter=s * t.midspan_diameter_mm,
             row=w.row,
@@ -357,7 +411,7 @@ class Unit:
         return hashlib.sha256(to_toml(self, comments=False).encode()).hexdigest()
 
 
-SECTIONS: tuple[type, ...] = (Chambers, Envelope, Waveguide, Material)
+SECTIONS: tuple[type, ...] = (Chambers, Envelope, Waveguide, Printing, Material)
 
 
 class Assumption(NamedTuple):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import attrs
@@ -14,7 +15,10 @@ PAPER = "paper"
 
 
 class Description(NamedTuple):
-    """What one parameter is; bounds are closed, `fixed` marks a length that is the same at every scale."""
+    """What one parameter is; bounds are closed, `fixed` marks a length that is the same at every scale.
+
+    A choice among names has those `choices`, and no bounds.
+    """
 
     name: str
     type: type
@@ -25,6 +29,14 @@ class Description(NamedTuple):
     text: str
     source: str
     fixed: bool
+    choices: tuple[str, ...] = ()
+
+    @property
+    def allowed(self) -> str:
+        """Bounds or choices in words, nothing for a flag."""
+        if self.type is bool:
+            return ""
+        return " or ".join(self.choices) if self.choices else f"{self.low:g} to {self.high:g}"
 
     @property
     def assumed(self) -> bool:
@@ -51,6 +63,21 @@ def quantity(
     )
 
 
+def choice(default: str, names: Callable[[], Sequence[str]], text: str, source: str) -> Any:
+    """attrs field of a parameter that is one of `names()`, asked for whenever a value is checked."""
+    metadata = {
+        "type": str,
+        "unit": "",
+        "low": math.nan,
+        "high": math.nan,
+        "text": text,
+        "source": source,
+        "fixed": False,
+        "names": names,
+    }
+    return attrs.field(default=default, metadata=metadata, validator=_check_choice)
+
+
 def describe(section: type) -> Iterator[Description]:
     """Descriptions of the parameters of an attrs class, in their order."""
     for field in attrs.fields(section):
@@ -66,6 +93,7 @@ def describe(section: type) -> Iterator[Description]:
                 m["text"],
                 m["source"],
                 m["fixed"],
+                tuple(m["names"]()) if "names" in m else (),
             )
 
 
@@ -98,4 +126,19 @@ def _check(instance: Any, field: Any, value: Any) -> None:
             f"{field.name} = {value:g}{unit} is out of bounds",
             where(instance, field.name),
             f"choose a value from {m['low']:g} to {m['high']:g}{unit}",
+        )
+
+
+def _check_choice(instance: Any, field: Any, value: Any) -> None:
+    names = tuple(field.metadata["names"]())
+    if not isinstance(value, str):
+        raise InputError(
+            f"{field.name} = {value!r} is not a name", where(instance, field.name), field.metadata["text"]
+        )
+    if value not in names:
+        close = difflib.get_close_matches(value, names, n=1)
+        raise InputError(
+            f"{field.name} = {value!r} is not known{f'; did you mean {close[0]!r}?' if close else ''}",
+            where(instance, field.name),
+            f"choose one of {', '.join(names)}",
         )

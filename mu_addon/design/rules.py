@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, NoReturn
 
 from ..errors import InputError
+from .printed import as_printed
 
 if TYPE_CHECKING:
     from .parameters import Dimensions
@@ -21,6 +22,60 @@ def check(d: Dimensions, allow_symmetric: bool = False) -> None:
     _ends(d)
     _struts(d)
     _waveguide(d)
+
+
+def check_printed(d: Dimensions, offset_xy: float, offset_z: float) -> None:
+    """Raise InputError where the printer's offsets (mm) erase, fill or close a part of a unit that fits."""
+    broken = _printed_breach(d, offset_xy, offset_z)
+    if broken is None:
+        return
+    rule, what = broken
+    for share in range(100, -1, -1):
+        xy, z = (math.trunc(10.0 * share * offset) / 1000.0 for offset in (offset_xy, offset_z))
+        if _printed_breach(d, xy, z) is None:
+            break
+    _refuse(
+        rule,
+        f"offsets of {offset_xy:g} mm in the plane and {offset_z:g} mm along z {what}",
+        "[print] offset_xy_mm, offset_z_mm",
+        f"offset_xy_mm = {xy:g} with offset_z_mm = {z:g} fits this scale; or thicken or widen that part",
+    )
+
+
+def _printed_breach(d: Dimensions, offset_xy: float, offset_z: float) -> tuple[str, str] | None:
+    """Rule and complaint of the first part that the offsets erase, fill or close."""
+    least, most = min(offset_xy, offset_z), max(offset_xy, offset_z)
+    thinnest = min(d.junction_diameter, d.midspan_diameter)
+    if thinnest + 2.0 * least <= 0.0:
+        return "struts left when printed", f"leave nothing of struts of {thinnest:.4g} mm"
+    for part, thickness in {
+        "walls": d.wall,
+        "end caps": min(d.base_cap, d.tip_cap),
+        "the inlet's walls": d.inlet_wall,
+        "the waveguide": d.waveguide_section - d.well_depth,
+    }.items():
+        if thickness + 2.0 * least <= 0.0:
+            return "walls left when printed", f"leave nothing of {part} of {thickness:.4g} mm"
+    opening = d.kind.opening * d.cell
+    if d.midspan_diameter + 2.0 * most >= opening:
+        return (
+            "open cells when printed",
+            f"fill the cell: struts of {d.midspan_diameter:.4g} mm close openings of {opening:.4g} mm",
+        )
+    if d.inlet_radius <= offset_xy:
+        return "an open inlet when printed", f"close the inlet of {2.0 * d.inlet_radius:.4g} mm"
+    if d.well_width <= 2.0 * offset_z:
+        return "open wells when printed", f"close wells of {d.well_width:.4g} mm"
+    p = as_printed(d, offset_xy, offset_z)
+    if min(p.a, p.b) <= 0.0:
+        return "bladder and neck when printed", "leave no necks between the bladders"
+    if p.inlet_radius >= p.r - p.wall:
+        return "a cavity when printed", f"close the necks, {2.0 * (d.r - d.wall):.4g} mm wide inside"
+    if p.wall >= p.apex_curvature_radius:
+        return "a cavity when printed", "fold the cavity at the apices"
+    if max(p.base_cap, p.tip_cap) >= p.cell / 2.0:
+        return "a cavity when printed", "fill an end chamber up to its apex"
+    return None
 
 
 def _refuse(rule: str, what: str, where: str, remedy: str) -> NoReturn:
@@ -57,6 +112,13 @@ def _sagittal_symmetry(d: Dimensions) -> None:
             "so no column of nodes lies on it and none meets the apices",
             "[lattice] cells_x",
             f"choose an odd count: {d.cells_x - 1} or {d.cells_x + 1}",
+        )
+    if not d.kind.mirrors[0]:
+        _refuse(
+            "bending plane is a mirror plane of the lattice",
+            f"a lattice of kind {d.kind.name!r} is not its own mirror image across x",
+            "[lattice] kind",
+            "choose a kind that is",
         )
 
 
@@ -136,8 +198,7 @@ def _struts(d: Dimensions) -> None:
             "[lattice] midspan_diameter_mm",
             f"choose at least {d.junction_diameter / s:g} mm at mid-span",
         )
-    # Two opposite sides of the rhombus between two centres and two corners lie sqrt(2/3) U apart.
-    opening = math.sqrt(2.0 / 3.0) * d.cell
+    opening = d.kind.opening * d.cell
     if d.midspan_diameter >= opening:
         _refuse(
             "open cells",

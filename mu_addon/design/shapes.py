@@ -39,32 +39,75 @@ def revolved(polygon: Array, n: int) -> Any:
     return CrossSection([polygon * [inscribed(n), 1.0]]).revolve(n)
 
 
-def ball(radius: float, n: int) -> Any:
-    """Ball with about n facets around, mm."""
+def offset_along(normals: Array, offset: ArrayLike) -> Array:
+    """How far (n, 3) the surface moves where its unit normals are (n, 3), for offsets (3,) along x, y, z.
+
+    D^2 n / |D n| with D = diag(offset): the point of the ellipsoid of those half-axes whose normal is n, so
+    that the body grows by that ellipsoid (its Minkowski sum); o n for equal offsets o. A negative offset
+    moves its component inward.
+    """
+    offset = np.asarray(offset, dtype=float)
+    # A normal that should lie in the plane must not pick a side of an ellipsoid without width by roundoff.
+    normals = np.where(np.abs(normals) < 1e-9, 0.0, normals)
+    length = np.linalg.norm(offset * normals, axis=-1, keepdims=True)
+    moved = np.sign(offset) * offset**2 * normals
+    return np.divide(moved, length, out=np.zeros_like(moved), where=length > 0.0)
+
+
+def ball(radius: float, n: int, offset: ArrayLike | None = None) -> Any:
+    """Ball with about n facets around, mm; its surface moved outward by offsets (3,) along x, y and z."""
     from manifold3d import Manifold
 
     unit = Manifold.sphere(1.0, n)
-    return unit.scale([radius * (4.0 / 3.0 * np.pi / unit.volume()) ** (1.0 / 3.0)] * 3)
+    enlarged = (4.0 / 3.0 * np.pi / unit.volume()) ** (1.0 / 3.0)
+    if offset is None:
+        return unit.scale([radius * enlarged] * 3)
+    return unit.warp_batch(lambda normal: enlarged * (radius * normal + offset_along(normal, offset)))
 
 
-def spindle(axis: Array, radii: Array, n: int) -> Any:
-    """Body of n sides along `axis` (3,) from the origin, with evenly spaced radii (m,) in mm."""
+def ring(axis: Array, n: int) -> Array:
+    """Directions (n, 3) square to an axis (3,), evenly around it."""
+    along = axis / np.linalg.norm(axis)
+    # One faces z, so that struts mirrored in a vertical plane have mirrored facets; around upright ones, x.
+    up = np.array([0.0, 0.0, 1.0]) - along[2] * along
+    if np.abs(up).max() < 1e-9:
+        up = np.array([1.0, 0.0, 0.0])
+    up /= np.linalg.norm(up)
+    angle = 2.0 * np.pi * np.arange(n) / n
+    return np.asarray(np.cos(angle)[:, None] * up + np.sin(angle)[:, None] * np.cross(along, up))
+
+
+def spindle(axis: Array, radii: Array, n: int, offset: ArrayLike | None = None) -> Any:
+    """Body of n sides along `axis` (3,) from the origin, with evenly spaced radii (m,) in mm.
+
+    Its sides are moved outward, square to the axis, by offsets (3,) along x, y and z where these are given.
+    """
     from manifold3d import Manifold, Mesh64
 
     along = axis / np.linalg.norm(axis)
-    # One side faces z, so that struts mirrored in a vertical plane have mirrored facets.
-    up = np.array([0.0, 0.0, 1.0]) - along[2] * along
-    up /= np.linalg.norm(up)
-    angle = 2.0 * np.pi * np.arange(n) / n
-    ring = np.cos(angle)[:, None] * up + np.sin(angle)[:, None] * np.cross(along, up)
+    normals = ring(axis, n)
     m = len(radii)
-    stations = np.linspace(0.0, 1.0, m)[:, None, None] * axis + (radii * inscribed(n))[:, None, None] * ring
+    stations = (
+        np.linspace(0.0, 1.0, m)[:, None, None] * axis + (radii * inscribed(n))[:, None, None] * normals
+    )
+    if offset is not None:
+        moved = offset_along(normals, offset)
+        stations += inscribed(n) * (moved - (moved @ along)[:, None] * along)
     vertices = np.concatenate([stations.reshape(-1, 3), np.zeros((1, 3)), axis[None]])
 
     i = np.arange(n)
     j = (i + 1) % n
     lower, upper = np.arange(m - 1)[:, None] * n, np.arange(1, m)[:, None] * n
     sides = [np.stack([lower + i, lower + j, upper + j], 2), np.stack([lower + i, upper + j, upper + i], 2)]
+    if offset is not None:
+        # Sides moved unequally are warped: only if their diagonals are mirror images, too, do mirrored
+        # struts meet in the plane between them and not in slivers beside it.
+        other = (4 * i // n % 2 == 1)[None, :] ^ (2 * np.arange(m - 1) >= m - 1)[:, None]
+        crossed = [
+            np.stack([lower + i, lower + j, upper + i], 2),
+            np.stack([lower + j, upper + j, upper + i], 2),
+        ]
+        sides = [np.where(other[..., None], b, a) for a, b in zip(sides, crossed, strict=True)]
     ends = [
         np.stack([np.full(n, m * n), j, i], 1),
         np.stack([np.full(n, m * n + 1), (m - 1) * n + i, (m - 1) * n + j], 1),

@@ -6,12 +6,13 @@ from typing import Any
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from . import shapes
 from .anchors import Window
 from .gates import Gates, check_solid
-from .lattice import DIRECTIONS, Lattice, body_centred
+from .lattice import Lattice, lattice_of
 from .parameters import Dimensions, Unit
 from .profile import cavity_polygon, cavity_volume, outer_polygon
 from .surface import Triangles, Vertices, bad_edges, weld
@@ -53,7 +54,7 @@ def build_solid(unit: Unit, window: Window | None = None, quality: str = "intera
         raise InputError(f"there is no quality {quality!r}", "quality", f"choose one of {', '.join(QUALITY)}")
     d, facets = unit.dimensions, QUALITY[quality]
     n = facets.around_axis
-    lattice = body_centred(d)
+    lattice = lattice_of(d)
     bare = lattice_solid(d, lattice, facets)
 
     # Every solid first, every cavity last: a cavity cut early leaves coincident faces, bodies of no volume.
@@ -82,24 +83,41 @@ def build_solid(unit: Unit, window: Window | None = None, quality: str = "intera
 
 
 def lattice_solid(d: Dimensions, lattice: Lattice, facets: Facets) -> Any:
-    """Bare lattice as a Manifold: a ball at each node, a tapered strut along each edge, cut to its box."""
+    """Bare lattice as a Manifold: a ball at each node, a strut along each edge, cut to its box."""
     from manifold3d import Manifold, OpType
 
+    kind, step = lattice.kind, d.cell / lattice.kind.divisions
     radii = lattice.radius(np.linspace(0.0, 1.0, facets.along_strut + 1))
-    ball = shapes.ball(lattice.junction_radius, facets.around_strut)
-    struts = [shapes.spindle(sign * d.cell / 2.0, radii, facets.around_strut) for sign in DIRECTIONS]
-    cell = Manifold.batch_boolean([ball, *struts], OpType.Add)
+    ball = shapes.ball(float(radii[0]), facets.around_strut)
 
-    # Layers of cells are equal: uniting one and stacking it is several times faster than uniting every strut.
-    centres, corners = lattice.nodes[lattice.is_centre], lattice.nodes[~lattice.is_centre]
-    layer = [cell.translate(node.tolist()) for node in centres if node[2] < d.cell]
-    layer += [ball.translate(node.tolist()) for node in corners if node[2] < 0.5 * d.cell]
+    def strut(ends: NDArray[np.int64]) -> Any:
+        return shapes.spindle((ends[1] - ends[0]) * step, radii, facets.around_strut)
+
+    def placed(body: Any, at: NDArray[np.int64]) -> Any:
+        return body.translate((at * step).tolist())
+
+    # Cells are equal, and so are layers of them: uniting one and repeating it is several times faster than
+    # uniting every strut. What cells share, the nodes and struts on their faces, is placed once.
+    middle = kind.divisions // 2
+    own = [placed(ball, node - middle) for node in kind.grid[kind.inside]]
+    own += [placed(strut(ends), ends[0] - middle) for ends in kind.grid[kind.struts[~kind.on_face]]]
+    low, up = lattice.cells[0, 2], kind.divisions
+    layer = []
+    if own:
+        cell = Manifold.batch_boolean(own, OpType.Add)
+        layer += [placed(cell, at + middle) for at in lattice.cells if at[2] == low]
+    nodes = lattice.grid[~lattice.inside]
+    faces = lattice.grid[lattice.struts[lattice.on_face]]
+    layer += [placed(ball, node) for node in nodes if node[2] < low + up]
+    layer += [placed(strut(ends), ends[0]) for ends in faces if ends[:, 2].min() < low + up]
     united = Manifold.batch_boolean(layer, OpType.Add)
     united.num_tri()  # manifold3d evaluates late; without this it would unite every strut again
     stack = [united.translate([0.0, 0.0, k * d.cell]) for k in range(d.count)]
-    stack += [ball.translate(node.tolist()) for node in corners if node[2] > d.height - 0.5 * d.cell]
-    low, high = np.array(d.bounds).T
-    return Manifold.batch_boolean(stack, OpType.Add) ^ shapes.box(low, high)
+    top = low + d.count * up
+    stack += [placed(ball, node) for node in nodes if node[2] == top]
+    stack += [placed(strut(ends), ends[0]) for ends in faces if ends[:, 2].min() == top]
+    box = shapes.box(*np.array(d.bounds).T)
+    return Manifold.batch_boolean(stack, OpType.Add) ^ box
 
 
 def printable(solid: Any) -> tuple[Vertices, Triangles]:

@@ -6,8 +6,9 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from .anchors import Window, anchors
-from .lattice import body_centred
+from .lattice import lattice_of
 from .parameters import Dimensions, Unit
 
 
@@ -22,16 +23,36 @@ class Bar:
 def junction_reach(d: Dimensions) -> float:
     """Distance (mm) from a node along the bar over which strut roots cover its faces.
 
-    A strut of radius rho along (1, 1, 1) cuts the face at height h above the node in an ellipse that reaches
-    h + sqrt(2) rho along the bar; that point lies sqrt(3) h + sqrt(3/2) rho up the strut, where rho is taken.
+    A strut of radius rho along the unit vector a cuts the face at height h above the node in an ellipse that
+    reaches h a_z/a_y + rho sqrt(1 - a_x^2)/a_y along the bar; that point lies
+    h/a_y + rho a_z/(a_y sqrt(1 - a_x^2)) up the strut, where rho is taken. Along (1, 1, 1) that is
+    h + sqrt(2) rho, at sqrt(3) h + sqrt(3/2) rho. A strut square to y covers nothing unless it is wider than
+    the bar, and then all its length. Raises InputError for a lattice without a node at the cell's centre.
     """
-    h = d.waveguide_section / 2.0
-    lattice = body_centred(d)
-    rho = lattice.junction_radius
-    for _ in range(20):
-        up = np.sqrt(3.0) * h + np.sqrt(1.5) * rho
-        rho = float(lattice.radius(min(up / (np.sqrt(0.75) * d.cell), 0.5)))
-    return h + np.sqrt(2.0) * rho
+    kind, h = d.kind, d.waveguide_section / 2.0
+    ways = kind.from_centre
+    if not len(ways):
+        raise InputError(
+            f"lattice {kind.name!r} has no node at the cell's centre, where the anchors are",
+            "[lattice] kind",
+            "choose a kind that has one, or build the unit without a waveguide",
+        )
+    lattice = lattice_of(d)
+    furthest = 0.0
+    for way in np.abs(ways):
+        length = float(np.linalg.norm(way)) * d.cell
+        x, y, z = way * d.cell / length
+        if y < 1e-9:
+            if lattice.radius([0.0, 0.5]).max() > h:
+                furthest = max(furthest, length)
+            continue
+        rho = float(lattice.radius(0.0))
+        side = np.sqrt(1.0 - x**2)
+        for _ in range(20):
+            up = (h + rho * z / side) / y
+            rho = float(lattice.radius(min(up / length, 0.5)))
+        furthest = max(furthest, h * z / y + rho * side / y)
+    return furthest
 
 
 def well_centres(d: Dimensions, spans: int) -> NDArray[np.float64]:

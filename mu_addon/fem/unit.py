@@ -6,19 +6,33 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..design.printed import skin_stiffening
 from ..meshing.mesh import LATTICE
-from .materials import Materials
+from .laws import NeoHooke
+from .materials import Layer, Materials
 
 if TYPE_CHECKING:
     from ..design.parameters import Unit
     from ..meshing.mesh import Mesh
+    from .lattice_law import LatticeLaw
 
 
-def materials_of(unit: Unit, mesh: Mesh) -> Materials:
-    """Materials of a unit's mesh: neo-Hookean membrane and lattice, as the unit's parameters have them."""
-    m = unit.material
-    lattice = mesh.region == LATTICE
+def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> Materials:
+    """Materials of a unit's mesh: neo-Hookean membrane and lattice, as the unit's parameters have them.
+
+    lattice: the law of the lattice in place of that. A skin of other cure is spread over the wall, see
+    `skin_stiffening`: right where the wall stretches, too soft where it bends.
+    """
+    m, p = unit.material, unit.print
+    stiffer = skin_stiffening(unit.printed.wall, p.skin_depth_mm, p.skin_factor)
+    membrane_MPa = stiffer * m.membrane_modulus_kPa / 1e3
+    inside = mesh.region == LATTICE
+    if lattice is not None:
+        wall = np.flatnonzero(~inside)
+        moduli = np.full(len(wall), membrane_MPa)
+        membrane = Layer(NeoHooke, wall, NeoHooke.parameters(moduli, m.membrane_poisson))
+        return Materials((membrane, *lattice.fill(np.flatnonzero(inside))))
     return Materials.neo_hooke(
-        np.where(lattice, m.lattice_modulus_kPa, m.membrane_modulus_kPa) / 1e3,
-        np.where(lattice, m.lattice_poisson, m.membrane_poisson),
+        np.where(inside, m.lattice_modulus_kPa / 1e3, membrane_MPa),
+        np.where(inside, m.lattice_poisson, m.membrane_poisson),
     )

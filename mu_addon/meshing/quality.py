@@ -52,7 +52,7 @@ class Quality:
 
 def quality(mesh: Mesh, unit: Unit) -> Quality:
     """Measure a mesh of a unit, half and quarter meshes as the whole body they stand for."""
-    d = unit.dimensions
+    d = unit.printed
     (x0, x1), (y0, y1), (z0, z1) = d.bounds
     exact = {
         "membrane": membrane_volume(d),

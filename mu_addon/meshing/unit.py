@@ -50,7 +50,7 @@ def mesh_unit(
     mesher: str = "auto",
     cache: Path | None = None,
 ) -> Mesh:
-    """The analysis mesh of a unit; `progress` is told a stage and the share done.
+    """The analysis mesh of a unit as it is printed; `progress` is told a stage and the share done.
 
     The membrane is a revolved grid; gmsh fills the lattice region around it. mesher "pytetwild" meshes
     the whole from surfaces instead, straight-sided, coarser in shape and slower, and keeps it in the
@@ -61,7 +61,7 @@ def mesh_unit(
     say = progress or (lambda stage, share: None)
     if mesher not in MESHERS:
         raise InputError(f"mesher {mesher!r} is not known", "mesher", f"one of: {', '.join(MESHERS)}")
-    d = unit.dimensions
+    d = unit.printed
     _, (y0, y1), _ = d.bounds
     if settings.fraction == "quarter" and y0 != -y1:
         raise InputError(

@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..design.lattice import body_centred
+from ..design.lattice import lattice_of
 from ..design.parameters import Dimensions
 from ..design.profile import outer_radius
 from ..errors import InputError
@@ -108,21 +108,20 @@ class Graph:
 def lattice_graph(d: Dimensions, clearance_mm: float | None = None) -> Graph:
     """Graph of the lattice nodes and steps that keep a distance from membrane and envelope.
 
-    Steps: the half-diagonal struts between centres and corners, and one cell along z from centre to
-    centre, as the windows of anchors go, or from corner to corner, which in a body-centred lattice is
-    the same. clearance_mm: least distance of a step's axis from the
+    Steps: the lattice's struts, and one cell along z from any node to its like, as the windows of anchors
+    go from centre to centre. clearance_mm: least distance of a step's axis from the
     membrane's outer surface and from the envelope's faces, by default the inclusion's radius, so that
     every inclusion is whole. Raises InputError where nothing is left.
     """
     clearance = d.inclusion_radius if clearance_mm is None else clearance_mm
-    lattice = body_centred(d)
-    # Twice the coordinates in cells are integers; one cell up is two of them.
-    place = np.rint(2 * lattice.nodes / d.cell).astype(int)
+    lattice = lattice_of(d)
+    place, up = lattice.grid, lattice.kind.divisions
     where = {tuple(p): i for i, p in enumerate(place.tolist())}
-    upright = [(i, where[x, y, z + 2]) for (x, y, z), i in where.items() if (x, y, z + 2) in where]
+    upright = [(i, where[x, y, z + up]) for (x, y, z), i in where.items() if (x, y, z + up) in where]
     pairs = np.vstack([lattice.struts, upright])
     z = lattice.nodes[:, 2]
     pairs = np.where((z[pairs[:, 0]] > z[pairs[:, 1]])[:, None], pairs[:, ::-1], pairs)
+    pairs = np.unique(pairs, axis=0)
     pairs = pairs[_clear(d, lattice.nodes[pairs], clearance)]
     if not len(pairs):
         raise InputError(

@@ -5,9 +5,12 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ..design.parameters import Unit
+    from .ending import Ending
+    from .progress import Progress
     from .study import Study
 
 EXAMPLE = "example: run.py place --preset mu-1.0x --out out/mu-1.0x"
@@ -90,7 +93,75 @@ def parser() -> argparse.ArgumentParser:
         "--checks", type=int, default=100, metavar="N", help="paths solved exactly at most (100)"
     )
     place.set_defaults(stages=("design", "simulate", "place"))
+
+    _add_homogenize(commands)
+    _add_fit_material(commands)
     return top
+
+
+def _add_homogenize(commands: argparse._SubParsersAction[_Parser]) -> None:
+    command = commands.add_parser(
+        "homogenize",
+        help="the lattice's moduli from its struts and resin, virtual compression tests, its law for `place`",
+        epilog="example: run.py homogenize --preset mu-1.0x --out out/lattice",
+    )
+    _add_unit(command)
+    command.add_argument(
+        "--resin",
+        metavar="NAME|FILE",
+        help="a material of the library, or its TOML file (the modulus of the unit's membrane)",
+    )
+    command.add_argument(
+        "--cells", type=int, default=3, metavar="N", help="cells along each side of the specimen (3)"
+    )
+    command.add_argument(
+        "--friction",
+        choices=("both", "slide", "stick"),
+        default="both",
+        help="whether plates let the specimen's faces slide or hold them (both)",
+    )
+    command.add_argument(
+        "--strain", type=float, default=0.4, metavar="E", help="nominal compression to go to (0.4)"
+    )
+    command.add_argument(
+        "--no-specimen", dest="specimen", action="store_false", help="only the endless lattice"
+    )
+    command.add_argument(
+        "--refine", type=float, default=1.0, metavar="F", help="divides the size of the cell's elements (1)"
+    )
+    command.set_defaults(stages=())
+
+
+def _add_fit_material(commands: argparse._SubParsersAction[_Parser]) -> None:
+    command = commands.add_parser(
+        "fit-material",
+        help="laws fitted to coupon tests, and the best as a material for simulations",
+        epilog="example: run.py fit-material my-coupons --out out/resin",
+    )
+    command.add_argument("folder", metavar="FOLDER", help="measured data: experiments.toml and its CSV files")
+    command.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
+    command.add_argument(
+        "--laws",
+        nargs="+",
+        default=(),
+        metavar="LAW",
+        help="neo-hooke, mooney-rivlin, yeoh, ogden-1, ogden-2, ogden-3 (all)",
+    )
+    command.add_argument(
+        "--hold-out",
+        nargs="+",
+        default=(),
+        metavar="MODE",
+        help="modes to check and not to fit: uniaxial, equibiaxial, pure_shear (none)",
+    )
+    command.add_argument(
+        "--weights",
+        choices=("absolute", "relative"),
+        default="absolute",
+        help="residuals as a share of their test's largest stress, or of the stress itself (absolute)",
+    )
+    command.add_argument("--json", action="store_true", help="one JSON message a line on standard output")
+    command.set_defaults(stages=())
 
 
 def _add_unit(command: argparse.ArgumentParser) -> None:
@@ -118,6 +189,12 @@ def _add_simulation(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--refine", type=float, default=1.0, metavar="F", help="divides every element size (1)"
     )
+    command.add_argument(
+        "--lattice",
+        metavar="FILE",
+        help="effective.toml of `homogenize`: the lattice's law, from its struts and resin, kept in the "
+        "results (without it the unit's material.lattice_modulus_kPa and lattice_poisson, neo-Hookean)",
+    )
     command.add_argument("--times", type=int, default=13, metavar="K", help="samples of the protocol (13)")
     command.add_argument(
         "--mesher", choices=("auto", "gmsh", "pytetwild"), default="auto", help="who makes the mesh (auto)"
@@ -135,15 +212,60 @@ def main(arguments: list[str]) -> int:
     from .progress import Progress, json_lines, terminal
 
     progress = Progress([json_lines(sys.stdout) if options.json else terminal(sys.stderr)])
+    answer = _answer
     with run_to_end(progress) as ending:
-        study = _open(options, progress, ending)
-        from .publish import publish
+        if options.command == "homogenize":
+            from .homogenizing import answer
 
-        ending.on_stop = lambda reason: publish(study, reason["what"])
-        _run(study, options)
+            _homogenize(options, progress, ending)
+        elif options.command == "fit-material":
+            from .fitting import answer
+
+            _fit_material(options, progress, ending)
+        else:
+            _study(options, progress, ending)
     if ending.status == 0 and not options.json:
-        sys.stdout.write(_answer(ending.summary, ending.folder) + "\n")
+        sys.stdout.write("\n".join([f"results: {ending.folder}", *answer(ending.summary)]) + "\n")
     return ending.status
+
+
+def _study(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    from .publish import publish
+
+    study = _open(options, progress, ending)
+    ending.on_stop = lambda reason: publish(study, reason["what"])
+    _run(study, options)
+
+
+def _homogenize(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    from .homogenizing import FRICTIONS, Job, homogenize, resin_of
+
+    unit = _unit(options)
+    frictions = FRICTIONS if options.friction == "both" else (options.friction,)
+    job = Job(
+        unit=unit,
+        resin=resin_of(options.resin, unit),
+        cells=options.cells,
+        frictions=frictions if options.specimen else (),
+        strain=options.strain,
+        refine=options.refine,
+    )
+    homogenize(job, Path(options.out), progress, ending)
+
+
+def _fit_material(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    from .fitting import fit_material
+
+    _require_folder(options)
+    fit_material(
+        Path(options.folder),
+        Path(options.out),
+        options.laws,
+        options.hold_out,
+        options.weights,
+        progress=progress,
+        ending=ending,
+    )
 
 
 def _presets() -> int:
@@ -155,23 +277,35 @@ def _presets() -> int:
     return 0
 
 
-def _open(options: argparse.Namespace, progress: object, ending: object) -> Study:
+def _unit(options: argparse.Namespace) -> Unit:
     from ..design.parameters import load_preset, read_unit
+
+    _require_folder(options)
+    return load_preset(options.preset) if options.preset is not None else read_unit(options.unit)
+
+
+def _require_folder(options: argparse.Namespace) -> None:
     from ..errors import InputError
+
+    if not options.out.strip():
+        raise InputError("no folder was named", "--out", "give a folder for the results")
+
+
+def _open(options: argparse.Namespace, progress: Progress, ending: Ending) -> Study:
+    from ..homogenize.effective import read_effective
     from ..meshing.settings import MeshSettings
     from ..placement.graph import Limits
     from .job import Job, protocol_of
     from .study import Study
 
-    if not options.out.strip():
-        raise InputError("no folder was named", "--out", "give a folder for the results")
-    unit = load_preset(options.preset) if options.preset is not None else read_unit(options.unit)
+    unit = _unit(options)
     extra = {}
     if "simulate" in options.stages:
         extra = {
             "mesh": MeshSettings(order=options.order, refine=options.refine),
             "times": options.times,
             "mesher": options.mesher,
+            "lattice": None if options.lattice is None else read_effective(options.lattice),
         }
     if "place" in options.stages:
         rules = ("intersect", "volume_fraction") if options.rule == "both" else (options.rule,)
@@ -186,7 +320,7 @@ def _open(options: argparse.Namespace, progress: object, ending: object) -> Stud
         }
     protocol = protocol_of(getattr(options, "protocol", None))
     job = Job(unit=unit, protocol=protocol, quality=options.quality, **extra)
-    return Study.open(job, Path(options.out), progress, ending)  # type: ignore[arg-type]
+    return Study.open(job, Path(options.out), progress, ending)
 
 
 def _run(study: Study, options: argparse.Namespace) -> None:
@@ -216,8 +350,8 @@ def _run(study: Study, options: argparse.Namespace) -> None:
     publish(study)
 
 
-def _answer(summary: dict[str, object], folder: Path | None) -> str:
-    lines = [f"results: {folder}"]
+def _answer(summary: dict[str, Any]) -> list[str]:
+    lines = []
     angles = summary.get("angle_deg")
     if isinstance(angles, dict):
         ends = sorted((float(p), a) for p, a in angles.items())
@@ -226,8 +360,8 @@ def _answer(summary: dict[str, object], folder: Path | None) -> str:
     if isinstance(chosen, dict):
         J, tied = summary["J_hat_mm"], summary["tied_with_chosen"]
         for rule, name in chosen.items():
-            equal = f", tied with {', '.join(tied[rule])}" if tied[rule] else ""  # type: ignore[index]
-            lines.append(f"{rule}: {name}, J_hat {J[rule][name]:.4f} mm{equal}")  # type: ignore[index]
+            equal = f", tied with {', '.join(tied[rule])}" if tied[rule] else ""
+            lines.append(f"{rule}: {name}, J_hat {J[rule][name]:.4f} mm{equal}")
     search = summary.get("search")
     if isinstance(search, dict):
         best = search["best"]
@@ -235,4 +369,4 @@ def _answer(summary: dict[str, object], folder: Path | None) -> str:
             f"whole lattice, {search['rule']}: {best['name']}, J_hat {best['J_hat_mm']:.4f} mm, "
             f"{best['length_mm']:.1f} mm long; {search['checked']} of {search['paths']} paths were solved"
         )
-    return "\n".join(lines)
+    return lines

@@ -10,7 +10,6 @@ import numpy as np
 from ..errors import InputError
 from ..fem.kinematics import probe
 from ..fem.model import Model
-from ..fem.unit import materials_of
 from ..files import write_csv
 from ..placement.candidates import Candidate
 from ..placement.graph import Graph, lattice_graph
@@ -48,7 +47,7 @@ def sensitivity_map(study: Study) -> Array:
     with study.progress.stage("map"):
         model = Model(study.mesh)
         monitor = probe(study.mesh, study.anchors)
-        materials = materials_of(study.job.unit, study.mesh)
+        materials = study.job.materials(study.mesh)
         chosen = telling_pressures(study.trajectory)
         found = influence(model, materials, study.trajectory, monitor, chosen)
         pressures = np.array([s.pressure_MPa for s in loaded(study.trajectory)])
@@ -67,7 +66,7 @@ def sensitivity_map(study: Study) -> Array:
 
 def chains_within(job: Job) -> tuple[Graph, list[tuple[int, ...]]]:
     """The lattice graph and its chains within a job's limits; raises InputError for none or too many."""
-    graph = lattice_graph(job.unit.dimensions)
+    graph = lattice_graph(job.unit.printed)
     chains = list(itertools.islice(graph.chains(job.limits), MOST_PATHS + 1))
     options = "--shortest-cells, --longest-cells, --bend-deg"
     if not chains:
@@ -153,7 +152,7 @@ def _predicted(study: Study, graph: Graph, chains: list[tuple[int, ...]], rule: 
     monitor = probe(study.mesh, study.anchors)
     found = response(
         model,
-        materials_of(unit, study.mesh),
+        study.job.materials(study.mesh),
         unit.material.sensor_modulus_kPa / 1e3,
         study.trajectory,
         monitor,

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 
@@ -11,13 +12,20 @@ from ..design.assets import asset_root
 from ..design.parameters import Unit, to_toml
 from ..errors import InputError
 from ..fem.protocol import Protocol, read_protocol
+from ..fem.unit import materials_of
+from ..homogenize.effective import Effective
 from ..meshing.settings import MeshSettings
 from ..placement.graph import Limits
 from ..placement.inclusion import RULES
 
+if TYPE_CHECKING:
+    from ..fem.materials import Materials
+    from ..meshing.mesh import Mesh
+
 GRASP = "protocols/grasp.csv"
 # The first line of study.toml, by which a study's folder is known.
 HEADER = "# The inputs of this study; unit.toml and protocol.csv beside it belong to them."
+LATTICE_LAW = "effective.toml"
 
 
 def _whole(low: int, high: int, what: str) -> Any:
@@ -50,6 +58,8 @@ class Job:
     paths: str = attrs.field(default="windows", validator=attrs.validators.in_(("windows", "graph")))
     limits: Limits = attrs.field(factory=Limits)
     most_checks: int = attrs.field(default=100, validator=_whole(2, 100_000, "the number of checks"))
+    # The lattice's law, by homogenizing its cell, in place of the unit's one modulus for it.
+    lattice: Effective | None = None
 
     def __attrs_post_init__(self) -> None:
         _, pressure = self.protocol.sample(self.times)
@@ -76,6 +86,7 @@ class Job:
             f'mesher = "{self.mesher}"',
             f"mesh_check = {str(self.mesh_check).lower()}",
             f'paths = "{self.paths}"',
+            *self._lattice_lines(),
             "",
             "[mesh]",
             *(f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {v}" for k, v in mesh.items()),
@@ -84,6 +95,31 @@ class Job:
             limits = attrs.asdict(self.limits) | {"most_checks": self.most_checks}
             lines += ["", "[search]", *(f"{k} = {v}" for k, v in limits.items())]
         return "\n".join(lines) + "\n"
+
+    def _lattice_lines(self) -> list[str]:
+        text = self.lattice_text()
+        if text is None:
+            return []
+        digest = hashlib.sha256(text.encode()).hexdigest()
+        return [f'lattice = "{LATTICE_LAW}"', f'lattice_sha256 = "{digest}"']
+
+    def materials(self, mesh: Mesh) -> Materials:
+        """Materials of the unit's mesh."""
+        return materials_of(self.unit, mesh, None if self.lattice is None else self.lattice.law)
+
+    def texts(self) -> dict[str, str]:
+        """Text of every file of inputs, by name; study.toml is the first."""
+        found = {
+            "study.toml": self.text(),
+            "unit.toml": self.unit_text(),
+            "protocol.csv": self.protocol_text(),
+        }
+        lattice = self.lattice_text()
+        return found if lattice is None else found | {LATTICE_LAW: lattice}
+
+    def lattice_text(self) -> str | None:
+        """effective.toml: the lattice's law and where it is from, or None where it is the unit's modulus."""
+        return None if self.lattice is None else self.lattice.text()
 
     def unit_text(self) -> str:
         """unit.toml: the unit's parameters with units, meaning and source."""

@@ -78,7 +78,7 @@ def unit_with_paths(view: SideView, paths: Sequence[Path], chosen: str, j_hat: F
     width, wide = 4.2, 1.85  # inches, of which the section's
     high = wide * (top - bottom) / (right - left)
     whole = high + 0.35  # a line below for the scale bar
-    with _figure(width, whole) as (figure, svg):
+    with canvas(width, whole) as (figure, svg):
         below, height = 0.30 / whole, high / whole
         picture = figure.add_axes((0.0, below, wide / width, height))
         picture.imshow(view.image, extent=view.extent, interpolation="lanczos", aspect="auto")
@@ -133,7 +133,7 @@ def _scale_bar(axes: Any, middle: float, z: float, length: float) -> None:
 
 def angle_against_pressure(pressure_kPa: Floats, angle_deg: Floats) -> str:
     """Bending angle against pressure, in the order the states were computed."""
-    with _figure(WIDTH, 3.1) as (figure, svg):
+    with canvas(WIDTH, 3.1) as (figure, svg):
         axes = figure.add_axes((0.14, 0.16, 0.82, 0.78))
         axes.axhline(0, color=QUIET, linewidth=0.8)
         axes.axvline(0, color=QUIET, linewidth=0.8)
@@ -154,7 +154,7 @@ def angle_against_pressure(pressure_kPa: Floats, angle_deg: Floats) -> str:
 
 def protocol(time_s: Floats, pressure_kPa: Floats) -> str:
     """Pressure against time."""
-    with _figure(WIDTH, 2.3) as (figure, svg):
+    with canvas(WIDTH, 2.3) as (figure, svg):
         axes = figure.add_axes((0.14, 0.21, 0.82, 0.72))
         axes.axhline(0, color=QUIET, linewidth=0.8)
         axes.plot(time_s, pressure_kPa, "-", color=INK, linewidth=1.6)
@@ -167,7 +167,7 @@ def heatmap(delta: Floats, top: float, chosen: bool = False) -> str:
     """One path's deviation (k times, j stations), 0..`top` mm: length to the right, time upward."""
     from matplotlib.colors import PowerNorm
 
-    with _figure(1.75, 1.75) as (figure, svg):
+    with canvas(1.75, 1.75) as (figure, svg):
         axes = figure.add_axes((0.20, 0.18, 0.74, 0.76))
         axes.imshow(
             delta,
@@ -192,7 +192,7 @@ def color_bar(top: float) -> str:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import PowerNorm
 
-    with _figure(WIDTH, 0.62) as (figure, svg):
+    with canvas(WIDTH, 0.62) as (figure, svg):
         axes = figure.add_axes((0.04, 0.68, 0.92, 0.26))
         mappable = ScalarMappable(PowerNorm(0.5, 0.0, top), MAP)
         series = np.outer(10.0 ** np.arange(-6, 6), [1.0, 2.0, 5.0]).ravel()
@@ -205,7 +205,7 @@ def color_bar(top: float) -> str:
 
 def marginal(values: Floats, paths: Sequence[Path], chosen: str, along: str) -> str:
     """One line a path of `values` (paths, n) in mm; `along` is "length" or "time"."""
-    with _figure(WIDTH, 3.3) as (figure, svg):
+    with canvas(WIDTH, 3.3) as (figure, svg):
         axes = figure.add_axes((0.14, 0.14, 0.66, 0.82))
         percent = np.linspace(0.0, 100.0, values.shape[1])
         for path, row in zip(paths, values, strict=True):
@@ -233,7 +233,7 @@ def ranking(result: RuleResult, paths: Sequence[Path]) -> str:
     order = np.argsort(np.asarray(result.rank), kind="stable")
     names = [paths[i].name for i in order]
     values = np.asarray(result.j_hat)[order]
-    with _figure(WIDTH, 0.6 + 0.27 * len(names)) as (figure, svg):
+    with canvas(WIDTH, 0.6 + 0.27 * len(names)) as (figure, svg):
         high = 0.6 + 0.27 * len(names)
         axes = figure.add_axes((0.11, 0.45 / high, 0.85, 1.0 - 0.5 / high))
         rows = np.arange(len(names))
@@ -262,7 +262,7 @@ def seconds(stages: Mapping[str, float]) -> str:
     """How long each stage took, in the order they ran."""
     names, values = list(stages), np.array(list(stages.values()))
     high = 0.55 + 0.24 * len(names)
-    with _figure(WIDTH, high) as (figure, svg):
+    with canvas(WIDTH, high) as (figure, svg):
         left = (0.15 + 0.075 * max(map(len, names))) / WIDTH
         axes = figure.add_axes((left, 0.42 / high, 0.92 - left, 1.0 - 0.47 / high))
         rows = np.arange(len(names))
@@ -278,7 +278,7 @@ def seconds(stages: Mapping[str, float]) -> str:
 
 
 @contextmanager
-def _figure(width: float, height: float) -> Iterator[tuple[Figure, Callable[[], str]]]:
+def canvas(width: float, height: float) -> Iterator[tuple[Figure, Callable[[], str]]]:
     """A figure of that many inches, and a function that gives its SVG text once the body has drawn it."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_svg import FigureCanvasSVG

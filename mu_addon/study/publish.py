@@ -13,16 +13,21 @@ from ..design.parameters import SECTIONS, assumed
 from ..design.quantity import describe
 from ..fem.kinematics import bending_angle_deg
 from ..files import write_bytes
+from .job import LATTICE_LAW
 from .results import Gate, Parameter, Path, Picture, ReportData, RuleResult, SideView
 
 if TYPE_CHECKING:
+    from ..homogenize.effective import Effective
     from .study import Study
 
 PACKAGES = ("numpy", "scipy", "warp-lang", "cvxopt", "pymetis", "manifold3d", "gmsh", "pytetwild", "meshio")
+# What the lattice's law stands in for.
+REPLACED = ("material.lattice_modulus_kPa", "material.lattice_poisson")
 FILES = {
     "study.toml": "inputs of this run",
     "unit.toml": "parameters of the unit",
     "protocol.csv": "pressure protocol",
+    "effective.toml": "law of the lattice, from its struts and resin",
     "unit.stl": "printable unit without a sensor, mm",
     "anchors.txt": "lattice nodes and anchors, mm",
     "mesh.vtu": "analysis mesh with regions and moduli",
@@ -42,7 +47,7 @@ def publish(study: Study, stopped: str = "") -> None:
     from .report import write_report
 
     with study.progress.stage("report", expected_s=15.0):
-        versions = _versions()
+        versions = package_versions()
         study.ending.summary["versions"] = versions
         view, pictures = _pictures(study)
         if pictures:
@@ -123,7 +128,11 @@ def _parameters(study: Study) -> list[Parameter]:
         for d in describe(section):
             value = getattr(values, d.name)
             path = f"{section.section}.{d.name}"  # type: ignore[attr-defined]
+            if study.job.lattice is not None and path in REPLACED:
+                rows.append(Parameter(path, value, d.unit, f"not used: {LATTICE_LAW} has the lattice's law"))
+                continue
             rows.append(Parameter(path, value, d.unit, reasons.get(path, d.source), d.assumed))
+    rows += _lattice_parameters(study.job.lattice)
     m, k, j = study.job.mesh, study.job.times, study.job.stations
     rows += [
         Parameter("study.times", k, "", "samples of the protocol; the paper prints none", True),
@@ -133,6 +142,32 @@ def _parameters(study: Study) -> list[Parameter]:
         Parameter(
             "protocol", "protocol.csv", "", "between the paper's pressures, times are not printed", True
         ),
+    ]
+    return rows
+
+
+def _lattice_parameters(lattice: Effective | None) -> list[Parameter]:
+    """The lattice's law, and what it was found from."""
+    if lattice is None:
+        return []
+    made = f"{LATTICE_LAW}: {lattice.cell.get('kind', 'a')} cell"
+    if "name" in lattice.resin:
+        made += f" of {lattice.resin['name']}"
+    low, high = lattice.stretch
+    fitted = f"{made}; fitted from stretch {low:g} to {high:g}"
+    rows = [
+        Parameter("lattice law.E100_kPa", lattice.E100_kPa, "kPa", f"{made}; small strain, along an axis"),
+        Parameter("lattice law.nu100", lattice.nu100, "", f"{made}; small strain, along an axis"),
+        Parameter("lattice law.C44_kPa", lattice.C44_kPa, "kPa", f"{made}; small strain, shear between axes"),
+        Parameter("lattice law.relative_density", lattice.relative_density, "", made),
+    ]
+    for law, values in lattice.law.layers:
+        for name, value in zip(law.parameter_names, values, strict=True):
+            unit = "MPa" if name.endswith("_MPa") else ""
+            rows.append(Parameter(f"lattice law.{law.name}.{name}", float(value), unit, fitted))
+    rows += [
+        Parameter(f"lattice law.misfit_{name}", value, "", "root mean square over the largest value")
+        for name, value in attrs.asdict(lattice.misfit).items()
     ]
     return rows
 
@@ -217,7 +252,8 @@ def _files(study: Study) -> dict[str, str]:
     return FILES | dict.fromkeys(solids, "printable unit with that waveguide, mm")
 
 
-def _versions() -> dict[str, str]:
+def package_versions() -> dict[str, str]:
+    """Versions of the program, of Python and of every package that decides a figure."""
     versions = {"mu_addon": _version("mu_addon"), "Python": platform.python_version()}
     return versions | {name: _version(name) for name in PACKAGES}
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import warnings
 from contextlib import closing
 from pathlib import Path
@@ -14,16 +13,18 @@ import numpy as np
 from ..design.anchors import Window, anchors, windows
 from ..design.export import write_nodes, write_stl
 from ..design.solid import Solid, build_solid
-from ..errors import ConvergenceError, InputError, MeshingError
+from ..design.strut_cell import strut_cell
+from ..errors import ConvergenceError, MeshingError
 from ..fem.contact import first_contact
 from ..fem.descent import NewtonSettings
 from ..fem.equilibrium import Equilibrium, State, rest
 from ..fem.kinematics import bending_angle_deg
+from ..fem.lattice_law import deformation_gradients, stretches
 from ..fem.model import Model
 from ..fem.trajectory import Trajectory, branches, simulate
-from ..fem.unit import materials_of
-from ..files import make_folder, output_error, write_csv, write_npz, write_text
-from ..meshing.mesh import Mesh
+from ..files import write_csv, write_npz
+from ..homogenize.foam_response import ellipticity
+from ..meshing.mesh import LATTICE, Mesh
 from ..meshing.quality import Quality, quality
 from ..meshing.settings import MeshSettings
 from ..meshing.unit import MeshingWarning, mesh_unit
@@ -31,7 +32,8 @@ from ..placement.candidates import Candidate, Evaluation, candidates
 from ..placement.deviation import rank
 from .cache import Cache, key
 from .ending import Ending
-from .job import HEADER, Job
+from .folder import claim, keep_inputs
+from .job import HEADER, LATTICE_LAW, Job
 from .progress import Progress
 from .results import LatticeSearch
 from .sweeping import PATH_DIFFERENCE_MM, Sweep
@@ -39,7 +41,6 @@ from .vtk_out import write_mesh, write_trajectory
 
 Array = np.ndarray[Any, Any]
 
-INPUTS = ("study.toml", "unit.toml", "protocol.csv")
 RESULTS = (
     "unit.stl",
     "anchors.txt",
@@ -80,18 +81,17 @@ class Study:
     @classmethod
     def open(cls, job: Job, folder: Path, progress: Progress, ending: Ending) -> Study:
         """Make the folder a study's; results of other inputs are moved to stale/, never shown as current."""
-        make_folder(folder)
-        _refuse_foreign(folder)
-        texts = dict(zip(INPUTS, (job.text(), job.unit_text(), job.protocol_text()), strict=True))
-        if any((folder / name).is_file() and _read(folder / name) != texts[name] for name in INPUTS):
-            _set_aside(folder)
+        texts = job.texts()
+        claim(folder, HEADER, texts, (*RESULTS, "unit_alpha[0-9]*.stl", "model_a"), optional=[LATTICE_LAW])
         ending.open_folder(folder)
         study = cls(job, folder, progress, ending)
-        for name, text in texts.items():
-            write_text(folder / name, text)
+        keep_inputs(folder, texts)
         ending.summary["parameters"] = attrs.asdict(job.unit)
         ending.summary["study"] = {"times": job.times, "stations": job.stations, "rules": job.rules}
         ending.summary["study"] |= {"mesh": attrs.asdict(job.mesh), "mesher": job.mesher}
+        if job.lattice is not None:
+            ending.summary["study"]["lattice"] = attrs.asdict(job.lattice)
+            study._warn_of_another_cell()
         study._warn_of_missed_corners()
         if job.mesh.order == 1:
             study.warn("Linear elements lock in thin walls: these answers are for a quick look only.")
@@ -137,7 +137,7 @@ class Study:
         with self.progress.stage("mesh"):
             self.mesh = self._mesh(self.job.mesh)
             self.quality = quality(self.mesh, self.job.unit)
-            modulus, _ = materials_of(self.job.unit, self.mesh).small_strain(len(self.mesh.tets))
+            modulus, _ = self.job.materials(self.mesh).small_strain(len(self.mesh.tets))
             write_mesh(self.folder / "mesh.vtu", self.mesh, modulus)
         self.ending.summary["mesh"] = {**attrs.asdict(self.quality), "hash": self.mesh.hash()}
         return self.mesh
@@ -187,6 +187,7 @@ class Study:
                 raise
             self._write_motion(self.trajectory.states)
             self._look_for_contact(self.trajectory.states)
+            self._look_beyond_the_fit(self.trajectory.states)
         states = [s for s in self.trajectory.states if s.pressure_MPa]
         self.solver = {
             "unknowns": len(model.free),
@@ -205,7 +206,7 @@ class Study:
 
     def _model_a(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
         """Model A's trajectory on a model's mesh, load step by load step from the cache where it is there."""
-        materials = materials_of(self.job.unit, model.mesh)
+        materials = self.job.materials(model.mesh)
         # A state's last digits depend on the pressures visited before it.
         visited = np.unique(pressure)
         name = key(model.mesh.hash(), materials.hash(), visited, NewtonSettings())
@@ -276,6 +277,46 @@ class Study:
                 "protocol short of this pressure."
             )
         self.ending.summary["walls_cross_at_kPa"] = found
+
+    def _look_beyond_the_fit(self, states: tuple[State, ...]) -> None:
+        """Warn where the lattice is strained further than its law was fitted, or than it is stable."""
+        if self.job.lattice is None:
+            return
+        assert self.mesh is not None
+        law = self.job.lattice.law
+        low, high = law.stretch
+        inside = np.flatnonzero(self.mesh.region == LATTICE)
+        found = {}
+        for state in states:
+            F, volume = deformation_gradients(self.mesh, state.u, inside)
+            a = stretches(F)
+            beyond = (a[:, :, 0] < low) | (a[:, :, 2] > high)
+            # One point an element: it takes a while.
+            lost = ellipticity(law, F[:, 0]) <= 0
+            found[f"{state.pressure_MPa * 1e3:.6g}"] = {
+                "least": float(a.min()),
+                "largest": float(a.max()),
+                "share_beyond_fit": float((volume * beyond).sum() / volume.sum()),
+                "share_not_elliptic": float((volume.sum(axis=1) * lost).sum() / volume.sum()),
+            }
+        self.ending.summary["lattice_stretch"] = found
+        least, largest = (
+            pick(s[n] for s in found.values()) for pick, n in ((min, "least"), (max, "largest"))
+        )
+        pressure, worst = max(found.items(), key=lambda item: item[1]["share_beyond_fit"])
+        if worst["share_beyond_fit"]:
+            self.warn(
+                f"The lattice is strained to stretches from {least:.2f} to {largest:.2f}, but its law was "
+                f"fitted from {low:g} to {high:g}: at {pressure} kPa {worst['share_beyond_fit']:.1%} of the "
+                "lattice's volume is beyond, and answers by extrapolation."
+            )
+        pressure, worst = max(found.items(), key=lambda item: item[1]["share_not_elliptic"])
+        if worst["share_not_elliptic"]:
+            self.warn(
+                f"At {pressure} kPa the law is not elliptic any more in {worst['share_not_elliptic']:.1%} of "
+                "the lattice's volume: struts buckle there, in patterns that depend on the mesh. Compare two "
+                "meshes (--refine)."
+            )
 
     def _keep_partial_motion(self) -> None:
         """What was found before a failure is kept; summary.json says that it is partial."""
@@ -386,6 +427,20 @@ class Study:
         limit = self.uncertainty_mm.get(rule, 0.0)
         return [name for name, value in J.items() if name != chosen and value - J[chosen] < limit]
 
+    def _warn_of_another_cell(self) -> None:
+        """Say where the lattice's law was found for another cell than the unit's."""
+        assert self.job.lattice is not None
+        own = strut_cell(self.job.unit)
+        values = {f.name: getattr(own, f.name) for f in attrs.fields(type(own))} | {"kind": own.kind.name}
+        other = []
+        for name, value in self.job.lattice.cell.items():
+            mine = values.get(name, value)
+            words = isinstance(value, str) or isinstance(mine, str)
+            if value != mine and (words or not np.isclose(value, mine, rtol=1e-6)):
+                other.append(f"{name} {value} (unit: {mine})")
+        if other:
+            self.warn(f"The lattice's law is that of another cell than the unit's: {', '.join(other)}.")
+
     def _warn_of_missed_corners(self) -> None:
         """Say where uniform samples miss the protocol's extremes."""
         corners = self.job.protocol.pressure_kPa
@@ -408,38 +463,3 @@ def extremes(pressure_kPa: Array) -> Array:
     """The pressures, ascending, that stand for a protocol: its extremes, without 0."""
     found = np.unique([pressure_kPa.min(), pressure_kPa.max()])
     return found[found != 0]
-
-
-def _read(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        return ""
-
-
-def _refuse_foreign(folder: Path) -> None:
-    """Refuse a folder that holds files under our names and is no study's: they are somebody's work."""
-    if _read(folder / "study.toml").startswith(HEADER):
-        return
-    ours = [name for name in (*INPUTS, *RESULTS) if (folder / name).exists()]
-    if ours:
-        raise InputError(
-            f"the folder holds a file that is not this program's: {ours[0]}",
-            str(folder),
-            "choose a new or empty folder for the results",
-        )
-
-
-def _set_aside(folder: Path) -> None:
-    """Move an earlier run's inputs and results to stale/, in place of what was set aside before."""
-    stale = folder / "stale"
-    solids = [p.name for p in folder.glob("unit_alpha[0-9]*.stl")]
-    try:
-        if stale.is_dir():
-            shutil.rmtree(stale)
-        stale.mkdir()
-        for name in (*INPUTS, *RESULTS, *solids, "summary.json", "log.ndjson", "model_a"):
-            if (folder / name).exists():
-                (folder / name).replace(stale / name)
-    except OSError as error:
-        raise output_error(error, stale) from error

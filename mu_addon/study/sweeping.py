@@ -12,7 +12,6 @@ from ..fem.descent import NewtonSettings
 from ..fem.equilibrium import State
 from ..fem.kinematics import probe
 from ..fem.trajectory import Trajectory
-from ..fem.unit import materials_of
 from ..meshing.mesh import Mesh
 from ..placement.candidates import Candidate, Evaluation, evaluation
 from ..placement.sampling import between, estimate, rounds
@@ -42,7 +41,7 @@ class Sweep:
         self._anchors = anchors(unit)
         self._radius = unit.dimensions.inclusion_radius
         sensor = unit.material.sensor_modulus_kPa / 1e3
-        materials = materials_of(unit, mesh)
+        materials = job.materials(mesh)
         self._sweeper = Sweeper(
             Setting(mesh, materials, self._anchors, tuple(jobs), self._radius, sensor), job.workers
         )

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mu_addon.design.anchors import SHORTEST, anchors, window, windows
-from mu_addon.design.lattice import body_centred
+from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import Envelope, Unit, Waveguide, load_preset
 from mu_addon.design.waveguide import junction_reach, waveguide, well_centres
 from mu_addon.errors import InputError
@@ -14,9 +14,9 @@ from .units import units
 
 @given(units())
 @settings(max_examples=40, deadline=None)
-def test_lattice_is_body_centred(unit):
+def test_lattice_is_lattice_of(unit):
     d = unit.dimensions
-    lattice = body_centred(d)
+    lattice = lattice_of(d)
     nx, ny, nz = d.cells_x, d.cells_y_minus + 1 + d.cells_y_plus, d.count
     assert lattice.is_centre.sum() == nx * ny * nz
     assert (~lattice.is_centre).sum() == (nx + 1) * (ny + 1) * (nz + 1)
@@ -32,7 +32,7 @@ def test_lattice_is_body_centred(unit):
 
 def test_nodes_coincide_with_the_bladder_apices():
     d = load_preset("mu-1.0x").dimensions
-    nodes = {tuple(node) for node in np.round(body_centred(d).nodes, 9)}
+    nodes = {tuple(node) for node in np.round(lattice_of(d).nodes, 9)}
     for k in range(6):
         z = (k + 0.5) * d.cell
         for apex in ((d.R, 0.0, z), (-d.R, 0.0, z), (0.0, d.R, z), (0.0, -d.R, z)):
@@ -40,21 +40,21 @@ def test_nodes_coincide_with_the_bladder_apices():
 
 
 def test_lattice_is_its_own_mirror_image_in_the_bending_plane():
-    nodes = body_centred(Unit().dimensions).nodes
+    nodes = lattice_of(Unit().dimensions).nodes
     mirrored = nodes * [-1, 1, 1]
     assert {tuple(n) for n in nodes} == {tuple(n + 0.0) for n in mirrored}
 
 
 def test_cycles_of_the_paper_unit():
-    lattice = body_centred(
+    lattice = lattice_of(
         Unit(lattice=Envelope(cells_y_plus=1, allow_symmetric=True), waveguide=Waveguide(row=1)).dimensions
     )
     assert (len(lattice.struts), len(lattice.nodes), lattice.cycles) == (432, 166, 267)
-    assert body_centred(Unit().dimensions).cycles == 576 - 212 + 1
+    assert lattice_of(Unit().dimensions).cycles == 576 - 212 + 1
 
 
 def test_struts_are_narrow_at_junctions_and_wide_at_mid_span():
-    lattice = body_centred(Unit().dimensions)
+    lattice = lattice_of(Unit().dimensions)
     assert lattice.radius([0.0, 0.5, 1.0]) == pytest.approx([0.75, 1.0, 0.75])
     t = np.linspace(0, 0.5, 50)
     assert (np.diff(lattice.radius(t)) > 0).all()
@@ -87,7 +87,7 @@ def test_the_papers_ten_windows():
 def test_anchors_are_lattice_centres_in_the_bending_plane(unit):
     d, points = unit.dimensions, anchors(unit)
     assert points.shape == (d.count, 3)
-    lattice = body_centred(d)
+    lattice = lattice_of(d)
     for point in points:
         gap = np.linalg.norm(lattice.nodes - point, axis=1)
         assert gap.min() < 1e-9 * d.cell
@@ -130,7 +130,7 @@ def test_wells_keep_their_pitch_and_clear_of_the_junctions(unit):
 def test_struts_reach_as_far_along_the_bar_as_said():
     """Against points sampled on a strut's surface where it crosses the plane of the bar's outer face."""
     d = load_preset("mu-1.5x").dimensions
-    lattice, h = body_centred(d), d.waveguide_section / 2
+    lattice, h = lattice_of(d), d.waveguide_section / 2
     along = np.ones(3) / np.sqrt(3)
     side = np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
     other = np.cross(along, side)

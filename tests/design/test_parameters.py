@@ -66,6 +66,9 @@ def test_lengths_scale_and_the_waveguide_does_not():
         "well_pitch_mm",
         "end_mm",
         "inclusion_radius_mm",
+        "offset_xy_mm",
+        "offset_z_mm",
+        "skin_depth_mm",
     }
 
 
@@ -114,7 +117,7 @@ def test_every_parameter_is_described():
         for d in quantity.describe(section):
             assert d.text
             assert d.source.startswith(("paper", "assumed: ", "measured: "))
-            assert d.low <= d.default <= d.high
+            assert d.default in d.choices if d.choices else d.low <= d.default <= d.high
             assert d.name.endswith(("_mm", "_kPa")) == bool(d.unit)
         assert [d.name for d in quantity.describe(section)] == [f.name for f in attrs.fields(section)]
 
@@ -162,6 +165,12 @@ BAD_FILES = {
     "range": (HEAD + "[chambers]\nwall_mm = 60\n", "wall_mm = 60 mm is out of bounds", "line 4"),
     "nan": (HEAD + "[chambers]\nwall_mm = nan\n", "is out of bounds", "line 4"),
     "huge": (HEAD + f"[chambers]\nwall_mm = {10**400}\n", "is out of bounds", "line 4"),
+    "choice": (
+        HEAD + '[lattice]\nkind = "body-centered"\n',
+        "kind = 'body-centered' is not known; did you mean 'body-centred'?",
+        "line 4, [lattice] kind",
+    ),
+    "no choice": (HEAD + "[lattice]\nkind = 2\n", "kind = 2 is not a name", "line 4"),
     "rule": (HEAD + "[chambers]\n# thick\nwall_mm = 5\n", "too thick", "line 5"),
 }
 
@@ -213,11 +222,10 @@ def test_the_documented_table_is_the_code():
     rows = (Path(__file__).parents[2] / "docs" / "design.md").read_text(encoding="utf-8").splitlines()
     for section in SECTIONS:
         for d in quantity.describe(section):
-            default = str(d.default).lower() if d.type is bool else f"{d.default:g}"
+            default = str(d.default).lower() if d.type in (bool, str) else f"{d.default:g}"
             text = f"{d.text}{' *' if d.fixed else ''}"
-            bounds = "" if d.type is bool else f"{d.low:g} to {d.high:g}"
             source = "assumed" if d.assumed else "paper"
             assert (
-                f"| `{section.section}.{d.name}` | {default} | {d.unit} | {bounds} | {text} | {source} |"
+                f"| `{section.section}.{d.name}` | {default} | {d.unit} | {d.allowed} | {text} | {source} |"
                 in rows
             )

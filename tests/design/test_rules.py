@@ -27,7 +27,7 @@ BROKEN = [
     ("inlet within the neck's bore", "inlet_diameter_mm", {"chambers": Chambers(inlet_diameter_mm=11.3)}),
     ("inlet boss on the base", "inlet_wall_mm", {"chambers": Chambers(inlet_wall_mm=4.3), "scale": 0.75}),
     ("struts narrow at junctions", "midspan_diameter_mm", {"lattice": Envelope(midspan_diameter_mm=1.4)}),
-    ("open cells", "midspan_diameter_mm", {"lattice": Envelope(midspan_diameter_mm=10.3)}),
+    ("open cells", "midspan_diameter_mm", {"lattice": Envelope(midspan_diameter_mm=8.9)}),
     ("anchors are lattice nodes outside the cavity", "row", {"waveguide": Waveguide(row=0)}),
     ("anchors are lattice nodes outside the cavity", "row", {"waveguide": Waveguide(row=3)}),
     ("anchors are lattice nodes outside the cavity", "row", {"waveguide": Waveguide(row=-2)}),
@@ -80,7 +80,8 @@ def test_every_rule_is_tested():
         and isinstance(call.args[0], ast.Constant)
     }
     assert len(named) > 10
-    assert named | {APEX, "a bore through every neck"} == {rule for rule, _, _ in BROKEN}
+    elsewhere = {"bending plane is a mirror plane of the lattice"}  # with its kind, in test_lattices
+    assert named | {APEX, "a bore through every neck"} == {rule for rule, _, _ in BROKEN} | elsewhere
 
 
 @pytest.mark.parametrize("scale", [0.75, 1.0, 1.3])

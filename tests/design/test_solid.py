@@ -10,7 +10,7 @@ import pytest
 from mu_addon.design import gates, shapes, solid, surface
 from mu_addon.design.anchors import window
 from mu_addon.design.export import write_nodes, write_stl
-from mu_addon.design.lattice import body_centred
+from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import Chambers, Envelope, Unit, Waveguide, load_preset
 from mu_addon.errors import InputError
 
@@ -213,7 +213,7 @@ VARIED = {
 @pytest.mark.parametrize("unit", VARIED.values(), ids=VARIED)
 def test_other_units_pass_the_gates(unit):
     s = solid.build_solid(unit, window(unit, "alpha1"))
-    assert s.gates.lattice_genus == body_centred(unit.dimensions).cycles
+    assert s.gates.lattice_genus == lattice_of(unit.dimensions).cycles
 
 
 @pytest.mark.slow
@@ -232,7 +232,7 @@ def test_node_file_lists_every_node_and_marks_the_anchors(tmp_path):
     header = [line for line in lines if line.startswith("#")]
     rows = [line.split() for line in lines if not line.startswith("#")]
     assert header[-1] == "# id kind x_mm y_mm z_mm"
-    lattice = body_centred(unit.dimensions)
+    lattice = lattice_of(unit.dimensions)
     assert [int(row[0]) for row in rows] == list(range(len(lattice.nodes)))
     assert np.array([row[2:] for row in rows], float) == pytest.approx(lattice.nodes, abs=1e-6)
     from mu_addon.design.anchors import anchors

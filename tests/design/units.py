@@ -42,8 +42,9 @@ def units(draw):
             cells_y_minus=cells_minus,
             cells_y_plus=cells_plus,
             allow_symmetric=cells_minus == cells_plus,
+            kind=draw(st.sampled_from(["body-centred", "body-centred-straight"])),
             junction_diameter_mm=junction,
-            midspan_diameter_mm=real(junction, min(0.8 * cell, 20.0)),
+            midspan_diameter_mm=real(junction, min(0.7 * cell, 20.0)),
         ),
         waveguide=Waveguide(
             row=draw(st.sampled_from(rows)),

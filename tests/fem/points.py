@@ -1,4 +1,4 @@
-"""A law at single points: energy, stress and tangent of given deformation gradients and parameters."""
+"""A law at a single point taken along a path, and derivatives by differences."""
 
 from __future__ import annotations
 
@@ -7,34 +7,10 @@ from functools import cache
 import numpy as np
 import warp as wp
 
-from mu_addon.fem import kernels  # noqa: F401 (sets Warp up)
-from mu_addon.fem.laws.tensors import mat33, mat99
+from mu_addon.fem.laws.tensors import mat33
+from mu_addon.fem.point import evaluate
 
 f64 = wp.float64
-
-
-@cache
-def _kernel(law, count):
-    energy_of, stress_of, tangent_of = law.energy, law.stress, law.tangent
-    vector = wp.types.vector(length=count, dtype=f64)
-
-    @wp.kernel(module="unique")
-    def kernel(
-        F: wp.array(dtype=mat33),
-        rows: wp.array2d(dtype=f64),
-        W: wp.array(dtype=f64),
-        P: wp.array(dtype=mat33),
-        A: wp.array(dtype=mat99),
-    ):
-        i = wp.tid()
-        m = vector()
-        for k in range(wp.static(count)):
-            m[k] = rows[i, k]
-        W[i] = energy_of(F[i], m)
-        P[i] = stress_of(F[i], m)
-        A[i] = tangent_of(F[i], m)
-
-    return kernel
 
 
 @cache
@@ -55,25 +31,6 @@ def _advance_kernel(law, count):
     return kernel
 
 
-def evaluate(law, F, rows):
-    """Energy (n,), stress (n, 3, 3) and tangent (n, 9, 9) at F (n, 3, 3), of rows (n, count) or one row.
-
-    A row holds the parameters and, for a law with history, its numbers and the time step.
-    """
-    inputs, n, count = _inputs(F, rows)
-    outputs = [wp.zeros(n, dtype=d, device="cpu") for d in (f64, mat33, mat99)]
-    wp.launch(_kernel(law, count), n, [*inputs, *outputs], device="cpu")
-    return tuple(o.numpy() for o in outputs)
-
-
-def _inputs(F, rows):
-    F = np.ascontiguousarray(F, float).reshape(-1, 3, 3)
-    n, count = len(F), np.shape(rows)[-1]
-    rows = np.broadcast_to(rows, (n, count)).astype(float).copy()
-    inputs = [wp.array(F, dtype=mat33, device="cpu"), wp.array(rows, dtype=f64, device="cpu")]
-    return inputs, n, count
-
-
 def drive(law, parameters, F, time):
     """Energy (n,) and stress (n, 3, 3) of one point taken through F (n, 3, 3) at times (n,), from rest."""
     history = np.zeros(law.history)
@@ -82,9 +39,9 @@ def drive(law, parameters, F, time):
     for now, at in zip(time, F, strict=True):
         row = np.concatenate([parameters, history, [now - before]])
         W, P, _ = evaluate(law, at, row)
-        inputs, _, count = _inputs(at, row)
+        inputs = [wp.array([at], dtype=mat33, device="cpu"), wp.array([row], dtype=f64, device="cpu")]
         out = wp.zeros((1, law.history), dtype=f64, device="cpu")
-        wp.launch(_advance_kernel(law, count), 1, [*inputs, out], device="cpu")
+        wp.launch(_advance_kernel(law, len(row)), 1, [*inputs, out], device="cpu")
         history, before = out.numpy()[0], now
         energies.append(W[0])
         stresses.append(P[0])

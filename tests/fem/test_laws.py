@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from mu_addon.errors import InputError
 from mu_addon.fem.laws import (
     Cubic,
+    CubicShear,
+    DiagonalStretch,
     Foam,
     Friction,
     Guccione,
@@ -35,11 +37,14 @@ ROWS = {
     Guccione: Guccione.parameters(2.0, 8.0, 2.0, 4.0, 100.0, FIBRE)[0],
     TransverselyIsotropic: TransverselyIsotropic.parameters(20.0, 2.0, 0.3, 0.4, 1.5, FIBRE)[0],
     Cubic: Cubic.parameters(3.0, 0.25, 0.4, FIBRE, [0, 1, 1])[0],
+    CubicShear: np.array([0.7]),
+    DiagonalStretch: np.array([0.5]),
     Prony: np.array([0.3, -0.02, 0.004, 5.0, 0.5, 1.0, 0.3, 10.0, 0.0, 1.0]),
     OgdenRoxburgh: np.array([0.3, -0.02, 0.004, 5.0, 1.5, 0.05, 0.1]),
     Friction: np.array([0.4, 0.1]),
 }
-ISOTROPIC = [law for law in ROWS if law not in (Guccione, TransverselyIsotropic, Cubic)]
+ANISOTROPIC = [Guccione, TransverselyIsotropic, Cubic, CubicShear]
+ISOTROPIC = [law for law in ROWS if law not in ANISOTROPIC]
 LAWS = pytest.mark.parametrize("law", ROWS, ids=lambda law: law.__name__)
 rotations = st.integers(0, 2**32 - 1).map(
     lambda seed: np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
@@ -157,7 +162,7 @@ def test_cubic_symmetry_has_the_engineering_constants_asked_for():
     assert 1 / (2 * np.diag(S)[3:]) == pytest.approx([0.4] * 3)
 
 
-@pytest.mark.parametrize("law", [Guccione, TransverselyIsotropic, Cubic], ids=lambda law: law.__name__)
+@pytest.mark.parametrize("law", ANISOTROPIC, ids=lambda law: law.__name__)
 def test_stated_moduli_are_the_average_over_directions(law):
     row = ROWS[law]
     C = evaluate(law, np.eye(3), row)[2][0].reshape(3, 3, 3, 3)
@@ -227,6 +232,61 @@ def test_foam_without_lateral_strain_follows_its_closed_form_on_either_side():
         np.testing.assert_allclose(P, np.diag([expected, 0, 0]), atol=1e-12)
 
 
+def test_cubic_shear_resists_shear_between_axes_and_no_stretch_along_them():
+    """Simple shear by s: W = G s^2/2, P_xy = G s; with a stretch a of x they are a^2 times that."""
+    (G,), s, a = ROWS[CubicShear], 0.3, 0.8
+    W, P, A = evaluate(CubicShear, np.diag([0.6, 1.3, 0.9]), ROWS[CubicShear])
+    assert W[0] == 0
+    assert not P.any()
+    A = A[0].reshape(3, 3, 3, 3)
+    stretched = [A[i, i, j, j] for i in range(3) for j in range(3)]
+    assert not np.any(stretched)
+    F = np.array([[a, s, 0], [0, 1, 0], [0, 0, 1.0]])
+    W, P, _ = evaluate(CubicShear, F, ROWS[CubicShear])
+    assert W[0] == pytest.approx(G * (a * s) ** 2 / 2)
+    # P = F S with S_xy = 2 G E_xy = G a s.
+    np.testing.assert_allclose(P[0], G * a * s * np.array([[s, a, 0], [1, 0, 0], [0, 0, 0]]), atol=1e-15)
+
+
+@pytest.mark.parametrize("law", [Cubic, CubicShear], ids=lambda law: law.__name__)
+def test_a_quarter_turn_of_the_body_about_an_axis_changes_nothing_and_another_turn_does(law):
+    row = ROWS[law]
+    if law is Cubic:
+        row = Cubic.parameters(3.0, 0.25, 0.4)[0]
+    F = gradients(3)
+    W, P, _ = evaluate(law, F, row)
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        Q = np.eye(3)
+        Q[[a, b]] = Q[[b, a]] * [[-1], [1]]
+        turned = evaluate(law, F @ Q.T, row)
+        np.testing.assert_allclose(turned[0], W, atol=1e-15)
+        np.testing.assert_allclose(turned[1], P @ Q.T, atol=1e-14)
+    c, s = np.cos(np.pi / 4), np.sin(np.pi / 4)
+    Q = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    assert np.abs(evaluate(law, F @ Q.T, row)[0] - W).max() > 0.01 * np.abs(W).max()
+
+
+def test_diagonal_stretch_and_cubic_shear_are_springs_along_the_diagonals():
+    """W = 9 C/8 times the sum of squared Green strains along the four diagonals of a cube."""
+    F = gradients(2)
+    E = (np.einsum("nki,nkj->nij", F, F) - np.eye(3)) / 2
+    diagonals = np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]]) / 3**0.5
+    along = np.einsum("di,nij,dj->nd", diagonals, E, diagonals)
+    W = sum(evaluate(law, F, [0.5])[0] for law in (DiagonalStretch, CubicShear))
+    np.testing.assert_allclose(W, 9 / 8 * 0.5 * (along**2).sum(axis=1), rtol=1e-12)
+    kept = np.diag([0.7, 1.1, (3 - 0.7**2 - 1.1**2) ** 0.5])
+    assert evaluate(DiagonalStretch, kept, [0.5])[0][0] < 1e-30
+
+
+def test_a_foam_in_parallel_with_cubic_shear_has_their_shear_moduli_added():
+    foam = Foam.parameters(0.018, 0.45, 3.0, 9.0)[0]
+    C = sum(evaluate(law, np.eye(3), row)[2][0] for law, row in ((Foam, foam), (CubicShear, [0.05])))
+    C = C.reshape(3, 3, 3, 3)
+    mu, lame = foam[0], foam[4]
+    assert C[0, 1, 0, 1] == pytest.approx(mu + 0.05)
+    assert (C[0, 0, 0, 0], C[0, 0, 1, 1]) == pytest.approx((lame + 2 * mu, lame))
+
+
 @pytest.mark.parametrize(
     ("law", "column", "value", "message"),
     [
@@ -242,6 +302,9 @@ def test_foam_without_lateral_strain_follows_its_closed_form_on_either_side():
         (TransverselyIsotropic, 2, -60.0, "stiffness"),
         (Cubic, 1, 9.0, "C11 - C12"),
         (Cubic, 6, 0.9, "length"),
+        (CubicShear, 0, -0.1, "G_MPa"),
+        (CubicShear, 0, np.inf, "G_MPa"),
+        (DiagonalStretch, 0, -0.1, "C_MPa"),
         (Prony, 4, -0.1, "beta1"),
         (Prony, 5, 0.0, "tau1_s"),
         (OgdenRoxburgh, 4, 0.5, "r = 0.5"),

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mu_addon.design.parameters import Unit, load_preset
-from mu_addon.design.profile import cavity_radius, cavity_volume, outer_radius
+from mu_addon.design.parameters import Printing, Unit, load_preset
+from mu_addon.design.profile import cavity_radius, cavity_volume, membrane_volume, outer_radius
 from mu_addon.errors import InputError, MeshingError
 from mu_addon.meshing import (
     LATTICE,
@@ -148,6 +148,22 @@ def test_wall_keeps_its_normal_thickness(unit: Unit, half: Mesh) -> None:
     inner = np.setdiff1d(shell, outer)
     gap = np.linalg.norm(half.nodes[inner][:, None] - half.nodes[outer][None], axis=2).min(axis=1)
     assert gap == pytest.approx(d.wall, rel=1e-9)
+
+
+@pytest.mark.parametrize("offsets", [(0.2, 0.2), (-0.15, -0.15), (0.05, 0.3)])
+def test_the_printed_unit_is_meshed(offsets: tuple[float, float]) -> None:
+    """Walls of the smallest unit as they are printed, and no others."""
+    unit = attrs.evolve(load_preset("mu-0.75x"), print=Printing(*offsets))
+    mesh, p = mesh_unit(unit), unit.printed
+    report = quality(mesh, unit)
+    assert report.inverted == 0
+    assert report.min_corner_jacobian > 0.05
+    assert abs(report.membrane_volume_error) < 1e-3
+    assert abs(report.cavity_volume_error) < 1e-3
+    assert report.membrane_volume_mm3 != pytest.approx(membrane_volume(unit.dimensions), rel=0.1)
+    on_profile = mesh.nodes[np.unique(interface(mesh))]
+    assert np.hypot(*on_profile[:, :2].T) == pytest.approx(outer_radius(p, on_profile[:, 2]), abs=1e-9)
+    assert outer_radius(p, p.cell / 2) == p.R == unit.dimensions.R + offsets[0]
 
 
 @pytest.mark.parametrize("name", ["half", "coarse"])

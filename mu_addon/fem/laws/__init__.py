@@ -1,6 +1,8 @@
 """Material laws: each gives energy, first Piola-Kirchhoff stress and tangent by F, and its valid range."""
 
 from .cubic import Cubic
+from .cubic_shear import CubicShear
+from .diagonal_stretch import DiagonalStretch
 from .foam import Foam
 from .friction import Friction
 from .guccione import Guccione
@@ -15,6 +17,8 @@ from .yeoh import Yeoh
 
 __all__ = [
     "Cubic",
+    "CubicShear",
+    "DiagonalStretch",
     "Foam",
     "Friction",
     "Guccione",

@@ -1,0 +1,215 @@
+"""Kinds of lattice: the nodes and struts of one cell and how a strut's radius runs, by name.
+
+A new kind is one `register(LatticeKind(...))`; solids, meshes and moduli take it from here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+
+Array = NDArray[np.float64]
+RadiusLaw = Callable[[Array, float, float], Array]
+
+_FINEST = 64
+"""Largest denominator of a node's coordinates: nodes that cells share are then found exactly."""
+
+
+def sin_squared(t: Array, junction_radius: float, midspan_radius: float) -> Array:
+    """Radius at fractions t of a strut: narrow at both junctions, widest at mid-span, sin^2 between."""
+    swell = np.sin(np.pi * np.asarray(t, dtype=float)) ** 2
+    return np.asarray(junction_radius + (midspan_radius - junction_radius) * swell)
+
+
+def constant(t: Array, junction_radius: float, midspan_radius: float) -> Array:
+    """The mid-span's radius all along; the junction's is ignored."""
+    return np.full_like(np.asarray(t, dtype=float), midspan_radius)
+
+
+def _coordinates(value: ArrayLike) -> Array:
+    return np.array(value, dtype=float).reshape(-1, 3)
+
+
+def _pairs(value: ArrayLike) -> NDArray[np.int64]:
+    return np.array(value, dtype=np.int64).reshape(-1, 2)
+
+
+def _content(array: NDArray[Any]) -> tuple[Any, ...]:
+    return tuple(array.ravel().tolist())
+
+
+@attrs.frozen
+class LatticeKind:
+    """One cell of a lattice, to be repeated along x, y and z.
+
+    nodes (n, 3): in cells of side 1, within [0, 1]^3, those on its faces and corners included, each
+    coordinate a fraction of denominator at most 64; struts (e, 2): pairs of nodes, those that neighbours
+    share included; radius(t, junction_radius, midspan_radius): of t (array, 0 .. 1), the same from either
+    end. Raises InputError.
+    """
+
+    name: str
+    nodes: Array = attrs.field(converter=_coordinates, eq=_content, repr=False)
+    struts: NDArray[np.int64] = attrs.field(converter=_pairs, eq=_content, repr=False)
+    radius: RadiusLaw = sin_squared
+
+    def __attrs_post_init__(self) -> None:
+        n = len(self.nodes)
+        t = np.linspace(0.0, 1.0, 11)
+        one = np.asarray(self.radius(t, 1.0, 2.0))
+        if not (np.isfinite(self.nodes).all() and (self.nodes >= 0).all() and (self.nodes <= 1).all()):
+            raise self._refused("has a node outside its cell", "give coordinates from 0 to 1")
+        if np.abs(self.grid / self.divisions - self.nodes).max(initial=0.0) > 1e-9:
+            raise self._refused(
+                "has a node off every simple fraction of the cell",
+                f"use coordinates of a denominator up to {_FINEST}, so that shared nodes are found exactly",
+            )
+        if len(np.unique(self.grid, axis=0)) < n:
+            raise self._refused("has two nodes in one place", "list each node once")
+        if not len(self.struts) or self.struts.min() < 0 or self.struts.max() >= n:
+            raise self._refused("has no struts, or one to a node that is not there", "count nodes from 0")
+        ends = np.sort(self.struts, axis=1)
+        if (ends[:, 0] == ends[:, 1]).any() or len(np.unique(ends, axis=0)) < len(ends):
+            raise self._refused("has a strut twice or without length", "list each strut once")
+        if self.opening < 1e-9:
+            raise self._refused("has struts that cross where there is no node", "split them at a node")
+        if one.shape != t.shape or not np.allclose(one, one[::-1]) or not (one > 0).all():
+            raise self._refused(
+                "has a radius that depends on a strut's direction or is not positive",
+                "give radius(t) = radius(1 - t) > 0",
+            )
+
+    def _refused(self, what: str, remedy: str) -> InputError:
+        return InputError(f"lattice {self.name!r} {what}", "lattice kind", remedy)
+
+    @cached_property
+    def divisions(self) -> int:
+        """Smallest even number of equal parts of a cell's side that puts every node on a whole number."""
+        parts = {Fraction(x).limit_denominator(_FINEST).denominator for x in self.nodes.ravel().tolist()}
+        return math.lcm(2, *parts)
+
+    @cached_property
+    def grid(self) -> NDArray[np.int64]:
+        """Nodes (n, 3) as whole numbers of `divisions` a side."""
+        return np.rint(self.nodes * self.divisions).astype(np.int64)
+
+    @cached_property
+    def inside(self) -> NDArray[np.bool_]:
+        """Whether a node (n,) lies inside the cell and is no neighbour's."""
+        return np.asarray(((self.grid > 0) & (self.grid < self.divisions)).all(axis=1))
+
+    @cached_property
+    def on_face(self) -> NDArray[np.bool_]:
+        """Whether a strut (e,) lies in a face of the cell and may be a neighbour's, too."""
+        first, second = self.grid[self.struts[:, 0]], self.grid[self.struts[:, 1]]
+        return np.asarray(((first == second) & (first % self.divisions == 0)).any(axis=1))
+
+    @cached_property
+    def opening(self) -> float:
+        """Least distance, in cells, between the axes of two struts that share no node; inf without such.
+
+        Struts as wide as that touch between their nodes: the openings around which they run close.
+        """
+        here = self.grid[self.struts]
+        shifts = np.array(list(product((-1, 0, 1), repeat=3))) * self.divisions
+        every = (here + shifts[:, None, None]).reshape(-1, 2, 3)
+        first = np.repeat(here, len(every), axis=0)
+        second = np.tile(every, (len(here), 1, 1))
+        apart = ~(first[:, :, None] == second[:, None]).all(axis=3).any(axis=(1, 2))
+        return float(_distances(first[apart], second[apart]).min(initial=np.inf)) / self.divisions
+
+    @cached_property
+    def from_centre(self) -> Array:
+        """Struts (k, 3), in cells, that leave the node at the cell's centre, where the anchors are."""
+        (centre,) = np.nonzero((2 * self.grid == self.divisions).all(axis=1))
+        here = np.isin(self.struts, centre)
+        both = np.concatenate([self.struts[here[:, 0]], self.struts[here[:, 1]][:, ::-1]])
+        return np.asarray(self.nodes[both[:, 1]] - self.nodes[both[:, 0]])
+
+    @cached_property
+    def mirrors(self) -> tuple[bool, bool, bool]:
+        """Whether the endless lattice is its own mirror image in the cell's mid-plane across x, y and z."""
+        period = self.divisions
+
+        def skeleton(grid: NDArray[np.int64]) -> set[tuple[int, ...]]:
+            found = set()
+            for a, b in self.struts.tolist():
+                for start, end in ((grid[a], grid[b]), (grid[b], grid[a])):
+                    found.add((*(start % period).tolist(), *(end - start).tolist()))
+            return found
+
+        here = skeleton(self.grid)
+        x, y, z = (bool(skeleton(self.grid * np.where(np.arange(3) == k, -1, 1)) == here) for k in range(3))
+        return x, y, z
+
+
+def _distances(first: NDArray[np.int64], second: NDArray[np.int64]) -> Array:
+    """Least distance (n,) between segments, their ends (n, 2, 3).
+
+    It lies between an end and the other segment or, where both feet fall inside, between the two lines.
+    """
+    found = np.full(len(first), np.inf)
+    for one, other in ((first, second), (second, first)):
+        axis = (other[:, 1] - other[:, 0]).astype(float)
+        for end in (0, 1):
+            away = (one[:, end] - other[:, 0]).astype(float)
+            t = np.clip(np.sum(away * axis, 1) / np.sum(axis**2, 1), 0.0, 1.0)
+            found = np.minimum(found, np.linalg.norm(away - t[:, None] * axis, axis=1))
+    u, v, w = (
+        x.astype(float)
+        for x in (first[:, 1] - first[:, 0], second[:, 1] - second[:, 0], first[:, 0] - second[:, 0])
+    )
+    a, b, c, d, e = (np.sum(p * q, 1) for p, q in ((u, u), (u, v), (v, v), (u, w), (v, w)))
+    det = a * c - b * b
+    skew = det > 1e-9 * a * c
+    s, t = np.full(len(u), -1.0), np.full(len(u), -1.0)
+    s[skew] = ((b * e - c * d) / np.where(skew, det, 1.0))[skew]
+    t[skew] = ((a * e - b * d) / np.where(skew, det, 1.0))[skew]
+    inner = (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
+    gap = np.linalg.norm(w + s[:, None] * u - t[:, None] * v, axis=1)
+    return np.where(inner, np.minimum(found, gap), found)
+
+
+_CENTRE_AND_CORNERS = [(0.5, 0.5, 0.5), *product((0.0, 1.0), repeat=3)]
+_HALF_DIAGONALS = [(0, corner) for corner in range(1, 9)]
+
+KINDS: dict[str, LatticeKind] = {}
+
+
+def register(kind: LatticeKind) -> LatticeKind:
+    """Make a kind known by its name; InputError where another has it."""
+    if KINDS.get(kind.name, kind) != kind:
+        raise InputError(f"there is a lattice {kind.name!r} already", "lattice kind", "choose another name")
+    KINDS[kind.name] = kind
+    return kind
+
+
+def kind(name: str) -> LatticeKind:
+    """The kind of that name; InputError lists those there are."""
+    if name not in KINDS:
+        raise InputError(
+            f"there is no lattice {name!r}", "[lattice] kind", f"choose one of {', '.join(names())}"
+        )
+    return KINDS[name]
+
+
+def names() -> tuple[str, ...]:
+    """Names of all kinds, in the order in which they were registered."""
+    return tuple(KINDS)
+
+
+BODY_CENTRED = register(LatticeKind("body-centred", _CENTRE_AND_CORNERS, _HALF_DIAGONALS, sin_squared))
+"""Eight half-diagonals from the centre, tapered: the source paper's."""
+
+STRAIGHT = register(LatticeKind("body-centred-straight", _CENTRE_AND_CORNERS, _HALF_DIAGONALS, constant))
+"""The same without taper."""

@@ -1,0 +1,63 @@
+"""Shear stiffness along fixed axes, for a lattice whose struts shear resists and stretch does not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from .green import of_green_strain, symmetric_identity
+from .law import Array, Law
+from .tensors import f64, mat33, mat99
+from .valid import require
+
+
+@wp.func
+def cubic_shear_energy(E: mat33, m: Any) -> wp.float64:
+    return f64(2.0) * m[0] * (E[0, 1] * E[0, 1] + E[1, 2] * E[1, 2] + E[2, 0] * E[2, 0])
+
+
+@wp.func
+def cubic_shear_stress(E: mat33, m: Any) -> mat33:
+    S = f64(2.0) * m[0] * E
+    for a in range(3):
+        S[a, a] = f64(0.0)
+    return S
+
+
+@wp.func
+def cubic_shear_stiffness(E: mat33, m: Any) -> mat99:
+    D = symmetric_identity(f64(2.0) * m[0])
+    for a in range(3):
+        D[4 * a, 4 * a] = f64(0.0)
+    return D
+
+
+class CubicShear(Law):
+    """W(E) = 2 G (Exy^2 + Eyz^2 + Ezx^2): resists shear between the axes x, y, z, and no stretch along them.
+
+    It acts in parallel with a law for the stretches, such as Foam: the whole's C44 is the sum of their shear
+    moduli. The square of the cosine between two axes' images is resisted, so that this law alone never has
+    negative energy, but shear puts the diagonals across it under compression: a companion with shear modulus
+    mu keeps the body elliptic up to a shear of about mu/G.
+    """
+
+    name = "cubic shear"
+    parameter_names = ("G_MPa",)
+    energy, stress, tangent = map(
+        staticmethod, of_green_strain(cubic_shear_energy, cubic_shear_stress, cubic_shear_stiffness)
+    )
+
+    @staticmethod
+    def small_strain(parameters: Array) -> Array:
+        """Shear modulus, averaged over directions (3/5 of G), and bulk modulus 0 (k, 2) in MPa."""
+        G = parameters[:, 0]
+        return np.stack([0.6 * G, np.zeros_like(G)], axis=1)
+
+    @staticmethod
+    def valid(parameters: Array) -> None:
+        """Raise InputError unless G is 0 or more and finite."""
+        G = parameters[:, 0]
+        good = np.isfinite(G) & (G >= 0)
+        require(good, CubicShear, "G_MPa", G, "0 or more and finite", "give a G_MPa from 0")

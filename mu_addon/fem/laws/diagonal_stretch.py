@@ -1,0 +1,59 @@
+"""Stretch of struts along the diagonals of a cell, whose length is all but kept."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from .green import of_green_strain
+from .law import Array, Law
+from .tensors import add_dyad, f64, mat33, mat99
+from .valid import require
+
+
+@wp.func
+def diagonal_energy(E: mat33, m: Any) -> wp.float64:
+    return f64(0.5) * m[0] * wp.trace(E) * wp.trace(E)
+
+
+@wp.func
+def diagonal_stress(E: mat33, m: Any) -> mat33:
+    return m[0] * wp.trace(E) * wp.identity(3, dtype=f64)
+
+
+@wp.func
+def diagonal_stiffness(E: mat33, m: Any) -> mat99:
+    one = wp.identity(3, dtype=f64)
+    return add_dyad(mat99(), m[0], one, one)
+
+
+class DiagonalStretch(Law):
+    """W(E) = C/2 (tr E)^2, where tr E/3 is the mean Green strain along the four diagonals of a cube.
+
+    It resists what lengthens or shortens struts from a cell's centre to its corners, and so nothing that
+    keeps the sum of squared stretches: the volume may shrink under tension as under compression, as that of
+    a body-centred lattice does. In parallel with CubicShear of G = C it is four springs along the diagonals.
+    C adds to C11 and C12. Under compression from all sides the springs buckle: a companion with shear modulus
+    mu keeps the body elliptic up to a trace of about -mu/C.
+    """
+
+    name = "diagonal stretch"
+    parameter_names = ("C_MPa",)
+    energy, stress, tangent = map(
+        staticmethod, of_green_strain(diagonal_energy, diagonal_stress, diagonal_stiffness)
+    )
+
+    @staticmethod
+    def small_strain(parameters: Array) -> Array:
+        """Shear modulus 0 and bulk modulus (k, 2) in MPa."""
+        C = parameters[:, 0]
+        return np.stack([np.zeros_like(C), C], axis=1)
+
+    @staticmethod
+    def valid(parameters: Array) -> None:
+        """Raise InputError unless C is 0 or more and finite."""
+        C = parameters[:, 0]
+        good = np.isfinite(C) & (C >= 0)
+        require(good, DiagonalStretch, "C_MPa", C, "0 or more and finite", "give a C_MPa from 0")

@@ -1,0 +1,75 @@
+"""What no arrangement of given phases can exceed: Voigt, Reuss and Hashin-Shtrikman bounds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import InputError
+
+Array = np.ndarray[Any, Any]
+
+
+@attrs.frozen
+class Moduli:
+    """Bulk and shear modulus in MPa of an isotropic material."""
+
+    bulk: float
+    shear: float
+
+    @property
+    def young(self) -> float:
+        """Young's modulus in MPa."""
+        return 9 * self.bulk * self.shear / (3 * self.bulk + self.shear) if self.shear else 0.0
+
+
+def voigt(shares: ArrayLike, bulk: ArrayLike, shear: ArrayLike) -> Moduli:
+    """Mean moduli of phases (k,), shares of the volume summing to 1: an upper bound under any strain."""
+    f, K, G = _phases(shares, bulk, shear)
+    return Moduli(float(f @ K), float(f @ G))
+
+
+def reuss(shares: ArrayLike, bulk: ArrayLike, shear: ArrayLike) -> Moduli:
+    """Harmonic mean moduli of phases (k,): a lower bound; 0 where a phase is a void."""
+    f, K, G = _phases(shares, bulk, shear)
+    return Moduli(_harmonic(f, K, 0.0), _harmonic(f, G, 0.0))
+
+
+def hashin_shtrikman(shares: ArrayLike, bulk: ArrayLike, shear: ArrayLike) -> tuple[Moduli, Moduli]:
+    """Lower and upper bound of an isotropic mixture of isotropic phases (k,), moduli in MPa.
+
+    A void has both moduli 0. The means over all directions (Voigt's) of an anisotropic mixture obey the
+    upper bound too: turned every way it is one of the mixtures Willis's bound, concave in the
+    arrangement, holds for. Sources: Hashin and Shtrikman, J. Mech. Phys. Solids 11 (1963) 127, as written
+    for several phases by Walpole, ibid. 14 (1966) 151; Willis, ibid. 25 (1977) 185.
+    """
+    f, K, G = _phases(shares, bulk, shear)
+    return _bound(f, K, G, K.min(), G.min()), _bound(f, K, G, K.max(), G.max())
+
+
+def _bound(f: Array, K: Array, G: Array, bulk: float, shear: float) -> Moduli:
+    """The bound of a reference medium no softer, or no stiffer, than every phase."""
+    if shear == 0.0:
+        return Moduli(_harmonic(f, K, 0.0), 0.0)
+    constraint = shear * (9 * bulk + 8 * shear) / (6 * (bulk + 2 * shear))
+    return Moduli(_harmonic(f, K, 4 / 3 * shear), _harmonic(f, G, constraint))
+
+
+def _harmonic(f: Array, moduli: Array, constraint: float) -> float:
+    present = f > 0
+    stiff = moduli[present] + constraint
+    if (stiff == 0).any():
+        return 0.0
+    return float(1.0 / (f[present] / stiff).sum() - constraint)
+
+
+def _phases(shares: ArrayLike, bulk: ArrayLike, shear: ArrayLike) -> tuple[Array, Array, Array]:
+    f, K, G = (np.atleast_1d(np.asarray(a, float)) for a in (shares, bulk, shear))
+    if abs(f.sum() - 1) > 1e-9 or (f < -1e-12).any():
+        raise InputError(f"shares of phases sum to {f.sum():.6g}", "bounds", "give shares that sum to 1")
+    if (K < 0).any() or (G < 0).any():
+        raise InputError("a phase has a negative modulus", "bounds", "give moduli of stable phases")
+    return f, K, G

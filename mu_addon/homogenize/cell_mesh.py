@@ -1,0 +1,132 @@
+"""An eighth of a printed lattice cell as tetrahedra; its mirror images are the whole lattice."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from ..design.strut_cell import Facets, StrutCell, depth_below_surface, octant_surface
+from ..errors import InputError, MeshingError
+from ..fem.elements import shape_functions
+from ..fem.laws import NeoHooke
+from ..fem.materials import Materials
+from ..meshing.mesh import Array, Mesh
+from ..meshing.surface import mesh_surface
+from .octant import pieces
+
+# Points of an element at which it is asked whether it lies in the skin: a corner's share of barycentric
+# coordinates in steps of a quarter, which makes 20.
+_STEPS = 4
+
+# About one mesh in thirty has an element that is turned over as its side is pressed flat; a tighter
+# tolerance, tried next, makes another.
+_TRIES = (1.0, 0.8, 0.6, 0.4)
+
+
+@attrs.frozen
+class CellMeshSettings:
+    """How fine a cell's mesh is; raises InputError.
+
+    order of the elements; per_diameter: elements to a diameter of the thinnest printed strut; facets of the
+    surface that is meshed, and tolerance, as a share of an element, of the mesh's distance from it.
+    """
+
+    order: int = 2
+    per_diameter: float = 4.0
+    facets: Facets = attrs.field(factory=lambda: Facets(around=16, along=20))
+    tolerance: float = 0.02
+
+    def __attrs_post_init__(self) -> None:
+        if self.order not in (1, 2):
+            raise InputError(f"order = {self.order} is not offered", "cell mesh", "give 1 or 2")
+        if not 0.5 <= self.per_diameter <= 20.0:
+            raise InputError(
+                f"per_diameter = {self.per_diameter:g} is out of bounds", "cell mesh", "give 0.5 to 20"
+            )
+        if not 1e-4 <= self.tolerance <= 0.2:
+            raise InputError(f"tolerance = {self.tolerance:g} is out of bounds", "cell mesh", "1e-4 to 0.2")
+
+
+def cell_mesh(cell: StrutCell, settings: CellMeshSettings | None = None, cache: Path | None = None) -> Mesh:
+    """Tetrahedra of the printed lattice within [0, size/2]^3 mm, nothing clamped.
+
+    Nodes of its flat sides lie exactly on the six planes. Cells that differ in size only have the same
+    mesh, enlarged, and with a cache folder it is made once. Raises InputError and MeshingError.
+    """
+    s = settings or CellMeshSettings()
+    half = cell.half_mm
+    vertices, triangles = octant_surface(cell, s.facets)
+    edge = round(2 * _thinnest(cell) / half / s.per_diameter, 9)
+    for share in _TRIES:
+        try:
+            mesh = mesh_surface(
+                # Rounded so that scaled cells are one input.
+                np.round(vertices / half, 12),
+                triangles,
+                edge,
+                epsilon_mm=round(share * s.tolerance * edge, 12),
+                order=s.order,
+                cache=cache,
+            )
+            break
+        except MeshingError as error:
+            failed = error
+    else:
+        raise MeshingError(failed.what, f"cell mesh, in halves of its size: {failed.where}", failed.remedy)
+    _require_faces(mesh)
+    nothing = mesh.base[:0]
+    return attrs.evolve(mesh, nodes=mesh.nodes * half, base=nothing, tip=nothing)
+
+
+def cell_materials(cell: StrutCell, mesh: Mesh, modulus_MPa: float, poisson: float) -> Materials:
+    """Neo-Hookean resin of a core modulus in MPa, with the cell's stiffer skin, in its mesh."""
+    count = len(mesh.tets)
+    core = Materials.neo_hooke(np.full(count, modulus_MPa), np.full(count, poisson))
+    if cell.skin_depth_mm == 0.0 or cell.skin_factor == 1.0:
+        return core
+    skin = NeoHooke.parameters(np.array([modulus_MPa * cell.skin_factor]), np.array([poisson]))
+    return core.blended(skin_share(cell, mesh), NeoHooke, skin)
+
+
+def skin_share(cell: StrutCell, mesh: Mesh) -> Array:
+    """Share (m,) of each element's volume within the cell's skin depth of the printed surface."""
+    at = _lattice_points(_STEPS)
+    points = np.einsum("qn,mnd->mqd", shape_functions(at, mesh.order), mesh.nodes[mesh.tets])
+    depth = depth_below_surface(cell, points.reshape(-1, 3)).reshape(points.shape[:2])
+    return np.asarray((depth < cell.skin_depth_mm).mean(axis=1))
+
+
+def _lattice_points(steps: int) -> Array:
+    """Barycentric centres (q, 4) of a tetrahedron's even subdivision, all of them inside."""
+    whole = np.array(
+        [
+            (a, b, c, steps - 1 - a - b - c)
+            for a in range(steps)
+            for b in range(steps - a)
+            for c in range(steps - a - b)
+        ]
+    )
+    return (whole + 0.25) / steps
+
+
+def _thinnest(cell: StrutCell) -> float:
+    """Least radius in mm of the printed struts."""
+    radii = cell.radius(np.linspace(0.0, 1.0, 33))
+    return float(radii.min()) + min(cell.offset_xy_mm, cell.offset_z_mm)
+
+
+def _require_faces(mesh: Mesh) -> None:
+    """Raise MeshingError unless a mesh is in one piece and reaches the six planes of its unit cube."""
+    count = len(np.unique(pieces(mesh)))
+    if count > 1:
+        raise MeshingError(f"the mesh of a cell falls into {count} pieces", "cell mesh", "refine it")
+    for axis, name in enumerate("xyz"):
+        for plane in (0.0, 1.0):
+            if not (mesh.nodes[:, axis] == plane).any():
+                raise MeshingError(
+                    f"the mesh of a cell does not reach its side {name} = {plane:g} size/2",
+                    "cell mesh",
+                    "refine it",
+                )

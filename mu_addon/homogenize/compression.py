@@ -1,0 +1,248 @@
+"""A specimen compressed between rigid plates, step by step, at finite deformation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
+
+import attrs
+import numpy as np
+
+from ..errors import ConvergenceError, InputError
+from ..fem.equilibrium import Equilibrium
+from ..fem.factor import IndefiniteError
+from ..fem.model import Model
+from .curve import Curve
+from .specimen import Specimen
+from .stability import Loss, Motions, first_loss, interpolated
+from .touching import Touch, first_touch
+
+Array = np.ndarray[Any, Any]
+Friction = Literal["slide", "stick"]
+
+# Small first steps for the initial slope, then even ones up to the 40 % of the paper's tests.
+STRAINS = (0.005, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
+# Steps are halved down to this strain.
+SMALLEST_STEP = 5e-4
+# Part of a strain over which the plate's pull on free nodes is measured for the first prediction.
+_PROBE = 1e-5
+
+
+@attrs.frozen(eq=False)
+class Compressed:
+    """A converged equilibrium: nominal strain, compression positive, displacement (n, 3) of the eighth in mm.
+
+    force_N and energy_mJ: of the plates on the whole block, compression positive, and stored in it.
+    """
+
+    strain: float
+    u: Array
+    force_N: float
+    energy_mJ: float
+    residual: float = 0.0
+    factorisations: int = 0
+
+
+@attrs.frozen(eq=False)
+class Compression:
+    """A specimen's states in ascending strain, the first of them at rest, and how far they can be believed.
+
+    touch: where struts first meet, which nothing resists here. loss: where the block first buckles out of
+    its symmetry, which is not followed. ended: why the path ends before the last strain asked for, or "".
+    """
+
+    specimen: Specimen
+    friction: Friction
+    states: tuple[Compressed, ...]
+    touch: Touch | None = None
+    loss: Loss | None = None
+    ended: str = ""
+
+    @property
+    def curve(self) -> Curve:
+        """Nominal stress, and the mean lateral stretches over the nodes of the side faces."""
+        s = self.specimen
+        half, nodes = s.side_mm / 2, s.mesh.nodes
+        sides = [np.flatnonzero(nodes[:, i] == nodes[:, i].max()) for i in range(2)]
+        states = self.states[::-1]
+        return Curve(
+            stretch=[1 - state.strain for state in states],
+            stress_MPa=[-state.force_N / s.side_mm**2 for state in states],
+            lateral=[
+                [1 + state.u[side, i].mean() / half for i, side in enumerate(sides)] for state in states
+            ],
+        )
+
+    @property
+    def valid_to_strain(self) -> float:
+        """The nominal strain, compression positive, up to which neither contact nor buckling is missing."""
+        ends = [self.states[-1].strain]
+        ends += [self.touch.strain] if self.touch else []
+        ends += [self.loss.before] if self.loss else []
+        return min(ends)
+
+    @property
+    def valid(self) -> Array:
+        """Whether each point (k,) of the curve is no farther than `valid_to_strain`."""
+        return np.array([state.strain <= self.valid_to_strain for state in self.states[::-1]])
+
+    @property
+    def why(self) -> str:
+        """A sentence on where the curve stops being valid."""
+        reasons = []
+        if self.loss:
+            reasons.append(str(self.loss))
+        if self.touch:
+            reasons.append(f"at {100 * self.touch.strain:.3g} % {self.touch}, and nothing resists that here")
+        if self.ended:
+            reasons.append(self.ended)
+        if not reasons:
+            reasons.append("there it ends; no struts meet each other or a plate")
+        return f"valid to {100 * self.valid_to_strain:.3g} % nominal strain: {'; '.join(reasons)}"
+
+
+def compress(
+    specimen: Specimen,
+    strains: Sequence[float] = STRAINS,
+    friction: Friction = "slide",
+    *,
+    threads: int = 2,
+    mean_dilatation: bool = False,
+    stability: bool = True,
+    on_state: Callable[[Compressed], None] | None = None,
+    load: Callable[[float], Compressed | None] = lambda strain: None,
+    store: Callable[[Compressed], None] = lambda state: None,
+) -> Compression:
+    """Equilibria at nominal strains in ascending order, compression positive, of a specimen between plates.
+
+    friction: the plates let faces slide ("slide") or hold them ("stick"), the bounds of what real ones do;
+    neither lets go of them. `load` gives a state of an earlier run at a strain, if it kept one with
+    `store`; a resumed run finds the same states to the last digit. Equilibria keep the mirror planes of the
+    block; `stability` asks where others branch off, for about as many factorisations again. Where the path
+    cannot be followed it ends, and says why; raises InputError, and ConvergenceError where there is no first
+    state.
+    """
+    strains = [float(s) for s in strains]
+    if not strains or not (np.diff([0.0, *strains, 1.0]) > 0).all():
+        raise InputError(
+            f"nominal strains {strains}", "compression test", "give them in ascending order between 0 and 1"
+        )
+    plates = Plates(specimen, friction, threads, mean_dilatation)
+    states, ended = [plates.rest], ""
+    for strain in strains:
+        state = load(strain)
+        if state is None:
+            state, failure = plates.reach(strain, states)
+            if failure is None:
+                store(state)
+            elif state is plates.rest:
+                raise failure
+            else:
+                ended = failure.what
+        if state is not states[-1]:
+            states.append(state)
+            if on_state:
+                on_state(state)
+        if ended:
+            break
+    reached, moves, held = [s.strain for s in states], [s.u for s in states], plates.held
+    # Its factor makes room for others.
+    del plates
+    touch, loss = first_touch(specimen.mesh, reached, moves), None
+    if stability:
+        # Only what comes before is of interest.
+        count = len(states) if touch is None else int(np.searchsorted(reached, touch.strain)) + 1
+        motions = Motions(specimen, held, threads, mean_dilatation)
+        loss = first_loss(motions, reached[:count], moves[:count])
+    return Compression(specimen, friction, tuple(states), touch, loss, ended)
+
+
+class Plates:
+    """Two rigid plates that a specimen's faces slide on or stick to, and its equilibria between them."""
+
+    def __init__(
+        self, specimen: Specimen, friction: Friction, threads: int = 2, mean_dilatation: bool = False
+    ) -> None:
+        if friction not in ("slide", "stick"):
+            raise InputError(f"no friction {friction!r}", "compression test", "choose slide or stick")
+        mesh = specimen.mesh
+        self.specimen = specimen
+        self.held = np.zeros(mesh.nodes.shape, bool)
+        self.held[mesh.tip, 2] = True
+        if friction == "stick":
+            self.held[mesh.tip] = True
+        self.equilibrium = Equilibrium(
+            Model(mesh, self.held, threads=threads, mean_dilatation=mean_dilatation), specimen.materials
+        )
+        self.rest = Compressed(0.0, np.zeros_like(mesh.nodes), 0.0, 0.0)
+
+    def reach(
+        self, strain: float, history: Sequence[Compressed]
+    ) -> tuple[Compressed, ConvergenceError | None]:
+        """The state at a strain, from converged states before it, the last of them the nearest.
+
+        Steps are halved until they converge near where they were predicted. Where the smallest fails, the
+        last state that did converge, and the error that names strain and cause.
+        """
+        history = list(history[-3:])
+        step = strain - history[-1].strain
+        while history[-1].strain != strain:
+            last = history[-1]
+            step = min(step, strain - last.strain)
+            # The last step ends on the strain itself, whatever rounding has left.
+            target = strain if strain - last.strain - step < SMALLEST_STEP / 2 else last.strain + step
+            try:
+                state = self._newton(history, target)
+            except ConvergenceError as why:
+                step /= 2
+                if step < SMALLEST_STEP:
+                    return last, self._failure(last, target, why.what)
+                continue
+            history = [*history[-2:], state]
+            step *= 2
+        return history[-1], None
+
+    def _newton(self, history: Sequence[Compressed], strain: float) -> Compressed:
+        eq, last = self.equilibrium, history[-1]
+        if len(history) > 1:
+            u = interpolated([state.strain for state in history], [state.u for state in history], strain)
+            guess = self._moved(u, strain)
+        else:
+            guess = self._along_tangent(last, strain)
+        state = eq.newton(guess, 0.0, eq.settings.surprise * np.abs(guess - last.u).max())
+        model = eq.model
+        # Four eighths of the block stand on a plate.
+        force = -4 * float(model.residual(state.u, 0.0, eq.parameters)[self.specimen.mesh.tip, 2].sum())
+        energy = 8 * model.potential(state.u, 0.0, eq.parameters)
+        return Compressed(strain, state.u, force, energy, state.residual, state.factorisations)
+
+    def _moved(self, u: Array, strain: float) -> Array:
+        u = u.copy()
+        u[self.specimen.mesh.tip, 2] = -strain * self.specimen.side_mm / 2
+        return u
+
+    def _along_tangent(self, last: Compressed, strain: float) -> Array:
+        """Free nodes follow the plate as the tangent has it, which must be definite."""
+        eq, model = self.equilibrium, self.equilibrium.model
+        try:
+            eq.factor.factor(model.tangent(last.u, 0.0, eq.parameters))
+        except IndefiniteError:
+            raise ConvergenceError("the state to start from is unstable") from None
+        # The whole step at once would turn the elements beside the plate inside out.
+        probe = self._moved(last.u, last.strain + _PROBE)
+        pull = model.residual(probe, 0.0, eq.parameters).ravel()[model.free] / _PROBE
+        rate = (probe - last.u) / _PROBE
+        rate.ravel()[model.free] -= eq.factor.solve(pull)
+        return self._moved(last.u + (strain - last.strain) * rate, strain)
+
+    def _failure(self, last: Compressed, strain: float, why: str) -> ConvergenceError:
+        model, mesh = self.equilibrium.model, self.specimen.mesh
+        least, element = model.smallest_jacobian(last.u, self.equilibrium.parameters)
+        nodes = mesh.tets[element]
+        x, y, z = (mesh.nodes[nodes] + last.u[nodes]).mean(axis=0)
+        return ConvergenceError(
+            f"no equilibrium at {100 * strain:.4g} % nominal strain: {why}",
+            f"the last converged state is {100 * last.strain:.4g} %; its most distorted element is {element} "
+            f"near ({x:.1f}, {y:.1f}, {z:.1f}) mm from the middle, with det F = {least:.3g}",
+            "compress less or refine the mesh",
+        )

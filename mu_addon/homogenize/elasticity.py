@@ -1,0 +1,189 @@
+"""The effective elasticity tensor of a periodic lattice, from an eighth of its cell at small strain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import MeshingError
+from ..fem.materials import Materials
+from ..meshing.mesh import Array, Mesh
+from .bounds import hashin_shtrikman
+from .octant import SHEARS, Octant, require_factor
+
+# Of energies.
+_ROUNDING = 1e-7
+# Quadratic elements three to a void's quarter circle are too stiff by up to 4e-4, and voids nearly reach the
+# bound; lattices are far below.
+_COARSE = 2e-3
+
+_NORMAL = slice(0, 3)
+
+
+def _tensor(values: ArrayLike) -> Array:
+    return np.ascontiguousarray(values, np.float64)
+
+
+@attrs.frozen(eq=False)
+class Effective:
+    """Effective elasticity of a lattice with three mirror planes: C (6, 6) in MPa, in Voigt's notation.
+
+    Order xx, yy, zz, yz, xz, xy with engineering shears; entries that vanish by symmetry are 0.
+    relative_density: share of the volume that is solid. C11, C12, C44 and what follows from them are those
+    of the nearest cubic material, means over the axes; `cubic_error` says how near it is.
+    """
+
+    C: Array = attrs.field(converter=_tensor)
+    relative_density: float = 1.0
+
+    @property
+    def C11(self) -> float:
+        """Mean of the three normal stiffnesses in MPa."""
+        return float(np.diag(self.C)[:3].mean())
+
+    @property
+    def C12(self) -> float:
+        """Mean of the three stiffnesses between two axes in MPa."""
+        return float((self.C[0, 1] + self.C[0, 2] + self.C[1, 2]) / 3)
+
+    @property
+    def C44(self) -> float:
+        """Mean of the three shear stiffnesses in MPa."""
+        return float(np.diag(self.C)[3:].mean())
+
+    @cached_property
+    def cubic(self) -> Array:
+        """The nearest cubic tensor (6, 6) in MPa."""
+        C = np.diag([self.C11 - self.C12] * 3 + [self.C44] * 3)
+        C[_NORMAL, _NORMAL] += self.C12
+        return C
+
+    @property
+    def cubic_error(self) -> float:
+        """Largest relative difference of strain energies, under any strain, from the nearest cubic tensor.
+
+        Of a lattice equal along its axes it is the mesh's noise; an offset along z alone makes it more.
+        """
+        root = np.linalg.inv(np.linalg.cholesky(self.cubic))
+        return float(np.abs(np.linalg.eigvalsh(root @ self.C @ root.T) - 1).max())
+
+    @property
+    def zener(self) -> float:
+        """Zener's ratio 2 C44 / (C11 - C12), 1 where isotropic."""
+        return 2 * self.C44 / (self.C11 - self.C12)
+
+    @property
+    def bulk(self) -> float:
+        """Bulk modulus in MPa of the cubic tensor."""
+        return (self.C11 + 2 * self.C12) / 3
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus in MPa, Hill's: the mean of Voigt's and Reuss's means over all directions."""
+        first, second = (self.C11 - self.C12) / 2, self.C44
+        return (self.shear_voigt + 5 / (2 / first + 3 / second)) / 2
+
+    @property
+    def shear_voigt(self) -> float:
+        """Voigt's mean over all directions of the shear modulus in MPa."""
+        return (self.C11 - self.C12 + 3 * self.C44) / 5
+
+    @property
+    def E100(self) -> float:
+        """Young's modulus in MPa along a cell's edge."""
+        return float(young_modulus(self.cubic, [[1, 0, 0]])[0])
+
+    @property
+    def E110(self) -> float:
+        """Young's modulus in MPa along a face's diagonal."""
+        return float(young_modulus(self.cubic, [[1, 1, 0]])[0])
+
+    @property
+    def E111(self) -> float:
+        """Young's modulus in MPa along the cell's diagonal."""
+        return float(young_modulus(self.cubic, [[1, 1, 1]])[0])
+
+    @property
+    def nu100(self) -> float:
+        """Poisson's ratio under stress along a cell's edge, across to another edge."""
+        return self.C12 / (self.C11 + self.C12)
+
+    def young_modulus(self, directions: ArrayLike) -> Array:
+        """Young's modulus (k,) in MPa along directions (k, 3), of the tensor as it is."""
+        return young_modulus(self.C, directions)
+
+
+def young_modulus(C: Array, directions: ArrayLike) -> Array:
+    """Young's modulus (k,) in MPa of a tensor (6, 6) in MPa along directions (k, 3) of any length."""
+    n = np.atleast_2d(np.asarray(directions, float))
+    n = n / np.linalg.norm(n, axis=1, keepdims=True)
+    pairs = np.stack([n[:, a] * n[:, b] for a, b in SHEARS], axis=1)
+    stress = np.hstack([n**2, pairs])
+    # Strain in engineering shears does the work of stress, component by component.
+    return np.asarray(1 / np.einsum("ka,ab,kb->k", stress, np.linalg.inv(C), stress))
+
+
+def effective_tensor(mesh: Mesh, materials: Materials, box: Sequence[float] | None = None) -> Effective:
+    """Effective elasticity of the periodic body of which a mesh is one eighth, [0, box] mm; see Octant.
+
+    Its mirror images in the six sides must make up the body. Energies of the exact small-strain solutions
+    on the mesh, so never below the true ones of the meshed shape. Raises MeshingError where a piece hangs
+    loose, or where the result is indefinite or above a bound, which no right mesh can give.
+    """
+    octant = Octant(mesh, materials, box)
+    values, K = octant.tangent(np.zeros_like(mesh.nodes))
+    C = np.zeros((6, 6))
+    limit = np.zeros((6, 6))
+    unit = np.eye(3)
+    cases = [(octant.stretching, range(3), [np.outer(e, e) for e in unit])]
+    for row, (a, b) in enumerate(SHEARS):
+        gradient = (np.outer(unit[a], unit[b]) + np.outer(unit[b], unit[a])) / 2
+        cases.append((octant.shearing((a, b)), range(3 + row, 4 + row), [gradient]))
+    for part, rows, gradients in cases:
+        affine = np.stack([octant.affine(g) for g in gradients], axis=1)
+        require_factor(part, values)
+        force = K @ affine
+        u = affine - part.solve(force)
+        C[np.ix_(rows, rows)] = u.T @ (K @ u) / octant.volume
+        limit[np.ix_(rows, rows)] = affine.T @ force / octant.volume
+    found = Effective((C + C.T) / 2, octant.relative_density)
+    _require_possible(found, octant, (limit + limit.T) / 2)
+    return found
+
+
+def _require_possible(found: Effective, octant: Octant, limit: Array) -> None:
+    """Raise MeshingError for a tensor that is indefinite, or above Voigt's or Hashin-Shtrikman's bound."""
+    if np.linalg.eigvalsh(found.C).min() <= 0:
+        raise _impossible("is not positive definite")
+    scale = np.linalg.eigvalsh(limit).max()
+    if np.linalg.eigvalsh(limit - found.C).min() < -_ROUNDING * scale:
+        raise _impossible("exceeds Voigt's bound, the mean of its materials")
+    young, poisson = octant.materials.small_strain(len(octant.mesh.tets))
+    bulk, shear = young / (3 * (1 - 2 * poisson)), young / (2 * (1 + poisson))
+    share = octant.model.volumes / octant.volume
+    isotropic = np.diag([2 * share @ shear] * 3 + [share @ shear] * 3)
+    isotropic[_NORMAL, _NORMAL] += share @ (bulk - 2 / 3 * shear)
+    if np.abs(isotropic - limit).max() > _ROUNDING * scale:
+        return  # The bound below is of isotropic phases.
+    # The last phase is the void; rounding must not make its share negative.
+    shares = np.append(share, max(0.0, 1 - share.sum()))
+    _, most = hashin_shtrikman(shares / shares.sum(), np.append(bulk, 0.0), np.append(shear, 0.0))
+    if found.bulk > most.bulk * (1 + _COARSE):
+        raise _impossible(
+            f"has a bulk modulus of {found.bulk:.4g} MPa, above Hashin and Shtrikman's {most.bulk:.4g}"
+        )
+    if found.shear_voigt > most.shear * (1 + _COARSE):
+        raise _impossible(
+            f"has a mean shear modulus of {found.shear_voigt:.4g} MPa, above Hashin and Shtrikman's "
+            f"{most.shear:.4g}"
+        )
+
+
+def _impossible(what: str) -> MeshingError:
+    return MeshingError(
+        f"the effective tensor {what}", "periodic cell", "refine its mesh, and check its box and units"
+    )

@@ -1,0 +1,197 @@
+"""An eighth of a periodic cell with three mirror planes: what its six sides prescribe, and its tangent.
+
+Under normal strains the lattice is its own mirror image, so the sides stay plane and free of shear. Under a
+shear of x against y it is turned into its negative by the mirrors across x and y and kept by that across z:
+on the sides across x the displacement in the plane is that of the mean shear, and so on the sides across y;
+on those across z only the normal one is. So the eighth carries the periodic problem exactly.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from functools import cached_property
+
+import attrs
+import numpy as np
+from scipy import sparse
+
+from ..errors import InputError, MeshingError
+from ..fem.factor import Cholesky, IndefiniteError, SuperLU, make_factor
+from ..fem.materials import Materials
+from ..fem.model import Model, Pattern
+from ..meshing.mesh import AXES, Array, Mesh
+from ..meshing.tiling import box_of
+
+# Voigt's order, and the axes each shear is of.
+SHEARS = ((1, 2), (0, 2), (0, 1))
+
+
+@attrs.frozen(eq=False)
+class Part:
+    """Some of a model's unknowns: their numbers (f,), where in the tangent theirs lie, and its factor."""
+
+    free: Array
+    entries: Array
+    factor: Cholesky | SuperLU
+
+    def factorise(self, values: Array) -> None:
+        """Factorise the part of a tangent's values (nnz,); raises IndefiniteError."""
+        self.factor.factor(values[self.entries])
+
+    def solve(self, force: Array) -> Array:
+        """Displacements (3n,) or (3n, k) in mm of such forces in N on these unknowns, 0 at all others."""
+        u = np.zeros_like(force)
+        u[self.free] = self.factor.solve(np.ascontiguousarray(force[self.free]))
+        return u
+
+
+def part(pattern: Pattern, free: Array) -> Part:
+    """The unknowns `free`, ascending, of a tangent's pattern."""
+    count = len(pattern.indptr) - 1
+    number = np.full(count, -1)
+    number[free] = np.arange(len(free))
+    columns = np.repeat(np.arange(count), np.diff(pattern.indptr))
+    entries = np.flatnonzero((number[columns] >= 0) & (number[pattern.indices] >= 0))
+    indptr = np.zeros(len(free) + 1, dtype=np.int64)
+    np.cumsum(np.bincount(number[columns[entries]], minlength=len(free)), out=indptr[1:])
+    order = number[pattern.order]
+    return Part(free, entries, make_factor(indptr, number[pattern.indices[entries]], order[order >= 0]))
+
+
+class Octant:
+    """An eighth [0, box] of a periodic cell as a model without supports, and its materials.
+
+    box: (3,) mm, the mesh's own if not given. Laws must be their own mirror images across x, y and z, as
+    isotropic ones are. Raises InputError for a mesh that leaves its box or is clamped, MeshingError for one
+    that does not reach its sides or of which a piece touches none.
+    """
+
+    def __init__(
+        self, mesh: Mesh, materials: Materials, box: Sequence[float] | None = None, threads: int = 2
+    ) -> None:
+        self.mesh = mesh
+        self.box = np.array(box_of(mesh) if box is None else box, float)
+        if mesh.symmetry or len(mesh.base):
+            raise InputError(
+                "an eighth of a cell must have neither mirror planes nor a clamped base of its own",
+                "periodic cell",
+                "leave them out: its sides are its supports",
+            )
+        if (mesh.nodes < 0).any() or (mesh.nodes > self.box).any():
+            raise InputError(
+                "a mesh leaves its cell", f"box {tuple(self.box)} mm", "give half the cell's size"
+            )
+        self.sides = np.stack([mesh.nodes == 0.0, mesh.nodes == self.box])
+        bare = [AXES[k] for k in range(3) if not self.sides[:, :, k].any(axis=1).all()]
+        if bare:
+            raise MeshingError(
+                f"a cell's mesh does not reach both of its sides across {' and '.join(bare)}",
+                "periodic cell",
+                "put its nodes exactly on the planes",
+            )
+        label = pieces(mesh)
+        held = np.zeros(label.max() + 1, bool)
+        held[label[self.sides.any(axis=(0, 2))]] = True
+        if not held.all():
+            place = tuple(float(c) for c in mesh.nodes[held[label].argmin()].round(2))
+            raise MeshingError(
+                "a piece of a cell's mesh hangs on nothing",
+                f"near {place} mm",
+                "let its struts meet, or refine it",
+            )
+        self.model = Model(mesh, threads=threads)
+        self.materials = materials
+        self.parameters = self.model.parameters(materials)
+        self.volume = float(np.prod(self.box))
+        self.relative_density = float(self.model.volumes.sum()) / self.volume
+
+    @cached_property
+    def across(self) -> Array:
+        """(n, 3) bool: node on a side across x, y, z."""
+        return np.asarray(self.sides.any(axis=0))
+
+    @cached_property
+    def stretching(self) -> Part:
+        """The unknowns under normal strains: all but the normal displacements of the sides."""
+        return self._part(self.across)
+
+    def shearing(self, axes: tuple[int, int]) -> Part:
+        """The unknowns under a shear of two axes."""
+        return self._part(self._kept_by(np.tile(np.isin(range(3), axes), (2, 1))))
+
+    def affine(self, gradient: Array) -> Array:
+        """Displacements (3n,) in mm of a uniform displacement gradient (3, 3)."""
+        return np.asarray((self.mesh.nodes @ np.asarray(gradient).T).ravel())
+
+    def tangent(self, u: Array) -> tuple[Array, sparse.csc_matrix]:
+        """The tangent at u (n, 3) in mm: its values (nnz,), and whole, of all displacements."""
+        values = self.model.tangent(u, 0.0, self.parameters)
+        return values, self.model.matrix(values)
+
+    def buckling(self, u: Array) -> str:
+        """A way the body may leave the equilibrium u (n, 3) in mm, in words, or "" if it is stable.
+
+        Seen are all motions that repeat after one or two cells along each axis, for they are made of those
+        that every mirror keeps or turns into their negative, each side by itself; and homogeneous shears.
+        Homogeneous stretches, and waves longer than two cells, are not.
+        """
+        values, K = self.tangent(u)
+        for turned in itertools.product((False, True), repeat=6):
+            odd = np.reshape(turned, (2, 3))
+            part = self._part(self._kept_by(odd))
+            try:
+                part.factorise(values)
+            except IndefiniteError:
+                return _wave(odd)
+            both = np.flatnonzero(odd.all(axis=0))
+            if len(both) == 2 and odd.sum() == 4:
+                gradient = np.zeros((3, 3))
+                gradient[both, both[::-1]] = 0.5
+                shear = self.affine(gradient)
+                force = K @ shear
+                if shear @ force <= force @ part.solve(force):
+                    return f"a homogeneous shear of {AXES[both[0]]} against {AXES[both[1]]}"
+        return ""
+
+    def _kept_by(self, odd: Array) -> Array:
+        """Displacements (n, 3), bool, that vanish in motions odd (2, 3) or even under each side's mirror."""
+        fixed = np.zeros_like(self.across)
+        for side, axis in itertools.product(range(2), range(3)):
+            normal = np.arange(3) == axis
+            fixed[self.sides[side, :, axis]] |= ~normal if odd[side, axis] else normal
+        for axis in range(3):
+            # A rigid motion costs nothing: it is held at one node.
+            if odd[:, axis].all() and odd.sum() == 2:
+                fixed[0, axis] = True
+        return fixed
+
+    def _part(self, fixed: Array) -> Part:
+        return part(self.model.pattern, np.flatnonzero(~fixed.ravel()))
+
+
+def pieces(mesh: Mesh) -> Array:
+    """The connected piece (n,) that each node of a mesh belongs to, numbered from 0."""
+    from scipy.sparse.csgraph import connected_components
+
+    first, other = mesh.tets[:, :1].repeat(mesh.tets.shape[1] - 1, axis=1), mesh.tets[:, 1:]
+    links = sparse.coo_matrix((np.ones(other.size), (first.ravel(), other.ravel())), (len(mesh.nodes),) * 2)
+    return np.asarray(connected_components(links, directed=False)[1])
+
+
+def _wave(odd: Array) -> str:
+    """A motion odd (2, 3) or even under each side's mirror, in words."""
+    double = [AXES[k] for k in range(3) if odd[0, k] != odd[1, k]]
+    if not double:
+        return "a motion that repeats in every cell"
+    return f"a motion that repeats after two cells along {' and '.join(double)}"
+
+
+def require_factor(part: Part, values: Array) -> None:
+    """Factorise at rest; raises MeshingError where a piece of the mesh hangs loose."""
+    try:
+        part.factorise(values)
+    except IndefiniteError:
+        raise MeshingError(
+            "the undeformed cell is not stable", "periodic cell", "mend its material, or let its struts meet"
+        ) from None

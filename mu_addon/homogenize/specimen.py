@@ -1,0 +1,72 @@
+"""A block of n x n x n cells between plates, one eighth of it: three mid-planes are mirrors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+from ..fem.materials import Layer, Materials
+from ..meshing.mesh import AXES, FLIPPED_TET, Mesh
+from ..meshing.tiling import box_of, tiled
+
+Array = np.ndarray[Any, Any]
+
+
+@attrs.frozen(eq=False)
+class Specimen:
+    """An eighth of a block, from its middle, the origin, to its outer faces; the plates move along z.
+
+    mesh: mirrored at all three zero planes; its `tip` are the nodes on the plate. cells: along each side.
+    side_mm: of the whole block. materials: of the eighth.
+    """
+
+    mesh: Mesh
+    cells: int
+    side_mm: float
+    materials: Materials
+
+
+def specimen(octant: Mesh, cells: int, materials: Materials, axis: str = "z") -> Specimen:
+    """A block of cells^3 cells, of the octant [0, U/2]^3 of one with a corner at the origin.
+
+    The block's outer faces are faces of cells, cut flat. materials: of the octant. axis: that of the cell
+    which the plates compress; the specimen is turned so that it becomes z. Laws must be isotropic: copies
+    are mirror images. Raises InputError.
+    """
+    if cells < 1 or cells != int(cells):
+        raise InputError(f"a specimen of {cells} cells", "compression test", "ask for 1 cell or more")
+    if axis not in AXES:
+        raise InputError(f"no axis {axis!r} to compress along", "compression test", "choose x, y or z")
+    box = box_of(octant)
+    if not np.allclose(box, box[0], rtol=1e-12):
+        raise InputError(f"the octant of a cell is {box} mm", "compression test", "give that of a cubic cell")
+    # A cyclic exchange of axes is a rotation; it keeps elements the right way round.
+    turned = np.roll(octant.nodes, 2 - AXES.index(axis), axis=1)
+    tets = octant.tets
+    if cells % 2:
+        # The middle of an odd block is the middle of a cell, of an even one a corner.
+        turned = box[0] - turned
+        tets = tets[:, FLIPPED_TET[: tets.shape[1]]]
+    piece = attrs.evolve(octant, nodes=turned, tets=tets, cavity=octant.cavity[:0], symmetry=())
+    mesh = tiled(piece, (cells,) * 3, (box[0],) * 3, symmetry=AXES)
+    mesh = attrs.evolve(mesh, base=mesh.base[:0])
+    return Specimen(mesh, int(cells), 2 * cells * box[0], repeated(materials, len(tets), cells**3))
+
+
+def repeated(materials: Materials, elements: int, copies: int) -> Materials:
+    """The materials of a piece of some elements, for its copies one after another."""
+    starts = elements * np.arange(copies)[:, None]
+    return Materials(
+        tuple(
+            Layer(
+                layer.law,
+                (starts + layer.elements).ravel(),
+                np.tile(layer.parameters, (copies, 1)),
+                np.tile(layer.weight, copies),
+            )
+            for layer in materials.layers
+        )
+    )

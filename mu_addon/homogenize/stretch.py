@@ -1,0 +1,346 @@
+"""A periodic lattice stretched along one axis at finite strain, by an eighth of its cell."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+
+import attrs
+import numpy as np
+
+from ..errors import ConvergenceError, InputError
+from ..fem.contact import crossings
+from ..fem.factor import IndefiniteError
+from ..fem.materials import Materials
+from ..meshing.mesh import AXES, Array, Mesh
+from .curve import Curve
+from .octant import Octant, require_factor
+
+# How far a node may lie beyond the mirror plane it should stay behind, as a share of the cell.
+_TOUCH = 1e-6
+
+
+@attrs.frozen
+class StretchSettings:
+    """How a virtual test of a periodic lattice is run.
+
+    strains: nominal, at which points are kept; rest is always one. confined: the lateral stretches are held
+    at 1, else their mean stresses are 0. buckling: also ask whether the lattice would leave the planes of
+    its mirrors (octant.Octant.buckling), at some 60 factorisations a point asked. tolerance: residual over
+    the root sum of squares of all element forces; min_step: least step of strain; surprise: how far from
+    its prediction a state may lie, as a share of the predicted move. Raises InputError.
+    """
+
+    axis: str = attrs.field(default="z", validator=attrs.validators.in_(AXES))
+    strains: tuple[float, ...] = tuple(float(s) for s in np.linspace(-0.4, 0.4, 41).round(12))
+    confined: bool = False
+    buckling: bool = False
+    tolerance: float = 1e-9
+    max_iterations: int = 30
+    min_step: float = 1e-3
+    max_backtracks: int = 8
+    surprise: float = 0.5
+    regularisation: tuple[float, ...] = (0.03, 0.3, 3.0, 30.0)
+
+    def __attrs_post_init__(self) -> None:
+        if not len(self.strains) or min(self.strains) <= -1.0 or not np.isfinite(self.strains).all():
+            raise InputError("no strains above -1 are asked for", "stretch", "give strains as -0.4 or 0.2")
+
+
+@attrs.frozen(eq=False)
+class Point:
+    """An equilibrium of the periodic lattice at a nominal strain.
+
+    stretch (3,) and stress_MPa (3,): mean nominal ones along x, y and z; u (n, 3): displacement in mm of the
+    eighth; residuals: of the search, relative.
+    """
+
+    strain: float
+    stretch: Array
+    stress_MPa: Array
+    u: Array
+    residuals: tuple[float, ...] = ()
+
+
+@attrs.frozen(eq=False)
+class Stretched:
+    """What a virtual test gave: the curve, its points, and where and why it stops short; "" where not."""
+
+    curve: Curve
+    points: tuple[Point, ...]
+    stopped: str = ""
+
+
+def stretch(
+    mesh: Mesh,
+    materials: Materials,
+    box: Sequence[float] | None = None,
+    settings: StretchSettings | None = None,
+    on_point: Callable[[Point], None] | None = None,
+) -> Stretched:
+    """Uniaxial test of the periodic body of which a mesh is one eighth, [0, box] mm; see octant.Octant.
+
+    The sides of every eighth stay plane, as the lattice's mirrors demand; a lattice that would buckle away
+    from them is found out with `settings.buckling` only. The curve ends where no stable equilibrium is
+    found or where walls meet, and `stopped` says so. Raises MeshingError where the undeformed cell is
+    unstable.
+    """
+    return Stretching(mesh, materials, box, settings).run(on_point)
+
+
+class Stretching:
+    """A periodic lattice under prescribed stretch along one axis; see `stretch`."""
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        materials: Materials,
+        box: Sequence[float] | None = None,
+        settings: StretchSettings | None = None,
+    ) -> None:
+        self.settings = settings or StretchSettings()
+        self.octant = Octant(mesh, materials, box)
+        self.axis = AXES.index(self.settings.axis)
+        self.lateral = () if self.settings.confined else tuple(k for k in range(3) if k != self.axis)
+        self._part = self.octant.stretching
+        self._affine = np.stack([self.octant.affine(np.diag(e)) for e in np.eye(3)], axis=1)
+        self._rest = self.octant.tangent(np.zeros_like(mesh.nodes))[0]
+        require_factor(self._part, self._rest)
+
+    @property
+    def rest(self) -> Point:
+        """The undeformed lattice."""
+        return Point(0.0, np.ones(3), np.zeros(3), np.zeros_like(self.octant.mesh.nodes))
+
+    def run(self, on_point: Callable[[Point], None] | None = None) -> Stretched:
+        """The test from rest to either end."""
+        rest = self.rest
+        wanted = sorted(set(self.settings.strains) - {0.0})
+        compressed, why_compressed = self._along([s for s in wanted if s < 0][::-1], rest, on_point)
+        pulled, why_pulled = self._along([s for s in wanted if s > 0], rest, on_point)
+        if self.settings.buckling:
+            compressed, why_compressed = self._until_buckled(compressed, why_compressed)
+            pulled, why_pulled = self._until_buckled(pulled, why_pulled)
+        points = (*compressed[::-1], rest, *pulled)
+        sides = [k for k in range(3) if k != self.axis]
+        curve = Curve(
+            [p.stretch[self.axis] for p in points],
+            [p.stress_MPa[self.axis] for p in points],
+            [p.stretch[sides] for p in points],
+        )
+        return Stretched(curve, points, "; ".join(w for w in (why_compressed, why_pulled) if w))
+
+    def _along(
+        self, strains: Sequence[float], rest: Point, on_point: Callable[[Point], None] | None
+    ) -> tuple[list[Point], str]:
+        """Points at strains farther and farther from rest, and why they end early, or ""."""
+        found: list[Point] = []
+        path = [rest]
+        for strain in strains:
+            try:
+                steps = self.reach(strain, path)
+            except ConvergenceError as stop:
+                return found, stop.what
+            if meeting := self._first_contact([path[-1], *steps]):
+                return found, meeting
+            path = [*path, *steps][-3:]
+            found.append(steps[-1])
+            if on_point:
+                on_point(steps[-1])
+        return found, ""
+
+    def _until_buckled(self, points: list[Point], stopped: str) -> tuple[list[Point], str]:
+        """Points up to the last that does not buckle, if each after the first that does, does; and why so."""
+        stable, unstable, way = 0, len(points) + 1, ""
+        asked = len(points)
+        while unstable - stable > 1:
+            if found := self.octant.buckling(points[asked - 1].u):
+                unstable, way = asked, found
+            else:
+                stable = asked
+            asked = (stable + unstable) // 2
+        if not way:
+            return points, stopped
+        strain = points[stable].strain
+        return points[:stable], f"the lattice buckles before a strain of {strain:.3f}: {way}"
+
+    def reach(self, strain: float, history: Sequence[Point]) -> list[Point]:
+        """The states on the way to a strain, from converged ones before it, the last of them the nearest.
+
+        Raises ConvergenceError naming strain and cause where the smallest step fails.
+        """
+        s = self.settings
+        path = list(history)
+        step = strain - path[-1].strain
+        while path[-1].strain != strain:
+            last = path[-1]
+            left = strain - last.strain
+            target = strain if abs(left) <= abs(step) * (1 + 1e-9) else last.strain + step
+            try:
+                guess = self.predicted(path[-3:], target)
+                reach = s.surprise * max(np.abs(guess[1] - last.u).max(), s.tolerance)
+                path.append(self.equilibrium(target, *guess, reach_mm=reach))
+            except ConvergenceError as why:
+                if abs(target - last.strain) / 2 < s.min_step:
+                    raise ConvergenceError(
+                        f"no equilibrium beyond a strain of {last.strain:.3f}: {why.what}"
+                    ) from None
+                step = (target - last.strain) / 2
+        return path[len(history) :]
+
+    def equilibrium(self, strain: float, stretch: Array, u: Array, reach_mm: float = np.inf) -> Point:
+        """Stable equilibrium at a strain from a start: stretches (3,) and displacement (n, 3) in mm.
+
+        The start's sides must lie where its stretches put them. Raises ConvergenceError where elements
+        invert, progress stops, the state is unstable, or lies farther from the start than `reach_mm`.
+        """
+        s, lateral = self.settings, list(self.lateral)
+        start = u
+        energy = self._energy(u)
+        if not np.isfinite(energy):
+            raise ConvergenceError("the predicted state inverts an element")
+        force, level = self._out_of_balance(u)
+        levels = [level]
+        definite = False
+        for _ in range(s.max_iterations):
+            if level <= s.tolerance:
+                if np.abs(u - start).max() > reach_mm:
+                    raise ConvergenceError(
+                        "the lattice snaps to a distant equilibrium (limit point or buckling)"
+                    )
+                # The last tangent was taken one quadratic step from here.
+                if not definite and not self._factorised(u)[0]:
+                    raise ConvergenceError("the equilibrium is unstable (limit point or buckling)")
+                stress = force @ self._affine / self.octant.volume
+                return Point(strain, stretch, stress, u, tuple(levels))
+            definite, change, du = self._step(u, force)
+            slope = float(force @ du.ravel())
+            length = 1.0
+            for _ in range(s.max_backtracks):
+                trial = u + length * du
+                force_there, level_there = self._out_of_balance(trial)
+                # Near the solution the energy's change drowns in rounding.
+                if level_there < 0.5 * level:
+                    energy = np.nan
+                    break
+                if np.isnan(energy):
+                    energy = self._energy(u)
+                energy_there = self._energy(trial)
+                if energy_there <= energy + 1e-4 * length * slope:
+                    energy = energy_there
+                    break
+                length /= 2
+            else:
+                raise ConvergenceError("the line search found no lower energy")
+            stretch = stretch.copy()
+            stretch[lateral] += length * change
+            u, force, level = trial, force_there, level_there
+            levels.append(level)
+        raise ConvergenceError(f"no convergence in {s.max_iterations} iterations")
+
+    def predicted(self, history: Sequence[Point], strain: float) -> tuple[Array, Array]:
+        """Stretches (3,) and displacement (n, 3) to start from at another strain."""
+        last = history[-1]
+        if len(history) == 1:
+            definite, solved, complement = self._factorised(last.u)
+            if not definite:
+                raise ConvergenceError("the state to start from is unstable")
+            change = np.zeros(3)
+            change[self.axis] = strain - last.strain
+            _, K = self.octant.tangent(last.u)
+            pushed = K @ (self._affine @ change)
+            lateral = np.linalg.solve(
+                complement, solved.T @ pushed - self._affine[:, self.lateral].T @ pushed
+            )
+            change[list(self.lateral)] = lateral
+            du = self._part.solve(-pushed) - solved @ lateral + self._affine @ change
+            return last.stretch + change, last.u + du.reshape(last.u.shape)
+        stretch, u = np.zeros(3), np.zeros_like(last.u)
+        for a in history:
+            weight = 1.0
+            for b in history:
+                if a is not b:
+                    weight *= (strain - b.strain) / (a.strain - b.strain)
+            stretch += weight * a.stretch
+            u += weight * a.u
+        # Rounding must not move it, nor the sides off the planes they are on.
+        stretch[self.axis] = 1.0 + strain
+        return stretch, self._on_planes(stretch, u)
+
+    def _energy(self, u: Array) -> float:
+        return self.octant.model.potential(u, 0.0, self.octant.parameters)
+
+    def _out_of_balance(self, u: Array) -> tuple[Array, float]:
+        """Forces (3n,) in N on all nodes, and the residual over all element forces."""
+        octant = self.octant
+        force = octant.model.residual(u, 0.0, octant.parameters).ravel()
+        # The mean force on a side, which a stretch's energy changes by.
+        mean = force @ self._affine[:, self.lateral] / octant.box[list(self.lateral)]
+        level = np.hypot(np.linalg.norm(force[self._part.free]), np.linalg.norm(mean))
+        return force, float(level / octant.model.force_scale())
+
+    def _factorised(self, u: Array) -> tuple[bool, Array, Array]:
+        """Factorise at u, with a share of the undeformed tangent's where indefinite; whether without one.
+
+        Returns the coupling (f, l) solved for, and the factorised complement (l, l) of the stretches.
+        """
+        octant, part = self.octant, self._part
+        at, _ = octant.tangent(u)
+        along = self._affine[:, self.lateral]
+        for share in (0.0, *self.settings.regularisation):
+            values = at + share * self._rest if share else at
+            try:
+                part.factorise(values)
+                coupling = octant.model.matrix(values) @ along
+                solved = part.solve(coupling)
+                complement = along.T @ coupling - coupling.T @ solved
+                np.linalg.cholesky(complement)
+            except (IndefiniteError, np.linalg.LinAlgError):
+                continue
+            return share == 0.0, solved, complement
+        raise ConvergenceError("the tangent is far from definite")
+
+    def _step(self, u: Array, force: Array) -> tuple[bool, Array, Array]:
+        """Newton's step: whether the tangent was definite, change of the lateral stretches, and of u."""
+        along = self._affine[:, self.lateral]
+        definite, solved, complement = self._factorised(u)
+        inner = self._part.solve(-force)
+        # The forces on the unknowns reach the stretches through the coupling that was solved for.
+        change = np.linalg.solve(complement, -(force @ along) + force @ solved)
+        du = inner - solved @ change + along @ change
+        return definite, change, du.reshape(u.shape)
+
+    def _on_planes(self, stretch: Array, u: Array) -> Array:
+        return np.where(self.octant.across, self.octant.mesh.nodes * (stretch - 1.0), u)
+
+    def _first_contact(self, path: Sequence[Point]) -> str:
+        """Where on a path, straight between its states, walls first meet, in words; "" if nowhere."""
+        for before, after in itertools.pairwise(path):
+            if not self._meeting(after.stretch, after.u):
+                continue
+            low, high = 0.0, 1.0
+            while high - low > 1e-3:
+                middle = (low + high) / 2
+                state = [
+                    a + middle * (b - a) for a, b in ((before.stretch, after.stretch), (before.u, after.u))
+                ]
+                low, high = (low, middle) if self._meeting(*state) else (middle, high)
+            state = [a + high * (b - a) for a, b in ((before.stretch, after.stretch), (before.u, after.u))]
+            strain = before.strain + high * (after.strain - before.strain)
+            return f"walls meet at a strain of {strain:.3f}: {self._meeting(*state)}"
+        return ""
+
+    def _meeting(self, stretch: Array, u: Array) -> str:
+        """What walls of the deformed lattice cut each other, in words, or "".
+
+        An eighth meets its mirror images exactly where it crosses a mirror plane.
+        """
+        octant = self.octant
+        x = octant.mesh.nodes + u
+        beyond = np.maximum(-x, x - octant.box * stretch)
+        node, axis = np.unravel_index(beyond.argmax(), beyond.shape)
+        if beyond[node, axis] > _TOUCH * octant.box[axis]:
+            place = ", ".join(f"{c:.2f}" for c in octant.mesh.nodes[node])
+            return f"the wall that was at ({place}) mm reaches its mirror image across {AXES[axis]}"
+        found = crossings(octant.mesh, u)
+        return str(found[0]) if found else ""

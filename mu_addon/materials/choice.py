@@ -1,0 +1,69 @@
+"""Which of the laws that were fitted to take, and which do as well."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+from .coupon import Array, Coupon
+from .fit import Fit, ranges
+from .stability import whole_ranges
+
+# Laws within this of the best Akaike criterion are as good, as is customary (Burnham and Anderson, 2002).
+AIC_TIE = 2.0
+# Laws that miss what was held out by up to this factor more than the best are as good.
+HELD_OUT_TIE = 1.1
+
+
+@attrs.frozen(eq=False)
+class Choice:
+    """The law that was chosen, those that do as well, and by which score ("held out" or "AICc") of each."""
+
+    chosen: Fit
+    tied: tuple[Fit, ...]
+    by: str
+    scores: Mapping[str, float]
+
+
+def choose(fits: Sequence[Fit]) -> Choice:
+    """The stable law that misses held-out coupons least or, without any, has the least AICc.
+
+    Laws that miss what they were fitted to are considered only if all do: a straight line may pass near a
+    held-out curve by chance. Of tied laws the one with the fewest parameters. The number of independent
+    values, for AICc, is that of the law that fits best: what is left over there is noise if anything is.
+    Raises InputError where no law is stable.
+    """
+    stable = [f for f in fits if f.stable]
+    if not stable:
+        why = "; ".join(f"{f.form.title}: {f.instability()}" for f in fits)
+        raise InputError("no fitted law is stable", why, "fit a narrower range, or Ogden laws, which are")
+    by = "held out" if np.isfinite(stable[0].held_out()) else "AICc"
+    n = min(stable, key=lambda f: f.rss).n_effective
+    scores = {f.form.name: f.held_out() if by == "held out" else f.aicc(n) for f in stable}
+    sound = [f for f in stable if f.follows] or stable
+    best = min(scores[f.form.name] for f in sound)
+    limit = HELD_OUT_TIE * best if by == "held out" else best + AIC_TIE
+    near = [f for f in sound if scores[f.form.name] <= limit]
+    chosen = min(near, key=lambda f: (f.form.count, scores[f.form.name]))
+    return Choice(chosen, tuple(f for f in near if f is not chosen), by, scores)
+
+
+def disagreement(fits: Sequence[Fit], coupons: Sequence[Coupon]) -> dict[str, tuple[Array, Array]]:
+    """For each mode without a coupon: stretches (k,), and how far laws that fit the rest differ there (k,).
+
+    The difference is the largest stress over the smallest among stable laws that miss no fitted coupon;
+    a mode is left out where fewer than two laws are left. k = 5 stretches up to the largest logarithmic
+    strain of the coupons.
+    """
+    good = [f for f in fits if f.stable and f.follows]
+    have = ranges(coupons)
+    found = {}
+    for mode, (_, high) in whole_ranges(have).items() if len(good) > 1 else ():
+        if mode not in have:
+            stretch = np.geomspace(1, high, 6)[1:]
+            stress = np.array([f.stress(mode, stretch) for f in good])
+            found[mode] = (stretch, stress.max(axis=0) / stress.min(axis=0))
+    return found

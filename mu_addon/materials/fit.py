@@ -1,0 +1,253 @@
+"""Laws fitted to coupons: parameters with intervals, errors a mode, stability."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+from .coupon import Array, Coupon, binned, incompressible
+from .forms import Form
+from .intervals import Parameter, intervals
+from .regression import Problem, best_exponents
+from .stability import Stability, stability, whole_ranges
+
+# Coupons do not see the bulk modulus; this ratio is what a nearly incompressible law is given.
+POISSON = 0.499
+# A law fails a mode whose stresses it misses by more than this share, norm over norm.
+TOLERANCE = 0.10
+# Relative weights never ask for more than this share of a coupon's largest stress.
+FLOOR = 0.05
+WEIGHTS = ("absolute", "relative")
+
+
+@attrs.frozen
+class ModeError:
+    """How far a law is from one coupon: root mean square in MPa; `share` of the stresses, norm over norm;
+    `worst` deviation as a share of the largest stress.
+    """
+
+    coupon: str
+    mode: str
+    fitted: bool
+    rms_MPa: float
+    share: float
+    worst: float
+
+
+@attrs.frozen(eq=False)
+class Fit:
+    """A law fitted to coupons.
+
+    parameters: the law's row (count,). rss: sum of squared weighted residuals of n values. memory: how many
+    of them tell as much as one that is independent. errors: of every coupon, fitted or held out. stability:
+    over each mode's range. invalid: why the law does not admit the parameters.
+    """
+
+    form: Form
+    parameters: Array
+    intervals: tuple[Parameter, ...]
+    weights: str
+    rss: float
+    n: int
+    memory: float
+    errors: tuple[ModeError, ...]
+    stability: tuple[Stability, ...]
+    invalid: str = ""
+
+    @property
+    def stable(self) -> bool:
+        """Whether the law is admissible and stable over all it was checked for."""
+        return not self.invalid and all(s.stable for s in self.stability)
+
+    @property
+    def fails(self) -> tuple[str, ...]:
+        """Modes that the law misses, fitted or held out."""
+        return tuple(dict.fromkeys(e.mode for e in self.errors if not e.share <= TOLERANCE))
+
+    @property
+    def follows(self) -> bool:
+        """Whether the law misses no coupon that it was fitted to."""
+        return all(e.share <= TOLERANCE for e in self.errors if e.fitted)
+
+    @property
+    def n_effective(self) -> float:
+        """How many independent values would tell as much."""
+        return self.n / self.memory
+
+    def aicc(self, n: float) -> float:
+        """Akaike's criterion, corrected for few values, with the likelihood of n independent ones."""
+        k = self.form.count + 1
+        if self.n - k - 1 <= 0:
+            return np.inf
+        return float(n * np.log(self.rss / self.n) + 2 * k + 2 * k * (k + 1) / (self.n - k - 1))
+
+    def held_out(self) -> float:
+        """Share by which the law misses the coupons it was not fitted to, together; nan without any."""
+        shares = [e.share for e in self.errors if not e.fitted]
+        return float(np.sqrt(np.mean(np.square(shares)))) if shares else np.nan
+
+    def usable(self) -> tuple[Any, Array]:
+        """Law and row of parameters, for a simulation; InputError where the law is not stable."""
+        if not self.stable:
+            raise InputError(
+                f"{self.form.title} as fitted is unstable: {self.instability()}",
+                "fit-material",
+                "take another law, or fit a narrower range",
+            )
+        return self.form.law, self.parameters
+
+    def instability(self) -> str:
+        """What is wrong with the law, in words; nothing where it is stable."""
+        if self.invalid:
+            return self.invalid
+        return "; ".join(s.where() for s in self.stability if not s.stable)
+
+    def stress(self, mode: str, stretch: Array) -> Array:
+        """Nominal stress (n,) in MPa at constant volume."""
+        return incompressible(self.form.law, self.parameters, mode, stretch)
+
+
+def fit(
+    form: Form,
+    coupons: Sequence[Coupon],
+    held_out: Sequence[Coupon] = (),
+    weights: str = "absolute",
+    poisson: float = POISSON,
+    profile: bool = False,
+) -> Fit:
+    """Fit a law to coupons by least squares, all modes at once, at constant volume.
+
+    weights: "absolute", residuals over the largest stress of their coupon, as a load cell's errors scale
+    with its range; "relative", residuals over the stress itself, or FLOOR of the largest where that is more.
+    Factors follow from exponents by linear least squares within their bounds, exponents by Newton's
+    method from the best combinations on a grid. Intervals of 95 %: linearised, or by `profile` for Ogden's,
+    with Student's t and widened where residuals resemble those before them. They hold for noise; where
+    the law itself is wrong no interval is honest, and a long memory says so. Raises InputError.
+    """
+    if weights not in WEIGHTS:
+        raise InputError(f"there are no {weights!r} weights", "fit", f"choose from {', '.join(WEIGHTS)}")
+    n = sum(len(c.stretch) for c in coupons)
+    if n <= form.count:
+        raise InputError(
+            f"{n} values do not determine the {form.count} parameters of {form.title}",
+            ", ".join(c.name for c in coupons) or "no coupon",
+            "measure more, or fit a law with fewer parameters",
+        )
+    problem = Problem.of(form, coupons, _weights(coupons, weights))
+    fewer = _fewer(form, coupons, weights)
+    exponents = best_exponents(fewer) if form.exponents else np.zeros(0)
+    factors, residual = problem.solve(exponents)
+    row = form.parameters(factors, exponents, poisson)
+    memory = _memory(residual, coupons)
+    return Fit(
+        form=form,
+        parameters=row,
+        intervals=intervals(problem, row, residual, memory, fewer if profile else None),
+        weights=weights,
+        rss=float(residual @ residual),
+        n=n,
+        memory=memory,
+        errors=tuple(
+            mode_error(form, row, c, fitted)
+            for group, fitted in ((coupons, True), (held_out, False))
+            for c in group
+        ),
+        stability=_stability(form, row, coupons),
+        invalid=_invalid(form, row),
+    )
+
+
+def leave_one_mode_out(form: Form, coupons: Sequence[Coupon], weights: str = "absolute") -> dict[str, float]:
+    """Share by which the law misses each mode when fitted to the others alone; {} for a single mode."""
+    modes = dict.fromkeys(c.mode for c in coupons)
+    found = {}
+    for mode in modes if len(modes) > 1 else ():
+        rest = [c for c in coupons if c.mode != mode]
+        out = [c for c in coupons if c.mode == mode]
+        found[mode] = fit(form, rest, out, weights).held_out()
+    return found
+
+
+def mode_error(form: Form, row: Array, coupon: Coupon, fitted: bool) -> ModeError:
+    """How far a law of parameters (count,) is from a coupon."""
+    off = incompressible(form.law, row, coupon.mode, coupon.stretch) - coupon.stress_MPa
+    size = np.abs(coupon.stress_MPa)
+    return ModeError(
+        coupon.name,
+        coupon.mode,
+        fitted,
+        float(np.sqrt(np.mean(off**2))),
+        float(np.linalg.norm(off) / np.linalg.norm(size)),
+        float(np.abs(off).max() / size.max()),
+    )
+
+
+def _weights(coupons: Sequence[Coupon], weights: str) -> Array:
+    """What residuals are divided by, (n,) in MPa."""
+    parts = []
+    for c in coupons:
+        size = np.abs(c.stress_MPa)
+        if not size.max() > 0:
+            raise InputError("every stress is 0", f"coupon {c.name!r}", "leave this coupon out")
+        least = size.max() if weights == "absolute" else FLOOR * size.max()
+        parts.append(np.maximum(size, least))
+    return np.concatenate(parts)
+
+
+def _fewer(form: Form, coupons: Sequence[Coupon], weights: str) -> Problem:
+    """The problem with long records in bins: within one a law is as good as straight."""
+    parts = [binned(c) for c in coupons]
+    means = [c for c, _ in parts]
+    scale = np.concatenate([_weights([c], weights) for c in means])
+    return Problem.of(form, means, scale / np.sqrt(np.concatenate([count for _, count in parts])))
+
+
+def _memory(residual: Array, coupons: Sequence[Coupon]) -> float:
+    """1 + 2 times the sum of the residuals' autocorrelation, pooled, up to where it first is not positive.
+
+    Source: Geyer, Statist. Sci. 7 (1992) 473, for means of correlated series.
+    """
+    longest = max(len(c.stretch) for c in coupons)
+    product, pairs = np.zeros(longest), np.zeros(longest)
+    start = 0
+    for c in coupons:
+        n = len(c.stretch)
+        transformed = np.fft.rfft(residual[start : start + n], 2 * n)
+        product[:n] += np.fft.irfft(np.abs(transformed) ** 2)[:n]
+        pairs[:n] += np.arange(n, 0, -1)
+        start += n
+    if product[0] == 0:
+        return 1.0
+    correlation = (product / pairs)[1 : max(longest // 2, 2)] / (product[0] / pairs[0])
+    end = np.flatnonzero(correlation <= 0)
+    return float(1 + 2 * correlation[: end[0] if len(end) else None].sum())
+
+
+def _stability(form: Form, row: Array, coupons: Sequence[Coupon]) -> tuple[Stability, ...]:
+    if _invalid(form, row):
+        return ()
+    return tuple(
+        stability(form.law, row, mode, low, high)
+        for mode, (low, high) in whole_ranges(ranges(coupons)).items()
+    )
+
+
+def ranges(coupons: Sequence[Coupon]) -> dict[str, tuple[float, float]]:
+    """Lowest and highest stretch of the modes that coupons reach, the unstretched state among them."""
+    found: dict[str, tuple[float, float]] = {}
+    for c in coupons:
+        low, high = found.get(c.mode, (1.0, 1.0))
+        found[c.mode] = (min(low, float(c.stretch.min())), max(high, float(c.stretch.max())))
+    return found
+
+
+def _invalid(form: Form, row: Array) -> str:
+    try:
+        form.law.valid(row[None])
+    except InputError as error:
+        return error.what
+    return ""

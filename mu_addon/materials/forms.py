@@ -1,0 +1,100 @@
+"""The laws that can be fitted, as sums of terms of which each has one factor and perhaps one exponent."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+from ..fem.laws import MooneyRivlin, NeoHooke, Ogden, Yeoh
+from .coupon import Array, isochoric_stress
+
+# Exponents of Ogden terms are looked for between these.
+EXPONENTS = (-15.0, 25.0)
+
+
+@attrs.frozen
+class Form:
+    """A law as it is fitted: stress = sum of factor_k times a term of the stretch.
+
+    names: the parameters that are fitted. exponents: how many Ogden terms, each of a free exponent alpha_p
+    and a factor c_p = mu_p alpha_p/2, its share of the shear modulus; 0 for a law whose terms are fixed.
+    least: lower bounds of the factors. Ogden's are kept at c_p >= 0, which is enough for stability (Hill
+    1970; Ogden, Non-Linear Elastic Deformations, 1984, section 6.2.6).
+    """
+
+    name: str
+    title: str
+    law: Any
+    names: tuple[str, ...]
+    least: tuple[float, ...]
+    exponents: int = 0
+
+    @property
+    def count(self) -> int:
+        """How many parameters are fitted."""
+        return len(self.names)
+
+    def parameters(self, factors: Array, exponents: Array, poisson: float) -> Array:
+        """The law's row (count,); kappa by Poisson's ratio at small strain."""
+        row = np.zeros(len(self.law.parameter_names))
+        if self.exponents:
+            order = np.argsort(-np.asarray(factors), kind="stable")
+            # A term that is not there needs some exponent, which has no effect.
+            row[1:6:2] = 1.0
+            row[1 : 2 * self.exponents : 2] = exponents[order]
+            row[0 : 2 * self.exponents : 2] = 2 * factors[order] / exponents[order]
+        else:
+            row[: len(factors)] = factors
+        return with_bulk(self.law, row, poisson)
+
+    def terms(self, stretches: Array, exponents: Array) -> Array:
+        """Nominal stress (n, k) in MPa of every term with factor 1, at principal stretches (n, 3)."""
+        k = len(exponents) if self.exponents else len(self.least)
+        rows = np.zeros((k, len(self.law.parameter_names)))
+        if self.exponents:
+            rows[:, 1:6:2] = 1.0
+            rows[:, 1] = exponents
+            rows[:, 0] = 2 / np.asarray(exponents)
+        else:
+            rows[:, :k] = np.eye(k)
+        n = len(stretches)
+        return (
+            isochoric_stress(self.law, np.repeat(rows, n, axis=0), np.tile(stretches, (k, 1))).reshape(k, n).T
+        )
+
+
+def with_bulk(law: Any, row: Array, poisson: float) -> Array:
+    """A row (count,) of a law that splits the volume off, its kappa by Poisson's ratio at small strain."""
+    row = np.array(row, float)
+    mu = abs(law.small_strain(row[None])[0, 0])
+    row[law.bulk] = 2 * mu * (1 + poisson) / (3 * (1 - 2 * poisson))
+    return row
+
+
+def _ogden(terms: int) -> Form:
+    names = tuple(name for p in range(1, terms + 1) for name in (f"mu{p}_MPa", f"alpha{p}"))
+    title = f"Ogden, {terms} term{'s' if terms > 1 else ''}"
+    return Form(f"ogden-{terms}", title, Ogden, names, (0.0,) * terms, terms)
+
+
+FORMS = {
+    form.name: form
+    for form in (
+        Form("neo-hooke", "neo-Hooke", NeoHooke, ("mu_MPa",), (0.0,)),
+        Form("mooney-rivlin", "Mooney-Rivlin", MooneyRivlin, ("c1_MPa", "c2_MPa"), (-np.inf, -np.inf)),
+        Form("yeoh", "Yeoh", Yeoh, ("c1_MPa", "c2_MPa", "c3_MPa"), (0.0, -np.inf, 0.0)),
+        _ogden(1),
+        _ogden(2),
+        _ogden(3),
+    )
+}
+
+
+def form(name: str) -> Form:
+    """The form of that name; InputError lists those there are."""
+    if name not in FORMS:
+        raise InputError(f"there is no law {name!r} to fit", "laws", f"choose from {', '.join(FORMS)}")
+    return FORMS[name]

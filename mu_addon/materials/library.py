@@ -1,0 +1,411 @@
+"""Materials: figures with their source and how sure they are, and a law for simulations."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..design.assets import asset_root
+from ..design.toml_text import nearest, parse, place
+from ..errors import InputError
+from ..fem import laws
+from ..fem.materials import Layer, Materials
+from ..files import write_text
+from .coupon import MODES, Array
+from .stability import Stability, stability, whole_ranges
+
+FORMAT = 1
+CONFIDENCE = ("datasheet", "measured", "fitted", "second hand", "derived", "assumed")
+
+LAWS: dict[str, Any] = {
+    law.name: law for law in (laws.NeoHooke, laws.Yeoh, laws.MooneyRivlin, laws.Ogden, laws.Foam)
+}
+# The quantities a file may give, with the unit each is in.
+QUANTITIES = {
+    "density": "g/ml",
+    "strength": "MPa",
+    "elongation": "%",
+    "hardness": "Shore A",
+    "tear_strength": "kN/m",
+    "modulus": "MPa",
+    "poisson": "",
+    "yeoh_c1": "MPa",
+}
+_VALUE = ("value", "low", "high", "unit", "confidence", "source")
+_POINT = ("mode", "strain", "stress_MPa", "confidence", "source")
+_LAW = ("name", "parameters", "low95", "high95", "confidence", "source", "ranges", "fails")
+_KEYS: dict[str, Sequence[str]] = {"": ("format", "name", "about", "point"), "law": _LAW}
+_KEYS |= dict.fromkeys(QUANTITIES, _VALUE)
+
+
+@attrs.frozen
+class Value:
+    """A figure in `unit`, from low to high where its source leaves room, with its source and confidence."""
+
+    name: str
+    value: float
+    unit: str
+    confidence: str
+    source: str
+    low: float | None = None
+    high: float | None = None
+
+
+@attrs.frozen
+class StressPoint:
+    """Nominal stress in MPa at a nominal strain, tension positive, in a mode of `coupon`."""
+
+    mode: str
+    strain: float
+    stress_MPa: float
+    confidence: str
+    source: str
+
+
+@attrs.frozen(eq=False)
+class Material:
+    """A material: figures by name, points of its stress-strain curve, a law with one row of parameters.
+
+    ranges: lowest and highest stretch of every mode that the law rests on; fails: modes it is known to
+    miss; low95, high95: intervals of parameters that were fitted.
+    """
+
+    name: str
+    about: str
+    values: Mapping[str, Value]
+    points: tuple[StressPoint, ...]
+    law: Any
+    parameters: Array
+    law_confidence: str
+    law_source: str
+    ranges: Mapping[str, tuple[float, float]]
+    fails: tuple[str, ...] = ()
+    low95: Mapping[str, float] = attrs.field(factory=dict)
+    high95: Mapping[str, float] = attrs.field(factory=dict)
+
+    @property
+    def density_g_per_ml(self) -> float:
+        """Density; InputError where none is given."""
+        if "density" not in self.values:
+            raise InputError(
+                f"{self.name} has no density", "[density]", "weigh a solid body of known volume and add it"
+            )
+        return self.values["density"].value
+
+    @property
+    def modulus_MPa(self) -> float:
+        """Young's modulus of the law at small strain."""
+        mu, kappa = self.law.small_strain(self.parameters[None])[0]
+        return float(9 * kappa * mu / (3 * kappa + mu))
+
+    @property
+    def poisson(self) -> float:
+        """Poisson's ratio of the law at small strain."""
+        mu, kappa = self.law.small_strain(self.parameters[None])[0]
+        return float((3 * kappa - 2 * mu) / (6 * kappa + 2 * mu))
+
+    @cached_property
+    def stability(self) -> tuple[Stability, ...]:
+        """The law's stability over its range, in every mode."""
+        checked = whole_ranges(self.ranges)
+        return tuple(stability(self.law, self.parameters, mode, *span) for mode, span in checked.items())
+
+    def require_stable(self) -> None:
+        """Raise InputError where the law is unstable within its range."""
+        for s in self.stability:
+            if s.unstable_at is not None:
+                raise InputError(
+                    f"{self.name}: the {self.law.name} law is unstable {s.where()}",
+                    "[law]",
+                    "take another law, or narrow its range to what will be reached",
+                )
+
+    def rows(self, count: int, factor: Any = 1.0) -> Array:
+        """Parameters (count, p) of so many elements, every modulus times `factor`, a number or (count,).
+
+        Raises InputError where the law is unstable within its range.
+        """
+        self.require_stable()
+        rows = np.repeat(self.parameters[None], count, axis=0)
+        moduli = [name.endswith("_MPa") for name in self.law.parameter_names]
+        rows[:, moduli] *= np.broadcast_to(np.asarray(factor, float), count)[:, None]
+        return rows
+
+    def materials(self, count: int, factor: Any = 1.0) -> Materials:
+        """A body of so many elements of this material, every modulus times `factor` as `rows` has it."""
+        return Materials((Layer(self.law, np.arange(count), self.rows(count, factor)),))
+
+
+def material_names() -> list[str]:
+    """Names of the shipped materials, sorted."""
+    return sorted(path.stem for path in (asset_root() / "materials").glob("*.toml"))
+
+
+def load_material(name: str) -> Material:
+    """The shipped material of that name; InputError lists the names there are."""
+    names = material_names()
+    if name not in names:
+        raise InputError(
+            f"there is no material {name!r}{nearest(name, names)}",
+            "material",
+            f"choose one of {', '.join(names)}, or give the path of a TOML file",
+        )
+    return read_material(asset_root() / "materials" / f"{name}.toml")
+
+
+def read_material(path: str | Path) -> Material:
+    """Read a material from TOML; raises InputError that names file, line and key."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(
+            f"cannot read the file: {error.strerror}",
+            str(path),
+            f"shipped materials: {', '.join(material_names())}",
+        ) from error
+    except UnicodeDecodeError as error:
+        raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
+    return parse_material(text, str(path))
+
+
+def parse_material(text: str, origin: str = "") -> Material:
+    """A material of TOML text; raises InputError that names `origin`, line and key."""
+    document = parse(text, _KEYS, origin)
+    reader = _Reader(text, origin)
+    if document.get("format") != FORMAT:
+        raise InputError(
+            f"format = {document.get('format')!r} is not known",
+            reader.at("", "format"),
+            f"write format = {FORMAT}",
+        )
+    values = {name: reader.value(name, document[name]) for name in QUANTITIES if name in document}
+    points = document.get("point", [])
+    if not isinstance(points, list):
+        raise InputError(
+            "point is not a list of tables", reader.at("", "point"), "write [[point]] above each"
+        )
+    if "law" not in document:
+        raise InputError(
+            "there is no [law]", origin or "TOML text", 'add [law] with its name, such as "neo-Hooke"'
+        )
+    return Material(
+        name=reader.word("", document, "name"),
+        about=reader.word("", document, "about") if "about" in document else "",
+        values=values,
+        points=tuple(reader.point(i, point) for i, point in enumerate(points, 1)),
+        **reader.law(document["law"], values),
+    )
+
+
+@attrs.frozen
+class _Reader:
+    """Values of a document, each checked where it stands."""
+
+    text: str
+    origin: str
+
+    def at(self, table: str, key: str, number: int = 1) -> str:
+        """File, line and name of a key; of the n-th table of that name."""
+        line, count, inside = None, 0, table == ""
+        for i, words in enumerate(self.text.splitlines(), 1):
+            header = words.strip().strip("[]").strip() if words.lstrip().startswith("[") else None
+            if header is not None:
+                count += header == table
+                inside = header == table and count == number
+                line = i if inside and line is None else line
+            elif inside and words.split("=")[0].strip() == key:
+                line = i
+        return f"{place(self.origin, line)}, {f'[{table}] ' if table else ''}{key}".rstrip()
+
+    def word(self, table: str, found: Mapping[str, Any], key: str, number: int = 1) -> str:
+        value = found.get(key)
+        if not isinstance(value, str) or not value.strip():
+            what = f"{key} is missing" if value is None else f"{key} = {value!r} is not a text"
+            raise InputError(what, self.at(table, key, number), f'write {key} = "..."')
+        return value
+
+    def number(
+        self, table: str, found: Mapping[str, Any], key: str, low: float, high: float, number: int = 1
+    ) -> float:
+        value = found.get(key)
+        where = self.at(table, key, number)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            what = f"{key} is missing" if value is None else f"{key} = {value!r} is not a number"
+            raise InputError(what, where, f"give a number from {low:g} to {high:g}")
+        if not low <= value <= high:
+            raise InputError(
+                f"{key} = {value:g} is out of bounds", where, f"give a number from {low:g} to {high:g}"
+            )
+        return float(value)
+
+    def choice(
+        self, table: str, found: Mapping[str, Any], key: str, choices: Sequence[str], number: int = 1
+    ) -> str:
+        value = self.word(table, found, key, number)
+        if value not in choices:
+            raise InputError(
+                f"{key} = {value!r} is not known{nearest(value, choices)}",
+                self.at(table, key, number),
+                f"choose one of {', '.join(choices)}",
+            )
+        return value
+
+    def value(self, name: str, found: Mapping[str, Any]) -> Value:
+        unit = found.get("unit")
+        if unit != QUANTITIES[name]:
+            raise InputError(
+                f"{name} is in {unit!r}", self.at(name, "unit"), f"give it in {QUANTITIES[name]!r}"
+            )
+        low, high = (-1.0, 0.5) if name == "poisson" else (0.0, 1e6)
+        value = self.number(name, found, "value", low, high)
+        span = {key: self.number(name, found, key, low, high) for key in ("low", "high") if key in found}
+        if not span.get("low", value) <= value <= span.get("high", value):
+            raise InputError(
+                f"{name} = {value:g} does not lie between its low and high",
+                self.at(name, "value"),
+                "correct one",
+            )
+        confidence = self.choice(name, found, "confidence", CONFIDENCE)
+        return Value(name, value, unit, confidence, self.word(name, found, "source"), **span)
+
+    def point(self, number: int, found: Mapping[str, Any]) -> StressPoint:
+        for key in found:
+            if key not in _POINT:
+                raise InputError(
+                    f"unknown key {key!r}{nearest(key, _POINT)}",
+                    self.at("point", key, number),
+                    f"known here: {', '.join(_POINT)}",
+                )
+        return StressPoint(
+            self.choice("point", found, "mode", MODES, number),
+            self.number("point", found, "strain", -0.99, 20.0, number),
+            self.number("point", found, "stress_MPa", -1e6, 1e6, number),
+            self.choice("point", found, "confidence", CONFIDENCE, number),
+            self.word("point", found, "source", number),
+        )
+
+    def law(self, found: Mapping[str, Any], values: Mapping[str, Value]) -> dict[str, Any]:
+        law = LAWS[self.choice("law", found, "name", tuple(LAWS))]
+        if "parameters" in found:
+            row = self._row(law, found["parameters"])
+        elif law is laws.NeoHooke and {"modulus", "poisson"} <= set(values):
+            row = law.parameters(values["modulus"].value, values["poisson"].value)[0]
+        else:
+            raise InputError(
+                f"the {law.name} law has no parameters",
+                self.at("law", "parameters"),
+                f"give parameters = {{ {', '.join(f'{name} = ...' for name in law.parameter_names)} }}"
+                + (", or [modulus] and [poisson]" if law is laws.NeoHooke else ""),
+            )
+        try:
+            law.valid(row[None])
+        except InputError as error:
+            raise InputError(error.what, self.at("law", "parameters"), error.remedy) from error
+        return {
+            "law": law,
+            "parameters": row,
+            "law_confidence": self.choice("law", found, "confidence", CONFIDENCE),
+            "law_source": self.word("law", found, "source"),
+            "ranges": self._ranges(found),
+            "fails": self._modes(found, "fails") if "fails" in found else (),
+            "low95": self._interval(law, found, "low95"),
+            "high95": self._interval(law, found, "high95"),
+        }
+
+    def _row(self, law: Any, found: Any) -> Array:
+        where = self.at("law", "parameters")
+        if not isinstance(found, dict):
+            raise InputError("parameters is not a table", where, "write { name = value, ... }")
+        for key in found:
+            if key not in law.parameter_names:
+                raise InputError(
+                    f"the {law.name} law has no parameter {key!r}{nearest(key, law.parameter_names)}",
+                    where,
+                    f"its parameters are {', '.join(law.parameter_names)}",
+                )
+        return np.array([self.number("law", found, name, -1e9, 1e9) for name in law.parameter_names])
+
+    def _ranges(self, found: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+        ranges, where = found.get("ranges"), self.at("law", "ranges")
+        remedy = "give what it is meant for, such as { uniaxial = [0.7, 1.5] }"
+        if not isinstance(ranges, dict) or not ranges or not set(ranges) <= set(MODES):
+            raise InputError(f"ranges = {ranges!r} does not name modes", where, remedy)
+        for mode, span in ranges.items():
+            pair = isinstance(span, list) and len(span) == 2
+            if not pair or not all(isinstance(x, int | float) and not isinstance(x, bool) for x in span):
+                raise InputError(f"the range of {mode}, {span!r}, is not two stretches", where, remedy)
+            if not 0 < span[0] <= 1 <= span[1] or span[0] == span[1]:
+                raise InputError(
+                    f"the range of {mode}, {span!r}, does not go from above 0 up to 1 and from 1 on",
+                    where,
+                    remedy,
+                )
+        return {mode: (float(low), float(high)) for mode, (low, high) in ranges.items()}
+
+    def _modes(self, found: Mapping[str, Any], key: str) -> tuple[str, ...]:
+        modes = found[key]
+        if not isinstance(modes, list) or not all(mode in MODES for mode in modes):
+            raise InputError(
+                f"{key} = {modes!r} is not a list of modes",
+                self.at("law", key),
+                f"choose from {', '.join(MODES)}",
+            )
+        return tuple(modes)
+
+    def _interval(self, law: Any, found: Mapping[str, Any], key: str) -> dict[str, float]:
+        table = found.get(key, {})
+        if not isinstance(table, dict) or not set(table) <= set(law.parameter_names):
+            raise InputError(
+                f"{key} names no parameters of the law", self.at("law", key), "write { name = value }"
+            )
+        return {name: self.number("law", table, name, -1e30, 1e30) for name in table}
+
+
+def write_material(material: Material, path: Path, head: str = "") -> None:
+    """Write a material as TOML that `read_material` takes, under `head` as comments; raises OutputError."""
+    write_text(path, material_text(material, head))
+
+
+def material_text(material: Material, head: str = "") -> str:
+    """A material as TOML text."""
+    lines = [f"# {line}".rstrip() for line in head.splitlines()]
+    lines += [f"format = {FORMAT}", f"name = {_quoted(material.name)}"]
+    if material.about:
+        lines.append(f"about = {_quoted(material.about)}")
+    for value in material.values.values():
+        lines += ["", f"[{value.name}]", f"value = {value.value!r}"]
+        lines += [
+            f"{key} = {bound!r}"
+            for key, bound in (("low", value.low), ("high", value.high))
+            if bound is not None
+        ]
+        lines += [f"unit = {_quoted(value.unit)}"]
+        lines += [f"confidence = {_quoted(value.confidence)}", f"source = {_quoted(value.source)}"]
+    for point in material.points:
+        lines += ["", "[[point]]", f"mode = {_quoted(point.mode)}", f"strain = {point.strain!r}"]
+        lines += [f"stress_MPa = {point.stress_MPa!r}", f"confidence = {_quoted(point.confidence)}"]
+        lines += [f"source = {_quoted(point.source)}"]
+    row = dict(zip(material.law.parameter_names, material.parameters.tolist(), strict=True))
+    lines += ["", "[law]", f"name = {_quoted(material.law.name)}"]
+    tables = [("parameters", row), ("low95", material.low95), ("high95", material.high95)]
+    lines += [f"{key} = {_inline(table)}" for key, table in tables if table]
+    lines += [f"confidence = {_quoted(material.law_confidence)}", f"source = {_quoted(material.law_source)}"]
+    spans = ", ".join(f"{mode} = [{low!r}, {high!r}]" for mode, (low, high) in material.ranges.items())
+    lines += [f"ranges = {{ {spans} }}"]
+    if material.fails:
+        lines += [f"fails = {json.dumps(list(material.fails))}"]
+    return "\n".join(lines) + "\n"
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def _inline(table: Mapping[str, float]) -> str:
+    return "{ " + ", ".join(f"{name} = {float(value)!r}" for name, value in table.items()) + " }"

@@ -1,0 +1,71 @@
+"""One experiment: what was tested, and the columns that were recorded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import attrs
+import numpy as np
+
+Array = np.ndarray[Any, Any]
+
+
+def _read_only(columns: Mapping[str, Any]) -> Mapping[str, Array]:
+    kept = {}
+    for name, values in columns.items():
+        kept[name] = np.array(values, np.float64)
+        kept[name].flags.writeable = False
+    return MappingProxyType(kept)
+
+
+@attrs.frozen(eq=False)
+class Experiment:
+    """One experiment of a folder of measured data; what a kind does not have, or was not given, is None.
+
+    columns: arrays (n,) by their names with unit; where a coupon or lattice was recorded as displacement
+    and force, strain and nominal stress_kPa are among them too (compression positive in
+    lattice_compression, tension positive in coupon). A column with _sd_ in its name is the spread by which
+    the whole record beside it is uncertain. A lattice that was weighed has columns mass_g and mass_sd_g, one
+    value throughout. rows (n,): where each lies in the file. orientation_deg:
+    direction of gravity about x, 0 hanging with the tip down. section_mm: width and thickness of what bears
+    the load. sha256: of the file's bytes.
+    """
+
+    name: str
+    kind: str
+    role: str
+    file: Path
+    columns: Mapping[str, Array] = attrs.field(converter=_read_only)
+    rows: Array
+    sha256: str
+    scale: float = 1.0
+    orientation_deg: float = 0.0
+    specimen: str = ""
+    temperature_C: float = math.nan
+    source: str = ""
+    mode: str | None = None
+    axis: str | None = None
+    section_mm: tuple[float, float] | None = None
+    length_mm: float | None = None
+    cells: tuple[int, int, int] | None = None
+    mass_g: float | None = None
+    mass_sd_g: float | None = None
+    added_mass_g: float | None = None
+    chamber_volume_mm3: float | None = None
+
+    def __getitem__(self, column: str) -> Array:
+        """A column (n,) by its name with unit."""
+        return self.columns[column]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def markers(self) -> dict[int, Array]:
+        """Positions (n, 3) in mm of each marker by its number; nan where a marker was not seen."""
+        numbers = sorted({int(c[6 : c.index("_")]) for c in self.columns if c.startswith("marker")})
+        return {n: np.stack([self.columns[f"marker{n}_{a}_mm"] for a in "xyz"], axis=1) for n in numbers}

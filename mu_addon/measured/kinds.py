@@ -1,0 +1,143 @@
+"""The kinds of experiment: which columns each has, which of them it needs, which keys describe it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import attrs
+
+MODES = ("uniaxial", "equibiaxial", "pure_shear")
+AXES = ("x", "y", "z")
+ROLES = ("fit", "held_out")
+
+# Every quantity is read in one unit, which its column's name ends with; "" has none.
+UNITS = {
+    "time": "s",
+    "pressure": "kPa",
+    "angle": "deg",
+    "displacement": "mm",
+    "force": "N",
+    "strain": "",
+    "stress": "kPa",
+    "stress_sd": "kPa",
+    "added_mass": "g",
+    "tip_deflection": "mm",
+    "voltage": "V",
+}
+# What a camera or a voltmeter can miss for a moment; a gap in anything else leaves rows without meaning.
+MAY_BE_MISSING = ("angle_deg", "voltage_V", "marker")
+
+_MARKER = re.compile(r"marker([1-9]\d*)_([xyz])_mm")
+
+COMMON = ("name", "kind", "file", "role", "scale", "orientation_deg", "specimen", "temperature_C", "source")
+
+
+@attrs.frozen
+class Kind:
+    """A kind of experiment.
+
+    needs: sets of columns, of which one must be whole; may_have: further columns; timed: whether time_s
+    must be there; needs_keys and may_have_keys: what describes it beyond `COMMON`; fewest: rows; marked:
+    whether markers may be among its columns.
+    """
+
+    name: str
+    needs: tuple[tuple[str, ...], ...]
+    may_have: tuple[str, ...] = ()
+    timed: bool = True
+    needs_keys: tuple[str, ...] = ()
+    may_have_keys: tuple[str, ...] = ()
+    fewest: int = 2
+    marked: bool = False
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Every column it knows by name, markers apart."""
+        needed = [column for group in self.needs for column in group]
+        return tuple(dict.fromkeys([*(("time_s",) if self.timed else ()), *needed, *self.may_have]))
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Every key that may describe it."""
+        return COMMON + self.needs_keys + self.may_have_keys
+
+    def knows(self, column: str) -> bool:
+        """Whether a column of that name belongs to it."""
+        return column in self.columns or (self.marked and _MARKER.fullmatch(column) is not None)
+
+
+_LOAD = (("strain", "stress_kPa"), ("displacement_mm", "force_N"))
+
+KINDS = {
+    kind.name: kind
+    for kind in (
+        Kind(
+            "unit_pressure",
+            (("pressure_kPa", "angle_deg"), ("pressure_kPa", "marker1_x_mm", "marker1_y_mm", "marker1_z_mm")),
+            may_have_keys=("added_mass_g", "chamber_volume_mm3"),
+            marked=True,
+        ),
+        Kind(
+            "lattice_compression",
+            _LOAD,
+            ("time_s", "stress_sd_kPa"),
+            timed=False,
+            may_have_keys=("section_mm", "length_mm", "cells", "axis", "mass_g", "mass_sd_g"),
+        ),
+        Kind(
+            "coupon",
+            _LOAD,
+            ("time_s", "stress_sd_kPa"),
+            timed=False,
+            needs_keys=("mode",),
+            may_have_keys=("section_mm", "length_mm", "axis", "mass_g"),
+        ),
+        Kind("pressure_hold", (("pressure_kPa",),), may_have_keys=("chamber_volume_mm3",)),
+        Kind(
+            "beam_deadweight",
+            (("added_mass_g", "tip_deflection_mm"),),
+            timed=False,
+            needs_keys=("section_mm", "length_mm"),
+            may_have_keys=("mass_g",),
+            fewest=1,
+        ),
+        Kind(
+            "waveguide_bending",
+            (("angle_deg", "voltage_V"),),
+            may_have_keys=("section_mm", "length_mm"),
+        ),
+    )
+}
+
+
+def quantity_of(column: str) -> tuple[str, str] | None:
+    """Quantity and unit that a column's name is made of; None where the quantity is not known."""
+    if re.fullmatch(r"marker[1-9]\d*_[xyz](_\w+)?", column):
+        head, _, tail = column.rpartition("_")
+        return (column, "") if tail in "xyz" else (head, tail)
+    for quantity in sorted(UNITS, key=len, reverse=True):
+        if column == quantity or column.startswith(quantity + "_"):
+            return quantity, column[len(quantity) + 1 :]
+    return None
+
+
+def named(quantity: str) -> str:
+    """The column of a quantity, with the unit it is read in."""
+    unit = UNITS.get(quantity, "mm")
+    return f"{quantity}_{unit}" if unit else quantity
+
+
+def markers(columns: Sequence[str]) -> dict[int, set[str]]:
+    """Which of x, y, z each marker among the columns has."""
+    found: dict[int, set[str]] = {}
+    for column in columns:
+        match = _MARKER.fullmatch(column)
+        if match:
+            found.setdefault(int(match[1]), set()).add(match[2])
+    return found
+
+
+def may_be_missing(column: str) -> bool:
+    """Whether single values of a column may be missing."""
+    return column.startswith(MAY_BE_MISSING)

@@ -1,0 +1,287 @@
+"""A CSV file of one experiment: numbers by column, and every problem named by its row."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+from .kinds import UNITS, Kind, markers, may_be_missing, named, quantity_of
+
+Array = np.ndarray[Any, Any]
+
+# A gap is an interval this many times as long as the usual one.
+GAP = 5.0
+# A spike leaves its neighbours' line by this many times the usual scatter about such lines, and by this
+# share of the column's whole range.
+SPIKE_SCATTER, SPIKE_RANGE = 10.0, 0.02
+
+
+@attrs.frozen
+class Remark:
+    """Something to know about data that can be used: `what`, `where`, and what to do about it."""
+
+    what: str
+    where: str
+    remedy: str
+
+
+@attrs.frozen(eq=False)
+class Table:
+    """Columns (n,) by name, the row of each in the file (n,), and remarks."""
+
+    columns: dict[str, Array]
+    rows: Array
+    remarks: tuple[Remark, ...]
+
+
+def read_table(text: str, kind: Kind, path: Path) -> Table:
+    """Read CSV text for an experiment of a kind; rows are counted as an editor counts lines.
+
+    Lines that begin with # are comments. Raises InputError for a file that cannot be used.
+    """
+    remarks: list[Remark] = []
+    header, body = _lines(text, path)
+    kept = _header(header, kind, path, remarks)
+    rows = np.array([number for number, _ in body])
+    if len(body) < kind.fewest:
+        raise InputError(
+            f"{len(body)} rows of numbers, and {kind.name} needs at least {kind.fewest}",
+            _at(path),
+            "record more, or leave this experiment out",
+        )
+    columns = {name: _numbers(body, i, name, len(header), path) for i, name in kept.items()}
+    columns, rows = _without_repeats(columns, rows, path, remarks)
+    if "time_s" in columns:
+        _check_time(columns["time_s"], rows, path, remarks)
+    for name, values in columns.items():
+        _check_missing(name, values, rows, path, remarks)
+        if name not in ("time_s", "added_mass_g"):
+            _check_spikes(name, values, columns.get("time_s"), rows, path, remarks)
+    return Table(columns, rows, tuple(remarks))
+
+
+def _at(path: Path, row: int | None = None, column: str = "") -> str:
+    parts = [str(path), f"row {row}" if row is not None else "", f"column {column}" if column else ""]
+    return ", ".join(part for part in parts if part)
+
+
+def _lines(text: str, path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Cells of the header, and of every further line with its number."""
+    found = []
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.strip() and not line.lstrip().startswith("#"):
+            found.append((number, [cell.strip() for cell in next(csv.reader(io.StringIO(line)))]))
+    if not found:
+        raise InputError("the file holds no table", _at(path), "begin it with the columns' names")
+    row, header = found[0]
+    if len(header) == 1 and (";" in header[0] or "\t" in header[0]):
+        raise InputError(
+            "the columns are not separated by commas",
+            _at(path, row),
+            "separate columns by commas, decimals by points",
+        )
+    if all(_is_number(cell) for cell in header):
+        raise InputError(
+            "the first line holds numbers instead of the columns' names",
+            _at(path, row),
+            "name the columns with their units, such as time_s,pressure_kPa",
+        )
+    for name in header:
+        if header.count(name) > 1:
+            raise InputError(
+                f"column {name!r} is there {header.count(name)} times", _at(path, row), "keep one"
+            )
+    return header, found[1:]
+
+
+def _header(header: Sequence[str], kind: Kind, path: Path, remarks: list[Remark]) -> dict[int, str]:
+    """The columns that are read, by their place."""
+    known = ", ".join(kind.columns) + (", marker1_x_mm, marker1_y_mm, ..." if kind.marked else "")
+    kept = {}
+    for i, name in enumerate(header):
+        if kind.knows(name):
+            kept[i] = name
+            continue
+        quantity = quantity_of(name)
+        if quantity is not None and kind.knows(named(quantity[0])):
+            wanted = named(quantity[0])
+            unit = UNITS.get(quantity[0], "mm")
+            told = f"in {quantity[1]!r}" if quantity[1] else "without a unit"
+            raise InputError(
+                f"column {name!r} is {told}; it is read " + (f"in {unit}" if unit else "as a bare number"),
+                _at(path, None, name),
+                f"convert it and name it {wanted}",
+            )
+        close = difflib.get_close_matches(name, kind.columns, n=1, cutoff=0.75)
+        if close:
+            raise InputError(
+                f"unknown column {name!r}; did you mean {close[0]!r}?", _at(path), f"known here: {known}"
+            )
+        remarks.append(
+            Remark(f"column {name!r} is not known and was not read", _at(path), f"known here: {known}")
+        )
+    names = list(kept.values())
+    if kind.timed and "time_s" not in names:
+        raise InputError("column time_s is missing", _at(path), f"{kind.name} needs the time of every row")
+    for number, axes in markers(names).items():
+        if len(axes) < 3:
+            gone = ", ".join(f"marker{number}_{a}_mm" for a in "xyz" if a not in axes)
+            raise InputError(f"marker {number} lacks {gone}", _at(path), "give x, y and z of every marker")
+    _check_needs(names, kind, path)
+    return kept
+
+
+def _check_needs(names: Sequence[str], kind: Kind, path: Path) -> None:
+    have = set(names)
+    if kind.marked and markers(names):
+        # Any marker will do.
+        have |= {f"marker1_{a}_mm" for a in "xyz"}
+    if any(have.issuperset(group) for group in kind.needs):
+        return
+    nearest = max(kind.needs, key=lambda group: len(have & set(group)) / len(group))
+    missing = [column for column in nearest if column not in have]
+    ways = " or ".join(", ".join(group) for group in kind.needs)
+    raise InputError(
+        f"column {' and '.join(missing)} is missing"
+        if len(missing) == 1
+        else f"columns {', '.join(missing)} are missing",
+        _at(path),
+        f"{kind.name} needs {ways}",
+    )
+
+
+def _numbers(body: Sequence[tuple[int, list[str]]], place: int, name: str, width: int, path: Path) -> Array:
+    values = np.empty(len(body))
+    for i, (row, cells) in enumerate(body):
+        if len(cells) != width:
+            remedy = "write decimals with a point" if len(cells) > width else "fill every column"
+            raise InputError(f"{len(cells)} values under {width} columns", _at(path, row), remedy)
+        cell = cells[place]
+        if cell == "" or cell.lower() == "nan":
+            values[i] = np.nan
+        elif _is_number(cell):
+            values[i] = float(cell)
+        else:
+            raise InputError(
+                f"{cell!r} is not a number", _at(path, row, name), "correct it, or leave the row out"
+            )
+    return values
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        return math.isfinite(float(cell)) and "_" not in cell
+    except ValueError:
+        return False
+
+
+def _without_repeats(
+    columns: dict[str, Array], rows: Array, path: Path, remarks: list[Remark]
+) -> tuple[dict[str, Array], Array]:
+    """Rows of a timed record less those that repeat the row before to the last digit."""
+    if "time_s" not in columns or len(rows) < 2:
+        return columns, rows
+    table = np.stack(list(columns.values()), axis=1)
+    same = ((table[1:] == table[:-1]) | (np.isnan(table[1:]) & np.isnan(table[:-1]))).all(axis=1)
+    if not same.any():
+        return columns, rows
+    first = rows[1:][same][0]
+    remarks.append(
+        Remark(
+            f"{same.sum()} rows repeat the row before and were left out",
+            _at(path, int(first)),
+            "see whether the logger stuttered",
+        )
+    )
+    keep = np.concatenate([[True], ~same])
+    return {name: values[keep] for name, values in columns.items()}, rows[keep]
+
+
+def _check_time(time: Array, rows: Array, path: Path, remarks: list[Remark]) -> None:
+    bad = np.flatnonzero(np.isnan(time))
+    if len(bad):
+        raise InputError(
+            "time_s is missing", _at(path, rows[bad[0]], "time_s"), "give it, or leave the row out"
+        )
+    step = np.diff(time)
+    bad = np.flatnonzero(step <= 0)
+    if len(bad):
+        i = bad[0]
+        what = "stands still" if step[i] == 0 else "runs backward"
+        raise InputError(
+            f"time {what}, from {time[i]:g} to {time[i + 1]:g} s",
+            _at(path, rows[i + 1], "time_s"),
+            "sort the rows by time; give two recordings as two experiments",
+        )
+    usual = np.median(step)
+    gaps = np.flatnonzero(step > GAP * usual)
+    if len(gaps):
+        i = gaps[np.argmax(step[gaps])]
+        remarks.append(
+            Remark(
+                f"{len(gaps)} gap{'s' if len(gaps) > 1 else ''} in time; the longest lasts {step[i]:.4g} s, "
+                f"where {usual:.4g} s is usual",
+                _at(path, int(rows[i + 1])),
+                "rates and lags across it are not seen",
+            )
+        )
+
+
+def _check_missing(name: str, values: Array, rows: Array, path: Path, remarks: list[Remark]) -> None:
+    bad = np.flatnonzero(np.isnan(values))
+    if not len(bad):
+        return
+    if not may_be_missing(name) or len(bad) == len(values):
+        raise InputError(f"{name} is missing", _at(path, rows[bad[0]], name), "give it, or leave the row out")
+    remarks.append(
+        Remark(
+            f"{len(bad)} of {len(values)} values of {name} are missing",
+            _at(path, int(rows[bad[0]]), name),
+            "these rows are not used for it",
+        )
+    )
+
+
+def _check_spikes(
+    name: str, values: Array, time: Array | None, rows: Array, path: Path, remarks: list[Remark]
+) -> None:
+    """Remark on single values that stand apart from both neighbours, as a corner or a step does not.
+
+    d is the distance from the line through the neighbours; a lone spike of height h shows as d = h with
+    -h/2 on either side.
+    """
+    seen = np.flatnonzero(np.isfinite(values))
+    if len(seen) < 8:
+        return
+    x = values[seen]
+    t = np.arange(len(x), dtype=float) if time is None else time[seen]
+    share = (t[1:-1] - t[:-2]) / (t[2:] - t[:-2])
+    d = np.zeros(len(x))
+    d[1:-1] = x[1:-1] - (x[:-2] + share * (x[2:] - x[:-2]))
+    scatter = 1.4826 * np.median(np.abs(d[1:-1]))
+    least = max(SPIKE_SCATTER * scatter, SPIKE_RANGE * float(np.ptp(x)))
+    i = np.arange(2, len(x) - 2)
+    opposite = (d[i] * d[i - 1] < 0) & (d[i] * d[i + 1] < 0)
+    beside = np.minimum(np.abs(d[i - 1]), np.abs(d[i + 1]))
+    found = i[(np.abs(d[i]) > least) & opposite & (beside > 0.25 * np.abs(d[i]))]
+    # Of a spike and the two echoes beside it only the largest is one.
+    found = [k for k in found if np.abs(d[k]) >= np.abs(d[k - 1 : k + 2]).max()]
+    if found:
+        worst = max(found, key=lambda k: abs(d[k]))
+        stand = "1 value stands" if len(found) == 1 else f"{len(found)} values stand"
+        remarks.append(
+            Remark(
+                f"{stand} apart from both neighbours, the worst ({x[worst]:.6g}) by {abs(d[worst]):.4g}",
+                _at(path, int(rows[seen[worst]]), name),
+                "look at it: an outlier that is no reading should be left out",
+            )
+        )

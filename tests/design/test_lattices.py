@@ -1,0 +1,180 @@
+"""Kinds of lattice: the registry, what a kind must be, and one that is added from outside."""
+
+import pickle
+from itertools import product
+
+import attrs
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mu_addon.design import lattices, solid
+from mu_addon.design.anchors import window
+from mu_addon.design.export import write_nodes
+from mu_addon.design.lattice import filled, lattice_of
+from mu_addon.design.lattices import BODY_CENTRED, STRAIGHT, LatticeKind, constant, sin_squared
+from mu_addon.design.parameters import Envelope, Unit, from_toml, to_toml
+from mu_addon.design.waveguide import junction_reach
+from mu_addon.errors import InputError
+from mu_addon.placement.graph import lattice_graph
+
+from .kinds import CORNERS, octet, simple_cubic, thirds
+
+
+@pytest.fixture
+def cubic(monkeypatch):
+    monkeypatch.setattr(lattices, "KINDS", dict(lattices.KINDS))
+    return lattices.register(simple_cubic())
+
+
+def test_shipped_kinds_differ_in_taper_only():
+    assert lattices.names() == ("body-centred", "body-centred-straight")
+    assert lattices.kind("body-centred") is BODY_CENTRED
+    assert np.array_equal(BODY_CENTRED.nodes, STRAIGHT.nodes)
+    t = np.array([0.0, 0.25, 0.5, 1.0])
+    assert BODY_CENTRED.radius(t, 0.75, 1.0) == pytest.approx([0.75, 0.875, 1.0, 0.75])
+    assert STRAIGHT.radius(t, 0.75, 1.0).tolist() == [1.0] * 4
+    assert all(BODY_CENTRED.mirrors)
+    assert sorted(map(tuple, np.abs(BODY_CENTRED.from_centre).tolist())) == [(0.5, 0.5, 0.5)] * 8
+
+
+@given(st.floats(0, 1), st.floats(0.1, 5), st.floats(0.1, 5))
+def test_radii_stay_between_junction_and_mid_span(t, junction, midspan):
+    low, high = sorted((junction, midspan))
+    assert low - 1e-12 <= sin_squared(t, junction, midspan) <= high + 1e-12
+    assert constant(t, junction, midspan) == midspan
+
+
+def test_a_kind_survives_another_process():
+    assert pickle.loads(pickle.dumps(BODY_CENTRED)) == BODY_CENTRED
+    assert BODY_CENTRED != STRAIGHT
+    unit = Unit()
+    again = pickle.loads(pickle.dumps(unit))
+    assert again == unit
+    assert again.dimensions == unit.dimensions
+
+
+def test_openings():
+    """Least distance of struts without a common node: closed forms, and by brute force."""
+    assert BODY_CENTRED.opening == pytest.approx(np.sqrt(0.5))
+    assert simple_cubic().opening == pytest.approx(1.0)
+    assert octet().opening == pytest.approx(0.5)
+    for kind in (BODY_CENTRED, octet(), thirds()):
+        t = np.linspace(0.0, 1.0, 13)[:, None]
+        here = kind.nodes[kind.struts]
+        every = (here + np.array(list(product((-1, 0, 1), repeat=3)))[:, None, None]).reshape(-1, 2, 3)
+        points = every[:, :1] + t * (every[:, 1:] - every[:, :1])
+        found = np.inf
+        for ends in here:
+            ends_meet = np.abs(every[:, :, None] - ends).max(axis=3).min(axis=(1, 2)) < 1e-9
+            along = ends[0] + t * (ends[1] - ends[0])
+            gaps = np.linalg.norm(points[~ends_meet][:, :, None] - along, axis=3)
+            found = min(found, gaps.min())
+        assert kind.opening == pytest.approx(found, abs=2e-3)
+
+
+def test_struts_closer_than_an_opening_close_it():
+    """Up to the opening the bare lattice keeps the genus of its graph; beyond it does not."""
+    facets = solid.Facets(16, 2, 16, 4)
+    nominal = attrs.evolve(Unit().dimensions, kind=STRAIGHT, count=3, cells_y_plus=1)
+    for share, whole in ((0.97, True), (1.03, False)):
+        width = share * STRAIGHT.opening * nominal.cell
+        d = attrs.evolve(nominal, junction_diameter=width, midspan_diameter=width)
+        lattice = lattice_of(d)
+        body = solid.lattice_solid(d, lattice, facets)
+        assert (body.genus() == lattice.cycles and len(body.decompose()) == 1) is whole
+
+
+BAD = {
+    "outside": ({"nodes": [(0, 0, 0), (1.5, 0, 0)], "struts": [(0, 1)]}, "a node outside its cell"),
+    "no number": ({"nodes": [(0, 0, 0), (np.nan, 0, 0)], "struts": [(0, 1)]}, "a node outside its cell"),
+    "fraction": ({"nodes": [(0, 0, 0), (1 / np.pi, 0, 0)], "struts": [(0, 1)]}, "off every simple fraction"),
+    "twice": ({"nodes": [(0, 0, 0), (0, 0, 0)], "struts": [(0, 1)]}, "two nodes in one place"),
+    "none": ({"nodes": CORNERS, "struts": []}, "no struts"),
+    "nowhere": ({"nodes": CORNERS, "struts": [(0, 8)]}, "a node that is not there"),
+    "point": ({"nodes": CORNERS, "struts": [(3, 3)]}, "without length"),
+    "double": ({"nodes": CORNERS, "struts": [(0, 1), (1, 0)]}, "a strut twice"),
+    "crossing": ({"nodes": CORNERS, "struts": [(0, 7), (1, 6)]}, "cross where there is no node"),
+    "one way": (
+        {"nodes": CORNERS, "struts": [(0, 1)], "radius": lambda t, a, b: a + t * (b - a)},
+        "depends on a strut's direction",
+    ),
+    "thin": ({"nodes": CORNERS, "struts": [(0, 1)], "radius": lambda t, a, b: 0 * t}, "not positive"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_a_bad_kind_is_named(case):
+    given, what = BAD[case]
+    with pytest.raises(InputError, match="lattice 'mine'") as caught:
+        LatticeKind("mine", **given)
+    assert what in caught.value.what
+    assert caught.value.remedy
+
+
+def test_registry_refuses_a_second_kind_of_a_name(cubic):
+    lattices.register(simple_cubic())  # the same again
+    with pytest.raises(InputError, match="a lattice 'simple-cubic' already"):
+        lattices.register(octet("simple-cubic"))
+    with pytest.raises(InputError, match="no lattice 'octopus'"):
+        lattices.kind("octopus")
+
+
+def test_another_kind_fills_a_unit(cubic, tmp_path):
+    """A registered kind goes through file, nodes, solid and graph by its name alone."""
+    unit = from_toml(to_toml(Unit(lattice=Envelope(kind="simple-cubic"))))
+    d = unit.dimensions
+    assert d.kind is cubic
+    lattice = lattice_of(d)
+    nx, ny, nz = 3, 4, 6
+    assert len(lattice.nodes) == (nx + 1) * (ny + 1) * (nz + 1)
+    assert len(lattice.struts) == (
+        nx * (ny + 1) * (nz + 1) + (nx + 1) * ny * (nz + 1) + (nx + 1) * (ny + 1) * nz
+    )
+    ends = lattice.nodes[lattice.struts]
+    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) == pytest.approx(d.cell)
+    assert lattice.is_corner.all()
+    assert solid.build_solid(unit).gates.lattice_genus == lattice.cycles
+    write_nodes(unit, tmp_path / "nodes.txt")
+    rows = [row.split() for row in (tmp_path / "nodes.txt").read_text().splitlines() if row[0] != "#"]
+    assert [row[1] for row in rows] == ["corner"] * len(lattice.nodes)
+    graph = lattice_graph(d)
+    assert graph.lengths == pytest.approx(d.cell)
+    with pytest.raises(InputError, match="no node at the cell's centre"):
+        solid.build_solid(unit, window(unit, "alpha1"))
+
+
+def test_shared_nodes_at_thirds_are_found_exactly():
+    kind = thirds()
+    assert kind.divisions == 6
+    cells = np.array(list(product(range(2), repeat=3))) * kind.divisions
+    lattice = filled(kind, cells, 12.5, 0.5, 0.5)
+    assert len(lattice.nodes) == 27 + 2 * 54
+    assert len(lattice.struts) == 3 * 54
+    assert lattice.on_face.all()
+    assert not lattice.inside.any()
+
+
+def test_a_one_sided_kind_is_no_units_lattice(monkeypatch):
+    monkeypatch.setattr(lattices, "KINDS", dict(lattices.KINDS))
+    slanted = LatticeKind("slanted", [(0.5, 0.5, 0.5), *CORNERS], [(0, 1), (0, 8)])
+    assert slanted.mirrors == (False, False, False)
+    lattices.register(slanted)
+    with pytest.raises(InputError, match="is not its own mirror image across x"):
+        Unit(lattice=Envelope(kind="slanted"))
+
+
+def test_upright_struts_cover_a_bar_only_where_they_are_wider(monkeypatch):
+    monkeypatch.setattr(lattices, "KINDS", dict(lattices.KINDS))
+    ends = [(0.5, 0.5, z) for z in (0.0, 1.0)] + [(0.5, y, 0.5) for y in (0.0, 1.0)]
+    ends += [(x, 0.5, 0.5) for x in (0.0, 1.0)]
+    lattices.register(LatticeKind("cross", [(0.5, 0.5, 0.5), *ends], [(0, k) for k in range(1, 7)], constant))
+
+    def reach(width):
+        envelope = Envelope(kind="cross", junction_diameter_mm=1.0, midspan_diameter_mm=width)
+        return junction_reach(Unit(lattice=envelope).dimensions)
+
+    # The strut along y leaves a circle on the bar's face, of its own radius.
+    assert reach(1.4) == pytest.approx(0.7)
+    assert reach(1.6) == pytest.approx(12.5 / 2)

@@ -1,0 +1,116 @@
+"""`homogenize` and `fit-material` as their users run them: files, figures that agree, and bad input."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mu_addon.homogenize.effective import read_effective
+
+from .processes import run
+
+COARSE = ("--cells", "1", "--friction", "slide", "--strain", "0.1", "--refine", "0.5")
+TRELOAR = Path(__file__).resolve().parents[1] / "data" / "treloar"
+
+
+@pytest.fixture(scope="module")
+def lattice(tmp_path_factory):
+    out = tmp_path_factory.mktemp("lattice")
+    done = run("homogenize", "--preset", "mu-1.0x", *COARSE, "--out", str(out))
+    assert done.returncode == 0, done.stderr
+    return out, done
+
+
+def table(path):
+    with path.open() as stream:
+        rows = list(csv.DictReader(stream))
+    return {key: [row[key] for row in rows] for key in rows[0]}
+
+
+@pytest.mark.slow
+def test_it_leaves_tensor_curves_law_and_report(lattice):
+    out, done = lattice
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["status"] == "complete"
+    moduli = summary["moduli_kPa"]
+    # Bending along the axes, stretching along the struts.
+    assert 2 < moduli["E100"] < 4
+    assert 60 < moduli["E111"] < 90
+    assert f"{moduli['E100']:.4g} kPa along an axis" in done.stdout
+    C = table(out / "tensor.csv")
+    assert np.mean([float(C["xx"][0]), float(C["yy"][1]), float(C["zz"][2])]) == pytest.approx(moduli["C11"])
+    cell = table(out / "cell.csv")
+    strain, stress = (np.array(cell[k], float) for k in ("strain", "stress_kPa"))
+    rise = np.interp(0.02, strain, stress) - np.interp(-0.02, strain, stress)
+    assert rise / 0.04 == pytest.approx(moduli["E100"], rel=0.02)
+    block = table(out / "specimen_slide.csv")
+    assert float(block["strain"][-1]) == pytest.approx(0.1)
+    assert float(block["stress_kPa"][1]) / float(block["strain"][1]) < moduli["E100"]
+    law = read_effective(out / "effective.toml")
+    assert law.C44_kPa == pytest.approx(moduli["C44"])
+    assert (out / "specimen.stl").stat().st_size > 10_000
+    report = (out / "report.html").read_text()
+    for words in ("Young&#x27;s modulus", "A block between plates", "The law for the analysis mesh"):
+        assert words in report or words.replace("&#x27;", "'") in report
+
+
+@pytest.mark.slow
+def test_it_resumes_from_what_was_finished(lattice):
+    out, _ = lattice
+    before = (out / "effective.toml").read_bytes(), (out / "specimen_slide.csv").read_bytes()
+    (out / "report.html").unlink()
+    done = run("homogenize", "--preset", "mu-1.0x", *COARSE, "--out", str(out))
+    assert done.returncode == 0, done.stderr
+    assert ((out / "effective.toml").read_bytes(), (out / "specimen_slide.csv").read_bytes()) == before
+    assert (out / "report.html").exists()
+
+
+@pytest.mark.slow
+def test_other_inputs_set_the_old_results_aside(lattice):
+    out, _ = lattice
+    done = run("homogenize", "--preset", "mu-1.5x", "--no-specimen", "--refine", "0.5", "--out", str(out))
+    assert done.returncode == 0, done.stderr
+    assert (out / "stale" / "specimen_slide.csv").exists()
+    assert not (out / "specimen_slide.csv").exists()
+    # One lattice at another scale: the same moduli, to the last digit of its mesh.
+    now, before = (json.loads((p / "summary.json").read_text())["moduli_kPa"] for p in (out, out / "stale"))
+    assert now["E100"] == pytest.approx(before["E100"], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("more", "status", "words"),
+    [
+        (("--cells", "0"), 2, "specimen of 0 cells"),
+        (("--strain", "2"), 2, "compression to 2"),
+        (("--resin", "no-such-resin"), 2, "no-such-resin"),
+    ],
+)
+def test_bad_input_is_named(tmp_path, more, status, words):
+    done = run("homogenize", "--preset", "mu-1.0x", *more, "--out", str(tmp_path / "out"))
+    assert done.returncode == status
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_an_offset_that_fills_the_cell_is_named(tmp_path):
+    unit = tmp_path / "unit.toml"
+    unit.write_text("format = 1\nscale = 0.2\n[print]\noffset_xy_mm = 0.5\noffset_z_mm = 0.5\n")
+    done = run("homogenize", "--unit", str(unit), "--no-specimen", "--out", str(tmp_path / "out"))
+    assert done.returncode == 2
+    assert "[print]" in done.stderr or "offset" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.slow
+def test_fit_material_shows_what_a_law_misses(tmp_path):
+    out = tmp_path / "rubber"
+    words = ("--laws", "neo-hooke", "yeoh", "--hold-out", "equibiaxial")
+    done = run("fit-material", str(TRELOAR), *words, "--out", str(out))
+    assert done.returncode == 0, done.stderr
+    assert "law: " in done.stdout
+    assert (out / "material.toml").exists()
+    assert (out / "report.html").exists()
+    summary = json.loads((out / "summary.json").read_text())
+    assert "equibiaxial" in json.dumps(summary["laws"]["neo-hooke"]["fails"])
