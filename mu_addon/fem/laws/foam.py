@@ -124,13 +124,14 @@ class Foam(Law):
     def parameters(modulus_MPa: Any, poisson: Any, alpha_tension: Any, alpha_compression: Any) -> Array:
         """Parameters (k, 6) of one small-strain Young's modulus and Poisson's ratio, and two exponents.
 
-        gamma = alpha_compression nu/(1 - 2 nu), as one term's hyperfoam has it, and 1 where nu is 0.
+        gamma = alpha_compression nu/(1 - 2 nu), as one term's hyperfoam has it, and 1 where nu is 0 (to 1e-12).
         """
         values = np.broadcast_arrays(*np.atleast_1d(modulus_MPa, poisson, alpha_tension, alpha_compression))
         modulus, nu, tension, compression = (np.array(v, float) for v in values)
         mu = modulus / (2 * (1 + nu))
         beta = nu / (1 - 2 * nu)
-        gamma = np.where(nu == 0, 1.0, compression * beta)
+        # Where lambda is nothing beside mu, gamma does not count, and a tiny one would be lost in rounding.
+        gamma = np.where(np.abs(beta) < 1e-12, 1.0, compression * beta)
         return np.stack([mu, tension, mu, compression, 2 * mu * beta, gamma], axis=1)
 
     @staticmethod
