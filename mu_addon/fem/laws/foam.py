@@ -124,7 +124,7 @@ class Foam(Law):
     def parameters(modulus_MPa: Any, poisson: Any, alpha_tension: Any, alpha_compression: Any) -> Array:
         """Parameters (k, 6) of one small-strain Young's modulus and Poisson's ratio, and two exponents.
 
-        gamma = alpha_compression nu/(1 - 2 nu), as one term's hyperfoam has it, and 1 where nu is 0 (to 1e-12).
+        gamma = alpha_compression nu/(1 - 2 nu), as one term's hyperfoam has it, and 1 for a nu of 0.
         """
         values = np.broadcast_arrays(*np.atleast_1d(modulus_MPa, poisson, alpha_tension, alpha_compression))
         modulus, nu, tension, compression = (np.array(v, float) for v in values)
