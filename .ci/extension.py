@@ -1,19 +1,37 @@
-"""Build the Blender extension: `python .ci/extension.py FOLDER` checks it and writes its .zip into FOLDER.
+"""Build the Blender extension, with Blender's own tool as it ships in the bpy wheel.
+
+    python .ci/extension.py FOLDER            check it and write its .zip, without wheels
+    python .ci/extension.py FOLDER --bundle   one .zip a platform with the wheels of every Blender's Python
+                                              inside, and index.json: FOLDER can then be hosted as it is
 
 Blender wants the manifest beside the package's `__init__.py`; the checkout keeps them apart so that the core
-is an ordinary package. What ships is copied together first. Needs the bpy wheel, for its `blender_ext.py`.
+is an ordinary package. What ships is copied together first. Wheels come from pip, unmodified, and are kept in
+FOLDER/wheels; numpy is never among them, since Blender has its own and a second one would replace it.
 """
 
 from __future__ import annotations
 
+import argparse
 import importlib.util
 import shutil
 import subprocess
 import sys
 import tempfile
+import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+PYTHONS = ("3.11", "3.13", "3.14")
+"""Of Blender 4.5 and 5.0; of 5.1 and 5.2; of Linux distributions that build Blender with their own."""
+PLATFORMS = {
+    "linux-x64": [f"manylinux_2_{minor}_x86_64" for minor in (28, 27, 24, 17)] + ["manylinux2014_x86_64"],
+    "windows-x64": ["win_amd64"],
+    "macos-arm64": [f"macosx_{major}_0_arm64" for major in (15, 14, 13, 12, 11)],
+}
+LEFT_OUT = ("numpy", "trimesh")
+"""numpy is Blender's; trimesh serves the tests alone."""
+UNAVAILABLE = {"windows-x64": ("pymetis",)}
+"""No wheel for a platform: the extension designs and exports there, and says why it cannot simulate."""
 
 
 def blender_ext() -> Path | None:
@@ -21,7 +39,18 @@ def blender_ext() -> Path | None:
     spec = importlib.util.find_spec("bpy")
     if spec is None or spec.origin is None:
         return None
-    return next(Path(spec.origin).parent.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py"), None)
+    # __init__.py lies in the version's scripts/modules/bpy in some wheels, at the package's top in others.
+    for folder in Path(spec.origin).parents:
+        for pattern in (
+            "*/scripts/addons_core/bl_pkg/cli/blender_ext.py",
+            "addons_core/bl_pkg/cli/blender_ext.py",
+        ):
+            found = next(folder.glob(pattern), None)
+            if found is not None:
+                return found
+        if folder.name == "site-packages":
+            break
+    return None
 
 
 def stage(folder: Path) -> None:
@@ -33,25 +62,93 @@ def stage(folder: Path) -> None:
         shutil.copytree(ROOT / "assets", folder / "assets")
 
 
-def main(out: Path) -> int:
-    """Stage, validate and build into `out`; the exit status of the first step that fails."""
-    tool = blender_ext()
-    if tool is None:
-        sys.stderr.write("bpy is not installed here: pip install -e '.[blender]' with Python 3.11\n")
-        return 2
-    out.mkdir(parents=True, exist_ok=True)
+def requirements(platform: str) -> list[str]:
+    """What the core needs at run time on a platform, pinned as in pyproject.toml."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    left_out = LEFT_OUT + UNAVAILABLE.get(platform, ())
+    return [r for r in project["dependencies"] if not r.startswith(left_out)]
+
+
+def download(folder: Path, platform: str, python: str) -> list[Path]:
+    """Wheels of one platform and Python, dependencies included, from pip; raises CalledProcessError."""
+    tags = [option for tag in [*PLATFORMS[platform], "any"] for option in ("--platform", tag)]
+    abis = [option for abi in (f"cp{python.replace('.', '')}", "abi3", "none") for option in ("--abi", abi)]
+    found = folder / platform / python
+    found.mkdir(parents=True, exist_ok=True)
+    subprocess.run(
+        [
+            *(sys.executable, "-m", "pip", "download", "--quiet", "--dest", str(found)),
+            *("--only-binary=:all:", "--implementation", "cp", "--python-version", python, *abis, *tags),
+            *requirements(platform),
+        ],
+        check=True,
+    )
+    for wheel in found.glob("*.whl"):
+        if wheel.name.split("-")[0] in LEFT_OUT:
+            wheel.unlink()
+    return sorted(found.glob("*.whl"))
+
+
+def bundle(source: Path, wheels: list[Path], platform: str) -> None:
+    """Put wheels into a staged extension, each once, and name them in its manifest."""
+    names = sorted({wheel.name for wheel in wheels})
+    (source / "wheels").mkdir()
+    for wheel in {wheel.name: wheel for wheel in wheels}.values():
+        shutil.copy(wheel, source / "wheels")
+    listed = "".join(f'  "./wheels/{name}",\n' for name in names)
+    manifest = source / "blender_manifest.toml"
+    head, permissions, rest = manifest.read_text(encoding="utf-8").partition("[permissions]")
+    text = f'{head}platforms = ["{platform}"]\nwheels = [\n{listed}]\n\n{permissions}{rest}'
+    manifest.write_text(text, encoding="utf-8")
+
+
+def build(tool: Path, out: Path, platform: str | None, pythons: list[str]) -> int:
+    """Stage, validate and build one .zip into `out`; the exit status of the first step that fails."""
     with tempfile.TemporaryDirectory() as scratch:
         source = Path(scratch) / "mu_addon"
         stage(source)
-        for arguments in (
-            ["validate", str(source)],
-            ["build", "--source-dir", str(source), "--output-dir", str(out)],
-        ):
+        target = ["--output-dir", str(out)]
+        if platform is not None:
+            wheels = [wheel for python in pythons for wheel in download(out / "wheels", platform, python)]
+            bundle(source, wheels, platform)
+            version = tomllib.loads((source / "blender_manifest.toml").read_text(encoding="utf-8"))["version"]
+            target = ["--output-filepath", str(out / f"mu_addon-{version}-{platform}.zip")]
+        for arguments in (["validate", str(source)], ["build", "--source-dir", str(source), *target]):
             status = subprocess.run([sys.executable, str(tool), *arguments], check=False).returncode
             if status:
                 return status
     return 0
 
 
+def main(arguments: list[str]) -> int:
+    """Build what is asked for; the exit status of the first step that fails."""
+    parser = argparse.ArgumentParser(description="Build the Blender extension.")
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("out"))
+    parser.add_argument(
+        "--bundle", action="store_true", help="one .zip a platform, wheels inside, and index.json"
+    )
+    parser.add_argument("--platform", nargs="+", choices=PLATFORMS, default=list(PLATFORMS))
+    parser.add_argument("--python", nargs="+", choices=PYTHONS, default=list(PYTHONS))
+    options = parser.parse_args(arguments)
+    tool = blender_ext()
+    if tool is None:
+        sys.stderr.write("bpy is not installed here: pip install -e '.[blender]' with Python 3.11\n")
+        return 2
+    out = options.folder.resolve()
+    out.mkdir(parents=True, exist_ok=True)
+    if not options.bundle:
+        return build(tool, out, None, [])
+    for platform in options.platform:
+        try:
+            status = build(tool, out, platform, options.python)
+        except subprocess.CalledProcessError as error:
+            sys.stderr.write(f"pip found no wheels for {platform}: {error}\n")
+            status = 1
+        if status:
+            return status
+    index = [sys.executable, str(tool), "server-generate", "--repo-dir", str(out)]
+    return subprocess.run(index, check=False).returncode
+
+
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1] if len(sys.argv) > 1 else "out")))
+    sys.exit(main(sys.argv[1:]))

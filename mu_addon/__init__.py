@@ -1,12 +1,19 @@
-"""Blender's door to the core: this version installs and registers, its panels are not there yet.
+"""Blender's door to the core: `register` and `unregister`; everywhere else the core is a plain package."""
 
-Until they are, the core is used from the command line (`headless/run.py`) or imported as a library.
-"""
+import importlib
+from typing import Any
 
 
 def register() -> None:
-    """Called by Blender when the extension is enabled; this version adds nothing to its interface."""
+    """Called by Blender when the extension is enabled; a second call changes nothing."""
+    _blender().register()
 
 
 def unregister() -> None:
-    """Called by Blender when the extension is disabled."""
+    """Called by Blender when the extension is disabled; a second call changes nothing."""
+    _blender().unregister()
+
+
+def _blender() -> Any:
+    # By name: whoever imports a part of the core must not be taken to import Blender's side.
+    return importlib.import_module(".blender", __package__)

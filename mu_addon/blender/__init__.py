@@ -1,0 +1,41 @@
+"""The designer's seat in Blender; the only package that imports bpy, and no module of the core imports it."""
+
+from __future__ import annotations
+
+_registered = False
+
+
+def register() -> None:
+    """Add classes, menus and handlers to Blender; where that fails, nothing is left behind."""
+    global _registered
+    if _registered:
+        return
+    done = []
+    try:
+        for module in _modules():
+            done.append(module)
+            module.register()
+    except Exception:
+        _remove(done)
+        raise
+    _registered = True
+
+
+def unregister() -> None:
+    """Take everything out of Blender again and end the simulations that this session started."""
+    global _registered
+    if _registered:
+        _remove(_modules())
+    _registered = False
+
+
+def _modules():
+    """Modules with something to register, in the order they need each other."""
+    from . import live, menus, operators, panels, properties, simulation
+
+    return [properties, live, simulation, operators, panels, menus]
+
+
+def _remove(modules):
+    for module in reversed(modules):
+        module.unregister()

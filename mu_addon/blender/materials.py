@@ -1,0 +1,36 @@
+"""Colours of the parts, as materials that the user may change: they are made once and then left alone."""
+
+from __future__ import annotations
+
+import bpy
+
+COLOURS = {
+    "MU Membrane": (0.16, 0.42, 0.55, 1.0),
+    "MU Section": (0.80, 0.30, 0.22, 1.0),
+    "MU Lattice": (0.72, 0.74, 0.76, 1.0),
+    "MU Anchors": (0.05, 0.06, 0.08, 1.0),
+    "MU Waveguide": (1.0, 0.42, 0.02, 1.0),
+    "MU Wells": (0.30, 0.10, 0.0, 1.0),
+    "MU Candidate": (0.62, 0.68, 0.78, 1.0),
+    "MU Solid": (0.62, 0.66, 0.70, 1.0),
+}
+
+
+def material(name: str):
+    """The material of that name, made with its colour where the file has none."""
+    found = bpy.data.materials.get(name)
+    if found is None:
+        found = bpy.data.materials.new(name)
+        found.diffuse_color = COLOURS[name]
+        found.roughness = 0.5
+        surface = found.node_tree.nodes.get("Principled BSDF") if found.node_tree else None
+        if surface is not None:
+            surface.inputs["Base Color"].default_value = COLOURS[name]
+    return found
+
+
+def assign(mesh, *names: str) -> None:
+    """Give a mesh these materials in its slots, in order, where it has none yet."""
+    if not mesh.materials:
+        for name in names:
+            mesh.materials.append(material(name))

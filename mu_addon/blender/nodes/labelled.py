@@ -1,0 +1,41 @@
+"""A tube with its name beside its lower end: candidate paths, which a click on tube or name selects."""
+
+from __future__ import annotations
+
+import math
+
+from . import tubes
+from .wiring import Wiring
+
+NAME = "MU Labelled Tube"
+VERSION = 1
+TEXT = "Tubes along edges with a name at a place, to be read from +x"
+USES = (tubes.NAME,)
+
+
+def build(tree, tube_group) -> None:
+    """The tubes of `tube_group`, and text in the plane across x."""
+    w = Wiring(tree)
+    w.socket("Geometry", "Geometry")
+    w.socket("Label", "String", "", text="Name to write")
+    w.socket("At", "Vector", text="Where the name begins")
+    w.socket("Size", "Float", 3.0, 0.0, 1000.0, "Height of the letters")
+    w.socket("Material", "Material")
+    tube = w.node("GeometryNodeGroup", {"node_tree": tube_group})
+    tree.links.new(w.given("Geometry"), tube.inputs["Geometry"])
+    tree.links.new(w.given("Material"), tube.inputs["Material"])
+    written = w.node("GeometryNodeStringToCurves", String=w.given("Label"), Size=w.given("Size"))
+    real = w.node("GeometryNodeRealizeInstances", Geometry=written.outputs[0])
+    filled = w.node("GeometryNodeFillCurve", Curve=real.outputs["Geometry"])
+    upright = (math.pi / 2.0, 0.0, math.pi / 2.0)
+    turned = w.node(
+        "GeometryNodeTransform", Geometry=filled.outputs["Mesh"], Translation=w.given("At"), Rotation=upright
+    )
+    painted = w.node(
+        "GeometryNodeSetMaterial", Geometry=turned.outputs["Geometry"], Material=w.given("Material")
+    )
+    both = w.node("GeometryNodeJoinGeometry")
+    # A join takes the last link first; the order does not matter here.
+    tree.links.new(tube.outputs["Geometry"], both.inputs[0])
+    tree.links.new(painted.outputs["Geometry"], both.inputs[0])
+    w.output(both.outputs[0])

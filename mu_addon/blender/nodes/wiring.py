@@ -1,0 +1,60 @@
+"""Few words to write a node group in: sockets, nodes side by side, links."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class Wiring:
+    """Builds one group: `socket` and `output` for its interface, `node` for what is between."""
+
+    def __init__(self, tree: Any) -> None:
+        self.tree = tree
+        self._inputs = None
+        self._x = 0
+        tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+
+    def socket(
+        self, name: str, kind: str, default: Any = None, low: Any = None, high: Any = None, text: str = ""
+    ):
+        """Add an input of `kind` ("Geometry", "Int", "Float", "String", ...) to the group."""
+        item = self.tree.interface.new_socket(name, in_out="INPUT", socket_type=f"NodeSocket{kind}")
+        item.description = text
+        for attribute, value in (("default_value", default), ("min_value", low), ("max_value", high)):
+            if value is not None:
+                setattr(item, attribute, value)
+
+    def given(self, name: str):
+        """The socket of an input, to link from."""
+        if self._inputs is None:
+            self._inputs = self.node("NodeGroupInput")
+        return self._inputs.outputs[name]
+
+    def node(self, kind: str, settings: dict[str, Any] | None = None, **inputs: Any):
+        """Add a node; `settings` are its own, `inputs` values or sockets to link from.
+
+        A name in `inputs` has _ for a space; False_ and True_ are the sockets of a switch.
+        """
+        node = self.tree.nodes.new(kind)
+        node.location = (self._x, 0.0)
+        self._x += 200
+        for name, value in (settings or {}).items():
+            setattr(node, name, value)
+        for name, value in inputs.items():
+            (socket, *_) = (s for s in node.inputs if s.enabled and s.name == name.replace("_", " ").strip())
+            if hasattr(value, "is_output"):
+                self.tree.links.new(value, socket)
+            else:
+                socket.default_value = value
+        return node
+
+    def smooth(self, mesh: Any):
+        """The mesh, shaded smooth; the node's first input is called Geometry before 5.0 and Mesh since."""
+        node = self.node("GeometryNodeSetShadeSmooth")
+        self.tree.links.new(mesh, node.inputs[0])
+        return node.outputs[0]
+
+    def output(self, geometry: Any) -> None:
+        """End the group with a geometry."""
+        out = self.node("NodeGroupOutput")
+        self.tree.links.new(geometry, out.inputs["Geometry"])

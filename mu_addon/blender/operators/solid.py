@@ -1,0 +1,75 @@
+"""Build the printable solid and write it as STL, both by the core."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+from pathlib import Path
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy_extras.io_utils import ExportHelper
+
+from ...design.export import write_nodes, write_stl
+from ...design.solid import QUALITY, build_solid
+from .. import unit_object
+from ..properties import to_unit
+from .acting import OnSoundUnit, telling
+
+_QUALITY = [
+    (name, name.capitalize(), f"{f.around_axis} facets around the axis, {f.around_strut} around a strut")
+    for name, f in QUALITY.items()
+]
+
+
+class MU_OT_solid(OnSoundUnit, bpy.types.Operator):
+    """Build the printable solid, with the waveguide of the chosen path, and check it; takes seconds"""
+
+    bl_idname = "mu.solid"
+    bl_label = "Build Solid"
+    bl_options = {"REGISTER", "UNDO"}
+
+    quality: EnumProperty(name="Quality", items=_QUALITY, default="interactive")
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        core = to_unit(root.mu_unit)
+        solid = build_solid(core, unit_object.chosen_window(root, core), self.quality)
+        unit_object.put_solid(root, solid, core)
+        gates = solid.gates
+        self.report({"INFO"}, f"Watertight, {gates.triangles} triangles, {gates.volume_mm3 / 1000:.2f} cm3")
+        return {"FINISHED"}
+
+
+class MU_OT_export_stl(OnSoundUnit, bpy.types.Operator, ExportHelper):
+    """Build the solid in the quality to print, check it and write it as binary STL in mm"""
+
+    bl_idname = "mu.export_stl"
+    bl_label = "Export STL"
+    bl_options = {"REGISTER"}
+
+    filename_ext = ".stl"
+    filter_glob: StringProperty(default="*.stl", options={"HIDDEN"})
+    quality: EnumProperty(name="Quality", items=_QUALITY, default="export")
+    nodes: BoolProperty(
+        name="Lattice Nodes as Text", description="Also write the nodes' coordinates beside it", default=False
+    )
+
+    def invoke(self, context, event):
+        root = unit_object.active_root(context)
+        path = root.mu_unit.path
+        self.filepath = f"{root.mu_unit.title}{'-' + path if path else ''}.stl"
+        return ExportHelper.invoke(self, context, event)
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        core = to_unit(root.mu_unit)
+        target = Path(bpy.path.abspath(self.filepath))
+        write_stl(build_solid(core, unit_object.chosen_window(root, core), self.quality), target)
+        if self.nodes:
+            write_nodes(core, target.with_suffix(".txt"))
+        self.report({"INFO"}, f"Written: {target}")
+        return {"FINISHED"}
+
+
+CLASSES = (MU_OT_solid, MU_OT_export_stl)

@@ -1,0 +1,327 @@
+"""The sidebar tab MU, in the order of work. Panels show state and call operators; they decide nothing."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+
+import bpy
+
+from ..design.anchors import windows
+from ..design.parameters import SECTIONS
+from ..design.quantity import describe
+from ..study.progress import spell
+from . import simulation, studies, unit_object
+from .child import CANCELLED, DONE, FAILED, RUNNING
+from .operators.acting import NO_UNIT
+from .operators.path import selected_candidate
+from .operators.unit import in_millimetres
+
+# Where a section's parameters are shown. A section that the core gains appears under Design by itself.
+PLACES = {
+    "chambers": "design",
+    "lattice": "lattice",
+    "waveguide": "path",
+    "material": "simulate",
+    "print": "print",
+}
+CHARACTERS = 34
+"""Letters in one line of a panel of usual width: labels do not wrap."""
+
+
+def wrapped(layout, text: str, icon: str = "NONE", width: int = CHARACTERS) -> None:
+    """Labels that show a text in several lines."""
+    column = layout.column(align=True)
+    column.scale_y = 0.85
+    for paragraph in text.split("\n"):
+        for line in textwrap.wrap(paragraph, width) or [""]:
+            column.label(text=line, icon=icon)
+            icon = "BLANK1" if icon != "NONE" else "NONE"
+
+
+def parameters(layout, props, place: str) -> None:
+    """Fields of every section that belongs to a place."""
+    for section in SECTIONS:
+        if PLACES.get(section.section, "design") == place:
+            group = getattr(props, section.section)
+            column = layout.column(align=True)
+            for d in describe(section):
+                column.prop(group, d.name)
+
+
+class _Panel:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "MU"
+
+
+class _OfUnit(_Panel):
+    bl_parent_id = "MU_PT_unit"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return unit_object.active_root(context) is not None
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        self.show(layout, context, unit_object.active_root(context))
+
+
+class MU_PT_unit(_Panel, bpy.types.Panel):
+    """The unit that is worked on"""
+
+    bl_idname = "MU_PT_unit"
+    bl_label = "Monolithic Unit"
+
+    def draw(self, context):
+        layout = self.layout
+        root = unit_object.active_root(context)
+        if root is None:
+            wrapped(layout, NO_UNIT, "INFO")
+            layout.operator("mu.add", text="Add Monolithic Unit", icon="ADD")
+            return
+        if not in_millimetres(context.scene):
+            box = layout.box()
+            wrapped(box, "The scene is not in millimetres: lengths here read wrong", "ERROR")
+            box.operator("mu.millimetres")
+        row = layout.row(align=True)
+        row.menu("MU_MT_presets", text=root.mu_unit.title, icon="PRESET")
+        row.operator("mu.preset_save", text="", icon="ADD")
+        layout.row(align=True).prop(root.mu_unit, "show", expand=True)
+        row = layout.row()
+        row.enabled = root.mu_unit.show != unit_object.SOLID
+        row.prop(root.mu_unit, "cut", icon="MOD_BOOLEAN", toggle=True)
+        if root.mu_unit.trouble:
+            box = layout.box()
+            box.alert = True
+            wrapped(box, root.mu_unit.trouble, "ERROR")
+            wrapped(layout, "The preview shows the last design that was possible", "INFO")
+
+
+class MU_PT_design(_OfUnit, bpy.types.Panel):
+    """Chambers: number, profile, wall, caps and inlet"""
+
+    bl_idname = "MU_PT_design"
+    bl_label = "Design"
+    bl_options = set()
+
+    def show(self, layout, context, root):
+        layout.prop(root.mu_unit, "title")
+        layout.prop(root.mu_unit, "scale")
+        parameters(layout, root.mu_unit, "design")
+
+
+class MU_PT_lattice(_OfUnit, bpy.types.Panel):
+    """Cells of the lattice and its struts"""
+
+    bl_idname = "MU_PT_lattice"
+    bl_label = "Lattice"
+
+    def show(self, layout, context, root):
+        parameters(layout, root.mu_unit, "lattice")
+
+
+class MU_PT_path(_OfUnit, bpy.types.Panel):
+    """Candidate paths and the waveguide along the chosen one"""
+
+    bl_idname = "MU_PT_path"
+    bl_label = "Sensor Paths"
+
+    def show(self, layout, context, root):
+        props = root.mu_unit
+        found = studies.findings(root)
+        ranking = dict(found.ranking(found.rule)) if found and not found.stale else {}
+        ranks = {name: number for number, name in enumerate(sorted(ranking, key=ranking.get), 1)}
+        row = layout.row()
+        row.use_property_split = False
+        row.prop(props, "candidates", toggle=True, icon="HIDE_OFF" if props.candidates else "HIDE_ON")
+        column = layout.column(align=True)
+        for window in windows(props.chambers.count):
+            chosen = props.path == window.name
+            text = f"{window.name}    P{window.start} to P{window.start + window.length - 1}"
+            if window.name in ranking:
+                text += f"    J {ranking[window.name]:.3f} mm, no. {ranks[window.name]}"
+            icon = "RADIOBUT_ON" if chosen else "RADIOBUT_OFF"
+            column.operator("mu.path", text=text, icon=icon, depress=chosen).name = (
+                "none" if chosen else window.name
+            )
+        name = selected_candidate(context)
+        if name and name != props.path:
+            layout.operator(
+                "mu.path", text=f"Use {name}, selected in the view", icon="RESTRICT_SELECT_OFF"
+            ).name = name
+        if not ranking:
+            wrapped(layout, "Simulate to rank them: Place the Sensor", "INFO")
+        parameters(layout, props, "path")
+
+
+class MU_PT_simulate(_OfUnit, bpy.types.Panel):
+    """Motion and ranking of paths, in a process of its own"""
+
+    bl_idname = "MU_PT_simulate"
+    bl_label = "Simulate"
+
+    def show(self, layout, context, root):
+        missing = simulation.missing()
+        if missing:
+            box = layout.box()
+            wrapped(
+                box,
+                f"Cannot simulate: {', '.join(missing)} not found in this Blender. Design, solid and export "
+                "work without. Install the extension built for this Blender and system.",
+                "ERROR",
+            )
+        study = root.mu_unit.study
+        layout.prop(study, "command")
+        layout.prop(study, "detail")
+        layout.prop(study, "protocol")
+        child = simulation.of(root.mu_unit.uuid)
+        if child is None or child.state != RUNNING:
+            row = layout.row()
+            row.scale_y = 1.4
+            row.operator("mu.simulate", icon="PLAY")
+        if child is not None:
+            _running(layout, child) if child.state == RUNNING else _ended(layout, child)
+        others = [uuid for uuid in simulation.running() if uuid != root.mu_unit.uuid]
+        if others:
+            wrapped(layout, f"{len(others)} other simulation(s) running", "INFO")
+        header, body = layout.panel("MU_material", default_closed=True)
+        header.label(text="Material")
+        if body:
+            parameters(body, root.mu_unit, "simulate")
+            body.prop(study, "folder")
+
+
+def _running(layout, child) -> None:
+    fraction = child.progress.get("fraction")
+    text = "stopping ..." if child.stopping else simulation.spell_left(child)
+    layout.progress(factor=fraction or 0.0, text=text)
+    row = layout.row()
+    row.label(text=f"running for {spell(child.seconds)}")
+    row.operator("mu.cancel", icon="CANCEL")
+    for warning in child.warnings[-2:]:
+        wrapped(layout, warning, "ERROR")
+
+
+def _ended(layout, child) -> None:
+    box = layout.box()
+    if child.state == DONE:
+        wrapped(box, f"Done in {spell(child.seconds)}: see Results", "CHECKMARK")
+    elif child.state == CANCELLED:
+        wrapped(box, "Cancelled. What was finished is kept: simulate again to go on", "CANCEL")
+    elif child.state == FAILED:
+        box.alert = True
+        error = child.error or {}
+        wrapped(box, str(error.get("what", "")), "ERROR")
+        for key in ("where", "what_to_do"):
+            if error.get(key):
+                wrapped(box, str(error[key]))
+    row = box.row(align=True)
+    if child.state == FAILED:
+        row.operator("mu.open", text="Log").what = "log"
+        row.operator("mu.open", text="Errors").what = "errors"
+    row.operator("mu.dismiss")
+
+
+class MU_PT_results(_OfUnit, bpy.types.Panel):
+    """What the study has found"""
+
+    bl_idname = "MU_PT_results"
+    bl_label = "Results"
+
+    def show(self, layout, context, root):
+        found = studies.findings(root)
+        if found is None:
+            wrapped(layout, "Nothing simulated yet", "INFO")
+            return
+        if found.stale:
+            box = layout.box()
+            box.alert = True
+            wrapped(box, "Stale: these results belong to other parameters. Simulate again", "ERROR")
+        if found.status != "complete":
+            wrapped(layout, f"The run is {found.status or 'not finished'}", "INFO")
+        if found.quick:
+            wrapped(layout, "A quick look: linear elements lock, so that angles come out too small", "ERROR")
+        column = layout.column(align=True)
+        column.active = not found.stale
+        for pressure, angle in found.angles:
+            if pressure in (found.angles[0][0], found.angles[-1][0]):
+                column.label(text=f"{angle:+.1f} deg at {pressure:g} kPa")
+        ranking = found.ranking(found.rule)
+        if ranking:
+            best, j = ranking[0]
+            tied = (found.summary.get("tied_with_chosen") or {}).get(found.rule) or []
+            column.label(text=f"Best path {best}, J {j:.4f} mm")
+            if tied:
+                column.label(text=f"tied with {', '.join(tied)}")
+            if root.mu_unit.path == best:
+                column.label(text="It is the chosen one", icon="CHECKMARK")
+            elif not found.stale:
+                layout.operator("mu.path", text=f"Use {best}", icon="CON_FOLLOWPATH").name = best
+        row = layout.row(align=True)
+        row.operator("mu.open", text="Report", icon="URL").what = "report"
+        row.operator("mu.open", text="Folder", icon="FILE_FOLDER").what = "folder"
+
+
+class MU_PT_print(_OfUnit, bpy.types.Panel):
+    """The printable solid, its gates and its files"""
+
+    bl_idname = "MU_PT_print"
+    bl_label = "Print"
+
+    def show(self, layout, context, root):
+        row = layout.row()
+        row.scale_y = 1.4
+        row.operator("mu.solid", icon="MESH_DATA")
+        solid = unit_object.part(root, unit_object.SOLID)
+        if solid is None:
+            wrapped(layout, "No solid built yet", "INFO")
+        else:
+            _gates(layout, root, solid)
+        layout.operator("mu.export_stl", icon="EXPORT")
+        header, body = layout.panel("MU_printing", default_closed=True)
+        header.label(text="How It Prints")
+        if body:
+            parameters(body, root.mu_unit, "print")
+
+
+def _gates(layout, root, solid) -> None:
+    box = layout.box()
+    if not unit_object.solid_is_current(root, solid):
+        wrapped(box, "Built from earlier parameters: build it again", "ERROR")
+    g = json.loads(solid["mu_gates"])
+    for text in (
+        f"Lattice genus {g['lattice_genus']}, as E - V + 1",
+        f"{g['components']} body, {g['bad_edges_after_stl']} open edges in its STL",
+        f"{g['inner_shells']} cavity of {g['inner_volume_mm3'] / 1000:.2f} cm3",
+        f"{g['volume_mm3'] / 1000:.2f} cm3 of resin, {g['triangles']} triangles",
+    ):
+        box.label(text=text, icon="CHECKMARK")
+    if solid["mu_path"]:
+        box.label(text=f"Waveguide along {solid['mu_path']}", icon="CHECKMARK")
+
+
+CLASSES = (
+    MU_PT_unit,
+    MU_PT_design,
+    MU_PT_lattice,
+    MU_PT_path,
+    MU_PT_simulate,
+    MU_PT_results,
+    MU_PT_print,
+)
+
+
+def register() -> None:
+    """All panels."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """All panels."""
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,103 @@
+"""Where a unit's results lie, and whether they belong to the unit as it is now."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import attrs
+import bpy
+
+from ..design.parameters import read_unit
+from ..errors import MuError
+from .compat import user_folder
+from .properties import to_unit
+
+LOG = "log.ndjson"
+REPORT = "report.html"
+
+
+@attrs.frozen
+class Findings:
+    """What a study's summary.json says; `stale` where the unit was changed since it was computed."""
+
+    folder: Path
+    status: str
+    stale: bool
+    summary: dict[str, Any]
+
+    @property
+    def angles(self) -> list[tuple[float, float]]:
+        """Pairs (pressure in kPa, bending angle in degrees) by pressure."""
+        found = self.summary.get("angle_deg") or {}
+        return sorted((float(p), float(a)) for p, a in found.items())
+
+    @property
+    def quick(self) -> bool:
+        """Whether it was computed with linear elements, which lock in thin walls."""
+        mesh = (self.summary.get("study") or {}).get("mesh") or {}
+        return mesh.get("order") == 1
+
+    def ranking(self, rule: str) -> list[tuple[str, float]]:
+        """Pairs (path, J_hat in mm) of one rule, the best first."""
+        found = (self.summary.get("J_hat_mm") or {}).get(rule) or {}
+        return sorted(((name, float(j)) for name, j in found.items()), key=lambda pair: pair[1])
+
+    @property
+    def rule(self) -> str:
+        """The rule whose best path is the answer, or nothing where no paths were ranked."""
+        rules = list(self.summary.get("chosen") or {})
+        return "volume_fraction" if "volume_fraction" in rules else (rules or [""])[0]
+
+
+def folder_of(root: Any) -> Path:
+    """Folder of the unit's study: the one it names, else beside the .blend file, else the user's own."""
+    props = root.mu_unit
+    if props.study.folder:
+        return Path(bpy.path.abspath(props.study.folder))
+    name = f"{re.sub(r'[^A-Za-z0-9._-]+', '-', props.title).strip('-.') or 'unit'}-{props.uuid[:8]}"
+    if bpy.data.filepath:
+        blend = Path(bpy.data.filepath)
+        return blend.with_name(f"{blend.stem}.mu") / name
+    return user_folder("studies") / name
+
+
+def settle(root: Any) -> Path:
+    """The unit's study folder, from now on kept with the unit, relative to the .blend file if possible."""
+    folder = folder_of(root)
+    if not root.mu_unit.study.folder:
+        text = str(folder)
+        if bpy.data.filepath:
+            try:
+                text = bpy.path.relpath(text)
+            except ValueError:  # on another drive
+                pass
+        root.mu_unit.study.folder = text
+    return folder
+
+
+_read: dict[Path, tuple[tuple[float, float], dict[str, Any], str]] = {}
+
+
+def findings(root: Any) -> Findings | None:
+    """What the unit's study has found, or None where there is none; read again only when files change."""
+    folder = folder_of(root)
+    try:
+        times = (folder / "summary.json").stat().st_mtime, (folder / "unit.toml").stat().st_mtime
+    except OSError:
+        return None
+    kept = _read.get(folder)
+    if kept is None or kept[0] != times:
+        try:
+            summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+            kept = times, summary if isinstance(summary, dict) else {}, read_unit(folder / "unit.toml").hash()
+        except (OSError, ValueError, MuError):
+            return None
+        _read[folder] = kept
+    try:
+        stale = to_unit(root.mu_unit).hash() != kept[2]
+    except MuError:
+        stale = True
+    return Findings(folder, str(kept[1].get("status", "")), stale, kept[1])

@@ -1,0 +1,81 @@
+"""Runs inside an installed Blender, without a window: from an empty scene to a print and a ranked path."""
+
+import importlib
+import sys
+import time
+from pathlib import Path
+
+import bpy
+
+folder = Path(sys.argv[sys.argv.index("--") + 1])
+(package,) = (name for name, _ in bpy.context.preferences.addons.items() if name.endswith(".mu_addon"))
+assert package.startswith("bl_ext."), package
+
+
+def module(name):
+    return importlib.import_module(f"{package}.{name}")
+
+
+unit_object, simulation = module("blender.unit_object"), module("blender.simulation")
+studies, child_module = module("blender.studies"), module("blender.child")
+
+assert "mu_addon" not in sys.modules, "the core was imported under a second name"
+assert bpy.ops.mu.add(preset="mu-0.75x") == {"FINISHED"}
+root = unit_object.active_root(bpy.context)
+taken = []
+for step in range(10):
+    before = time.perf_counter()
+    root.mu_unit.chambers.wall_mm = 0.85 + 0.01 * step
+    bpy.context.view_layer.update()
+    taken.append(time.perf_counter() - before)
+assert min(taken) < 0.1, taken
+print("preview", round(1000 * min(taken)), "ms")
+root.mu_unit.chambers.wall_mm = 0.9
+assert bpy.ops.mu.path(name="alpha4") == {"FINISHED"}
+assert bpy.ops.mu.solid() == {"FINISHED"}
+assert bpy.ops.mu.export_stl(filepath=str(folder / "unit.stl"), quality="interactive") == {"FINISHED"}
+bpy.ops.wm.save_as_mainfile(filepath=str(folder / "day.blend"))
+
+
+def watch(child):
+    # Timers never fire in background.
+    end = time.monotonic() + 600
+    while child.state == child_module.RUNNING:
+        assert time.monotonic() < end
+        simulation.poll()
+        time.sleep(0.1)
+
+
+assert simulation.missing() == []
+root.mu_unit.study.detail = "quick"
+assert bpy.ops.mu.simulate() == {"FINISHED"}
+child = simulation.of(root.mu_unit.uuid)
+while not child.progress:
+    simulation.poll()
+    time.sleep(0.1)
+assert bpy.ops.mu.cancel() == {"FINISHED"}
+watch(child)
+assert child.state == child_module.CANCELLED, child.error
+
+assert bpy.ops.mu.simulate() == {"FINISHED"}
+child = simulation.of(root.mu_unit.uuid)
+watch(child)
+assert child.state == child_module.DONE, child.error
+assert not any("gmsh" in warning for warning in child.warnings), child.warnings
+found = studies.findings(root)
+assert (found.status, found.stale, found.quick) == ("complete", False, True)
+assert len(found.ranking(found.rule)) == 10
+bpy.ops.wm.save_mainfile()
+bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+(root,) = unit_object.roots()
+assert len(studies.findings(root).ranking("volume_fraction")) == 10
+
+uuid = root.mu_unit.uuid
+bpy.ops.preferences.addon_disable(module=package)
+assert not [name for name in dir(bpy.types) if name.startswith("MU_")]
+assert not hasattr(bpy.types.Object, "mu_unit")
+bpy.ops.preferences.addon_enable(module=package)
+(root,) = (obj for obj in bpy.data.objects if obj.mu_unit.uuid)
+assert root.mu_unit.uuid == uuid
+assert bpy.ops.mu.rebuild() == {"FINISHED"}
+print("the day is over")

@@ -1,0 +1,221 @@
+"""Every action of a designer's, called as a script would, and what it leaves in the file."""
+
+import numpy as np
+
+from mu_addon.design.parameters import read_unit
+from mu_addon.design.surface import bad_edges, stl_surface
+
+from .session import blender, needs_bpy
+
+pytestmark = needs_bpy
+
+
+def test_add_makes_a_unit_in_millimetres(tmp_path):
+    blender(
+        """
+        from mu_addon.blender.properties import to_unit
+
+        bpy.context.scene.cursor.location = (1.0, 2.0, 3.0)
+        root = add()
+        assert to_unit(root.mu_unit) == load_preset("mu-1.0x")
+        assert root.location[:] == (1.0, 2.0, 3.0)
+        assert bpy.context.object == root and bpy.context.selected_objects == [root]
+        units = bpy.context.scene.unit_settings
+        assert abs(units.scale_length - 0.001) < 1e-9 and units.length_unit == "MILLIMETERS"
+        bpy.context.view_layer.update()
+        assert abs(unit_object.part(root, "actuator").dimensions.z - 81.0) < 1e-3  # 75 and the inlet's 6
+        small = add(preset="mu-0.75x")
+        assert small.mu_unit.scale == 0.75 and small.mu_unit.uuid != root.mu_unit.uuid
+        other = add(preset="mu-1.0x", scale=1.2)
+        assert to_unit(other.mu_unit).scale == 1.2
+        # As the redo panel does when another preset is chosen there: it brings its own scale.
+        redone = add(preset="mu-0.75x", scale=1.0, scaled="mu-1.0x")
+        assert redone.mu_unit.scale == 0.75
+        units.system = "IMPERIAL"
+        assert bpy.ops.mu.millimetres() == {"FINISHED"}
+        assert units.system == "METRIC"
+        """,
+        tmp_path,
+    )
+
+
+def test_operators_without_a_unit_say_what_is_missing(tmp_path):
+    blender(
+        """
+        from mu_addon.blender.operators import CLASSES
+
+        for cls in CLASSES:
+            name = cls.bl_idname.split(".")[1]
+            operator = getattr(bpy.ops.mu, name)
+            if name in ("add", "millimetres", "preset_remove"):
+                assert operator.poll()
+            else:
+                assert not operator.poll(), name
+                assert "Add > Mesh > Monolithic Unit" in refused(operator), name
+            assert cls.__doc__ and cls.bl_label
+        """,
+        tmp_path,
+    )
+
+
+def test_what_changes_the_file_is_one_undo_step(tmp_path):
+    blender(
+        """
+        from mu_addon.blender.operators import CLASSES
+
+        changing = {"add", "rebuild", "delete", "millimetres", "select", "preset_load", "path", "solid"}
+        for cls in CLASSES:
+            assert ("UNDO" in cls.bl_options) == (cls.bl_idname.split(".")[1] in changing), cls
+            assert "REGISTER" in cls.bl_options
+        """,
+        tmp_path,
+    )
+
+
+def test_path_select_and_stale_names(tmp_path):
+    blender(
+        """
+        root = add()
+        assert bpy.ops.mu.path(name="alpha4") == {"FINISHED"}
+        bar = unit_object.part(root, "waveguide")
+        assert bar is not None and [m.name for m in bar.data.materials] == ["MU Waveguide", "MU Wells"]
+        assert abs(bar.dimensions.z) >= 0 and len(bar.data.polygons) % 6 == 0
+        assert "alpha11" in refused(bpy.ops.mu.path, name="alpha11")
+        assert root.mu_unit.path == "alpha4"
+        root.mu_unit.candidates = True
+        tube = unit_object.part(root, "candidate:alpha7")
+        bpy.context.view_layer.objects.active = tube
+        assert unit_object.active_root(bpy.context) == root
+        assert bpy.ops.mu.path() == {"FINISHED"} and root.mu_unit.path == "alpha7"
+        assert tube.data.materials[0].name == "MU Waveguide"
+        assert bpy.ops.mu.select() == {"FINISHED"} and bpy.context.object == root
+        # A unit of fewer chambers has fewer paths: the chosen one is not drawn, and nothing breaks.
+        root.mu_unit.chambers.count = 3
+        assert root.mu_unit.trouble == "" and unit_object.part(root, "waveguide") is None
+        assert bpy.ops.mu.path(name="none") == {"FINISHED"} and root.mu_unit.path == ""
+        """,
+        tmp_path,
+    )
+
+
+def test_solid_is_the_cores_and_knows_when_it_is_old(tmp_path):
+    blender(
+        """
+        import json
+        import numpy as np
+        from mu_addon.design.anchors import window
+        from mu_addon.design.solid import build_solid
+
+        root = add()
+        bpy.ops.mu.path(name="alpha4")
+        assert bpy.ops.mu.solid() == {"FINISHED"}
+        solid = unit_object.part(root, "solid")
+        core = load_preset("mu-1.0x")
+        made = build_solid(core, window(core, "alpha4"))
+        found = np.empty(3 * len(solid.data.vertices), np.float32)
+        solid.data.vertices.foreach_get("co", found)
+        assert np.array_equal(found.reshape(-1, 3), made.vertices.astype(np.float32))
+        assert len(solid.data.polygons) == len(made.triangles)
+        assert json.loads(solid["mu_gates"])["genus"] == made.gates.genus
+        assert unit_object.solid_is_current(root, solid)
+        assert root.mu_unit.show == "solid" and not solid.hide_viewport
+        assert unit_object.part(root, "lattice").hide_viewport
+        root.mu_unit.show = "preview"
+        assert solid.hide_viewport and not unit_object.part(root, "lattice").hide_viewport
+        root.mu_unit.chambers.wall_mm = 1.0
+        assert not unit_object.solid_is_current(root, solid)
+        root.mu_unit.chambers.wall_mm = 0.9
+        assert unit_object.solid_is_current(root, solid)
+        bpy.ops.mu.path(name="alpha5")
+        assert not unit_object.solid_is_current(root, solid)
+        """,
+        tmp_path,
+    )
+
+
+def test_stl_comes_out_in_millimetres(tmp_path):
+    blender(
+        """
+        root = add(preset="mu-0.75x")
+        target = sys.argv[1] + "/unit.stl"
+        assert bpy.ops.mu.export_stl(filepath=target, quality="interactive", nodes=True) == {"FINISHED"}
+        nowhere = dict(filepath="/proc/no/unit.stl", quality="interactive")
+        assert "what to do" in refused(bpy.ops.mu.export_stl, **nowhere)
+        """,
+        tmp_path,
+        tmp_path,
+    )
+    vertices, triangles = stl_surface((tmp_path / "unit.stl").read_bytes())
+    assert bad_edges(triangles) == 0
+    assert np.ptp(vertices[:, 2]) == np.float32(0.75 * (75.0 + 6.0))
+    assert "# id kind x_mm y_mm z_mm" in (tmp_path / "unit.txt").read_text()
+
+
+def test_presets_of_the_users_own(tmp_path):
+    said = blender(
+        """
+        from mu_addon.blender import presets
+
+        assert presets.names() == ["mu-0.75x", "mu-1.0x", "mu-1.5x"]
+        root = add()
+        root.mu_unit.chambers.wall_mm = 1.1
+        assert bpy.ops.mu.preset_save(name="thick one") == {"FINISHED"}
+        assert presets.names()[-1] == "user:thick one"
+        assert bpy.ops.mu.preset_load(name="mu-1.5x") == {"FINISHED"}
+        assert root.mu_unit.scale == 1.5 and not unit_object.behind(root)
+        assert bpy.ops.mu.preset_load(name="user:thick one") == {"FINISHED"}
+        assert round(root.mu_unit.chambers.wall_mm, 4) == 1.1 and root.mu_unit.scale == 1.0
+        fresh = add(preset="user:thick one")
+        assert round(fresh.mu_unit.chambers.wall_mm, 4) == 1.1
+        for name in ("", "../escape", "a/b", ".hidden", "x" * 61):
+            assert "cannot be the name" in refused(bpy.ops.mu.preset_save, name=name)
+        assert "no preset" in refused(bpy.ops.mu.preset_load, name="mu-9x")
+        assert "cannot read" in refused(bpy.ops.mu.preset_load, name="user:never")
+        assert "comes with the extension" in refused(bpy.ops.mu.preset_remove, name="mu-1.0x")
+        print("kept in", presets._file("user:thick one"))
+        """,
+        tmp_path,
+    )
+    kept = tmp_path / said.split("kept in ")[1].splitlines()[0]
+    assert tmp_path in kept.parents
+    assert read_unit(kept).chambers.wall_mm == 1.1
+    blender(
+        """
+        from mu_addon.blender import presets
+
+        assert presets.names()[-1] == "user:thick one"  # another session finds it
+        assert bpy.ops.mu.preset_remove(name="user:thick one") == {"FINISHED"}
+        assert presets.names() == ["mu-0.75x", "mu-1.0x", "mu-1.5x"]
+        """,
+        tmp_path,
+    )
+
+
+def test_save_and_reload(tmp_path):
+    blender(
+        """
+        from mu_addon.blender.properties import to_unit
+
+        root = add()
+        root.mu_unit.chambers.wall_mm = 0.95
+        root.mu_unit.lattice.cells_y_plus = 3
+        bpy.ops.mu.path(name="alpha6")
+        kept, uuid = to_unit(root.mu_unit), root.mu_unit.uuid
+        path = sys.argv[1] + "/seat.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        assert unit_object.roots() == []
+        bpy.ops.wm.open_mainfile(filepath=path)
+        (root,) = unit_object.roots()
+        assert to_unit(root.mu_unit) == kept and root.mu_unit.uuid == uuid and root.mu_unit.path == "alpha6"
+        assert not unit_object.behind(root)
+        parts = {c["mu_part"]: c for c in root.children}
+        assert set(parts) == {"actuator", "lattice", "anchors", "waveguide"}
+        root.mu_unit.chambers.count = 5
+        assert unit_object.part(root, "actuator") == parts["actuator"]
+        assert abs(max(v.co.z for v in parts["actuator"].data.vertices) - 62.5) < 1e-4
+        assert len(bpy.data.node_groups) == 2  # none was made twice
+        """,
+        tmp_path,
+        tmp_path,
+    )
