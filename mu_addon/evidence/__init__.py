@@ -1,0 +1,1 @@
+"""Measured data against the model: what is wrong, why, and what mending it gains."""

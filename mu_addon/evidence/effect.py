@@ -1,0 +1,125 @@
+"""Effects a model may lack: each a mechanism with parameters that leave the model as it is at their null."""
+
+from __future__ import annotations
+
+import math
+
+import attrs
+
+from ..errors import InputError
+
+# What each effect is, and the experiment that shows it best.
+LIBRARY = {
+    "viscoelasticity": ("all moduli relax with time", "holds, and one protocol at rates a decade apart"),
+    "rate_independent_hysteresis": ("friction inside the material resists every reversal", "slow loops"),
+    "strain_stiffening": ("the material stiffens at large stretch", "an amplitude ladder to full pressure"),
+    "mullins_softening": ("the first loading softens whatever follows below its peak", "a virgin ladder"),
+    "tension_compression_asymmetry": ("tension and compression differ", "pressure and vacuum"),
+    "anisotropy": ("layers make the modulus depend on direction", "specimens printed along x, y and z"),
+    "fatigue_drift": ("the modulus falls with the number of cycles", "the first protocol again at the end"),
+    "temperature_drift": ("the modulus depends on temperature", "one protocol at two temperatures"),
+    "overcure": ("light cures resin beyond the drawn surface: every part is thicker", "weighed specimens"),
+    "skin_cure": ("the surface cured more than the core and is stiffer", "coupons of several thicknesses"),
+    "wall_thickness": ("the chamber's wall is thicker or thinner than drawn", "a section, or the mass"),
+    "pressure_offset": ("the gauge does not read zero at rest", "a record at rest; pressure and vacuum"),
+    "pressure_gain": ("the gauge reads a constant share too much", "a dead load, or a second gauge"),
+    "line_lag": ("the line's resistance delays the chamber behind the gauge", "steps and fast cycles"),
+    "leak": ("air that leaks flows through the line, so the chamber is below the gauge", "a closed valve"),
+    "clogged_chamber": ("one chamber gets less pressure than the others", "markers along the unit"),
+    "gravity": ("weight bends the unit", "one protocol in three orientations, or an added mass"),
+    "contact": ("the unit touches something", "the same protocol away from every obstacle"),
+    "angle_offset": ("the camera's zero of angle is not the unit's", "a record at rest"),
+    "clock_offset": ("camera and gauge do not share their clock", "steps and fast cycles"),
+    "seating": ("faces of the specimen close gaps before it bears load", "a preload; two specimen lengths"),
+    "frame_compliance": ("the testing machine gives way", "a rigid block in the specimen's place"),
+    "led_drift": ("the light source fades", "a straight waveguide over the same time"),
+    "ambient_light": ("light from outside adds to the signal", "the light source switched off"),
+    "optical_nonlinearity": ("light lost is not proportional to curvature", "an amplitude ladder"),
+    "mesh_error": ("the model's mesh is too coarse", "the same simulation on a finer mesh"),
+}
+
+
+@attrs.frozen
+class Parameter:
+    """A number with unit, bounds, the `null` at which it changes nothing, `starts` for a fit, its source.
+
+    linear: the prediction is affine in it, with one slope whatever the other values are. spread: standard
+    deviation of what is known of it before any data; inf where nothing is.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    null: float
+    starts: tuple[float, ...] = ()
+    source: str = ""
+    linear: bool = False
+    spread: float = math.inf
+
+    def __attrs_post_init__(self) -> None:
+        inside = [self.null, *self.starts]
+        if not (self.low < self.high and all(self.low <= v <= self.high for v in inside)):
+            raise InputError(
+                f"{self.name}: null or a start is out of bounds",
+                "effect library",
+                f"keep them from {self.low:g} to {self.high:g}",
+            )
+
+    @property
+    def step(self) -> float:
+        """A change small enough for a derivative at the null, away from the nearer bound."""
+        away = [abs(v - self.null) for v in self.starts if v != self.null]
+        size = 1e-3 * min(self.high - self.low, *away) if away else 1e-3 * (self.high - self.low)
+        return size if self.null + size <= self.high else -size
+
+
+@attrs.frozen
+class Effect:
+    """Physics that the base model lacks; `kinds` are the experiments it can be seen in.
+
+    parameters: the first is its size, whose null switches the effect off exactly; the others give its shape.
+    mechanism, reveals: in words, of `LIBRARY` where not given. Raises InputError for a name not in `LIBRARY`.
+    """
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    kinds: tuple[str, ...]
+    mechanism: str = attrs.field()
+    reveals: str = attrs.field()
+
+    @mechanism.default
+    def _of_library(self) -> str:
+        return LIBRARY.get(self.name, ("", ""))[0]
+
+    @reveals.default
+    def _shown_by(self) -> str:
+        return LIBRARY.get(self.name, ("", ""))[1]
+
+    def __attrs_post_init__(self) -> None:
+        if self.name not in LIBRARY or not self.parameters:
+            raise InputError(
+                f"no effect {self.name!r} is known", "effect library", f"known: {', '.join(LIBRARY)}"
+            )
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Names of its parameters among the values of a prediction."""
+        return tuple(f"{self.name}.{p.name}" for p in self.parameters)
+
+    def starts(self) -> tuple[dict[str, float], ...]:
+        """Every combination of the starts of its parameters, the nulls of those that have none."""
+        combined: list[dict[str, float]] = [{}]
+        for key, p in zip(self.keys, self.parameters, strict=True):
+            combined = [{**c, key: v} for c in combined for v in (p.starts or (p.null,))]
+        return tuple(combined)
+
+    def shapes(self) -> tuple[dict[str, float], ...]:
+        """Every combination of the starts of its shape, its size at null."""
+        key, size = self.keys[0], self.parameters[0]
+        found = []
+        for start in self.starts():
+            shape = {**start, key: size.null}
+            if shape not in found:
+                found.append(shape)
+        return tuple(found)

@@ -1,0 +1,104 @@
+"""The extended model: effects that were named, as a file that simulations accept."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from ..errors import InputError
+from ..files import write_text
+from .effect import LIBRARY
+from .verdict import Verdict
+
+
+@attrs.frozen
+class Fitted:
+    """A value with its standard deviation and the bounds of 95 %, in `unit`."""
+
+    value: float
+    sd: float
+    low95: float
+    high95: float
+    unit: str = ""
+
+
+@attrs.frozen
+class ExtendedModel:
+    """Fitted parameters by effect and name, and nuisances by name; verdict: how sure the effects are."""
+
+    verdict: str
+    effects: Mapping[str, Mapping[str, Fitted]]
+    nuisances: Mapping[str, Fitted]
+
+    @property
+    def values(self) -> dict[str, float]:
+        """What a simulator's `predict` takes."""
+        named = {f"{e}.{p}": f.value for e, ps in self.effects.items() for p, f in ps.items()}
+        return {**{n: f.value for n, f in self.nuisances.items()}, **named}
+
+    def save(self, path: Path) -> None:
+        """Write model.toml; raises OutputError."""
+        lines = ["# Effects that measured data named, with what each parameter is known to.", ""]
+        lines.append(f"verdict = {json.dumps(self.verdict)}")
+        for effect, parameters in self.effects.items():
+            lines += ["", f"# {LIBRARY[effect][0]}"]
+            for name, f in parameters.items():
+                lines += [f"[effect.{effect}.{name}]", *_lines(f)]
+        for name, f in self.nuisances.items():
+            lines += ["", f"[nuisance.{name}]", *_lines(f)]
+        write_text(path, "\n".join(lines) + "\n")
+
+
+def _lines(f: Fitted) -> list[str]:
+    numbers = {"value": f.value, "sd": f.sd, "low95": f.low95, "high95": f.high95}
+    return [f"{k} = {v!r}" for k, v in numbers.items() if math.isfinite(v)] + [f"unit = {json.dumps(f.unit)}"]
+
+
+def extended_model(verdict: Verdict) -> ExtendedModel:
+    """The model that a verdict leaves: the base with its nuisances fitted where no effect was named."""
+    found = verdict.selection
+    fit = found.chosen if verdict.names else found.base
+
+    def fitted(key: str, unit: str = "") -> Fitted:
+        low, high = verdict.intervals.get(key, (math.nan, math.nan))
+        return Fitted(fit.values[key], fit.sd(key), low, high, unit)
+
+    effects = {
+        e.name: {p.name: fitted(k, p.unit) for k, p in zip(e.keys, e.parameters, strict=True)}
+        for e in fit.effects
+    }
+    nuisances = {k: fitted(k) for k in fit.keys if "." not in k}
+    return ExtendedModel(verdict.kind, effects, nuisances)
+
+
+def load_model(path: Path) -> ExtendedModel:
+    """Read model.toml; raises InputError that names the table it cannot use."""
+    try:
+        document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(
+            f"cannot read {path}: {error.strerror}", str(path), "diagnose a folder first"
+        ) from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"this is not TOML: {error}", str(path), "correct that line") from error
+    effects = {}
+    for name, parameters in document.get("effect", {}).items():
+        if name not in LIBRARY:
+            raise InputError(f"no effect {name!r} is known", f"{path}, [effect.{name}]", ", ".join(LIBRARY))
+        effects[name] = {p: _fitted(path, f"effect.{name}.{p}", table) for p, table in parameters.items()}
+    nuisances = {n: _fitted(path, f"nuisance.{n}", t) for n, t in document.get("nuisance", {}).items()}
+    return ExtendedModel(str(document.get("verdict", "")), effects, nuisances)
+
+
+def _fitted(path: Path, name: str, table: Any) -> Fitted:
+    value = table.get("value") if isinstance(table, dict) else None
+    if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
+        raise InputError(f"[{name}] has no value", str(path), "write value = and a number")
+    others = {k: float(table.get(k, math.nan)) for k in ("sd", "low95", "high95")}
+    return Fitted(float(value), unit=str(table.get("unit", "")), **others)

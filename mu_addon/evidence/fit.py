@@ -1,0 +1,234 @@
+"""Generalised least squares: nuisances, and parameters of effects, fitted to whitened records."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from .effect import Effect, Parameter
+from .noise import Source, Whitening, estimate
+from .record import Record
+from .simulator import Composite
+
+Array = np.ndarray[Any, Any]
+
+ITERATIONS = 25
+# A step that gains less of chi squared than this ends a fit.
+GAIN = 1e-3
+
+
+@attrs.frozen(eq=False)
+class Fit:
+    """A model fitted to a record: its effects, values of all that was free, and what it leaves.
+
+    chi2: of the whitened residual (N,), into which the zeros have been fitted. jacobian (N, k): whitened,
+    zeros projected out, in the coordinates of the fit; covariance (k, k) of those; keys (k,).
+    """
+
+    effects: tuple[Effect, ...]
+    values: Mapping[str, float]
+    chi2: float
+    residual: Array
+    keys: tuple[str, ...]
+    jacobian: Array
+    covariance: Array
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its effects."""
+        return tuple(e.name for e in self.effects)
+
+    def sd(self, key: str) -> float:
+        """Standard deviation of a value, by the curvature at the fit."""
+        i = self.keys.index(key)
+        slope = self.values[key] if self._logarithmic(key) else 1.0
+        return abs(slope) * math.sqrt(max(float(self.covariance[i, i]), 0.0))
+
+    def _logarithmic(self, key: str) -> bool:
+        for e in self.effects:
+            for name, p in zip(e.keys, e.parameters, strict=True):
+                if name == key:
+                    return logarithmic(p)
+        return False
+
+
+def logarithmic(p: Parameter) -> bool:
+    """Whether a parameter is fitted by its logarithm: positive, with bounds decades apart."""
+    return p.low > 0 and p.high / p.low > 30 and p.null > 0
+
+
+class Fitter:
+    """Fits models to one record under one noise; `kept` (N,) are the values that count, all by default."""
+
+    def __init__(
+        self,
+        record: Record,
+        simulator: Composite,
+        sources: Mapping[str, Source],
+        kept: Array | None = None,
+        whitening: Whitening | None = None,
+    ) -> None:
+        self.record = record
+        self.simulator = simulator
+        self.sources = dict(sources)
+        self._kept = kept
+        self.whitening = whitening or Whitening(record, sources)
+        base = record.predict(simulator, {})
+        self._linear: list[Parameter] = []
+        columns = []
+        for p in simulator.nuisances:
+            if p.linear:
+                column = record.predict(simulator, {p.name: p.null + 1.0}) - base
+                if column.any():
+                    self._linear.append(p)
+                    columns.append(column)
+        self.curved = tuple(p for p in simulator.nuisances if not p.linear)
+        white = self._white(np.stack(columns, axis=1)) if columns else np.zeros((len(record), 0))
+        self._zeros = white
+        self._q = np.linalg.qr(white)[0]
+
+    def without(self, left_out: Array) -> Fitter:
+        """The same, for what is left when some of the N values (N,) are left out."""
+        kept = ~left_out if self._kept is None else self._kept & ~left_out
+        return Fitter(self.record, self.simulator, self.sources, kept, self.whitening)
+
+    def _white(self, columns: Array) -> Array:
+        w = self.whitening(columns)
+        if self._kept is not None:
+            w[~self._kept] = 0.0
+        return w
+
+    def project(self, columns: Array, zeros: bool = True) -> Array:
+        """Columns (N,) or (N, k) whitened, and freed of what zeros of channels can do."""
+        w = self._white(columns)
+        return w - self._q @ (self._q.T @ w) if zeros and self._q.shape[1] else w
+
+    def deviance(self, fit: Fit) -> dict[str, float]:
+        """-2 log likelihood of a fit by group of series, but for a constant."""
+        found = dict(self.whitening.log_dets)
+        for s in self.record.series:
+            r = fit.residual[s.at]
+            found[s.group] = found.get(s.group, 0.0) + float(r @ r)
+        return found
+
+    def under_its_own_noise(self, fit: Fit) -> tuple[Fitter, Fit]:
+        """The fit under the noise that its residual shows if nothing in it has a cause."""
+        left = self.record.values - self.predict(fit.values)
+        constant = [np.ones((s.at.stop - s.at.start, 1)) for s in self.record.series]
+        own = Fitter(self.record, self.simulator, estimate(self.record, left, constant))
+        return own, own.fit(fit.effects, fit.values)
+
+    def zeros(self, left: Array) -> dict[str, float]:
+        """Values of the linear nuisances that take most of what is left (N,), not whitened."""
+        if not self._linear:
+            return {}
+        found = np.linalg.lstsq(self._zeros, self._white(left), rcond=None)[0]
+        return {p.name: p.null + float(z) for p, z in zip(self._linear, found, strict=True)}
+
+    def predict(self, values: Mapping[str, float]) -> Array:
+        """Prediction (N,), not whitened."""
+        return self.record.predict(self.simulator, values)
+
+    def fit(
+        self,
+        effects: Sequence[Effect] = (),
+        start: Mapping[str, float] | None = None,
+        fixed: Mapping[str, float] | None = None,
+    ) -> Fit:
+        """The model with these effects, from one start (missing: null, or the first start of an effect).
+
+        fixed: values that are not fitted.
+        """
+        start, fixed = start or {}, dict(fixed or {})
+        free: list[tuple[str, Parameter]] = [(p.name, p) for p in self.curved]
+        for e in effects:
+            free += zip(e.keys, e.parameters, strict=True)
+        free = [(k, p) for k, p in free if k not in fixed]
+        first = {k: p.starts[0] if p.starts else p.null for k, p in free}
+        logs = np.array([logarithmic(p) for _, p in free], bool)
+        x = np.array([start.get(k, first[k]) for k, _ in free], float)
+        low, high = (np.array([getattr(p, side) for _, p in free], float) for side in ("low", "high"))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x, low, high = (np.where(logs, np.log(np.abs(v)), v) for v in (x, low, high))
+        step = np.array([1e-3 if log else abs(p.step) for log, (_, p) in zip(logs, free, strict=True)])
+        keys = tuple(k for k, _ in free)
+        measured = self.record.values
+        known = [(i, p) for i, (_, p) in enumerate(free) if math.isfinite(p.spread)]
+
+        def at(x: Array) -> dict[str, float]:
+            return fixed | dict(
+                zip(keys, np.where(logs, np.exp(np.where(logs, x, 0.0)), x).tolist(), strict=True)
+            )
+
+        def prior(x: Array) -> Array:
+            return np.array([(p.null - x[i]) / p.spread for i, p in known])
+
+        f = self.predict(at(x))
+        r = np.concatenate([self.project(measured - f), prior(x)])
+        chi2, damping = float(r @ r), 1e-4
+        jacobian = np.zeros((len(r), len(x)))
+        for _ in range(ITERATIONS):
+            if not len(x):
+                break
+            shifted = np.empty((len(f), len(x)))
+            for i in range(len(x)):
+                h = step[i] if x[i] + step[i] <= high[i] else -step[i]
+                moved = x.copy()
+                moved[i] += h
+                shifted[:, i] = (self.predict(at(moved)) - f) / h
+            jacobian = np.vstack([self.project(shifted), np.zeros((len(known), len(x)))])
+            for row, (i, p) in enumerate(known):
+                jacobian[len(f) + row, i] = 1.0 / p.spread
+            gram, gradient = jacobian.T @ jacobian, jacobian.T @ r
+            gained, settled = 0.0, False
+            for _ in range(8):
+                new = np.clip(x + _step(gram, gradient, damping, x, low, high), low, high)
+                f_new = self.predict(at(new))
+                r_new = np.concatenate([self.project(measured - f_new), prior(new)])
+                chi2_new = float(r_new @ r_new)
+                if chi2_new <= chi2:
+                    gained, settled = chi2 - chi2_new, True
+                    x, f, r, chi2 = new, f_new, r_new, chi2_new
+                    damping = max(damping / 10.0, 1e-9)
+                    break
+                damping = max(damping * 10.0, 1e-6)
+            if not settled or gained < GAIN:
+                break
+        return self._finished(tuple(effects), at(x), chi2, r[: len(f)], f, keys, jacobian, measured)
+
+    def _finished(
+        self,
+        effects: tuple[Effect, ...],
+        values: dict[str, float],
+        chi2: float,
+        residual: Array,
+        f: Array,
+        keys: tuple[str, ...],
+        jacobian: Array,
+        measured: Array,
+    ) -> Fit:
+        values |= self.zeros(measured - f)
+        gram = jacobian.T @ jacobian
+        covariance = np.linalg.pinv(gram, rcond=1e-12, hermitian=True) if len(keys) else np.zeros((0, 0))
+        return Fit(effects, values, chi2, residual, keys, jacobian[: len(f)], covariance)
+
+    def best(self, effects: Sequence[Effect], starts: Sequence[Mapping[str, float]]) -> Fit:
+        """The best of the fits from several starts."""
+        return min((self.fit(effects, s) for s in starts), key=lambda found: found.chi2)
+
+
+def _step(gram: Array, gradient: Array, damping: float, x: Array, low: Array, high: Array) -> Array:
+    """Damped Gauss-Newton step; coordinates at a bound that would leave it stand still."""
+    free = ~(((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0)))
+    free &= np.diag(gram) > 0
+    step = np.zeros_like(x)
+    if free.any():
+        inner = gram[np.ix_(free, free)]
+        scale = np.sqrt(np.diag(inner))
+        scaled = inner / np.outer(scale, scale) + damping * np.eye(len(scale))
+        step[free] = np.linalg.solve(scaled, gradient[free] / scale) / scale
+    return step

@@ -1,0 +1,175 @@
+"""What an extended model gains on experiments it has not seen, against three models that know no cause."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..measured import Experiment
+from .fit import Fit, Fitter
+from .record import Record, record
+
+Array = np.ndarray[Any, Any]
+
+RESAMPLES = 400
+
+
+@attrs.frozen
+class Errors:
+    """Root mean squares of what the base and the extended model leave, in `unit`; bounds are of the drop.
+
+    permuted, black_box: of the same effects put on the wrong experiments, and of as many parameters that
+    mean nothing; nan where there is no such model.
+    """
+
+    before: float
+    after: float
+    unit: str
+    low95: float = math.nan
+    high95: float = math.nan
+    permuted: float = math.nan
+    black_box: float = math.nan
+
+    def as_json(self) -> dict[str, Any]:
+        """As in verdict.json; nan becomes null."""
+        return {
+            "rmse_before": self.before,
+            "rmse_after": self.after,
+            "unit": self.unit,
+            "low95": self.low95,
+            "high95": self.high95,
+            "rmse_permuted": self.permuted,
+            "rmse_black_box": self.black_box,
+        }
+
+
+@attrs.frozen
+class Gain:
+    """Errors on the experiments that were fitted, and on those held out, if there are any."""
+
+    fit: Errors
+    held_out: Errors | None
+
+    def as_json(self) -> dict[str, Any]:
+        """As in verdict.json."""
+        return {"fit": self.fit.as_json(), "held_out": self.held_out.as_json() if self.held_out else None}
+
+
+def gain(fitter: Fitter, base: Fit, extended: Fit, held_out: Sequence[Experiment]) -> Gain:
+    """Errors of the base and extended fits; the first quantity of a record (its angle, if any) is judged."""
+    on_fit = _errors(fitter, fitter.record, base, extended)
+    known = [e for e in held_out if fitter.simulator.knows(e)]
+    if not known:
+        return Gain(on_fit, None)
+    return Gain(on_fit, _errors(fitter, record(known, fitter.simulator), base, extended))
+
+
+def _errors(fitter: Fitter, judged: Record, base: Fit, extended: Fit) -> Errors:
+    group = judged.groups[0]
+    members = [s for s in judged.series if s.group == group]
+    rows = np.concatenate([np.arange(s.at.start, s.at.stop) for s in members])
+    unit = members[0].channel.rpartition("_")[2]
+    simulator = fitter.simulator
+    before = (judged.values - judged.predict(simulator, base.values))[rows]
+    after = (judged.values - judged.predict(simulator, extended.values))[rows]
+    if not extended.effects:
+        return Errors(_rms(before), _rms(after), unit)
+    many = sum(len(e.keys) for e in extended.effects)
+    blind = (judged.values - _black_box(fitter, judged, base, many))[rows]
+    permuted = (judged.values - _permuted(fitter, judged, base, extended))[rows]
+    low, high = _bootstrap(members, rows[0], before, after)
+    return Errors(_rms(before), _rms(after), unit, low, high, _rms(permuted), _rms(blind))
+
+
+def _rms(r: Array) -> float:
+    return float(np.sqrt(np.mean(r**2)))
+
+
+def _bootstrap(members: Sequence[Any], first: int, before: Array, after: Array) -> tuple[float, float]:
+    """95 % interval of the drop of the error, from eighths of series drawn with replacement."""
+    pieces: list[Array] = []
+    for s in members:
+        at = np.arange(s.at.start, s.at.stop) - first
+        pieces += [p for p in np.array_split(at, min(8, len(at))) if len(p)]
+    squares = np.array([(np.sum(before[p] ** 2), np.sum(after[p] ** 2), len(p)) for p in pieces])
+    drawn = np.random.default_rng(0).integers(0, len(pieces), (RESAMPLES, len(pieces)))
+    sums = squares[drawn].sum(axis=1)
+    drop = np.sqrt(sums[:, 0] / sums[:, 2]) - np.sqrt(sums[:, 1] / sums[:, 2])
+    low, high = np.quantile(drop, [0.025, 0.975])
+    return float(low), float(high)
+
+
+def _permuted(fitter: Fitter, judged: Record, base: Fit, extended: Fit) -> Array:
+    """The base with the change by the effects taken from other experiments, its size fitted."""
+
+    def shift(r: Record) -> Array:
+        plain = {k: v for k, v in extended.values.items() if k in base.values}
+        change = r.predict(fitter.simulator, extended.values) - r.predict(fitter.simulator, plain)
+        moved = np.zeros(len(r))
+        for channel in dict.fromkeys(s.channel for s in r.series):
+            same = [s for s in r.series if s.channel == channel]
+            for s, other in zip(same, same[1:] + same[:1], strict=True):
+                source = change[other.at]
+                if other is s:
+                    source = source[::-1]
+                at = np.linspace(0.0, 1.0, s.at.stop - s.at.start)
+                moved[s.at] = np.interp(at, np.linspace(0.0, 1.0, len(source)), source)
+        return moved
+
+    return _with_columns(fitter, judged, base, shift(fitter.record)[:, None], shift(judged)[:, None])
+
+
+def _black_box(fitter: Fitter, judged: Record, base: Fit, many: int) -> Array:
+    """The base with as many corrections of its response as the effects have parameters, of no meaning."""
+    return _with_columns(
+        fitter,
+        judged,
+        base,
+        _corrections(fitter, fitter.record, base, many),
+        _corrections(fitter, judged, base, many),
+    )
+
+
+def _corrections(fitter: Fitter, r: Record, base: Fit, many: int) -> Array:
+    """The base's response to its modulus times powers of what drives it, and of the time since its start."""
+    plain = r.predict(fitter.simulator, base.values)
+    response = np.ones(len(r))
+    if fitter.curved:
+        p = fitter.curved[0]
+        moved = {**base.values, p.name: base.values[p.name] + p.step}
+        response = (r.predict(fitter.simulator, moved) - plain) / p.step
+    drives = ("pressure_kPa", "strain", "added_mass_g", "angle_deg")
+
+    def driven(e: Experiment) -> Array:
+        i = next(i for i, other in enumerate(r.experiments) if other is e)
+        name = next((d for d in drives if r.driven(i, d)), None)
+        return e[name] if name else np.zeros(len(e))
+
+    x = r.covariate(driven)
+    t = r.covariate(lambda e: e["time_s"] - e["time_s"][0] if "time_s" in e.columns else np.zeros(len(e)))
+    columns = [response * x**k for k in range(1, many + 1)]
+    columns[many // 2 :] = [response * t**k for k in range(1, many - many // 2 + 1)] if many > 1 else columns
+    return np.stack(columns, axis=1)
+
+
+def _with_columns(fitter: Fitter, judged: Record, base: Fit, fitted: Array, applied: Array) -> Array:
+    """Prediction (N,) of the base plus columns whose sizes, with the nuisances', were fitted."""
+    p = list(fitter.curved)
+    plain = fitter.predict(base.values)
+    tangent = [
+        (fitter.predict({**base.values, q.name: base.values[q.name] + q.step}) - plain) / q.step for q in p
+    ]
+    every = np.column_stack([fitted, *tangent]) if tangent else fitted
+    length = np.linalg.norm(every, axis=0)
+    white = fitter.project(every / np.where(length > 0, length, 1.0))
+    left = fitter.project(fitter.record.values - plain)
+    size = np.linalg.lstsq(white, left, rcond=1e-10)[0] / np.where(length > 0, length, 1.0)
+    k = fitted.shape[1]
+    zeros = fitter.zeros(fitter.record.values - plain - every @ size)
+    values = {**base.values, **{q.name: base.values[q.name] + s for q, s in zip(p, size[k:], strict=True)}}
+    values |= {name: base.values.get(name, 0.0) + z for name, z in zeros.items()}
+    return np.asarray(judged.predict(fitter.simulator, values) + applied @ size[:k])

@@ -1,0 +1,98 @@
+"""Which experiment to make next: the one, of those a bench can make, that best separates what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+from ..measured import Experiment
+from .fit import Fit, Fitter
+from .noise import Whitening
+from .record import record
+from .selection import Selection
+from .sensitivity import Sensitivity
+
+Array = np.ndarray[Any, Any]
+
+
+@attrs.frozen
+class Proposal:
+    """An experiment in words, the effects it separates, and the delta chi squared expected between them."""
+
+    what: str
+    separates: tuple[str, ...]
+    expected: float
+
+
+def next_experiment(
+    fitter: Fitter, found: Selection, seen: Sequence[Sensitivity], feasible: Sequence[Experiment] = ()
+) -> Proposal | None:
+    """The best of `feasible` experiments, else of variations of those made; None where nothing is in doubt.
+
+    feasible: their columns hold what drives them; what would be measured may hold anything but nan.
+    """
+    rivals = [c for c in found.causes if c.rivals]
+    if not rivals:
+        return None
+    cause = rivals[0]
+    names = (cause.effect.name, *cause.rivals)
+    fits: dict[str, Fit] = {}
+    for name in names:
+        for f in (found.chosen, *found.singles):
+            if f.names == (name,) or (f is found.chosen and name == cause.effect.name):
+                fits.setdefault(name, f)
+    made = [e for i, e in enumerate(fitter.record.experiments) if fitter.record.driven(i, "pressure_kPa")]
+    options = list(feasible) or _variations(made)
+    best: Proposal | None = None
+    for e in options:
+        try:
+            expected = _divergence(fitter, e, [fits[n].values for n in names if n in fits])
+        except InputError:
+            continue
+        if expected > 0.0 and (best is None or expected > best.expected):
+            best = Proposal(f"{e.name}: {cause.effect.reveals}", names, expected)
+    if best is None or best.expected < 1.0:
+        words = "; or ".join(dict.fromkeys(s.effect.reveals for s in seen if s.effect.name in names))
+        return Proposal(words, names, best.expected if best else 0.0)
+    return best
+
+
+def _divergence(fitter: Fitter, e: Experiment, models: Sequence[Any]) -> float:
+    """Least delta chi squared between two of the models in one experiment, nuisances as they were fitted."""
+    planned = record([e], fitter.simulator)
+    if any(g not in fitter.sources for g in planned.groups):
+        return 0.0
+    whitening = Whitening(planned, fitter.sources)
+    white = [whitening(planned.predict(fitter.simulator, m)) for m in models]
+    apart = [float(np.sum((a - b) ** 2)) for i, a in enumerate(white) for b in white[i + 1 :]]
+    return min(apart, default=0.0)
+
+
+def _variations(made: Sequence[Experiment]) -> list[Experiment]:
+    """Experiments made before, faster, slower, to higher pressure, under vacuum, or turned."""
+    found = []
+    for e in made:
+        if "time_s" not in e.columns or "pressure_kPa" not in e.columns:
+            continue
+        t, p = e["time_s"], e["pressure_kPa"]
+        found += [
+            _driven(e, f"{e.name!r} three times as fast", t[0] + (t - t[0]) / 3.0, p),
+            _driven(e, f"{e.name!r} at a fifth of the rate", t[0] + (t - t[0]) * 5.0, p),
+            _driven(e, f"{e.name!r} to 1.3 times the pressure", t, 1.3 * p),
+            _driven(e, f"{e.name!r} with vacuum for pressure", t, -0.5 * p),
+        ]
+        found += [
+            attrs.evolve(e, name=f"{e.name!r} at {phi:g} deg", orientation_deg=phi)
+            for phi in (0.0, 90.0, 180.0)
+            if phi != e.orientation_deg
+        ]
+    return found
+
+
+def _driven(e: Experiment, name: str, t: Array, p: Array) -> Experiment:
+    columns = {k: np.zeros(len(p)) for k in e.columns} | {"time_s": t, "pressure_kPa": p}
+    return attrs.evolve(e, name=name, columns=columns)

@@ -1,0 +1,323 @@
+"""Noise of instruments: white and slow (a first-order process), its estimate, and whitening by it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from .record import KNOWN, Record, Series
+
+Array = np.ndarray[Any, Any]
+
+
+@attrs.frozen
+class Source:
+    """Noise of a group of series: white of standard deviation `white` a sample, slow of `slow` and `time_s`.
+
+    The slow part is an Ornstein-Uhlenbeck process: an AR(1) series of rho = exp(-dt/time_s) when sampled.
+    """
+
+    white: float
+    slow: float
+    time_s: float
+
+
+class Whitening:
+    """Turns series of a record into series of unit white noise, by sources a group.
+
+    The means of blocks of such noise, apart by their clock, are again a first-order process beside a white
+    one; what remains of each after the part of the last that persists is correlated with its neighbour
+    only, so the factor has one diagonal beside the main one. log_dets: of the covariance, by group.
+    """
+
+    def __init__(self, record: Record, sources: Mapping[str, Source], groups: Sequence[str] = ()) -> None:
+        self.log_dets: dict[str, float] = {}
+        self._sources = dict(sources)
+        self._parts: list[tuple[slice, Any]] = []
+        for group in groups or record.groups:
+            if group == KNOWN:
+                continue
+            members = [s for s in record.series if s.group == group]
+            factor, log_det = _factor(members, sources[group])
+            self._parts.append((slice(members[0].at.start, members[-1].at.stop), factor))
+            self.log_dets[group] = log_det
+
+    def __call__(self, columns: Array) -> Array:
+        """Whitened columns (N,) or (N, k); rows of groups that are not whitened stay."""
+        found = np.array(columns, float, order="F")
+        for rows, factor in self._parts:
+            found[rows] = _applied(factor, found[rows])
+        return found
+
+    def series(self, series: Series, columns: Array) -> Array:
+        """Whitened columns (b, k) of one series."""
+        if series.group == KNOWN:
+            return columns
+        return _applied(_factor([series], self._sources[series.group])[0], columns)
+
+
+def _applied(factor: Any, x: Array) -> Array:
+    from scipy.linalg.lapack import dtbtrs
+
+    scale, persist, band = factor
+    x = (x.T / scale).T
+    y = np.array(x, order="F")
+    y[1:] -= (persist[1:] * x[:-1].T).T
+    solved, _ = dtbtrs(band, y if y.ndim == 2 else y[:, None], uplo="L")
+    return solved if y.ndim == 2 else np.asarray(solved[:, 0])
+
+
+def _factor(members: Sequence[Series], source: Source) -> tuple[Any, float]:
+    from scipy.linalg.lapack import dpbtrf
+
+    persist, slow, white = [], [], []
+    for s in members:
+        if math.isnan(s.sample_s):
+            # Without a clock each value stands alone.
+            persist.append(np.zeros(len(s.time_s)))
+            slow.append(np.full(len(s.time_s), source.white**2))
+            white.append(np.zeros(len(s.time_s)))
+            continue
+        apart = np.diff(s.time_s, prepend=-math.inf)
+        persist.append(np.exp(-apart / source.time_s))
+        kept, first = _block(s.count, s.sample_s / source.time_s)
+        variance = source.slow**2 * kept
+        slow.append(variance)
+        white.append(source.white**2 / s.count + source.slow**2 * first - variance)
+    phi, c, v = np.concatenate(persist), np.concatenate(slow), np.concatenate(white)
+    u = v / c
+    before = np.concatenate([[0.0], u[:-1]])
+    band = np.zeros((2, len(c)))
+    band[0] = 1.0 - phi**2 + u + phi**2 * before
+    band[1, :-1] = -(phi * before)[1:]
+    factor, failed = dpbtrf(band, lower=1)
+    if failed:
+        band[0] *= 1.0 + 1e-9
+        factor, _ = dpbtrf(band, lower=1)
+    log_det = float(np.log(c).sum() + 2.0 * np.log(factor[0]).sum())
+    return (np.sqrt(c), phi, factor), log_det
+
+
+def _block(count: Array, step: float) -> tuple[Array, Array]:
+    """Covariance of two blocks' means over exp(-distance), and variance of one's, for unit slow noise."""
+    if (count == 1).all():
+        return np.ones(len(count)), np.ones(len(count))
+    a = max(step, 1e-9)
+    kept = (np.sinh(count * a / 2.0) / (count * math.sinh(a / 2.0))) ** 2
+    r = math.exp(-a)
+    # Sum over pairs of samples of r^|i - j|.
+    total = count + 2.0 * (r * count / (1.0 - r) - r * (1.0 - r**count) / (1.0 - r) ** 2)
+    return kept, total / count**2
+
+
+def estimate(record: Record, residual: Array, columns: Sequence[Array]) -> dict[str, Source]:
+    """Sources by restricted maximum likelihood, so that nothing in the span of `columns` counts as noise.
+
+    residual (N,): of the base model; columns: of each series (b, k), each free in every series. What any
+    effect of the library can do is in the span, so that an effect neither swells the noise nor is whitened
+    away; what degrees of freedom the span costs, the restricted likelihood accounts for.
+    """
+    found = {}
+    for group in record.groups:
+        if group == KNOWN:
+            continue
+        members = [i for i, s in enumerate(record.series) if s.group == group]
+        found[group] = _estimate(record, group, members, residual, columns)
+    return found
+
+
+# Series that suffice for three numbers; the search begins with fewer.
+SERIES = 24
+FIRST_SERIES = 8
+
+
+def _estimate(
+    record: Record, group: str, members: Sequence[int], residual: Array, columns: Sequence[Array]
+) -> Source:
+    series = [record.series[i] for i in members]
+    square, dof = 0.0, 0
+    for i, s in zip(members, series, strict=True):
+        q = np.linalg.qr(columns[i])[0]
+        r = residual[s.at] - q @ (q.T @ residual[s.at])
+        square += float(r @ r)
+        dof += max(len(r) - columns[i].shape[1], 0)
+    total = math.sqrt(square / max(dof, 1)) or 1e-9
+    timed = [s for s in series if not math.isnan(s.sample_s)]
+    if not timed:
+        pure = _pure_error(record, series, residual)
+        return Source(total if pure is None else pure, 0.0, 1.0)
+    if dof < 12:
+        return Source(total, 0.0, 1.0)
+    sample = float(np.median([s.sample_s for s in timed]))
+    block = float(np.median([np.median(s.count) for s in timed]))
+    longest = max(float(s.time_s[-1] - s.time_s[0]) for s in timed)
+    short, every = (_some(members, most) for most in (FIRST_SERIES, SERIES))
+    deviance = _deviance(record, group, short, residual, columns, (sample, longest))
+    size, best = 0.7, None
+    for time in (3.0 * sample * block, 15.0 * sample * block):
+        x0 = np.array([math.log(total * 0.7 * math.sqrt(block)), math.log(total * 0.7), math.log(time)])
+        found = _minimum(deviance, x0, size)
+        if best is None or found.fun < best.fun:
+            best = found
+    assert best is not None
+    if len(every) > len(short):
+        deviance = _deviance(record, group, every, residual, columns, (sample, longest))
+        best = _minimum(deviance, best.x, 0.15)
+    return _source(best.x, sample, longest)
+
+
+def _pure_error(record: Record, series: Sequence[Series], residual: Array) -> float | None:
+    """Standard deviation of rows that repeat what was done to the digit; None without two such.
+
+    Few repeats tell it badly, so it is the bound that four in five such estimates keep below.
+    """
+    from scipy.stats import chi2
+
+    alike: dict[Any, list[float]] = {}
+    for s in series:
+        e = record.experiments[s.experiment]
+        drives = [e.columns[c] for c in sorted(e.columns) if record.driven(s.experiment, c)]
+        place = (s.channel, e.scale, e.orientation_deg, e.axis, e.mode, e.section_mm, e.length_mm, e.cells)
+        for k, value in enumerate(residual[s.at]):
+            if len(residual[s.at]) == len(e):
+                alike.setdefault((place, *(float(d[k]) for d in drives)), []).append(float(value))
+    repeats = [np.array(v) for v in alike.values() if len(v) > 1]
+    dof = sum(len(v) - 1 for v in repeats)
+    if dof < 2:
+        return None
+    square = sum(float(np.sum((v - v.mean()) ** 2)) for v in repeats)
+    return math.sqrt(square / float(chi2.ppf(0.2, dof))) or None
+
+
+def _some(members: Sequence[int], most: int) -> list[int]:
+    """At most so many members, evenly from the first to the last."""
+    chosen = np.unique(np.round(np.linspace(0, len(members) - 1, most)).astype(int))
+    return [members[i] for i in chosen]
+
+
+def _minimum(deviance: Callable[[Array], float], x0: Array, size: float) -> Any:
+    from scipy.optimize import minimize
+
+    simplex = x0 + size * np.vstack([np.zeros(3), np.eye(3)])
+    options = {"initial_simplex": simplex, "xatol": 0.02, "fatol": 0.05, "maxfev": 120}
+    return minimize(deviance, x0, method="Nelder-Mead", options=options)
+
+
+def _deviance(
+    record: Record,
+    group: str,
+    members: Sequence[int],
+    residual: Array,
+    columns: Sequence[Array],
+    clock: tuple[float, float],
+) -> Callable[[Array], float]:
+    """Restricted deviance of the logarithms of white, slow and time_s, for some members of a group."""
+    k = max(columns[i].shape[1] for i in members)
+    places, series, start = [], [], 0
+    for i in members:
+        s = record.series[i]
+        b = s.at.stop - s.at.start
+        places.append((slice(start, start + b), columns[i].shape[1]))
+        series.append(s)
+        start += b
+    stack = np.zeros((start, k + 1), order="F")
+    for i, (at, many) in zip(members, places, strict=True):
+        stack[at, :many] = columns[i]
+        stack[at, k] = residual[record.series[i].at]
+
+    def deviance(x: Array) -> float:
+        factor, value = _factor(series, _source(x, *clock))
+        w = _applied(factor, stack)
+        for at, many in places:
+            b, r = w[at, :many], w[at, k]
+            gram = b.T @ b
+            lower = np.linalg.cholesky(gram + 1e-12 * np.trace(gram) * np.eye(many))
+            half = np.linalg.solve(lower, b.T @ r)
+            value += 2.0 * float(np.log(np.diag(lower)).sum()) + float(r @ r - half @ half)
+        return value
+
+    return deviance
+
+
+def _source(x: Array, sample_s: float, longest_s: float) -> Source:
+    low, high = math.log(0.5 * sample_s), math.log(max(longest_s, 4.0 * sample_s))
+    return Source(math.exp(x[0]), math.exp(x[1]), math.exp(min(max(x[2], low), high)))
+
+
+def span(record: Record, signatures: Array) -> list[Array]:
+    """Orthonormal columns (b, k) a series: what causes, known or not, may do to it smoothly.
+
+    signatures (N, m): changes of the prediction by effects and nuisances. Beside them stand a drift, powers
+    of the base's own response, and, where the record repeats a cycle, the cycle's harmonics. Directions that
+    hold less than a hundredth of a signature's size are left out, and never more than a fifth of a series
+    is spent.
+    """
+    found = []
+    for s in record.series:
+        b = s.at.stop - s.at.start
+        here = signatures[s.at]
+        constant = np.ones((b, 1)) / math.sqrt(b)
+        parts = [_centred(here)]
+        if not math.isnan(s.sample_s):
+            drift = np.linspace(-1.0, 1.0, b)[:, None]
+            parts.append(_centred(drift))
+        cycle = harmonics(record, s)
+        if cycle is not None:
+            parts.append(_centred(cycle))
+        every = np.hstack(parts)
+        u, sizes, _ = np.linalg.svd(every, full_matrices=False)
+        most = max(b // 5 - 1, 0) if not math.isnan(s.sample_s) else max(b // 2 - 1, 0)
+        many = min(int((sizes > 1e-2).sum()), most)
+        found.append(np.hstack([constant, u[:, :many]]))
+    return found
+
+
+def _centred(columns: Array) -> Array:
+    """Columns without their mean, of unit length; those that were constant are dropped."""
+    c = columns - columns.mean(axis=0)
+    size = np.linalg.norm(c, axis=0)
+    kept = size > 1e-9 * (np.linalg.norm(columns, axis=0) + 1e-300)
+    return np.asarray(c[:, kept] / size[kept])
+
+
+def harmonics(record: Record, s: Series, orders: int = 12) -> Array | None:
+    """Sines and cosines (b, 2 orders) of the cycle that a record's input repeats; None where it does not."""
+    e = record.experiments[s.experiment]
+    if math.isnan(s.sample_s) or not record.driven(s.experiment, "pressure_kPa"):
+        return None
+    period = repeated(e["time_s"], e["pressure_kPa"])
+    if period is None:
+        return None
+    most = min(orders, int(period / (4.0 * s.sample_s * np.median(s.count))))
+    phase = 2.0 * math.pi * s.time_s[:, None] / period * np.arange(1, most + 1)
+    return np.hstack([np.sin(phase), np.cos(phase)]) if most else None
+
+
+def repeated(time_s: Array, signal: Array) -> float | None:
+    """Period in s that a signal (n,) goes through twice or more, by its autocorrelation, or None."""
+    n = len(signal)
+    x = np.interp(np.linspace(time_s[0], time_s[-1], n), time_s, signal)
+    x = x - x.mean()
+    if n < 16 or not x.any():
+        return None
+    power = np.abs(np.fft.rfft(x, 2 * n)) ** 2
+    # Of overlapping parts, so that a whole number of cycles comes back to one.
+    together = np.fft.irfft(power)[: n // 2 + 1] / (n - np.arange(n // 2 + 1)) * n
+    together = together / together[0]
+    low = int(np.argmax(together < 0.2)) if (together < 0.2).any() else n
+    if low >= len(together) - 2:
+        return None
+    back = np.flatnonzero(together[low:] > 0.75)
+    if not len(back):
+        return None
+    # The first return, not a later one that happens to be a little closer.
+    begin = low + int(back[0])
+    ends = np.flatnonzero(together[begin:] <= 0.75)
+    if not len(ends):
+        return None
+    peak = begin + int(np.argmax(together[begin : begin + int(ends[0])]))
+    return float(peak * (time_s[-1] - time_s[0]) / (n - 1))

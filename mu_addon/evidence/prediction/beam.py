@@ -1,0 +1,150 @@
+"""beam_deadweight: a horizontal cantilever sagging under masses at its tip, at any deflection."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...errors import ConvergenceError
+from ...measured import Experiment
+from ..effect import Effect, Parameter
+from .coupon import STRAIN_STIFFENING
+from .specimen import FRAME
+
+Array = np.ndarray[Any, Any]
+
+KIND = "beam_deadweight"
+GRAVITY = 9.80665
+# Shear coefficient of a rectangle, 10 (1 + nu)/(12 + 11 nu) at 1/2: Cowper, J. Appl. Mech. 33 (1966) 335.
+SHEAR = 15.0 / 17.5
+NODES = 24
+
+MODULUS = Parameter("beam_modulus_kPa", "kPa", 10.0, 1e6, 300.0, (), "soft silicones to hard rubber")
+
+EFFECTS = (
+    Effect(
+        "gravity",
+        (Parameter("density_kg_m3", "kg/m3", 0.0, 4000.0, 0.0, (1000.0,), "elastomers 950 to 1300"),),
+        (KIND,),
+        "the beam sags under its own weight",
+    ),
+    Effect("strain_stiffening", STRAIN_STIFFENING.parameters, (KIND,)),
+    Effect(
+        "angle_offset",
+        # A sag of its own weight and a tilt look alike: what is known of clamps tells them apart.
+        (Parameter("tilt_deg", "deg", -10.0, 10.0, 0.0, (2.0,), "clamps set by eye or level", spread=1.0),),
+        (KIND,),
+        "the clamp, or what was taken for no sag, is not level",
+        "a mass on the beam turned upside down",
+    ),
+    Effect(
+        "frame_compliance",
+        (FRAME,),
+        (KIND,),
+        "the clamp turns under the moment at the root, its jaws a thickness apart giving way",
+    ),
+)
+
+
+class BeamSag:
+    """Predicts the sag of a tip: an elastica of given modulus, without weight of its own.
+
+    Shear is added at first order; the solid is incompressible. Width and thickness are section_mm.
+    """
+
+    nuisances = (MODULUS,)
+    effects = EFFECTS
+
+    def channels(self, experiment: Experiment) -> tuple[str, ...]:
+        """The sag of the tip."""
+        return ("tip_deflection_mm",)
+
+    def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
+        """Prediction (1, n) in mm, see Simulator."""
+        assert experiment.section_mm is not None
+        assert experiment.length_mm is not None
+        get = values.get
+        (width, h), L = experiment.section_mm, experiment.length_mm
+        bending = 1e-3 * get(MODULUS.name, MODULUS.null) * width * h**3 / 12
+        # kg/m3 is 1e-9 kg/mm3.
+        weight = 1e-9 * GRAVITY * get("gravity.density_kg_m3", 0.0) * width * h * L
+        masses, row = np.unique(experiment["added_mass_g"], return_inverse=True)
+        sag = cantilever(
+            1e-3 * GRAVITY * masses * L**2 / bending,
+            weight * L**2 / bending,
+            tilt=np.radians(get("angle_offset.tilt_deg", 0.0)),
+            give=get("frame_compliance.mm_per_N", 0.0) / h**2 * bending / L,
+            # c2 (I1 - 3)^2 adds 6 c2/c1 e^2 to the modulus, and 3/20 of that at the faces to the moment.
+            stiffening=0.9 * get("strain_stiffening.c2_over_c1", 0.0) * (h / L) ** 2,
+            shear=h**2 / (4 * SHEAR * L**2),
+        )
+        return (L * sag[row])[None]
+
+
+def cantilever(
+    tip: Array,
+    weight: float,
+    *,
+    tilt: float = 0.0,
+    give: float = 0.0,
+    stiffening: float = 0.0,
+    shear: float = 0.0,
+) -> Array:
+    """Sag (m,) of a level cantilever's tip over its length; raises ConvergenceError.
+
+    tip (m,): force at the tip times L^2/EI; weight: of the beam times L^2/EI. tilt: of the clamp, in rad,
+    down; give: turn of the clamp a moment, times EI/L; stiffening: moment = EI k (1 + stiffening (L k)^2) of
+    curvature k; shear: EI/(GA' L^2), whose sag is added at first order. The slope a below the level obeys
+    (a' + stiffening a'^3)' = -(tip + weight (1 - s)) cos a, solved by collocation at Chebyshev points.
+    """
+    s, D = _chebyshev(NODES)
+    load = np.asarray(tip, float)[:, None] + weight * (1 - s)
+    identity = np.eye(NODES + 1)
+    a = np.full_like(load, tilt)
+    # Large loads are come to in steps.
+    steps = max(1, int(np.ceil(np.sqrt(load.max() / 2)))) if load.size else 1
+    for share in np.linspace(1 / steps, 1, steps):
+        for _ in range(60):
+            k = a @ D.T
+            moment = k * (1 + stiffening * k**2)
+            stiff = 1 + 3 * stiffening * k**2
+            residual = moment @ D.T + share * load * np.cos(a)
+            J = D @ (stiff[:, :, None] * D) - (share * load * np.sin(a))[:, :, None] * identity
+            residual[:, -1] = k[:, -1]
+            J[:, -1] = D[-1]
+            residual[:, 0] = a[:, 0] - tilt - give * moment[:, 0]
+            J[:, 0] = identity[0] - give * stiff[:, :1] * D[0]
+            step = np.linalg.solve(J, -residual[:, :, None])[:, :, 0]
+            largest = np.abs(step).max() if step.size else 0.0
+            a = a + step * min(1.0, 0.7 / max(largest, 1e-300))
+            if largest < 1e-9 and (stiff > 0).all():
+                break
+        else:
+            raise ConvergenceError(
+                "no equilibrium of the beam was found", KIND, "its modulus is far too low, or its law softens"
+            )
+    weights = _clenshaw_curtis(NODES)
+    return np.asarray((np.sin(a) + shear * load * np.cos(a) ** 2) @ weights)
+
+
+def _chebyshev(n: int) -> tuple[Array, Array]:
+    """Points (n + 1,) from 0 to 1 and the matrix that differentiates there (Trefethen 2000, chapter 6)."""
+    x = -np.cos(np.pi * np.arange(n + 1) / n)
+    c = (-1.0) ** np.arange(n + 1)
+    c[[0, -1]] *= 2
+    apart = x[:, None] - x + np.eye(n + 1)
+    D = c[:, None] / c / apart
+    D -= np.diag(D.sum(axis=1))
+    return (x + 1) / 2, 2 * D
+
+
+def _clenshaw_curtis(n: int) -> Array:
+    """Weights (n + 1,) of the integral over those points, n even."""
+    angle = np.pi * np.arange(n + 1) / n
+    k = np.arange(1, n // 2 + 1)
+    share = np.where(k == n // 2, 1.0, 2.0) / (4 * k**2 - 1)
+    w = (1 - np.cos(2 * np.outer(angle, k)) @ share) / n
+    w[[0, -1]] /= 2
+    return np.asarray(w)

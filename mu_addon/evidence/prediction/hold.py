@@ -1,0 +1,212 @@
+"""pressure_hold: the gas balance of a chamber whose valve was shut."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...measured import Experiment
+from ..effect import Effect, Parameter
+from .unit import TIMED, lagged
+
+Array = np.ndarray[Any, Any]
+
+KIND = "pressure_hold"
+ATMOSPHERE_kPa = 101.325
+ROOM_K = 296.0
+# Creep is spread over these decades after its onset.
+DECADES = 6
+# The readings of this time tell where a hold begins, to within this share of the absolute pressure.
+BEGINNING_s, NEAR = 1.0, 0.01
+
+EFFECTS = (
+    Effect(
+        "leak",
+        (
+            Parameter("loss_per_s", "1/s", 0.0, 0.2, 0.0, (3e-4, 0.03), "share of a small overpressure lost"),
+            Parameter(
+                "inertia", "", 0.0, 30.0, 0.0, (0.0, 1.0), "of the flow, after Forchheimer; 0 is laminar"
+            ),
+        ),
+        (KIND,),
+        "gas flows out through pores or cracks, by the difference of the squared absolute pressures",
+    ),
+    Effect(
+        "viscoelasticity",
+        (
+            Parameter(
+                "creep_per_MPa", "1/MPa", 0.0, 0.5, 0.0, (3e-3,), "the volume's growth a decade of time"
+            ),
+            Parameter("onset_s", "s", 0.1, 100.0, 1.0, (1.0, 10.0), "when that growth begins"),
+        ),
+        (KIND,),
+        "the wall creeps under pressure, so the chamber grows by as much in each decade of time",
+    ),
+    Effect(
+        "temperature_drift",
+        (
+            Parameter("cooling_K", "K", -40.0, 120.0, 0.0, (-3.0, 3.0), "compressed gas is warm"),
+            Parameter("cooling_s", "s", 0.5, 3600.0, 30.0, (10.0, 60.0), "to the temperature of the wall"),
+        ),
+        (KIND,),
+        "the gas cools to the temperature of the wall, and its pressure with it",
+    ),
+    *(Effect(e.name, e.parameters, (KIND,)) for e in TIMED if e.name in ("pressure_offset", "pressure_gain")),
+)
+
+
+class ChamberPressure:
+    """Predicts holds: p V = m R T in a chamber that, without effects, keeps volume, gas and temperature.
+
+    Every hold has its own initial pressure, and its own moment at which the valve was shut, until when the
+    supply keeps the pressure. compliance_per_kPa: growth of the volume with pressure, as a share, which only
+    matters while the pressure changes and is not told by a hold.
+    """
+
+    effects = EFFECTS
+
+    def __init__(self, experiments: Sequence[Experiment], compliance_per_kPa: float = 0.0) -> None:
+        self._compliance = compliance_per_kPa
+        nuisances = []
+        for e in experiments:
+            if e.kind != KIND:
+                continue
+            first = beginning_kPa(e)
+            near = NEAR * (first + ATMOSPHERE_kPa)
+            lasts = float(e["time_s"][-1] - e["time_s"][0])
+            nuisances.append(
+                Parameter(_initial(e), "kPa", first - near, first + near, first, (), "its first readings")
+            )
+            nuisances.append(
+                Parameter(_shut(e), "s", 0.0, 0.5 * lasts, 0.0, (), "records begin by hand", spread=5.0)
+            )
+        self.nuisances = tuple(nuisances)
+
+    def channels(self, experiment: Experiment) -> tuple[str, ...]:
+        """The gauge pressure."""
+        return ("pressure_kPa",)
+
+    def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
+        """Prediction (1, n) in kPa, see Simulator."""
+        get = values.get
+        initial = get(_initial(experiment), None)
+        initial = beginning_kPa(experiment) if initial is None else initial
+        time = experiment["time_s"] - experiment["time_s"][0] - get(_shut(experiment), 0.0)
+        p = held(
+            time,
+            initial,
+            loss_per_s=get("leak.loss_per_s", 0.0),
+            inertia=get("leak.inertia", 0.0),
+            creep_per_kPa=1e-3 * get("viscoelasticity.creep_per_MPa", 0.0),
+            onset_s=get("viscoelasticity.onset_s", 1.0),
+            cooling_K=get("temperature_drift.cooling_K", 0.0),
+            cooling_s=get("temperature_drift.cooling_s", 30.0),
+            compliance_per_kPa=self._compliance,
+        )
+        p = p * (1 + get("pressure_gain.gain", 0.0)) + get("pressure_offset.offset_kPa", 0.0)
+        return p[None]
+
+
+def beginning_kPa(experiment: Experiment) -> float:
+    """Mean of the first readings."""
+    time = experiment["time_s"]
+    return float(np.mean(experiment["pressure_kPa"][time <= time[0] + BEGINNING_s]))
+
+
+def _initial(experiment: Experiment) -> str:
+    return f"initial_kPa of {experiment.name}"
+
+
+def _shut(experiment: Experiment) -> str:
+    return f"shut_s of {experiment.name}"
+
+
+def held(
+    time_s: Array,
+    initial_kPa: float,
+    *,
+    loss_per_s: float = 0.0,
+    inertia: float = 0.0,
+    creep_per_kPa: float = 0.0,
+    onset_s: float = 1.0,
+    cooling_K: float = 0.0,
+    cooling_s: float = 30.0,
+    compliance_per_kPa: float = 0.0,
+) -> Array:
+    """Gauge pressure (n,) in kPa at times (n,) after the valve was shut, before which it is the initial one.
+
+    With P absolute, P0 the atmosphere, V and T relative to the start: P V = P_i m T. Gas is lost by
+    P_i dm/dt = -k P0 x, where x + b x^2 = (P^2 - P0^2)/(2 P0^2), so that a small overpressure falls by
+    exp(-k t), and a large b makes it the flow of an orifice. The volume is
+    V = 1 + C (p - p_i) + sum over decades d of c x_d, where x_d follows p with the time onset 10^d.
+    """
+    from scipy.interpolate import CubicSpline
+
+    end = float(time_s[-1])
+    if not (loss_per_s or creep_per_kPa or cooling_K) or end <= 0:
+        return np.full(len(time_s), float(initial_kPa))
+    start = initial_kPa + ATMOSPHERE_kPa
+    # Runge and Kutta's method is stable below 2.8 steps a time constant; four steps are accurate.
+    steps = int(np.clip(4 * end * loss_per_s * start / ATMOSPHERE_kPa, 200, 20000))
+    t = np.linspace(0.0, end, 2 * steps + 1)
+    warm = np.ones_like(t)
+    if cooling_K:
+        warm += cooling_K * np.expm1(-t / cooling_s) / (ROOM_K + cooling_K)
+    p, grown = np.full_like(t, initial_kPa), np.zeros_like(t)
+    for _ in range(50):
+        before = p
+        if creep_per_kPa:
+            grown = creep_per_kPa * sum(
+                lagged(t, p, tau) - p[0] * np.exp(-t / tau) for tau in onset_s * 10.0 ** np.arange(DECADES)
+            )
+        gas = np.ones_like(t)
+        if loss_per_s:
+            gas = _lost(t, warm, grown, start, loss_per_s, inertia, compliance_per_kPa)
+        p = _pressure(start, gas * warm, grown, compliance_per_kPa) - ATMOSPHERE_kPa
+        if not creep_per_kPa or np.abs(p - before).max() < 1e-8 * start:
+            break
+    found = np.full(len(time_s), p[0])
+    found[time_s > 0] = CubicSpline(t, p)(time_s[time_s > 0])
+    return found
+
+
+def _pressure(start: float, gas: Any, grown: Any, compliance: float) -> Any:
+    """Absolute pressure of an amount of warm gas in a chamber grown by a share, and by its compliance."""
+    rest = 1 + grown
+    if not compliance:
+        return start * gas / rest
+    # P (rest + C (P - P_i)) = P_i gas.
+    b = rest - compliance * start
+    return (-b + np.sqrt(b * b + 4 * compliance * start * gas)) / (2 * compliance)
+
+
+def _lost(
+    t: Array, warm: Array, grown: Array, start: float, loss: float, inertia: float, compliance: float
+) -> Array:
+    """Share of the gas (2 n + 1,) left at times of which every second is a step."""
+    rate = loss * ATMOSPHERE_kPa / start
+    # In a rigid chamber the pressure, in atmospheres, is this times the gas.
+    per_gas = (start / ATMOSPHERE_kPa * warm / (1 + grown)).tolist()
+    W, G = warm.tolist(), grown.tolist()
+
+    def slope(gas: float, i: int) -> float:
+        P = gas * per_gas[i]
+        if compliance:
+            P = float(_pressure(start, gas * W[i], G[i], compliance)) / ATMOSPHERE_kPa
+        drive = P * P - 1
+        return -rate * drive / (1 + math.sqrt(1 + 2 * inertia * abs(drive)))
+
+    h = float(t[2] - t[0])
+    gas, found = 1.0, [1.0]
+    for i in range(0, len(t) - 2, 2):
+        k1 = slope(gas, i)
+        k2 = slope(gas + h / 2 * k1, i + 1)
+        k3 = slope(gas + h / 2 * k2, i + 1)
+        k4 = slope(gas + h * k3, i + 2)
+        middle = gas + h / 24 * (5 * k1 + 4 * k2 + 4 * k3 - k4)
+        gas += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        found += [middle, gas]
+    return np.array(found)

@@ -1,0 +1,164 @@
+"""lattice_compression: a block of lattice between plates, and its mass where it was weighed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
+
+import attrs
+import numpy as np
+
+from ...measured import Experiment
+from ..effect import Effect, Parameter
+from .specimen import NEW, machine, pasts, recorded
+
+Array = np.ndarray[Any, Any]
+
+KIND = "lattice_compression"
+
+MODULUS = Parameter("lattice_modulus_kPa", "kPa", 0.1, 1e5, 30.0, (), "at 1.0x, as drawn, along z")
+DENSITY = Parameter("lattice_density_g_cm3", "g/cm3", 0.005, 2.0, 0.15, (), "as drawn")
+
+EFFECTS = (
+    Effect(
+        "overcure",
+        (
+            Parameter(
+                "offset_mm",
+                "mm",
+                0.0,
+                0.25,
+                0.0,
+                (0.03, 0.1),
+                "of every surface; printers cure 0.05 to 0.1 mm too far, J. Manuf. Mater. Process. 8(3) 90",
+            ),
+        ),
+        (KIND,),
+    ),
+    Effect(
+        "skin_cure",
+        (
+            Parameter(
+                "excess_mm",
+                "mm",
+                0.0,
+                0.4,
+                0.0,
+                (0.05, 0.2),
+                "depth of the skin times its modulus over the core's, less 1; cure depths are 0.05 to 0.2 mm",
+            ),
+        ),
+        (KIND,),
+    ),
+    Effect(
+        "strain_stiffening",
+        (
+            Parameter(
+                "closing",
+                "",
+                -5.0,
+                2.4,
+                0.0,
+                (-1.0, 1.0),
+                "1 over the strain at which cells have closed; below 0 struts buckle",
+            ),
+        ),
+        (KIND,),
+        "cells close or struts buckle, so the stiffness changes with strain",
+    ),
+    *machine(KIND),
+)
+
+
+class Scaling(Protocol):
+    """How printing changes a lattice of a scale, relative to the lattice as drawn."""
+
+    def stiffness(self, scale: float, offset_mm: float, excess_mm: float) -> float:
+        """Modulus over that as drawn, with every surface moved outward and a stiffer skin."""
+        ...
+
+    def mass(self, scale: float, offset_mm: float) -> float:
+        """Mass over that as drawn."""
+        ...
+
+
+@attrs.frozen
+class Struts:
+    """Slender struts of one thickness at 1.0x: stiffness of its power `exponent`, mass of its square.
+
+    exponent: 4 where struts bend, 2 where they stretch (Gibson and Ashby, Cellular Solids, 1997). A thin skin
+    of depth d and modulus k times the core's adds 2 exponent (k - 1) d/t to the stiffness. For the lattice's
+    own cell give what `homogenize` computes instead.
+    """
+
+    thickness_mm: float = 1.5
+    exponent: float = 4.0
+
+    def stiffness(self, scale: float, offset_mm: float, excess_mm: float) -> float:
+        """Modulus over that as drawn."""
+        t = self.thickness_mm * scale
+        # Without an effect exactly 1.
+        return ((t + 2 * offset_mm) / t) ** self.exponent * (1 + 2 * self.exponent * excess_mm / t)
+
+    def mass(self, scale: float, offset_mm: float) -> float:
+        """Mass over that as drawn."""
+        t = self.thickness_mm * scale
+        return ((t + 2 * offset_mm) / t) ** 2
+
+
+def _linear(strain: Array) -> Array:
+    return strain
+
+
+class LatticeStress:
+    """Predicts compressed lattices: modulus times `curve` of the strain, and the mass of weighed specimens.
+
+    A lattice scaled as a whole has no length of its own: as drawn, its modulus does not depend on scale.
+    curve: stress (n,) over modulus at strain (n,), compression positive, of slope 1 at 0. Experiments, in the
+    order they were run, tell what each specimen went through. The mass needs columns mass_g and mass_sd_g,
+    and section_mm and length_mm.
+    """
+
+    nuisances = (MODULUS, DENSITY)
+    effects = EFFECTS
+
+    def __init__(
+        self,
+        experiments: Sequence[Experiment] = (),
+        scaling: Scaling | None = None,
+        curve: Callable[[Array], Array] = _linear,
+    ) -> None:
+        self._pasts = pasts(experiments, KIND)
+        self._scaling = scaling or Struts()
+        self._curve = curve
+
+    def channels(self, experiment: Experiment) -> tuple[str, ...]:
+        """The nominal stress, and the mass where it is known."""
+        weighed = "mass_g" in experiment.columns and _volume_cm3(experiment) is not None
+        return ("stress_kPa", "mass_g") if weighed else ("stress_kPa",)
+
+    def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
+        """Prediction (channels, n), see Simulator."""
+        offset = values.get("overcure.offset_mm", 0.0)
+        excess = values.get("skin_cure.excess_mm", 0.0)
+        modulus = values.get(MODULUS.name, MODULUS.null)
+        modulus *= self._scaling.stiffness(experiment.scale, offset, excess)
+        closing = values.get("strain_stiffening.closing", 0.0)
+
+        def law(strain: Array) -> Array:
+            stress = modulus * self._curve(strain)
+            # Slope 1 at first; a strain near 1/closing would be beyond the last gap between struts.
+            return stress / np.maximum(1 - closing * strain, 0.02) if closing else stress
+
+        found = [recorded(experiment, law, values, self._pasts.get(experiment.name, NEW))]
+        if "mass_g" in self.channels(experiment):
+            mass = values.get(DENSITY.name, DENSITY.null) * (_volume_cm3(experiment) or 0.0)
+            mass *= self._scaling.mass(experiment.scale, offset)
+            found.append(np.full(len(experiment), mass))
+        return np.stack(found)
+
+
+def _volume_cm3(experiment: Experiment) -> float | None:
+    if experiment.section_mm is None or experiment.length_mm is None:
+        return None
+    return experiment.section_mm[0] * experiment.section_mm[1] * experiment.length_mm * 1e-3

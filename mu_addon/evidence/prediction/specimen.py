@@ -1,0 +1,179 @@
+"""A specimen in a testing machine: from the law of its material to the stress that the machine records."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...errors import ConvergenceError
+from ...measured import Experiment
+from ..effect import Effect, Parameter
+from .unit import REFERENCE_C, TIMED, lagged
+
+Array = np.ndarray[Any, Any]
+# Stress (n,) in kPa of strain (n,) at rest: 0 at 0, and rising.
+Law = Callable[[Array], Array]
+
+# Length of a specimen at 1.0x whose length is not given.
+LENGTH_mm = 25.0
+# A preload needs faces to bear it: it comes in over this much of the gap, so that seating has one size.
+ONSET_mm = 0.01
+# Strain up to which a preload is looked for.
+FARTHEST = 0.5
+FRAME = Parameter("mm_per_N", "mm/N", 0.0, 0.1, 0.0, (0.005,), "steel 1e-5, printed plates 0.1")
+_TIMED = {e.name: e.parameters for e in TIMED}
+# Gauss-Legendre points on 0..1 for the energy: exact for laws up to degree 15.
+_AT, _WEIGHT = np.polynomial.legendre.leggauss(8)
+_AT, _WEIGHT = (_AT + 1) / 2, _WEIGHT / 2
+
+
+def machine(kind: str) -> tuple[Effect, ...]:
+    """Effects that coupons and lattices share: of the machine, of layers, and of the material in time."""
+    in_time = ("viscoelasticity", "mullins_softening", "fatigue_drift", "temperature_drift")
+    return (
+        *(Effect(name, _TIMED[name], (kind,)) for name in in_time),
+        Effect(
+            "anisotropy",
+            # One for x and y alike: with one each, an axis left out could not be predicted from the others.
+            (
+                Parameter(
+                    "in_plane", "", -0.9, 9.0, 0.0, (-0.3, 0.5), "modulus along x and y over z's, less 1"
+                ),
+            ),
+            (kind,),
+        ),
+        Effect(
+            "seating",
+            (
+                Parameter(
+                    "gap_mm", "mm", 0.0, 3.0, 0.0, (0.3,), "rough faces, loose grips: toe of ASTM D695"
+                ),
+                Parameter("preload_kPa", "kPa", 0.0, 20.0, 0.0, (0.0, 1.0), "machines start at a preload"),
+            ),
+            (kind,),
+        ),
+        Effect(
+            "frame_compliance",
+            (FRAME,),
+            (kind,),
+        ),
+    )
+
+
+@attrs.frozen
+class Past:
+    """What a specimen went through before an experiment: how many tests, and its largest strain."""
+
+    tests: int = 0
+    strain: float = 0.0
+
+
+NEW = Past()
+
+
+def pasts(experiments: Sequence[Experiment], kind: str) -> dict[str, Past]:
+    """The past of each experiment of a kind, by name; they were run in the order given."""
+    found: dict[str, Past] = {}
+    now: dict[Any, Past] = {}
+    for e in experiments:
+        if e.kind != kind:
+            continue
+        # A specimen without a name is taken for a fresh one.
+        whose = (e.specimen or e.name, e.scale)
+        past = found[e.name] = now.get(whose, NEW)
+        now[whose] = Past(past.tests + 1, max(past.strain, float(np.abs(e["strain"]).max())))
+    return found
+
+
+def recorded(experiment: Experiment, law: Law, values: Mapping[str, float], past: Past = NEW) -> Array:
+    """Nominal stress (n,) in kPa that the machine records; raises ConvergenceError.
+
+    Faces close a gap g while the load builds up: the specimen strains by e - g/L (1 - exp(-e L/g)). What the
+    machine calls zero is where the preload was reached. A frame of compliance c in series leaves the specimen
+    e - c A s/L. Relaxation needs time_s, the frame section_mm and length_mm: without them they are not felt.
+    """
+    strain = experiment["strain"]
+    factor = _factor(experiment, values, past)
+    seated = _seated(experiment, (lambda e: factor * law(e)) if factor != 1 else law, values)
+    compliance = values.get("frame_compliance.mm_per_N", 0.0)
+    stress = _remembering(experiment, seated, strain, values, past)
+    if not compliance or experiment.section_mm is None or experiment.length_mm is None:
+        return stress
+    # Strain the frame takes a kPa, which is 1e-3 N/mm2.
+    give = 1e-3 * compliance * experiment.section_mm[0] * experiment.section_mm[1] / experiment.length_mm
+    grid = np.linspace(min(0.0, strain.min()), max(0.0, strain.max()), 101)
+    steepest = float((np.diff(seated(grid)) / np.diff(grid)).max())
+    for _ in range(1000):
+        off = stress - _remembering(experiment, seated, strain - give * stress, values, past)
+        # History only softens, so that the steepest slope at rest makes a contraction of it.
+        stress = stress - off / (1 + give * steepest)
+        if np.abs(off).max() <= 1e-11 * np.abs(stress).max():
+            return stress
+    raise ConvergenceError(
+        "the frame's share of the displacement was not found", experiment.name, "leave frame_compliance out"
+    )
+
+
+def _factor(experiment: Experiment, values: Mapping[str, float], past: Past) -> float:
+    """What the modulus is multiplied by: direction, temperature, tests before."""
+    factor = 1.0
+    if experiment.axis in ("x", "y"):
+        factor *= 1 + values.get("anisotropy.in_plane", 0.0)
+    if (per_K := values.get("temperature_drift.per_K", 0.0)) and math.isfinite(experiment.temperature_C):
+        factor *= 1 + per_K * (experiment.temperature_C - REFERENCE_C)
+    if per_decade := values.get("fatigue_drift.per_decade", 0.0):
+        factor *= 1 - per_decade * math.log10(1 + past.tests)
+    return max(factor, 1e-3)
+
+
+def _seated(experiment: Experiment, law: Law, values: Mapping[str, float]) -> Law:
+    """The law between faces that close, strain counted from the preload."""
+    gap = values.get("seating.gap_mm", 0.0)
+    if not gap:
+        return law
+    toe = gap / (experiment.length_mm or LENGTH_mm * experiment.scale)
+
+    def closing(strain: Array) -> Array:
+        return law(np.sign(strain) * (np.abs(strain) + toe * np.expm1(-np.abs(strain) / toe)))
+
+    preload = values.get("seating.preload_kPa", 0.0) * min(1.0, gap / ONSET_mm)
+    if not preload:
+        return closing
+    low, high = 0.0, FARTHEST
+    for _ in range(3):
+        grid = np.linspace(low, high, 200)
+        k = int(np.clip(np.searchsorted(closing(grid), preload), 1, len(grid) - 1))
+        low, high = grid[k - 1], grid[k]
+    below, above = closing(np.array([low, high]))
+    zero = low + (high - low) * min(max((preload - below) / (above - below), 0.0), 1.0)
+    return lambda strain: closing(strain + zero)
+
+
+def _remembering(
+    experiment: Experiment, law: Law, strain: Array, values: Mapping[str, float], past: Past
+) -> Array:
+    """Stress (n,) of a specimen whose strain (n,) is known, with what it remembers of earlier strain."""
+    stress = law(strain)
+    if softening := values.get("mullins_softening.softening", 0.0):
+        from scipy.special import erf
+
+        energy = _energy(law, strain)
+        before = float(_energy(law, np.array([past.strain * (np.sign(strain.sum()) or 1.0)]))[0])
+        most = np.maximum(np.maximum.accumulate(energy), before)
+        width = values.get("mullins_softening.energy_share", 0.3) * (float(most.max()) or 1.0)
+        stress = stress * (1 - softening * erf((most - energy) / width))
+    if (share := values.get("viscoelasticity.share", 0.0)) and "time_s" in experiment.columns:
+        # Relaxing from equilibrium: sigma = sigma_0 - share of what the dashpot has given way.
+        stress = stress - share * lagged(
+            experiment["time_s"], stress, values.get("viscoelasticity.time_s", 1.0)
+        )
+    return stress
+
+
+def _energy(law: Law, strain: Array) -> Array:
+    """Energy (n,) in kJ/m3 of straining from 0."""
+    return strain * (law((strain[:, None] * _AT).ravel()).reshape(len(strain), -1) @ _WEIGHT)

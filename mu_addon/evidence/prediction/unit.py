@@ -1,0 +1,353 @@
+"""unit_pressure: the unit's quasi-static response, with what acts in time before and after it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...errors import InputError
+from ...measured import Experiment
+from ..effect import Effect, Parameter
+
+Array = np.ndarray[Any, Any]
+
+KIND = "unit_pressure"
+REFERENCE_C = 23.0
+# Smaller reversals are noise of the gauge.
+DEADBAND_kPa = 0.2
+
+
+def _float64(values: Any) -> Array:
+    return np.ascontiguousarray(values, np.float64)
+
+
+@attrs.frozen(eq=False)
+class Variant:
+    """The unit's response with one static effect: values (m, c, k) at parameter values (m,) ascending.
+
+    The parameter's null is among them, and there the response is the base's.
+    """
+
+    parameter: Parameter
+    at: Array = attrs.field(converter=_float64)
+    values: Array = attrs.field(converter=_float64)
+
+    def __attrs_post_init__(self) -> None:
+        if len(self.at) < 2 or not (np.diff(self.at) > 0).all() or self.parameter.null not in self.at:
+            raise InputError(
+                f"variants of {self.parameter.name} do not ascend through their null",
+                "unit response",
+                "run the unit at the null and at one more value at least",
+            )
+
+
+@attrs.frozen(eq=False)
+class UnitResponse:
+    """Quasi-static response of the unit: values (c, k) of channels at pressures (k,) in kPa ascending.
+
+    channels: columns as measured (angle_deg, marker1_y_mm, ...). variants: by the name of their effect.
+    Interpolated by cubic splines, and along their end slopes beyond the last pressures.
+    """
+
+    channels: tuple[str, ...]
+    pressures_kPa: Array = attrs.field(converter=_float64)
+    values: Array = attrs.field(converter=_float64)
+    variants: Mapping[str, Variant] = attrs.field(factory=dict)
+    scale: float = 1.0
+    orientation_deg: float = 0.0
+    _splines: Mapping[str, Any] = attrs.field(init=False, repr=False)
+
+    def __attrs_post_init__(self) -> None:
+        from scipy.interpolate import CubicSpline
+
+        k, shape = len(self.pressures_kPa), (len(self.channels), len(self.pressures_kPa))
+        wrong = [n for n, v in self.variants.items() if v.values.shape != (len(v.at), *shape)]
+        if self.values.shape != shape or k < 4 or wrong:
+            raise InputError(
+                f"{shape[0]} channels at {k} pressures do not fit their values {' '.join(wrong)}",
+                "unit response",
+                "give values (channels, pressures) at four pressures or more",
+            )
+        splines: dict[str, Any] = {"": CubicSpline(self.pressures_kPa, self.values, axis=1).c}
+        for name, v in self.variants.items():
+            base = v.values[int(np.argmin(np.abs(v.at - v.parameter.null)))]
+            c = CubicSpline(self.pressures_kPa, v.values - base, axis=2).c
+            # c is (4, k - 1, m, channels); in the parameter it is a spline again.
+            splines[name] = CubicSpline(v.at, np.moveaxis(c, 2, 0), axis=0)
+        object.__setattr__(self, "_splines", MappingProxyType(splines))
+
+    def at(self, pressure_kPa: Array, sizes: Mapping[str, float]) -> Array:
+        """Channels (c, n) at effective pressures (n,) with static effects of the given sizes."""
+        from scipy.interpolate import PPoly
+
+        c = self._splines[""]
+        for name, size in sizes.items():
+            if size != self.variants[name].parameter.null:
+                c = c + self._splines[name](size)
+        curve = PPoly.construct_fast(c, self.pressures_kPa, extrapolate=True, axis=0)
+        low, high = self.pressures_kPa[0], self.pressures_kPa[-1]
+        inside = np.clip(pressure_kPa, low, high)
+        found: Array = curve(inside).T
+        if not np.array_equal(inside, pressure_kPa):
+            ends = curve(np.array([low, high]), 1).T
+            beyond = pressure_kPa - inside
+            found = found + np.where(beyond < 0, ends[:, :1], ends[:, 1:]) * beyond
+        return found
+
+
+@attrs.frozen
+class Past:
+    """What a specimen went through before an experiment: cycles, and its extreme pressures in kPa."""
+
+    cycles: float = 0.0
+    trough_kPa: float = 0.0
+    peak_kPa: float = 0.0
+
+
+def histories(experiments: Sequence[Experiment]) -> dict[str, Past]:
+    """The past of each unit_pressure experiment, by name; they were run in the order given."""
+    found: dict[str, Past] = {}
+    now: dict[tuple[str, float], Past] = {}
+    for e in experiments:
+        if e.kind != KIND:
+            continue
+        p = e["pressure_kPa"]
+        whose = (e.specimen, e.scale)
+        past = now.get(whose, Past())
+        found[e.name] = past
+        now[whose] = Past(
+            past.cycles + float(cycles(p)[-1]),
+            min(past.trough_kPa, float(p.min())),
+            max(past.peak_kPa, float(p.max())),
+        )
+    return found
+
+
+def nuisances(channels: Sequence[str]) -> tuple[Parameter, ...]:
+    """What every fit of a unit frees: the modulus, and the zero of each channel."""
+    zeros = [
+        Parameter(_zero(c), c.rpartition("_")[2], -1e3, 1e3, 0.0, source="set by the camera", linear=True)
+        for c in channels
+    ]
+    modulus = Parameter("modulus_factor", "", 0.2, 5.0, 1.0, (1.0,), "batches of resin differ")
+    return (modulus, *zeros)
+
+
+def _zero(channel: str) -> str:
+    head, _, unit = channel.rpartition("_")
+    return f"{head}_zero_{unit}"
+
+
+# Effects in time; those of the unit itself come as variants of its response.
+TIMED = (
+    Effect(
+        "viscoelasticity",
+        (
+            Parameter("share", "", 0.0, 0.7, 0.0, (0.1,), "share of the instantaneous modulus that relaxes"),
+            Parameter("time_s", "s", 0.02, 1000.0, 1.0, (0.5, 5.0, 50.0), "relaxation time"),
+        ),
+        (KIND,),
+    ),
+    Effect(
+        "rate_independent_hysteresis",
+        (
+            Parameter("share", "", 0.0, 0.6, 0.0, (0.1,), "share of the stiffness that friction bears"),
+            Parameter("threshold_kPa", "kPa", 0.05, 30.0, 2.0, (0.7, 3.0, 9.0), "pressure at which it slips"),
+        ),
+        (KIND,),
+    ),
+    Effect(
+        "mullins_softening",
+        (
+            Parameter("softening", "", 0.0, 0.7, 0.0, (0.1,), "1/r of Ogden and Roxburgh 1999"),
+            Parameter("energy_share", "", 0.02, 2.0, 0.3, (0.1, 0.6), "m of Ogden and Roxburgh 1999"),
+        ),
+        (KIND,),
+    ),
+    Effect(
+        "fatigue_drift",
+        (Parameter("per_decade", "", -0.3, 0.4, 0.0, (0.03,), "modulus lost in ten times the cycles"),),
+        (KIND,),
+    ),
+    Effect(
+        "temperature_drift",
+        (Parameter("per_K", "1/K", -0.05, 0.05, 0.0, (-0.005,), "modulus lost a kelvin"),),
+        (KIND,),
+    ),
+    Effect(
+        "pressure_offset",
+        (Parameter("offset_kPa", "kPa", -10.0, 10.0, 0.0, (-1.0, 1.0), "gauge pressures of benches"),),
+        (KIND,),
+    ),
+    Effect("pressure_gain", (Parameter("gain", "", -0.3, 0.3, 0.0, (0.05,), "gauge's sheet"),), (KIND,)),
+    Effect(
+        "line_lag",
+        (Parameter("time_s", "s", 0.0, 5.0, 0.0, (0.05, 0.5), "resistance times the chambers' volume"),),
+        (KIND,),
+    ),
+    Effect(
+        "leak",
+        (Parameter("conductance_ratio", "", 0.0, 1.0, 0.0, (0.1,), "of the leak over the line"),),
+        (KIND,),
+    ),
+    Effect(
+        "angle_offset", (Parameter("offset_deg", "deg", -30.0, 30.0, 0.0, (1.0,), "camera frame"),), (KIND,)
+    ),
+    Effect(
+        "clock_offset",
+        (Parameter("offset_s", "s", -2.0, 2.0, 0.0, (-0.1, 0.1), "clocks set by hand"),),
+        (KIND,),
+    ),
+)
+
+
+class UnitPressure:
+    """Predicts unit_pressure experiments from responses of the unit, one a scale and orientation.
+
+    The gauge's reading becomes the pressure in the chambers (offset, gain, leak, lag), that becomes the
+    pressure at which the unmended unit would stand where the unit stands now (all moduli scaled alike are
+    the pressure scaled inversely, at rest exactly and for moduli that relax alike to first order of the
+    hereditary integral), and that is looked up in the response. Each record starts in equilibrium.
+    """
+
+    def __init__(self, responses: Sequence[UnitResponse], experiments: Sequence[Experiment] = ()) -> None:
+        if not responses:
+            raise InputError("no response of the unit is given", "unit_pressure", "simulate the unit first")
+        self._responses = tuple(responses)
+        self._past = histories(experiments)
+        self.channels_known = self._responses[0].channels
+        self.nuisances = nuisances(self.channels_known)
+        static: dict[str, Effect] = {}
+        for r in self._responses:
+            for name, v in r.variants.items():
+                static.setdefault(name, Effect(name, (v.parameter,), (KIND,)))
+        self.effects = (*TIMED, *static.values())
+        self._reference_kPa = max(float(np.abs(r.pressures_kPa).max()) for r in self._responses)
+
+    def channels(self, experiment: Experiment) -> tuple[str, ...]:
+        """Columns of the experiment that the response knows."""
+        return tuple(c for c in self._response(experiment).channels if c in experiment.columns)
+
+    def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
+        """Prediction (channels, n), see Simulator."""
+        response = self._response(experiment)
+        pressure = self.effective_kPa(experiment, values)
+        keys = {name: f"{name}.{v.parameter.name}" for name, v in response.variants.items()}
+        static = {name: values[key] for name, key in keys.items() if key in values}
+        y = response.at(pressure, static)
+        y = y + np.array([values.get(_zero(c), 0.0) for c in response.channels])[:, None]
+        if "angle_deg" in response.channels:
+            y[response.channels.index("angle_deg")] += values.get("angle_offset.offset_deg", 0.0)
+        kept = [i for i, c in enumerate(response.channels) if c in experiment.columns]
+        return y if len(kept) == len(y) else y[kept]
+
+    def effective_kPa(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
+        """Pressure (n,) at which the base unit would stand where the unit of these values stands."""
+        t, p = experiment["time_s"], experiment["pressure_kPa"]
+        past = self._past.get(experiment.name, Past())
+        get = values.get
+        if delay := get("clock_offset.offset_s", 0.0):
+            p = np.interp(t - delay, t, p)
+        p = (p - get("pressure_offset.offset_kPa", 0.0)) / (1.0 + get("pressure_gain.gain", 0.0))
+        leak, lag = get("leak.conductance_ratio", 0.0), get("line_lag.time_s", 0.0)
+        if leak:
+            # The line feeds the leak: tau dp_c/dt = p - p_c - leak p_c.
+            p, lag = p / (1.0 + leak), lag / (1.0 + leak)
+        p = lagged(t, p, lag)
+        modulus = get("modulus_factor", 1.0) * np.ones_like(p)
+        if per_K := get("temperature_drift.per_K", 0.0):
+            kelvin = experiment.temperature_C - REFERENCE_C
+            modulus *= 1.0 + per_K * (kelvin if math.isfinite(kelvin) else 0.0)
+        if per_decade := get("fatigue_drift.per_decade", 0.0):
+            modulus *= 1.0 - per_decade * np.log10(1.0 + past.cycles + cycles(experiment["pressure_kPa"]))
+        p = p / modulus
+        if share := get("viscoelasticity.share", 0.0):
+            time = get("viscoelasticity.time_s", 1.0) / (1.0 - share)
+            p = (1.0 - share) * p + share * lagged(t, p, time)
+        if share := get("rate_independent_hysteresis.share", 0.0):
+            p = (1.0 - share) * p + share * play(p, get("rate_independent_hysteresis.threshold_kPa", 2.0))
+        if softening := get("mullins_softening.softening", 0.0):
+            width = get("mullins_softening.energy_share", 0.3) * self._reference_kPa**2
+            before = max(past.peak_kPa, -past.trough_kPa) / get("modulus_factor", 1.0)
+            p = p / softened(p, before, softening, width)
+        return p
+
+    def _response(self, experiment: Experiment) -> UnitResponse:
+        apart = [
+            abs(r.scale - experiment.scale)
+            + abs(_turn(r.orientation_deg - experiment.orientation_deg)) / 90.0
+            for r in self._responses
+        ]
+        nearest = int(np.argmin(apart))
+        if apart[nearest] > 0.02:
+            raise InputError(
+                f"no response at scale {experiment.scale:g}, orientation {experiment.orientation_deg:g} deg",
+                experiment.name,
+                "simulate the unit there, or leave the experiment out",
+            )
+        return self._responses[nearest]
+
+
+def _turn(degrees: float) -> float:
+    return (degrees + 180.0) % 360.0 - 180.0
+
+
+def lagged(t: Array, p: Array, time_s: float) -> Array:
+    """Solution (n,) of time_s dx/dt + x = p from equilibrium, exact for p straight between its samples."""
+    from scipy.signal import lfilter
+
+    if time_s <= 0.0:
+        return p
+    h = np.diff(t)
+    if np.ptp(h) <= 1e-3 * h.mean():
+        a, b0, b1 = _weights(h.mean(), time_s)
+        found, _ = lfilter([b1, b0], [1.0, -a], p, zi=[(1.0 - b1) * p[0]])
+        return np.asarray(found)
+    a, b0, b1 = _weights(h, time_s)
+    driven = b0 * p[:-1] + b1 * p[1:]
+    x = [float(p[0])]
+    for ai, di in zip(a.tolist(), driven.tolist(), strict=True):
+        x.append(ai * x[-1] + di)
+    return np.array(x)
+
+
+def _weights(h: Any, time_s: float) -> tuple[Any, Any, Any]:
+    a = np.exp(-h / time_s)
+    mean = -np.expm1(-h / time_s) * time_s / h
+    return a, mean - a, 1.0 - mean
+
+
+def play(p: Array, threshold: float) -> Array:
+    """Play operator (n,) of a half-width `threshold`, at rest in the middle at first."""
+    x = float(p[0])
+    found = []
+    for v in p.tolist():
+        x = min(max(x, v - threshold), v + threshold)
+        found.append(x)
+    return np.array(found)
+
+
+def softened(p: Array, before_kPa: float, softening: float, width: float) -> Array:
+    """Share (n,) of the virgin modulus left, 1 - softening erf((W_max - W)/width), Ogden and Roxburgh 1999.
+
+    W, in kPa^2, is the square of the pressure, as the energy of the virgin unit nearly is; before_kPa: the
+    largest one of earlier experiments.
+    """
+    from scipy.special import erf
+
+    energy = p**2
+    most = np.maximum(np.maximum.accumulate(energy), before_kPa**2)
+    return np.asarray(1.0 - softening * erf((most - energy) / width))
+
+
+def cycles(p: Array) -> Array:
+    """Cycles gone through (n,): travel of the pressure in kPa over twice its range, noise left out."""
+    smooth = play(p, DEADBAND_kPa)
+    travel = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(smooth)))])
+    extent = float(np.ptp(smooth))
+    return travel / (2.0 * extent) if extent else travel

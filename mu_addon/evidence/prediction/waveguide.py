@@ -1,0 +1,72 @@
+"""waveguide_bending: light through a waveguide in a bent body, as the voltage of a photodiode."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...measured import Experiment
+from ..effect import Effect, Parameter
+from .unit import TIMED
+
+Array = np.ndarray[Any, Any]
+
+KIND = "waveguide_bending"
+
+STRAIGHT = Parameter("straight_V", "V", 1e-3, 100.0, 1.0, (), "set by light source and photodiode")
+LOSS = Parameter("loss_per_deg", "1/deg", -0.2, 0.2, 0.01, (), "wells on the outside lose light, inside gain")
+
+EFFECTS = (
+    Effect(
+        "led_drift",
+        (Parameter("per_hour", "1/h", -10.0, 10.0, 0.0, (-0.2,), "light sources lose light as they warm"),),
+        (KIND,),
+    ),
+    Effect(
+        "ambient_light",
+        (Parameter("ambient_V", "V", 0.0, 5.0, 0.0, (0.05,), "photodiodes see the room"),),
+        (KIND,),
+    ),
+    Effect(
+        "optical_nonlinearity",
+        (
+            Parameter("excess", "", -0.9, 10.0, 0.0, (0.3,), "loss at 90 deg over proportional, less 1"),
+            Parameter("onset_deg", "deg", 0.0, 90.0, 0.0, (0.0, 20.0), "bend at which modes begin to leak"),
+        ),
+        (KIND,),
+    ),
+    *(Effect(e.name, e.parameters, (KIND,)) for e in TIMED if e.name in ("angle_offset", "clock_offset")),
+)
+
+
+class WaveguideVoltage:
+    """Predicts waveguides: voltage V exp(-b a) at bending angle a, as each bend loses a share of the light.
+
+    The loss of the straight guide is in V, which makes a zero of the angle the same as another V until
+    something else is nonlinear. Missing angles are interpolated in time.
+    """
+
+    nuisances = (STRAIGHT, LOSS)
+    effects = EFFECTS
+
+    def channels(self, experiment: Experiment) -> tuple[str, ...]:
+        """The voltage."""
+        return ("voltage_V",)
+
+    def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
+        """Prediction (1, n) in V, see Simulator."""
+        get = values.get
+        time, angle = experiment["time_s"], experiment["angle_deg"]
+        seen = np.isfinite(angle)
+        angle = np.interp(time - get("clock_offset.offset_s", 0.0), time[seen], angle[seen])
+        angle = angle - get("angle_offset.offset_deg", 0.0)
+        if excess := get("optical_nonlinearity.excess", 0.0):
+            beyond = np.maximum(np.abs(angle) - get("optical_nonlinearity.onset_deg", 0.0), 0.0)
+            angle = angle + np.sign(angle) * excess * beyond**2 / 90.0
+        exponent = -get(LOSS.name, LOSS.null) * angle
+        exponent = exponent + get("led_drift.per_hour", 0.0) * (time - time[0]) / 3600.0
+        # Far from the data a fit may try losses that no float holds.
+        voltage = get(STRAIGHT.name, STRAIGHT.null) * np.exp(np.clip(exponent, -100.0, 100.0))
+        return (voltage + get("ambient_light.ambient_V", 0.0))[None]

@@ -1,0 +1,431 @@
+"""What a model leaves of the data: the residual against everything it should not depend on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..measured import Experiment
+from .fit import Fit, Fitter
+from .noise import harmonics, repeated
+from .prediction.unit import cycles, play
+from .record import KNOWN, Record, Series
+
+Array = np.ndarray[Any, Any]
+
+# Share of clean sets in which any structure at all may be seen.
+FALSE_ALARM = 0.003
+BANDS = 16
+
+
+@attrs.frozen
+class Dependence:
+    """One test of a whitened residual: `statistic` is a chi squared or a deviate, `where` it is strongest.
+
+    p_value: of that test alone, for noise that is white once whitened, so that it accounts for correlation.
+    """
+
+    against: str
+    statistic: float
+    p_value: float
+    where: str = ""
+    dof: int = 1
+
+
+def _rate(e: Experiment) -> Array:
+    p = e["pressure_kPa"]
+    return np.gradient(p, e["time_s"])
+
+
+def _direction(e: Experiment) -> Array:
+    return np.sign(np.gradient(play(e["pressure_kPa"], 0.2)))
+
+
+def _most(e: Experiment) -> Array:
+    return np.maximum.accumulate(np.abs(np.nan_to_num(e["angle_deg"])))
+
+
+# Quantities of a sample that the residual must not depend on, by the columns they need.
+COVARIATES = (
+    ("pressure", ("pressure_kPa",), lambda e: e["pressure_kPa"]),
+    ("pressure_rate", ("pressure_kPa", "time_s"), _rate),
+    ("loading_direction", ("pressure_kPa", "time_s"), _direction),
+    ("largest_angle", ("angle_deg", "time_s"), _most),
+    ("strain", ("strain",), lambda e: e["strain"]),
+    ("added_mass", ("added_mass_g",), lambda e: e["added_mass_g"]),
+    ("time", ("time_s",), lambda e: e["time_s"] - e["time_s"][0]),
+    ("cycle", ("pressure_kPa", "time_s"), lambda e: cycles(e["pressure_kPa"])),
+)
+# Quantities of a whole experiment.
+CONDITIONS = (
+    ("orientation", lambda e, i: e.orientation_deg),
+    ("scale", lambda e, i: e.scale),
+    ("temperature", lambda e, i: e.temperature_C if math.isfinite(e.temperature_C) else 23.0),
+    ("run_order", lambda e, i: float(i)),
+)
+
+
+def dependence_table(fitter: Fitter, fit: Fit) -> list[Dependence]:
+    """Every test of what a fit leaves, in a fixed order; what cannot vary in these data is left out.
+
+    Each is made twice. Under the noise that was estimated with every smooth cause set aside, whose slow part
+    the data then tell little of; there a dependence must gain more likelihood than the noise does when it
+    is estimated from the residual itself. And, where a test is no fit, under that second noise.
+    """
+    own, refitted = fitter.under_its_own_noise(fit)
+    before, after = fitter.deviance(fit), own.deviance(refitted)
+    spare = {group: max(before[group] - after[group], 0.0) for group in before}
+    found = _fitted_tests(fitter, fit, spare)
+    once, again = (_plain_tests(f.record, m.residual) for f, m in ((fitter, fit), (own, refitted)))
+    found += [max(pair, key=lambda d: d.p_value) for pair in zip(once, again, strict=True)]
+    return found
+
+
+def _fitted_tests(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Dependence]:
+    from scipy.stats import chi2
+
+    record, r = fitter.record, fit.residual
+    found = []
+    if any(s.group == KNOWN for s in record.series):
+        rows = np.concatenate([np.arange(s.at.start, s.at.stop) for s in record.series if s.group == KNOWN])
+        dof = max(len(rows) - len(fit.keys), 1)
+        value = float(r[rows] @ r[rows])
+        found.append(Dependence("spread", value, float(chi2.sf(value, dof)), "all", dof))
+    if all(s.group == KNOWN for s in record.series):
+        return found
+    for name, needs, of in COVARIATES:
+        held = [
+            i
+            for i, e in enumerate(record.experiments)
+            if all(c in e.columns for c in needs)
+            and ("pressure_kPa" not in needs or record.driven(i, "pressure_kPa"))
+        ]
+        columns = _powers(record, held, of)
+        found += _tested(fitter, fit, name, columns, spare)
+    response = _response(fitter, fit)
+    for name, condition in CONDITIONS:
+        values = np.array([condition(e, i) for i, e in enumerate(record.experiments)], float)
+        found += _tested(fitter, fit, name, _by_condition(record, values, response), spare)
+    return [
+        *found,
+        *_phase(fitter, fit, spare),
+        *_steps(fitter, r, spare),
+        *_breaks(fitter, fit, response, spare),
+    ]
+
+
+def _plain_tests(record: Record, r: Array) -> list[Dependence]:
+    return [
+        *_spectrum(record, r),
+        *_cycles_alike(record, r),
+        *_repeats_alike(record, r),
+        *_outliers(record, r),
+    ]
+
+
+def structure(table: Sequence[Dependence]) -> tuple[str, ...]:
+    """What the residual depends on, too strongly for chance, `FALSE_ALARM` shared by all tests."""
+    level = FALSE_ALARM / max(len(table), 1)
+    return tuple(d.against for d in sorted(table, key=lambda d: d.p_value) if d.p_value < level)
+
+
+def _response(fitter: Fitter, fit: Fit) -> Array:
+    """Change (N,) of the prediction by the first nuisance that is not a zero."""
+    if not fitter.curved:
+        return np.ones(len(fitter.record))
+    p = fitter.curved[0]
+    moved = {**fit.values, p.name: fit.values[p.name] + p.step}
+    return (fitter.predict(moved) - fitter.predict(fit.values)) / p.step
+
+
+def _channels(record: Record) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(s.channel for s in record.series if s.group != KNOWN))
+
+
+def _powers(record: Record, held: Sequence[int], of: Any, degree: int = 4) -> dict[str, Array]:
+    """Chebyshev powers of a covariate and, for a fairly straight unit, of it alone, a channel."""
+    if not held:
+        return {}
+    values = {i: np.asarray(of(record.experiments[i]), float) for i in held}
+    low, high = min(v.min() for v in values.values()), max(v.max() for v in values.values())
+    if not high > low:
+        return {}
+    few = len(np.unique(np.concatenate([np.unique(v)[:20] for v in values.values()])))
+    columns = {}
+    for channel in _channels(record):
+        block = np.zeros((len(record), min(degree, few - 1)))
+        for s in record.series:
+            if s.channel == channel and s.experiment in values:
+                x = 2.0 * (values[s.experiment] - low) / (high - low) - 1.0
+                c = np.polynomial.chebyshev.chebvander(x, block.shape[1])[:, 1:]
+                block[s.at] = np.stack([s.mean(column) for column in c.T], axis=1)
+        columns[channel] = block
+    return columns
+
+
+def _by_condition(record: Record, values: Array, response: Array) -> dict[str, Array]:
+    """The response (N,) to the modulus, stronger or weaker by a condition of whole experiments."""
+    if len(np.unique(values)) < 2:
+        return {}
+    x = (values - values.mean()) / np.ptp(values)
+    columns = {}
+    for channel in _channels(record):
+        block = np.zeros((len(record), 2))
+        for s in record.series:
+            if s.channel == channel:
+                block[s.at] = response[s.at, None] * x[s.experiment] ** np.arange(1, 3)
+        columns[channel] = block
+    return columns
+
+
+def _tested(
+    fitter: Fitter, fit: Fit, name: str, columns: dict[str, Array], spare: Mapping[str, float]
+) -> list[Dependence]:
+    """The joint test of all channels and the best single one, each given half of the chance."""
+    from scipy.stats import chi2
+
+    if not columns:
+        return []
+    q = _basis(fit.jacobian)
+    joint, total, best = [], 0, (1.0, "", 0.0, 0)
+    groups = {s.channel: s.group for s in fitter.record.series}
+    for channel, block in columns.items():
+        white = _unit(fitter.project(block))
+        white -= q @ (q.T @ white)
+        b = _basis(white)
+        if not b.shape[1]:
+            continue
+        gain = float(np.sum((b.T @ fit.residual) ** 2))
+        p = float(chi2.sf(gain - spare[groups[channel]], b.shape[1]))
+        joint.append(gain)
+        total += b.shape[1]
+        if p <= best[0]:
+            best = (p, channel, gain, b.shape[1])
+    if not joint:
+        return []
+    together = float(chi2.sf(sum(joint) - sum(spare[g] for g in {groups[c] for c in columns}), total))
+    single = min(1.0, len(joint) * best[0])
+    if together < single:
+        return [Dependence(name, sum(joint), min(1.0, 2.0 * together), "all channels", total)]
+    return [Dependence(name, best[2], min(1.0, 2.0 * single), best[1], best[3])]
+
+
+def _unit(columns: Array) -> Array:
+    length = np.linalg.norm(columns, axis=0)
+    return np.asarray(columns / np.where(length > 0, length, 1.0))
+
+
+def _basis(columns: Array) -> Array:
+    """Orthonormal columns that span these, near dependences left out."""
+    if not columns.shape[1]:
+        return columns
+    u, sizes, _ = np.linalg.svd(_unit(columns), full_matrices=False)
+    return np.asarray(u[:, sizes > 0.03])
+
+
+def _clocked(record: Record) -> list[Series]:
+    return [s for s in record.series if s.group != KNOWN and not math.isnan(s.sample_s)]
+
+
+def _phase(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Dependence]:
+    """What comes back in every cycle: harmonics of it, a channel and an experiment."""
+    from scipy.stats import chi2
+
+    gains, groups, worst = [], set(), (1.0, "", 0.0, 0)
+    for s in _clocked(fitter.record):
+        columns = harmonics(fitter.record, s)
+        if columns is None or columns.shape[1] < 2:
+            continue
+        b = _basis(fitter.whitening.series(s, columns))
+        gain = float(np.sum((b.T @ fit.residual[s.at]) ** 2))
+        gains.append((gain, b.shape[1]))
+        groups.add(s.group)
+        p = float(chi2.sf(gain - spare[s.group], b.shape[1]))
+        if p <= worst[0]:
+            worst = (p, f"{fitter.record.experiments[s.experiment].name}, {s.channel}", gain, b.shape[1])
+    if not gains:
+        return []
+    saved = sum(spare[g] for g in groups)
+    together = float(chi2.sf(sum(g for g, _ in gains) - saved, sum(d for _, d in gains)))
+    single = min(1.0, len(gains) * worst[0])
+    p = min(1.0, 2.0 * min(together, single))
+    return [Dependence("phase_of_cycle", worst[2], p, worst[1], worst[3])]
+
+
+def _spectrum(record: Record, r: Array) -> list[Dependence]:
+    """Power of the whitened residual by bands of frequency, series of a group and of one clock together."""
+    from scipy.stats import chi2
+
+    bands: dict[tuple[str, float], list[tuple[Array, Array]]] = {}
+    for s in _clocked(record):
+        x = r[s.at]
+        if len(x) < 32:
+            continue
+        power = np.abs(np.fft.rfft(x - x.mean())[1:-1]) ** 2 / len(x)
+        f = np.fft.rfftfreq(len(x))[1:-1] / (s.sample_s * float(np.median(s.count)))
+        bands.setdefault((s.group, s.sample_s), []).append((f, power))
+    tests: list[tuple[float, str, float, int]] = []
+    for (group, _), members in bands.items():
+        f = np.concatenate([m[0] for m in members])
+        power = np.concatenate([m[1] for m in members])
+        edges = np.quantile(f, np.linspace(0.0, 1.0, BANDS + 1))
+        for low, high in pairwise(edges):
+            inside = (f >= low) & (f <= high)
+            # Twice a periodogram's ordinate is chi squared of two degrees.
+            value, dof = 2.0 * float(power[inside].sum()), 2 * int(inside.sum())
+            if dof:
+                tests.append((float(chi2.sf(value, dof)), f"{group}, {low:.3g} to {high:.3g} Hz", value, dof))
+    if not tests:
+        return []
+    p, where, value, dof = min(tests)
+    return [Dependence("frequency", value, min(1.0, p * len(tests)), where, dof)]
+
+
+def _cycles_alike(record: Record, r: Array) -> list[Dependence]:
+    """Whether the whitened residual of a cycle is like that of the next."""
+    from scipy.stats import norm
+
+    sums, count = 0.0, 0
+    for s in _clocked(record):
+        e = record.experiments[s.experiment]
+        driven = record.driven(s.experiment, "pressure_kPa")
+        period = repeated(e["time_s"], e["pressure_kPa"]) if driven else None
+        if period is None:
+            continue
+        lag = round(period / (s.sample_s * float(np.median(s.count))))
+        x = r[s.at]
+        if 4 < lag < len(x):
+            sums += float(x[lag:] @ x[:-lag])
+            count += len(x) - lag
+    if not count:
+        return []
+    z = sums / math.sqrt(count)
+    return [Dependence("next_cycle", z, float(norm.sf(z)), "all cyclic records")]
+
+
+def _repeats_alike(record: Record, r: Array) -> list[Dependence]:
+    """Whether repeats of a protocol leave the same residual; what differs is noise."""
+    from scipy.stats import norm
+
+    sums, count = 0.0, 0
+    clocked = _clocked(record)
+    for k, s in enumerate(clocked):
+        for o in clocked[k + 1 :]:
+            if s.channel == o.channel != "pressure_kPa" and same_protocol(
+                record.experiments[s.experiment], record.experiments[o.experiment]
+            ):
+                a, b = r[s.at], r[o.at]
+                n = min(len(a), len(b))
+                sums += float(a[:n] @ b[:n])
+                count += n
+    if not count:
+        return []
+    z = sums / math.sqrt(count)
+    return [Dependence("repeat", z, float(norm.sf(z)), "all repeats")]
+
+
+def same_protocol(a: Experiment, b: Experiment) -> bool:
+    """Whether two experiments put the same pressures on the same design in the same way."""
+    if a.kind != b.kind or len(a) != len(b) or "pressure_kPa" not in a.columns or "time_s" not in a.columns:
+        return False
+    if (a.scale, a.orientation_deg, a.added_mass_g) != (b.scale, b.orientation_deg, b.added_mass_g):
+        return False
+    p, q = a["pressure_kPa"], b["pressure_kPa"]
+    clock = np.abs((a["time_s"] - a["time_s"][0]) - (b["time_s"] - b["time_s"][0])).max()
+    step = float(np.median(np.diff(a["time_s"])))
+    return bool(clock < step and np.abs(p - q).max() < 0.05 * max(float(np.ptp(p)), 1e-9))
+
+
+def _steps(fitter: Fitter, r: Array, spare: Mapping[str, float]) -> list[Dependence]:
+    """Whether a channel jumped once, anywhere: every place of the jump is tried."""
+    from scipy.stats import norm
+
+    best, tried = (0.0, ""), 0
+    known: dict[Any, Array] = {}
+    for s in _clocked(fitter.record):
+        b = s.at.stop - s.at.start
+        if b < 16:
+            continue
+        key = (s.group, b, s.sample_s, s.count[0])
+        if key not in known:
+            jump = np.tril(np.ones((b, b)))[:, 4:-4]
+            white = fitter.whitening.series(s, jump - jump.mean(axis=0))
+            known[key] = white / np.linalg.norm(white, axis=0)
+        z = np.sqrt(np.maximum((known[key].T @ r[s.at]) ** 2 - spare[s.group], 0.0))
+        tried += len(z)
+        at = int(np.argmax(z))
+        if z[at] > best[0]:
+            name = fitter.record.experiments[s.experiment].name
+            best = (float(z[at]), f"{name}, {s.channel}, {s.time_s[at + 4]:.4g} s")
+    if not tried:
+        return []
+    # Jumps at neighbouring places are nearly the same test, yet no fewer than a third are independent.
+    return [Dependence("jump", best[0], min(1.0, 2.0 * tried * float(norm.sf(best[0]))), best[1])]
+
+
+def _breaks(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, float]) -> list[Dependence]:
+    """Whether from some moment on the response was another: every eighth of every experiment is tried.
+
+    Each channel has a size of its own, and its zero and what was fitted are free in each.
+    """
+    from scipy.stats import chi2
+
+    record = fitter.record
+    moments: list[tuple[int, float, str]] = []
+    for i, e in enumerate(record.experiments):
+        t = e.columns.get("time_s")
+        if t is not None:
+            at = t[0] + np.linspace(0.0, 1.0, 9)[:-1] * (t[-1] - t[0])
+            moments += [(i, float(v), f"{e.name}, {v:.4g} s") for v in at]
+    moments = moments[1:]
+    if not moments:
+        return []
+    after = np.zeros((len(record), len(moments)))
+    for s in _clocked(record):
+        for k, (i, t0, _) in enumerate(moments):
+            if s.experiment > i:
+                after[s.at, k] = 1.0
+            elif s.experiment == i:
+                after[s.at, k] = s.time_s >= t0
+    white = fitter.whitening(after * response[:, None])
+    level = fitter.whitening(np.ones(len(record)))
+    gains, dof = np.zeros(len(moments)), 0
+    saved = sum(spare[g] for g in {s.group for s in _clocked(record)})
+    for channel in _channels(record):
+        rows = np.concatenate(
+            [np.arange(s.at.start, s.at.stop) for s in record.series if s.channel == channel]
+        )
+        columns, own = white[rows], np.column_stack([level[rows], fit.jacobian[rows]])
+        before = np.linalg.norm(columns, axis=0)
+        q = _basis(own)
+        columns = columns - q @ (q.T @ columns)
+        length = np.linalg.norm(columns, axis=0)
+        told = length > 1e-3 * np.maximum(before, 1e-300)
+        along = columns.T @ fit.residual[rows]
+        gains += np.where(told, along / np.where(told, length, 1.0), 0.0) ** 2
+        dof += 1
+    best = int(np.argmax(gains))
+    p = min(1.0, len(moments) * float(chi2.sf(gains[best] - saved, dof)))
+    return [Dependence("break", float(gains[best]), p, moments[best][2], dof)]
+
+
+def _outliers(record: Record, r: Array) -> list[Dependence]:
+    from scipy.stats import norm
+
+    clocked = _clocked(record)
+    if not clocked:
+        return []
+    worst, where, tried = 0.0, "", 0
+    for s in clocked:
+        z = np.abs(r[s.at])
+        tried += len(z)
+        if z.max() > worst:
+            at = int(np.argmax(z))
+            name = record.experiments[s.experiment].name
+            worst, where = float(z[at]), f"{name}, {s.channel}, {s.time_s[at]:.4g} s"
+    return [Dependence("outlier", worst, min(1.0, 2.0 * tried * float(norm.sf(worst))), where)]

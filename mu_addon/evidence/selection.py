@@ -1,0 +1,292 @@
+"""Which effects, if any, explain the data: each rival refitted, each step paid for by the library's size."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from .effect import Effect
+from .fit import Fit, Fitter, logarithmic
+from .residuals import Dependence, dependence_table, structure
+from .sensitivity import ABSORBED, Sensitivity
+
+Array = np.ndarray[Any, Any]
+
+# Chance of naming an effect, any of the library, that is not there.
+CHANCE = 5e-4
+# Rivals within this delta chi squared (99 % for two parameters) cannot be told apart.
+TOLD_APART = 9.2
+MOST_EFFECTS = 3
+# Models that the next effect is added to: the best one may be wrong while two effects are seen as one.
+SEEDS = 4
+DRAWS = 20000
+
+
+@attrs.frozen(eq=False)
+class Cause:
+    """One effect of the chosen model; p_value: of a gain as large by chance, over the whole library.
+
+    loss: chi squared lost on experiments left out in turn when the effect is taken away; rivals: effects
+    that would do in its place.
+    """
+
+    effect: Effect
+    p_value: float
+    loss: float
+    rivals: tuple[str, ...]
+
+
+@attrs.frozen(eq=False)
+class Selection:
+    """The base model, the chosen one, its causes, and what either leaves; p_best: of the best effect tried.
+
+    singles: the fit of every single effect, best first. doubted: why the best was not accepted, if so.
+    """
+
+    base: Fit
+    chosen: Fit
+    causes: tuple[Cause, ...]
+    singles: tuple[Fit, ...]
+    table_base: tuple[Dependence, ...]
+    table: tuple[Dependence, ...]
+    p_best: float
+    doubted: str = ""
+
+    @property
+    def left(self) -> tuple[str, ...]:
+        """What the residual of the chosen model still depends on."""
+        return structure(self.table)
+
+
+def select(
+    fitter: Fitter, seen: Sequence[Sensitivity], progress: Callable[[str], None] = lambda _: None
+) -> Selection:
+    """Add effects while each one gains more than chance does and predicts experiments left out."""
+    base = fitter.fit()
+    table_base = tuple(dependence_table(fitter, base))
+    usable = {s.effect.keys: s.effect for s in seen if s.identifiable}
+    effects = tuple(usable.values())
+    pool: list[Fit] = []
+    for e in effects:
+        progress(e.name)
+        pool.append(fitter.best([e], [{**base.values, **s} for s in e.starts()]))
+    pool.sort(key=_cost)
+    singles = tuple(pool)
+    chosen, ps, doubted, p_best = base, [], "", 1.0
+    levels: list[list[Fit]] = []
+    for level in range(min(MOST_EFFECTS, len(effects))):
+        if level:
+            pool = _extended(fitter, effects, levels[-1][:1], progress)
+        if not pool:
+            break
+        p = _chance(fitter, chosen, seen, _gain(fitter, chosen, pool[0]))
+        p_best = p if level == 0 else p_best
+        if p >= CHANCE:
+            break
+        if level:
+            more = _extended(fitter, effects, levels[-1][1:SEEDS], progress)
+            pool = sorted([*pool, *more], key=_cost)
+        if _loss(fitter, chosen, pool[0]) <= 0.0:
+            doubted = f"{pool[0].names[-1]} fits, yet does not predict experiments left out"
+            break
+        chosen = pool[0]
+        ps.append(p)
+        levels.append(pool)
+    doubted = doubted or _sudden(table_base, base, chosen)
+    causes = _causes(fitter, effects, chosen, ps, levels)
+    table = table_base if chosen is base else tuple(dependence_table(fitter, chosen))
+    return Selection(base, chosen, causes, singles, table_base, table, p_best, doubted)
+
+
+def _sudden(table: Sequence[Dependence], base: Fit, chosen: Fit) -> str:
+    """What something that broke or slipped at one moment would explain better than the chosen effects do.
+
+    By Akaike's criterion; its moment is one parameter more than its sizes.
+    """
+    if chosen is base:
+        return ""
+    named = base.chi2 - chosen.chi2 - 2.0 * (len(chosen.keys) - len(base.keys))
+    for d in table:
+        gain = {"break": d.statistic, "jump": d.statistic**2}.get(d.against, 0.0)
+        if gain - 2.0 * (d.dof + 1) > named:
+            return f"a sudden change explains more than {' and '.join(chosen.names)}: {d.where}"
+    return ""
+
+
+def _cost(fit: Fit) -> float:
+    """Akaike's: of models that fit alike the one with fewer parameters leads."""
+    return fit.chi2 + 2.0 * len(fit.keys)
+
+
+def _extended(
+    fitter: Fitter, effects: Sequence[Effect], seeds: Sequence[Fit], progress: Callable[[str], None]
+) -> list[Fit]:
+    """Every seed with one more effect, each set of effects once, best first."""
+    found: dict[frozenset[tuple[str, ...]], Fit] = {}
+    for seed in seeds:
+        for e in effects:
+            every = frozenset((*(o.keys for o in seed.effects), e.keys))
+            if e.name in seed.names or every in found:
+                continue
+            progress(" and ".join((*seed.names, e.name)))
+            found[every] = fitter.best([*seed.effects, e], [{**seed.values, **s} for s in e.starts()])
+    return sorted(found.values(), key=_cost)
+
+
+def _chance(fitter: Fitter, fit: Fit, seen: Sequence[Sensitivity], gain: float) -> float:
+    """Probability that noise alone lets some effect of the library gain as much on top of a fit.
+
+    The parametric bootstrap of the linearised library: gains are squares of the noise along each effect's
+    signature, one-sided where a bound makes it so; far in the tail, as many independent squares as fit the
+    bootstrap's hundredth.
+    """
+    from scipy.stats import chi2
+
+    columns, one_sided = [], []
+    for s in seen:
+        if s.identifiable and s.effect.name not in fit.names:
+            columns.append(s.column / np.linalg.norm(s.column))
+            p = s.effect.parameters[0]
+            one_sided.append(p.null in (p.low, p.high))
+    if not columns:
+        return 1.0
+    u = np.stack(columns, axis=1)
+    q = np.linalg.qr(fit.jacobian)[0] if fit.jacobian.shape[1] else fit.jacobian
+    u -= q @ (q.T @ u)
+    length = np.linalg.norm(u, axis=0)
+    u = u[:, length > ABSORBED] / length[length > ABSORBED]
+    sides = np.array(one_sided)[length > ABSORBED]
+    if not len(sides):
+        return 1.0
+    values, vectors = np.linalg.eigh(u.T @ u)
+    half = vectors * np.sqrt(np.clip(values, 0.0, None))
+    z = np.random.default_rng(0).normal(size=(DRAWS, len(half))) @ half.T
+    most = np.max(np.where(sides, np.maximum(z, 0.0), np.abs(z)) ** 2, axis=1)
+    more = int((most >= gain).sum())
+    if more >= 50:
+        return more / DRAWS
+    tail = float(np.quantile(most, 0.99))
+    alike = 0.01 / float(chi2.sf(tail, 1))
+    return min(1.0, max(alike, 1.0) * float(chi2.sf(max(gain, 0.0), 1)))
+
+
+def _gain(fitter: Fitter, less: Fit, more: Fit) -> float:
+    """Twice the log likelihood gained by an effect: the least under one noise and under each one's own.
+
+    Without the second, slow noise estimated too small would pass for a cause; without the first, noise
+    swollen by a cause would hide it.
+    """
+    gain = less.chi2 - more.chi2
+    if gain < TOLD_APART:
+        return gain
+    own = []
+    for fit in (less, more):
+        under, refitted = fitter.under_its_own_noise(fit)
+        own.append(sum(under.deviance(refitted).values()))
+    return min(gain, own[0] - own[1])
+
+
+def _loss(fitter: Fitter, less: Fit, more: Fit) -> float:
+    """Chi squared of experiments left out in turn that a model loses against one with an effect more.
+
+    An experiment that holds most of what is known of the effects is left out in parts, not whole.
+    """
+    lost = 0.0
+    for rows in _folds(fitter, more):
+        rest = fitter.without(rows)
+        chi2 = []
+        for model in (less, more):
+            found = rest.fit(model.effects, model.values)
+            r = fitter.whitening(fitter.record.values - fitter.predict(found.values))[rows]
+            chi2.append(float(r @ r))
+        lost += chi2[0] - chi2[1]
+    return lost
+
+
+def _folds(fitter: Fitter, fit: Fit) -> list[Array]:
+    record = fitter.record
+    last = fit.jacobian[:, -len(fit.effects[-1].keys)]
+    q = np.linalg.qr(fit.jacobian[:, : -len(fit.effects[-1].keys)])[0]
+    told = (last - q @ (q.T @ last)) ** 2
+    folds = []
+    for i, e in enumerate(record.experiments):
+        rows = record.rows(i)
+        if not rows.any():
+            continue
+        share = float(told[rows].sum() / max(told.sum(), 1e-300))
+        if share < 0.6 or "time_s" not in e.columns or rows.sum() < 40:
+            folds.append(rows)
+            continue
+        clock = np.zeros(len(record))
+        for s in record.series:
+            if s.experiment == i:
+                clock[s.at] = s.time_s
+        edges = np.quantile(clock[rows], [0.25, 0.5, 0.75])
+        part = np.digitize(clock, edges)
+        # Alternate quarters, so that either half has seen both early and late.
+        folds += [rows & (part % 2 == k) for k in (0, 1)]
+    return folds
+
+
+def _causes(
+    fitter: Fitter,
+    effects: Sequence[Effect],
+    chosen: Fit,
+    ps: Sequence[float],
+    levels: Sequence[Sequence[Fit]],
+) -> tuple[Cause, ...]:
+    """The chosen effects, the most needed first, each with what would do in its place."""
+    found = []
+    for e in chosen.effects:
+        others = [o for o in chosen.effects if o.name != e.name]
+        rivals: dict[str, float] = {}
+        if others:
+            tried = []
+            for a in effects:
+                if a.name not in chosen.names:
+                    fits = fitter.best([*others, a], [{**chosen.values, **s} for s in a.starts()])
+                    tried.append((a.name, fits.chi2))
+        else:
+            tried = [(f.names[0], f.chi2) for f in levels[0] if f.names != chosen.names]
+        for name, chi2 in tried:
+            if chi2 - chosen.chi2 < TOLD_APART:
+                rivals[name] = min(chi2, rivals.get(name, chi2))
+        less = fitter.best(others, [chosen.values])
+        p = max(ps)
+        found.append(Cause(e, p, less.chi2 - chosen.chi2, tuple(sorted(rivals, key=lambda n: rivals[n]))))
+    return tuple(sorted(found, key=lambda c: -c.loss))
+
+
+def interval(fitter: Fitter, fit: Fit, key: str, rise: float = 3.84) -> tuple[float, float]:
+    """Bounds of a value: chi squared, all else fitted anew, has risen by `rise` (95 %), or its own bounds."""
+    p = next(
+        (p for e in fit.effects for name, p in zip(e.keys, e.parameters, strict=True) if name == key),
+        None,
+    ) or next(p for p in fitter.curved if p.name == key)
+    log = logarithmic(p)
+    centre = math.log(fit.values[key]) if log else fit.values[key]
+    scale = fit.sd(key) / (fit.values[key] if log else 1.0)
+    if not (math.isfinite(scale) and scale > 0.0):
+        return p.low, p.high
+    found = []
+    for sign, bound in ((-1.0, p.low), (1.0, p.high)):
+        limit = math.log(bound) if log else bound
+        inner, outer, value = 0.0, math.inf, math.sqrt(rise)
+        for _ in range(7):
+            at = centre + sign * value * scale
+            if (limit - at) * sign <= 0.0:
+                at, value = limit, abs(limit - centre) / scale
+            fixed = {key: math.exp(at) if log else at}
+            risen = fitter.fit(fit.effects, fit.values, fixed).chi2 - fit.chi2
+            if abs(risen - rise) < 0.2 or (risen < rise and at == limit):
+                break
+            inner, outer = (value, outer) if risen < rise else (inner, value)
+            grown = value * min(math.sqrt(rise / max(risen, 0.1)), 3.0)
+            value = grown if inner < grown < outer else 0.5 * (inner + min(outer, 4.0 * inner + value))
+        at = centre + sign * value * scale
+        found.append(math.exp(at) if log else at)
+    return found[0], found[1]

@@ -1,0 +1,141 @@
+"""What each effect does to a record, what nuisances can hide of it, and which effects look alike."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from .effect import Effect, Parameter
+from .fit import Fitter
+from .record import Record
+from .simulator import Composite
+
+Array = np.ndarray[Any, Any]
+
+# Delta chi squared of 16: seen in nearly every set of data, once a library of some 25 effects is paid for.
+SEEN = 4.0
+# Below this share an effect is a nuisance by another name.
+ABSORBED = 2e-3
+
+
+def signatures(record: Record, simulator: Composite, values: Mapping[str, float]) -> Array:
+    """Changes (N, m) of the prediction by every effect, small and at its starts, and by every nuisance."""
+    base = record.predict(simulator, values)
+    columns = [
+        (record.predict(simulator, {**values, p.name: values.get(p.name, p.null) + abs(p.step)}) - base)
+        / p.step
+        for p in simulator.nuisances
+        if not p.linear
+    ]
+    for e in simulator.effects:
+        size = e.parameters[0]
+        for shape in e.shapes():
+            moved = {**values, **shape, e.keys[0]: size.null + size.step}
+            columns.append((record.predict(simulator, moved) - base) / size.step)
+        columns += [record.predict(simulator, {**values, **start}) - base for start in e.starts()]
+    return np.stack([c for c in columns if c.any()], axis=1) if columns else np.zeros((len(base), 0))
+
+
+@attrs.frozen(eq=False)
+class Sensitivity:
+    """Whitened derivative of the data by the size of one effect, at its null, nuisances fitted too.
+
+    column (N,): what of it nuisances leave, for the shape that is seen best; unabsorbed: its length over the
+    length before; limit: size at which delta chi squared is 16, in the parameter's unit; absorbed_by: the
+    nuisances that take most, by how much of the rest each takes.
+    """
+
+    effect: Effect
+    shape: Mapping[str, float]
+    column: Array
+    unabsorbed: float
+    limit: float
+    absorbed_by: tuple[str, ...]
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether the data could show the effect at a size within its bounds."""
+        p = self.effect.parameters[0]
+        reach = max(abs(p.high - p.null), abs(p.low - p.null))
+        return self.unabsorbed > ABSORBED and self.limit < reach
+
+
+def sensitivities(fitter: Fitter, values: Mapping[str, float]) -> list[Sensitivity]:
+    """Of every effect of the simulator and of each of its shapes, around nuisances of given values."""
+    simulator = fitter.simulator
+    base = fitter.predict(values)
+    nuisances = []
+    names = []
+    for p in simulator.nuisances:
+        column = _slope(fitter, values, p.name, p)
+        if column.any():
+            nuisances.append(column)
+            names.append(p)
+    n = fitter.project(np.stack(nuisances, axis=1), zeros=False) if nuisances else np.zeros((len(base), 0))
+    lengths = np.linalg.norm(n, axis=0)
+    q = np.linalg.qr(n)[0]
+    found = []
+    for e in simulator.effects:
+        size = e.parameters[0]
+        for shape in e.shapes():
+            j = fitter.project(_slope(fitter, {**values, **shape}, e.keys[0], size), zeros=False)
+            whole = float(np.linalg.norm(j))
+            left: Array = j - q @ (q.T @ j)
+            left -= q @ (q.T @ left)
+            rest = float(np.linalg.norm(left))
+            limit = SEEN / rest if rest > 1e-9 * whole and whole > 0 else math.inf
+            absorbed = _absorbers(n, names, lengths, j) if whole > 0 else ()
+            share = rest / whole if whole > 0 else 0.0
+            found.append(Sensitivity(e, shape, left, share, limit, absorbed))
+    return found
+
+
+def _slope(fitter: Fitter, values: Mapping[str, float], key: str, p: Parameter) -> Array:
+    """Derivative (N,) of the prediction by one value, central unless a bound is in the way."""
+    at, h = values.get(key, p.null), 1.0 if p.linear else 0.05 * p.step
+    up, down = fitter.predict({**values, key: at + h}), at - h
+    if p.low <= down <= p.high:
+        return np.asarray((up - fitter.predict({**values, key: down})) / (2.0 * h))
+    return np.asarray((up - fitter.predict({**values, key: at})) / h)
+
+
+def _absorbers(n: Array, names: Sequence[Parameter], lengths: Array, j: Array) -> tuple[str, ...]:
+    if not n.shape[1]:
+        return ()
+    by = np.linalg.lstsq(n / lengths, j, rcond=None)[0]
+    order = np.argsort(-np.abs(by))
+    most = float(np.abs(by[order[0]]))
+    return tuple(names[i].name for i in order[:2] if abs(by[i]) > 0.3 * most > 0)
+
+
+def best_seen(found: Sequence[Sensitivity]) -> dict[str, Sensitivity]:
+    """The shape of each effect that is seen best, by the effect's name."""
+    best: dict[str, Sensitivity] = {}
+    for s in found:
+        known = best.get(s.effect.name)
+        if known is None or s.unabsorbed > known.unabsorbed:
+            best[s.effect.name] = s
+    return best
+
+
+def similarity(found: Sequence[Sensitivity]) -> Array:
+    """Cosines (m, m) between what nuisances leave of effects; 0 with one that they leave nothing of."""
+    unit = _unit(found)
+    return np.asarray(unit.T @ unit)
+
+
+def collinearity(found: Sequence[Sensitivity]) -> float:
+    """Index of Brun et al. 2001 of a set of effects: 1 if independent; above 10 to 15 they act as fewer."""
+    unit = _unit(found)
+    least = float(np.linalg.eigvalsh(unit.T @ unit)[0])
+    return 1.0 / math.sqrt(least) if least > 1e-14 else math.inf
+
+
+def _unit(found: Sequence[Sensitivity]) -> Array:
+    columns = np.stack([s.column if s.unabsorbed > ABSORBED else 0.0 * s.column for s in found], axis=1)
+    length = np.linalg.norm(columns, axis=0)
+    return np.asarray(columns / np.where(length > 0, length, 1.0))

@@ -1,0 +1,130 @@
+"""What predicts an experiment: one simulator a kind, and one that holds them all."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+from ..measured import Experiment
+from .effect import Effect, Parameter
+
+Array = np.ndarray[Any, Any]
+
+
+class Simulator(Protocol):
+    """Predicts what an experiment's instruments read.
+
+    nuisances: what must be fitted whatever the cause; effects: what the base model may lack.
+    """
+
+    @property
+    def nuisances(self) -> tuple[Parameter, ...]:
+        """What is fitted in every model."""
+        ...
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """What may be added to the base."""
+        ...
+
+    def channels(self, experiment: Experiment) -> tuple[str, ...]:
+        """Columns of the experiment that are predicted."""
+        ...
+
+    def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
+        """Prediction (channels, n); `values` by "effect.parameter" or nuisance, null where missing."""
+        ...
+
+
+class Composite:
+    """Simulators of several kinds as one, that share parameters by name; it remembers predictions.
+
+    An effect whose parameters differ from kind to kind is several effects of one name.
+
+    calls: predictions that were computed; remembered: predictions kept, the oldest are dropped.
+    """
+
+    def __init__(self, simulators: Mapping[str, Simulator], remembered: int = 1024) -> None:
+        self._simulators = dict(simulators)
+        self._remembered = remembered
+        self._kept: OrderedDict[Any, tuple[Experiment, Array]] = OrderedDict()
+        self.calls = 0
+        nuisances: dict[str, Parameter] = {}
+        effects: dict[tuple[str, ...], Effect] = {}
+        for kind, simulator in self._simulators.items():
+            for p in simulator.nuisances:
+                nuisances[p.name] = _shared(nuisances.get(p.name, p), p)
+            for e in simulator.effects:
+                known = effects.get(e.keys)
+                if known is None:
+                    effects[e.keys] = attrs.evolve(e, kinds=(kind,))
+                    continue
+                both = [_shared(a, b) for a, b in zip(known.parameters, e.parameters, strict=True)]
+                effects[e.keys] = attrs.evolve(known, parameters=tuple(both), kinds=(*known.kinds, kind))
+        self.nuisances = tuple(nuisances.values())
+        self.effects = tuple(effects.values())
+        self._knows = {
+            kind: {p.name for p in s.nuisances} | {key for e in s.effects for key in e.keys}
+            for kind, s in self._simulators.items()
+        }
+
+    def knows(self, experiment: Experiment) -> bool:
+        """Whether there is a simulator of that kind of experiment."""
+        return experiment.kind in self._simulators
+
+    def channels(self, experiment: Experiment) -> tuple[str, ...]:
+        """Columns of the experiment that are predicted."""
+        return self._of(experiment).channels(experiment)
+
+    def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
+        """Prediction (channels, n), from memory where it was made before; InputError for other kinds."""
+        simulator = self._of(experiment)
+        knows = self._knows[experiment.kind]
+        own = {k: v for k, v in values.items() if k in knows}
+        key = (experiment.name, id(experiment), tuple(sorted(own.items())))
+        if key in self._kept:
+            self._kept.move_to_end(key)
+            return self._kept[key][1]
+        found = simulator.predict(experiment, own)
+        found.flags.writeable = False
+        self.calls += 1
+        # With the experiment, whose identity would otherwise be given to another one.
+        self._kept[key] = experiment, found
+        if len(self._kept) > self._remembered:
+            self._kept.popitem(last=False)
+        return found
+
+    def _of(self, experiment: Experiment) -> Simulator:
+        if experiment.kind not in self._simulators:
+            raise InputError(
+                f"nothing predicts {experiment.kind}",
+                experiment.name,
+                f"there are simulators of {', '.join(self._simulators)}",
+            )
+        return self._simulators[experiment.kind]
+
+
+def _shared(known: Parameter, other: Parameter) -> Parameter:
+    """One parameter of two simulators, within the bounds of both."""
+    low, high = max(known.low, other.low), min(known.high, other.high)
+    if (known.unit, known.null, known.linear) != (other.unit, other.null, other.linear) or not low < high:
+        raise InputError(
+            f"two simulators describe {known.name} differently", "simulators", "give it one unit and one null"
+        )
+    starts = tuple(v for v in known.starts if low <= v <= high) or (0.5 * (low + high),) * bool(known.starts)
+    return attrs.evolve(known, low=low, high=high, starts=starts, spread=min(known.spread, other.spread))
+
+
+def effect_named(effects: Sequence[Effect], name: str) -> Effect:
+    """The effect of that name; raises InputError."""
+    for e in effects:
+        if e.name == name:
+            return e
+    raise InputError(
+        f"no simulator knows {name!r}", "effects", f"known: {', '.join(e.name for e in effects)}"
+    )

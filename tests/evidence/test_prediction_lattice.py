@@ -1,0 +1,233 @@
+"""Lattices between plates: dimensional analysis across scales, directions, seating, and weighing."""
+
+from pathlib import Path
+
+import attrs
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mu_addon.errors import InputError
+from mu_addon.evidence.prediction.lattice import LatticeStress, Struts
+from mu_addon.measured import read_folder
+
+from .bench import experiment, measured, recovered
+
+EXAMPLES = Path(__file__).parents[2] / "assets" / "examples"
+SCALES = (0.75, 1.0, 1.5)
+
+
+def block(scale=1.0, name="", **fields):
+    size = 37.5 * scale
+    strain = np.linspace(0.0, 0.4, 81)
+    columns = {"time_s": strain * size / (10 / 60), "strain": strain}
+    return experiment(
+        "lattice_compression",
+        {**columns, **fields.pop("columns", {})},
+        name or f"{scale:g}x",
+        scale=scale,
+        **{"section_mm": (size, size), "length_mm": size, **fields},
+    )
+
+
+def modulus(e, **values):
+    found = LatticeStress().predict(e, {k.replace("__", "."): v for k, v in values.items()})[0]
+    return found[-1] / e["strain"][-1]
+
+
+@given(scale=st.floats(0.1, 10.0))
+def test_a_lattice_scaled_as_a_whole_keeps_its_modulus(scale):
+    assert modulus(block(scale)) == pytest.approx(30.0)
+
+
+@given(
+    scale=st.floats(0.3, 4.0), offset=st.floats(0.0, 0.25), excess=st.floats(0.0, 0.4), by=st.floats(0.5, 2.0)
+)
+def test_lengths_of_the_printer_scaled_alike_change_nothing(scale, offset, excess, by):
+    """Stiffness and mass depend on offset and skin over the scale alone."""
+    struts = Struts()
+    assert struts.stiffness(by * scale, by * offset, by * excess) == pytest.approx(
+        struts.stiffness(scale, offset, excess)
+    )
+    assert struts.mass(by * scale, by * offset) == pytest.approx(struts.mass(scale, offset))
+
+
+def test_thicker_struts():
+    """A strut of 1.5 mm that is 0.2 mm thicker: (1.7/1.5)^4 in bending, squared in mass."""
+    assert Struts().stiffness(1.0, 0.1, 0.0) == pytest.approx((1.7 / 1.5) ** 4)
+    assert Struts().mass(1.0, 0.1) == pytest.approx((1.7 / 1.5) ** 2)
+
+
+def test_a_thin_skin_stiffens_a_bent_strut_as_a_tube_around_a_core():
+    """(k - 1) (1 - (1 - 2 d/t)^4) of a skin of depth d and modulus k, to first order of d/t."""
+    d, k, t = 1e-3, 3.0, 1.5
+    exact = 1 + (k - 1) * (1 - (1 - 2 * d / t) ** 4)
+    assert Struts().stiffness(1.0, 0.0, (k - 1) * d) - 1 == pytest.approx(exact - 1, rel=4 * d / t)
+
+
+def test_small_specimens_are_stiffer_by_every_length_of_the_printer():
+    for key in ("overcure__offset_mm", "skin_cure__excess_mm"):
+        moduli = [modulus(block(s), **{key: 0.1}) for s in SCALES]
+        assert moduli[0] > moduli[1] > moduli[2] > 30.0
+
+
+def test_equal_speed_strains_small_specimens_faster():
+    relaxing = {"viscoelasticity__share": 0.3, "viscoelasticity__time_s": 50.0}
+    moduli = [modulus(block(s), **relaxing) for s in SCALES]
+    assert moduli[0] > moduli[1] > moduli[2] > 0.7 * 30.0
+
+
+def test_a_frame_is_felt_by_stiff_specimens_and_those_are_large():
+    """c E A/L grows with the scale; of 18 kPa and 37.5 mm a frame of 0.1 mm/N takes 6 %."""
+    moduli = [modulus(block(s), lattice_modulus_kPa=18.0, frame_compliance__mm_per_N=0.1) for s in SCALES]
+    give = 0.1 * 0.018 * 37.5 * np.array(SCALES)
+    np.testing.assert_allclose(moduli, 18.0 / (1 + give), rtol=1e-9)
+
+
+def test_a_gap_makes_small_specimens_softer():
+    moduli = [modulus(block(s), seating__gap_mm=0.5) for s in SCALES]
+    assert moduli[0] < moduli[1] < moduli[2] < 30.0
+
+
+def test_directions():
+    values = {"lattice_modulus_kPa": 60.0, "anisotropy__in_plane": 0.9}
+    assert modulus(block(axis="z"), **values) == pytest.approx(60.0)
+    assert modulus(block(axis="x"), **values) == pytest.approx(114.0)
+    assert modulus(block(axis="y"), **values) == pytest.approx(114.0)
+    assert modulus(block(), **values) == pytest.approx(60.0)
+
+
+def test_cells_that_close():
+    """E e/(1 - e/e_d): the tangent doubles where (1 - e/e_d)^2 is a half."""
+    e = block()
+    found = LatticeStress().predict(e, {"strain_stiffening.closing": 1.0})[0]
+    np.testing.assert_allclose(found, 30.0 * e["strain"] / (1 - e["strain"]), rtol=1e-12)
+
+
+def test_warmth_and_earlier_tests_change_the_modulus():
+    assert modulus(block(temperature_C=33.0), temperature_drift__per_K=-0.01) == pytest.approx(27.0)
+    tests = [block(name=str(i), specimen="A") for i in range(10)]
+    last = LatticeStress(tests).predict(tests[9], {"fatigue_drift.per_decade": 0.1})[0]
+    assert last[-1] / 0.4 == pytest.approx(30.0 * 0.9)
+
+
+def test_a_specimen_is_weighed_as_drawn_and_as_printed():
+    e = block(columns={"mass_g": np.ones(81)})
+    simulator = LatticeStress()
+    assert simulator.channels(e) == ("stress_kPa", "mass_g")
+    drawn = simulator.predict(e, {"lattice_density_g_cm3": 0.2})[1]
+    np.testing.assert_allclose(drawn, 0.2 * 3.75**3)
+    printed = simulator.predict(e, {"lattice_density_g_cm3": 0.2, "overcure.offset_mm": 0.1})[1]
+    np.testing.assert_allclose(printed / drawn, (1.7 / 1.5) ** 2)
+    hard = simulator.predict(e, {"lattice_density_g_cm3": 0.2, "skin_cure.excess_mm": 0.2})[1]
+    np.testing.assert_array_equal(hard, drawn)
+
+
+def test_a_lattice_without_size_is_not_weighed():
+    e = block(columns={"mass_g": np.ones(81)}, section_mm=None)
+    assert LatticeStress().channels(e) == ("stress_kPa",)
+
+
+def test_another_scaling_can_be_given():
+    class Stretched:
+        def stiffness(self, scale, offset_mm, excess_mm):
+            return (1 + offset_mm / scale) ** 2
+
+        def mass(self, scale, offset_mm):
+            return 1.0
+
+    found = LatticeStress(scaling=Stretched()).predict(block(2.0), {"overcure.offset_mm": 0.2})[0]
+    assert found[-1] / 0.4 == pytest.approx(30.0 * 1.1**2)
+
+
+def test_overcure_is_recovered_from_three_scales():
+    simulator = LatticeStress()
+    truth = {"lattice_modulus_kPa": 12.0, "overcure.offset_mm": 0.09}
+    seen = [measured(simulator, block(s), truth, 0.05, seed) for seed, s in enumerate(SCALES)]
+    start = {"lattice_modulus_kPa": 20.0, "overcure.offset_mm": 0.03}
+    found, sd, _ = recovered(simulator, seen, start, 0.05)
+    for key, value in truth.items():
+        assert abs(found[key] - value) < 3.5 * sd[key], key
+
+
+def papers(extra=lambda e: e):
+    return [extra(e) for e in read_folder(EXAMPLES / "paper-moduli").experiments]
+
+
+def one_number(simulator, experiments, values):
+    """Chi squared of records of which each is one number with its spread."""
+    total = 0.0
+    for e in experiments:
+        off = (e["stress_kPa"] - simulator.predict(e, values)[0])[1:] / e["stress_sd_kPa"][1:]
+        total += float(np.mean(off)) ** 2
+    return total
+
+
+def least(effect=None):
+    from scipy.optimize import minimize
+
+    known = {e.name: e for e in LatticeStress.effects}
+    simulator = LatticeStress()
+    keys = ["lattice_modulus_kPa"] + ([known[effect].keys[0]] if effect else [])
+    bounds = [(1.0, 100.0)] + (
+        [(known[effect].parameters[0].low, known[effect].parameters[0].high)] if effect else []
+    )
+    start = [20.0] + ([known[effect].parameters[0].starts[0]] if effect else [])
+    size = np.array(start)
+    found = minimize(
+        lambda x: one_number(simulator, papers(), dict(zip(keys, x * size, strict=True))),
+        np.ones(len(size)),
+        bounds=[(a / s, b / s) for (a, b), s in zip(bounds, size, strict=True)],
+        method="Nelder-Mead",
+        options={"xatol": 1e-6, "fatol": 1e-8},
+    )
+    return found.fun, dict(zip(keys, found.x * size, strict=True))
+
+
+def test_the_papers_moduli_refuse_one_modulus():
+    chi2, values = least()
+    assert chi2 == pytest.approx(20.3, abs=0.1)
+    assert values["lattice_modulus_kPa"] == pytest.approx(21.2, abs=0.1)
+
+
+def test_the_papers_moduli_ask_for_struts_thicker_by_0_18_mm():
+    chi2, values = least("overcure")
+    assert chi2 < 0.1
+    assert 2 * values["overcure.offset_mm"] == pytest.approx(0.182, abs=0.003)
+    assert values["lattice_modulus_kPa"] == pytest.approx(11.9, abs=0.1)
+
+
+def test_what_else_three_moduli_cannot_exclude():
+    assert least("skin_cure")[0] < 0.2
+    # A frame would have to be softer than any.
+    assert least("frame_compliance")[0] > 9.2
+    # A gap has the wrong sign.
+    assert least("seating")[0] == pytest.approx(20.3, abs=0.1)
+
+
+def test_weighing_would_tell_thicker_struts_from_harder_skin():
+    """0.18 mm makes the 0.75x specimen denser by 15 % against the 1.5x one; the skin by nothing."""
+    struts = Struts()
+    assert struts.mass(0.75, 0.091) / struts.mass(1.5, 0.091) == pytest.approx(1.155, abs=0.005)
+
+
+def test_a_mass_reaches_the_experiment_through_the_folder(tmp_path):
+    folder = EXAMPLES / "paper-moduli"
+    for file in folder.iterdir():
+        text = file.read_text()
+        (tmp_path / file.name).write_text(
+            text.replace('axis = "z"', 'axis = "z"\nmass_g = 9.5\nmass_sd_g = 0.05')
+        )
+    first = read_folder(tmp_path).experiments[0]
+    np.testing.assert_array_equal(first["mass_g"], 9.5)
+    np.testing.assert_array_equal(first["mass_sd_g"], 0.05)
+    assert LatticeStress().channels(first) == ("stress_kPa", "mass_g")
+    assert attrs.evolve(first, section_mm=None).mass_g == 9.5
+
+
+def test_a_negative_spread_is_refused_by_its_row(tmp_path):
+    for file in (EXAMPLES / "paper-moduli").iterdir():
+        (tmp_path / file.name).write_text(file.read_text().replace("4.3400,0.0700", "4.3400,-0.0700"))
+    with pytest.raises(InputError, match="row 5, column stress_sd_kPa"):
+        read_folder(tmp_path)

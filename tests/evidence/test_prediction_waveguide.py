@@ -1,0 +1,88 @@
+"""Waveguides: an exponential of the angle, and what bends its logarithm."""
+
+import numpy as np
+import pytest
+
+from mu_addon.evidence.prediction.waveguide import WaveguideVoltage
+
+from .bench import experiment, measured, recovered
+
+TIME = np.linspace(0.0, 600.0, 1201)
+ANGLE = 45.0 + 50.0 * np.sin(TIME / 25.0)
+GUIDE = experiment("waveguide_bending", {"time_s": TIME, "angle_deg": ANGLE})
+SIMULATOR = WaveguideVoltage()
+BASE = {"straight_V": 3.0, "loss_per_deg": 0.012}
+
+
+def predict(**values):
+    return SIMULATOR.predict(GUIDE, {**BASE, **{k.replace("__", "."): v for k, v in values.items()}})[0]
+
+
+def test_equal_bends_lose_equal_shares():
+    found = predict()
+    np.testing.assert_allclose(found, 3.0 * np.exp(-0.012 * ANGLE), rtol=1e-12)
+
+
+def test_a_zero_of_the_angle_is_only_another_light_source():
+    found = predict(angle_offset__offset_deg=5.0)
+    np.testing.assert_allclose(found / predict(), np.exp(0.012 * 5.0), rtol=1e-12)
+
+
+def test_light_that_fades_does_so_in_proportion():
+    ratio = predict(led_drift__per_hour=-0.3) / predict()
+    np.testing.assert_allclose(ratio, np.exp(-0.3 * TIME / 3600.0), rtol=1e-12)
+
+
+def test_room_light_adds():
+    np.testing.assert_allclose(predict(ambient_light__ambient_V=0.2) - predict(), 0.2, rtol=1e-12)
+
+
+def test_excess_loss_is_its_share_at_a_right_angle():
+    e = experiment(
+        "waveguide_bending", {"time_s": np.array([0.0, 1.0]), "angle_deg": np.array([90.0, -90.0])}
+    )
+    found = SIMULATOR.predict(e, {**BASE, "optical_nonlinearity.excess": 0.4})[0]
+    np.testing.assert_allclose(np.log(found / 3.0), [-0.012 * 90 * 1.4, 0.012 * 90 * 1.4], rtol=1e-12)
+
+
+def test_below_its_onset_nothing_more_is_lost():
+    found = predict(optical_nonlinearity__excess=2.0, optical_nonlinearity__onset_deg=40.0)
+    below = np.abs(ANGLE) <= 40.0
+    np.testing.assert_array_equal(found[below], predict()[below])
+    assert (found[ANGLE > 40.0] < predict()[ANGLE > 40.0]).all()
+
+
+def test_a_late_clock_reads_earlier_angles():
+    found = predict(clock_offset__offset_s=1.0)
+    inner = slice(10, -10)
+    expected = 3.0 * np.exp(-0.012 * np.interp(TIME - 1.0, TIME, ANGLE))
+    np.testing.assert_allclose(found[inner], expected[inner], rtol=1e-12)
+
+
+def test_angles_the_camera_missed_are_bridged():
+    angle = ANGLE.copy()
+    angle[100:103] = np.nan
+    e = experiment("waveguide_bending", {"time_s": TIME, "angle_deg": angle})
+    found = SIMULATOR.predict(e, BASE)[0]
+    # A chord of 2 s leaves the sine by up to 0.04 deg.
+    np.testing.assert_allclose(found, predict(), rtol=0.012 * 0.04)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "start"),
+    [
+        ("led_drift.per_hour", -0.3, -0.1),
+        ("ambient_light.ambient_V", 0.15, 0.01),
+        ("optical_nonlinearity.excess", 0.25, 0.05),
+        ("clock_offset.offset_s", 0.4, 0.1),
+    ],
+)
+def test_each_effect_is_recovered(key, value, start):
+    truth = {**BASE, key: value}
+    seen = measured(SIMULATOR, GUIDE, truth, 0.01)
+    found, sd, chi2 = recovered(
+        SIMULATOR, [seen], {"straight_V": 1.0, "loss_per_deg": 0.01, key: start}, 0.01
+    )
+    assert chi2 < len(TIME) + 5 * np.sqrt(2 * len(TIME))
+    for name, at in truth.items():
+        assert abs(found[name] - at) < 3.5 * sd[name], name
