@@ -19,6 +19,8 @@ Array = np.ndarray[Any, Any]
 ITERATIONS = 25
 # A step that gains less of chi squared than this ends a fit.
 GAIN = 1e-3
+# Group of what was known of values before any data.
+PRIOR = "known before"
 
 
 @attrs.frozen(eq=False)
@@ -26,7 +28,8 @@ class Fit:
     """A model fitted to a record: its effects, values of all that was free, and what it leaves.
 
     chi2: of the whitened residual (N,), into which the zeros have been fitted. jacobian (N, k): whitened,
-    zeros projected out, in the coordinates of the fit; covariance (k, k) of those; keys (k,).
+    zeros projected out, in the coordinates of the fit; covariance (k, k) of those; keys (k,). prior (m, k):
+    derivative of what was known of values before, in spreads; nuisances come first.
     """
 
     effects: tuple[Effect, ...]
@@ -36,6 +39,7 @@ class Fit:
     keys: tuple[str, ...]
     jacobian: Array
     covariance: Array
+    prior: Array
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -87,6 +91,7 @@ class Fitter:
                     self._linear.append(p)
                     columns.append(column)
         self.curved = tuple(p for p in simulator.nuisances if not p.linear)
+        self.known = tuple(p for p in self.curved if math.isfinite(p.spread))
         white = self._white(np.stack(columns, axis=1)) if columns else np.zeros((len(record), 0))
         self._zeros = white
         self._q = np.linalg.qr(white)[0]
@@ -108,8 +113,10 @@ class Fitter:
         return w - self._q @ (self._q.T @ w) if zeros and self._q.shape[1] else w
 
     def deviance(self, fit: Fit) -> dict[str, float]:
-        """-2 log likelihood of a fit by group of series, but for a constant."""
+        """-2 log likelihood of a fit by group of series and of `PRIOR`, but for a constant."""
         found = dict(self.whitening.log_dets)
+        # What was known before any data has a likelihood as well.
+        found[PRIOR] = fit.chi2 - float(fit.residual @ fit.residual)
         for s in self.record.series:
             r = fit.residual[s.at]
             found[s.group] = found.get(s.group, 0.0) + float(r @ r)
@@ -158,6 +165,8 @@ class Fitter:
         keys = tuple(k for k, _ in free)
         measured = self.record.values
         known = [(i, p) for i, (_, p) in enumerate(free) if math.isfinite(p.spread)]
+        # Holding a value costs what is known against it.
+        held = sum(((p.null - fixed[p.name]) / p.spread) ** 2 for p in self.known if p.name in fixed)
 
         def at(x: Array) -> dict[str, float]:
             return fixed | dict(
@@ -198,7 +207,7 @@ class Fitter:
                 damping = max(damping * 10.0, 1e-6)
             if not settled or gained < GAIN:
                 break
-        return self._finished(tuple(effects), at(x), chi2, r[: len(f)], f, keys, jacobian, measured)
+        return self._finished(tuple(effects), at(x), chi2 + held, r[: len(f)], f, keys, jacobian, measured)
 
     def _finished(
         self,
@@ -214,7 +223,8 @@ class Fitter:
         values |= self.zeros(measured - f)
         gram = jacobian.T @ jacobian
         covariance = np.linalg.pinv(gram, rcond=1e-12, hermitian=True) if len(keys) else np.zeros((0, 0))
-        return Fit(effects, values, chi2, residual, keys, jacobian[: len(f)], covariance)
+        n = len(f)
+        return Fit(effects, values, chi2, residual, keys, jacobian[:n], covariance, jacobian[n:])
 
     def best(self, effects: Sequence[Effect], starts: Sequence[Mapping[str, float]]) -> Fit:
         """The best of the fits from several starts."""

@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from .effect import Effect
-from .fit import Fit, Fitter, logarithmic
+from .fit import PRIOR, Fit, Fitter, logarithmic
 from .residuals import Dependence, dependence_table, structure
 from .sensitivity import ABSORBED, Sensitivity
 
@@ -68,7 +68,7 @@ def select(
     """Add effects while each one gains more than chance does and predicts experiments left out."""
     base = fitter.fit()
     table_base = tuple(dependence_table(fitter, base))
-    usable = {s.effect.keys: s.effect for s in seen if s.identifiable}
+    usable = {s.effect.keys: s.effect for s in seen if s.worth_a_fit}
     effects = tuple(usable.values())
     pool: list[Fit] = []
     for e in effects:
@@ -100,6 +100,27 @@ def select(
     causes = _causes(fitter, effects, chosen, ps, levels)
     table = table_base if chosen is base else tuple(dependence_table(fitter, chosen))
     return Selection(base, chosen, causes, singles, table_base, table, p_best, doubted)
+
+
+def reviewed(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) -> Selection:
+    """A selection under another noise: no effect is added, yet any may be doubted or get rivals."""
+    base = fitter.fit((), found.base.values)
+    chosen = fitter.fit(found.chosen.effects, found.chosen.values)
+    singles = tuple(sorted((fitter.fit(f.effects, f.values) for f in found.singles), key=_cost))
+    ps = [c.p_value for c in found.causes]
+    doubted = found.doubted
+    for e in chosen.effects:
+        less = fitter.fit([o for o in chosen.effects if o is not e], chosen.values)
+        p = _chance(fitter, less, seen, less.chi2 - chosen.chi2)
+        ps.append(p)
+        if p >= CHANCE:
+            doubted = doubted or f"{e.name} gains no more than chance under the noise that the causes leave"
+    table_base = tuple(dependence_table(fitter, base))
+    doubted = doubted or _sudden(table_base, base, chosen)
+    effects = [f.effects[0] for f in singles]
+    causes = _causes(fitter, effects, chosen, ps, [singles])
+    table = tuple(dependence_table(fitter, chosen))
+    return Selection(base, chosen, causes, singles, table_base, table, found.p_best, doubted)
 
 
 def _sudden(table: Sequence[Dependence], base: Fit, chosen: Fit) -> str:
@@ -148,14 +169,17 @@ def _chance(fitter: Fitter, fit: Fit, seen: Sequence[Sensitivity], gain: float) 
 
     columns, one_sided = [], []
     for s in seen:
-        if s.identifiable and s.effect.name not in fit.names:
+        if s.worth_a_fit and s.effect.name not in fit.names:
             columns.append(s.column / np.linalg.norm(s.column))
             p = s.effect.parameters[0]
             one_sided.append(p.null in (p.low, p.high))
     if not columns:
         return 1.0
     u = np.stack(columns, axis=1)
-    q = np.linalg.qr(fit.jacobian)[0] if fit.jacobian.shape[1] else fit.jacobian
+    # What is known of nuisances is uncertain as the data are, and effects may come with such knowledge too.
+    q = np.vstack([fit.jacobian, fit.prior])
+    u = np.vstack([u, np.zeros((len(q) - len(u), u.shape[1]))])
+    q = np.linalg.qr(q)[0] if q.shape[1] else q
     u -= q @ (q.T @ u)
     length = np.linalg.norm(u, axis=0)
     u = u[:, length > ABSORBED] / length[length > ABSORBED]
@@ -193,9 +217,10 @@ def _gain(fitter: Fitter, less: Fit, more: Fit) -> float:
 def _loss(fitter: Fitter, less: Fit, more: Fit) -> float:
     """Chi squared of experiments left out in turn that a model loses against one with an effect more.
 
-    An experiment that holds most of what is known of the effects is left out in parts, not whole.
+    An experiment that holds most of what is known of the effects is left out in parts, not whole. What was
+    known before any data counts as an experiment.
     """
-    lost = 0.0
+    lost = fitter.deviance(less)[PRIOR] - fitter.deviance(more)[PRIOR]
     for rows in _folds(fitter, more):
         rest = fitter.without(rows)
         chi2 = []
@@ -209,9 +234,10 @@ def _loss(fitter: Fitter, less: Fit, more: Fit) -> float:
 
 def _folds(fitter: Fitter, fit: Fit) -> list[Array]:
     record = fitter.record
-    last = fit.jacobian[:, -len(fit.effects[-1].keys)]
-    q = np.linalg.qr(fit.jacobian[:, : -len(fit.effects[-1].keys)])[0]
-    told = (last - q @ (q.T @ last)) ** 2
+    every, own = np.vstack([fit.jacobian, fit.prior]), len(fit.effects[-1].keys)
+    last = every[:, -own]
+    q = np.linalg.qr(every[:, :-own])[0]
+    told = ((last - q @ (q.T @ last)) ** 2)[: len(record)]
     folds = []
     for i, e in enumerate(record.experiments):
         rows = record.rows(i)

@@ -9,6 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..errors import MuError
 from .effect import Effect, Parameter
 from .fit import Fitter
 from .record import Record
@@ -18,12 +19,17 @@ Array = np.ndarray[Any, Any]
 
 # Delta chi squared of 16: seen in nearly every set of data, once a library of some 25 effects is paid for.
 SEEN = 4.0
+# Root of delta chi squared below which an effect, at its largest, explains nothing that is seen.
+WORTH = 2.0
 # Below this share an effect is a nuisance by another name.
 ABSORBED = 2e-3
 
 
 def signatures(record: Record, simulator: Composite, values: Mapping[str, float]) -> Array:
-    """Changes (N, m) of the prediction by every effect, small and at its starts, and by every nuisance."""
+    """Changes (N, m) of the prediction by every effect, small and at its starts, and by every nuisance.
+
+    Around values that hold an effect its own columns are the derivatives by its parameters.
+    """
     base = record.predict(simulator, values)
     columns = [
         (record.predict(simulator, {**values, p.name: values.get(p.name, p.null) + abs(p.step)}) - base)
@@ -33,6 +39,15 @@ def signatures(record: Record, simulator: Composite, values: Mapping[str, float]
     ]
     for e in simulator.effects:
         size = e.parameters[0]
+        if values.get(e.keys[0], size.null) != size.null:
+            for key, p in zip(e.keys, e.parameters, strict=True):
+                moved = {
+                    **values,
+                    key: values.get(key, p.null)
+                    + (p.step if values.get(key, p.null) + p.step <= p.high else -p.step),
+                }
+                columns.append((record.predict(simulator, moved) - base) / p.step)
+            continue
         for shape in e.shapes():
             moved = {**values, **shape, e.keys[0]: size.null + size.step}
             columns.append((record.predict(simulator, moved) - base) / size.step)
@@ -44,9 +59,11 @@ def signatures(record: Record, simulator: Composite, values: Mapping[str, float]
 class Sensitivity:
     """Whitened derivative of the data by the size of one effect, at its null, nuisances fitted too.
 
-    column (N,): what of it nuisances leave, for the shape that is seen best; unabsorbed: its length over the
-    length before; limit: size at which delta chi squared is 16, in the parameter's unit; absorbed_by: the
-    nuisances that take most, by how much of the rest each takes.
+    column (N + m,): what of it nuisances leave, for the shape that is seen best, and what it costs to move
+    the m nuisances of which something is known; unabsorbed: its length over the length before; limit: size
+    at which delta chi squared is 16, in the parameter's unit; absorbed_by: the nuisances that take most, by
+    how much of the rest each takes; at_bounds: root of delta chi squared at the effect's largest size, nan
+    where that was not computed.
     """
 
     effect: Effect
@@ -55,13 +72,24 @@ class Sensitivity:
     unabsorbed: float
     limit: float
     absorbed_by: tuple[str, ...]
+    at_bounds: float = math.nan
+
+    @property
+    def linear(self) -> bool:
+        """Whether the effect, were it proportional to its size, would be seen within its bounds."""
+        p = self.effect.parameters[0]
+        reach = max(abs(p.high - p.null), abs(p.low - p.null))
+        return self.unabsorbed > ABSORBED and self.limit < reach
 
     @property
     def identifiable(self) -> bool:
         """Whether the data could show the effect at a size within its bounds."""
-        p = self.effect.parameters[0]
-        reach = max(abs(p.high - p.null), abs(p.low - p.null))
-        return self.unabsorbed > ABSORBED and self.limit < reach
+        return self.linear or (self.unabsorbed > ABSORBED and self.at_bounds >= SEEN)
+
+    @property
+    def worth_a_fit(self) -> bool:
+        """Whether the effect could explain a part of what another one explains."""
+        return self.linear or (self.unabsorbed > ABSORBED and self.at_bounds >= WORTH)
 
 
 def sensitivities(fitter: Fitter, values: Mapping[str, float]) -> list[Sensitivity]:
@@ -69,20 +97,27 @@ def sensitivities(fitter: Fitter, values: Mapping[str, float]) -> list[Sensitivi
     simulator = fitter.simulator
     base = fitter.predict(values)
     nuisances = []
-    names = []
+    names: list[Parameter] = []
     for p in simulator.nuisances:
         column = _slope(fitter, values, p.name, p)
         if column.any():
             nuisances.append(column)
             names.append(p)
     n = fitter.project(np.stack(nuisances, axis=1), zeros=False) if nuisances else np.zeros((len(base), 0))
+    # A nuisance of which something is known does not move for nothing.
+    prior = np.zeros((len(fitter.known), n.shape[1]))
+    for row, known in enumerate(fitter.known):
+        if known in names:
+            prior[row, names.index(known)] = 1.0 / known.spread
+    n = np.vstack([n, prior])
     lengths = np.linalg.norm(n, axis=0)
     q = np.linalg.qr(n)[0]
-    found = []
+    found: list[Sensitivity] = []
     for e in simulator.effects:
         size = e.parameters[0]
         for shape in e.shapes():
             j = fitter.project(_slope(fitter, {**values, **shape}, e.keys[0], size), zeros=False)
+            j = np.concatenate([j, np.zeros(len(prior))])
             whole = float(np.linalg.norm(j))
             left: Array = j - q @ (q.T @ j)
             left -= q @ (q.T @ left)
@@ -92,6 +127,32 @@ def sensitivities(fitter: Fitter, values: Mapping[str, float]) -> list[Sensitivi
             share = rest / whole if whole > 0 else 0.0
             found.append(Sensitivity(e, shape, left, share, limit, absorbed))
     return found
+
+
+def at_bounds(fitter: Fitter, values: Mapping[str, float], found: Sequence[Sensitivity]) -> list[Sensitivity]:
+    """The same, with what effects that a linear step cannot make large enough do at their bounds.
+
+    A bound's prediction is taken for measured, and the base model is fitted to it.
+    """
+    judged = []
+    for s in found:
+        if s.linear or s.unabsorbed <= ABSORBED:
+            judged.append(s)
+            continue
+        p, most = s.effect.parameters[0], 0.0
+        for bound in {p.low, p.high} - {p.null}:
+            try:
+                made = fitter.predict({**values, **s.shape, s.effect.keys[0]: bound})
+                imagined = attrs.evolve(fitter.record, values=made)
+                other = Fitter(imagined, fitter.simulator, fitter.sources, None, fitter.whitening)
+                chi2 = other.fit((), values).chi2
+            except MuError:
+                # Not every law has a solution at its bound.
+                continue
+            if math.isfinite(chi2):
+                most = max(most, math.sqrt(chi2))
+        judged.append(attrs.evolve(s, at_bounds=most))
+    return judged
 
 
 def _slope(fitter: Fitter, values: Mapping[str, float], key: str, p: Parameter) -> Array:
@@ -117,7 +178,7 @@ def best_seen(found: Sequence[Sensitivity]) -> dict[str, Sensitivity]:
     best: dict[str, Sensitivity] = {}
     for s in found:
         known = best.get(s.effect.name)
-        if known is None or s.unabsorbed > known.unabsorbed:
+        if known is None or (s.identifiable, s.unabsorbed) > (known.identifiable, known.unabsorbed):
             best[s.effect.name] = s
     return best
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -15,8 +15,8 @@ from .gain import Gain, gain
 from .next_experiment import Proposal, next_experiment
 from .noise import Source, estimate, span
 from .record import Record, record
-from .selection import Selection, interval, select
-from .sensitivity import Sensitivity, best_seen, sensitivities, signatures
+from .selection import Selection, interval, reviewed, select
+from .sensitivity import ABSORBED, SEEN, Sensitivity, at_bounds, best_seen, sensitivities, signatures
 from .simulator import Composite
 
 Array = np.ndarray[Any, Any]
@@ -24,6 +24,8 @@ Array = np.ndarray[Any, Any]
 KINDS = ("none", "named", "ambiguous", "unidentifiable", "unexplained")
 # A nuisance this many spreads from what was known of it is no longer only a nuisance.
 UNLIKELY = 3.0
+# Noise around the causes this many times larger or smaller than around the base model is believed instead.
+RENEWED = 1.5
 
 
 @attrs.frozen(eq=False)
@@ -59,7 +61,7 @@ class Verdict:
         return {"value": self.selection.chosen.values[key], "low95": low, "high95": high}
 
     def as_json(self) -> dict[str, Any]:
-        """verdict.json."""
+        """verdict.json; partly_explained_by: what an unexplained verdict found, which is not the cause."""
         causes = [
             {
                 "effect": c.effect.name,
@@ -69,13 +71,13 @@ class Verdict:
                 "rivals": list(c.rivals),
             }
             for c in self.selection.causes
-            if self.names
         ]
         left = self.selection.left
         next_ = self.proposal
         return {
             "verdict": self.kind,
-            "causes": causes,
+            "causes": causes if self.names else [],
+            "partly_explained_by": [] if self.names else causes,
             "remaining_structure": {"detected": bool(left), "where": list(left)},
             "gain": self.gain.as_json(),
             "residual_table": [
@@ -93,13 +95,17 @@ class Verdict:
         }
 
 
-def noise_of(measured: Record, simulator: Composite) -> dict[str, Source]:
-    """Noise of a record, whatever effect of the library it may hold."""
-    rough = Fitter(measured, simulator, {g: _rough(measured, g) for g in measured.groups})
-    base = rough.fit()
-    curved = {p.name: base.values[p.name] for p in rough.curved}
+def noise_of(
+    measured: Record, simulator: Composite, values: Mapping[str, float] | None = None
+) -> dict[str, Source]:
+    """Noise of a record, whatever effect of the library it may hold; around the base model, or `values`."""
+    if values is None:
+        rough = Fitter(measured, simulator, {g: _rough(measured, g) for g in measured.groups})
+        values = rough.fit().values
+    zeros = {p.name for p in simulator.nuisances if p.linear}
+    curved = {k: v for k, v in values.items() if k not in zeros}
     columns = span(measured, signatures(measured, simulator, curved))
-    return estimate(measured, measured.values - rough.predict(base.values), columns)
+    return estimate(measured, measured.values - measured.predict(simulator, values), columns)
 
 
 def _rough(measured: Record, group: str) -> Source:
@@ -122,16 +128,29 @@ def diagnose(
     base = fitter.fit()
     progress("sensitivities")
     curved = {p.name: base.values[p.name] for p in fitter.curved}
-    seen = sensitivities(fitter, curved)
+    seen = at_bounds(fitter, curved, sensitivities(fitter, curved))
     chosen = select(fitter, seen, progress)
+    if chosen.causes:
+        progress("noise around the causes")
+        # What is left of a large cause once its linear part is set aside had counted as noise.
+        renewed = noise_of(measured, simulator, chosen.chosen.values)
+        if any(_apart(sources[g], renewed[g]) for g in sources):
+            sources, fitter = renewed, Fitter(measured, simulator, renewed)
+            chosen = reviewed(fitter, seen, chosen)
     kind = _kind(fitter, chosen)
     progress("gain")
     gained = gain(fitter, chosen.base, chosen.chosen, [e for e in experiments if e.role == "held_out"])
     proposal = next_experiment(fitter, chosen, seen)
     known = chosen.chosen if chosen.causes else chosen.base
     bounds = {k: interval(fitter, known, k) for k in known.keys}
-    told = _identifiability(seen)
+    told = _identifiability(seen, chosen)
     return Verdict(kind, chosen, tuple(seen), sources, measured, gained, proposal, told, bounds)
+
+
+def _apart(one: Source, other: Source) -> bool:
+    """Whether two estimates of one noise differ more than such estimates do."""
+    total = [math.hypot(s.white, s.slow) for s in (one, other)]
+    return max(total) > RENEWED * min(total)
 
 
 def _kind(fitter: Fitter, found: Selection) -> str:
@@ -145,13 +164,22 @@ def _kind(fitter: Fitter, found: Selection) -> str:
     return "none"
 
 
-def _identifiability(seen: Sequence[Sensitivity]) -> dict[str, str]:
+def _identifiability(seen: Sequence[Sensitivity], chosen: Selection) -> dict[str, str]:
     """Effects that these data cannot show, with the reason and what would show them."""
     found = {}
+    shown = {f.names[0] for f in chosen.singles if chosen.base.chi2 - f.chi2 >= SEEN**2}
     for name, s in best_seen(seen).items():
-        if s.identifiable:
+        if s.identifiable or name in shown:
             continue
-        if s.absorbed_by and s.limit is not None and s.unabsorbed > 0:
+        p = s.effect.parameters[0]
+        if s.unabsorbed > ABSORBED and math.isfinite(s.limit):
+            most = max((p.low, p.high), key=lambda bound: abs(bound - p.null))
+            size, unit = p.name.replace("_", " "), f" {p.unit}" * bool(p.unit)
+            found[name] = (
+                f"its bound, {size} {most:g}{unit}, is too small to be seen here, where "
+                f"{s.limit:.2g}{unit} would be; what would show it: {s.effect.reveals}"
+            )
+        elif s.absorbed_by and s.unabsorbed > 0:
             by = " and ".join(n.replace("_", " ") for n in s.absorbed_by)
             found[name] = f"absorbed by {by}; what would show it: {s.effect.reveals}"
         else:

@@ -49,6 +49,7 @@ def parser() -> argparse.ArgumentParser:
         "simulate", help="... and its motion under a pressure protocol", epilog=EXAMPLE
     )
     _add_unit(simulate)
+    _add_model(simulate)
     _add_solid(simulate)
     _add_simulation(simulate)
     simulate.set_defaults(stages=("design", "simulate"))
@@ -57,6 +58,7 @@ def parser() -> argparse.ArgumentParser:
         "place", help="... and the ranking of sensor paths (the main job)", epilog=EXAMPLE
     )
     _add_unit(place)
+    _add_model(place)
     _add_solid(place)
     _add_simulation(place)
     place.add_argument(
@@ -96,6 +98,8 @@ def parser() -> argparse.ArgumentParser:
 
     _add_homogenize(commands)
     _add_fit_material(commands)
+    _add_diagnose(commands)
+    _add_design_experiments(commands)
     return top
 
 
@@ -106,6 +110,7 @@ def _add_homogenize(commands: argparse._SubParsersAction[_Parser]) -> None:
         epilog="example: run.py homogenize --preset mu-1.0x --out out/lattice",
     )
     _add_unit(command)
+    _add_model(command)
     command.add_argument(
         "--resin",
         metavar="NAME|FILE",
@@ -164,12 +169,50 @@ def _add_fit_material(commands: argparse._SubParsersAction[_Parser]) -> None:
     command.set_defaults(stages=())
 
 
-def _add_unit(command: argparse.ArgumentParser) -> None:
-    which = command.add_mutually_exclusive_group(required=True)
+def _add_diagnose(commands: argparse._SubParsersAction[_Parser]) -> None:
+    command = commands.add_parser(
+        "diagnose",
+        help="what measured data say is wrong with the model, why, and what mending it gains",
+        epilog="example: run.py diagnose assets/examples/paper-moduli --out out/why",
+    )
+    command.add_argument("folder", metavar="FOLDER", help="measured data: experiments.toml and its CSV files")
+    _add_unit(command, required=False)
+    command.set_defaults(stages=())
+
+
+def _add_design_experiments(commands: argparse._SubParsersAction[_Parser]) -> None:
+    command = commands.add_parser(
+        "design-experiments",
+        help="before measuring: which effects planned experiments would show, from which size on",
+        epilog="example: run.py design-experiments my-protocols --noise angle=0.5 --out out/plan",
+    )
+    command.add_argument(
+        "folder", metavar="FOLDER", help="as for `diagnose`; what would be measured may hold any numbers"
+    )
+    _add_unit(command, required=False)
+    command.add_argument(
+        "--noise",
+        nargs="+",
+        default=(),
+        metavar="QUANTITY=VALUE",
+        help="standard deviation of a reading, in the unit of its column (angle=0.3 marker=0.1 stress=0.1 "
+        "pressure=0.1 tip_deflection=0.1 voltage=0.002)",
+    )
+    command.set_defaults(stages=())
+
+
+def _add_unit(command: argparse.ArgumentParser, required: bool = True) -> None:
+    which = command.add_mutually_exclusive_group(required=required)
     which.add_argument("--preset", metavar="NAME", help="a preset: mu-0.75x, mu-1.0x, mu-1.5x")
     which.add_argument("--unit", metavar="FILE", help="a unit's parameters, TOML")
     command.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
     command.add_argument("--json", action="store_true", help="one JSON message a line on standard output")
+
+
+def _add_model(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--model", metavar="FILE", help="model.toml of `diagnose`: what it found is put into the unit"
+    )
 
 
 def _add_solid(command: argparse.ArgumentParser) -> None:
@@ -222,6 +265,14 @@ def main(arguments: list[str]) -> int:
             from .fitting import answer
 
             _fit_material(options, progress, ending)
+        elif options.command == "diagnose":
+            from .diagnosing import answer
+
+            _diagnose(options, progress, ending)
+        elif options.command == "design-experiments":
+            from .protocol_design import answer
+
+            _design_experiments(options, progress, ending)
         else:
             _study(options, progress, ending)
     if ending.status == 0 and not options.json:
@@ -240,7 +291,7 @@ def _study(options: argparse.Namespace, progress: Progress, ending: Ending) -> N
 def _homogenize(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
     from .homogenizing import FRICTIONS, Job, homogenize, resin_of
 
-    unit = _unit(options)
+    unit = _modelled(options, progress, ending)
     frictions = FRICTIONS if options.friction == "both" else (options.friction,)
     job = Job(
         unit=unit,
@@ -268,6 +319,23 @@ def _fit_material(options: argparse.Namespace, progress: Progress, ending: Endin
     )
 
 
+def _diagnose(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    from .diagnosing import diagnose_folder
+
+    _require_folder(options)
+    unit = None if options.preset is None and options.unit is None else _unit(options)
+    diagnose_folder(Path(options.folder), Path(options.out), unit, progress=progress, ending=ending)
+
+
+def _design_experiments(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    from .protocol_design import design_experiments, noise_of
+
+    _require_folder(options)
+    unit = None if options.preset is None and options.unit is None else _unit(options)
+    noise = noise_of(options.noise)
+    design_experiments(Path(options.folder), Path(options.out), unit, noise, progress=progress, ending=ending)
+
+
 def _presets() -> int:
     from ..design.parameters import load_preset, preset_names
 
@@ -284,6 +352,20 @@ def _unit(options: argparse.Namespace) -> Unit:
     return load_preset(options.preset) if options.preset is not None else read_unit(options.unit)
 
 
+def _modelled(options: argparse.Namespace, progress: Progress, ending: Ending) -> Unit:
+    """The unit, with what an extended model adds to it."""
+    unit = _unit(options)
+    if getattr(options, "model", None) is None:
+        return unit
+    from .model_file import read_extended
+
+    found = read_extended(unit, options.model)
+    for words in found.left_out:
+        progress.warning(f"not applied here: {words}", str(options.model))
+    ending.summary["model"] = {"applied": found.applied, "left_out": found.left_out}
+    return found.unit
+
+
 def _require_folder(options: argparse.Namespace) -> None:
     from ..errors import InputError
 
@@ -298,7 +380,7 @@ def _open(options: argparse.Namespace, progress: Progress, ending: Ending) -> St
     from .job import Job, protocol_of
     from .study import Study
 
-    unit = _unit(options)
+    unit = _modelled(options, progress, ending)
     extra = {}
     if "simulate" in options.stages:
         extra = {

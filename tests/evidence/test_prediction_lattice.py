@@ -9,7 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mu_addon.errors import InputError
-from mu_addon.evidence.prediction.lattice import LatticeStress, Struts
+from mu_addon.evidence.prediction.bench import bench_simulators
+from mu_addon.evidence.prediction.lattice import ComputedCell, LatticeStress, Struts
+from mu_addon.evidence.simulator import Composite
+from mu_addon.evidence.verdict import diagnose
+from mu_addon.homogenize.offset_response import OffsetResponse, fit_offset
 from mu_addon.measured import read_folder
 
 from .bench import experiment, measured, recovered
@@ -130,7 +134,7 @@ def test_a_lattice_without_size_is_not_weighed():
 
 
 def test_another_scaling_can_be_given():
-    class Stretched:
+    class Stretched(Struts):
         def stiffness(self, scale, offset_mm, excess_mm):
             return (1 + offset_mm / scale) ** 2
 
@@ -167,7 +171,7 @@ def one_number(simulator, experiments, values):
 def least(effect=None):
     from scipy.optimize import minimize
 
-    known = {e.name: e for e in LatticeStress.effects}
+    known = {e.name: e for e in LatticeStress().effects}
     simulator = LatticeStress()
     keys = ["lattice_modulus_kPa"] + ([known[effect].keys[0]] if effect else [])
     bounds = [(1.0, 100.0)] + (
@@ -231,3 +235,61 @@ def test_a_negative_spread_is_refused_by_its_row(tmp_path):
         (tmp_path / file.name).write_text(file.read_text().replace("4.3400,0.0700", "4.3400,-0.0700"))
     with pytest.raises(InputError, match="row 5, column stress_sd_kPa"):
         read_folder(tmp_path)
+
+
+# The paper's lattice, 3 cells a side between plates that hold: kPa, of a resin of 2.5 MPa.
+OFFSETS = (-0.05, 0.0, 0.05, 0.1, 0.2)
+HELD_kPa = (8.19, 9.75, 11.9, 14.3, 19.9)
+
+
+def computed():
+    # The mass of slender struts, which the moduli do not depend on.
+    density = [0.16 * Struts(1.75).mass(1.0, o) for o in OFFSETS]
+    return ComputedCell(OffsetResponse(OFFSETS, np.array(HELD_kPa) / 2500.0, density))
+
+
+def test_a_computed_cell_hands_over_its_virtual_tests():
+    cell = computed()
+    assert cell.stiffness(1.0, 0.0, 0.0) == cell.mass(1.0, 0.0) == 1.0
+    assert cell.stiffness(1.3, 0.0, 0.0) == 1.0
+    assert cell.stiffness(1.0, 0.1, 0.0) == pytest.approx(14.3 / 9.75)
+    # Twice as large, with twice the offset: the same lattice.
+    assert cell.stiffness(2.0, 0.2, 0.0) == pytest.approx(14.3 / 9.75)
+    assert cell.mass(2.0, 0.2) == pytest.approx(Struts(1.75).mass(1.0, 0.1), rel=1e-6)
+    with pytest.raises(InputError, match="not computed"):
+        cell.stiffness(0.75, 0.16, 0.0)
+
+
+@given(scale=st.floats(0.5, 2.0), excess=st.floats(0.0, 0.2))
+def test_a_computed_cell_of_slender_struts_is_the_power_law(scale, excess):
+    struts = Struts()
+    at = np.linspace(-0.05, 0.2, 26)
+    made = OffsetResponse(at, [struts.stiffness(1, o, 0) for o in at], [struts.mass(1, o) for o in at])
+    cell = ComputedCell(made)
+    for offset in (0.0, 0.08):
+        assert cell.stiffness(scale, offset, 0.0) == pytest.approx(
+            struts.stiffness(scale, offset, 0.0), rel=1e-5
+        )
+        assert cell.mass(scale, offset) == pytest.approx(struts.mass(scale, offset), rel=1e-5)
+    assert cell.stiffness(scale, 0.0, excess) == pytest.approx(struts.stiffness(scale, 0.0, excess), rel=1e-3)
+
+
+def test_the_papers_moduli_by_the_computed_cell():
+    """The same verdict as by the power law, and the offset that the homogenization fits by itself."""
+    experiments = read_folder(EXAMPLES / "paper-moduli").experiments
+    cell = computed()
+    simulators = bench_simulators(experiments, cell)
+    (overcure,) = (e for e in simulators["lattice_compression"].effects if e.name == "overcure")
+    # 0.75x was computed up to there.
+    assert overcure.parameters[0].high == pytest.approx(0.15)
+    found = diagnose(experiments, Composite(simulators))
+    assert found.kind == "ambiguous"
+    assert {"overcure", "skin_cure"} <= found.ambiguity
+    fits = {f.names[0]: f for f in found.selection.singles}
+    alone = fit_offset(cell.response, SCALES, (21.70, 18.34, 16.38), (0.35, 1.86, 1.21))
+    offset = fits["overcure"].values["overcure.offset_mm"]
+    assert offset == pytest.approx(alone.offset_mm, abs=1e-4)
+    assert offset == pytest.approx(0.129, abs=1e-3)
+    # Of the resin, in kPa, and so of the lattice as drawn.
+    drawn = fits["overcure"].values["lattice_modulus_kPa"]
+    assert drawn == pytest.approx(alone.resin_MPa * HELD_kPa[1] / 2500.0, rel=1e-3)

@@ -59,7 +59,7 @@ def test_its_weight_is_found_and_a_mass_not_seen_is_predicted():
     def tilted(tilt):
         class Tilted(BeamSag):
             def predict(self, experiment, values):
-                return super().predict(experiment, {**values, "angle_offset.tilt_deg": tilt})
+                return super().predict(experiment, {**values, "tilt_deg": tilt})
 
         return recovered(Tilted(), fit, start, 0.05)[0]["gravity.density_kg_m3"]
 
@@ -68,10 +68,10 @@ def test_its_weight_is_found_and_a_mass_not_seen_is_predicted():
 
 def test_a_tilted_clamp_would_do_as_well_were_it_plausible():
     fit, _ = folder("silicone_beam")
-    start = {"beam_modulus_kPa": 300.0, "angle_offset.tilt_deg": 2.0}
+    start = {"beam_modulus_kPa": 300.0, "tilt_deg": 2.0}
     found, _, _ = recovered(BeamSag(), fit, start, 0.05)
     assert rms(BeamSag(), fit, found) < 0.05
-    assert found["angle_offset.tilt_deg"] == pytest.approx(3.7, abs=0.1)
+    assert found["tilt_deg"] == pytest.approx(3.7, abs=0.1)
 
 
 # Chambers shut at 7.5 bar.
@@ -144,7 +144,10 @@ def test_the_verdict_on_the_papers_moduli():
     """A length is behind it; whether of struts or of skin these numbers cannot say, and a balance would."""
     found = verdict(read_folder(PAPER).experiments)
     assert found.kind == "ambiguous"
-    assert {"overcure", "skin_cure"} <= found.ambiguity
+    # Small specimens strain faster at one speed: what creeps by its bound fits too.
+    assert found.ambiguity == {"overcure", "skin_cure", "viscoelasticity"}
+    assert "viscoelasticity" not in found.identifiability
+    assert found.identifiability["frame_compliance"].startswith("its bound, mm per N 0.1 mm/N")
     offset = found.selection.chosen.values["overcure.offset_mm"]
     assert 2 * offset == pytest.approx(0.18, abs=0.01)
     assert found.proposal is not None
@@ -170,8 +173,18 @@ def test_masses_end_the_ambiguity_between_struts_and_skin(truth):
 def test_the_verdict_on_the_printed_chamber():
     fit, _ = folder("chamber_printed_fdm")
     found = verdict(fit)
-    assert found.kind == "named"
-    assert found.names == ("leak",)
+    # Of 648 kPa the leak leaves 2, yet these are no noise: the gauge's own is 0.3 kPa.
+    assert [c.effect.name for c in found.selection.causes] == ["leak"]
+    assert not found.selection.causes[0].rivals
+    assert found.gain.fit.after < 0.005 * found.gain.fit.before
+    assert found.sources["pressure_hold pressure"].white < 0.35
+    assert found.sources["pressure_hold pressure"].slow < 2.0
+    low, high = found.intervals["leak.loss_per_s"]
+    assert 0.025 < low < high < 0.028
+    assert found.kind == "unexplained"
+    written = found.as_json()
+    assert written["causes"] == []
+    assert [c["effect"] for c in written["partly_explained_by"]] == ["leak"]
 
 
 def test_the_verdict_on_the_rigid_blank_is_no_leak():
@@ -187,12 +200,23 @@ def test_the_verdict_on_the_beam():
     found = verdict([*fit, *held])
     assert found.kind == "named"
     assert found.names == ("gravity",)
-    assert found.gain.held_out.after < 0.2 * found.gain.held_out.before
+    # Without weight the clamp must have been turned by nearly four of its spreads, which does as well.
+    assert found.selection.base.values["tilt_deg"] > 3.5
+    assert found.gain.held_out.after < min(0.7, found.gain.held_out.before)
+    # Its maker's density; a degree of tilt is worth 240 kg/m3.
+    low, high = found.intervals["gravity.density_kg_m3"]
+    assert low < 1070 < high
+    assert 400 < high - 902 < 550
+    low, high = found.intervals["tilt_deg"]
+    assert (low, high) == pytest.approx((-1.96, 1.96), abs=0.05)
 
 
 def test_the_verdict_on_the_foam_finds_direction_and_seating():
     fit, held = folder("printed_foam")
     found = verdict([*fit, *held])
     chosen = [c.effect.name for c in found.selection.causes]
-    assert chosen[:2] == ["anisotropy", "seating"]
-    assert found.gain.held_out.after < 0.5 * found.gain.held_out.before
+    assert sorted(chosen) == ["anisotropy", "seating"]
+    assert found.gain.held_out.after < 0.06
+    # A third effect would gain on what was fitted and lose on what was left out.
+    assert "does not predict" in found.selection.doubted
+    assert {c["effect"] for c in found.as_json()["partly_explained_by"]} == {"anisotropy", "seating"}

@@ -22,6 +22,9 @@ SHEAR = 15.0 / 17.5
 NODES = 24
 
 MODULUS = Parameter("beam_modulus_kPa", "kPa", 10.0, 1e6, 300.0, (), "soft silicones to hard rubber")
+# Of the clamp, or of what was taken for no sag. A sag of its own weight and a tilt look alike: only what is
+# known of clamps tells them apart, and it belongs to the uncertainty of the weight.
+TILT = Parameter("tilt_deg", "deg", -10.0, 10.0, 0.0, (), "clamps set by eye or level", spread=1.0)
 
 EFFECTS = (
     Effect(
@@ -31,14 +34,6 @@ EFFECTS = (
         "the beam sags under its own weight",
     ),
     Effect("strain_stiffening", STRAIN_STIFFENING.parameters, (KIND,)),
-    Effect(
-        "angle_offset",
-        # A sag of its own weight and a tilt look alike: what is known of clamps tells them apart.
-        (Parameter("tilt_deg", "deg", -10.0, 10.0, 0.0, (2.0,), "clamps set by eye or level", spread=1.0),),
-        (KIND,),
-        "the clamp, or what was taken for no sag, is not level",
-        "a mass on the beam turned upside down",
-    ),
     Effect(
         "frame_compliance",
         (FRAME,),
@@ -54,7 +49,7 @@ class BeamSag:
     Shear is added at first order; the solid is incompressible. Width and thickness are section_mm.
     """
 
-    nuisances = (MODULUS,)
+    nuisances = (MODULUS, TILT)
     effects = EFFECTS
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
@@ -74,7 +69,7 @@ class BeamSag:
         sag = cantilever(
             1e-3 * GRAVITY * masses * L**2 / bending,
             weight * L**2 / bending,
-            tilt=np.radians(get("angle_offset.tilt_deg", 0.0)),
+            tilt=np.radians(get(TILT.name, 0.0)),
             give=get("frame_compliance.mm_per_N", 0.0) / h**2 * bending / L,
             # c2 (I1 - 3)^2 adds 6 c2/c1 e^2 to the modulus, and 3/20 of that at the faces to the moment.
             stiffening=0.9 * get("strain_stiffening.c2_over_c1", 0.0) * (h / L) ** 2,

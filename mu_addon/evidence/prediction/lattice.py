@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 import attrs
 import numpy as np
 
+from ...homogenize.offset_response import OffsetResponse
 from ...measured import Experiment
 from ..effect import Effect, Parameter
 from .specimen import NEW, machine, pasts, recorded
@@ -81,6 +83,10 @@ class Scaling(Protocol):
         """Mass over that as drawn."""
         ...
 
+    def largest_offset_mm(self, scale: float) -> float:
+        """Largest offset at which stiffness and mass are known."""
+        ...
+
 
 @attrs.frozen
 class Struts:
@@ -88,7 +94,7 @@ class Struts:
 
     exponent: 4 where struts bend, 2 where they stretch (Gibson and Ashby, Cellular Solids, 1997). A thin skin
     of depth d and modulus k times the core's adds 2 exponent (k - 1) d/t to the stiffness. For the lattice's
-    own cell give what `homogenize` computes instead.
+    own cell give what `homogenize` computes instead, see `ComputedCell`.
     """
 
     thickness_mm: float = 1.5
@@ -105,6 +111,42 @@ class Struts:
         t = self.thickness_mm * scale
         return ((t + 2 * offset_mm) / t) ** 2
 
+    def largest_offset_mm(self, scale: float) -> float:
+        """None."""
+        return math.inf
+
+
+@attrs.frozen
+class ComputedCell:
+    """Stiffness and mass of a lattice's own cell, from virtual tests of it at several print offsets.
+
+    A thin skin is, to first order of its depth, as good as its excess modulus times its depth of more resin
+    on the surface, so that it stiffens by the slope of the offset's response.
+    """
+
+    response: OffsetResponse
+
+    def stiffness(self, scale: float, offset_mm: float, excess_mm: float) -> float:
+        """Modulus over that as drawn; raises InputError beyond the offsets that were computed."""
+        modulus = self.response.modulus_MPa
+        found = float(modulus(scale, offset_mm, 1.0) / modulus(scale, 0.0, 1.0))
+        if not excess_mm:
+            return found
+        low, high = (bound * scale for bound in self.response.range_mm)
+        h = 0.01 * (high - low)
+        at = min(max(offset_mm, low + h), high - h)
+        slope = math.log(modulus(scale, at + h, 1.0) / modulus(scale, at - h, 1.0)) / (2 * h)
+        return found * (1 + slope * excess_mm)
+
+    def mass(self, scale: float, offset_mm: float) -> float:
+        """Mass over that as drawn; raises InputError beyond the offsets that were computed."""
+        density = self.response.relative_density
+        return float(density(scale, offset_mm) / density(scale, 0.0))
+
+    def largest_offset_mm(self, scale: float) -> float:
+        """The last offset that was computed, enlarged as the lattice."""
+        return self.response.range_mm[1] * scale
+
 
 def _linear(strain: Array) -> Array:
     return strain
@@ -120,7 +162,6 @@ class LatticeStress:
     """
 
     nuisances = (MODULUS, DENSITY)
-    effects = EFFECTS
 
     def __init__(
         self,
@@ -130,6 +171,9 @@ class LatticeStress:
     ) -> None:
         self._pasts = pasts(experiments, KIND)
         self._scaling = scaling or Struts()
+        smallest = min((e.scale for e in experiments if e.kind == KIND), default=1.0)
+        most = self._scaling.largest_offset_mm(smallest)
+        self.effects = tuple(_within(e, most) if e.name == "overcure" else e for e in EFFECTS)
         self._curve = curve
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
@@ -156,6 +200,15 @@ class LatticeStress:
             mass *= self._scaling.mass(experiment.scale, offset)
             found.append(np.full(len(experiment), mass))
         return np.stack(found)
+
+
+def _within(effect: Effect, most: float) -> Effect:
+    """The effect with its size kept below some value."""
+    size, *others = effect.parameters
+    if size.high <= most:
+        return effect
+    starts = tuple(v for v in size.starts if v < most) or (0.5 * most,)
+    return attrs.evolve(effect, parameters=(attrs.evolve(size, high=most, starts=starts), *others))
 
 
 def _volume_cm3(experiment: Experiment) -> float | None:

@@ -171,7 +171,7 @@ TIMED = (
     ),
     Effect(
         "fatigue_drift",
-        (Parameter("per_decade", "", -0.3, 0.4, 0.0, (0.03,), "modulus lost in ten times the cycles"),),
+        (Parameter("per_decade", "", 0.0, 0.4, 0.0, (0.03,), "modulus lost in ten times the cycles"),),
         (KIND,),
     ),
     Effect(

@@ -1,0 +1,169 @@
+"""Which point of the unit a marker sits on, and where that point goes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+from ..fem.kinematics import Probe, probe
+from ..measured import Experiment
+from ..measured.kinds import markers
+from ..meshing.mesh import AXES, Mesh, boundary_faces
+
+Array = np.ndarray[Any, Any]
+
+# A marker is at rest where the pressure is within this share of its range from 0 ...
+AT_REST = 0.02
+# ... and lies where these first samples of rest put it on average.
+SAMPLES = 5
+
+
+@attrs.frozen(eq=False)
+class Marker:
+    """A marker's measured position at rest (3,), the material point (3,) that stands for it, both in mm.
+
+    The frame is that of DESIGN section 2: z along the axis from the inlet, x = 0 the sagittal plane, +y the
+    side with more lattice. axes: coordinates that were measured; without x, the marker is taken to lie in
+    the sagittal plane. distance_mm: between the two, over the measured coordinates.
+    """
+
+    number: int
+    axes: str
+    seen: Array
+    point: Array
+    distance_mm: float
+
+
+def at_rest(experiments: Sequence[Experiment]) -> dict[int, tuple[str, Array, str]]:
+    """Axes, position (3,) in mm at rest, 0 where not measured, and experiment of each marker by its number.
+
+    Of the first experiment that shows the marker at rest. Raises InputError where none does or a marker
+    lacks y or z.
+    """
+    found: dict[int, tuple[str, Array, str]] = {}
+    missed: dict[int, str] = {}
+    for e in experiments:
+        p = np.abs(e["pressure_kPa"])
+        still = p <= AT_REST * np.ptp(e["pressure_kPa"])
+        for number, axes in markers(list(e.columns)).items():
+            if number in found:
+                continue
+            if not {"y", "z"} <= axes:
+                raise InputError(f"marker {number} lacks its y or z", e.name, "give both columns")
+            known = "".join(a for a in AXES if a in axes)
+            columns = np.stack([e[f"marker{number}_{a}_mm"] for a in known], axis=1)
+            rows = np.flatnonzero(still & np.isfinite(columns).all(axis=1))[:SAMPLES]
+            if len(rows):
+                seen = np.zeros(3)
+                seen[[AXES.index(a) for a in known]] = columns[rows].mean(axis=0)
+                found[number] = known, seen, e.name
+            else:
+                missed.setdefault(number, e.name)
+    for number in missed.keys() - found.keys():
+        raise InputError(
+            f"marker {number} is never seen at rest",
+            missed[number],
+            "record it at no pressure before the run",
+        )
+    return dict(sorted(found.items()))
+
+
+def attached(mesh: Mesh, experiments: Sequence[Experiment], farthest_mm: float) -> tuple[Marker, ...]:
+    """Markers of experiments of one scale, each on the nearest point of the undeformed mesh.
+
+    Raises InputError for a marker farther than farthest_mm from the unit, see also `at_rest`, and for one
+    that lies farther than that from its place in another of the experiments.
+    """
+    every = at_rest(experiments)
+    found = []
+    for number, (axes, seen, where) in every.items():
+        point = nearest(mesh, seen)
+        known = [AXES.index(a) for a in axes]
+        distance = float(np.linalg.norm((point - seen)[known]))
+        if distance > farthest_mm:
+            place = ", ".join(f"{a} = {seen[AXES.index(a)]:.1f}" for a in axes)
+            raise InputError(
+                f"marker {number} lies {distance:.1f} mm from the unit, at {place} mm",
+                where,
+                "give positions in the unit's frame (z from the inlet along the axis, +y to the side with "
+                "more lattice, x = 0 in the plane of bending) and its scale",
+            )
+        found.append(Marker(number, axes, seen, point, distance))
+    for e in experiments:
+        for number, (_, seen, _) in _again(e).items():
+            apart = float(np.linalg.norm(seen - every[number][1]))
+            if apart > farthest_mm:
+                raise InputError(
+                    f"marker {number} sits {apart:.1f} mm from where {every[number][2]} has it",
+                    e.name,
+                    "give markers on another place another number",
+                )
+    return tuple(found)
+
+
+def _again(e: Experiment) -> dict[int, tuple[str, Array, str]]:
+    """As `at_rest` of one experiment, without those it does not show at rest."""
+    try:
+        return at_rest([e])
+    except InputError:
+        return {}
+
+
+def nearest(mesh: Mesh, place: Array) -> Array:
+    """The point (3,) of the undeformed body nearest to a place (3,), in mm; itself where it is inside.
+
+    The surface is taken flat between corners.
+    """
+    turned = np.array(
+        [-1.0 if a in mesh.symmetry and x < 0 else 1.0 for a, x in zip(AXES, place, strict=True)]
+    )
+    try:
+        probe(mesh, turned * place)
+    except InputError:
+        return np.asarray(turned * _on_surface(mesh, turned * place))
+    return np.array(place)
+
+
+def _on_surface(mesh: Mesh, place: Array) -> Array:
+    faces, _ = boundary_faces(mesh.tets)
+    corners = mesh.nodes[faces]
+    a, edges = corners[:, 0], corners[:, 1:] - corners[:, :1]
+    normal = np.cross(edges[:, 0], edges[:, 1])
+    gram = edges @ edges.transpose(0, 2, 1)
+    st = np.linalg.solve(gram, (edges @ (place - a)[:, :, None]))[:, :, 0]
+    within = (st >= 0).all(axis=1) & (st.sum(axis=1) <= 1) & (np.linalg.norm(normal, axis=1) > 0)
+    candidates = [(a + np.einsum("fe,fei->fi", st, edges))[within]]
+    for i in range(3):
+        start, along = corners[:, i], corners[:, (i + 1) % 3] - corners[:, i]
+        t = np.einsum("fi,fi->f", place - start, along) / np.einsum("fi,fi->f", along, along)
+        candidates.append(start + np.clip(t, 0, 1)[:, None] * along)
+    points = np.concatenate(candidates)
+    return np.asarray(points[np.linalg.norm(points - place, axis=1).argmin()])
+
+
+@attrs.frozen(eq=False)
+class Followed:
+    """Material points (p, 3) in mm, followed by what they are woven into; sides: -1 across a mirror plane."""
+
+    points: Array
+    sides: Array
+    probe: Probe
+
+    def at(self, u: Array) -> Array:
+        """Places (p, 3) in mm of the points under nodal displacements (n, 3)."""
+        return np.asarray(self.points + self.sides * self.probe.displacement(u))
+
+
+def followed(mesh: Mesh, points: Array) -> Followed:
+    """Points (p, 3) of another mesh of the unit, each at the nearest place of this one."""
+    mirrored = [AXES.index(a) for a in mesh.symmetry]
+    sides = np.ones((len(points), 3))
+    sides[:, mirrored] = np.where(np.asarray(points)[:, mirrored] < 0, -1.0, 1.0)
+    near = np.array([nearest(mesh, p) for p in points]).reshape(-1, 3)
+    if not len(near):
+        return Followed(near, sides, Probe(np.empty((0, 4), int), np.empty((0, 4))))
+    return Followed(near, sides, probe(mesh, sides * near))

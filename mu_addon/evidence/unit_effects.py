@@ -1,0 +1,248 @@
+"""How each static effect of the unit enters its finite-element model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..design.parameters import Unit
+from ..design.strut_cell import relative_density, strut_cell
+from ..errors import InputError
+from ..fem.clogged import CloggedModel
+from ..fem.descent import NewtonSettings
+from ..fem.lattice_law import LatticeLaw
+from ..fem.laws import Foam, Yeoh
+from ..fem.loads import gravity
+from ..fem.materials import Layer, Materials
+from ..fem.model import Model
+from ..fem.unit import materials_of
+from ..meshing.mesh import LATTICE, MEMBRANE, Mesh
+from ..meshing.morph import morphed
+from ..meshing.settings import MeshSettings
+from ..meshing.unit import mesh_unit
+from .effect import Effect, Parameter
+from .prediction import beam, coupon, lattice
+
+Array = np.ndarray[Any, Any]
+
+# A skin of this depth stands for every skin of the same depth times excess modulus.
+SKIN_MM = 0.1
+# Of a foam that resists one side only, its share on the other: laws ask for more than none.
+NEXT_TO_NOTHING = 1e-3
+SMOOTH = NewtonSettings()
+# Where the tangent jumps at rest, even the smallest step ends away from where it was predicted.
+KINKED = NewtonSettings(surprise=3.0)
+TONNE_PER_MM3 = 1e-12  # in kg/m3
+
+
+@attrs.frozen
+class Body:
+    """What a run of the unit is made from, before it has a mesh.
+
+    finer: the mesh that mesh_error compares with. distal: how many chambers, from the tip, a clog cuts off.
+    lattice: a law for the lattice in place of the unit's moduli. drawn: the unit whose mesh is moved to this
+    one's dimensions, since another mesh would bring noise as large as a small effect.
+    """
+
+    unit: Unit
+    mesh: MeshSettings
+    finer: MeshSettings
+    distal: int = 1
+    lattice: LatticeLaw | None = None
+    orientation_deg: float = 0.0
+    drawn: Unit | None = None
+
+    def meshed(self, cache: Path | None = None) -> Mesh:
+        """The unit's mesh; raises InputError and MeshingError. cache: see `mesh_unit`."""
+        mesh = mesh_unit(self.drawn or self.unit, self.mesh, cache=cache)
+        return morphed(mesh, self.drawn, self.unit, self.mesh) if self.drawn else mesh
+
+    def materials(self, mesh: Mesh) -> Materials:
+        """The base model's materials."""
+        return materials_of(self.unit, mesh, self.lattice)
+
+    def model(self, mesh: Mesh) -> Model:
+        """The base model, under pressure alone."""
+        return Model(mesh, threads=1)
+
+
+@attrs.frozen
+class UnitEffect:
+    """A static effect: its parameter, the sizes (ascending, the null among them) that are run, what changes.
+
+    body: of a body and a size; materials, model: of a body, its mesh and a size, the base's where None.
+    weighs: whether it depends on the direction of gravity. newton: of its runs.
+    """
+
+    name: str
+    parameter: Parameter
+    sizes: tuple[float, ...]
+    body: Callable[[Body, float], Body] | None = None
+    materials: Callable[[Body, Mesh, float], Materials] | None = None
+    model: Callable[[Body, Mesh, float], Model] | None = None
+    weighs: bool = False
+    newton: NewtonSettings = SMOOTH
+
+    def __attrs_post_init__(self) -> None:
+        p = self.parameter
+        if p.null not in self.sizes or not all(p.low <= s <= p.high for s in self.sizes):
+            raise InputError(f"{self.name}: sizes miss the null or leave the bounds", "unit effects")
+
+
+def down(orientation_deg: float) -> Array:
+    """Unit vector (3,) along which things fall: z turned about x, so that at 0 the tip hangs down."""
+    a = math.radians(orientation_deg)
+    return np.array([0.0, -math.sin(a), math.cos(a)])
+
+
+def _weighed(body: Body, mesh: Mesh, density_kg_m3: float) -> Model:
+    model = body.model(mesh)
+    solid = np.where(mesh.region == LATTICE, relative_density(strut_cell(body.unit)), 1.0)
+    if density_kg_m3:
+        model.load = gravity(mesh, density_kg_m3 * TONNE_PER_MM3 * solid, down(body.orientation_deg))
+    return model
+
+
+def _clogged(body: Body, mesh: Mesh, share_lost: float) -> Model:
+    d = body.unit.printed
+    if not 0 < body.distal < d.count:
+        raise InputError(
+            f"{body.distal} of {d.count} chambers cannot be cut off", "clogged_chamber", "give 1 or more"
+        )
+    return CloggedModel(mesh, (d.count - body.distal) * d.cell, share_lost, threads=1)
+
+
+def _printed(body: Body, **changes: float) -> Body:
+    unit = attrs.evolve(body.unit, print=attrs.evolve(body.unit.print, **changes))
+    return attrs.evolve(body, unit=unit, drawn=body.unit)
+
+
+def _overcured(body: Body, offset_mm: float) -> Body:
+    p = body.unit.print
+    grown = {"offset_xy_mm": p.offset_xy_mm + offset_mm, "offset_z_mm": p.offset_z_mm + offset_mm}
+    return _printed(body, **grown)
+
+
+def _skinned(body: Body, excess_mm: float) -> Body:
+    p = body.unit.print
+    excess = excess_mm + p.skin_depth_mm * (p.skin_factor - 1.0)
+    return _printed(body, skin_depth_mm=SKIN_MM, skin_factor=1.0 + excess / SKIN_MM)
+
+
+def _thickened(body: Body, factor: float) -> Body:
+    chambers = attrs.evolve(body.unit.chambers, wall_mm=factor * body.unit.chambers.wall_mm)
+    return attrs.evolve(body, unit=attrs.evolve(body.unit, chambers=chambers), drawn=body.unit)
+
+
+def _refined(body: Body, share: float) -> Body:
+    return attrs.evolve(body, mesh=body.finer) if share else body
+
+
+def parted(materials: Materials, mesh: Mesh, region: int) -> tuple[tuple[Layer, ...], tuple[Layer, ...]]:
+    """The layers of a region of the mesh, and those of the rest."""
+    inside = mesh.region == region
+    found: tuple[list[Layer], list[Layer]] = ([], [])
+    for layer in materials.layers:
+        here = inside[layer.elements]
+        for side, rows in zip(found, (np.flatnonzero(here), np.flatnonzero(~here)), strict=True):
+            if len(rows):
+                side.append(layer.kept(rows, layer.weight[rows]))
+    return tuple(found[0]), tuple(found[1])
+
+
+def _shares(layers: Sequence[Layer], share: float) -> tuple[Layer, ...]:
+    return tuple(attrs.evolve(layer, weight=share * layer.weight) for layer in layers)
+
+
+def _elastic(materials: Materials, mesh: Mesh, region: int) -> tuple[Array, Array, Array]:
+    """Elements (k,) of a region, Young's moduli (k,) in MPa and Poisson's ratios (k,) at small strain."""
+    elements = np.flatnonzero(mesh.region == region)
+    modulus, poisson = materials.small_strain(len(mesh.tets))
+    return elements, modulus[elements], poisson[elements]
+
+
+def _stiffening(body: Body, mesh: Mesh, c2_over_c1: float) -> Materials:
+    wall, rest = parted(body.materials(mesh), mesh, MEMBRANE)
+    stiffer = []
+    for layer in wall:
+        # The unit's membrane is neo-Hookean, which is Yeoh's law with c1 = mu/2 alone.
+        mu, kappa = layer.parameters.T
+        c1 = mu / 2
+        rows = np.stack([c1, c2_over_c1 * c1, np.zeros_like(c1), kappa], axis=1)
+        stiffer.append(Layer(Yeoh, layer.elements, rows, layer.weight))
+    return Materials((*stiffer, *rest))
+
+
+def _asymmetric(body: Body, mesh: Mesh, excess: float) -> Materials:
+    """Struts stiffer by `excess` where the lattice shortens; below 0 less stiff there, as if they buckled.
+
+    In parallel with the lattice's law a foam that resists one side only; for less stiff struts it resists
+    tension, and takes the place of as much of the law. Two such foams are the lattice at small strain.
+    """
+    base = body.materials(mesh)
+    lattice_, rest = parted(base, mesh, LATTICE)
+    elements, E, nu = _elastic(base, mesh, LATTICE)
+    both = Foam.parameters(E, nu, 2.0, 2.0)
+    both[:, 2 if excess < 0 else 0] *= NEXT_TO_NOTHING
+    both[:, 4] /= 2
+    foam = Layer(Foam, elements, both, abs(excess))
+    return Materials((*rest, *_shares(lattice_, min(1.0, 1.0 + excess)), foam))
+
+
+def _shared(effects: Sequence[Effect], name: str) -> Parameter:
+    """The parameter that another kind of experiment has for an effect: one effect, one value."""
+    return next(e.parameters[0] for e in effects if e.name == name)
+
+
+EFFECTS = {
+    effect.name: effect
+    for effect in (
+        UnitEffect(
+            "gravity", _shared(beam.EFFECTS, "gravity"), (0.0, 1300.0, 4000.0), model=_weighed, weighs=True
+        ),
+        UnitEffect(
+            "strain_stiffening",
+            _shared(coupon.EFFECTS, "strain_stiffening"),
+            (-0.03, 0.0, 0.1, 0.4, 1.0, 2.0),
+            materials=_stiffening,
+        ),
+        UnitEffect(
+            "overcure", _shared(lattice.EFFECTS, "overcure"), (0.0, 0.06, 0.14, 0.25), body=_overcured
+        ),
+        UnitEffect(
+            "skin_cure", _shared(lattice.EFFECTS, "skin_cure"), (0.0, 0.04, 0.1, 0.2, 0.4), body=_skinned
+        ),
+        UnitEffect(
+            "wall_thickness",
+            Parameter(
+                "factor", "", 0.8, 1.3, 1.0, (0.95, 1.05), "assumed: printers miss it by a fifth at most"
+            ),
+            (0.8, 0.9, 1.0, 1.15, 1.3),
+            body=_thickened,
+        ),
+        UnitEffect(
+            "tension_compression_asymmetry",
+            _shared(coupon.EFFECTS, "tension_compression_asymmetry"),
+            (-0.8, -0.4, 0.0, 0.5, 1.5, 4.0),
+            materials=_asymmetric,
+            newton=KINKED,
+        ),
+        UnitEffect(
+            "clogged_chamber",
+            Parameter("share_lost", "", 0.0, 1.0, 0.0, (0.1, 0.5), "of the pressure, in the last chambers"),
+            (0.0, 0.3, 1.0),
+            model=_clogged,
+        ),
+        UnitEffect(
+            "mesh_error",
+            Parameter("share", "", 0.0, 2.0, 0.0, (1.0,), "1: the finer mesh; beyond: the way further on"),
+            (0.0, 1.0),
+            body=_refined,
+        ),
+    )
+}

@@ -1,0 +1,145 @@
+"""A unit whose last chambers lie behind a clog: the pressure drops in the neck before them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from ..errors import InputError
+from ..meshing.mesh import AXES, TRIANGLE_EDGES
+from . import kernels
+from .laws.tensors import mat33
+from .model import MaterialData, Model
+
+if TYPE_CHECKING:
+    from ..meshing.mesh import Mesh
+
+Array = np.ndarray[Any, Any]
+
+# Gauss-Legendre points on 0..1, exact for the cone's integrand of degree 5.
+_AT, _WEIGHT = np.polynomial.legendre.leggauss(3)
+_AT, _WEIGHT = (_AT + 1) / 2, _WEIGHT / 2
+
+
+class CloggedModel(Model):
+    """A body whose cavity beyond a neck at `height_mm` holds 1 - share_lost of the pressure.
+
+    What closes the neck is a cone from the neck's rim to the mean of its nodes. It bears the difference and
+    hands it to the rim, so that both chambers are closed and the load has a potential, -p (V - share_lost
+    V_beyond): the tangent stays symmetric. Its own part of the tangent, of the rim alone, is left out, which
+    costs Newton's method steps and changes no equilibrium. Raises InputError where no neck is cut.
+    """
+
+    def __init__(self, mesh: Mesh, height_mm: float, share_lost: float, **more: Any) -> None:
+        super().__init__(mesh, **more)
+        beyond = mesh.nodes[mesh.cavity_corners].mean(axis=1)[:, 2] > height_mm
+        if beyond.all() or not beyond.any():
+            raise InputError(
+                f"no cavity is cut at z = {height_mm:g} mm", "clogged chamber", "give the height of a neck"
+            )
+        self.share_lost = share_lost
+        self._beyond = np.flatnonzero(beyond)
+        self._rim = _rim(mesh, mesh.cavity[beyond])
+        self._rim_nodes = np.unique(self._rim)
+        faces = mesh.cavity[beyond].astype(np.int32)
+        count, k = faces.shape
+        self._lost_faces = self._put(faces, int)
+        self._lost_volume = wp.zeros(count, dtype=wp.float64, device=self.device)
+        self._lost_force = wp.zeros((count, k), dtype=wp.vec3d, device=self.device)
+        self._pairs = k * (k + 1) // 2
+        self._lost_blocks = wp.zeros(count * self._pairs, dtype=mat33, device=self.device)
+
+    def potential(self, u: Array, pressure: float, m: MaterialData) -> float:
+        """As `Model.potential`, with the clogged part's share of the pressure's work."""
+        return super().potential(u, pressure, m) + self.share_lost * pressure * self.volume_beyond(u)
+
+    def residual(self, u: Array, pressure: float, m: MaterialData) -> Array:
+        """As `Model.residual`, with what the clogged part and the clog bear less and more."""
+        residual = super().residual(u, pressure, m)
+        lost = -self.share_lost * pressure
+        inputs = [lost, self._x, self._lost_faces, *self._face_rule, 0, self._lost_force]
+        wp.launch(kernels.pressure_force, len(self._beyond), inputs, device=self.device)
+        np.add.at(residual, self.mesh.cavity[self._beyond], self._lost_force.numpy())
+        self._add_cone(residual, self.mesh.nodes + u, lost)
+        return residual
+
+    def tangent(self, u: Array, pressure: float, m: MaterialData) -> Array:
+        """As `Model.tangent`, without the clog's own part."""
+        self._place(u)
+        self._launch_layers("stiffness", m, [self._mean_slope, self._block_parts])
+        inputs = [self._x, self._faces, *self._face_rule, self._element_blocks, self._block_parts]
+        wp.launch(kernels.pressure_stiffness, len(self.mesh.cavity), [pressure, *inputs], device=self.device)
+        if self.share_lost:
+            inputs = [self._x, self._lost_faces, *self._face_rule, 0, self._lost_blocks]
+            lost = -self.share_lost * pressure
+            wp.launch(kernels.pressure_stiffness, len(self._beyond), [lost, *inputs], device=self.device)
+            parts = self._block_parts.numpy()
+            at = self._element_blocks + self._beyond[:, None] * self._pairs + np.arange(self._pairs)
+            parts[at.ravel()] += self._lost_blocks.numpy()
+            self._block_parts.assign(parts)
+        inputs = [self._block_parts, *self._block_lists, self._blocks]
+        self._launch(kernels.gather_blocks, len(self._blocks), inputs)
+        return np.asarray(self._blocks.numpy().ravel()[self._scalar_map])
+
+    def volume_beyond(self, u: Array) -> float:
+        """Volume in mm3 that the cavity beyond the clog, the clog and the mirror planes enclose."""
+        self._place(u)
+        inputs = [self._x, self._lost_faces, *self._face_rule, self._lost_volume]
+        wp.launch(kernels.enclosed_volume, len(self._beyond), inputs, device=self.device)
+        x = self.mesh.nodes + u
+        apex = self._apex(x)
+        _, area = self._cone(x, apex)
+        # On a cone x - apex lies in the surface; its normal points into the part beyond.
+        return float(self._lost_volume.numpy().sum() - apex @ area.sum(axis=0) / 3)
+
+    def _apex(self, x: Array) -> Array:
+        apex = x[self._rim_nodes].mean(axis=0)
+        for axis in self.mesh.symmetry:
+            apex[AXES.index(axis)] = 0.0
+        return apex
+
+    def _cone(self, x: Array, apex: Array) -> tuple[Array, Array]:
+        """Area vectors of the cone of each of e rim edges by its nodes (e, k, 3), and whole (e, 3)."""
+        shape, slope = _edge_shapes(self._rim.shape[1])
+        edge = x[self._rim]
+        place = np.einsum("qa,eai->eqi", shape, edge) - apex
+        along = np.einsum("qa,eai->eqi", slope, edge)
+        area = np.cross(place, along) * _WEIGHT[:, None]
+        return np.einsum("qa,eqi->eai", shape, area) / 3, area.sum(axis=1) / 2
+
+    def _add_cone(self, residual: Array, x: Array, pressure: float) -> None:
+        """Add the force of a pressure on the cone; the apex hands its third to the rim's nodes alike."""
+        of_nodes, whole = self._cone(x, self._apex(x))
+        np.add.at(residual, self._rim, pressure * of_nodes)
+        at_apex = pressure * whole.sum(axis=0) / 3
+        for axis in self.mesh.symmetry:
+            at_apex[AXES.index(axis)] = 0.0
+        residual[self._rim_nodes] += at_apex / len(self._rim_nodes)
+
+
+def _rim(mesh: Mesh, faces: Array) -> Array:
+    """Edges (e, 2 | 3) of faces (f, 3 | 6) that one of them has, mirror planes left out, turned round.
+
+    Turned so that a cone over them continues the faces' orientation.
+    """
+    edges = faces[:, TRIANGLE_EDGES].reshape(-1, 2)
+    middles = faces[:, 3:].reshape(-1, 1)
+    whole = np.hstack([edges, middles]) if middles.size else edges
+    _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
+    open_ = whole[first[count == 1]]
+    for axis in mesh.symmetry:
+        open_ = open_[(mesh.nodes[open_, AXES.index(axis)] != 0.0).any(axis=1)]
+    turned = open_.copy()
+    turned[:, :2] = open_[:, 1::-1]
+    return turned
+
+
+def _edge_shapes(count: int) -> tuple[Array, Array]:
+    """Shape functions (q, count) of an edge's ends, and middle if it has one, and their derivatives."""
+    t = _AT
+    if count == 2:
+        return np.stack([1 - t, t], axis=1), np.stack([-np.ones_like(t), np.ones_like(t)], axis=1)
+    shape = [(1 - t) * (1 - 2 * t), t * (2 * t - 1), 4 * t * (1 - t)]
+    return np.stack(shape, axis=1), np.stack([4 * t - 3, 4 * t - 1, 4 - 8 * t], axis=1)

@@ -1,0 +1,373 @@
+"""From measured data to a verdict on the model: read, predict, judge and write down, in one folder."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from ..design.parameters import Unit, load_preset, to_toml
+from ..errors import InputError
+from ..evidence.effect import Parameter
+from ..evidence.extended import ExtendedModel, extended_model
+from ..evidence.prediction import unit as unit_pressure
+from ..evidence.prediction.bench import bench_simulators
+from ..evidence.selection import Cause
+from ..evidence.sensitivity import best_seen
+from ..evidence.simulator import Composite, Simulator
+from ..evidence.verdict import Verdict, diagnose
+from ..files import write_csv, write_json
+from ..measured import Experiment, Measured, read_folder
+from ..measured.folder import FILE
+from .ending import Ending
+from .folder import claim, keep_inputs
+from .progress import Progress
+
+if TYPE_CHECKING:
+    from ..evidence.unit_fem import UnitSettings
+
+Array = np.ndarray[Any, Any]
+
+HEADER = "# The inputs of this diagnosis; the measured data are named by the SHA-256 of their files."
+RESULTS = ("verdict.json", "model.toml", "residuals.csv", "report.html")
+UNIT = "unit.toml"
+PRESET = "mu-1.0x"
+
+
+@attrs.frozen(eq=False)
+class Diagnosis:
+    """A verdict and what it was found with; remarks: of the reader, in words."""
+
+    measured: Measured
+    simulator: Composite
+    verdict: Verdict
+    model: ExtendedModel
+    unit: Unit | None
+    remarks: tuple[str, ...]
+
+    @property
+    def before(self) -> Mapping[str, float]:
+        """Values of the base model."""
+        return self.verdict.selection.base.values
+
+    @property
+    def after(self) -> Mapping[str, float]:
+        """Values of the extended model, or of the best attempt where nothing was named."""
+        return self.verdict.selection.chosen.values
+
+    @property
+    def extends(self) -> bool:
+        """Whether any effect was added to the base model, named or not."""
+        return bool(self.verdict.selection.chosen.effects)
+
+
+@attrs.frozen(eq=False)
+class Curve:
+    """One channel of an experiment: measured, and predicted by the base and the extended model, all (n,)."""
+
+    experiment: Experiment
+    channel: str
+    measured: Array
+    before: Array
+    after: Array
+
+    @property
+    def spread(self) -> Array | None:
+        """Standard deviation (n,) of the channel, where the data give it."""
+        head, _, unit = self.channel.rpartition("_")
+        return self.experiment.columns.get(f"{head}_sd_{unit}")
+
+
+def diagnose_folder(
+    folder: Path,
+    out: Path,
+    unit: Unit | None = None,
+    *,
+    progress: Progress,
+    ending: Ending,
+    settings: UnitSettings | None = None,
+) -> Diagnosis:
+    """Judge the model by a folder of measured data; results in `out`.
+
+    unit: what unit_pressure experiments were made with, whatever its scale; the preset `PRESET` without one;
+    settings: how it is simulated. Writes verdict.json, model.toml, residuals.csv, report.html. Raises
+    InputError, OutputError.
+    """
+    from .diagnosis_report import publish
+
+    measured = read_folder(Path(folder))
+    if not any(e.role == "fit" for e in measured.experiments):
+        raise InputError(
+            "every experiment is held out", str(measured.folder / FILE), 'give role = "fit" to some'
+        )
+    if any(e.kind == unit_pressure.KIND for e in measured.experiments):
+        unit = unit or load_preset(PRESET)
+    else:
+        unit = None
+    more = [] if settings is None else [f"settings = {json.dumps(repr(settings))}"]
+    inputs = folder_inputs("diagnose.toml", HEADER, measured, unit, more)
+    claim(out, HEADER, inputs, RESULTS, optional=(UNIT,))
+    ending.open_folder(out)
+    keep_inputs(out, inputs)
+    for remark in measured.remarks:
+        progress.warning(remark.what, remark.where, remark.remedy)
+    simulators, told = simulators_of(measured.experiments, unit, out / "cache", progress, settings)
+    simulator = Composite(simulators)
+    with _stages(progress, simulator) as tell:
+        verdict = diagnose(measured.experiments, simulator, tell)
+    remarks = [*(f"{r.what} ({_place(r.where)})" for r in measured.remarks), *told]
+    unknown = dict.fromkeys(e.kind for e in measured.experiments if not simulator.knows(e))
+    remarks += [f"nothing predicts {kind}: its experiments were left out" for kind in unknown]
+    found = Diagnosis(measured, simulator, verdict, _told_by(verdict), unit, tuple(remarks))
+    write_json(out / "verdict.json", verdict.as_json())
+    found.model.save(out / "model.toml")
+    _write_residuals(found, out / "residuals.csv")
+    ending.summary |= summary(found)
+    with progress.stage("report", expected_s=5.0):
+        publish(found, out, ending)
+    return found
+
+
+def simulators_of(
+    experiments: Sequence[Experiment],
+    unit: Unit | None,
+    cache: Path,
+    progress: Progress,
+    settings: UnitSettings | None = None,
+) -> tuple[dict[str, Simulator], list[str]]:
+    """Simulators of every kind among the experiments, by kind; and what could not be simulated, in words.
+
+    The unit is followed by finite elements; its runs are kept in the folder `cache`.
+    """
+    found, told = bench_simulators(experiments), []
+    bent = [e for e in experiments if e.kind == unit_pressure.KIND]
+    if bent:
+        assert unit is not None
+        from ..evidence.unit_fem import unit_responses
+
+        with warnings.catch_warnings(record=True) as heard, progress.stage("unit"):
+            warnings.simplefilter("always")
+            responses = unit_responses(unit, bent, settings, cache, lambda _, share: progress.update(share))
+        # Where and what to do, on further lines, is of a simulation that nobody asked for.
+        told = [str(warning.message).partition("\n")[0] for warning in heard]
+        for words in told:
+            progress.warning(words, "unit")
+        found[unit_pressure.KIND] = unit_pressure.UnitPressure(responses, experiments)
+    return found, told
+
+
+def _told_by(verdict: Verdict) -> ExtendedModel:
+    """The extended model, without nuisances that these data say nothing of."""
+    model = extended_model(verdict)
+    fit = verdict.selection.chosen if verdict.names else verdict.selection.base
+    seen = {k for k, column in zip(fit.keys, fit.jacobian.T, strict=True) if column.any()}
+    return attrs.evolve(model, nuisances={k: f for k, f in model.nuisances.items() if k in seen})
+
+
+@contextmanager
+def _stages(progress: Progress, simulator: Composite) -> Iterator[Callable[[str], None]]:
+    """What the engine says of its work, as stages."""
+    many = max(len(simulator.effects), 1)
+    with ExitStack() as stack:
+        now, done = "", 0
+
+        def tell(what: str) -> None:
+            nonlocal now, done
+            stage = what
+            if what not in ("noise", "sensitivities", "gain"):
+                stage = ("single", "pairs of", "triples of")[min(what.count(" and "), 2)] + " effects"
+            if stage != now:
+                stack.close()
+                stack.enter_context(progress.stage(stage))
+            now, done = stage, done + 1 if stage == now else 0
+            # Later steps try up to four models with each effect.
+            progress.update(done / (many if stage == "single effects" else 4 * many))
+
+        yield tell
+
+
+def folder_inputs(
+    name: str, header: str, measured: Measured, unit: Unit | None, more: Sequence[str] = ()
+) -> dict[str, str]:
+    """Text of a run's files of inputs, by name; the first has this name and header, and more lines."""
+    described = (measured.folder / FILE).read_bytes()
+    lines = [header, f'experiments_sha256 = "{hashlib.sha256(described).hexdigest()}"', *more]
+    lines += ["", "[data]"]
+    for e in measured.experiments:
+        lines.append(f"{json.dumps(e.name, ensure_ascii=False)} = {json.dumps([e.kind, e.role, e.sha256])}")
+    found = {name: "\n".join(lines) + "\n"}
+    return found if unit is None else found | {UNIT: to_toml(unit)}
+
+
+def _place(where: str) -> str:
+    """A place in a file without the folders above it."""
+    path, comma, rest = where.partition(", ")
+    return Path(path).name + comma + rest
+
+
+def curves(found: Diagnosis) -> list[Curve]:
+    """Every predicted channel of every experiment, in the order of the folder."""
+    simulator = found.simulator
+    listed = []
+    for e in found.measured.experiments:
+        if not simulator.knows(e):
+            continue
+        before = simulator.predict(e, found.before)
+        after = simulator.predict(e, found.after)
+        for row, channel in enumerate(simulator.channels(e)):
+            listed.append(Curve(e, channel, e[channel], before[row], after[row]))
+    return listed
+
+
+def _write_residuals(found: Diagnosis, path: Path) -> None:
+    rows = [
+        (c.experiment.name, c.experiment.role, c.channel, int(row), m, b, a)
+        for c in curves(found)
+        for row, m, b, a in zip(
+            c.experiment.rows, c.measured.tolist(), c.before.tolist(), c.after.tolist(), strict=True
+        )
+    ]
+    head = ["experiment", "role", "channel", "row", "measured", "base_model", "extended_model"]
+    write_csv(path, head, rows)
+
+
+def spoken(name: str) -> str:
+    """An effect's or quantity's name as it is said."""
+    return name.replace("_", " ")
+
+
+def listed(names: Sequence[str], last: str = "and") -> str:
+    """Names in a row: "a, b and c"."""
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + f" {last} " + names[-1]
+
+
+def bare(p: Parameter) -> str:
+    """A parameter's name as it is said, without the unit that stands behind its value."""
+    unit = p.unit.replace("1/", "per_").replace("/", "_")
+    return spoken(p.name.removesuffix(f"_{unit}") if unit else p.name)
+
+
+def between(low: float, high: float) -> str:
+    """An interval in as few figures as tell its ends apart, three at least."""
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return "not known"
+    for digits in range(3, 7):
+        ends = f"{low:.{digits}g}", f"{high:.{digits}g}"
+        if ends[0] != ends[1]:
+            break
+    return f"{ends[0]} to {ends[1]}"
+
+
+def sized(verdict: Verdict, cause: Cause) -> str:
+    """Parameters of a cause with their intervals in words."""
+    said = []
+    for key, p in zip(cause.effect.keys, cause.effect.parameters, strict=True):
+        low, high = verdict.intervals.get(key, (math.nan, math.nan))
+        unit = f" {p.unit}" if p.unit else ""
+        value = verdict.selection.chosen.values[key]
+        said.append(f"{bare(p)} {value:.3g}{unit} (95 %: {between(low, high)})")
+    return ", ".join(said)
+
+
+def sentence(verdict: Verdict) -> tuple[str, str]:
+    """The verdict in words: its headline, and one plain sentence."""
+    found = verdict.selection
+    if verdict.kind == "named":
+        said = [f"{_upper(c.effect.mechanism)}; {sized(verdict, c)}." for c in found.causes]
+        return listed([spoken(n) for n in verdict.names]), " ".join(said)
+    if verdict.kind == "ambiguous":
+        choices = [listed([spoken(n) for n in (c.effect.name, *c.rivals)], "or") for c in found.causes]
+        said = [f"{spoken(c.effect.name)} has {sized(verdict, c)}" for c in found.causes]
+        return (
+            " and ".join(choices),
+            "Something is wrong, and these data cannot tell which of these it is: each explains them. "
+            f"Fitted, {'; '.join(said)}.",
+        )
+    if verdict.kind == "none":
+        return (
+            "nothing wrong",
+            "What the model leaves of these data looks like the noise of the instruments. An effect larger "
+            "than its limit in the table below would have been seen.",
+        )
+    if verdict.kind == "unidentifiable":
+        return (
+            "cannot be told",
+            "The model follows the data only with a fitted value far from what is known of it. Whatever is "
+            "behind that, these data could not show it, however many of their kind there were.",
+        )
+    where = [spoken(n) for n in found.left]
+    tried = f"What it leaves depends on {listed(where)}. " if where else ""
+    if found.doubted:
+        tried += f"{_upper(spoken(found.doubted))}. "
+    if found.chosen.effects:
+        names = listed([spoken(n) for n in found.chosen.names])
+        tried += f"The best attempt, {names}, is not named, since it leaves structure behind."
+    return (
+        "something no known effect explains",
+        f"The model is wrong, but the cause is not known here. {tried}".strip(),
+    )
+
+
+def advice(verdict: Verdict) -> str:
+    """What to measure next, in words."""
+    if verdict.proposal is not None:
+        told = listed([spoken(n) for n in verdict.proposal.separates])
+        return f"{_upper(verdict.proposal.what)}. It tells {told} apart."
+    found = verdict.selection
+    if verdict.kind == "named":
+        return f"To confirm it on fresh data: {'; '.join(c.effect.reveals for c in found.causes)}."
+    if verdict.kind == "unexplained":
+        places = [d for d in found.table if d.against in found.left and d.where]
+        places.sort(key=lambda d: d.p_value)
+        at = f" It is strongest at: {places[0].where}." if places else ""
+        return f"Repeat an experiment and change nothing: what does not come back is not the model's.{at}"
+    hidden = [s for s in best_seen(verdict.seen).values() if not s.identifiable]
+    if not hidden:
+        return ""
+    shown = dict.fromkeys(s.effect.reveals for s in hidden)
+    some = list(shown)[:3]
+    return (
+        f"These data could not show {listed([spoken(s.effect.name) for s in hidden])}. "
+        f"To see more: {'; or '.join(some)}."
+    )
+
+
+def _upper(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def summary(found: Diagnosis) -> dict[str, Any]:
+    """Every figure of a diagnosis in plain data."""
+    verdict = found.verdict
+    headline, words = sentence(verdict)
+    return {
+        "verdict": verdict.kind,
+        "headline": headline,
+        "sentence": words,
+        "next": advice(verdict),
+        "causes": verdict.as_json()["causes"],
+        "gain": verdict.gain.as_json(),
+        "experiments": {e.name: [e.kind, e.role] for e in found.measured.experiments},
+        "noise": {group: attrs.asdict(source) for group, source in verdict.sources.items()},
+        "predictions": found.simulator.calls,
+        "remarks": list(found.remarks),
+    }
+
+
+def answer(summary: Mapping[str, Any]) -> list[str]:
+    """What a diagnosis found, in a few lines of text, of its `summary`."""
+    lines = [f"verdict: {summary['verdict']}: {summary['headline']}", summary["sentence"]]
+    for name, words in (("fit", "data that were fitted"), ("held_out", "data held out")):
+        errors = summary["gain"][name]
+        if errors and summary["causes"]:
+            before, after = errors["rmse_before"], errors["rmse_after"]
+            lines.append(f"error on {words}: {before:.3g} -> {after:.3g} {errors['unit']}")
+    return [*lines, f"next: {summary['next']}"] if summary["next"] else lines

@@ -1,0 +1,402 @@
+"""The unit's simulated responses: exact at nulls, kept and found again, right in sign; its markers."""
+
+import attrs
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mu_addon.design.parameters import load_preset
+from mu_addon.errors import ConvergenceError, InputError
+from mu_addon.evidence import unit_fem
+from mu_addon.evidence.markers import at_rest, attached, followed, nearest
+from mu_addon.evidence.prediction.unit import UnitPressure
+from mu_addon.evidence.unit_effects import EFFECTS, Body, down
+from mu_addon.evidence.unit_fem import (
+    COARSE,
+    FINE,
+    Run,
+    UnitResponseWarning,
+    UnitSettings,
+    pressures,
+    run,
+    unit_markers,
+    unit_responses,
+)
+from mu_addon.fem.clogged import CloggedModel
+from mu_addon.fem.equilibrium import Equilibrium
+from mu_addon.fem.model import Model
+from mu_addon.fem.unit import materials_of
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.unit import mesh_unit
+from tests.evidence import analytic
+
+UNIT = load_preset("mu-1.0x")
+ROUGH = MeshSettings(refine=0.4, order=1)
+FINER = MeshSettings(refine=0.5, order=1)
+QUICK = UnitSettings(ROUGH, FINER, pressures=6, effects=("gravity", "mesh_error"), workers=1)
+# On the side, off its middle plane; and on the tip.
+MARKERS = {1: (18.75, 10.0, 40.0), 2: (0.0, 5.0, 75.0)}
+TIME, PRESSURE = analytic.triangle(0.5, 10.0, 1, -10.0, 20.0)
+
+
+def bench(name="one", markers=MARKERS, pressure=PRESSURE, angle=True, axes="xyz", **more):
+    """An experiment with markers at rest, or nearly."""
+    n = len(pressure)
+    columns = {"angle_deg": np.zeros(n)} if angle else {}
+    for number, place in markers.items():
+        for a, x in zip("xyz", place, strict=True):
+            if a in axes:
+                columns[f"marker{number}_{a}_mm"] = np.full(n, float(x))
+    return analytic.experiment(name, np.arange(n) * 0.5, pressure, columns, **more)
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return mesh_unit(UNIT, ROUGH)
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    return tmp_path_factory.mktemp("runs")
+
+
+TURNS = (0.0, 90.0, 180.0, 270.0)
+
+
+@pytest.fixture(scope="module")
+def responses(cache):
+    tests = [bench(f"at {turn:g}", orientation_deg=turn) for turn in TURNS]
+    return unit_responses(UNIT, tests, QUICK, cache)
+
+
+def test_there_is_one_response_an_orientation_and_the_simulator_takes_them(responses):
+    assert [(r.scale, r.orientation_deg) for r in responses] == [(1.0, t) for t in TURNS]
+    one = responses[0]
+    assert one.channels == ("angle_deg", *(f"marker{m}_{a}_mm" for m in (1, 2) for a in "xyz"))
+    assert one.pressures_kPa[0] < PRESSURE.min() < PRESSURE.max() < one.pressures_kPa[-1]
+    level = bench(orientation_deg=-270.0)
+    unit = UnitPressure(responses, [level])
+    assert {"gravity", "mesh_error"} <= {e.name for e in unit.effects}
+    y = unit.predict(level, {"gravity.density_kg_m3": 1000.0})
+    assert y.shape == (7, len(PRESSURE))
+    assert np.isfinite(y).all()
+
+
+def test_at_its_null_a_variant_is_the_base_and_at_rest_the_base_is_as_drawn(responses):
+    for r in responses:
+        for v in r.variants.values():
+            np.testing.assert_array_equal(v.values[list(v.at).index(v.parameter.null)], r.values)
+        rest = r.values[:, list(r.pressures_kPa).index(0.0)]
+        np.testing.assert_array_equal(rest, [0.0, *MARKERS[1], *MARKERS[2]])
+
+
+def test_pressure_bends_the_unit_to_the_side_with_more_lattice(responses):
+    assert (np.diff(responses[0].values[0]) > 0).all()
+    assert (np.diff(responses[0].values[responses[0].channels.index("marker2_y_mm")]) > 0).all()
+
+
+def test_things_fall_downward(responses):
+    hanging, level, standing, other = responses
+    at = list(hanging.pressures_kPa).index(0.0)
+
+    def sag(r, size=-1):
+        """Moves of the tip's marker (x, y, z) and turn of the tip, unpressed, by the densest resin."""
+        moved = (r.variants["gravity"].values[size] - r.values)[:, at]
+        return moved[4:7], moved[0]
+
+    assert sag(hanging)[0][2] > 0 > sag(standing)[0][2]
+    assert sag(level)[0][1] < 0 < sag(other)[0][1]
+    assert sag(level)[1] < 0 < sag(other)[1]
+    # Weight along the axis stretches; across it, it bends, much further.
+    assert abs(sag(level)[0][1]) > 5 * abs(sag(hanging)[0][2])
+    assert sag(hanging)[0][2] == pytest.approx(-sag(standing)[0][2], rel=0.1)
+    assert sag(level)[0][1] == pytest.approx(-sag(other)[0][1], rel=0.05)
+    # Nearly in proportion to the weight.
+    ratio = np.divide(*level.variants["gravity"].at[[2, 1]])
+    assert sag(level)[0][1] == pytest.approx(ratio * sag(level, 1)[0][1], rel=0.05)
+    np.testing.assert_allclose(sag(hanging)[0][0], 0.0, atol=1e-9)
+
+
+def test_down_is_z_turned_about_x():
+    np.testing.assert_allclose(down(0.0), [0, 0, 1])
+    np.testing.assert_allclose(down(90.0), [0, -1, 0], atol=1e-15)
+    np.testing.assert_allclose(down(180.0), [0, 0, -1], atol=1e-15)
+
+
+def test_moduli_scaled_alike_are_the_pressure_scaled():
+    m = UNIT.material
+    stiffer = attrs.evolve(
+        UNIT,
+        material=attrs.evolve(
+            m,
+            lattice_modulus_kPa=1.2 * m.lattice_modulus_kPa,
+            membrane_modulus_kPa=1.2 * m.membrane_modulus_kPa,
+        ),
+    )
+    at = (-12.0, -5.0, 0.0, 8.0, 16.0, 24.0)
+    points = (MARKERS[1],)
+    found = run(Run(Body(stiffer, ROUGH, FINER), at, points)).values
+    expected = run(Run(Body(UNIT, ROUGH, FINER), tuple(p / 1.2 for p in at), points)).values
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
+
+
+def test_what_was_run_is_found_again(responses, cache, monkeypatch):
+    def refuse(*_):
+        raise AssertionError("ran again")
+
+    told = []
+    with monkeypatch.context() as patch:
+        patch.setattr(unit_fem, "run", refuse)
+        again = unit_responses(UNIT, [bench(orientation_deg=90.0)], QUICK, cache)
+        np.testing.assert_array_equal(again[0].values, responses[1].values)
+        for name, v in responses[1].variants.items():
+            np.testing.assert_array_equal(again[0].variants[name].values, v.values)
+        with pytest.raises(AssertionError, match="ran again"):
+            unit_responses(UNIT, [bench(orientation_deg=45.0)], QUICK, cache)
+    # A damaged entry is missing: one run is done again, with the same result.
+    base = Run(Body(UNIT, ROUGH, FINER), tuple(responses[0].pressures_kPa), tuple(MARKERS.values()))
+    path = cache / f"unit-{base.key()}.npz"
+    path.write_bytes(path.read_bytes()[:-40])
+    one = unit_responses(UNIT, [bench()], QUICK, cache, lambda stage, share: told.append((stage, share)))
+    np.testing.assert_array_equal(one[0].values, responses[0].values)
+    assert [t for t in told if t[0].startswith("unit")] == [("unit at 1x, base", 1.0)]
+    assert any("marker 1 at 1x lies 0.00 mm" in stage for stage, _ in told)
+
+
+def test_what_changes_a_result_changes_its_key():
+    base = Run(Body(UNIT, ROUGH, FINER), (-5.0, 0.0, 5.0))
+    others = [
+        attrs.evolve(base, pressures_kPa=(-5.0, 0.0, 6.0)),
+        attrs.evolve(base, points=(MARKERS[1],)),
+        attrs.evolve(base, effect="gravity", size=1000.0),
+        attrs.evolve(base, effect="gravity", size=1000.0, body=attrs.evolve(base.body, orientation_deg=90.0)),
+        *(attrs.evolve(base, effect=name, size=e.sizes[-1]) for name, e in EFFECTS.items()),
+    ]
+    keys = {base.key(), *(r.key() for r in others)}
+    assert len(keys) == len(others) + 1
+    # The finer mesh is the base's to a model that has it.
+    fine = attrs.evolve(base, body=Body(UNIT, FINER, FINER))
+    assert attrs.evolve(base, effect="mesh_error", size=1.0).key() == fine.key()
+    # Pressure alone does not know which way is down.
+    assert attrs.evolve(base, body=attrs.evolve(base.body, orientation_deg=90.0)).key() == base.key()
+
+
+AT = (-10.0, 0.0, 10.0, 20.0)
+
+
+@pytest.fixture(scope="module")
+def angle():
+    return run(Run(Body(UNIT, ROUGH, FINER), AT)).values[0]
+
+
+STIFFER = [name for name in EFFECTS if name not in ("gravity", "mesh_error")]
+
+
+@pytest.mark.parametrize("name", STIFFER)
+def test_an_effect_grows_from_nothing_and_the_right_way(name, angle):
+    e = EFFECTS[name]
+    body = Body(UNIT, ROUGH, FINER)
+    far = run(Run(body, AT, (), name, e.sizes[-1])).values[0] - angle
+    assert (far[2:] < 0).all(), "the unit bends less under pressure"
+    sizes = [s for s in (e.parameter.null + 1e-4, e.parameter.null - 1e-4) if s >= e.sizes[0]]
+    for size in sizes:
+        near = run(Run(body, AT, (), name, size)).values[0] - angle
+        assert 0 < np.abs(near).max() < 1e-3
+        assert np.sign(near[3]) == -np.sign(size - e.parameter.null)
+
+
+def test_what_cannot_be_computed_is_left_out_and_said(monkeypatch):
+    e = EFFECTS["wall_thickness"]
+    # A wall of 9 mm has no room in a bladder of 12.5 mm.
+    broken = attrs.evolve(e, parameter=attrs.evolve(e.parameter, high=20.0), sizes=(0.9, 1.0, 10.0))
+    monkeypatch.setitem(EFFECTS, "wall_thickness", broken)
+    quick = attrs.evolve(QUICK, effects=("wall_thickness",))
+    with pytest.warns(UnitResponseWarning, match="wall_thickness = 10 at 1x is left out"):
+        (r,) = unit_responses(UNIT, [bench(markers={})], quick)
+    np.testing.assert_array_equal(r.variants["wall_thickness"].at, [0.9, 1.0])
+    monkeypatch.setitem(EFFECTS, "wall_thickness", attrs.evolve(broken, sizes=(1.0, 10.0)))
+    with pytest.warns(UnitResponseWarning):
+        (r,) = unit_responses(UNIT, [bench(markers={})], quick)
+    assert not r.variants
+
+
+def test_pressures_out_of_reach_are_named():
+    soft = attrs.evolve(UNIT, material=attrs.evolve(UNIT.material, membrane_modulus_kPa=25.0))
+    with pytest.raises(ConvergenceError, match="too few of the measured pressures"):
+        unit_responses(soft, [bench(markers={}, pressure=100 * PRESSURE)], attrs.evolve(QUICK, effects=()))
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.floats(-90, 90), st.floats(0.5, 90), st.integers(5, 20))
+def test_pressures_span_the_readings_with_rest_among_them(low, width, count):
+    found = np.array(pressures(np.array([low, low + width]), count, 0.05))
+    assert len(found) == count
+    assert (np.diff(found) > 0).all()
+    assert 0.0 in found
+    # Two digits: ends may be rounded inward by half of the second.
+    assert found[0] <= min(0.0, low) + 0.05 * abs(low)
+    assert found[-1] >= max(0.0, low + width) - 0.05 * abs(low + width)
+
+
+def test_scales_and_kinds_are_told_apart():
+    tests = [bench(markers={}), bench("small", {}, scale=0.75), bench("hold", {})]
+    tests[2] = attrs.evolve(tests[2], kind="pressure_hold")
+    found = unit_responses(UNIT, tests, attrs.evolve(QUICK, effects=()))
+    assert [r.scale for r in found] == [0.75, 1.0]
+    # Proportional scaling has no length of its own: the same angle.
+    np.testing.assert_allclose(found[0].values, found[1].values, rtol=1e-6)
+    assert unit_responses(UNIT, tests[2:], QUICK) == ()
+
+
+def test_bad_orders_are_refused():
+    with pytest.raises(InputError, match="viscosity"):
+        UnitSettings(effects=("viscosity",))
+    with pytest.raises(InputError, match="too few"):
+        UnitSettings(workers=0)
+    with pytest.raises(InputError, match="added mass"):
+        unit_responses(UNIT, [bench(added_mass_g=5.0)], QUICK)
+    with pytest.raises(InputError, match="0 throughout"):
+        unit_responses(UNIT, [bench(pressure=0 * PRESSURE)], QUICK)
+
+
+# Markers
+
+
+def test_a_marker_sits_on_the_nearest_point_of_the_unit(mesh):
+    # Half-widths of the envelope: 1.5 cells in x; -1.5 to 2.5 cells in y.
+    places = {1: (18.75 + 1.0, 10.0, 40.0), 2: (-10.0, 31.25 + 0.5, 30.0), 3: (2.0, 20.0, 50.0)}
+    found = {m.number: m for m in attached(mesh, [bench(markers=places)], 4.0)}
+    np.testing.assert_allclose(found[1].point, [18.75, 10.0, 40.0], atol=1e-9)
+    assert found[1].distance_mm == pytest.approx(1.0)
+    np.testing.assert_allclose(found[2].point, [-10.0, 31.25, 30.0], atol=1e-9)
+    # Inside the lattice it is where it is.
+    np.testing.assert_array_equal(found[3].point, places[3])
+    assert found[3].distance_mm == 0.0
+    # Within the air of a chamber it is on its wall, the nearest one.
+    wall = nearest(mesh, np.array([0.0, 0.0, 31.25]))
+    nodes = mesh.nodes[np.unique(mesh.cavity)]
+    assert np.linalg.norm(wall - [0, 0, 31.25]) <= np.linalg.norm(nodes - [0, 0, 31.25], axis=1).min() + 1e-9
+
+
+def test_a_marker_across_the_mirror_moves_like_its_image(mesh):
+    u = np.random.default_rng(0).standard_normal(mesh.nodes.shape)
+    one, other = followed(mesh, np.array([[5.0, 20.0, 40.0], [-5.0, 20.0, 40.0]])).at(u)
+    np.testing.assert_allclose(other, one * [-1, 1, 1])
+
+
+def test_without_x_a_marker_lies_in_the_sagittal_plane(mesh):
+    (m,) = attached(mesh, [bench(markers={4: (9.0, 20.0, 40.0)}, axes="yz")], 4.0)
+    np.testing.assert_array_equal(m.point, [0.0, 20.0, 40.0])
+    assert m.axes == "yz"
+    with pytest.raises(InputError, match="marker 4 lacks its y or z"):
+        attached(mesh, [bench(markers={4: (9.0, 20.0, 40.0)}, axes="xy")], 4.0)
+
+
+def test_a_marker_off_the_unit_is_named():
+    with pytest.raises(InputError, match=r"marker 3 lies 11\.2 mm from the unit") as error:
+        unit_markers(UNIT, [bench("bad camera", {1: MARKERS[1], 3: (30.0, 10.0, 40.0)})])
+    assert error.value.where == "bad camera"
+    one = unit_markers(UNIT, [bench()])[1.0]
+    assert [m.number for m in one] == [1, 2]
+
+
+def test_a_marker_on_two_places_is_named(mesh):
+    moved = bench("second", {1: (18.75, 10.0, 50.0)})
+    with pytest.raises(InputError, match=r"marker 1 sits 10\.0 mm from where one has it"):
+        attached(mesh, [bench(), moved], 4.0)
+
+
+def test_rest_is_looked_for_where_there_is_no_pressure():
+    p = np.concatenate([np.full(10, 15.0), np.zeros(10), np.full(10, 20.0)])
+    e = bench(markers={1: (18.0, 10.0, 40.0)}, pressure=p)
+    y = 10.0 + p
+    e = attrs.evolve(e, columns={**e.columns, "marker1_y_mm": np.where(np.arange(30) == 11, np.nan, y)})
+    np.testing.assert_allclose(at_rest([e])[1][1], [18.0, 10.0, 40.0])
+    pressed = attrs.evolve(
+        e,
+        name="pressed",
+        columns={c: v[20:] + (np.arange(10) if "p" in c else 0.0) for c, v in e.columns.items()},
+    )
+    with pytest.raises(InputError, match="marker 1 is never seen at rest"):
+        at_rest([pressed])
+    assert at_rest([pressed, e])[1][2] == e.name
+
+
+# The clog
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_clogged_body_has_the_potential_of_its_residual(order):
+    m = mesh_unit(UNIT, MeshSettings(refine=0.3, order=order))
+    model = CloggedModel(m, 50.0, 0.7, threads=1)
+    plain = Model(m, threads=1)
+    data = model.parameters(materials_of(UNIT, m))
+    rng = np.random.default_rng(1)
+    u, way = (0.02 * rng.standard_normal(m.nodes.shape) for _ in range(2))
+    for axis in m.symmetry:
+        u[m.symmetry_nodes(axis), "xyz".index(axis)] = 0.0
+        way[m.symmetry_nodes(axis), "xyz".index(axis)] = 0.0
+    p, h = 0.03, 1e-3
+    slope = (model.potential(u + h * way, p, data) - model.potential(u - h * way, p, data)) / (2 * h)
+    residual = model.residual(u, p, data)
+    assert slope == pytest.approx(float((residual * way).sum()), rel=1e-6)
+    # Each closed part is in balance under its own pressure.
+    added = residual - plain.residual(u, p, data)
+    assert np.abs(added).max() > 1e-3
+    np.testing.assert_allclose(added.sum(axis=0)[1:], 0.0, atol=1e-12)
+    # The two parts of the cavity are the whole.
+    whole = plain.cavity_volume(u)
+    beyond = model.volume_beyond(u)
+    assert 0.2 * whole < beyond < 0.45 * whole
+
+
+def test_nothing_lost_is_no_clog_and_all_lost_leaves_the_rest(mesh):
+    data = (whole := Model(mesh, threads=1)).parameters(materials_of(UNIT, mesh))
+    u = 0.01 * np.random.default_rng(2).standard_normal(mesh.nodes.shape)
+    none = CloggedModel(mesh, 62.5, 0.0, threads=1)
+    np.testing.assert_array_equal(none.residual(u, 0.01, data), whole.residual(u, 0.01, data))
+    np.testing.assert_array_equal(none.tangent(u, 0.01, data), whole.tangent(u, 0.01, data))
+    with pytest.raises(InputError, match="no cavity is cut"):
+        CloggedModel(mesh, 99.0, 0.5)
+    # Behind a clog before the last chambers only the weight of what is before it is felt.
+    one, three = (
+        run(Run(Body(UNIT, ROUGH, FINER, distal=k), (0.0, 10.0), (), "clogged_chamber", 1.0)).values[0, 1]
+        for k in (1, 3)
+    )
+    base = run(Run(Body(UNIT, ROUGH, FINER), (0.0, 10.0))).values[0, 1]
+    assert 0.2 * base < three < one < base
+
+
+def test_a_clogged_tangent_is_near_that_of_its_residual():
+    m = mesh_unit(UNIT, MeshSettings(refine=0.3, order=1))
+    model = CloggedModel(m, 50.0, 0.7, threads=1)
+    data = model.parameters(materials_of(UNIT, m))
+    state = Equilibrium(model, materials_of(UNIT, m)).newton(np.zeros_like(m.nodes), 0.005)
+    assert state.residual < 1e-9
+    K = model.matrix(model.tangent(state.u, 0.005, data))
+    way = np.zeros(m.nodes.size)
+    way[model.free] = np.random.default_rng(3).standard_normal(len(model.free))
+    step = 1e-6 * way.reshape(-1, 3)
+    change = model.residual(state.u + step, 0.005, data) - model.residual(state.u - step, 0.005, data)
+    expected = change.ravel()[model.free] / 2e-6
+    away = K @ way[model.free] - expected
+    assert np.linalg.norm(away) < 1e-2 * np.linalg.norm(expected)
+
+
+@pytest.mark.slow
+def test_the_default_mesh_is_near_a_finer_one_and_pressures_are_dense_enough(tmp_path):
+    """Order 2 in two processes: 4 % of the angle in vacuum and 1 % under pressure are the mesh's."""
+    settings_ = UnitSettings(COARSE, FINE, effects=("mesh_error", "clogged_chamber"))
+    p = np.concatenate([PRESSURE * 2, [-20.0, 0.0]])
+    (r,) = unit_responses(UNIT, [bench(markers={}, pressure=p)], settings_, tmp_path)
+    coarse, fine = r.variants["mesh_error"].values[:, 0]
+    at = r.pressures_kPa
+    apart = np.abs(fine - coarse)
+    assert (apart[at > 0] < 0.015 * np.abs(fine[at > 0]) + 0.05).all()
+    assert (apart[at < 0] < 0.06 * np.abs(fine[at < 0])).all()
+    assert len(r.variants["clogged_chamber"].at) > 1
+    between = tuple(np.concatenate([(at[1:] + at[:-1]) / 2, [0.0]]).tolist())
+    exact = run(Run(Body(UNIT, COARSE, FINE), tuple(sorted(between)))).values[0]
+    met = r.at(np.array(sorted(between)), {})[0]
+    assert np.abs(met - exact).max() < 0.05
