@@ -41,12 +41,9 @@ def signatures(record: Record, simulator: Composite, values: Mapping[str, float]
         size = e.parameters[0]
         if values.get(e.keys[0], size.null) != size.null:
             for key, p in zip(e.keys, e.parameters, strict=True):
-                moved = {
-                    **values,
-                    key: values.get(key, p.null)
-                    + (p.step if values.get(key, p.null) + p.step <= p.high else -p.step),
-                }
-                columns.append((record.predict(simulator, moved) - base) / p.step)
+                now = values.get(key, p.null)
+                h = p.step if p.low <= now + p.step <= p.high else -p.step
+                columns.append((record.predict(simulator, {**values, key: now + h}) - base) / h)
             continue
         for shape in e.shapes():
             moved = {**values, **shape, e.keys[0]: size.null + size.step}
