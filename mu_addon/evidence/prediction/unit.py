@@ -304,7 +304,7 @@ def lagged(t: Array, p: Array, time_s: float) -> Array:
     if time_s <= 0.0:
         return p
     h = np.diff(t)
-    if np.ptp(h) <= 1e-3 * h.mean():
+    if np.ptp(h) <= 1e-9 * h.mean():
         a, b0, b1 = _weights(h.mean(), time_s)
         found, _ = lfilter([b1, b0], [1.0, -a], p, zi=[(1.0 - b1) * p[0]])
         return np.asarray(found)
