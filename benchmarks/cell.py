@@ -19,7 +19,7 @@ from mu_addon.design.lattices import BODY_CENTRED, STRAIGHT
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.strut_cell import relative_density, strut_cell
 from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, cell_mesh
-from mu_addon.homogenize.elasticity import Effective, effective_tensor
+from mu_addon.homogenize.elasticity import Elasticity, effective_tensor
 from mu_addon.homogenize.stretch import StretchSettings, stretch
 from tests.homogenize.cells import body_centred_by_beams
 
@@ -59,7 +59,7 @@ def levels(cell, modulus, poisson, sizes):
         error = " | ".join(f"{100 * v:+.2f} %" for v in values / limit - 1)
         print(f"| error at {size:g} | | | | | | {error} | | | |")
     if cell.kind in (BODY_CENTRED, STRAIGHT):
-        beams = Effective(body_centred_by_beams(cell, modulus, poisson), relative_density(cell))
+        beams = Elasticity(body_centred_by_beams(cell, modulus, poisson), relative_density(cell))
         print(row("| beams, rigid joints | | | |", beams), flush=True)
 
 

@@ -12,7 +12,7 @@ import attrs
 from ..errors import InputError
 from ..files import write_bytes
 from . import lattices, rules, toml_text
-from .assets import asset_root
+from .assets import asset_file, asset_names
 from .printed import as_printed
 from .quantity import PAPER, choice, describe, quantity
 
@@ -488,19 +488,12 @@ def write_unit(unit: Unit, path: str | Path) -> None:
 
 def preset_names() -> list[str]:
     """Names of the shipped presets, sorted."""
-    return sorted(path.stem for path in (asset_root() / "presets").glob("*.toml"))
+    return asset_names("presets")
 
 
 def load_preset(name: str) -> Unit:
     """The shipped unit of that name; InputError lists the names there are."""
-    names = preset_names()
-    if name not in names:
-        raise InputError(
-            f"there is no preset {name!r}{toml_text.nearest(name, names)}",
-            "preset",
-            f"choose one of {', '.join(names)}, or give the path of a TOML file",
-        )
-    return read_unit(asset_root() / "presets" / f"{name}.toml")
+    return read_unit(asset_file("presets", "preset", name))
 
 
 def _attribute(section: Any) -> str:

@@ -4,15 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import multiprocessing
-import os
-import threading
 import warnings
-import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +20,12 @@ from ..fem.equilibrium import Equilibrium, State, rest
 from ..fem.kinematics import bending_angle_deg
 from ..fem.lattice_law import LatticeLaw
 from ..fem.trajectory import branches
-from ..files import write_npz
+from ..files import read_npz, write_npz
 from ..measured import Experiment
 from ..meshing.mesh import AXES
 from ..meshing.settings import MeshSettings
 from ..meshing.unit import mesh_unit
+from ..processes import end_with_parent, one_thread_each
 from .markers import Marker, attached, followed
 from .prediction.unit import KIND, UnitResponse, Variant
 from .unit_effects import EFFECTS, SMOOTH, Body, UnitEffect
@@ -373,7 +369,7 @@ def _solved(missing: dict[str, Run], workers: int, cache: Path | None) -> Iterat
     if not rest_:
         return
     context = multiprocessing.get_context("spawn")
-    with _one_thread_each(), ProcessPoolExecutor(workers, context, _start) as pool:
+    with one_thread_each(), ProcessPoolExecutor(workers, context, end_with_parent) as pool:
         waiting = {pool.submit(run, case, cache): key for key, case in rest_.items()}
         try:
             for done in as_completed(waiting):
@@ -388,34 +384,6 @@ def _solved(missing: dict[str, Run], workers: int, cache: Path | None) -> Iterat
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _start() -> None:
-    # A parent that was killed cannot end its workers.
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Processes started inside inherit these: with one a core, more threads each only get in the way."""
-    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
-
 def _path(cache: Path, key: str) -> Path:
     return cache / f"unit-{key}.npz"
 
@@ -424,11 +392,8 @@ def _stored(cache: Path | None, key: str, case: Run) -> Result | None:
     """A kept result, or None where there is none that can be read whole."""
     if cache is None:
         return None
-    try:
-        with np.load(_path(cache, key), allow_pickle=False) as stored:
-            values, why = stored["values"], str(stored["why"])
-    # What a changed byte can raise, depending on where in the archive it lies.
-    except (OSError, ValueError, EOFError, KeyError, NotImplementedError, zipfile.BadZipFile, zlib.error):
+    kept = read_npz(_path(cache, key))
+    if kept is None or not {"values", "why"} <= set(kept):
         return None
     shape = (1 + 3 * len(case.points), len(case.pressures_kPa))
-    return Result(values, why) if values.shape == shape else None
+    return Result(kept["values"], str(kept["why"])) if kept["values"].shape == shape else None

@@ -29,7 +29,7 @@ def _tensor(values: ArrayLike) -> Array:
 
 
 @attrs.frozen(eq=False)
-class Effective:
+class Elasticity:
     """Effective elasticity of a lattice with three mirror planes: C (6, 6) in MPa, in Voigt's notation.
 
     Order xx, yy, zz, yz, xz, xy with engineering shears; entries that vanish by symmetry are 0.
@@ -127,7 +127,7 @@ def young_modulus(C: Array, directions: ArrayLike) -> Array:
     return np.asarray(1 / np.einsum("ka,ab,kb->k", stress, np.linalg.inv(C), stress))
 
 
-def effective_tensor(mesh: Mesh, materials: Materials, box: Sequence[float] | None = None) -> Effective:
+def effective_tensor(mesh: Mesh, materials: Materials, box: Sequence[float] | None = None) -> Elasticity:
     """Effective elasticity of the periodic body of which a mesh is one eighth, [0, box] mm; see Octant.
 
     Its mirror images in the six sides must make up the body. Energies of the exact small-strain solutions
@@ -150,12 +150,12 @@ def effective_tensor(mesh: Mesh, materials: Materials, box: Sequence[float] | No
         u = affine - part.solve(force)
         C[np.ix_(rows, rows)] = u.T @ (K @ u) / octant.volume
         limit[np.ix_(rows, rows)] = affine.T @ force / octant.volume
-    found = Effective((C + C.T) / 2, octant.relative_density)
+    found = Elasticity((C + C.T) / 2, octant.relative_density)
     _require_possible(found, octant, (limit + limit.T) / 2)
     return found
 
 
-def _require_possible(found: Effective, octant: Octant, limit: Array) -> None:
+def _require_possible(found: Elasticity, octant: Octant, limit: Array) -> None:
     """Raise MeshingError for a tensor that is indefinite, or above Voigt's or Hashin-Shtrikman's bound."""
     if np.linalg.eigvalsh(found.C).min() <= 0:
         raise _impossible("is not positive definite")

@@ -11,7 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..design.assets import asset_root
+from ..design.assets import asset_file, asset_names
 from ..design.toml_text import nearest, parse, place
 from ..errors import InputError
 from ..fem import laws
@@ -144,19 +144,12 @@ class Material:
 
 def material_names() -> list[str]:
     """Names of the shipped materials, sorted."""
-    return sorted(path.stem for path in (asset_root() / "materials").glob("*.toml"))
+    return asset_names("materials")
 
 
 def load_material(name: str) -> Material:
     """The shipped material of that name; InputError lists the names there are."""
-    names = material_names()
-    if name not in names:
-        raise InputError(
-            f"there is no material {name!r}{nearest(name, names)}",
-            "material",
-            f"choose one of {', '.join(names)}, or give the path of a TOML file",
-        )
-    return read_material(asset_root() / "materials" / f"{name}.toml")
+    return read_material(asset_file("materials", "material", name))
 
 
 def read_material(path: str | Path) -> Material:

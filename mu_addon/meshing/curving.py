@@ -7,6 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from .harmonic import harmonic
 from .mesh import LATTICE, MEMBRANE, TET_EDGES, Array, Mesh
 from .quality import GAUSS, folded_corners, shapes
 
@@ -42,21 +43,9 @@ def _harmonic(nodes: Array, tets: Array, moved: Array, held: Array) -> Array:
     tets (m, 10) are straight-sided. The medium is stiffer where elements are small, as in Persson and
     Peraire, AIAA 2009-949.
     """
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.linalg import splu
-
     _, gradient = shapes(GAUSS, TET_EDGES, 2)
     x = nodes[tets[:, :4]]
     slopes = np.einsum("qnr,mrd->mqnd", gradient, np.linalg.inv((x[:, 1:] - x[:, :1]).transpose(0, 2, 1)))
     # Not weighed by the elements' volumes, so that small ones are the stiff ones.
     local = np.einsum("mqad,mqbd->mab", slopes, slopes)
-    rows, columns = np.repeat(tets, 10, axis=1).ravel(), np.tile(tets, (1, 10)).ravel()
-    matrix = csr_matrix((local.ravel(), (rows, columns)), shape=(len(nodes), len(nodes)))
-    result = np.where(held, moved, 0.0)
-    in_use = np.zeros(len(nodes), bool)
-    in_use[tets] = True
-    for axis in range(3):
-        free = np.flatnonzero(in_use & ~held[:, axis])
-        load = -(matrix[free] @ result[:, axis])
-        result[free, axis] = splu(matrix[free][:, free].tocsc()).solve(load)
-    return result
+    return harmonic(len(nodes), tets, local, moved, held)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..design.parameters import Dimensions, Unit
 from ..errors import MeshingError
+from .harmonic import harmonic
 from .membrane import Membrane, Meridian, division, membrane_mesh, stations
 from .mesh import LATTICE, MEMBRANE, TET_EDGES, Array, Mesh, edge_keys, edges_of
 from .quality import check_positive
@@ -104,23 +105,11 @@ def _middles(mesh: Mesh, membrane: Membrane) -> Array:
 
 def _followed(nodes: Array, tets: Array, moved: Array, held: Array) -> Array:
     """Displacements (n, 3): `moved` where `held` (n, 3), harmonic in linear tets (m, 4), small ones stiff."""
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.linalg import splu
-
     x = nodes[tets]
     inverse = np.linalg.inv(x[:, 1:] - x[:, :1]).transpose(0, 2, 1)
     slopes = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
     local = np.einsum("mad,mbd->mab", slopes, slopes)
-    rows, columns = np.repeat(tets, 4, axis=1).ravel(), np.tile(tets, (1, 4)).ravel()
-    matrix = csr_matrix((local.ravel(), (rows, columns)), shape=(len(nodes), len(nodes)))
-    result = np.where(held, moved, 0.0)
-    in_use = np.zeros(len(nodes), bool)
-    in_use[tets] = True
-    for axis in range(3):
-        free = np.flatnonzero(in_use & ~held[:, axis])
-        load = -(matrix[free] @ result[:, axis])
-        result[free, axis] = splu(matrix[free][:, free].tocsc()).solve(load)
-    return result
+    return harmonic(len(nodes), tets, local, moved, held)
 
 
 def _failed(why: str) -> MeshingError:

@@ -144,7 +144,7 @@ def _add_fit_material(commands: argparse._SubParsersAction[_Parser]) -> None:
         epilog="example: run.py fit-material my-coupons --out out/resin",
     )
     command.add_argument("folder", metavar="FOLDER", help="measured data: experiments.toml and its CSV files")
-    command.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
+    _add_results(command)
     command.add_argument(
         "--laws",
         nargs="+",
@@ -165,7 +165,6 @@ def _add_fit_material(commands: argparse._SubParsersAction[_Parser]) -> None:
         default="absolute",
         help="residuals as a share of their test's largest stress, or of the stress itself (absolute)",
     )
-    command.add_argument("--json", action="store_true", help="one JSON message a line on standard output")
     command.set_defaults(stages=())
 
 
@@ -201,12 +200,16 @@ def _add_design_experiments(commands: argparse._SubParsersAction[_Parser]) -> No
     command.set_defaults(stages=())
 
 
+def _add_results(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
+    command.add_argument("--json", action="store_true", help="one JSON message a line on standard output")
+
+
 def _add_unit(command: argparse.ArgumentParser, required: bool = True) -> None:
     which = command.add_mutually_exclusive_group(required=required)
     which.add_argument("--preset", metavar="NAME", help="a preset: mu-0.75x, mu-1.0x, mu-1.5x")
     which.add_argument("--unit", metavar="FILE", help="a unit's parameters, TOML")
-    command.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
-    command.add_argument("--json", action="store_true", help="one JSON message a line on standard output")
+    _add_results(command)
 
 
 def _add_model(command: argparse.ArgumentParser) -> None:

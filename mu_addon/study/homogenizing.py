@@ -19,8 +19,7 @@ from ..homogenize.cell_mesh import CellMeshSettings, cell_materials, cell_mesh
 from ..homogenize.compression import STRAINS, Compressed, Compression, Friction, compress
 from ..homogenize.curve import Curve
 from ..homogenize.effective import Effective, effective, write_effective
-from ..homogenize.elasticity import Effective as Elasticity
-from ..homogenize.elasticity import effective_tensor
+from ..homogenize.elasticity import Elasticity, effective_tensor
 from ..homogenize.foam_fit import FoamFit, fit_foam
 from ..homogenize.modulus import moduli
 from ..homogenize.specimen import Specimen, specimen

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import signal
 import threading
 from collections.abc import Iterator, Sequence
@@ -24,6 +23,7 @@ from ..meshing.mesh import Mesh
 from ..placement.candidates import Candidate, roi
 from ..placement.inclusion import sensor_share
 from ..placement.sweep import Sweep
+from ..processes import end_with_parent, one_thread_each
 
 Array = np.ndarray[Any, Any]
 
@@ -67,16 +67,8 @@ _evaluator: Evaluator | None = None
 
 def _start(setting: Setting) -> None:
     global _evaluator
-    # A parent that was killed cannot end its workers.
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     _evaluator = Evaluator(setting, threads=1)
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def _work(state: State) -> Array:
@@ -112,22 +104,6 @@ def _ctrl_c_ignored() -> Iterator[None]:
 
 
 @contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Children inherit these: with a process a core, more threads a process only get in each other's way."""
-    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
-
-@contextmanager
 def _worker_errors() -> Iterator[None]:
     try:
         yield
@@ -154,7 +130,7 @@ class Sweeper:
             self._submitted[state.pressure_MPa] = self._submit(_work, state)
 
     def _submit(self, work: Any, *arguments: Any) -> Future[Array]:
-        with _one_thread_each():
+        with one_thread_each():
             _survive_broken_pipes()
             if self._pool is None:
                 context = multiprocessing.get_context("spawn")

@@ -10,8 +10,8 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from mu_addon.design.lattices import LatticeKind, constant
-from mu_addon.fem.materials import Layer, Materials
 from mu_addon.fem.model import Model
+from mu_addon.homogenize.specimen import repeated
 from mu_addon.meshing.mesh import boundary_faces
 from mu_addon.meshing.tiling import tiled
 from tests.fem import bodies
@@ -38,22 +38,6 @@ def isotropic(bulk, shear):
 
 def bulk_and_shear(young, poisson):
     return young / (3 * (1 - 2 * poisson)), young / (2 * (1 + poisson))
-
-
-def repeated(materials, elements, copies):
-    """The materials of an octant for its copies, one after another."""
-    starts = elements * np.arange(copies)[:, None]
-    return Materials(
-        tuple(
-            Layer(
-                a.law,
-                (starts + a.elements).ravel(),
-                np.tile(a.parameters, (copies, 1)),
-                np.tile(a.weight, copies),
-            )
-            for a in materials.layers
-        )
-    )
 
 
 def ties(nodes, period):

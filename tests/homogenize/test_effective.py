@@ -14,7 +14,7 @@ from mu_addon.homogenize.effective import (
     read_effective,
     write_effective,
 )
-from mu_addon.homogenize.elasticity import Effective as Tensor
+from mu_addon.homogenize.elasticity import Elasticity as Tensor
 from mu_addon.homogenize.foam_fit import FoamFit, Misfit
 
 from .lattice_laws import body_centred

@@ -14,7 +14,7 @@ from mu_addon.fem.laws import Cubic
 from mu_addon.fem.materials import Materials
 from mu_addon.homogenize.bounds import hashin_shtrikman
 from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, cell_mesh
-from mu_addon.homogenize.elasticity import Effective, effective_tensor, young_modulus
+from mu_addon.homogenize.elasticity import Elasticity, effective_tensor, young_modulus
 from tests.fem import bodies
 
 from . import cells
@@ -140,7 +140,7 @@ def test_a_body_centred_lattice_bends_or_stretches_with_direction(tmp_path):
     runs = slender(kind("body-centred-straight"), radii, 10.0, tmp_path)
     density = np.array([e.relative_density for _, e in runs])
     E100, E111 = (np.array([getattr(e, name) for _, e in runs]) for name in ("E100", "E111"))
-    beams = [Effective(cells.body_centred_by_beams(c, 1.0, 0.3)) for c, _ in runs]
+    beams = [Elasticity(cells.body_centred_by_beams(c, 1.0, 0.3)) for c, _ in runs]
     bending, stretching = (np.diff(np.log(E)) / np.diff(np.log(density)) for E in (E100, E111))
     # Struts merge at joints, which shortens them by about their radius: exponents are off by as much.
     assert (np.diff(bending) < 0).all()
@@ -189,7 +189,7 @@ def test_a_lattice_stays_below_its_bounds(midspan, ratio, poisson):
 
 
 def test_youngs_modulus_by_direction():
-    cubic = Effective(np.diag([3.0, 3, 3, 2, 2, 2]) + np.pad(np.ones((3, 3)), (0, 3)))
+    cubic = Elasticity(np.diag([3.0, 3, 3, 2, 2, 2]) + np.pad(np.ones((3, 3)), (0, 3)))
     assert cubic.young_modulus([[1, 0, 0], [0, 0, 5]]) == pytest.approx(cubic.E100)
     assert cubic.young_modulus([[1, 1, 0]])[0] == pytest.approx(cubic.E110)
     assert cubic.young_modulus([[2, -2, 2]])[0] == pytest.approx(cubic.E111)

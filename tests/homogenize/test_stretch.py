@@ -14,6 +14,7 @@ from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, cell_mesh
 from mu_addon.homogenize.elasticity import effective_tensor
+from mu_addon.homogenize.specimen import repeated
 from mu_addon.homogenize.stretch import Stretching, StretchSettings, stretch
 from mu_addon.meshing.tiling import tiled, tiled_displacement
 from tests.fem import bodies
@@ -93,7 +94,7 @@ def test_its_images_are_in_equilibrium_as_a_periodic_body(lattice):
     whole = attrs.evolve(whole, base=whole.base[:0])
     u = tiled_displacement(mesh, point.u, (2, 2, 2), box, box * point.stretch)
     model = Model(whole)
-    force = model.residual(u, 0.0, model.parameters(cells.repeated(materials, len(mesh.tets), 8)))
+    force = model.residual(u, 0.0, model.parameters(repeated(materials, len(mesh.tets), 8)))
     tied = np.zeros_like(force)
     np.add.at(tied, cells.ties(whole.nodes, 2 * box), force)
     assert np.abs(force).max() > 1e-3 * np.abs(point.stress_MPa).max() * box[0] ** 2
