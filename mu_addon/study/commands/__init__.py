@@ -1,0 +1,27 @@
+"""The subcommands of the command line, a module each.
+
+Each has `add(commands)`, which adds its parser and may import nothing heavy; `run(options, progress,
+ending)`, which does the work; and `answer(summary)`, the lines that end a run at a terminal.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+
+# In the order in which --help lists them; a module's name is its command's, with _ for -.
+NAMES = (
+    "presets",
+    "design",
+    "simulate",
+    "place",
+    "homogenize",
+    "fit_material",
+    "diagnose",
+    "design_experiments",
+)
+
+
+def all_commands() -> dict[str, ModuleType]:
+    """Every subcommand's module by the subcommand's name."""
+    return {name.replace("_", "-"): import_module(f".{name}", __name__) for name in NAMES}

@@ -1,0 +1,138 @@
+"""What `design`, `simulate` and `place` share: a study of one unit, and the stages of it that are run."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .options import modelled_unit
+
+if TYPE_CHECKING:
+    from ..ending import Ending
+    from ..progress import Progress
+    from ..study import Study
+
+EXAMPLE = "example: run.py place --preset mu-1.0x --out out/mu-1.0x"
+
+
+def add_solid(command: argparse.ArgumentParser) -> None:
+    """How fine the STL is."""
+    command.add_argument(
+        "--quality",
+        choices=("interactive", "export"),
+        default="interactive",
+        help="facets of the STL (interactive)",
+    )
+
+
+def add_simulation(command: argparse.ArgumentParser) -> None:
+    """Protocol, mesh and material of a simulation."""
+    command.add_argument(
+        "--protocol", metavar="CSV", help="time_s,pressure_kPa (the grasp that comes with it)"
+    )
+    command.add_argument("--order", type=int, choices=(1, 2), default=2, help="order of the elements (2)")
+    command.add_argument(
+        "--refine", type=float, default=1.0, metavar="F", help="divides every element size (1)"
+    )
+    command.add_argument(
+        "--lattice",
+        metavar="FILE",
+        help="effective.toml of `homogenize`: the lattice's law, from its struts and resin, kept in the "
+        "results (without it the unit's material.lattice_modulus_kPa and lattice_poisson, neo-Hookean)",
+    )
+    command.add_argument("--times", type=int, default=13, metavar="K", help="samples of the protocol (13)")
+    command.add_argument(
+        "--mesher", choices=("auto", "gmsh", "pytetwild"), default="auto", help="who makes the mesh (auto)"
+    )
+
+
+def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    """Run the stages that `options.stages` names, and publish what they found."""
+    from ..publish import publish
+
+    study = _open(options, progress, ending)
+    ending.on_stop = lambda reason: publish(study, reason["what"])
+    _run(study, options)
+
+
+def _open(options: argparse.Namespace, progress: Progress, ending: Ending) -> Study:
+    from ...homogenize.effective import read_effective
+    from ...meshing.settings import MeshSettings
+    from ...placement.graph import Limits
+    from ..job import Job, protocol_of
+    from ..study import Study
+
+    unit = modelled_unit(options, progress, ending)
+    extra: dict[str, Any] = {}
+    if "simulate" in options.stages:
+        extra = {
+            "mesh": MeshSettings(order=options.order, refine=options.refine),
+            "times": options.times,
+            "mesher": options.mesher,
+            "lattice": None if options.lattice is None else read_effective(options.lattice),
+        }
+    if "place" in options.stages:
+        rules = ("intersect", "volume_fraction") if options.rule == "both" else (options.rule,)
+        extra |= {
+            "stations": options.stations,
+            "rules": rules,
+            "workers": options.workers,
+            "mesh_check": options.mesh_check,
+            "paths": options.paths,
+            "limits": Limits(options.shortest_cells, options.longest_cells, options.bend_deg),
+            "most_checks": options.checks,
+        }
+    protocol = protocol_of(getattr(options, "protocol", None))
+    job = Job(unit=unit, protocol=protocol, quality=options.quality, **extra)
+    return Study.open(job, Path(options.out), progress, ending)
+
+
+def _run(study: Study, options: argparse.Namespace) -> None:
+    from ...design.anchors import window
+    from ..publish import publish
+
+    # An unknown path is found out before an hour's work, not after.
+    path = window(study.job.unit, options.path) if getattr(options, "path", None) is not None else None
+    if study.job.paths == "graph":
+        from ..graph_search import chains_within
+
+        chains_within(study.job)
+    study.design()
+    if path is not None:
+        study.design(path)
+    if "simulate" in options.stages:
+        study.make_mesh()
+        study.simulate(candidates_beside="place" in options.stages)
+    if "place" in options.stages:
+        from ..graph_search import search_graph, sensitivity_map
+
+        chosen = study.place()
+        sensitivity_map(study)
+        if study.job.paths == "graph":
+            search_graph(study)
+        study.design(window(study.job.unit, chosen[study.headline_rule]))
+    publish(study)
+
+
+def answer(summary: dict[str, Any]) -> list[str]:
+    """Angles, chosen paths and the best of a search, as far as the stages went."""
+    lines = []
+    angles = summary.get("angle_deg")
+    if isinstance(angles, dict):
+        ends = sorted((float(p), a) for p, a in angles.items())
+        lines.append("angle: " + ", ".join(f"{a:+.1f} deg at {p:g} kPa" for p, a in (ends[0], ends[-1])))
+    chosen = summary.get("chosen")
+    if isinstance(chosen, dict):
+        J, tied = summary["J_hat_mm"], summary["tied_with_chosen"]
+        for rule, name in chosen.items():
+            equal = f", tied with {', '.join(tied[rule])}" if tied[rule] else ""
+            lines.append(f"{rule}: {name}, J_hat {J[rule][name]:.4f} mm{equal}")
+    search = summary.get("search")
+    if isinstance(search, dict):
+        best = search["best"]
+        lines.append(
+            f"whole lattice, {search['rule']}: {best['name']}, J_hat {best['J_hat_mm']:.4f} mm, "
+            f"{best['length_mm']:.1f} mm long; {search['checked']} of {search['paths']} paths were solved"
+        )
+    return lines
