@@ -86,12 +86,18 @@ def quality(mesh: Mesh, unit: Unit) -> Quality:
     )
 
 
-def check_positive(mesh: Mesh) -> None:
-    """Raise MeshingError, with number and place, if any element is inverted at a Gauss point."""
+def inverted(mesh: Mesh) -> Array:
+    """Indices (k,) of the elements that are inverted at a Gauss point, the worst first."""
     determinants = _determinants(mesh, GAUSS).min(axis=1)
     bad = np.flatnonzero(~(determinants > 0))
+    return np.asarray(bad[np.argsort(determinants[bad], kind="stable")])
+
+
+def check_positive(mesh: Mesh) -> None:
+    """Raise MeshingError, with number and place, if any element is inverted at a Gauss point."""
+    bad = inverted(mesh)
     if len(bad):
-        worst = bad[np.argmin(determinants[bad])]
+        worst = bad[0]
         centre = mesh.nodes[mesh.corners[worst]].mean(axis=0)
         region = "membrane" if mesh.region[worst] == MEMBRANE else "lattice"
         raise MeshingError(

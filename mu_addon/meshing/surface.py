@@ -7,7 +7,6 @@ import hashlib
 import sys
 import tempfile
 import types
-import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,11 +15,13 @@ import attrs
 import numpy as np
 
 from ..errors import InputError, MeshingError
-from ..files import write_npz
+from ..files import read_npz, write_npz
 from .mesh import LATTICE, Array, Mesh, boundary_faces, edges_of, oriented, second_order
-from .quality import check_positive
+from .quality import check_positive, inverted
 
 VOID = 0
+# Without a seed pytetwild gives another mesh each time; a sliver on a side made flat is bad luck.
+_ATTEMPTS = 4
 
 
 @attrs.frozen(eq=False)
@@ -64,15 +65,32 @@ def mesh_surface(
     points = np.vstack([s.vertices for s in surfaces])
     faces = np.vstack([s.triangles + start for s, start in zip(surfaces, starts, strict=False)])
     epsilon = edge_mm / 50 if epsilon_mm is None else epsilon_mm
-    nodes, tets = _cached(cache, points, faces.astype(np.int32), edge_mm, epsilon)
-    tets = oriented(nodes, tets)
+    for attempt in range(_ATTEMPTS):
+        nodes, tets = _cached(cache, points, faces.astype(np.int32), edge_mm, epsilon, anew=attempt > 0)
+        mesh = _labelled(nodes, oriented(nodes, tets), surfaces, classify, epsilon, order, symmetry)
+        if not len(inverted(mesh)):
+            break
+    check_positive(mesh)
+    return mesh
 
+
+def _labelled(
+    nodes: Array,
+    tets: Array,
+    surfaces: Sequence[Surface],
+    classify: Callable[[Array], Array] | None,
+    epsilon: float,
+    order: int,
+    symmetry: tuple[str, ...],
+) -> Mesh:
+    """The tetrahedra inside the first surface, without voids, labelled, and flat where its box is."""
+    outer, *inside = surfaces
     tets = tets[winding_number(outer, nodes[tets].mean(axis=1)) > 0.5]
     centroids = nodes[tets].mean(axis=1)
     if classify is not None:
         label = np.asarray(classify(centroids))
     else:
-        label = np.full(len(tets), region)
+        label = np.full(len(tets), outer.region)
         for surface in inside:
             label[winding_number(surface, centroids) > 0.5] = surface.region
     kept = label != VOID
@@ -95,9 +113,7 @@ def mesh_surface(
         edges, _ = edges_of(tets)
         nodes, tets, cavity = second_order(nodes, tets, cavity, nodes[edges].mean(axis=1))
     base, tip = (np.flatnonzero(nodes[:, 2] == z) for z in bounds[:, 2])
-    mesh = Mesh(nodes, tets, label[kept], cavity, base, tip, symmetry)
-    check_positive(mesh)
-    return mesh
+    return Mesh(nodes, tets, label[kept], cavity, base, tip, symmetry)
 
 
 def winding_number(surface: Surface, points: Array) -> Array:
@@ -137,16 +153,17 @@ def _flatten(nodes: Array, faces: Array, column: int, plane: float, epsilon: flo
 
 
 def _cached(
-    cache: Path | None, points: Array, faces: Array, edge: float, epsilon: float
+    cache: Path | None, points: Array, faces: Array, edge: float, epsilon: float, *, anew: bool
 ) -> tuple[Array, Array]:
-    """pytetwild's nodes and tets for an input, from the cache folder if it holds them."""
+    """pytetwild's nodes and tets for an input, from the cache folder if it holds them, or made `anew`."""
     if cache is None:
         return _tetrahedralize(points, faces, edge, epsilon)
     digest = hashlib.sha256(repr((points.shape, faces.shape, edge, epsilon, _version())).encode())
     digest.update(np.ascontiguousarray(points).tobytes())
     digest.update(np.ascontiguousarray(faces).tobytes())
     path = Path(cache) / f"tetwild-{digest.hexdigest()[:32]}.npz"
-    with contextlib.suppress(OSError, ValueError, KeyError, zipfile.BadZipFile), np.load(path) as stored:
+    stored = None if anew else read_npz(path)
+    if stored is not None and {"nodes", "tets"} <= stored.keys():
         return stored["nodes"], stored["tets"]
     nodes, tets = _tetrahedralize(points, faces, edge, epsilon)
     write_npz(path, {"nodes": nodes, "tets": tets})

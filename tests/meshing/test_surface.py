@@ -89,6 +89,20 @@ def test_the_cache_makes_it_repeatable(tmp_path: Path) -> None:
     assert len(list(tmp_path.iterdir())) == 2
 
 
+def test_a_flat_element_is_bad_luck_and_meshed_again(tmp_path: Path) -> None:
+    ball = sphere(10.0)
+    mesh_surface(ball.vertices, ball.faces, 4.0, cache=tmp_path)
+    (file,) = tmp_path.glob("tetwild-*.npz")
+    stored = dict(np.load(file))
+    bottom, *_, top = stored["tets"][0]
+    stored["nodes"][top] = stored["nodes"][bottom]
+    np.savez(file, **stored)
+    mesh = mesh_surface(ball.vertices, ball.faces, 4.0, cache=tmp_path)
+    assert element_volumes(mesh).min() > 1e-3
+    again = mesh_surface(ball.vertices, ball.faces, 4.0, cache=tmp_path)
+    np.testing.assert_array_equal(again.nodes, mesh.nodes)
+
+
 def test_nothing_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     ball = sphere(5.0, 1)
