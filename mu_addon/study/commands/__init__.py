@@ -19,6 +19,10 @@ NAMES = (
     "fit_material",
     "diagnose",
     "design_experiments",
+    "ports",
+    "stream",
+    "record",
+    "replay",
 )
 
 

@@ -1,0 +1,1 @@
+"""The real sensor: its optics, its calibration, and the serial line that it speaks on."""

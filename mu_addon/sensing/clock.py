@@ -1,0 +1,77 @@
+"""Clocks: a counter that wraps made endless, and a device's time told in the host's."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, Any]
+
+
+class Endless:
+    """Readings of a counter that begins again at `modulus`, as one that never does.
+
+    A reading less than half the modulus ahead of the last is later; anything else came out of order, or its
+    counter was set back.
+    """
+
+    def __init__(self, modulus: int | None) -> None:
+        self.modulus = modulus
+        self.last: float | None = None
+
+    def ahead(self, reading: float, expected: float = 0.0) -> float:
+        """How far a reading is ahead of the last one, negative if behind; `expected` counts whole turns.
+
+        expected: how many counts should have passed since, from another clock; only turns are taken from it.
+        """
+        if self.last is None:
+            return 0.0
+        if self.modulus is None:
+            return reading - self.last
+        turn = self.modulus
+        diff = (reading - self.last) % turn
+        if expected > turn / 2:
+            return float(diff + turn * max(0, round((expected - diff) / turn)))
+        return float(diff if diff < turn / 2 else diff - turn)
+
+
+class HostTime:
+    """Device time told in the host's, by the messages that were delayed least.
+
+    A message is never early: host minus device time, seen when it arrives, is their offset plus a delay. The
+    least of each second lies near the offset, which drifts along a straight line as the two crystals differ;
+    the line is fitted through the last half minute and lowered until no message is early.
+    """
+
+    bin_s = 1.0
+    bins = 30
+
+    def __init__(self) -> None:
+        self._least: deque[tuple[float, float]] = deque(maxlen=self.bins)
+        self._slope, self._offset, self._origin = 0.0, 0.0, 0.0
+
+    def learn(self, device_s: float, host_s: float) -> None:
+        """Take in one arrival: device time of the newest sample of a message, and host time; both in s."""
+        delta = host_s - device_s
+        if self._least and device_s - self._least[-1][0] < self.bin_s:
+            if delta >= self._least[-1][1]:
+                return
+            self._least[-1] = (self._least[-1][0], delta)
+        else:
+            self._least.append((device_s, delta))
+        t, d = np.array(self._least).T
+        self._origin = float(t[-1])
+        self._slope = 0.0
+        if len(t) >= 5:
+            self._slope = float(np.polyfit(t - t[-1], d, 1)[0])
+        self._offset = float((d - self._slope * (t - self._origin)).min())
+
+    def of(self, device_s: Array) -> Array:
+        """Host times (n,) in s of device times (n,) in s."""
+        return device_s + self._offset + self._slope * (device_s - self._origin)
+
+    def restart(self) -> None:
+        """Forget everything: the device's clock was set back."""
+        self._least.clear()

@@ -1,0 +1,199 @@
+"""Recordings of a sensor: CSV that any program reads, written so that a crash loses next to nothing.
+
+A recording is a folder: recording-000.csv with the columns time_s, device_s, sequence and one a channel
+(another file begins when the device's channels change), and index.ndjson, which says what the files hold,
+with a line for every event (connected, lost, format, mark) and one a second with row, byte and counters. Rows
+reach the operating system with every batch, and the disk once a second: a killed process loses none of those,
+a power cut a second.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import IO, Any
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+from ..files import make_folder, output_error, plain
+from .decoder import Samples
+
+Array = np.ndarray[Any, Any]
+
+FIXED = ("time_s", "device_s", "sequence")
+INDEX = "index.ndjson"
+VERSION = 1
+_SYNC_S = 1.0
+
+
+def columns_of(samples: Samples) -> tuple[str, ...]:
+    """Columns that samples of this layout fill, units in the names."""
+    unit = f"_{samples.layout.unit}" if samples.layout.unit else ""
+    return (*FIXED, *(f"{name.strip().replace(' ', '_')}{unit}" for name in samples.layout.channels))
+
+
+class Recorder:
+    """Writes one recording; `folder` must not hold one. Raises InputError and OutputError."""
+
+    def __init__(self, folder: Path, about: Mapping[str, Any]) -> None:
+        self.folder = make_folder(folder)
+        if (folder / INDEX).exists():
+            raise InputError(
+                "that folder holds a recording already",
+                str(folder),
+                "choose another folder: none is overwritten",
+            )
+        self.rows = 0
+        self._file: IO[bytes] | None = None
+        self._columns: tuple[str, ...] = ()
+        self._number = -1
+        self._row = 0
+        self._synced = self._indexed = -np.inf
+        try:
+            self._index = (folder / INDEX).open("ab", buffering=0)
+        except OSError as error:
+            raise output_error(error, folder / INDEX) from error
+        self._say({"type": "recording", "version": VERSION, **about})
+
+    def write(self, samples: Samples, start_s: float) -> None:
+        """Append samples, host times counted from start_s; they are the system's when this returns."""
+        columns = columns_of(samples)
+        if columns != self._columns:
+            self._begin(columns)
+        rows = (
+            f"{t:.6f},{d:.6f},{n:d},{','.join(map(repr, v))}\n"
+            for t, d, n, v in zip(
+                (samples.host_s - start_s).tolist(),
+                samples.device_s.tolist(),
+                samples.sequence.tolist(),
+                samples.values.tolist(),
+                strict=True,
+            )
+        )
+        self._write("".join(rows).encode())
+        self._row += len(samples)
+        self.rows += len(samples)
+
+    def tick(self, time_s: float, counters: Mapping[str, int]) -> None:
+        """Once a second of time_s: where the file is, into the index, and everything to the disk."""
+        if time_s - self._indexed < _SYNC_S:
+            return
+        self._indexed = time_s
+        place = 0 if self._file is None else self._file.tell()
+        self._say({"type": "place", "time_s": time_s, "row": self._row, "byte": place, **counters})
+        self._sync()
+
+    def event(self, name: str, time_s: float, **details: Any) -> None:
+        """A line in the index: what happened, when in s from the start, and details of it."""
+        self._say({"type": "event", "event": name, "time_s": round(time_s, 6), "row": self._row, **details})
+
+    def close(self) -> None:
+        """Everything to the disk, and the end."""
+        self._sync()
+        if self._file is not None:
+            self._file.close()
+        self._index.close()
+
+    def _begin(self, columns: tuple[str, ...]) -> None:
+        if self._file is not None:
+            self._sync()
+            self._file.close()
+        self._number += 1
+        self._row, self._columns = 0, columns
+        path = self.folder / f"recording-{self._number:03d}.csv"
+        try:
+            self._file = path.open("ab", buffering=0)
+        except OSError as error:
+            raise output_error(error, path) from error
+        self._write((",".join(columns) + "\n").encode())
+        self._say({"type": "file", "file": path.name, "columns": columns})
+
+    def _write(self, data: bytes) -> None:
+        assert self._file is not None
+        try:
+            # An unbuffered file may take less than it is given.
+            while data:
+                data = data[self._file.write(data) or 0 :]
+        except OSError as error:
+            raise output_error(error, Path(self._file.name)) from error
+
+    def _say(self, message: Mapping[str, Any]) -> None:
+        try:
+            self._index.write(json.dumps(plain(message)).encode() + b"\n")
+        except OSError as error:
+            raise output_error(error, self.folder / INDEX) from error
+
+    def _sync(self) -> None:
+        for stream in (self._file, self._index):
+            if stream is not None:
+                try:
+                    os.fsync(stream.fileno())
+                except OSError as error:
+                    raise output_error(error, Path(stream.name)) from error
+
+
+@attrs.frozen(eq=False)
+class Recording:
+    """One file of a recording: columns by name, (n,) each, and the index's messages of the whole folder."""
+
+    columns: dict[str, Array]
+    messages: tuple[dict[str, Any], ...]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of what was measured."""
+        return tuple(name for name in self.columns if name not in FIXED)
+
+
+def read_recording(folder: Path) -> list[Recording]:
+    """The files of a recording in order; a last line cut by a crash is left out. Raises InputError."""
+    folder = Path(folder)
+    messages = []
+    try:
+        lines = (folder / INDEX).read_bytes().split(b"\n")
+    except OSError as error:
+        raise InputError(
+            f"no recording: {error.strerror}", str(folder), f"name a folder with {INDEX}"
+        ) from None
+    for line in lines:
+        try:
+            message = json.loads(line)
+        except ValueError:
+            continue
+        if isinstance(message, dict):
+            messages.append(message)
+    found = [_read_file(path, tuple(messages)) for path in sorted(folder.glob("recording-*.csv"))]
+    return [recording for recording in found if recording is not None]
+
+
+def _read_file(path: Path, messages: tuple[dict[str, Any], ...]) -> Recording | None:
+    try:
+        text = path.read_bytes().decode()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read {path.name}: {error}", str(path), "restore it from a copy") from None
+    head, _, body = text.partition("\n")
+    names = head.split(",")
+    whole = body[: body.rfind("\n") + 1]
+    if tuple(names[:3]) != FIXED or not whole:
+        return None
+    rows = [line.split(",") for line in whole.splitlines()]
+    try:
+        table = np.array([[float(cell) for cell in row] for row in rows]).reshape(len(rows), len(names))
+    except ValueError:
+        bad = next(k for k, row in enumerate(rows) if len(row) != len(names) or not _numbers(row))
+        raise InputError(
+            f"row {bad + 2} of {path.name} is not {len(names)} numbers", str(path), "remove or mend that row"
+        ) from None
+    return Recording(dict(zip(names, table.T, strict=True)), messages)
+
+
+def _numbers(row: list[str]) -> bool:
+    try:
+        [float(cell) for cell in row]
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,90 @@
+"""The latest samples in a file that one process writes and others look into; none waits for another."""
+
+from __future__ import annotations
+
+import mmap
+import struct
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+from ..files import output_error
+
+Array = np.ndarray[Any, Any]
+
+_MAGIC = b"mu-ring1"
+# Magic, columns, capacity, rows written so far.
+_HEAD = struct.Struct("<8sIIQ")
+_COUNT_AT = 16
+_START = 64
+
+
+@attrs.define(eq=False)
+class Ring:
+    """Rows (capacity, columns) of float64 in a mapped file; row k lies at k modulo capacity."""
+
+    rows: Array
+    _map: mmap.mmap
+
+    @classmethod
+    def create(cls, path: Path, columns: int, capacity: int = 1 << 16) -> Ring:
+        """A new, empty ring at `path`; raises OutputError."""
+        size = _START + 8 * columns * capacity
+        try:
+            with path.open("wb+") as stream:
+                stream.truncate(size)
+                mapped = mmap.mmap(stream.fileno(), size)
+        except OSError as error:
+            raise output_error(error, path) from error
+        mapped[: _HEAD.size] = _HEAD.pack(_MAGIC, columns, capacity, 0)
+        return cls(_rows(mapped, columns, capacity), mapped)
+
+    @classmethod
+    def attach(cls, path: Path) -> Ring:
+        """Look into the ring at `path`; raises InputError if it is none."""
+        try:
+            with path.open("rb") as stream:
+                mapped = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
+            magic, columns, capacity, _ = _HEAD.unpack_from(mapped)
+        except (OSError, ValueError, struct.error):
+            magic, columns, capacity = b"", 0, 0
+        if magic != _MAGIC or len(mapped) < _START + 8 * columns * capacity:
+            raise InputError("not the live data of a stream", str(path), "start the stream again")
+        return cls(_rows(mapped, columns, capacity), mapped)
+
+    @property
+    def written(self) -> int:
+        """Rows written since the beginning, most of them overwritten by now."""
+        return int(struct.unpack_from("<Q", self._map, _COUNT_AT)[0])
+
+    def append(self, rows: Array) -> None:
+        """Write rows (n, columns); the latest capacity of them remain."""
+        capacity, count = len(self.rows), self.written
+        kept = rows[-capacity:]
+        places = np.arange(count + len(rows) - len(kept), count + len(rows)) % capacity
+        self.rows[places] = kept
+        # Counted after they are there, so that who looks sees whole rows.
+        struct.pack_into("<Q", self._map, _COUNT_AT, count + len(rows))
+
+    def latest(self, n: int) -> Array:
+        """A copy (m, columns) of the last rows, at most n and at most half of the ring.
+
+        The other half is what the writer may overwrite while this copies.
+        """
+        count, capacity = self.written, len(self.rows)
+        m = min(n, count, capacity // 2)
+        return self.rows[np.arange(count - m, count) % capacity]
+
+    def close(self) -> None:
+        """Let go of the file."""
+        del self.rows
+        self._map.close()
+
+
+def _rows(mapped: mmap.mmap, columns: int, capacity: int) -> Array:
+    return np.frombuffer(mapped, dtype="<f8", count=columns * capacity, offset=_START).reshape(
+        capacity, columns
+    )

@@ -1,0 +1,287 @@
+"""One session with a sensor: read, record, then show; cut lines are waited for, ports given back on request.
+
+A thread does nothing but read the port, so that neither the disk nor whoever looks on can hold up the line.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..files import plain
+from .decoder import Decoder, Samples
+from .recording import Recorder, columns_of
+from .ring import Ring
+from .sources import Ended, Gone, Source
+
+Array = np.ndarray[Any, Any]
+Tell = Callable[[str, dict[str, Any]], None]
+# Values (n, c) in the channels' units -> further columns (n, d), shown beside them and not recorded.
+Derive = Callable[[tuple[str, ...], Array], tuple[tuple[str, ...], Array]]
+
+STATUS = "status.json"
+_STATUS_S = 0.2
+_BACK_OFF_S = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
+
+
+@attrs.define
+class Control:
+    """What others ask of a running session, from any thread: set a flag, or leave a mark."""
+
+    stop: threading.Event = attrs.field(factory=threading.Event)
+    pause: threading.Event = attrs.field(factory=threading.Event)
+    """While set, the port is given back; the session goes on when it is cleared."""
+    marks: queue.SimpleQueue[str] = attrs.field(factory=queue.SimpleQueue)
+
+
+@attrs.frozen
+class _Piece:
+    at: float
+    data: bytes = b""
+    event: str = ""
+    detail: str = ""
+
+
+def run_session(
+    source: Source,
+    folder: Path,
+    *,
+    about: Mapping[str, Any],
+    control: Control | None = None,
+    seconds: float | None = None,
+    derive: Derive | None = None,
+    keep_time: bool = False,
+    tell: Tell = lambda event, details: None,
+) -> dict[str, Any]:
+    """Record a source into `folder` until it ends, `seconds` have passed, or it is asked to stop.
+
+    Beside the recording, status.json says five times a second how it goes, and names the file of the latest
+    samples (a Ring: time_s, device_s, sequence, channels, what `derive` makes of them). `tell` hears of
+    events, and of "status" as often. keep_time: the source's clock is the time that is recorded, as for a
+    recording that is played again. Returns the last status. Raises InputError and OutputError.
+    """
+    control = control or Control()
+    clock = _Clock()
+    pieces: queue.SimpleQueue[_Piece] = queue.SimpleQueue()
+    recorder = Recorder(folder, {**about, "started": time.strftime("%Y-%m-%dT%H:%M:%S%z")})
+    view = _View(folder, recorder, clock.start, derive, keep_time, tell)
+    reader = threading.Thread(target=_read, args=(source, pieces, control, clock), daemon=True)
+    reader.start()
+    try:
+        running = True
+        while running:
+            running = _take(pieces, view, clock) and not control.stop.is_set()
+            while not control.marks.empty():
+                view.event("mark", clock.now(), text=control.marks.get())
+            if seconds is not None and clock.now() - clock.start >= seconds:
+                running = False
+            view.tick(clock.now())
+        control.stop.set()
+        reader.join(timeout=5.0)
+        while not pieces.empty():
+            _take(pieces, view, clock)
+        view.take(view.decoder.finish(clock.now()))
+        return view.end(clock.now())
+    finally:
+        control.stop.set()
+        recorder.close()
+
+
+class _Clock:
+    """Seconds since the epoch that never run backward, whatever is done to the computer's clock."""
+
+    def __init__(self) -> None:
+        self.start = time.time()
+        self._origin = time.perf_counter()
+
+    def now(self) -> float:
+        return self.start + time.perf_counter() - self._origin
+
+
+def _read(source: Source, pieces: queue.SimpleQueue[_Piece], control: Control, clock: _Clock) -> None:
+    """The reading thread: hands over what comes, and opens the line again whenever it is gone."""
+    connected, tries = False, 0
+    try:
+        while not control.stop.is_set():
+            if control.pause.is_set():
+                if connected:
+                    source.close()
+                    pieces.put(_Piece(clock.now(), event="paused"))
+                connected = False
+                time.sleep(0.02)
+                continue
+            try:
+                if not connected:
+                    words = source.open()
+                    connected, tries = True, 0
+                    pieces.put(_Piece(clock.now(), event="connected", detail=words))
+                data = source.read()
+            except Gone as gone:
+                source.close()
+                if connected or tries == 0:
+                    event = "disconnected" if connected else "waiting"
+                    pieces.put(_Piece(clock.now(), event=event, detail=str(gone)))
+                connected = False
+                control.stop.wait(_BACK_OFF_S[min(tries, len(_BACK_OFF_S) - 1)])
+                tries += 1
+                continue
+            if data:
+                pieces.put(_Piece(clock.now(), data))
+        source.close()
+    except Ended:
+        pieces.put(_Piece(clock.now(), event="ended"))
+    # Whatever else stops the reading ends the session with its own words.
+    except Exception as error:  # noqa: BLE001 - handed to the thread that can raise it
+        pieces.put(_Failure(clock.now(), error=error))
+
+
+@attrs.frozen
+class _Failure(_Piece):
+    error: Exception = attrs.field(kw_only=True)
+
+
+def _take(pieces: queue.SimpleQueue[_Piece], view: _View, clock: _Clock) -> bool:
+    """Decode, record and show what has come, waiting a little; False at the end."""
+    try:
+        piece = pieces.get(timeout=0.05)
+    except queue.Empty:
+        return True
+    while True:
+        if isinstance(piece, _Failure):
+            raise piece.error
+        if piece.event:
+            if piece.event in ("disconnected", "paused"):
+                view.decoder.interrupted()
+            view.event(piece.event, piece.at, detail=piece.detail)
+            if piece.event == "ended":
+                return False
+        if piece.data:
+            view.take(view.decoder.feed(piece.data, piece.at))
+        try:
+            piece = pieces.get_nowait()
+        except queue.Empty:
+            return True
+
+
+class _View:
+    """What a session shows: the recorder first, then ring and status."""
+
+    def __init__(
+        self,
+        folder: Path,
+        recorder: Recorder,
+        start: float,
+        derive: Derive | None,
+        keep_time: bool,
+        tell: Tell,
+    ) -> None:
+        self.decoder = Decoder()
+        self.folder, self.recorder, self.start = folder, recorder, start
+        self.derive, self.keep_time, self.tell = derive, keep_time, tell
+        self.state, self.port = "searching", ""
+        self.reconnects = -1
+        self._ring: Ring | None = None
+        self._ring_name, self._rings = "", 0
+        self._columns: tuple[str, ...] = ()
+        self._latest: Array = np.empty(0)
+        self._format: str | None = None
+        self._said = -np.inf
+        self._rate: list[tuple[float, int]] = []
+
+    def take(self, groups: list[Samples]) -> None:
+        if self.decoder.format != self._format:
+            self._format = self.decoder.format
+            at = float(groups[0].host_s[0]) if groups else self.start
+            self.event("format", at, detail=self._format)
+        for samples in groups:
+            if self.keep_time:
+                samples = attrs.evolve(samples, host_s=self.start + samples.device_s)
+            self.recorder.write(samples, self.start)
+            self._show(samples)
+
+    def _show(self, samples: Samples) -> None:
+        names = columns_of(samples)
+        table = [samples.host_s - self.start, samples.device_s, samples.sequence, *samples.values.T]
+        if self.derive is not None:
+            more, values = self.derive(names[3:], samples.values)
+            names, table = (*names, *more), [*table, *values.T]
+        if names != self._columns or self._ring is None:
+            self._columns = names
+            self._ring_name = f"live-{self._rings}.bin"
+            self._rings += 1
+            self._ring = Ring.create(self.folder / self._ring_name, len(names))
+        rows = np.column_stack(table)
+        self._ring.append(rows)
+        self._latest = rows[-1]
+
+    def event(self, name: str, at: float, **details: Any) -> None:
+        if name == "connected":
+            self.reconnects += 1
+            self.state, self.port = "connected", str(details.get("detail", ""))
+        elif name in ("disconnected", "paused", "waiting", "ended"):
+            self.state = name
+        self.recorder.event(name, at - self.start, **details)
+        self.tell(name, details)
+        self._said = -np.inf
+
+    def tick(self, now: float) -> None:
+        """Index once a second, status five times; called often."""
+        self.recorder.tick(now - self.start, attrs.asdict(self.decoder.counters))
+        if now - self._said >= _STATUS_S:
+            self._said = now
+            self._rate = [*self._rate, (now, self.decoder.counters.samples)][-10:]
+            status = self.status(now)
+            self._write_status(status)
+            self.tell("status", status)
+
+    def status(self, now: float) -> dict[str, Any]:
+        rate = 0.0
+        if len(self._rate) > 1:
+            (t0, n0), (t1, n1) = self._rate[0], self._rate[-1]
+            rate = (n1 - n0) / (t1 - t0) if t1 > t0 else 0.0
+        return {
+            "state": self.state,
+            "port": self.port,
+            "format": self._format,
+            "columns": self._columns,
+            "live": self._ring_name,
+            "latest": self._latest,
+            "rate_hz": round(rate, 2),
+            "duration_s": round(now - self.start, 3),
+            "written": time.time(),
+            "pid": os.getpid(),
+            "reconnects": max(0, self.reconnects),
+            "rows": self.recorder.rows,
+            **attrs.asdict(self.decoder.counters),
+        }
+
+    def end(self, now: float) -> dict[str, Any]:
+        """The last status, with everything on disk; the live view is removed, the recording holds it all."""
+        self.state = "ended"
+        self.recorder.tick(np.inf, attrs.asdict(self.decoder.counters))
+        status = {**self.status(now), "live": ""}
+        self._write_status(status)
+        if self._ring is not None:
+            self._ring.close()
+        for path in self.folder.glob("live-*.bin"):
+            path.unlink(missing_ok=True)
+        return status
+
+    def _write_status(self, status: Mapping[str, Any]) -> None:
+        # Not flushed to the disk: it is for those who look on, and gone with the session.
+        beside = self.folder / f".{STATUS}.part"
+        try:
+            beside.write_text(json.dumps(plain(status)))
+            beside.replace(self.folder / STATUS)
+        except OSError:
+            # A reader on Windows may hold it open for a moment; the next one comes soon.
+            beside.unlink(missing_ok=True)

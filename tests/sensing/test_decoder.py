@@ -1,0 +1,243 @@
+"""The decoder on every format, on noise, cut lines and wrapped clocks: nothing lost unseen, never a crash."""
+
+from __future__ import annotations
+
+import json
+import random
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mu_addon.sensing.decoder import Decoder, Samples
+from mu_addon.sensing.framing import info_frame, sample_frame
+
+INFO = info_frame({"channels": ["light", "dark"], "unit": "V", "unit_per_count": 0.001})
+
+
+def fed(decoder: Decoder, data: bytes, sizes: list[int] | None = None, start_s: float = 0.0) -> list[Samples]:
+    """Feed in pieces of given sizes, over and over, a millisecond apart."""
+    result, place, turn = [], 0, 0
+    sizes = sizes or [64]
+    while place < len(data):
+        size = max(1, sizes[turn % len(sizes)])
+        result += decoder.feed(data[place : place + size], start_s + 1e-3 * turn)
+        place, turn = place + size, turn + 1
+    return [*result, *decoder.finish(start_s + 1e-3 * turn)]
+
+
+def all_of(groups: list[Samples], what: str) -> np.ndarray:
+    return np.concatenate([getattr(g, what) for g in groups]) if groups else np.empty(0)
+
+
+def frames(n: int, first: int = 0, period_us: int = 200, start_us: int = 0) -> bytes:
+    return b"".join(
+        sample_frame(first + k, start_us + period_us * k, ((first + k) % 60000, 7)) for k in range(n)
+    )
+
+
+@given(st.lists(st.integers(1, 300), min_size=1, max_size=5))
+@settings(max_examples=30, deadline=None)
+def test_frames_come_through_however_they_are_cut(sizes: list[int]) -> None:
+    decoder = Decoder()
+    groups = fed(decoder, INFO + frames(400), sizes)
+    assert decoder.format == "frames"
+    assert {g.layout.channels for g in groups} == {("light", "dark")}
+    # The very first frame was INFO; it was whole and passed its check, so nothing is lost.
+    np.testing.assert_array_equal(all_of(groups, "sequence"), np.arange(400))
+    np.testing.assert_allclose(all_of(groups, "values")[:, 0], 0.001 * np.arange(400))
+    np.testing.assert_allclose(all_of(groups, "device_s"), 2e-4 * np.arange(400), atol=1e-12)
+    assert decoder.counters.lost == decoder.counters.crc_errors == 0
+
+
+def test_names_that_come_late_hold_for_what_came_before() -> None:
+    groups = fed(Decoder(), frames(100) + INFO + frames(100, 100, start_us=20_000))
+    assert {g.layout.channels for g in groups} == {("light", "dark")}
+    assert len(all_of(groups, "sequence")) == 200
+
+
+def test_a_device_that_never_says_its_names() -> None:
+    decoder = Decoder()
+    groups = fed(decoder, frames(4000))
+    assert {g.layout.channels for g in groups} == {("channel1", "channel2")}
+    assert len(all_of(groups, "sequence")) == 4000
+
+
+def test_lost_and_damaged_frames_are_counted() -> None:
+    parts = [sample_frame(k, 200 * k, (k, 7)) for k in range(300)]
+    damaged = bytearray(parts[100])
+    damaged[4] ^= 0x55
+    if 0 in damaged[:-1]:
+        damaged[4] ^= 0x57
+    line = INFO + b"".join(parts[:100]) + bytes(damaged) + b"".join(parts[101:200] + parts[205:])
+    decoder = Decoder()
+    groups = fed(decoder, line)
+    assert decoder.counters.crc_errors == 1
+    assert decoder.counters.lost == 1 + 5
+    assert decoder.counters.samples == len(all_of(groups, "sequence")) == 300 - 6
+    assert (np.diff(all_of(groups, "sequence")) > 0).all()
+
+
+def test_repeated_and_late_frames_are_left_out() -> None:
+    parts = [sample_frame(k, 200 * k, (k, 7)) for k in range(50)]
+    decoder = Decoder()
+    order = [*range(20), 10, 19, *range(20, 50)]
+    groups = fed(decoder, INFO + b"".join(parts[k] for k in order))
+    np.testing.assert_array_equal(all_of(groups, "sequence"), np.arange(50))
+    assert decoder.counters.repeated == 2
+
+
+def test_clock_and_number_wrap() -> None:
+    decoder = Decoder()
+    start = 2**32 - 20_000
+    line = b"".join(sample_frame(2**32 - 100 + k, start + 200 * k, (k, 7)) for k in range(200))
+    groups = fed(decoder, INFO + line)
+    np.testing.assert_array_equal(np.diff(all_of(groups, "sequence")), 1)
+    np.testing.assert_allclose(np.diff(all_of(groups, "device_s")), 2e-4, atol=1e-9)
+    assert decoder.counters.lost == decoder.counters.restarts == 0
+
+
+def test_turns_missed_while_unplugged_are_counted_by_the_host() -> None:
+    decoder = Decoder()
+    before = fed(decoder, INFO + frames(50))
+    decoder.interrupted()
+    away_s = 3 * 2**32 * 1e-6 + 100.0
+    after = fed(decoder, frames(50, 5000, start_us=round(away_s * 1e6) % 2**32), start_s=away_s)
+    gap = all_of(after, "device_s")[0] - all_of(before, "device_s")[-1]
+    assert gap == pytest.approx(away_s, abs=0.1)
+
+
+def test_a_device_that_starts_anew() -> None:
+    decoder = Decoder()
+    fed(decoder, INFO + frames(5000, 10_000, start_us=2_000_000))
+    decoder.interrupted()
+    groups = fed(decoder, INFO + frames(300), start_s=5.0)
+    assert decoder.counters.restarts == 1
+    assert len(all_of(groups, "sequence")) == 300
+    assert (np.diff(all_of(groups, "sequence")) == 1).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("labels", "light:{0},dark:7.5\n"),
+        ("labels", "light:{0}\ndark:7.5\n"),
+        ("labels", "light: {0}\tdark: 7.5\r\n"),
+        ("json", '{{"light": {0}, "dark": 7.5, "note": "x"}}\n'),
+        ("csv", "{0},7.5\n"),
+        ("csv", "{0} 7.5\r\n"),
+        ("csv", "{0};7.5\n"),
+    ],
+)
+def test_text_is_told_apart(name: str, line: str) -> None:
+    decoder = Decoder()
+    groups = fed(decoder, "".join(line.format(k) for k in range(60)).encode(), [13])
+    assert decoder.format == name
+    values = np.vstack([g.values for g in groups])
+    expected = ("channel1", "channel2") if name == "csv" else ("light", "dark")
+    # A label a line begins with whichever comes whole.
+    assert set(groups[0].layout.channels) == set(expected)
+    light = values[:, groups[0].layout.channels.index(expected[0])]
+    assert len(light) >= 58
+    # The last label may be missing from the last sample.
+    np.testing.assert_array_equal(np.diff(light[:-1]), 1)
+    assert decoder.counters.malformed == 0
+
+
+def test_csv_with_header_number_and_clock() -> None:
+    rows = "".join(f"{k},{(2**32 - 30_000 + 1000 * k) % 2**32},{k / 10}\n" for k in range(100))
+    decoder = Decoder()
+    groups = fed(decoder, ("seq,time_us,light\n" + rows).encode())
+    assert groups[0].layout.channels == ("light",)
+    np.testing.assert_array_equal(all_of(groups, "sequence"), np.arange(100))
+    np.testing.assert_allclose(np.diff(all_of(groups, "device_s")), 1e-3, atol=1e-9)
+
+
+def test_the_first_line_is_not_trusted() -> None:
+    # "2,300" is the rest of "512,300".
+    decoder = Decoder()
+    groups = fed(decoder, b"2,300\n512,300\n513,300\n514,300\n515,300\n")
+    np.testing.assert_array_equal(all_of(groups, "values")[:, 0], [512, 513, 514, 515])
+
+
+def test_garbage_between_lines_is_counted_and_passed() -> None:
+    generator = random.Random(1)
+    lines = [f"light:{k},dark:1\n".encode() for k in range(200)]
+    lines.insert(50, bytes(generator.randrange(256) for _ in range(40)).replace(b"\n", b"x") + b"\n")
+    lines.insert(90, b"light:,dark:\n")
+    lines.insert(120, b"ligh\xffht:3,dark:1\n")
+    decoder = Decoder()
+    groups = fed(decoder, b"".join(lines))
+    assert decoder.counters.malformed == 3
+    assert len(all_of(groups, "values")) == 199
+
+
+def test_a_damaged_label_is_no_new_channel() -> None:
+    lines = [f"light:{k},dark:1\n" for k in range(50)]
+    lines[20] = "lght:20,dark:1\n"
+    groups = fed(Decoder(), "".join(lines).encode())
+    assert {g.layout.channels for g in groups} == {("light", "dark")}
+
+
+def test_a_device_that_changes_its_language() -> None:
+    decoder = Decoder()
+    text = "".join(f"light:{k},dark:1\n" for k in range(100)).encode()
+    groups = fed(decoder, text + INFO + frames(2000))
+    assert decoder.format == "frames"
+    assert len(groups[-1].values) > 0
+    assert len(all_of(groups, "sequence")) > 1800
+
+
+def test_a_megabyte_without_an_end_is_thrown_away() -> None:
+    for start in (b"", INFO + frames(20), b"light:1,dark:2\n" * 20):
+        decoder = Decoder()
+        fed(decoder, start + b"\x41" * 2**20, [4096])
+        assert len(decoder._buffer) < 20_000
+        assert decoder.counters.overlong > 2**20 - 40_000
+        groups = fed(decoder, b"\n\x00" + INFO + frames(3000), start_s=10.0)
+        assert sum(len(g) for g in groups) > 2000
+
+
+@given(st.lists(st.binary(max_size=400), max_size=20))
+@settings(max_examples=60, deadline=None)
+def test_no_bytes_crash_it(chunks: list[bytes]) -> None:
+    decoder = Decoder()
+    for k, chunk in enumerate(chunks):
+        decoder.feed(chunk, 0.01 * k)
+    decoder.interrupted()
+    decoder.finish(1.0)
+
+
+@given(
+    st.lists(st.sampled_from(["light:1\n", "dark:2,", "{", '{"a":1}\n', "1,2\n", "seq,a\n", "\x00", "nan\n"]))
+)
+@settings(max_examples=100, deadline=None)
+def test_no_lines_crash_it(parts: list[str]) -> None:
+    decoder = Decoder()
+    for k, part in enumerate(parts * 5):
+        decoder.feed(part.encode(), 0.01 * k)
+    decoder.finish(10.0)
+
+
+def test_host_time_follows_the_least_delayed() -> None:
+    generator = np.random.default_rng(4)
+    decoder = Decoder()
+    decoder.feed(INFO, 0.0)
+    drift, offset = 80e-6, 12.5
+    error = []
+    for k in range(4000):
+        device_s = 0.01 * k
+        true_host = offset + device_s * (1 + drift)
+        at = true_host + 0.001 + generator.exponential(0.02)
+        for samples in decoder.feed(sample_frame(k, round(device_s * 1e6), (k, 1)), at):
+            error.append(samples.host_s[-1] - true_host)
+    # The least delay remains, as no clock can tell it from the offset.
+    assert np.median(error[1000:]) == pytest.approx(0.001, abs=0.001)
+    assert np.ptp(error[1000:]) < 0.004
+
+
+def test_json_values_of_all_kinds() -> None:
+    lines = [json.dumps({"a": k, "on": True, "list": [1], "t_ms": 10 * k}) for k in range(30)]
+    groups = fed(Decoder(), ("\n".join(lines) + "\n").encode())
+    assert groups[0].layout.channels == ("a", "on")
