@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from ..errors import InputError
+from ..sensing.calibration import deriver, read_calibration
 from ..sensing.session import Control, run_session
 from ..sensing.sources import SerialLine, Simulated, Source, ports
 from .ending import Ending
@@ -54,18 +55,21 @@ def stream(
     progress: Progress,
     ending: Ending,
     controlled: bool = False,
+    calibration: str | None = None,
     keep_time: bool = False,
     show: Sink | None = None,
 ) -> None:
     """Record a source into `folder`, telling what happens; Ctrl-C ends it well.
 
-    show: hears how it goes five times a second, and of what happens. keep_time: see run_session. controlled:
+    show: hears how it goes five times a second, and of what happens. keep_time: see run_session.
+    calibration: a file whose map is shown beside the voltages. controlled:
     lines on standard input ask for "pause", "resume", "stop" and "mark WORDS", as Blender does; its end ends
     the session. Raises InputError and OutputError.
     """
     control = Control()
     if controlled:
         threading.Thread(target=_obey, args=(control,), daemon=True).start()
+    derive = None if calibration is None else deriver(read_calibration(Path(calibration)))
     ending.open_folder(folder)
 
     def tell(event: str, details: dict[str, Any]) -> None:
@@ -81,7 +85,14 @@ def stream(
 
     with _ctrl_c_stops(control):
         status = run_session(
-            source, folder, about=about, control=control, seconds=seconds, tell=tell, keep_time=keep_time
+            source,
+            folder,
+            about=about,
+            control=control,
+            seconds=seconds,
+            tell=tell,
+            keep_time=keep_time,
+            derive=derive,
         )
     ending.summary.update(status)
 

@@ -23,6 +23,7 @@ NAMES = (
     "stream",
     "record",
     "replay",
+    "calibrate",
 )
 
 

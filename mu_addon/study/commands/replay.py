@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .options import add_results, require_out
-from .stream import shown
+from .stream import add_calibration, shown
 
 if TYPE_CHECKING:
     from ..ending import Ending
@@ -27,6 +27,7 @@ def add(commands: Commands[Any]) -> None:
     command.add_argument(
         "--speed", type=float, default=1.0, metavar="F", help="times as fast as it was; 0: at once (1)"
     )
+    add_calibration(command)
     command.add_argument("--controlled", action="store_true", help="as for `stream`")
 
 
@@ -44,6 +45,7 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
         progress=progress,
         ending=ending,
         controlled=options.controlled,
+        calibration=options.calibration,
         keep_time=True,
         show=shown(options),
     )

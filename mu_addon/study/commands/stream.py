@@ -38,11 +38,19 @@ def add_source(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--simulate", action="store_true", help="a simulated sensor instead, bending to and fro"
     )
+    add_calibration(command)
     command.add_argument("--seconds", type=float, metavar="S", help="stop after that long (Ctrl-C)")
     command.add_argument(
         "--controlled",
         action="store_true",
         help="obey pause, resume, mark WORDS and stop on standard input, and end with it",
+    )
+
+
+def add_calibration(command: argparse.ArgumentParser) -> None:
+    """--calibration, a map from voltage to angle."""
+    command.add_argument(
+        "--calibration", metavar="FILE", help="calibration.toml of `calibrate`: shows angles beside voltages"
     )
 
 
@@ -61,6 +69,7 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
         progress=progress,
         ending=ending,
         controlled=options.controlled,
+        calibration=options.calibration,
         show=shown(options) if options.show else None,
     )
 

@@ -1,0 +1,403 @@
+"""From voltage to bending angle: a monotone map fitted to sweeps, with a band that new sweeps keep to.
+
+The signal, after its dark level is taken off, is modelled as (1 + drift t) f(angle) with f a cubic spline
+whose coefficients rise or fall only, so that f does: to every voltage belongs one angle, or one interval
+where the sensor says nothing. The band comes from sweeps that were left out of the fit: how far they lie off
+as a whole (mounting, drift, rate) and within (noise, hysteresis).
+
+Source: Ramsay, Statistical Science 3 (1988) 425, for monotone splines by increments of one sign.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+from scipy.interpolate import BSpline
+from scipy.optimize import minimize_scalar, nnls
+from scipy.stats import t as student
+
+from ..errors import InputError
+from ..files import write_text
+
+Array = np.ndarray[Any, Any]
+
+VERSION = 1
+_DEGREE = 3
+_INTERVALS = (1, 2, 3, 4, 6, 8, 12)
+_TABLE = 2001
+# Beyond this the light has faded to nothing within a day.
+_MOST_DRIFT_PER_H = 1.0
+_FEWEST = 8
+# A drift is believed if it leaves less than this share of the mean square in left-out sweeps.
+_CLEARLY = 0.25
+
+
+@attrs.frozen(eq=False)
+class Sweep:
+    """One bending to and fro: time_s, angle_deg and voltage_V (n,), the dark level already taken off."""
+
+    time_s: Array
+    angle_deg: Array
+    voltage_V: Array
+
+
+@attrs.frozen(eq=False)
+class Calibration:
+    """A fitted map; `angle_of` turns voltages into angles, `voltage_of` angles into voltages.
+
+    knots (m + 7,) in degrees and coefficients (m + 3,) in V of a cubic spline on `range_deg`; band_V: a new
+    reading lies within that of the map with 95 % probability; drift_per_h: relative change of the light an
+    hour that was seen and taken out; gain: what the signal is divided by before it is read, 1 when
+    calibrated, set anew by `zeroed`; channel and dark: columns of the recording, or the dark level in V.
+    """
+
+    knots: Array
+    coefficients: Array
+    band_V: float
+    drift_per_h: float
+    channel: str
+    dark: str | float = 0.0
+    gain: float = 1.0
+    error_deg: float = math.nan
+    """Root mean square error in sweeps left out of the fit."""
+    sweeps: int = 0
+
+    @property
+    def range_deg(self) -> tuple[float, float]:
+        """The angles that were swept."""
+        return float(self.knots[_DEGREE]), float(self.knots[-_DEGREE - 1])
+
+    def voltage_of(self, angle_deg: Array) -> Array:
+        """The voltages (n,) in V, dark level aside, that angles (n,) in degrees within the range give."""
+        low, high = self.range_deg
+        clipped = np.clip(np.asarray(angle_deg, float), low, high)
+        return np.asarray(BSpline(self.knots, self.coefficients, _DEGREE)(clipped)) * self.gain
+
+    def angle_of(self, voltage_V: Array) -> tuple[Array, Array, Array, Array]:
+        """Angles, their 95 % low and high (n,) in degrees, and whether the map can give such a voltage (n,).
+
+        voltage_V (n,): dark level taken off. Where the sensor says nothing, low and high are the ends of that
+        interval and the angle its middle.
+        """
+        voltage = np.asarray(voltage_V, float) / self.gain
+        angles = np.linspace(*self.range_deg, _TABLE)
+        volts = np.asarray(BSpline(self.knots, self.coefficients, _DEGREE)(angles))
+        if volts[-1] < volts[0]:
+            volts, angles = volts[::-1], angles[::-1]
+        first, _ = _interval(volts, angles, voltage)
+        _, last = _interval(volts, angles, voltage)
+        near, _ = _interval(volts, angles, voltage - self.band_V)
+        _, far = _interval(volts, angles, voltage + self.band_V)
+        slack = self.band_V + 1e-9 * (volts[-1] - volts[0])
+        possible = (voltage >= volts[0] - slack) & (voltage <= volts[-1] + slack)
+        return (first + last) / 2, np.minimum(near, far), np.maximum(near, far), possible
+
+    def zeroed(self, voltage_V: float, angle_deg: float = 0.0) -> Calibration:
+        """The same map for light that has become stronger or weaker: told by a voltage at a known angle.
+
+        Raises InputError if no such light could be.
+        """
+        expected = float(attrs.evolve(self, gain=1.0).voltage_of(np.array([angle_deg]))[0])
+        gain = voltage_V / expected if expected else math.nan
+        if not 0.05 < gain < 20:
+            raise InputError(
+                f"{voltage_V:.3g} V at {angle_deg:g} degrees, where the calibration has {expected:.3g} V",
+                "zero",
+                "check the cable and the light, then calibrate again",
+            )
+        return attrs.evolve(self, gain=gain)
+
+
+def _interval(volts: Array, angles: Array, at: Array) -> tuple[Array, Array]:
+    """First and last angle (n,) at which a rising table has the voltages `at` (n,), its ends beyond them."""
+    inside = np.clip(at, volts[0], volts[-1])
+    last = np.clip(np.searchsorted(volts, inside, side="right"), 1, len(volts) - 1)
+    first = np.clip(np.searchsorted(volts, inside, side="left"), 1, len(volts) - 1)
+
+    def crossing(upper: Array) -> Array:
+        step = volts[upper] - volts[upper - 1]
+        share = np.divide(inside - volts[upper - 1], step, out=np.ones_like(inside), where=step > 0)
+        return np.asarray(angles[upper - 1] + np.clip(share, 0, 1) * (angles[upper] - angles[upper - 1]))
+
+    return crossing(first), crossing(last)
+
+
+def calibrate(sweeps: Sequence[Sweep], channel: str, dark: str | float = 0.0) -> Calibration:
+    """Fit a map to two sweeps or more; raises InputError if there is too little to fit, or no signal.
+
+    The number of the spline's intervals is what predicts left-out sweeps best; a drift is taken out if that
+    quarters their squared error. The map is that of the sweeps' middle time.
+    """
+    _require(sweeps)
+    middle = float(np.mean(np.concatenate([s.time_s for s in sweeps])))
+    sweeps = [attrs.evolve(s, time_s=s.time_s - middle) for s in sweeps]
+    drift = _drift(sweeps) if len(sweeps) > 2 else 0.0
+    steady, drifting = (_best(sweeps, d) for d in (0.0, drift))
+    # A line through a handful of sweeps always takes some of their scatter.
+    if drift and drifting[0] > _CLEARLY * steady[0]:
+        drift = 0.0
+    _, intervals, off = drifting if drift else steady
+    knots = _knots(sweeps, intervals)
+    coefficients, _ = _monotone([_triangle(s, knots, drift) for s in sweeps])
+    span, band = float(np.ptp(coefficients)), _band(off)
+    if span <= 2 * band:
+        raise InputError(
+            f"the voltage changes by {span:.3g} V over the sweep and scatters by {band:.3g} V",
+            channel,
+            "choose the channel of the light sensor, or bend further",
+        )
+    result = Calibration(knots, coefficients, band, drift, channel, dark, sweeps=len(sweeps))
+    errors = [
+        attrs.evolve(result, knots=k, coefficients=c).angle_of(s.voltage_V / _gain(s.time_s, drift))[0]
+        - s.angle_deg
+        for s, (k, c) in zip(sweeps, _without_each(sweeps, intervals, drift), strict=True)
+    ]
+    return attrs.evolve(result, error_deg=float(np.sqrt(np.mean(np.concatenate(errors) ** 2))))
+
+
+def _best(sweeps: Sequence[Sweep], drift: float) -> tuple[float, int, list[Array]]:
+    """Mean square in left-out sweeps, the number of intervals that makes it least, and what is left."""
+    tried = [(m, _left_out(sweeps, m, drift)) for m in _INTERVALS]
+    squares = [float(np.mean(np.concatenate(off) ** 2)) for _, off in tried]
+    best = int(np.argmin(squares))
+    return squares[best], *tried[best]
+
+
+def _require(sweeps: Sequence[Sweep]) -> None:
+    if len(sweeps) < 2:
+        raise InputError(
+            f"{len(sweeps)} sweep",
+            "calibration",
+            "record two or more: one alone cannot show how well it repeats",
+        )
+    for number, sweep in enumerate(sweeps, 1):
+        if len(sweep.angle_deg) < _FEWEST or np.ptp(sweep.angle_deg) <= 0:
+            raise InputError(
+                f"sweep {number} has {len(sweep.angle_deg)} readings over {np.ptp(sweep.angle_deg):.3g} deg",
+                "calibration",
+                f"{_FEWEST} readings or more at different angles are needed",
+            )
+        if not np.isfinite(sweep.voltage_V).all():
+            raise InputError(
+                f"sweep {number} has readings that are no numbers", "calibration", "leave them out"
+            )
+
+
+def _gain(time_s: Array, drift_per_h: float) -> Array:
+    return np.asarray(1 + drift_per_h * time_s / 3600)
+
+
+def _knots(sweeps: Sequence[Sweep], intervals: int) -> Array:
+    low, high = (f(float(f(s.angle_deg)) for s in sweeps) for f in (min, max))
+    return np.concatenate([[low] * _DEGREE, np.linspace(low, high, intervals + 1), [high] * _DEGREE])
+
+
+def _triangle(sweep: Sweep, knots: Array, drift_per_h: float) -> Array:
+    """The sweep's least-squares problem (p, p + 1), reduced by QR, for a first coefficient and increments."""
+    asked = _within(sweep, knots)
+    basis = BSpline.design_matrix(sweep.angle_deg[asked], knots, _DEGREE).toarray()
+    basis *= _gain(sweep.time_s[asked], drift_per_h)[:, None]
+    sums = np.cumsum(basis[:, ::-1], axis=1)[:, ::-1]
+    return np.asarray(np.linalg.qr(np.column_stack([sums, sweep.voltage_V[asked]]), mode="r"))
+
+
+def _monotone(triangles: Sequence[Array]) -> tuple[Array, float]:
+    """Coefficients of the best spline that only rises or only falls, and the sum of squares it leaves."""
+    stacked = np.vstack(triangles)
+    matrix, target = stacked[:, :-1], stacked[:, -1]
+    best: tuple[Array, float] | None = None
+    for sign in (1.0, -1.0):
+        # The first coefficient may have either sign: it is a difference of two that have not.
+        x, left = nnls(np.column_stack([-matrix[:, :1], matrix[:, :1], sign * matrix[:, 1:]]), target)
+        if best is None or left**2 < best[1]:
+            best = np.cumsum(np.concatenate([[x[1] - x[0]], sign * x[2:]])), float(left**2)
+    assert best is not None
+    return best
+
+
+def _within(sweep: Sweep, knots: Array) -> Array:
+    return np.asarray((sweep.angle_deg >= knots[0]) & (sweep.angle_deg <= knots[-1]))
+
+
+def _drift(sweeps: Sequence[Sweep]) -> float:
+    """The drift an hour that leaves least, with a spline of medium size."""
+    knots = _knots(sweeps, 4)
+    hours = max(max(float(np.abs(s.time_s).max()) for s in sweeps) / 3600, 1e-6)
+    most = min(_MOST_DRIFT_PER_H, 0.5 / hours)
+
+    def left(drift: float) -> float:
+        return _monotone([_triangle(s, knots, drift) for s in sweeps])[1]
+
+    return float(minimize_scalar(left, bounds=(-most, most), method="bounded").x)
+
+
+def _without_each(sweeps: Sequence[Sweep], intervals: int, drift: float) -> list[tuple[Array, Array]]:
+    """Knots and coefficients of the fits to all sweeps but one."""
+    result = []
+    for k in range(len(sweeps)):
+        others = [s for j, s in enumerate(sweeps) if j != k]
+        knots = _knots(others, intervals)
+        result.append((knots, _monotone([_triangle(s, knots, drift) for s in others])[0]))
+    return result
+
+
+def _left_out(sweeps: Sequence[Sweep], intervals: int, drift: float) -> list[Array]:
+    """What each sweep is off in V from the fit to the others, at angles that these reach."""
+    result = []
+    for sweep, (knots, coefficients) in zip(sweeps, _without_each(sweeps, intervals, drift), strict=True):
+        asked = _within(sweep, knots)
+        predicted = BSpline(knots, coefficients, _DEGREE)(sweep.angle_deg[asked])
+        result.append(sweep.voltage_V[asked] / _gain(sweep.time_s[asked], drift) - predicted)
+    return result
+
+
+def _band(off: Sequence[Array]) -> float:
+    """Half width in V that holds 95 % of a new sweep's readings, of what left-out sweeps are off (n_k,) each.
+
+    A sweep is off as a whole, with variance B known from few sweeps, and within, with variance E known from
+    many readings; Satterthwaite's degrees of freedom weigh the two.
+    """
+    whole = np.array([o.mean() for o in off if len(o)])
+    within = [o - o.mean() for o in off if len(o)]
+    B = float(np.mean(whole**2))
+    E = float(np.mean(np.concatenate(within) ** 2))
+    readings = sum(_independent(o) for o in within)
+    if B + E == 0:
+        return 0.0
+    freedom = (B + E) ** 2 / (B**2 / max(len(whole) - 1, 1) + E**2 / max(readings, 1.0))
+    return math.sqrt(B + E) * float(student.ppf(0.975, max(freedom, 1.0)))
+
+
+def _independent(off: Array) -> float:
+    """How many independent readings carry as much as these correlated ones, by their lag-one correlation."""
+    if len(off) < 3 or not off.any():
+        return float(len(off))
+    rho = float(np.clip(off[1:] @ off[:-1] / (off @ off), 0.0, 0.999))
+    return len(off) * (1 - rho) / (1 + rho)
+
+
+def sweeps_of(time_s: Array, angle_deg: Array, voltage_V: Array, fewest: int = 2) -> list[Sweep]:
+    """Cut one record (n,) into sweeps, each to and fro; raises InputError for less than `fewest`.
+
+    It is cut where the angle is lowest between two visits to the upper third of its range, so that neither
+    noise nor hesitation counts as a turn.
+    """
+    good = np.isfinite(angle_deg) & np.isfinite(voltage_V) & np.isfinite(time_s)
+    time_s, angle_deg, voltage_V = time_s[good], angle_deg[good], voltage_V[good]
+    third = np.ptp(angle_deg) / 3 if len(angle_deg) else 0.0
+    zone = np.zeros(len(angle_deg), int)
+    if third > 0:
+        zone[angle_deg >= angle_deg.max() - third] = 1
+        zone[angle_deg <= angle_deg.min() + third] = -1
+    there = np.flatnonzero(zone)
+    changes = np.flatnonzero(np.diff(zone[there])) + 1
+    visits = [visit for visit in np.split(there, changes) if len(visit)]
+    cuts = [0, len(angle_deg)]
+    for before, visit, after in zip(visits, visits[1:], visits[2:], strict=False):
+        if zone[visit[0]] == -1:
+            inside = np.arange(before[-1], after[0])
+            cuts.insert(-1, int(inside[np.argmin(angle_deg[inside])]))
+    result = [Sweep(time_s[a:b], angle_deg[a:b], voltage_V[a:b]) for a, b in itertools.pairwise(cuts)]
+    if len(result) < fewest:
+        raise InputError(
+            f"{len(result)} sweep in that record", "angle_deg", "bend to and fro at least twice in one record"
+        )
+    return result
+
+
+def write_calibration(path: Path, calibration: Calibration, about: str = "") -> None:
+    """Write a calibration as TOML; raises OutputError."""
+    c = calibration
+    low, high = c.range_deg
+    dark = repr(c.dark) if not isinstance(c.dark, str) else json.dumps(c.dark)
+    lines = [
+        f"# {line}" for line in ["A sensor's map from voltage to bending angle.", *about.splitlines()] if line
+    ]
+    lines += [
+        f"version = {VERSION}",
+        f"channel = {json.dumps(c.channel)}",
+        f"dark = {dark}  # a channel, or a level in V",
+        f"range_deg = [{low!r}, {high!r}]",
+        f"knots_deg = {c.knots.tolist()!r}",
+        f"coefficients_V = {c.coefficients.tolist()!r}",
+        f"band_V = {c.band_V!r}  # 95 %",
+        f"drift_per_h = {c.drift_per_h!r}",
+        f"gain = {c.gain!r}",
+        f"sweeps = {c.sweeps}",
+        f"error_deg = {c.error_deg!r}  # root mean square, in sweeps left out",
+    ]
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def read_calibration(path: Path) -> Calibration:
+    """Read what `write_calibration` wrote; raises InputError with what is wrong."""
+    try:
+        table = tomllib.loads(Path(path).read_text())
+        if table["version"] != VERSION:
+            raise InputError(f"version {table['version']} is not known", str(path), "calibrate again")
+        result = Calibration(
+            np.array(table["knots_deg"], float),
+            np.array(table["coefficients_V"], float),
+            float(table["band_V"]),
+            float(table["drift_per_h"]),
+            str(table["channel"]),
+            table["dark"] if isinstance(table["dark"], str) else float(table["dark"]),
+            float(table["gain"]),
+            float(table["error_deg"]),
+            int(table["sweeps"]),
+        )
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(
+            f"cannot read the calibration: {error}", str(path), "name a calibration.toml"
+        ) from None
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"no calibration: {error!r}", str(path), "calibrate again") from None
+    steps = np.diff(result.coefficients)
+    sound = (
+        len(result.knots) == len(result.coefficients) + _DEGREE + 1 >= 2 * (_DEGREE + 1)
+        and np.isfinite(result.knots).all()
+        and np.isfinite(result.coefficients).all()
+        and (np.diff(result.knots) >= 0).all()
+        and ((steps >= 0).all() or (steps <= 0).all())
+        and result.band_V >= 0
+        and result.gain > 0
+    )
+    if not sound:
+        raise InputError("its map is not monotone, or its numbers make none", str(path), "calibrate again")
+    return result
+
+
+def deriver(calibration: Calibration) -> Any:
+    """What a session shows beside the voltages: angle_deg, its 95 % low and high, and 1 where the map holds.
+
+    Raises InputError, when it is called, if the stream has not the channels that were calibrated.
+    """
+    names = ("angle_deg", "angle_low_deg", "angle_high_deg", "in_range")
+
+    def derive(columns: tuple[str, ...], values: Array) -> tuple[tuple[str, ...], Array]:
+        return names, np.column_stack(calibration.angle_of(light_of(calibration, columns, values)))
+
+    return derive
+
+
+def light_of(calibration: Calibration, columns: Sequence[str], values: Array) -> Array:
+    """Voltages (n,) of the calibrated channel without its dark level, of values (n, c) in these columns."""
+    level: Any = calibration.dark
+    for name in (calibration.channel, *([level] if isinstance(level, str) else [])):
+        if name not in columns:
+            raise InputError(
+                f"the stream has no channel {name}",
+                ", ".join(columns),
+                "connect the sensor that was calibrated",
+            )
+    if isinstance(level, str):
+        level = values[:, list(columns).index(level)]
+    return np.asarray(values[:, list(columns).index(calibration.channel)] - level)
