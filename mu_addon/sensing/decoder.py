@@ -353,7 +353,8 @@ class Decoder:
             ahead, later = 1.0, passed_s / self._tick_s
         self._repeats = 0
         self.counters.lost += max(0, int(ahead) - 1) if known else 0
-        self._sequence += int(ahead)
+        # The first number of all is taken as it is.
+        self._sequence = int(number) if not known and number is not None else self._sequence + int(ahead)
         self._device_s += later * self._tick_s
         if ticks is not None and self._clock.last is None:
             self._device_s = ticks * self._tick_s
