@@ -1,0 +1,108 @@
+"""Rays of light through a guide: refraction, total reflection, absorption and rough walls, by Monte Carlo.
+
+At each surface a ray is reflected with Fresnel's probability for unpolarised light, else refracted; in air it
+goes on, and may come in again across a well. Its weight falls by Beer and Lambert inside. A rough wall tilts
+the normal by a Gaussian slope. What JUNCTION faces let through is lost in the struts.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+import warp as wp
+
+from ..errors import InputError
+from .guide import Guide
+from .rays import ABSORBED, DETECTED, FATES, follow
+
+Array = np.ndarray[Any, Any]
+
+
+@attrs.frozen
+class Optics:
+    """What the resin does to light at one wavelength.
+
+    index: of refraction; around: that of what surrounds it; attenuation_per_mm: natural logarithm of the loss
+    a mm; roughness: standard deviation of the wall's slope.
+    """
+
+    index: float = 1.5
+    attenuation_per_mm: float = 0.01
+    roughness: float = 0.02
+    around: float = 1.0
+
+    def __attrs_post_init__(self) -> None:
+        if not (self.around >= 1 and 1 <= self.index <= 4 and self.attenuation_per_mm >= 0 <= self.roughness):
+            raise InputError(f"no resin is like {self}", "optics", "index 1 to 4, no negative losses")
+
+
+@attrs.frozen
+class Light:
+    """Shares of the light that was sent toward the entry, by where it ended, and the error of `detected`."""
+
+    detected: float
+    error: float
+    shares: dict[str, float]
+
+
+def lambertian(guide: Guide, rays: int, seed: int = 0) -> tuple[Array, Array]:
+    """Starts and directions (rays, 3) of light from a diffuse source that touches the whole entry."""
+    random = np.random.default_rng(seed)
+    right, up, inward = guide.entry_frame
+    u, v = random.random((2, rays))
+    a, b = random.random((2, rays))
+    radius, turn = np.sqrt(a), 2 * np.pi * b
+    e1, e2 = right / np.linalg.norm(right), up / np.linalg.norm(up)
+    directions = (
+        (radius * np.cos(turn))[:, None] * e1
+        + (radius * np.sin(turn))[:, None] * e2
+        + np.sqrt(1 - a)[:, None] * inward
+    )
+    return guide.entry_corner + u[:, None] * right + v[:, None] * up - 1e-3 * inward, directions
+
+
+def beam(guide: Guide, rays: int, angle_deg: float = 0.0, seed: int = 0) -> tuple[Array, Array]:
+    """Starts and directions (rays, 3) of parallel light on the entry, tilted toward the wells' side."""
+    starts, _ = lambertian(guide, rays, seed)
+    _, up, inward = guide.entry_frame
+    a = np.radians(angle_deg)
+    direction = np.cos(a) * inward + np.sin(a) * up / np.linalg.norm(up)
+    return starts, np.tile(direction, (rays, 1))
+
+
+def trace(guide: Guide, optics: Optics, rays: tuple[Array, Array], seed: int = 0) -> Light:
+    """Follow rays (starts, directions), each (n, 3), through a guide to where they end."""
+    starts, directions = rays
+    n = len(starts)
+    mesh = wp.Mesh(
+        points=wp.array(guide.vertices.astype(np.float32), dtype=wp.vec3, device="cpu"),
+        indices=wp.array(guide.triangles.astype(np.int32).ravel(), dtype=int, device="cpu"),
+    )
+    fate = wp.zeros(n, dtype=int, device="cpu")
+    weight, absorbed = (wp.zeros(n, dtype=float, device="cpu") for _ in range(2))
+    wp.launch(
+        follow,
+        dim=n,
+        inputs=[
+            mesh.id,
+            wp.array(guide.kinds.astype(np.int32), dtype=int, device="cpu"),
+            wp.array(starts.astype(np.float32), dtype=wp.vec3, device="cpu"),
+            wp.array(directions.astype(np.float32), dtype=wp.vec3, device="cpu"),
+            optics.index,
+            optics.around,
+            optics.attenuation_per_mm,
+            optics.roughness,
+            seed,
+            fate,
+            weight,
+            absorbed,
+        ],
+        device="cpu",
+    )
+    ended, w = fate.numpy(), weight.numpy().astype(float)
+    shares = {name: float(w[ended == k].sum() / n) for k, name in enumerate(FATES)}
+    shares["absorbed"] = float((absorbed.numpy().sum() + w[ended == ABSORBED].sum()) / n)
+    detected = np.where(ended == DETECTED, w, 0.0)
+    return Light(float(detected.mean()), float(detected.std() / np.sqrt(n)), shares)
