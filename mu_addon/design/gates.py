@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
 import attrs
@@ -12,11 +13,29 @@ from .surface import Triangles, Vertices, area, bad_edges, genus, stl_bytes, stl
 CAVITY_TOLERANCE = 0.01
 """Relative difference allowed between the cavity found in the solid and its analytic volume."""
 
+STRAYED_MM3 = 1e-6
+"""Volume that the waveguide's cuts may take from anything else: what roundoff may make of nothing."""
+
 
 class GateError(MuError):
     """A solid that must not be printed; it names the gate that failed."""
 
     status = 6
+
+
+@attrs.frozen
+class Guide:
+    """What was measured on the lattice with its waveguide, next to what it had to be.
+
+    cut_mm3: what wells, pockets and notches take away; strayed_mm3: what of that is strut or membrane and not
+    waveguide.
+    """
+
+    genus: int
+    genus_expected: int
+    components: int
+    cut_mm3: float
+    strayed_mm3: float
 
 
 @attrs.frozen
@@ -37,6 +56,7 @@ class Gates:
     area_mm2: float
     vertices: int
     triangles: int
+    guide: Guide | None = None
 
     @property
     def inner_volume_error(self) -> float:
@@ -51,11 +71,13 @@ def check_solid(
     sealed_volume: float,
     lattice: tuple[int, int],
     lattice_cycles: int,
+    guide: Guide | None = None,
 ) -> Gates:
     """Gates of a surface; GateError names the first that fails.
 
     `plug` is a Manifold that stops the inlet and `sealed_volume` (mm3) what it seals off; `lattice` is the
-    bare lattice's measured (genus, components), `lattice_cycles` the E - V + 1 of its graph.
+    bare lattice's measured (genus, components), `lattice_cycles` the E - V + 1 of its graph; `guide` what
+    `check_waveguide` found, if there is a waveguide.
     """
     import manifold3d
 
@@ -79,9 +101,45 @@ def check_solid(
         area_mm2=area(vertices, triangles),
         vertices=len(vertices),
         triangles=len(triangles),
+        guide=guide,
     )
     require(gates)
     return gates
+
+
+def check_waveguide(sensed: Any, bar: Any, cuts: Any, actuator: Sequence[Any], cycles: int) -> Guide:
+    """What the lattice with its waveguide measures; GateError where a cut opens more than the waveguide.
+
+    sensed: lattice and waveguide united; bar: the waveguide alone; cuts: its wells, pockets and notches;
+    actuator: its bodies, all as Manifolds. cycles: E - V + 1 of the lattice's graph with the waveguide's own
+    steps.
+    """
+    from manifold3d import Manifold, OpType
+
+    cut = sensed - cuts
+    taken = float(sensed.volume() - cut.volume())
+    membrane = float((Manifold.batch_boolean(list(actuator), OpType.Add) ^ cuts).volume())
+    guide = Guide(
+        genus=cut.genus(),
+        genus_expected=cycles,
+        components=len(cut.decompose()),
+        cut_mm3=taken,
+        strayed_mm3=taken - float((bar ^ cuts).volume()) + membrane,
+    )
+    if guide.strayed_mm3 > STRAYED_MM3:
+        _fail(
+            "cuts clear of struts and membrane",
+            f"wells or pockets of the waveguide take {guide.strayed_mm3:.3g} mm3 from struts or membrane",
+        )
+    if guide.components != 1:
+        _fail("waveguide in one piece", f"lattice and waveguide fall into {guide.components} pieces")
+    if guide.genus != guide.genus_expected:
+        _fail(
+            "waveguide genus",
+            f"the lattice with its waveguide has genus {guide.genus}, its graph {guide.genus_expected}: "
+            "a well or a seat makes a tunnel or closes one",
+        )
+    return guide
 
 
 def require(gates: Gates) -> None:

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 
 @attrs.frozen(eq=False)
-class Lattice:
-    """Nodes (N, 3) in mm and struts (E, 2) between them; radii in mm.
+class Graph:
+    """Nodes (N, 3) in mm and struts (E, 2) between them, without thickness.
 
     grid (N, 3) and cells (C, 3), the cells' lower corners, are whole numbers of kind.divisions a cell. Nodes
     inside a cell come first, cell by cell, then those on the cells' faces and corners.
@@ -27,8 +27,6 @@ class Lattice:
     grid: NDArray[np.int64]
     struts: NDArray[np.int64]
     cell: float
-    junction_radius: float
-    midspan_radius: float
 
     @property
     def nodes(self) -> NDArray[np.float64]:
@@ -65,6 +63,14 @@ class Lattice:
         """Independent cycles E - V + 1 of the connected graph: the genus of its thickened surface."""
         return len(self.struts) - len(self.nodes) + 1
 
+
+@attrs.frozen(eq=False)
+class Lattice(Graph):
+    """The same with struts of these radii, in mm."""
+
+    junction_radius: float
+    midspan_radius: float
+
     def radius(self, t: ArrayLike) -> NDArray[np.float64]:
         """Strut radius (mm) at fractions t of its length, as the kind has it."""
         return self.kind.radius(np.asarray(t, dtype=float), self.junction_radius, self.midspan_radius)
@@ -72,6 +78,11 @@ class Lattice:
 
 def lattice_of(d: Dimensions) -> Lattice:
     """Lattice of all cells of the envelope, their centres at (iU, jU, (k + 1/2)U)."""
+    return thickened(graph_of(d), d.junction_diameter / 2.0, d.midspan_diameter / 2.0)
+
+
+def graph_of(d: Dimensions) -> Graph:
+    """Nodes and struts of all cells of the envelope."""
     half_x = d.cells_x // 2
     i, j, k = (
         np.arange(-half_x, half_x + 1),
@@ -79,8 +90,7 @@ def lattice_of(d: Dimensions) -> Lattice:
         np.arange(d.count),
     )
     whole, half = d.kind.divisions, d.kind.divisions // 2
-    cells = grid_points(whole * i - half, whole * j - half, whole * k)
-    return filled(d.kind, cells, d.cell, d.junction_diameter / 2.0, d.midspan_diameter / 2.0)
+    return joined(d.kind, grid_points(whole * i - half, whole * j - half, whole * k), d.cell)
 
 
 def filled(
@@ -90,7 +100,18 @@ def filled(
     junction_radius: float,
     midspan_radius: float,
 ) -> Lattice:
-    """Lattice of cells of `cell` mm, their lower corners (C, 3) in whole numbers of kind.divisions a cell.
+    """Lattice of cells, as `joined`, with struts of these radii in mm."""
+    return thickened(joined(kind, cells, cell), junction_radius, midspan_radius)
+
+
+def thickened(graph: Graph, junction_radius: float, midspan_radius: float) -> Lattice:
+    """The graph with struts of these radii, in mm."""
+    own = {f.name: getattr(graph, f.name) for f in attrs.fields(Graph)}
+    return Lattice(**own, junction_radius=junction_radius, midspan_radius=midspan_radius)
+
+
+def joined(kind: LatticeKind, cells: NDArray[np.int64], cell: float) -> Graph:
+    """Cells of `cell` mm, their lower corners (C, 3) in whole numbers of kind.divisions a cell.
 
     Nodes and struts that cells share are there once.
     """
@@ -104,14 +125,12 @@ def filled(
     number[:, ~inside] = n * own + index.reshape(n, m - own)
     struts = number[:, kind.struts].reshape(-1, 2)
     _, first = np.unique(np.sort(struts, axis=1), axis=0, return_index=True)
-    return Lattice(
+    return Graph(
         kind=kind,
         cells=cells,
         grid=np.concatenate([every[:, inside].reshape(-1, 3), shared[:, ::-1]]),
         struts=struts[np.sort(first)],
         cell=cell,
-        junction_radius=junction_radius,
-        midspan_radius=midspan_radius,
     )
 
 

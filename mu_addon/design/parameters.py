@@ -181,9 +181,71 @@ class Waveguide:
         "mm",
         0.0,
         20.0,
-        "length beyond each end anchor",
+        "least length beyond each end anchor; longer where a seat has no room",
         "assumed: the paper prints none; carries the end faces clear of the junction, "
         "where light source and detector sit",
+        fixed=True,
+    )
+    seats: bool = quantity(
+        True,
+        "",
+        0,
+        1,
+        "print a seat for the light source and one for the detector at the waveguide's ends",
+        "assumed: the paper says where they are and not how they are held",
+    )
+    part_length_mm: float = quantity(
+        2.0,
+        "mm",
+        0.5,
+        10.0,
+        "length of light source and detector, across the waveguide",
+        "assumed: the paper names VSMY1850 and VEMT7100X01 and no size; their package, 0805, has 2.0 x 1.25",
+        fixed=True,
+    )
+    part_width_mm: float = quantity(
+        1.25,
+        "mm",
+        0.5,
+        10.0,
+        "width of light source and detector, across the waveguide",
+        "assumed: as for the length",
+        fixed=True,
+    )
+    part_height_mm: float = quantity(
+        0.85,
+        "mm",
+        0.2,
+        10.0,
+        "height of light source and detector, along the waveguide",
+        "assumed: as for the length; 0.85 mm in that package",
+        fixed=True,
+    )
+    seat_clearance_mm: float = quantity(
+        0.15,
+        "mm",
+        0.0,
+        2.0,
+        "room on every side of a part in its seat",
+        "assumed: slips in by hand; less than the overcure found in the paper's lattices would close",
+        fixed=True,
+    )
+    seat_wall_mm: float = quantity(
+        0.8,
+        "mm",
+        0.2,
+        5.0,
+        "wall of a seat, around the part and before it",
+        "assumed: above the 0.6 mm that guidelines ask of unsupported walls",
+        fixed=True,
+    )
+    cable_mm: float = quantity(
+        0.8,
+        "mm",
+        0.2,
+        5.0,
+        "width of the notch in a seat's wall through which the wires leave",
+        "assumed: two enamelled wires of 0.3 mm side by side",
         fixed=True,
     )
     inclusion_radius_mm: float = quantity(
@@ -311,6 +373,13 @@ class Dimensions:
     well_width: float
     well_depth: float
     well_pitch: float
+    seats: bool
+    part_length: float
+    part_width: float
+    part_height: float
+    seat_clearance: float
+    seat_wall: float
+    cable: float
     inclusion_radius: float
 
     @property
@@ -403,6 +472,13 @@ class Unit:
             well_width=w.well_width_mm,
             well_depth=w.well_depth_mm,
             well_pitch=w.well_pitch_mm,
+            seats=w.seats,
+            part_length=w.part_length_mm,
+            part_width=w.part_width_mm,
+            part_height=w.part_height_mm,
+            seat_clearance=w.seat_clearance_mm,
+            seat_wall=w.seat_wall_mm,
+            cable=w.cable_mm,
             inclusion_radius=w.inclusion_radius_mm,
         )
 

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .shapes import offset_along
+
 if TYPE_CHECKING:
     from .parameters import Dimensions
 
@@ -67,19 +69,42 @@ def cavity_arcs(d: Dimensions) -> list[Array]:
     return kept
 
 
-def outer_polygon(d: Dimensions, per_arc: int) -> Array:
-    """Half section of the actuator without its cavity, counter-clockwise (n, 2) points (radius, z) in mm."""
+def outer_polygon(d: Dimensions, per_arc: int, offset: Array | None = None) -> Array:
+    """Half section of the actuator without its cavity, counter-clockwise (n, 2) points (radius, z) in mm.
+
+    Its surface is moved outward by offset (3,), along x, y and z, where that is given.
+    """
     s = _samples(d, 0.0, d.height, per_arc)
-    return _closed(np.stack([outer_radius(d, s), s], axis=1))
+    curve = np.stack([outer_radius(d, s), s], axis=1)
+    if offset is None:
+        return _closed(curve)
+    return _closed(_between(curve + _moves(d, s, offset), -offset[2], d.height + offset[2]))
 
 
-def cavity_polygon(d: Dimensions, per_arc: int) -> Array:
-    """Half section of the cavity between the end caps, counter-clockwise (n, 2) points (radius, z) in mm."""
+def cavity_polygon(d: Dimensions, per_arc: int, offset: Array | None = None) -> Array:
+    """Half section of the cavity between the end caps, counter-clockwise (n, 2) points (radius, z) in mm.
+
+    The solid's surface is moved by offset (3,), along x, y and z, out of the wall and so into the cavity,
+    where that is given.
+    """
     low, high = d.base_cap, d.height - d.tip_cap
-    ends = _foot(d, np.array([low, high]))
-    radius, z, _ = _inner(d, _samples(d, ends[0], ends[1], per_arc))
-    z[[0, -1]] = low, high
-    return _closed(np.stack([radius, z], axis=1))
+    if offset is None:
+        ends = _foot(d, np.array([low, high]))
+        radius, z, _ = _inner(d, _samples(d, ends[0], ends[1], per_arc))
+        z[[0, -1]] = low, high
+        return _closed(np.stack([radius, z], axis=1))
+    room = 3.0 * np.abs(offset).max()
+    ends = _foot(d, np.array([low - room, high + room]))
+    s = _samples(d, ends[0], ends[1], per_arc)
+    radius, z, _ = _inner(d, s)
+    curve = np.stack([radius, z], axis=1) - _moves(d, s, offset)
+    return _closed(_between(curve, low + offset[2], high - offset[2]))
+
+
+def revolved_volume(polygon: Array) -> float:
+    """Volume (mm3) of a half section (n, 2) of (radius, z), counter-clockwise, turned once around z."""
+    (r, z), (q, y) = polygon.T, np.roll(polygon, -1, axis=0).T
+    return float(np.pi / 3.0 * np.sum((y - z) * (r * r + r * q + q * q)))
 
 
 def cavity_volume(d: Dimensions) -> float:
@@ -149,6 +174,20 @@ def _samples(d: Dimensions, low: float, high: float, per_arc: int) -> Array:
     inner = (knots[:-1, None] + np.diff(knots)[:, None] * np.arange(per_arc) / per_arc).ravel()
     near = 1e-3 * d.cell / per_arc  # no sliver beside an end
     return np.concatenate([[low], inner[(inner > low + near) & (inner < high - near)], [high]])
+
+
+def _moves(d: Dimensions, s: Array, offset: Array) -> Array:
+    """How far (n, 2) along (radius, z) the outer profile moves at heights s for an offset (3,)."""
+    slope = outer_slope(d, s)
+    normals = np.stack([np.ones_like(s), np.zeros_like(s), -slope], axis=1) / np.hypot(1.0, slope)[:, None]
+    return offset_along(normals, offset)[:, [0, 2]]
+
+
+def _between(curve: Array, low: float, high: float) -> Array:
+    """The part of a curve (n, 2) of rising z between two heights, upright beyond its ends."""
+    inside = curve[(curve[:, 1] > low) & (curve[:, 1] < high)]
+    ends = np.interp([low, high], curve[:, 1], curve[:, 0])
+    return np.concatenate([[[ends[0], low]], inside, [[ends[1], high]]])
 
 
 def _closed(curve: Array) -> Array:

@@ -6,17 +6,19 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from . import shapes
 from .anchors import Window
-from .gates import Gates, check_solid
+from .body import Body, covering, require_path_inside
+from .gates import Gates, check_solid, check_waveguide
 from .lattice import Lattice, lattice_of
 from .parameters import Dimensions, Unit
-from .profile import cavity_polygon, cavity_volume, outer_polygon
+from .profile import cavity_polygon, cavity_volume, outer_polygon, revolved_volume
+from .rules import check_printed
 from .surface import Triangles, Vertices, bad_edges, weld
-from .waveguide import waveguide
+from .waveguide import Bar, strut_radii, waveguide
 
 QUANTA = (1e-4, 2e-5, 5e-4)
 """Steps in mm that vertices are rounded to; the first that leaves every edge to two triangles is kept."""
@@ -37,87 +39,208 @@ QUALITY = {"interactive": Facets(64, 6, 12, 4), "export": Facets(192, 16, 32, 10
 
 @attrs.frozen(eq=False)
 class Solid:
-    """Outward oriented surface: vertices (n, 3) in mm, triangles (m, 3), and the gates it passed."""
+    """Outward oriented surface: vertices (n, 3) in mm, triangles (m, 3), and the gates it passed.
+
+    window: of its waveguide, None without one and along another path; bar: its waveguide; taken_off: what
+    the drawing leaves out for the printer to add, in the plane and along z, in mm.
+    """
 
     vertices: Vertices
     triangles: Triangles
     gates: Gates
     window: Window | None
     quality: str
+    bar: Bar | None = None
+    taken_off: tuple[float, float] = (0.0, 0.0)
 
 
-def build_solid(unit: Unit, window: Window | None = None, quality: str = "interactive") -> Solid:
-    """Printable solid, with the waveguide along `window` if one is given; GateError if a gate fails."""
+def build_solid(
+    unit: Unit,
+    path: Window | ArrayLike | None = None,
+    quality: str = "interactive",
+    body: Body | None = None,
+    take_off: tuple[float, float] = (0.0, 0.0),
+) -> Solid:
+    """Printable solid, with the waveguide along a window or along lattice nodes (n, 3) if a path is given.
+
+    body: what the lattice is cut to in place of its box, itself cut by `envelope`; ends of struts that
+    nothing holds any more are left out. take_off: how far in mm, in the plane and along z, a printer moves
+    every surface outward: the drawing is smaller by it (Minkowski), so that the print has the unit's nominal
+    size. Raises GateError if a gate fails, InputError for a path or an offset that does not fit.
+    """
     from manifold3d import Manifold, OpType
 
     if quality not in QUALITY:
         raise InputError(f"there is no quality {quality!r}", "quality", f"choose one of {', '.join(QUALITY)}")
     d, facets = unit.dimensions, QUALITY[quality]
+    if body is not None:
+        if isinstance(path, Window):
+            require_path_inside(body, unit, path)
+        d = covering(d, body)
+    offset = _drawn_offset(d, take_off)
+    xy, z = (0.0, 0.0) if offset is None else (float(offset[0]), float(offset[2]))
     n = facets.around_axis
     lattice = lattice_of(d)
-    bare = lattice_solid(d, lattice, facets)
+    bare = lattice_solid(d, lattice, facets, offset)
 
     # Every solid first, every cavity last: a cavity cut early leaves coincident faces, bodies of no volume.
-    boss = shapes.cylinder(d.inlet_radius + d.inlet_wall, -d.inlet_length, d.base_cap / 2.0, n)
-    solids = [bare, shapes.revolved(outer_polygon(d, facets.along_arc), n), boss]
-    bore = shapes.cylinder(d.inlet_radius, -1.5 * d.inlet_length, d.base_cap + d.inlet_radius, n)
-    cavities = [shapes.revolved(cavity_polygon(d, facets.along_arc), n), bore]
-    if window is not None:
-        bar = waveguide(unit, window)
-        solids.append(shapes.box(*bar.box))
-        cavities += [shapes.box(*well) for well in bar.wells]
-    filled = Manifold.batch_boolean(solids, OpType.Add)
+    boss = shapes.cylinder(d.inlet_radius + d.inlet_wall + xy, -d.inlet_length - z, d.base_cap / 2.0, n)
+    actuator = [shapes.revolved(outer_polygon(d, facets.along_arc, offset), n), boss]
+    bore = shapes.cylinder(d.inlet_radius - xy, -1.5 * d.inlet_length, d.base_cap + d.inlet_radius, n)
+    cavities = [shapes.revolved(cavity_polygon(d, facets.along_arc, offset), n), bore]
+    bar, guide, holder = None, None, bare
+    if path is not None:
+        bar = waveguide(unit, path, d)
+        holder = with_waveguide(d, lattice, facets, bar, bare, offset)
+        cuts = Manifold.batch_boolean(bar.cut_solids(offset), OpType.Add)
+        guide = check_waveguide(holder, bar.solid(offset), cuts, actuator, lattice.cycles + bar.loops)
+        cavities.append(cuts)
+    if body is not None:
+        if offset is not None:
+            raise InputError(
+                "the printer's offsets are not taken off a body of your own",
+                "body",
+                "draw it smaller yourself",
+            )
+        holder = holder ^ body.manifold
+    filled = Manifold.batch_boolean([holder, *actuator], OpType.Add)
+    if body is not None:
+        filled = max(filled.decompose(), key=lambda piece: float(piece.volume()))
     vertices, triangles = printable(Manifold.batch_boolean([filled, *cavities], OpType.Subtract))
 
+    cavity = cavity_volume(d) if offset is None else revolved_volume(cavity_polygon(d, 64, offset))
     gates = check_solid(
         vertices,
         triangles,
         plug=shapes.cylinder(
             d.inlet_radius + d.inlet_wall / 2.0, -1.5 * d.inlet_length, -0.5 * d.inlet_length, n
         ),
-        sealed_volume=cavity_volume(d) + np.pi * d.inlet_radius**2 * (d.base_cap + 0.5 * d.inlet_length),
+        sealed_volume=cavity + np.pi * (d.inlet_radius - xy) ** 2 * (d.base_cap + z + 0.5 * d.inlet_length),
         lattice=(bare.genus(), len(bare.decompose())),
         lattice_cycles=lattice.cycles,
+        guide=guide,
     )
-    return Solid(vertices, triangles, gates, window, quality)
+    window = path if isinstance(path, Window) else None
+    return Solid(vertices, triangles, gates, window, quality, bar, take_off)
 
 
-def lattice_solid(d: Dimensions, lattice: Lattice, facets: Facets) -> Any:
-    """Bare lattice as a Manifold: a ball at each node, a strut along each edge, cut to its box."""
+def _drawn_offset(d: Dimensions, take_off: tuple[float, float]) -> NDArray[np.float64] | None:
+    """Outward move (3,) of the drawing's surfaces that undoes a printer's; None for none. InputError."""
+    xy, z = (float(value) for value in take_off)
+    if not xy and not z:
+        return None
+    if min(xy, z) < 0.0 < max(xy, z):
+        raise InputError(
+            f"offsets of {xy:g} mm in the plane and {z:g} mm along z have opposite signs",
+            "printer's offsets",
+            "no body grows and shrinks at once: measure again, or take the smaller one as 0",
+        )
+    check_printed(d, -xy, -z)
+    return -np.array([xy, xy, z])
+
+
+def with_waveguide(
+    d: Dimensions,
+    lattice: Lattice,
+    facets: Facets,
+    bar: Bar,
+    bare: Any,
+    offset: NDArray[np.float64] | None = None,
+) -> Any:
+    """The lattice with its waveguide, uncut, as a Manifold.
+
+    Struts that the bar follows are left out; those that meet it are raised to its thickness.
+    """
+    from manifold3d import Manifold, OpType
+
+    t = np.linspace(0.0, 1.0, facets.along_strut + 1)
+    radii = strut_radii(lattice, bar.met, bar.half, t)
+    raised = (radii > lattice.radius(t) + 1e-9).any(axis=1) & ~bar.followed
+    if (bar.followed | raised).any():
+        bare = lattice_solid(d, lattice, facets, offset, bar.followed | raised)
+    parts = [bare, bar.solid(offset)]
+    if raised.any():
+        thicker = [
+            shapes.spindle(end - start, thick, facets.around_strut, offset).translate(start.tolist())
+            for (start, end), thick in zip(lattice.nodes[lattice.struts[raised]], radii[raised], strict=True)
+        ]
+        ball = shapes.ball(bar.half, facets.around_strut, offset)
+        met = np.unique(lattice.struts[bar.met])
+        thicker += [ball.translate(node.tolist()) for node in lattice.nodes[met]]
+        parts.append(Manifold.batch_boolean(thicker, OpType.Add) ^ _envelope(d, offset))
+    united = Manifold.batch_boolean(parts, OpType.Add)
+    united.num_tri()  # manifold3d evaluates late; without this it would be united again by each who asks
+    return united
+
+
+def _envelope(d: Dimensions, offset: NDArray[np.float64] | None) -> Any:
+    low, high = np.array(d.bounds).T
+    return shapes.box(low, high) if offset is None else shapes.box(low - offset, high + offset)
+
+
+def lattice_solid(
+    d: Dimensions,
+    lattice: Lattice,
+    facets: Facets,
+    offset: NDArray[np.float64] | None = None,
+    without: NDArray[np.bool_] | None = None,
+) -> Any:
+    """Bare lattice as a Manifold: a ball at each node, a strut along each edge, cut to its box.
+
+    offset (3,): outward move of its surfaces; without (E,): struts that are left out.
+    """
     from manifold3d import Manifold, OpType
 
     kind, step = lattice.kind, d.cell / lattice.kind.divisions
     radii = lattice.radius(np.linspace(0.0, 1.0, facets.along_strut + 1))
-    ball = shapes.ball(float(radii[0]), facets.around_strut)
+    ball = shapes.ball(float(radii[0]), facets.around_strut, offset)
+    left_out = set() if without is None else {_ends(ends) for ends in lattice.grid[lattice.struts[without]]}
 
     def strut(ends: NDArray[np.int64]) -> Any:
-        return shapes.spindle((ends[1] - ends[0]) * step, radii, facets.around_strut)
+        return shapes.spindle((ends[1] - ends[0]) * step, radii, facets.around_strut, offset)
 
     def placed(body: Any, at: NDArray[np.int64]) -> Any:
         return body.translate((at * step).tolist())
 
     # Cells are equal, and so are layers of them: uniting one and repeating it is several times faster than
     # uniting every strut. What cells share, the nodes and struts on their faces, is placed once.
-    middle = kind.divisions // 2
-    own = [placed(ball, node - middle) for node in kind.grid[kind.inside]]
-    own += [placed(strut(ends), ends[0] - middle) for ends in kind.grid[kind.struts[~kind.on_face]]]
-    low, up = lattice.cells[0, 2], kind.divisions
-    layer = []
-    if own:
-        cell = Manifold.batch_boolean(own, OpType.Add)
-        layer += [placed(cell, at + middle) for at in lattice.cells if at[2] == low]
+    up, inner = kind.divisions, kind.grid[kind.struts[~kind.on_face]]
+    balls = [placed(ball, node) for node in kind.grid[kind.inside]]
+    whole = [*balls, *(placed(strut(ends), ends[0]) for ends in inner)]
+    cell = Manifold.batch_boolean(whole, OpType.Add) if whole else None
     nodes = lattice.grid[~lattice.inside]
     faces = lattice.grid[lattice.struts[lattice.on_face]]
-    layer += [placed(ball, node) for node in nodes if node[2] < low + up]
-    layer += [placed(strut(ends), ends[0]) for ends in faces if ends[:, 2].min() < low + up]
-    united = Manifold.batch_boolean(layer, OpType.Add)
-    united.num_tri()  # manifold3d evaluates late; without this it would unite every strut again
-    stack = [united.translate([0.0, 0.0, k * d.cell]) for k in range(d.count)]
-    top = low + d.count * up
+    faces = faces[[_ends(ends) not in left_out for ends in faces]] if left_out else faces
+    low, top = lattice.cells[0, 2], lattice.cells[0, 2] + d.count * up
+
+    def layer(floor: int) -> Any:
+        found = []
+        for at in lattice.cells[lattice.cells[:, 2] == floor] if cell is not None else ():
+            kept = [ends for ends in inner if _ends(at + ends) not in left_out]
+            if len(kept) == len(inner):
+                found.append(placed(cell, at))
+            else:
+                parts = [*balls, *(placed(strut(ends), ends[0]) for ends in kept)]
+                found.append(placed(Manifold.batch_boolean(parts, OpType.Add), at))
+        found += [placed(ball, node) for node in nodes if floor <= node[2] < floor + up]
+        found += [placed(strut(ends), ends[0]) for ends in faces if floor <= ends[:, 2].min() < floor + up]
+        united = Manifold.batch_boolean(found, OpType.Add)
+        united.num_tri()  # as above
+        return united
+
+    if left_out:
+        stack = [layer(low + k * up) for k in range(d.count)]
+    else:
+        first = layer(low)
+        stack = [first.translate([0.0, 0.0, k * d.cell]) for k in range(d.count)]
     stack += [placed(ball, node) for node in nodes if node[2] == top]
     stack += [placed(strut(ends), ends[0]) for ends in faces if ends[:, 2].min() == top]
-    box = shapes.box(*np.array(d.bounds).T)
-    return Manifold.batch_boolean(stack, OpType.Add) ^ box
+    return Manifold.batch_boolean(stack, OpType.Add) ^ _envelope(d, offset)
+
+
+def _ends(ends: NDArray[np.int64]) -> frozenset[tuple[int, ...]]:
+    """A strut (2, 3) of the grid, whichever end comes first."""
+    return frozenset(tuple(end) for end in ends.tolist())
 
 
 def printable(solid: Any) -> tuple[Vertices, Triangles]:

@@ -66,7 +66,7 @@ def lattice_mesh(
     # gmsh numbers its own nodes on from the largest it was given, so these must be dense.
     used, dense = np.unique(outside, return_inverse=True)
     surface = np.reshape(dense, (-1, 3))
-    with _model(load_gmsh()) as gmsh:
+    with gmsh_model(load_gmsh()) as gmsh:
         _place_surface(gmsh, nodes[used], surface, height)
         _envelope(gmsh, plan, height, sizes)
         try:
@@ -118,7 +118,7 @@ _OPTIONS = {
 
 
 @contextmanager
-def _model(gmsh: Any) -> Iterator[Any]:
+def gmsh_model(gmsh: Any) -> Iterator[Any]:
     """A fresh silent model under fixed options; afterwards gmsh is as it was found."""
     ours = not gmsh.isInitialized()
     if ours:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
+from ..design.body import Body
 from ..design.parameters import Unit
 from ..design.profile import cavity_volume, membrane_volume, outer_volume
+from ..design.surface import volume
 from ..errors import MeshingError
 from .mesh import LATTICE, MEMBRANE, TET_EDGES, TRIANGLE_EDGES, Array, Mesh
 
@@ -50,13 +52,18 @@ class Quality:
     cavity_volume_error: float
 
 
-def quality(mesh: Mesh, unit: Unit) -> Quality:
-    """Measure a mesh of a unit, half and quarter meshes as the whole body they stand for."""
+def quality(mesh: Mesh, unit: Unit, body: Body | None = None) -> Quality:
+    """Measure a mesh of a unit, half and quarter meshes as the whole body they stand for.
+
+    body: what took the place of the envelope's box in it, if anything did.
+    """
     d = unit.printed
     (x0, x1), (y0, y1), (z0, z1) = d.bounds
+    box = (x1 - x0) * (y1 - y0) * (z1 - z0)
+    envelope = box if body is None else volume(body.vertices, body.triangles)
     exact = {
         "membrane": membrane_volume(d),
-        "lattice": (x1 - x0) * (y1 - y0) * (z1 - z0) - outer_volume(d),
+        "lattice": envelope - outer_volume(d),
         "cavity": cavity_volume(d),
     }
     copies = 2 ** len(mesh.symmetry)

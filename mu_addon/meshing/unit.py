@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..design.body import Body, half
 from ..design.parameters import Dimensions, Unit
 from ..errors import InputError, MeshingError
 from .curving import relieved
@@ -29,7 +30,7 @@ from .mesh import (
 from .quality import check_positive, folded_corners
 from .revolved import region_at, unit_surfaces
 from .settings import CELL_MM, MeshSettings
-from .surface import mesh_surface
+from .surface import Surface, mesh_surface
 
 Progress = Callable[[str, float], None]
 
@@ -49,19 +50,24 @@ def mesh_unit(
     progress: Progress | None = None,
     mesher: str = "auto",
     cache: Path | None = None,
+    body: Body | None = None,
 ) -> Mesh:
     """The analysis mesh of a unit as it is printed; `progress` is told a stage and the share done.
 
     The membrane is a revolved grid; gmsh fills the lattice region around it. mesher "pytetwild" meshes
     the whole from surfaces instead, straight-sided, coarser in shape and slower, and keeps it in the
     folder `cache`; "auto" does so, with a MeshingWarning, only where gmsh cannot be loaded. The inlet
-    is left out: the base is clamped. Raises InputError and MeshingError.
+    is left out: the base is clamped. A sound `body` takes the place of the envelope's box, see
+    `design.body.envelope`: pytetwild meshes it, its half where it is its own mirror image across x, else the
+    whole. Raises InputError and MeshingError.
     """
     settings = settings or MeshSettings()
     say = progress or (lambda stage, share: None)
     if mesher not in MESHERS:
         raise InputError(f"mesher {mesher!r} is not known", "mesher", f"one of: {', '.join(MESHERS)}")
     d = unit.printed
+    if body is not None:
+        return _within(body, d, settings, say, mesher, cache)
     _, (y0, y1), _ = d.bounds
     if settings.fraction == "quarter" and y0 != -y1:
         raise InputError(
@@ -69,8 +75,10 @@ def mesh_unit(
             f"y from {y0:g} to {y1:g} mm",
             'use fraction "half"',
         )
+    quarter = settings.fraction == "quarter"
+    part = (math.pi / 2, ("x", "y")) if quarter else (math.pi, ("x",))
     if mesher == "pytetwild":
-        mesh = _from_surfaces(d, settings, say, cache)
+        mesh = _from_surfaces(d, settings, say, cache, *part)
     else:
         try:
             mesh = _structured(d, settings, say)
@@ -83,7 +91,7 @@ def mesh_unit(
                 MeshingWarning,
                 stacklevel=2,
             )
-            mesh = _from_surfaces(d, settings, say, cache)
+            mesh = _from_surfaces(d, settings, say, cache, *part)
     check_positive(mesh)
     if settings.fraction == "full":
         mesh = mirror(mesh, "x")
@@ -185,12 +193,41 @@ def _flattening_chords(mesh: Mesh, outside: Array) -> Array:
     return edges[chosen]
 
 
-def _from_surfaces(d: Dimensions, settings: MeshSettings, say: Progress, cache: Path | None) -> Mesh:
-    """Half or quarter mesh by pytetwild, tagged by the exact profile."""
+def _within(
+    body: Body, d: Dimensions, settings: MeshSettings, say: Progress, mesher: str, cache: Path | None
+) -> Mesh:
+    """Mesh of a unit with a body for its envelope."""
+    if mesher == "gmsh" or settings.fraction == "quarter":
+        raise InputError(
+            "a body of one's own is meshed by pytetwild, as a half or whole",
+            "mesher, fraction",
+            'choose mesher "auto" or "pytetwild" and fraction "half" or "full"',
+        )
+    right = half(body)
+    envelope = body if right is None else right
+    surface = Surface(envelope.vertices, envelope.triangles.astype(np.int32), LATTICE)
+    turn, symmetry = (2.0 * math.pi, ()) if right is None else (math.pi, ("x",))
+    mesh = _from_surfaces(d, settings, say, cache, turn, symmetry, surface)
+    check_positive(mesh)
+    if settings.fraction == "full" and symmetry:
+        mesh = mirror(mesh, "x")
+    say("mesh", 1.0)
+    return mesh
+
+
+def _from_surfaces(
+    d: Dimensions,
+    settings: MeshSettings,
+    say: Progress,
+    cache: Path | None,
+    turn: float,
+    symmetry: tuple[str, ...],
+    envelope: Surface | None = None,
+) -> Mesh:
+    """Part of a unit between angles 0 and `turn` by pytetwild, tagged by the exact profile."""
     size = d.cell / CELL_MM / settings.refine
-    quarter = settings.fraction == "quarter"
-    turn = math.pi / 2 if quarter else math.pi
-    envelope, profile, cavity = unit_surfaces(d, turn, settings.meridian_mm * size)
+    box, profile, cavity = unit_surfaces(d, turn, settings.meridian_mm * size)
+    envelope = envelope or box
     say("mesh by pytetwild", 0.0)
     mesh = mesh_surface(
         envelope.vertices,
@@ -200,7 +237,7 @@ def _from_surfaces(d: Dimensions, settings: MeshSettings, say: Progress, cache: 
         classify=lambda points: region_at(d, points),
         epsilon_mm=d.wall / 5,
         order=settings.order,
-        symmetry=("x", "y") if quarter else ("x",),
+        symmetry=symmetry,
         cache=cache,
     )
     if set(np.unique(mesh.region)) != {MEMBRANE, LATTICE}:

@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 from mu_addon.design.anchors import SHORTEST, anchors, window, windows
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import Envelope, Unit, Waveguide, load_preset
-from mu_addon.design.waveguide import junction_reach, waveguide, well_centres
 from mu_addon.errors import InputError
 
 from .units import units
@@ -94,61 +93,3 @@ def test_anchors_are_lattice_centres_in_the_bending_plane(unit):
         assert lattice.is_centre[gap.argmin()]
     assert (points[:, 0] == 0).all()
     assert np.diff(points[:, 2]) == pytest.approx(d.cell)
-
-
-@pytest.mark.parametrize(("name", "per_span"), [("mu-0.75x", 2), ("mu-1.0x", 3), ("mu-1.5x", 5)])
-def test_number_of_wells_follows_the_length(name, per_span):
-    unit = load_preset(name)
-    for w in windows(6):
-        bar = waveguide(unit, w)
-        assert len(bar.wells) == per_span * (w.length - 1)
-        size = bar.wells[:, 1] - bar.wells[:, 0]
-        assert size[:, 2] == pytest.approx(1.0)
-        depth = bar.box[1, 1] - bar.wells[:, 0, 1]
-        assert depth == pytest.approx(0.65)
-        assert bar.box[1] - bar.box[0] == pytest.approx(
-            [1.5, 1.5, (w.length - 1) * unit.dimensions.cell + 5.0]
-        )
-
-
-@given(units())
-@settings(max_examples=60, deadline=None)
-def test_wells_keep_their_pitch_and_clear_of_the_junctions(unit):
-    d, w = unit.dimensions, windows(unit.dimensions.count)[-1]
-    at = well_centres(d, w.length - 1)
-    steps = np.diff(at) / d.well_pitch
-    assert steps == pytest.approx(np.rint(steps), abs=1e-6)
-    nodes = anchors(unit)[:, 2] - anchors(unit)[0, 2]
-    if len(at):
-        assert np.abs(at[:, None] - nodes).min() > d.well_width / 2 + d.waveguide_section / 2
-    bar = waveguide(unit, w)
-    low, high = np.array(d.bounds).T
-    assert (bar.box[0] >= low - 1e-9).all()
-    assert (bar.box[1] <= high + 1e-9).all()
-
-
-def test_struts_reach_as_far_along_the_bar_as_said():
-    """Against points sampled on a strut's surface where it crosses the plane of the bar's outer face."""
-    d = load_preset("mu-1.5x").dimensions
-    lattice, h = lattice_of(d), d.waveguide_section / 2
-    along = np.ones(3) / np.sqrt(3)
-    side = np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
-    other = np.cross(along, side)
-    length = np.sqrt(0.75) * d.cell
-    s, angle = np.meshgrid(np.linspace(0, length, 4001), np.linspace(0, 2 * np.pi, 721))
-    radius = lattice.radius(s / length)[..., None]
-    points = s[..., None] * along + radius * (
-        np.cos(angle)[..., None] * side + np.sin(angle)[..., None] * other
-    )
-    on_face = np.abs(points[..., 1] - h) < 0.005
-    assert points[on_face][:, 2].max() == pytest.approx(junction_reach(d), abs=0.02)
-
-
-def test_wells_face_away_from_the_axis():
-    for row in (2, 1, -1):
-        unit = Unit(waveguide=Waveguide(row=row))
-        bar = waveguide(unit, windows(6)[0])
-        y = bar.wells[..., 1]
-        outer_face = bar.box[1 if row > 0 else 0, 1]
-        assert np.abs(y - outer_face).min(axis=1) == pytest.approx(0.03)
-        assert np.abs(y).max() > abs(outer_face)

@@ -15,7 +15,6 @@ from mu_addon.design.export import write_nodes
 from mu_addon.design.lattice import filled, lattice_of
 from mu_addon.design.lattices import BODY_CENTRED, STRAIGHT, LatticeKind, constant, sin_squared
 from mu_addon.design.parameters import Envelope, Unit, from_toml, to_toml
-from mu_addon.design.waveguide import junction_reach
 from mu_addon.errors import InputError
 from mu_addon.placement.graph import lattice_graph
 
@@ -163,18 +162,3 @@ def test_a_one_sided_kind_is_no_units_lattice(monkeypatch):
     lattices.register(slanted)
     with pytest.raises(InputError, match="is not its own mirror image across x"):
         Unit(lattice=Envelope(kind="slanted"))
-
-
-def test_upright_struts_cover_a_bar_only_where_they_are_wider(monkeypatch):
-    monkeypatch.setattr(lattices, "KINDS", dict(lattices.KINDS))
-    ends = [(0.5, 0.5, z) for z in (0.0, 1.0)] + [(0.5, y, 0.5) for y in (0.0, 1.0)]
-    ends += [(x, 0.5, 0.5) for x in (0.0, 1.0)]
-    lattices.register(LatticeKind("cross", [(0.5, 0.5, 0.5), *ends], [(0, k) for k in range(1, 7)], constant))
-
-    def reach(width):
-        envelope = Envelope(kind="cross", junction_diameter_mm=1.0, midspan_diameter_mm=width)
-        return junction_reach(Unit(lattice=envelope).dimensions)
-
-    # The strut along y leaves a circle on the bar's face, of its own radius.
-    assert reach(1.4) == pytest.approx(0.7)
-    assert reach(1.6) == pytest.approx(12.5 / 2)

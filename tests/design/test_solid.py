@@ -125,8 +125,8 @@ def test_a_leak_is_caught(monkeypatch):
     """A cavity that breaks through the wall joins inside and outside once more."""
     from mu_addon.design.profile import cavity_polygon
 
-    def swollen(d, per_arc):
-        polygon = cavity_polygon(d, per_arc)
+    def swollen(d, per_arc, offset=None):
+        polygon = cavity_polygon(d, per_arc, offset)
         return polygon * np.where(np.abs(polygon[:, 1:] - d.cell / 2) < 1.0, [1.1, 1.0], [1.0, 1.0])
 
     with pytest.raises(gates.GateError, match="gate: one cavity"):
@@ -137,13 +137,13 @@ def test_a_wrong_cavity_is_caught(monkeypatch):
     from mu_addon.design.profile import cavity_polygon
 
     with pytest.raises(gates.GateError, match="gate: cavity volume"):
-        rebuilt(monkeypatch, cavity_polygon=lambda d, n: cavity_polygon(attrs.evolve(d, wall=0.6), n))
+        rebuilt(monkeypatch, cavity_polygon=lambda d, *rest: cavity_polygon(attrs.evolve(d, wall=0.6), *rest))
 
 
 def test_a_missing_strut_is_caught(monkeypatch):
-    def cut(d, lattice, facets):
+    def cut(*taken):
         hole = shapes.box([-11, 26.6, 1.6], [-8, 29.6, 4.6])
-        return original(d, lattice, facets) - hole
+        return original(*taken) - hole
 
     original = solid.lattice_solid
     with pytest.raises(gates.GateError, match="gate: lattice genus"):

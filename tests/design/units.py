@@ -48,6 +48,7 @@ def units(draw):
         ),
         waveguide=Waveguide(
             row=draw(st.sampled_from(rows)),
+            seats=False,
             section_mm=real(0.8, 1.7),
             well_depth_mm=real(0.05, 0.4),
             well_width_mm=real(0.1, 0.9),

@@ -1,0 +1,343 @@
+"""A body of the user's own as a closed surface: read, examined, and cut to serve as a unit's envelope."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from . import shapes
+from .printing.crossing import crossings
+from .profile import outer_polygon
+from .surface import Triangles, Vertices, volume, weld
+
+if TYPE_CHECKING:
+    from .anchors import Window
+    from .parameters import Dimensions, Unit
+
+MOST_TRIANGLES = 60_000
+"""A finer body would take minutes to examine and to mesh, and say no more: the mesh is coarser by far."""
+QUANTUM_MM = 1e-5
+"""Vertices closer than that are one: files repeat them for every triangle."""
+AROUND = 96
+"""Flat pieces around the actuator where it is asked whether a body holds it."""
+SLACK_MM = 1e-3
+"""A body may miss an end plane by so much."""
+_UNITS = {1000.0: "metres", 25.4: "inches", 10.0: "centimetres", 0.001: "micrometres"}
+
+
+@attrs.frozen
+class Flaw:
+    """Why a body cannot be an envelope: what, the places (n, 3) in mm where it shows, and what to do."""
+
+    what: str
+    remedy: str
+    places: NDArray[np.float64] = attrs.field(eq=False, factory=lambda: np.empty((0, 3)))
+
+
+@attrs.frozen(eq=False)
+class Body:
+    """Triangles (m, 3) between vertices (n, 3) in mm, in the unit's frame; raises InputError.
+
+    A closed body whose faces all look inward is turned: nothing else can be meant.
+    """
+
+    vertices: Vertices
+    triangles: Triangles
+    name: str = "body"
+
+    def __attrs_post_init__(self) -> None:
+        if not (len(self.triangles) and np.isfinite(self.vertices).all()):
+            raise InputError(
+                "there is no surface in it, or a coordinate is no number",
+                self.name,
+                "give a closed mesh of triangles",
+            )
+        if len(self.triangles) > MOST_TRIANGLES:
+            raise InputError(
+                f"it has {len(self.triangles)} triangles",
+                self.name,
+                f"simplify it to {MOST_TRIANGLES} at most; the analysis mesh is coarser still",
+            )
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lowest and highest corner (2, 3) in mm."""
+        return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of the surface, in hexadecimal."""
+        return hashlib.sha256(self.text().encode()).hexdigest()
+
+    def text(self) -> str:
+        """The surface as a Wavefront OBJ in mm, with every digit."""
+        lines = ["# closed surface, millimetres"]
+        lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in self.vertices.tolist()]
+        lines += [f"f {a} {b} {c}" for a, b, c in (self.triangles + 1).tolist()]
+        return "\n".join(lines) + "\n"
+
+    @cached_property
+    def manifold(self) -> Any:
+        """The body for manifold3d."""
+        from manifold3d import Manifold, Mesh64
+
+        return Manifold(Mesh64(self.vertices, self.triangles.astype(np.uint64)))
+
+
+def body_of(vertices: ArrayLike, triangles: ArrayLike, name: str = "body") -> Body:
+    """Body of triangles (m, 3) and vertices (n, 3) in mm, equal vertices merged; raises InputError."""
+    given = np.asarray(vertices, float).reshape(-1, 3), np.asarray(triangles, np.int64).reshape(-1, 3)
+    if not (len(given[1]) and np.isfinite(given[0]).all()):
+        return Body(*given, name)
+    points, faces = weld(*given, QUANTUM_MM)
+    if len(faces) and not len(_odd_edges(faces)[0]) and volume(points, faces) < 0.0:
+        faces = faces[:, ::-1]
+    return Body(points, faces, name)
+
+
+def read_body(path: str | Path) -> Body:
+    """Body in an STL, OBJ or PLY file in mm; raises InputError."""
+    from meshio import ReadError, obj, ply, stl
+
+    path = Path(path)
+    readers = {".stl": stl.read, ".obj": obj.read, ".ply": ply.read}
+    remedy = "give a closed surface as STL, OBJ or PLY, in mm"
+    if path.suffix.lower() not in readers:
+        raise InputError(f"a body is not read from {path.suffix or 'such a file'}", str(path), remedy)
+    try:
+        mesh = readers[path.suffix.lower()](path)
+    except (OSError, ValueError, LookupError, TypeError, AssertionError, ReadError) as error:
+        why = getattr(error, "strerror", None) or "it is damaged or of another kind"
+        raise InputError(f"no body can be read from it: {why}", str(path), remedy) from error
+    found = [np.empty((0, 3), np.int64)]
+    for block in mesh.cells:
+        if block.type == "triangle":
+            found.append(np.asarray(block.data))
+        elif block.type == "quad":
+            found += [block.data[:, [0, 1, 2]], block.data[:, [0, 2, 3]]]
+    triangles, points = np.concatenate(found), np.asarray(mesh.points, float)
+    known = ((triangles >= 0) & (triangles < len(points))).all()
+    if points.ndim != 2 or points.shape[1] != 3 or not known:
+        raise InputError("no body can be read from it: its faces and points do not fit", str(path), remedy)
+    return body_of(points, triangles, path.name)
+
+
+def flaws(body: Body) -> list[Flaw]:
+    """What keeps a surface from being the skin of one body: empty for one that is."""
+    v, t = body.vertices, body.triangles
+    open_, crowded = _odd_edges(t)
+    found = []
+    if len(open_):
+        found.append(
+            Flaw(
+                f"{len(open_)} edges are open or have neighbours facing the other way",
+                "fill the holes and make all faces look outward",
+                v[open_].mean(axis=1),
+            )
+        )
+    if len(crowded):
+        found.append(
+            Flaw(
+                f"{len(crowded)} edges belong to more than two faces",
+                "remove inner and doubled faces",
+                v[crowded].mean(axis=1),
+            )
+        )
+    crossing = crossings(v, t)
+    if len(crossing):
+        found.append(
+            Flaw(
+                f"the surface cuts itself, in {len(crossing)} places",
+                "unite the parts, or move them apart",
+                crossing,
+            )
+        )
+    if found:
+        return found
+    shells = body.manifold.decompose()
+    if len(shells) != 1:
+        places = np.array([_middle(s) for s in shells])
+        found.append(Flaw(f"there are {len(shells)} separate bodies", "unite them, or give one", places))
+    elif body.manifold.volume() <= 0.0:
+        found.append(Flaw("it encloses nothing", "make its faces look outward"))
+    return found
+
+
+def misfits(body: Body, d: Dimensions) -> list[Flaw]:
+    """Why a sound body cannot be the envelope of a unit of these dimensions."""
+    low, high = body.bounds
+    size, own = float(np.ptp(body.bounds, axis=0).max()), float(np.ptp(np.array(d.bounds), axis=1).max())
+    for factor, unit in _UNITS.items():
+        if 0.6 < size * factor / own < 1.6 and not 0.3 < size / own < 3.0:
+            return [
+                Flaw(
+                    f"it is {size:.4g} mm long, the unit {own:.4g} mm: it seems to be in {unit}",
+                    f"scale it by {factor:g}",
+                    np.stack([low, high]),
+                )
+            ]
+    found = []
+    if low[2] > SLACK_MM or high[2] < d.height - SLACK_MM:
+        found.append(
+            Flaw(
+                f"it reaches from z = {low[2]:.4g} to {high[2]:.4g} mm, the unit from 0 to {d.height:.4g} mm",
+                "move it, or lengthen it past both ends; what is beyond them is cut off flat",
+                np.array([[0.0, 0.0, z] for z in (low[2], high[2])]),
+            )
+        )
+    # A little less than its length: there the ends of both lie in one plane.
+    near = 2.0 * SLACK_MM
+    between = shapes.box([-2.0 * d.R, -2.0 * d.R, near], [2.0 * d.R, 2.0 * d.R, d.height - near])
+    outside = (shapes.revolved(outer_polygon(d, 6), AROUND) ^ between) - body.manifold
+    pieces = [piece for piece in outside.decompose() if piece.volume() > 1e-6 * d.cell**3]
+    if pieces and not found:
+        found.append(
+            Flaw(
+                f"the chambers come out of it in {len(pieces)} places",
+                f"widen it: the chambers are {2.0 * d.R:.4g} mm wide around the z axis",
+                np.array([_vertex(piece) for piece in pieces]),
+            )
+        )
+    return found
+
+
+def envelope(body: Body, d: Dimensions) -> Body:
+    """The body between the unit's end planes, z = 0 and the height; InputError names its first flaw."""
+    require_sound(body, [*flaws(body)] or misfits(body, d))
+    low, high = body.bounds
+    slab = shapes.box([*low[:2] - 1.0, 0.0], [*high[:2] + 1.0, d.height])
+    return _body_from(body.manifold ^ slab, body.name, d.height)
+
+
+def require_sound(body: Body, found: list[Flaw]) -> None:
+    """Raise InputError for the first of these flaws, with the first of its places."""
+    if found:
+        flaw = found[0]
+        at = ", first at ({:.2f}, {:.2f}, {:.2f}) mm".format(*flaw.places[0]) if len(flaw.places) else ""
+        raise InputError(f"the body cannot be an envelope: {flaw.what}", f"{body.name}{at}", flaw.remedy)
+
+
+def require_path_inside(body: Body, unit: Unit, window: Window) -> None:
+    """Raise InputError where the waveguide along a window leaves the body."""
+    from .waveguide import waveguide
+
+    bar = waveguide(unit, window, covering(unit.dimensions, body)).solid()
+    if (bar - body.manifold).volume() > 1e-6 * bar.volume():
+        raise InputError(
+            f"the waveguide along {window.name} comes out of the body",
+            f"{body.name}; [waveguide] row",
+            "choose a row nearer to the axis, or a wider body",
+        )
+
+
+def covering(d: Dimensions, body: Body) -> Dimensions:
+    """Dimensions whose envelope has cells wherever the body is: the box that the body is cut from."""
+    low, high = body.bounds
+    half_x = _cells(max(-low[0], high[0]), d.cell)
+    return attrs.evolve(
+        d,
+        cells_x=2 * half_x + 1,
+        cells_y_minus=_cells(-low[1], d.cell),
+        cells_y_plus=_cells(high[1], d.cell),
+    )
+
+
+def half(body: Body) -> Body | None:
+    """The part at x >= 0 of a body that is its own mirror image across x; None of any other."""
+    whole = body.manifold
+    mirrored = whole.mirror([1.0, 0.0, 0.0])
+    if (whole - mirrored).volume() > 1e-4 * whole.volume():
+        return None
+    low, high = body.bounds
+    right = whole ^ shapes.box([0.0, *low[1:] - 1.0], high + 1.0)
+    return _body_from(right, body.name)
+
+
+def inside(body: Body, points: ArrayLike) -> NDArray[np.bool_]:
+    """Whether points (..., 3) lie in a sound body: how often a ray along z leaves through its surface.
+
+    Rays are moved aside by a nanometre, in a direction of no simple slope: an edge of a drawn body that one
+    would meet is missed. Triangles are found by columns of a grid across z.
+    """
+    at = np.asarray(points, float)
+    p = at.reshape(-1, 3) + np.array([1e-6 * np.sqrt(2.0), 1e-6 * np.sqrt(3.0), 0.0])
+    corners = body.vertices[body.triangles]
+    low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
+    origin = low.min(axis=0)
+    n = max(1, int(np.sqrt(len(corners))))
+    step = np.maximum((high.max(axis=0) - origin) / n, 1e-12)
+    first, last = (np.clip(((c - origin) / step).astype(int), 0, n - 1) for c in (low, high))
+    spans = last - first + 1
+    count = spans.prod(axis=1)
+    which = np.repeat(np.arange(len(corners)), count)
+    nth = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+    column = (first[which, 0] + nth // spans[which, 1]) * n + first[which, 1] + nth % spans[which, 1]
+    order = np.argsort(column, kind="stable")
+    which, starts = which[order], np.searchsorted(column[order], np.arange(n * n + 1))
+
+    place = ((p[:, :2] - origin) / step).astype(int)
+    near = ((p[:, :2] >= origin) & (place < n)).all(axis=1)
+    found = np.zeros(len(p), bool)
+    rows = np.flatnonzero(near)
+    cell = place[rows, 0] * n + place[rows, 1]
+    for some in np.array_split(np.arange(len(rows)), max(1, len(rows) // 20_000)):
+        many = starts[cell[some] + 1] - starts[cell[some]]
+        point = np.repeat(rows[some], many)
+        nth = np.arange(len(point)) - np.repeat(np.cumsum(many) - many, many)
+        a, b, c = np.moveaxis(corners[which[np.repeat(starts[cell[some]], many) + nth]], 1, 0)
+        q = p[point]
+        areas = [_area(q, b, c), _area(q, c, a), _area(q, a, b)]
+        whole = areas[0] + areas[1] + areas[2]
+        within = np.all([s * np.sign(whole) > 0.0 for s in areas], axis=0)
+        height = sum(s * corner[:, 2] for s, corner in zip(areas, (a, b, c), strict=True))
+        above = within & (height * np.sign(whole) > q[:, 2] * np.abs(whole))
+        found[rows[some]] = np.bincount(point[above], minlength=len(p))[rows[some]] % 2 == 1
+    return found.reshape(at.shape[:-1])
+
+
+def _area(p: NDArray[np.float64], q: NDArray[np.float64], r: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Twice the signed area of triangles seen along z."""
+    return np.asarray((q[:, 0] - p[:, 0]) * (r[:, 1] - p[:, 1]) - (q[:, 1] - p[:, 1]) * (r[:, 0] - p[:, 0]))
+
+
+def _odd_edges(triangles: Triangles) -> tuple[Triangles, Triangles]:
+    """Edges (k, 2) not used once in each direction: those of one or two triangles, and of more."""
+    ends = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    edges, place = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
+    ahead = np.bincount(place.ravel(), weights=ends[:, 0] < ends[:, 1], minlength=len(edges))
+    total = np.bincount(place.ravel(), minlength=len(edges))
+    return edges[(total <= 2) & ~((ahead == 1) & (total == 2))], edges[total > 2]
+
+
+def _middle(piece: Any) -> list[float]:
+    """Centre of a Manifold's bounding box."""
+    box = np.reshape(piece.bounding_box(), (2, 3))
+    return [float(c) for c in box.mean(axis=0)]
+
+
+def _vertex(piece: Any) -> NDArray[np.float64]:
+    """The vertex of a Manifold that is nearest to the mean of all."""
+    vertices = np.asarray(piece.to_mesh64().vert_properties)[:, :3]
+    return np.asarray(vertices[np.linalg.norm(vertices - vertices.mean(axis=0), axis=1).argmin()])
+
+
+def _cells(reach: float, cell: float) -> int:
+    """Cells beside the middle one that cover a distance from the axis."""
+    return max(1, int(np.ceil(reach / cell - 0.5 - 1e-9)))
+
+
+def _body_from(solid: Any, name: str, height: float | None = None) -> Body:
+    """Surface of a Manifold, its ends put exactly on the planes it was cut at."""
+    mesh = solid.simplify(QUANTUM_MM).to_mesh64()
+    vertices = np.array(mesh.vert_properties)[:, :3]
+    if height is not None:
+        for plane in (0.0, height):
+            vertices[np.abs(vertices[:, 2] - plane) < 1e-6, 2] = plane
+    return body_of(vertices, np.asarray(mesh.tri_verts).astype(np.int64), name)

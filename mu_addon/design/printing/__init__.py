@@ -1,0 +1,1 @@
+"""Print check: what a printer would make of a triangle surface, measured against its limits."""

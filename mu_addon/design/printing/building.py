@@ -1,0 +1,97 @@
+"""Islands, cups, overhangs and spans of a build against the printer's limits."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import layers
+from .drain import Chambers
+from .finding import MOST_PLACES, Finding, Points, Severity, gathered, numbered
+from .printer import Printer
+from .voxels import Columns
+
+
+def building(built: Columns, chambers: Chambers, printer: Printer) -> tuple[list[Finding], dict[str, float]]:
+    """Findings of a build, its columns along the build direction a layer high, and its cups in ml."""
+    begun = layers.islands(built, layers.regions(built, free=False))
+    closed = layers.cups(built, layers.regions(built, free=True))
+    over = layers.overhangs(built, printer["overhang_deg"])
+    inner = chambers.hold(begun.places)
+    found = [
+        _islands("islands", begun.places[~inner], printer, "warning", "support each of them"),
+        _islands(
+            "islands in chambers",
+            begun.places[inner],
+            printer,
+            "error",
+            "turn the part: no support can be taken out of there",
+        ),
+        _cups(closed, printer),
+        _spans("overhang", "overhang_mm", over.places, over.reach, ~over.bridge, printer),
+        _spans("bridge", "bridge_mm", over.places, 2.0 * over.reach, over.bridge, printer),
+    ]
+    ml = {
+        "trapped_ml": float(closed.volume[closed.sealed].sum()) / 1e3,
+        "largest_cup_ml": float(closed.volume[:1].sum()) / 1e3,
+    }
+    return found, ml
+
+
+def _islands(name: str, places: Points, printer: Printer, severity: Severity, remedy: str) -> Finding:
+    layer = printer.limits["layer_mm"]
+    return Finding(
+        name,
+        severity if len(places) else "pass",
+        numbered(len(places), "region begins on nothing", "regions begin on nothing"),
+        float(len(places)),
+        0.0,
+        "",
+        places[:MOST_PLACES],
+        len(places),
+        f"layers of {layer.value:g} mm: {layer.source}",
+        layer.assumed,
+        remedy if len(places) else "",
+    )
+
+
+def _cups(closed: layers.Cups, printer: Printer) -> Finding:
+    limit = printer.limits["cup_ml"]
+    most = float(closed.volume[:1].sum()) / 1e3
+    large = closed.volume / 1e3 > limit.value
+    return Finding(
+        "cups",
+        "warning" if large.any() else "pass",
+        f"{most:.3f} ml sealed against the film at the most",
+        most,
+        limit.value,
+        "ml",
+        closed.places[large][:MOST_PLACES],
+        int(large.sum()),
+        limit.source,
+        limit.assumed,
+        "print with the opening toward the platform: see the build directions" if large.any() else "",
+    )
+
+
+def _spans(
+    name: str, key: str, places: Points, size: Points, mine: NDArray[np.bool_], printer: Printer
+) -> Finding:
+    limit = printer.limits[key]
+    bad = mine & (size > limit.value)
+    most = float(size[mine].max(initial=0.0))
+    worst = gathered(places[bad], size[bad])
+    where = "between supports" if name == "bridge" else "beyond support"
+    return Finding(
+        name,
+        "warning" if bad.any() else "pass",
+        f"{most:.3g} mm {where} at the most, flatter than {printer['overhang_deg']:g} degrees",
+        most,
+        limit.value,
+        "mm",
+        worst[:MOST_PLACES],
+        len(worst),
+        limit.source,
+        limit.assumed,
+        "support it, or turn the part" if bad.any() else "",
+    )

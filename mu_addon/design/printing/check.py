@@ -1,0 +1,306 @@
+"""Everything a printer would stumble over in a triangle surface, with value, limit, place and source."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from ..anchors import Window
+from ..parameters import Unit
+from ..surface import Triangles, Vertices, stl_bytes, stl_surface, volume
+from ..waveguide import waveguide
+from . import faces
+from .building import building
+from .crossing import crossings
+from .drain import chambers, room
+from .finding import NOWHERE, Finding, Severity, at_least, gathered, none_of
+from .leaks import drains
+from .orientation import Build, fits, orientations
+from .printer import Printer
+from .thickness import across, samples
+from .voxels import columns, frame_along
+from .walls import chamber_walls, narrowest, thinnest
+
+Array = NDArray[np.float64]
+
+SPACING = 0.5
+"""Distance in mm between the samples at which thickness and gaps are measured."""
+STEP = 0.25
+"""Cell in mm of the grid in which chambers and drains are sought, and of the layers' pictures."""
+COARSE = 0.75
+"""Cell in mm of the grid on which build directions are compared; finer where walls are thinner."""
+MOST_CELLS = 4e8
+"""Cells of a grid beyond which it is made coarser: an array of units, or a part far too large."""
+STAGES = ("thickness", "chambers", "layers", "directions")
+INCH = 25.4
+
+Stage = Callable[[str], AbstractContextManager[Any]]
+
+
+@attrs.frozen(eq=False)
+class PrintCheck:
+    """What a check found: every check's outcome, key figures by name, build directions, the best first."""
+
+    findings: list[Finding]
+    figures: dict[str, float]
+    builds: list[Build]
+
+    @property
+    def worst(self) -> Severity:
+        """`error`, `warning` or `pass`."""
+        found = {f.severity for f in self.findings}
+        return "error" if "error" in found else "warning" if "warning" in found else "pass"
+
+
+def check(
+    vertices: Vertices,
+    triangles: Triangles,
+    printer: Printer,
+    unit: Unit | None = None,
+    window: Window | None = None,
+    direction: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    stages: Collection[str] = STAGES,
+    stage: Stage = nullcontext,
+) -> PrintCheck:
+    """Check a surface (n, 3), (m, 3) in mm as its STL is read back.
+
+    With a unit, its inlet, chamber and drawing are known and checked against. direction points away from
+    the platform. A surface that is not closed is examined no further than its faces. `stages` may leave some
+    out, for a quick answer: layers need chambers, directions need both chambers and thickness.
+    """
+    vertices, triangles = stl_surface(stl_bytes(vertices, triangles))
+    up = np.asarray(direction, float) / np.linalg.norm(direction)
+    with stage("faces"):
+        found, triangles, sound = _faces(vertices, triangles)
+    sized = _size(vertices, printer, unit, up)
+    found += sized
+    figures = {"triangles": float(len(triangles)), "volume_ml": volume(vertices, triangles) / 1e3}
+    for axis, extent in zip("xyz", np.ptp(vertices, axis=0).tolist(), strict=True):
+        figures[f"{axis}_mm"] = extent
+    if unit is not None:
+        found += _drawing(unit, window, printer)
+    if not sound or any(f.severity == "error" for f in sized):
+        return PrintCheck([*found, _unexamined(sound)], figures, [])
+
+    from manifold3d import Error, Manifold, Mesh64
+
+    solid = Manifold(Mesh64(vertices, triangles.astype(np.uint64)))
+    if solid.status() != Error.NoError:
+        return PrintCheck([*found, _unexamined(False)], figures, [])
+    figures["volume_ml"] = solid.volume() / 1e3
+    figures["mass_g"] = figures["volume_ml"] * printer["density_g_per_ml"]
+    # Grids see no more of a surface than their cells: what is simplified is less than they tell.
+    simple = solid.simplify(0.01).to_mesh64()
+    seen = np.asarray(simple.vert_properties)[:, :3], np.asarray(simple.tri_verts).astype(np.int64)
+
+    if "thickness" in stages:
+        with stage("thickness and gaps"):
+            surface = samples(vertices, triangles, SPACING)
+            inward = across(solid, surface, -1, max(3.0, 2.0 * printer["wall_mm"]))
+            outward = across(solid, surface, 1, 2.0 * printer["gap_mm"])
+            found += [thinnest(surface, inward, printer), narrowest(surface, outward, printer)]
+    if "chambers" in stages:
+        with stage("chambers and drains"):
+            step = _step(STEP, vertices)
+            pockets = chambers(room(columns(*seen, step)))
+            found += drains(solid, pockets, unit, printer)
+            figures["chamber_ml"] = sum(p.volume for p in pockets.found) / 1e3
+            if "thickness" in stages:
+                lit = pockets.hold(surface.points + step * surface.normals)
+                other = pockets.hold(inward.at - step * surface.normals)
+                found += chamber_walls(surface, inward, lit & ~other, printer)
+    if "layers" in stages:
+        with stage("layers"):
+            built = columns(*seen, _step(STEP, vertices), printer["layer_mm"], frame_along(up))
+            more, ml = building(built, pockets, printer)
+            found += more
+            figures |= ml
+    builds: list[Build] = []
+    if "directions" in stages:
+        with stage("build directions"):
+            coarse = _step(max(min(COARSE, 0.9 * float(inward.distance.min())), STEP), vertices)
+            volume_mm = (printer["build_x_mm"], printer["build_y_mm"], printer["build_z_mm"])
+            builds = orientations(*seen, surface, lit, coarse, printer["overhang_deg"], volume_mm, up)
+    return PrintCheck(found, figures, builds)
+
+
+def _faces(vertices: Vertices, triangles: Triangles) -> tuple[list[Finding], Triangles, bool]:
+    """Findings of the surface itself, its triangles without doubles and turned right, and if it is sound."""
+    middles = vertices[triangles].mean(axis=1)
+    twice = faces.doubled(triangles)
+    words = ("triangle lies on another", "triangles lie on others")
+    places = gathered(middles[twice])
+    found = [none_of("doubled faces", int(twice.sum()), places, words, "remove one of each pair")]
+    triangles, middles = triangles[~twice], middles[~twice]
+    places, count = faces.open_places(vertices, triangles)
+    words = ("edge is not shared by two triangles", "edges are not shared by two triangles")
+    found.append(none_of("open edges", count, places, words, "close the holes"))
+    over = faces.turned(vertices, triangles)
+    words = ("triangle faces the wrong way", "triangles face the wrong way")
+    found.append(none_of("flipped faces", int(over.sum()), gathered(middles[over]), words, "turn them over"))
+    triangles = np.where(over[:, None], triangles[:, ::-1], triangles)
+    cut = crossings(vertices, triangles)
+    words = ("edge passes through another triangle", "edges pass through other triangles")
+    remedy = "unite the parts before export"
+    found.append(none_of("self-intersection", len(cut), gathered(cut), words, remedy))
+    if count:
+        return found, triangles, False
+    shells = faces.pieces(vertices, triangles)
+    for name, group, words, remedy in (
+        (
+            "inside out",
+            shells.inside_out,
+            ("shell has its inside outside", "shells have their insides outside"),
+            "turn all their triangles over",
+        ),
+        (
+            "loose pieces",
+            shells.bodies[1:],
+            ("piece hangs on nothing", "pieces hang on nothing"),
+            "join them to the part, or remove them",
+        ),
+        (
+            "sealed voids",
+            shells.voids,
+            ("void keeps its resin for good", "voids keep their resin for good"),
+            "open them, or fill them",
+        ),
+        (
+            "nested solids",
+            shells.nested,
+            ("solid lies within the solid", "solids lie within the solid"),
+            "unite the parts before export",
+        ),
+    ):
+        places = np.array([shell.centroid for shell in group]).reshape(-1, 3)
+        found.append(none_of(name, len(group), places, words, remedy))
+    return found, triangles, not shells.inside_out
+
+
+def _size(vertices: Vertices, printer: Printer, unit: Unit | None, up: Array) -> list[Finding]:
+    """Whether the part has its drawing's size and fits the printer."""
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    found = []
+    if unit is not None:
+        drawn = np.array(unit.dimensions.bounds)
+        drawn[2, 0] -= unit.dimensions.inlet_length
+        ratio = float(np.linalg.norm(high - low) / np.linalg.norm(drawn[:, 1] - drawn[:, 0]))
+        # A waveguide's seats may reach a little beyond the drawing's box.
+        same = abs(ratio - 1.0) < 0.02
+        off = np.abs(np.stack([low - drawn[:, 0], high - drawn[:, 1]])).max(axis=1)
+        known = {
+            INCH: " (inches for mm)",
+            1.0 / INCH: " (mm for inches)",
+            10.0: " (cm for mm)",
+            0.1: " (mm for cm)",
+        }
+        why = "".join(words for factor, words in known.items() if abs(ratio / factor - 1.0) < 0.02)
+        found.append(
+            Finding(
+                "scale",
+                "pass" if same else "error",
+                f"the part is {ratio:.4g} times as large as its drawing{why}",
+                ratio,
+                1.0,
+                "",
+                NOWHERE if same else np.stack([low, high])[np.argsort(-off)][:1],
+                0 if same else 1,
+                f"the unit's drawing, {drawn[0, 1] - drawn[0, 0]:g} x {drawn[1, 1] - drawn[1, 0]:g} x "
+                f"{drawn[2, 1] - drawn[2, 0]:g} mm",
+                remedy="" if same else "export in mm",
+            )
+        )
+    extent = np.ptp(vertices @ frame_along(up).T, axis=0)
+    room_mm = (printer["build_x_mm"], printer["build_y_mm"], printer["build_z_mm"])
+    inside = fits(extent, room_mm)
+    share = max(extent[2] / room_mm[2], min(_flat(extent, room_mm), _flat(extent[[1, 0, 2]], room_mm)))
+    limit = printer.limits["build_x_mm"]
+    words = "it would fit if its figures were inches" if not inside and share / INCH < 1.0 else ""
+    tiny = float(extent.max()) < 5.0
+    words = "the whole part is smaller than 5 mm: were metres or inches meant?" if tiny else words
+    found.append(
+        Finding(
+            "build volume",
+            "error" if not inside or tiny else "pass",
+            f"{extent[0]:.4g} x {extent[1]:.4g} x {extent[2]:.4g} mm as it stands"
+            + (f"; {words}" if words else ""),
+            float(share),
+            1.0,
+            "of the room",
+            0.5 * (low + high)[None] if not inside or tiny else NOWHERE,
+            int(not inside or tiny),
+            limit.source,
+            limit.assumed,
+            "" if inside and not tiny else "turn the part, divide it, or check its scale",
+        )
+    )
+    return found
+
+
+def _flat(extent: Array, room_mm: tuple[float, float, float]) -> float:
+    return float(max(extent[0] / room_mm[0], extent[1] / room_mm[1]))
+
+
+def _drawing(unit: Unit, window: Window | None, printer: Printer) -> list[Finding]:
+    """What the drawing's own figures say, with the printer's offsets that the unit knows."""
+    d, printed = unit.dimensions, unit.printed
+    found = [
+        at_least(
+            "thinnest strut",
+            d.junction_diameter,
+            printer,
+            "strut_mm",
+            f"struts of {d.junction_diameter:.3g} mm at the junctions; they scale with the unit down to "
+            f"{unit.scale * printer['strut_mm'] / d.junction_diameter:.2f}x",
+            "warning",
+            remedy="keep the strut's diameter below that scale, or print larger",
+        )
+    ]
+    if window is not None:
+        wells = np.array([well.corners.mean(axis=0) for well in waveguide(unit, window).wells])
+        wells = wells.reshape(-1, 3)
+        # `printed` thins wells by the offsets; depth stays, since face and ground move alike.
+        found += [
+            at_least(
+                "well width",
+                printed.well_width,
+                printer,
+                "well_width_mm",
+                f"wells {printed.well_width:.3g} mm wide once printed ({d.well_width:.3g} mm drawn)",
+                "error",
+                wells,
+                "widen the wells, or lower the offset",
+            ),
+            at_least(
+                "well depth",
+                printed.well_depth,
+                printer,
+                "well_depth_mm",
+                f"wells {printed.well_depth:.3g} mm deep once printed ({d.well_depth:.3g} mm drawn)",
+                "error",
+                wells,
+                "deepen the wells",
+            ),
+        ]
+    return found
+
+
+def _step(wanted: float, vertices: Vertices) -> float:
+    """The wanted cell, or the least that keeps the grid's size in bounds."""
+    return max(wanted, float((np.prod(np.ptp(vertices, axis=0)) / MOST_CELLS) ** (1.0 / 3.0)))
+
+
+def _unexamined(sound: bool) -> Finding:
+    what = "of the right size" if sound else "closed"
+    return Finding(
+        "not examined",
+        "info",
+        f"thickness, gaps, chambers and layers are measured once the surface is {what}",
+        np.nan,
+        remedy="mend the errors above and check again",
+    )

@@ -1,0 +1,119 @@
+"""Triangles of a surface that pass through one another."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..surface import Triangles, Vertices
+from .finding import Points
+
+DEPTH = 2e-3
+"""Passing through by less (mm) is rounding: vertices lie on a grid of 1e-4 mm, and layers are 0.1 mm."""
+
+_AT_ONCE = 4_000_000
+
+
+def crossings(vertices: Vertices, triangles: Triangles) -> Points:
+    """Places (k, 3) in mm where an edge of one triangle goes through the inside of another.
+
+    Triangles with a common edge are not tested against each other; overlap within one plane is not seen.
+    """
+    pairs = near_pairs(vertices[triangles])
+    shared = (triangles[pairs[:, 0]][:, :, None] == triangles[pairs[:, 1]][:, None, :]).sum(axis=(1, 2))
+    pairs = pairs[shared < 2]
+    found = [_through(vertices, triangles, pairs[:, 0], pairs[:, 1])]
+    found.append(_through(vertices, triangles, pairs[:, 1], pairs[:, 0]))
+    return np.concatenate(found)
+
+
+def near_pairs(corners: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Pairs (p, 2) of triangles (m, 3, 3) whose boxes overlap, each once, by hashing into cells."""
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    if not len(corners):
+        return np.empty((0, 2), np.int64)
+    size = 1.5 * float(np.median((high - low).max(axis=1))) or 1.0
+    origin = low.min(axis=0)
+    first = np.floor((low - origin) / size).astype(np.int64)
+    last = np.floor((high - origin) / size).astype(np.int64)
+    owner, cell = _covered(first, last)
+    shape = last.max(axis=0) + 1
+    code = (cell[:, 0] * shape[1] + cell[:, 1]) * shape[2] + cell[:, 2]
+    order = np.argsort(code, kind="stable")
+    owner, cell, code = owner[order], cell[order], code[order]
+    begins = np.packbits(first[owner] == cell, axis=1, bitorder="little")[:, 0]
+    end = np.searchsorted(code, code, side="right")
+    partners = end - 1 - np.arange(len(code))
+    pairs = []
+    for part in _slices(partners):
+        one = np.repeat(np.arange(part.start, part.stop), partners[part])
+        two = one + 1 + _counted(partners[part])
+        # A pair meets in every cell both cover; it counts in the one where their common box begins.
+        once = (begins[one] | begins[two]) == 7
+        a, b = owner[one[once]], owner[two[once]]
+        touch = ((low[a] <= high[b]) & (low[b] <= high[a])).all(axis=1)
+        pairs.append(np.stack([a[touch], b[touch]], axis=1))
+    return np.concatenate(pairs)
+
+
+def _through(
+    vertices: Vertices, triangles: Triangles, one: NDArray[np.int64], other: NDArray[np.int64]
+) -> Points:
+    """Points where edges of triangles `one` (p,) go through triangles `other` (p,)."""
+    origin, second, third = np.moveaxis(vertices[triangles[other]], 1, 0)
+    u, v = second - origin, third - origin
+    normal = np.cross(u, v)
+    length = np.linalg.norm(normal, axis=1)
+    flat = length < 1e-12
+    normal /= np.where(flat, 1.0, length)[:, None]
+    corners = vertices[triangles[one]] - origin[:, None, :]
+    height = np.einsum("pij,pj->pi", corners, normal)
+    longest = np.maximum.reduce([np.linalg.norm(w, axis=1) for w in (u, v, v - u)])
+    depth = np.minimum(DEPTH, 1e-2 * longest)
+    found = []
+    for k in range(3):
+        n = (k + 1) % 3
+        ends = triangles[one][:, [k, n]]
+        common = (ends[:, :, None] == triangles[other][:, None, :]).any(axis=(1, 2))
+        a, b = height[:, k], height[:, n]
+        across = (a * b < 0.0) & (np.minimum(np.abs(a), np.abs(b)) > depth) & ~common & ~flat
+        i = np.flatnonzero(across)
+        t = (a[i] / (a[i] - b[i]))[:, None]
+        point = corners[i, k] + t * (corners[i, n] - corners[i, k])
+        # Barycentric shares, each at least `depth` away from its edge.
+        inside = np.ones(len(i), bool)
+        loop = (np.zeros_like(u[i]), u[i], v[i])
+        for j in range(3):
+            side = loop[(j + 1) % 3] - loop[j]
+            off = np.einsum("pi,pi->p", np.cross(side, point - loop[j]), normal[i])
+            inside &= off / np.maximum(np.linalg.norm(side, axis=1), 1e-12) > depth[i]
+        found.append((point + origin[i])[inside])
+    return np.concatenate(found)
+
+
+def _covered(
+    first: NDArray[np.int64], last: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Every cell (c, 3) of boxes first..last (m, 3), and the box it is of (c,)."""
+    span = last - first + 1
+    count = span.prod(axis=1)
+    owner = np.repeat(np.arange(len(first)), count)
+    k = _counted(count)
+    sx, sy = span[owner, 0], span[owner, 1]
+    cell = first[owner] + np.stack([k % sx, k // sx % sy, k // (sx * sy)], axis=1)
+    return owner, cell
+
+
+def _counted(count: NDArray[np.int64]) -> NDArray[np.int64]:
+    """0, 1, .. count - 1 for each count, one after the other."""
+    start = np.cumsum(count) - count
+    return np.arange(int(count.sum())) - np.repeat(start, count)
+
+
+def _slices(count: NDArray[np.int64]) -> list[slice]:
+    """Consecutive slices whose counts add up to about _AT_ONCE at most."""
+    part = np.cumsum(count) // _AT_ONCE
+    cuts = [0, *(np.flatnonzero(np.diff(part)) + 1).tolist(), len(count)]
+    return [slice(a, b) for a, b in pairwise(cuts)]

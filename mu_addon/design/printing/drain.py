@@ -1,0 +1,218 @@
+"""Chambers of a part and the openings through which they drain, or leak."""
+
+from __future__ import annotations
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from .voxels import Columns
+
+Array = NDArray[np.float64]
+
+DEEP = 6.0
+"""Distances to the surface are told apart up to so many mm."""
+NARROWING = 0.55
+"""A pocket is a chamber if its way out is narrower than this share of its own greatest radius."""
+MOST_OPENINGS = 12
+
+
+@attrs.frozen(eq=False)
+class Opening:
+    """A way out of a chamber: its narrowest place (3,) in mm, the radius there of the widest ball in mm, to
+    a cell, and the unit vector (3,) along the way."""
+
+    place: Array
+    radius: float
+    along: Array
+
+
+@attrs.frozen(eq=False)
+class Chamber:
+    """A pocket: its widest place (3,) in mm, the ball's radius there, its volume in mm3, its ways out.
+
+    The widest way comes first; a sealed chamber has none.
+    """
+
+    place: Array
+    radius: float
+    volume: float
+    openings: list[Opening]
+
+
+@attrs.frozen(eq=False)
+class Room:
+    """Distance in mm, up to DEEP, from the centre of every free cell to the surface; 0 in the solid.
+
+    A cell's distance is to the nearest solid cell's centre less half a cell: within half a cell of true.
+    """
+
+    columns: Columns
+    distance: NDArray[np.float32]
+
+
+@attrs.frozen(eq=False)
+class Chambers:
+    """The chambers of a part, the largest first, and the grid's cells within them, up to their ways out's
+    narrowest places; free: the cells that hold no solid."""
+
+    found: list[Chamber]
+    columns: Columns
+    within: NDArray[np.bool_]
+    free: NDArray[np.bool_]
+
+    def hold(self, points: Array) -> NDArray[np.bool_]:
+        """Whether each of the points (n, 3) in mm lies in a chamber's cell."""
+        return np.asarray(self.within[self._cells(points)])
+
+    def beside(self, points: Array) -> NDArray[np.bool_]:
+        """Whether each of the points (n, 3) in mm lies in a free cell that is in no chamber."""
+        cells = self._cells(points)
+        return np.asarray(self.free[cells] & ~self.within[cells])
+
+    def _cells(self, points: Array) -> tuple[NDArray[np.int64], ...]:
+        grid = self.columns
+        cell = np.floor((points @ grid.frame.T - grid.low) / grid.step).astype(np.int64)
+        return tuple(np.clip(cell, 0, np.array(grid.shape) - 1).T)
+
+
+def room(columns: Columns) -> Room:
+    """Distances of a grid of cubes, slab by slab, so that memory beside the answer does not grow."""
+    from scipy.ndimage import distance_transform_edt
+
+    step = float(columns.step[0])
+    nx, ny, levels = columns.shape
+    halo = int(np.ceil(DEEP / step)) + 1
+    thick = max(halo, 12_000_000 // (nx * ny))
+    distance = np.zeros((nx, ny, levels), np.float32)
+    for first in range(0, levels, thick):
+        last = min(first + thick, levels)
+        a, b = max(first - halo, 0), min(last + halo, levels)
+        free = columns.slab(a, b) <= 0
+        if free.all():
+            distance[:, :, first:last] = DEEP
+            continue
+        far = distance_transform_edt(free, sampling=step)[:, :, first - a : last - a]
+        np.clip(far - 0.5 * step, 0.5 * step, DEEP, out=far)
+        far[~free[:, :, first - a : last - a]] = 0.0
+        distance[:, :, first:last] = far
+    # The grid ends two cells beside the part: its rim stands for all the room beyond.
+    for side in (0, -1):
+        distance[side] = distance[:, side] = distance[:, :, side] = DEEP
+    return Room(columns, distance)
+
+
+def chambers(space: Room, smallest_radius: float = 1.0) -> Chambers:
+    """Pockets that narrow toward the outside, the largest first, with every way out that the grid shows.
+
+    Ways out are found down to a radius of about 0.87 of a cell: what passes through a wall of cells.
+    """
+    from scipy.ndimage import find_objects, label
+
+    step = float(space.columns.step[0])
+    d = space.distance.copy()
+    found: list[Chamber] = []
+    within = np.zeros(d.shape, bool)
+    ladder = (4.0, 3.0, 2.2, 1.6, 1.2, 0.9, 0.65, 0.45, 0.3)
+    for t in [t for t in ladder if t > 0.9 * step] + [0.0]:
+        wide, _ = label(d > t)
+        outside = wide[0, 0, 0]
+        for number, box in enumerate(find_objects(wide), 1):
+            if number == outside:
+                continue
+            depth = np.where(wide[box] == number, d[box], 0.0)
+            greatest = float(depth.max())
+            if greatest < max(smallest_radius, t / NARROWING):
+                continue
+            at = np.array(np.unravel_index(depth.argmax(), depth.shape)) + [s.start for s in box]
+            seed = tuple(at.tolist())
+            openings: list[Opening] = []
+            while len(openings) < MOST_OPENINGS:
+                cells, radius = _narrowest(d, seed, step)
+                if not len(cells):
+                    break
+                openings.append(_opening(space, cells, radius))
+                _block(d, cells, radius + 2.5 * step, step)
+            inside, _ = label(d > 0.0)
+            inside = inside == inside[seed]
+            volume = float(np.count_nonzero(inside)) * space.columns.cell_volume
+            d[inside] = 0.0
+            if volume < 2.0 * greatest**3:  # half a ball: what blocking left over, no chamber
+                continue
+            within |= inside
+            found.append(Chamber(space.columns.points(at), greatest, volume, openings))
+    found.sort(key=lambda chamber: -chamber.volume)
+    return Chambers(found, space.columns, within, space.distance > 0.0)
+
+
+def _narrowest(d: NDArray[np.float32], seed: tuple[int, ...], step: float) -> tuple[NDArray[np.int64], float]:
+    """Cells (n, 3) where the widest way from the seed to the outside is narrowest, and its radius there."""
+    from scipy.ndimage import label
+
+    low, high = 0.0, float(d[seed])
+    wide, _ = label(d > low)
+    if wide[seed] != wide[0, 0, 0] or d[seed] <= 0.0:
+        return np.empty((0, 3), np.int64), 0.0
+    while high - low > step / 8.0:
+        middle = 0.5 * (low + high)
+        wide, _ = label(d > middle)
+        if wide[seed] == wide[0, 0, 0]:
+            low = middle
+        else:
+            high = middle
+    wide, _ = label(d > high)
+    path = _passage(d > low, wide == wide[seed], wide == wide[0, 0, 0])
+    return path, 0.5 * (low + high)
+
+
+def _passage(
+    free: NDArray[np.bool_], inner: NDArray[np.bool_], outer: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """Cells (n, 3) of a shortest way from `outer` to `inner` through what is free, with its ends in them."""
+    offsets = np.array([1, -1], np.int64)[:, None] * np.array(
+        [free.shape[1] * free.shape[2], free.shape[2], 1]
+    )
+    offsets = offsets.ravel()
+    flat_free, flat_outer = free.ravel(), outer.ravel()
+    # Rings around the inner part; the grid's rim is outside, so that no ring runs over its edge.
+    ring = np.where(inner.ravel(), np.int16(0), np.int16(-1))
+    cells = np.flatnonzero(ring == 0)
+    cells = cells[(ring[cells[:, None] + offsets] < 0).any(axis=1)]  # its surface
+    for distance in range(1, 30_000):
+        reached = np.unique((cells[:, None] + offsets).ravel())
+        arrived = reached[flat_outer[reached]]
+        if len(arrived):
+            break
+        cells = reached[flat_free[reached] & (ring[reached] < 0)]
+        ring[cells] = distance
+    # Back from the place where outside was met, one ring at a time.
+    steps = arrived[:1]
+    way = [int(steps[0])]
+    for level in range(distance - 1, -1, -1):
+        steps = steps[0] + offsets
+        steps = steps[ring[steps] == level][:1]
+        way.append(int(steps[0]))
+    return np.stack(np.unravel_index(np.array(way), free.shape), axis=1)
+
+
+def _opening(space: Room, cells: NDArray[np.int64], radius: float) -> Opening:
+    """The opening where a way of cells (n, 3) is narrowest, halfway if it is so for a while."""
+    width = space.distance[tuple(cells.T)]
+    narrowest = np.flatnonzero(width <= width.min() + 1e-3)
+    middle = int(narrowest[len(narrowest) // 2])
+    near = space.columns.points(cells[max(middle - 3, 0) : middle + 4])
+    along = near[-1] - near[0]
+    return Opening(space.columns.points(cells[middle]), radius, along / np.linalg.norm(along))
+
+
+def _block(d: NDArray[np.float32], cells: NDArray[np.int64], radius: float, step: float) -> None:
+    """Fill what lies within `radius` mm of cells."""
+    from scipy.ndimage import distance_transform_edt
+
+    pad = int(np.ceil(radius / step)) + 1
+    first = np.maximum(cells.min(axis=0) - pad, 0)
+    last = cells.max(axis=0) + pad + 1
+    box = tuple(slice(a, b) for a, b in zip(first, last, strict=True))
+    free = np.ones(d[box].shape, bool)
+    free[tuple((cells - first).T)] = False
+    d[box][distance_transform_edt(free, sampling=step) <= radius] = 0.0

@@ -1,0 +1,197 @@
+"""Faults of a triangle surface as such: open, doubled, turned over, in pieces, hollow."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from ..surface import Triangles, Vertices
+from .finding import NOWHERE, Points
+
+MOST_SHELLS = 400
+"""Shells beyond which only the largest are looked at one by one."""
+
+
+class Edges(NamedTuple):
+    """Edges of a surface: ends (e, 2), and the edge (3 m,) and direction (3 m,) of every side.
+
+    Side k of triangle t is number k m + t and runs from corner k to the next.
+    """
+
+    ends: NDArray[np.int64]
+    of_side: NDArray[np.int64]
+    forward: NDArray[np.bool_]
+
+
+@attrs.frozen(eq=False)
+class Shell:
+    """A closed connected part of a surface: its triangles (m,) by number, signed volume in mm3, centroid."""
+
+    triangles: NDArray[np.int64]
+    volume: float
+    centroid: Points
+
+
+@attrs.frozen(eq=False)
+class Pieces:
+    """Shells by what they are: solid bodies, the largest first; sealed voids; and solids within solids."""
+
+    bodies: list[Shell]
+    voids: list[Shell]
+    nested: list[Shell]
+    inside_out: list[Shell]
+
+
+def edges(triangles: Triangles) -> Edges:
+    """Edges of triangles (m, 3)."""
+    sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    forward = sides[:, 0] < sides[:, 1]
+    low, high = sides.min(axis=1), sides.max(axis=1)
+    span = int(high.max(initial=0)) + 1
+    code, of_side = np.unique(low * span + high, return_inverse=True)
+    return Edges(np.stack([code // span, code % span], axis=1), np.ravel(of_side), forward)
+
+
+def doubled(triangles: Triangles) -> NDArray[np.bool_]:
+    """Which triangles (m,) have all three corners of one before them, whichever way they turn."""
+    key = np.sort(triangles, axis=1)
+    order = np.lexsort(key.T[::-1])
+    same = np.zeros(len(key), bool)
+    same[order[1:]] = (key[order[1:]] == key[order[:-1]]).all(axis=1)
+    return same
+
+
+def open_places(vertices: Vertices, triangles: Triangles) -> tuple[Points, int]:
+    """Middles (k, 3) of the surface's holes, the largest first, and the number of open edges.
+
+    A hole is a connected run of edges with one triangle; edges of more than two count as well.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    e = edges(triangles)
+    ends = e.ends[np.bincount(e.of_side) != 2]
+    if not len(ends):
+        return NOWHERE, 0
+    used, index = np.unique(ends, return_inverse=True)
+    a, b = index.reshape(-1, 2).T
+    label = connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(len(used),) * 2), False)[1][a]
+    length = np.linalg.norm(vertices[ends[:, 1]] - vertices[ends[:, 0]], axis=1)
+    middle = vertices[ends].mean(axis=1)
+    around = np.bincount(label, length)
+    places = np.stack([np.bincount(label, length * middle[:, k]) / around for k in range(3)], axis=1)
+    return places[np.argsort(-around, kind="stable")], len(ends)
+
+
+def turned(vertices: Vertices, triangles: Triangles) -> NDArray[np.bool_]:
+    """Which triangles (m,) face the other way than the larger part of the surface they are joined to."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+    m = len(triangles)
+    e = edges(triangles)
+    order = np.argsort(e.of_side, kind="stable")
+    count = np.bincount(e.of_side)
+    start = np.cumsum(count) - count
+    pairs = start[count == 2]
+    first, second = order[pairs], order[pairs + 1]
+    agree = e.forward[first] != e.forward[second]
+    wrong = np.zeros(m, bool)
+    if agree.all():
+        return wrong
+    a, b = first % m, second % m
+    patch = connected_components(_graph(a[agree], b[agree], m), directed=False)[1]
+    area = np.linalg.norm(_area_vectors(vertices, triangles), axis=1)
+    size = np.bincount(patch, area)
+    links = _graph(patch[a[~agree]], patch[b[~agree]], len(size))
+    links = coo_matrix(links + links.T).tocsr()
+    group = connected_components(links, directed=False)[1]
+    parity = np.zeros(len(size), bool)
+    for g in np.unique(group[np.unique(patch[a[~agree]])]):
+        members = np.flatnonzero(group == g)
+        root = members[size[members].argmax()]
+        walk, before = breadth_first_order(links, root, directed=False)
+        for node in walk[1:]:
+            parity[node] = not parity[before[node]]
+        if size[members][parity[members]].sum() > 0.5 * size[members].sum():
+            parity[members] = ~parity[members]
+    return np.asarray(parity[patch])
+
+
+def pieces(vertices: Vertices, triangles: Triangles) -> Pieces:
+    """The shells of a closed, oriented surface, told apart by what encloses them."""
+    from scipy.sparse.csgraph import connected_components
+
+    m = len(triangles)
+    e = edges(triangles)
+    order = np.argsort(e.of_side, kind="stable") % m
+    same = e.of_side[np.argsort(e.of_side, kind="stable")]
+    linked = same[1:] == same[:-1]
+    label = connected_components(_graph(order[1:][linked], order[:-1][linked], m), directed=False)[1]
+    shells = [_shell(vertices, triangles, members) for members in _members(label)]
+    shells.sort(key=lambda shell: -abs(shell.volume))
+    found = Pieces([], [], [], [])
+    for number, shell in enumerate(shells):
+        if number == 0 and shell.volume > 0.0:
+            found.bodies.append(shell)
+            continue
+        around = 0.0
+        if number < MOST_SHELLS:
+            mine = np.zeros(m, bool)
+            mine[shell.triangles] = True
+            point = vertices[triangles[shell.triangles[0]]].mean(axis=0)
+            around = winding(point, vertices[triangles[~mine]])
+        if shell.volume < 0.0:
+            (found.voids if around > 0.5 else found.inside_out).append(shell)
+        else:
+            (found.nested if around > 0.5 else found.bodies).append(shell)
+    return found
+
+
+def winding(point: Points, corners: Points) -> float:
+    """How often triangles (m, 3, 3) wind around a point (3,): their solid angles over 4 pi.
+
+    Source: Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30 (1983) 125.
+    """
+    if not len(corners):
+        return 0.0
+    a, b, c = np.moveaxis(corners - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    top = np.einsum("ij,ij->i", a, np.cross(b, c))
+    below = la * lb * lc
+    for (u, v), length in (((a, b), lc), ((b, c), la), ((c, a), lb)):
+        below += np.einsum("ij,ij->i", u, v) * length
+    return float(np.arctan2(top, below).sum() / (2.0 * np.pi))
+
+
+def _shell(vertices: Vertices, triangles: Triangles, members: NDArray[np.int64]) -> Shell:
+    p, q, r = vertices[triangles[members].T]
+    # Volumes of tetrahedra over a point of the shell, not over a far origin: small shells keep their digits.
+    base = p[0]
+    share = np.einsum("ij,ij->i", p - base, np.cross(q - base, r - base)) / 6.0
+    volume = float(share.sum())
+    if abs(volume) > 1e-12:
+        centroid = base + (share @ (p + q + r - 3.0 * base)) / (4.0 * volume)
+    else:
+        centroid = vertices[triangles[members]].mean(axis=(0, 1))
+    return Shell(members, volume, centroid)
+
+
+def _members(label: NDArray[np.integer]) -> list[NDArray[np.int64]]:
+    order = np.argsort(label, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(label))[:-1])
+
+
+def _graph(a: NDArray[np.int64], b: NDArray[np.int64], n: int) -> Any:
+    """Links a (k,) to b (k,) among n as a sparse matrix."""
+    from scipy.sparse import coo_matrix
+
+    return coo_matrix((np.ones(len(a)), (a, b)), shape=(n, n)).tocsr()
+
+
+def _area_vectors(vertices: Vertices, triangles: Triangles) -> Points:
+    p, q, r = vertices[triangles.T]
+    return np.asarray(0.5 * np.cross(q - p, r - p))

@@ -1,0 +1,123 @@
+"""What a print check has to say: a value, its limit, where, and how bad it is."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from .printer import Printer
+
+Severity = Literal["error", "warning", "pass", "info"]
+Points = NDArray[np.float64]
+
+NOWHERE: Points = np.empty((0, 3))
+MOST_PLACES = 50
+"""Places kept of one finding; its `count` says how many there are."""
+
+
+@attrs.frozen(eq=False)
+class Finding:
+    """One check's outcome: `error` must not be printed, `warning` needs a decision, `info` has no limit.
+
+    value and limit are in `unit`; places (n, 3) are in mm in the frame of the surface, the worst first.
+    """
+
+    check: str
+    severity: Severity
+    what: str
+    value: float
+    limit: float | None = None
+    unit: str = ""
+    places: Points = NOWHERE
+    count: int = 0
+    source: str = ""
+    assumed: bool = False
+    remedy: str = ""
+
+    @property
+    def is_fault(self) -> bool:
+        """Whether something is to be done about it."""
+        return self.severity in ("error", "warning")
+
+    def plain(self) -> dict[str, Any]:
+        """Its fields by name, for a file."""
+        return attrs.asdict(self)
+
+
+def gathered(points: Points, badness: NDArray[np.float64] | None = None, reach: float = 1.0) -> Points:
+    """One place (k, 3) for each group of points (n, 3) that lie within `reach` mm of one another.
+
+    It is the group's worst point, of the greatest badness (n,), or its middle; the worst group comes first,
+    or the largest.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    if not len(points):
+        return NOWHERE
+    # Points in one small box are near one another: linking boxes keeps the pairs few.
+    box = np.unique(np.floor(points / (reach / 2.0)).astype(np.int64), axis=0, return_inverse=True)
+    cells, index = box[0], np.ravel(box[1])
+    pairs = cKDTree(cells * (reach / 2.0)).query_pairs(reach, output_type="ndarray")
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells),) * 2)
+    group = connected_components(graph, directed=False)[1][index]
+    size = np.bincount(group)
+    if badness is None:
+        middle = [np.bincount(group, points[:, k]) / size for k in range(3)]
+        return np.stack(middle, axis=1)[np.argsort(-size, kind="stable")]
+    order = np.lexsort((-badness, group))
+    first = order[np.searchsorted(group[order], np.arange(len(size)))]
+    return points[first[np.argsort(-badness[first], kind="stable")]]
+
+
+def none_of(name: str, number: int, places: Points, what: tuple[str, str], remedy: str) -> Finding:
+    """A finding of something of which there must be none; `what` says one of them and several."""
+    return Finding(
+        name,
+        "error" if number else "pass",
+        numbered(number, *what),
+        float(number),
+        0.0,
+        "",
+        places[:MOST_PLACES],
+        len(places) if number else 0,
+        "a printable surface has none",
+        remedy=remedy if number else "",
+    )
+
+
+def at_least(
+    name: str,
+    value: float,
+    printer: Printer,
+    key: str,
+    what: str,
+    severity: Severity,
+    places: Points = NOWHERE,
+    remedy: str = "",
+) -> Finding:
+    """A finding of something that must reach the printer's limit `key`, in mm."""
+    limit = printer.limits[key]
+    bad = value < limit.value
+    return Finding(
+        name,
+        severity if bad else "pass",
+        what,
+        value,
+        limit.value,
+        "mm",
+        places[:MOST_PLACES] if bad else NOWHERE,
+        max(1, len(places)) if bad else 0,
+        limit.source,
+        limit.assumed,
+        remedy if bad else "",
+    )
+
+
+def numbered(number: int, one: str, several: str) -> str:
+    """`1 triangle lies on another`, `3 triangles lie on others`."""
+    return f"{number} {one if number == 1 else several}"

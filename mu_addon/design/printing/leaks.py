@@ -1,0 +1,183 @@
+"""Whether chambers drain through their inlet and hold pressure otherwise."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import shapes
+from ..parameters import Dimensions, Unit
+from .drain import Chambers, Opening
+from .finding import NOWHERE, Finding, Points, numbered
+from .neck import necks
+from .printer import Printer
+from .voxels import frame_along
+
+
+def drains(solid: Any, chambers: Chambers, unit: Unit | None, printer: Printer) -> list[Finding]:
+    """Whether every chamber of a Manifold drains through its inlet, and through nothing else.
+
+    Without a unit a chamber's widest way out is taken for its inlet, and others are warned of.
+    """
+    limit = printer.limits["drain_diameter_mm"]
+    step = float(chambers.columns.step[0])
+    leaks: list[Points] = []
+    widths: list[float] = []
+    inlets: list[tuple[float, Points]] = []
+    closed: list[Points] = []
+    for chamber in chambers.found:
+        ways = [_widest_ball(solid, way, step) for way in chamber.openings]
+        inlet = 0 if ways else -1
+        if unit is not None:
+            inlet = next((k for k, (p, _) in enumerate(ways) if _in_inlet(p, unit.dimensions)), -1)
+        if inlet < 0:
+            stop = None if unit is None else _blockage(solid, unit.dimensions)
+            closed.append(chamber.place if stop is None else stop)
+        else:
+            inlets.append((2.0 * ways[inlet][1], ways[inlet][0]))
+        leaks += [place for k, (place, _) in enumerate(ways) if k != inlet]
+        widths += [2.0 * radius for k, (_, radius) in enumerate(ways) if k != inlet]
+    places = np.array(leaks).reshape(-1, 3)
+    wide = f", {max(widths):.2g} mm wide at the most" if widths else ""
+    found = [
+        Finding(
+            "leaks",
+            ("error" if unit is not None else "warning") if leaks else "pass",
+            numbered(len(leaks), "way", "ways") + f" out of chambers beside their inlet{wide}; "
+            f"holes under {1.75 * step:.2g} mm are too small for this test",
+            float(len(leaks)),
+            0.0,
+            "",
+            places,
+            len(leaks),
+            "a chamber that is to hold pressure has one opening",
+            remedy="close the hole" if leaks else "",
+        )
+    ]
+    if unit is not None:
+        found.append(_leak_test(solid, chambers, unit, places))
+    if closed:
+        found.append(
+            Finding(
+                "drain",
+                "error",
+                numbered(len(closed), "chamber does not drain", "chambers do not drain"),
+                0.0,
+                limit.value,
+                "mm",
+                np.array(closed),
+                len(closed),
+                limit.source,
+                limit.assumed,
+                "open the inlet",
+            )
+        )
+    elif inlets:
+        least, place = min(inlets, key=lambda way: way[0])
+        bad = least < limit.value
+        found.append(
+            Finding(
+                "drain",
+                "warning" if bad else "pass",
+                f"{least:.3g} mm wide where the way out is narrowest",
+                least,
+                limit.value,
+                "mm",
+                place[None],
+                int(bad),
+                limit.source,
+                limit.assumed,
+                "widen the inlet, or rinse the chamber through a needle" if bad else "",
+            )
+        )
+    return found
+
+
+def _leak_test(solid: Any, chambers: Chambers, unit: Unit, leaks: Points) -> Finding:
+    """With the inlet plugged there must be one inner shell more: exact, however small a hole is."""
+    d = unit.dimensions
+    plug = shapes.cylinder(
+        d.inlet_radius + d.inlet_wall / 2.0, -1.5 * d.inlet_length, -0.5 * d.inlet_length, 32
+    )
+    stopped = solid + plug
+    before = sum(shell.volume() < 0.0 for shell in solid.decompose())
+    volumes = [shell.volume() for shell in stopped.decompose() if shell.volume() < 0.0]
+    sealed = len(volumes) - before
+    tight = sealed == 1
+    words = f"with the inlet plugged {numbered(sealed, 'chamber is', 'chambers are')} sealed off"
+    if tight:
+        words += f", of {-sum(volumes) / 1e3:.4g} ml"
+    elif not len(leaks) and not before:
+        leaks = _holes(stopped, chambers, d)
+    return Finding(
+        "leak test",
+        "pass" if tight else "error",
+        words,
+        float(sealed),
+        1.0,
+        "",
+        leaks if not tight else NOWHERE,
+        0 if tight else max(1, len(leaks)),
+        "exact Boolean with a plug in the inlet",
+        remedy="" if tight else "close the hole, or open the inlet",
+    )
+
+
+def _holes(stopped: Any, chambers: Chambers, d: Dimensions) -> Points:
+    """Middles (k, 3) of the holes that join a chamber's surface to the outside's, the inlet stopped."""
+    mesh = stopped.to_mesh64()
+    vertices = np.asarray(mesh.vert_properties)[:, :3]
+    triangles = np.asarray(mesh.tri_verts).astype(np.int64)
+    p, q, r = vertices[triangles.T]
+    normal = np.cross(q - p, r - p)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    before = (p + q + r) / 3.0 + float(chambers.columns.step[0]) * normal
+    curves = necks(vertices, triangles, chambers.hold(before), chambers.beside(before))
+    middles = np.array([curve.mean(axis=0) for curve in curves]).reshape(-1, 3)
+    return middles[[not _in_inlet(place, d) for place in middles]]
+
+
+def _in_inlet(place: Points, d: Dimensions) -> bool:
+    return bool(np.hypot(place[0], place[1]) <= d.inlet_radius and place[2] <= d.base_cap + d.inlet_radius)
+
+
+def _blockage(solid: Any, d: Dimensions) -> Points | None:
+    """Middle of what stops the inlet's axis, or None where nothing does."""
+    low, high = -2.0 * d.inlet_length, 0.5 * d.cell
+    nudge = 1e-3 * d.inlet_radius
+    hits = solid.ray_cast([nudge, 0.7 * nudge, low], [nudge, 0.7 * nudge, high])
+    if len(hits) < 2:
+        return None
+    return np.array([0.0, 0.0, low + 0.5 * (hits[0].distance + hits[1].distance) * (high - low)])
+
+
+def _widest_ball(solid: Any, way: Opening, step: float) -> tuple[Points, float]:
+    """The widest free ball about a cell's width across a way: its middle (3,) and radius, by rays around."""
+    k = np.arange(200) + 0.5
+    z = 1.0 - k / 100.0
+    turn = np.pi * (1.0 + np.sqrt(5.0)) * k
+    rays = np.stack([np.sqrt(1.0 - z * z) * np.cos(turn), np.sqrt(1.0 - z * z) * np.sin(turn), z], axis=1)
+    reach = 8.0
+    x, y, _ = frame_along(way.along)
+
+    def radius(at: Points) -> float:
+        hits = (solid.ray_cast(at.tolist(), end) for end in (at + reach * rays).tolist())
+        return reach * min((hit[0].distance for hit in hits if hit), default=1.0)
+
+    best, size = way.place, radius(way.place)
+    shift = 0.5 * step
+    while shift > 0.02 * step:
+        around = [best + shift * side for side in (x, -x, y, -y, x + y, x - y, y - x, -x - y)]
+        around = [at for at in around if np.linalg.norm(at - way.place) < 1.5 * step and _free(solid, at)]
+        sizes = [radius(at) for at in around]
+        if sizes and max(sizes) > size:
+            best, size = around[int(np.argmax(sizes))], max(sizes)
+        else:
+            shift *= 0.5
+    return best, size
+
+
+def _free(solid: Any, at: Points) -> bool:
+    """Whether a point lies outside the solid: a line from it leaves as often as it enters."""
+    return len(solid.ray_cast(at.tolist(), (at + np.array([311.0, 173.0, 97.0])).tolist())) % 2 == 0

@@ -1,0 +1,138 @@
+"""Which way up to print: cups, islands, overhangs and height of many build directions, and the trade-off."""
+
+from __future__ import annotations
+
+import itertools
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from ..surface import Triangles, Vertices
+from .layers import cups, islands, regions
+from .thickness import Samples
+from .voxels import columns, frame_along
+
+Array = NDArray[np.float64]
+
+
+@attrs.frozen
+class Build:
+    """One build direction, a unit vector away from the platform, and what it costs.
+
+    cup_ml: the largest volume sealed against the film; islands: regions that begin on nothing; support_mm2:
+    surface flatter than the printer's slope that needs supports; inner_mm2: the part of it in chambers,
+    where no support can be removed; height_mm; fits: within the build volume, turned about the direction by
+    0 or 90 degrees; best_among: no other direction is as good in all of these and better in one.
+    """
+
+    direction: tuple[float, float, float]
+    cup_ml: float
+    islands: int
+    support_mm2: float
+    inner_mm2: float
+    height_mm: float
+    fits: bool
+    best_among: bool = False
+
+    @property
+    def costs(self) -> tuple[float, ...]:
+        """What is to be small, the most important first; in steps below which directions count as equal."""
+        return (
+            float(not self.fits),
+            0.5 * round(2.0 * self.cup_ml),
+            5.0 * round(self.inner_mm2 / 5.0),
+            float(self.islands),
+            5.0 * round(self.support_mm2 / 5.0),
+            round(self.height_mm, 0),
+        )
+
+
+def directions() -> Array:
+    """The 26 directions (26, 3) to the sides, edges and corners of a cube; the six along the axes first."""
+    every = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+    every = every[np.argsort(np.abs(every).sum(axis=1), kind="stable")]
+    return np.asarray(every / np.linalg.norm(every, axis=1, keepdims=True))
+
+
+def tilted(direction: Array, degrees: float) -> Array:
+    """Eight directions (8, 3) inclined against `direction`, all around it."""
+    x, y, z = frame_along(direction)
+    angle = np.arange(8) * np.pi / 4.0
+    away = np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y
+    return np.asarray(np.cos(np.radians(degrees)) * z + np.sin(np.radians(degrees)) * away)
+
+
+def build(
+    vertices: Vertices,
+    triangles: Triangles,
+    surface: Samples,
+    in_chamber: NDArray[np.bool_],
+    direction: Array,
+    step: float,
+    slope_deg: float,
+    room: tuple[float, float, float],
+) -> Build:
+    """What printing along `direction` (3,) costs, on a grid of `step` mm; room is the build volume's, mm.
+
+    Samples cover the surface, in_chamber (s,) marks those on a chamber's.
+    """
+    grid = columns(vertices, triangles, step, frame=frame_along(direction))
+    closed = cups(grid, regions(grid, free=True))
+    loose = islands(grid, regions(grid, free=False))
+    height = surface.points @ direction
+    flat = surface.normals @ direction < -np.cos(np.radians(slope_deg))
+    flat &= height > height.min() + step
+    extent = np.ptp(vertices @ grid.frame.T, axis=0)
+    return Build(
+        direction=tuple(direction.tolist()),
+        cup_ml=float(closed.volume[:1].sum()) / 1e3,
+        islands=len(loose.area),
+        support_mm2=float(surface.area[flat].sum()),
+        inner_mm2=float(surface.area[flat & in_chamber].sum()),
+        height_mm=float(extent[2]),
+        fits=fits(extent, room),
+    )
+
+
+def fits(extent: Array, room: tuple[float, float, float]) -> bool:
+    """Whether a part of `extent` (3,) mm fits the room as it stands or turned by 90 degrees about z."""
+    x, y, z = extent.tolist()
+    flat = (x <= room[0] and y <= room[1]) or (y <= room[0] and x <= room[1])
+    return bool(flat and z <= room[2])
+
+
+def ranked(builds: list[Build]) -> list[Build]:
+    """The builds, the one to choose first, those that no other beats marked.
+
+    Order: fits, then the largest cup, flat surface in chambers, islands, supported surface, height.
+    """
+    cost = np.array([b.costs for b in builds])
+    as_good = (cost[:, None, :] <= cost[None, :, :]).all(axis=2)
+    better = (cost[:, None, :] < cost[None, :, :]).any(axis=2)
+    beaten = (as_good & better).any(axis=0)
+    marked = [attrs.evolve(b, best_among=not bad) for b, bad in zip(builds, beaten.tolist(), strict=True)]
+    return sorted(marked, key=lambda b: b.costs)
+
+
+def orientations(
+    vertices: Vertices,
+    triangles: Triangles,
+    surface: Samples,
+    in_chamber: NDArray[np.bool_],
+    step: float,
+    slope_deg: float,
+    room: tuple[float, float, float],
+    own: Array,
+) -> list[Build]:
+    """Builds along 26 directions, the part's `own` (3,), and eight tilted by 20 degrees about the best."""
+
+    def built(direction: Array) -> Build:
+        return build(vertices, triangles, surface, in_chamber, direction, step, slope_deg, room)
+
+    first = directions()
+    if np.abs(first - own).sum(axis=1).min() > 1e-6:
+        first = np.concatenate([own[None], first])
+    found = [built(direction) for direction in first]
+    best = np.array(ranked(found)[0].direction)
+    return ranked(found + [built(direction) for direction in tilted(best, 20.0)])

@@ -1,0 +1,111 @@
+"""What a printer and its resin can make: limits with their sources, from assets/printers/*.toml."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+
+import attrs
+
+from ...errors import InputError
+from ..assets import asset_file, asset_names
+from ..toml_text import parse, place
+
+DEFAULT = "form-4-elastic-50a"
+MEANING = {
+    "build_x_mm": "room of the build volume along x",
+    "build_y_mm": "room of the build volume along y",
+    "build_z_mm": "room of the build volume above the platform",
+    "layer_mm": "height of a layer",
+    "solid_mm": "thinnest solid",
+    "wall_mm": "thinnest wall between a chamber and the outside",
+    "strut_mm": "thinnest strut",
+    "gap_mm": "narrowest gap between two surfaces",
+    "well_width_mm": "narrowest engraved detail",
+    "well_depth_mm": "shallowest engraved detail",
+    "drain_diameter_mm": "narrowest opening that drains a chamber",
+    "leak_diameter_mm": "smallest hole that stays open",
+    "overhang_deg": "flattest slope that needs no support, from level",
+    "overhang_mm": "longest unsupported overhang",
+    "bridge_mm": "longest span between two supports",
+    "cup_ml": "largest volume sealed against the film",
+    "density_g_per_ml": "density of the cured resin",
+}
+
+
+@attrs.frozen
+class Limit:
+    """One figure, where it is from, and whether nobody has published it for this printer and resin."""
+
+    value: float
+    source: str
+    assumed: bool
+
+
+@attrs.frozen
+class Printer:
+    """A printer with a resin and a layer height, and its limits by the names of MEANING."""
+
+    name: str
+    title: str
+    limits: dict[str, Limit]
+
+    def __getitem__(self, name: str) -> float:
+        return self.limits[name].value
+
+
+def load_printer(name: str = DEFAULT) -> Printer:
+    """The shipped printer whose name is, or alone begins with, `name`; or the TOML file at that path."""
+    if name.endswith(".toml") or "/" in name or "\\" in name:
+        return read_printer(name)
+    matches = [known for known in asset_names("printers") if known.startswith(name)] if name else []
+    found = matches[0] if len(matches) == 1 else name
+    return read_printer(asset_file("printers", "printer", found))
+
+
+def read_printer(path: str | Path) -> Printer:
+    """The printer in a TOML file; InputError names the file, the line and the key that is wrong."""
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read the printer's limits: {error}", str(path), "check the name") from error
+    keys = {"": ("format", "name", "title"), **dict.fromkeys(MEANING, ("value", "source", "assumed"))}
+    document = parse(text, keys, str(path))
+    if document.get("format") != 1:
+        raise InputError("the printer's file has no format = 1", place(str(path), None), "write format = 1")
+    missing = [name for name in MEANING if name not in document]
+    if missing:
+        raise InputError(
+            f"a limit is missing: {missing[0]}, {MEANING[missing[0]]}",
+            str(path),
+            f"add [{missing[0]}] with value and source, or start from a shipped file",
+        )
+    limits = {name: _limit(name, document[name], str(path)) for name in MEANING}
+    return Printer(str(document.get("name", path.stem)), str(document.get("title", path.stem)), limits)
+
+
+def printer_text(printer: Printer) -> str:
+    """The printer as the text of such a file."""
+    lines = ["format = 1", f'name = "{printer.name}"', f'title = "{printer.title}"']
+    for name, limit in printer.limits.items():
+        source = limit.source.replace("\\", "\\\\").replace('"', '\\"')
+        lines += ["", f"# {MEANING[name]}", f"[{name}]", f"value = {limit.value!r}", f'source = "{source}"']
+        lines += [f"assumed = {'true' if limit.assumed else 'false'}"]
+    text = "\n".join(lines) + "\n"
+    tomllib.loads(text)
+    return text
+
+
+def _limit(name: str, table: dict[str, object], origin: str) -> Limit:
+    value, source, assumed = table.get("value"), table.get("source"), table.get("assumed", False)
+    where = f"{origin}, [{name}]"
+    real = isinstance(value, int | float) and not isinstance(value, bool)
+    if not real or not math.isfinite(float(value)) or float(value) <= 0.0:  # type: ignore[arg-type]
+        raise InputError(f"value = {value!r} is not a number above zero", where, MEANING[name])
+    if not isinstance(source, str) or not source.strip():
+        raise InputError("the limit names no source", where, 'write source = "where the figure is from"')
+    if not isinstance(assumed, bool):
+        raise InputError(f"assumed = {assumed!r} is not true or false", where, "write true or false")
+    return Limit(float(value), source, assumed)  # type: ignore[arg-type]

@@ -1,0 +1,84 @@
+"""Thinnest solid, narrowest gap and chamber walls against the printer's limits."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .finding import MOST_PLACES, NOWHERE, Finding, Severity, gathered
+from .printer import Printer
+from .thickness import Across, Samples
+
+OPPOSED = -0.9
+"""Cosine between two faces up to which what lies between them is a wall or a gap and not a wedge."""
+
+
+def thinnest(surface: Samples, inward: Across, printer: Printer) -> Finding:
+    """The thinnest solid, by rays into it."""
+    return _measured(
+        "thinnest solid",
+        surface,
+        inward,
+        inward.cosine < OPPOSED,
+        printer,
+        "solid_mm",
+        "error",
+        "thick",
+        "thicken it",
+    )
+
+
+def narrowest(surface: Samples, outward: Across, printer: Printer) -> Finding:
+    """The narrowest gap, by rays out of the solid."""
+    remedy = "widen it, or close it in the drawing: resin may close it in print"
+    facing = outward.cosine < OPPOSED
+    return _measured("narrowest gap", surface, outward, facing, printer, "gap_mm", "warning", "wide", remedy)
+
+
+def _measured(
+    name: str,
+    surface: Samples,
+    rays: Across,
+    counts: NDArray[np.bool_],
+    printer: Printer,
+    key: str,
+    severity: Severity,
+    adjective: str,
+    remedy: str,
+) -> Finding:
+    limit = printer.limits[key]
+    width = np.where(counts, rays.distance, np.inf)
+    least = float(width.min(initial=np.inf))
+    bad = width < limit.value
+    if not np.isfinite(least):
+        words = "nothing so thin is near the limit" if adjective == "thick" else "no gap is near the limit"
+        return Finding(
+            name, "pass", words, np.nan, limit.value, "mm", NOWHERE, 0, limit.source, limit.assumed
+        )
+    middle = 0.5 * (surface.points + rays.at)
+    places = gathered(middle[bad], -width[bad]) if bad.any() else middle[[int(width.argmin())]]
+    return Finding(
+        name,
+        severity if bad.any() else "pass",
+        f"{least:.3g} mm {adjective} at the least"
+        + (f", in {len(places)} places too little" if bad.any() else ""),
+        least,
+        limit.value,
+        "mm",
+        places[:MOST_PLACES],
+        len(places) if bad.any() else 0,
+        limit.source,
+        limit.assumed,
+        remedy if bad.any() else "",
+    )
+
+
+def chamber_walls(
+    surface: Samples, inward: Across, between: NDArray[np.bool_], printer: Printer
+) -> list[Finding]:
+    """The wall between chambers and the outside; nothing where there is no chamber."""
+    if not between.any():
+        return []
+    counts = between & (inward.cosine < -0.5)
+    remedy = "thicken the wall"
+    return [_measured("chamber wall", surface, inward, counts, printer, "wall_mm", "error", "thick", remedy)]

@@ -1,0 +1,424 @@
+"""The design as small steps, each made from those before it, and made again only where what it takes changed.
+
+    profile -> chambers -> membranes
+       \\-> cells -> trim -> struts
+              \\-> anchors -> path -> wells
+                                        \\-> solid, of all of them
+
+A step owns parameters of the unit, and may read those of others; its value is kept under a key of all that it
+is made from, so that a slider, an undo or another unit of the same shape costs only what is new. A muted step
+passes on what it would have changed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter, OrderedDict
+from collections.abc import Callable
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .anchors import SHORTEST, Window, anchors, window
+from .body import Body, covering, inside
+from .lattice import Graph, Lattice, graph_of, thickened
+from .parameters import Chambers, Envelope, Unit, Waveguide
+from .profile import cavity_polygon, outer_polygon, outer_radius
+from .quantity import describe
+from .solid import Solid, build_solid
+from .waveguide import Bar, waveguide
+
+Array = NDArray[np.float64]
+
+ALONG = 4
+"""Flat pieces along a quarter of a chamber in the polygons of `profile` and `chambers`."""
+FINE = np.linspace(0.0, 1.0, 33)
+"""Places along a strut where `trim` asks whether it is still outside the actuator."""
+CLEARANCE = 0.018
+"""Distance, in cells, that `trim` keeps between a strut's axis and the actuator: none shows inside then."""
+KEPT = 12
+"""Values of a step that are kept: enough for an undo, a slider that goes back, and a few units."""
+
+
+@attrs.frozen
+class Given:
+    """What the steps are made from: a unit, the name of a path or nothing, and the muted steps.
+
+    body: a sound body in place of the lattice's box, see `body.envelope`, or None.
+    """
+
+    unit: Unit
+    path: str = ""
+    muted: frozenset[str] = attrs.field(default=frozenset(), converter=frozenset)
+    quality: str = "interactive"
+    body: Body | None = None
+
+    def __attrs_post_init__(self) -> None:
+        for name in self.muted:
+            if name not in STEPS:
+                raise _unknown(name)
+            if not STEPS[name].muting:
+                raise InputError(
+                    f"the step {name} cannot be muted", name, "everything else is made from it: leave it on"
+                )
+
+
+@attrs.frozen(eq=False)
+class Section:
+    """Half sections in mm, (radius, z) each: the outer profile, the inlet, and the cavity or None.
+
+    The inlet runs from the inner end of its bore out around the boss.
+    """
+
+    outer: Array
+    inlet: Array
+    cavity: Array | None
+
+
+@attrs.frozen(eq=False)
+class Trimmed:
+    """Struts that show: their ends (e, 2, 3) in mm, and the fractions (e,) first .. last left of each."""
+
+    graph: Graph
+    ends: Array
+    first: Array
+    last: Array
+
+
+@attrs.frozen(eq=False)
+class Struts:
+    """Trimmed struts and the lattice that knows their radii; without a lattice they are bare lines."""
+
+    trimmed: Trimmed
+    lattice: Lattice | None
+
+
+@attrs.frozen(eq=False)
+class Path:
+    """The window that the waveguide follows and its anchors (n, 3) in mm."""
+
+    window: Window
+    points: Array
+
+
+@attrs.frozen
+class Step:
+    """One step: what it is made from, which parameters are its own, and what muting it does.
+
+    after: steps before it, whose values `make` is given in this order; own and reads: parameters of the unit
+    as `section.name`; chosen: fields of Given it depends on besides; muting: what muting does, in words, or
+    nothing where it cannot be; mute: its value then, from the same arguments as `make`.
+    """
+
+    name: str
+    text: str
+    make: Callable[..., Any]
+    after: tuple[str, ...] = ()
+    own: tuple[str, ...] = ()
+    reads: tuple[str, ...] = ()
+    chosen: tuple[str, ...] = ()
+    muting: str = ""
+    mute: Callable[..., Any] = lambda *_: None
+
+
+@attrs.define
+class Stack:
+    """Values of the steps by content, and how often each was made.
+
+    counts: evaluations by step's name; one that is found again is not counted.
+    """
+
+    counts: Counter[str] = attrs.field(factory=Counter)
+    _values: dict[str, OrderedDict[str, Any]] = attrs.field(
+        factory=lambda: {name: OrderedDict() for name in STEPS}
+    )
+
+    def value(self, name: str, given: Given) -> Any:
+        """What a step gives, made where it is not there yet; raises InputError and what the step raises."""
+        if name not in STEPS:
+            raise _unknown(name)
+        return self._value(name, given, keys(given))
+
+    def again(self, name: str, given: Given) -> Any:
+        """What a step gives, made anew even if it is there; those before it only where they are not."""
+        if name not in STEPS:
+            raise _unknown(name)
+        key = keys(given)
+        self._values[name].pop(key[name], None)
+        return self._value(name, given, key)
+
+    def _value(self, name: str, given: Given, key: dict[str, str]) -> Any:
+        kept = self._values[name]
+        if key[name] not in kept:
+            step = STEPS[name]
+            taken = [self._value(before, given, key) for before in step.after]
+            make = step.mute if name in given.muted else step.make
+            value = make(given, *taken)
+            self.counts[name] += 1
+            kept[key[name]] = value
+            while len(kept) > KEPT:
+                kept.popitem(last=False)
+        kept.move_to_end(key[name])
+        return kept[key[name]]
+
+
+def keys(given: Given) -> dict[str, str]:
+    """Hash, by step, of everything that its value is made from."""
+    found: dict[str, str] = {}
+    for step in STEPS.values():
+        content = [
+            step.name,
+            step.name in given.muted,
+            given.unit.scale,
+            *(parameter(given.unit, path) for path in (*step.own, *step.reads)),
+            *(_content(getattr(given, name)) for name in step.chosen),
+            *(found[name] for name in step.after),
+        ]
+        found[step.name] = hashlib.sha256(repr(content).encode()).hexdigest()
+    return found
+
+
+def parameter(unit: Unit, path: str) -> Any:
+    """Value of the parameter `section.name` of a unit."""
+    section, name = path.split(".")
+    return getattr(getattr(unit, section), name)
+
+
+def downstream(name: str) -> tuple[str, ...]:
+    """The steps that are made from this one, directly or not, in their order."""
+    found = {name}
+    for step in STEPS.values():
+        if found.intersection(step.after):
+            found.add(step.name)
+    return tuple(step for step in STEPS if step in found and step != name)
+
+
+def require_whole(given: Given) -> None:
+    """Raise InputError where a muted step leaves out what the print needs; a path may be left out."""
+    needed = set(STEPS) - {"path", "solid"}
+    if not given.path or "path" in given.muted:
+        needed -= {"anchors", "wells"}
+    missing = [name for name in STEPS if name in needed & given.muted]
+    if missing:
+        raise InputError(
+            f"a solid without {' and '.join(missing)} is not the unit: {STEPS[missing[0]].muting}",
+            "muted steps",
+            f"unmute {', '.join(missing)}, then build the solid",
+        )
+
+
+def _content(value: Any) -> Any:
+    return value.hash if isinstance(value, Body) else value
+
+
+def _unknown(name: str) -> InputError:
+    return InputError(f"there is no step {name!r}", "steps", f"choose one of {', '.join(STEPS)}")
+
+
+# What the steps do. Each reads only what its Step says, which a test checks by watching it.
+
+
+def _profile(given: Given) -> Array:
+    return outer_polygon(given.unit.dimensions, ALONG)
+
+
+def _chambers(given: Given, profile: Array) -> Array:
+    return cavity_polygon(given.unit.dimensions, ALONG)
+
+
+def _membranes(given: Given, profile: Array, cavity: Array | None) -> Section:
+    d = given.unit.dimensions
+    boss = d.inlet_radius + d.inlet_wall
+    bore = [[d.inlet_radius, d.base_cap], [d.inlet_radius, -d.inlet_length]]
+    inlet = np.array([*bore, [boss, -d.inlet_length], [boss, 0.0]])
+    return Section(profile, inlet, cavity)
+
+
+def _cells(given: Given, profile: Array) -> Graph:
+    d = given.unit.dimensions
+    return graph_of(d if given.body is None else covering(d, given.body))
+
+
+def _trim(given: Given, profile: Array, graph: Graph | None) -> Trimmed | None:
+    if graph is None:
+        return None
+    d = given.unit.dimensions
+    ends = graph.nodes[graph.struts]
+    at = along(ends, FINE)
+    shown = np.hypot(at[..., 0], at[..., 1]) >= outer_radius(d, at[..., 2]) + CLEARANCE * d.cell
+    if given.body is not None:
+        shown &= inside(given.body, at)
+    left = shown.any(axis=1)
+    ends, shown = ends[left], shown[left]
+    last = FINE[len(FINE) - 1 - shown[:, ::-1].argmax(axis=1)]
+    return Trimmed(graph, ends, FINE[shown.argmax(axis=1)], last)
+
+
+def _untrimmed(given: Given, profile: Array, graph: Graph | None) -> Trimmed | None:
+    if graph is None:
+        return None
+    ends = graph.nodes[graph.struts]
+    return Trimmed(graph, ends, np.zeros(len(ends)), np.ones(len(ends)))
+
+
+def _struts(given: Given, trimmed: Trimmed | None) -> Struts | None:
+    if trimmed is None:
+        return None
+    d = given.unit.dimensions
+    return Struts(trimmed, thickened(trimmed.graph, d.junction_diameter / 2.0, d.midspan_diameter / 2.0))
+
+
+def _lines(given: Given, trimmed: Trimmed | None) -> Struts | None:
+    return None if trimmed is None else Struts(trimmed, None)
+
+
+def _anchors(given: Given, graph: Graph | None) -> Array:
+    return anchors(given.unit)
+
+
+def _path(given: Given, points: Array | None) -> Path | None:
+    if not given.path or points is None:
+        return None
+    found = window(given.unit, given.path)
+    return Path(found, points[list(found.indices)])
+
+
+def _wells(given: Given, path: Path | None) -> Bar | None:
+    if path is None:
+        return None
+    d = given.unit.dimensions
+    return waveguide(given.unit, path.window, d if given.body is None else covering(d, given.body))
+
+
+def _without_wells(given: Given, path: Path | None) -> Bar | None:
+    bar = _wells(given, path)
+    return None if bar is None else attrs.evolve(bar, wells=bar.wells[:0])
+
+
+def _solid(given: Given, *_: Any) -> Solid:
+    require_whole(given)
+    chosen = bool(given.path) and "path" not in given.muted
+    path = window(given.unit, given.path) if chosen else None
+    return build_solid(given.unit, path, given.quality, given.body)
+
+
+def along(ends: Array, t: Array) -> Array:
+    """Points (e, n, 3) at fractions t, (n,) or (e, n), of the way between ends (e, 2, 3)."""
+    return np.asarray(ends[:, :1] + t[..., None] * (ends[:, 1:] - ends[:, :1]))
+
+
+def _all_of(section: type[Chambers | Envelope | Waveguide]) -> tuple[str, ...]:
+    return tuple(f"{section.section}.{d.name}" for d in describe(section))
+
+
+_PROFILE = (
+    "chambers.count",
+    "chambers.cell_mm",
+    "chambers.bladder_diameter_mm",
+    "chambers.neck_diameter_mm",
+    "chambers.bladder_share",
+)
+_CHAMBERS = ("chambers.wall_mm", "chambers.base_cap_mm", "chambers.tip_cap_mm")
+_STRUTS = ("lattice.junction_diameter_mm", "lattice.midspan_diameter_mm")
+_PITCH = ("chambers.count", "chambers.cell_mm")
+_WELLS = tuple(p for p in _all_of(Waveguide) if p.startswith("waveguide.well_"))
+_ROW = ("waveguide.row",)
+
+
+def _rest(section: type[Chambers | Envelope | Waveguide]) -> tuple[str, ...]:
+    """The section's parameters that no other step owns: a new one gets its step by itself."""
+    owned = {*_PROFILE, *_CHAMBERS, *_STRUTS, *_WELLS, *_ROW}
+    return tuple(p for p in _all_of(section) if p not in owned)
+
+
+STEPS: dict[str, Step] = {
+    step.name: step
+    for step in (
+        Step("profile", "outer profile of bladders and necks", _profile, own=_PROFILE),
+        Step(
+            "chambers",
+            "cavity inside a constant wall",
+            _chambers,
+            ("profile",),
+            _CHAMBERS,
+            _PROFILE,
+            muting="the actuator stays a full body, without a cavity",
+        ),
+        Step(
+            "membranes",
+            "wall of the chambers, with the inlet",
+            _membranes,
+            ("profile", "chambers"),
+            _rest(Chambers),
+            muting="the lattice stands without an actuator",
+        ),
+        Step(
+            "cells",
+            "cells of the lattice envelope",
+            _cells,
+            ("profile",),
+            _rest(Envelope),
+            _PITCH,
+            ("body",),
+            muting="the actuator stands without a lattice",
+        ),
+        Step(
+            "trim",
+            "struts cut where they enter the actuator or leave a body of one's own",
+            _trim,
+            ("profile", "cells"),
+            reads=_PROFILE,
+            chosen=("body",),
+            muting="struts run through wall and chambers",
+            mute=_untrimmed,
+        ),
+        Step(
+            "struts",
+            "thickness of the struts, tapered to their ends",
+            _struts,
+            ("trim",),
+            _STRUTS,
+            muting="struts are lines without thickness",
+            mute=_lines,
+        ),
+        Step(
+            "anchors",
+            "anchors P1 .. Pn for the sensor",
+            _anchors,
+            ("cells",),
+            _ROW,
+            _PITCH,
+            muting="without anchors there is no path",
+        ),
+        Step(
+            "path",
+            f"a window of {SHORTEST} or more anchors that the waveguide follows",
+            _path,
+            ("anchors",),
+            _rest(Waveguide),
+            _PITCH,
+            chosen=("path",),
+            muting="the unit has no waveguide",
+        ),
+        Step(
+            "wells",
+            "the waveguide's bar, with wells at a constant pitch",
+            _wells,
+            ("path",),
+            _WELLS,
+            (*_PROFILE, *_STRUTS, "chambers.wall_mm"),
+            muting="a bar without wells does not feel which way it bends",
+            mute=_without_wells,
+        ),
+        Step(
+            "solid",
+            "the printable body, checked by its gates",
+            _solid,
+            ("membranes", "struts", "wells"),
+            chosen=("quality", "body"),
+        ),
+    )
+}

@@ -1,0 +1,320 @@
+"""Thickness, gaps, grids, layers and chambers against bodies whose answers are known."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mu_addon.design import shapes
+from mu_addon.design.printing import drain, faces, layers
+from mu_addon.design.printing.crossing import crossings, near_pairs
+from mu_addon.design.printing.finding import gathered
+from mu_addon.design.printing.neck import necks
+from mu_addon.design.printing.orientation import Build, directions, fits, ranked, tilted
+from mu_addon.design.printing.thickness import across, samples
+from mu_addon.design.printing.voxels import columns, frame_along
+
+from .parts import arrays
+
+
+def rays(body, side, reach=6.0):
+    vertices, triangles = arrays(body)
+    surface = samples(vertices, triangles, 0.3)
+    return surface, across(body, surface, side, reach)
+
+
+def box(*size):
+    return shapes.box(-np.array(size) / 2.0, np.array(size) / 2.0)
+
+
+# Thickness and gaps.
+
+
+def test_samples_cover_every_surface_alike():
+    fine, coarse = (samples(*arrays(shapes.ball(5.0, n)), 0.5) for n in (128, 16))
+    for surface in (fine, coarse):
+        assert surface.area.sum() == pytest.approx(4 * np.pi * 25, rel=0.02)
+        assert len(surface.points) == pytest.approx(4 * np.pi * 25 / 0.25, rel=0.02)
+        assert surface.points.mean(axis=0) == pytest.approx(np.zeros(3), abs=0.2)
+        # Each eighth of the ball has its eighth of the points.
+        octant = (surface.points > 0.0) @ [1, 2, 4]
+        assert np.bincount(octant) == pytest.approx(np.full(8, len(octant) / 8), rel=0.15)
+
+
+def test_a_slab_is_as_thick_as_it_is():
+    surface, found = rays(box(10, 10, 0.37), -1)
+    top = np.abs(surface.normals[:, 2]) > 0.9
+    assert found.distance[top] == pytest.approx(0.37, abs=1e-6)
+    assert found.cosine[top] == pytest.approx(-1.0)
+
+
+def test_balls_and_rods_are_as_thick_as_they_are():
+    """Facets cost cos(pi/n) at the most: a ray square to a facet meets the opposite one."""
+    _, found = rays(shapes.ball(1.5, 64), -1)
+    assert found.distance == pytest.approx(3.0, rel=0.01)
+    surface, found = rays(shapes.cylinder(0.4, -5, 5, 48), -1)
+    side = np.abs(surface.normals[:, 2]) < 0.1
+    assert found.distance[side] == pytest.approx(0.8, rel=0.005)
+
+
+def test_a_wedge_is_no_thin_wall():
+    """Near its edge a wedge is as thin as one likes; its faces are not opposed."""
+    from manifold3d import CrossSection
+
+    wedge = CrossSection([np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 6.0]])]).extrude(5.0)
+    _, found = rays(wedge, -1)
+    thin = found.distance < 0.3
+    assert thin.any()
+    assert (found.cosine[thin] > -0.9).all()
+
+
+@settings(deadline=None, max_examples=15)
+@given(width=st.floats(0.05, 2.0), turn=st.floats(0.0, 360.0))
+def test_a_slot_is_as_wide_as_it_is(width, turn):
+    body = box(8, 8, 8) - box(width, 10, 6).translate([0, 0, 3])
+    _, found = rays(body.rotate([turn, 0.3 * turn, 0]), 1)
+    facing = found.cosine < -0.999
+    assert facing.any()
+    assert found.distance[facing].min() == pytest.approx(width, abs=2e-4)
+
+
+# Grids.
+
+
+@settings(deadline=None, max_examples=15)
+@given(way=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda w: sum(x * x for x in w) > 0.1))
+def test_columns_fill_the_same_volume_along_any_direction(way):
+    body = shapes.ball(4.0, 48) - shapes.cylinder(1.0, -6, 6, 32)
+    vertices, triangles = arrays(body)
+    grid = columns(vertices, triangles, 0.2, frame=frame_along(np.array(way)))
+    wound = grid.slab(0, grid.shape[2])
+    assert set(np.unique(wound)) == {0, 1}
+    assert np.count_nonzero(wound) * grid.cell_volume == pytest.approx(body.volume(), rel=0.01)
+    # The middle of the cells, brought back to the body's frame, is its centroid.
+    assert grid.points(np.argwhere(wound)).mean(axis=0) == pytest.approx(np.zeros(3), abs=0.03)
+
+
+def test_slabs_are_the_whole():
+    grid = columns(*arrays(shapes.ball(4.0, 32)), 0.3)
+    whole = grid.slab(0, grid.shape[2])
+    parts = [grid.slab(k, min(k + 7, grid.shape[2])) for k in range(0, grid.shape[2], 7)]
+    assert (np.concatenate(parts, axis=2) == whole).all()
+
+
+def test_overlapping_bodies_count_twice():
+    one, other = arrays(box(4, 4, 4)), arrays(box(4, 4, 4).translate([2, 0, 0]))
+    grid = columns(np.concatenate([one[0], other[0]]), np.concatenate([one[1], other[1] + len(one[0])]), 0.25)
+    wound = grid.slab(0, grid.shape[2])
+    assert wound.max() == 2
+    assert np.count_nonzero(wound == 2) * grid.cell_volume == pytest.approx(32.0, rel=0.05)
+
+
+# Layers.
+
+
+def built(body, up=(0, 0, 1), step=0.2):
+    return columns(*arrays(body), step, 0.1, frame_along(np.array(up, float)))
+
+
+def cups_of(body, up=(0, 0, 1)):
+    grid = built(body, up)
+    return layers.cups(grid, layers.regions(grid, free=True, at_once=20_000))
+
+
+def bowl():
+    """A tumbler of 8 x 8 x 9 mm inside, open to +z."""
+    return box(10, 10, 10) - box(8, 8, 10).translate([0, 0, 1])
+
+
+def test_a_bowl_is_a_cup_from_the_bottom_up_and_none_upside_down():
+    """Built from its bottom the bowl opens toward the film and holds its whole volume under it."""
+    cup = cups_of(bowl())
+    assert cup.volume[0] == pytest.approx(8 * 8 * 9, rel=0.02)
+    assert cup.places[0] == pytest.approx([0, 0, 0.5], abs=0.1)
+    assert not cup.sealed[0]
+    assert cups_of(bowl(), (0, 0, -1)).volume[:1].sum() == 0.0
+
+
+def test_a_hole_in_the_bottom_vents_a_bowl():
+    assert cups_of(bowl() - shapes.cylinder(1.0, -6, 0, 24)).volume[:1].sum() == 0.0
+    # One at half height lets go at half height.
+    vented = bowl() - shapes.cylinder(1.0, 0, 6, 24).rotate([0, 90, 0])
+    assert cups_of(vented).volume[0] == pytest.approx(8 * 8 * 3, rel=0.05)
+
+
+def test_a_hollow_ball_never_opens():
+    cup = cups_of(shapes.ball(5.0, 48) - shapes.ball(3.0, 48))
+    assert cup.volume[0] == pytest.approx(36 * np.pi, rel=0.02)
+    assert cup.sealed.tolist() == [True]
+
+
+def test_islands_are_what_begins_on_nothing():
+    table = box(10, 10, 1) + box(1, 1, 4).translate([4.5, 4.5, -2]) + box(2, 1, 3).translate([-4, -4.5, -1.5])
+    grid = built(table)
+    found = layers.islands(grid, layers.regions(grid, free=False, at_once=20_000))
+    # The long leg is the first layer; the short one hangs in the air until the top joins them.
+    assert len(found.area) == 1
+    assert found.places[0] == pytest.approx([-4, -4.5, -2.95], abs=0.1)
+    assert found.area[0] == pytest.approx(2.0, rel=0.1)
+    upside_down = built(table, (0, 0, -1))
+    assert len(layers.islands(upside_down, layers.regions(upside_down, free=False)).area) == 0
+
+
+def test_a_shelf_overhangs_and_a_bridge_spans():
+    post = box(2, 4, 10).translate([-4, 0, 0])
+    shelf = post + box(6, 4, 1).translate([-2, 0, 4.5])
+    grid = built(shelf, step=0.1)
+    over = layers.overhangs(grid, 19.0, at_once=20_000)
+    worst = int(over.reach.argmax())
+    # From the post's face at -3 to the shelf's end at 1, less what 19 degrees carry of one layer.
+    assert over.reach[worst] == pytest.approx(4.0 - 0.1 / np.tan(np.radians(19)), abs=0.15)
+    assert not over.bridge[worst]
+    assert over.places[worst][[0, 2]] == pytest.approx([1.0, 4.0], abs=0.15)
+
+    over = layers.overhangs(built(shelf + post.translate([6, 0, 0]), step=0.1), 19.0)
+    worst = int(over.reach.argmax())
+    assert over.bridge[worst]
+    assert 2.0 * over.reach[worst] == pytest.approx(4.0 - 0.2 / np.tan(np.radians(19)), abs=0.3)
+
+
+@pytest.mark.parametrize(("slope", "hangs"), [(30.0, False), (10.0, True)])
+def test_slopes_steeper_than_the_limit_need_no_support(slope, hangs):
+    from manifold3d import CrossSection
+
+    rise = 6.0 * np.tan(np.radians(slope))
+    outline = np.array([[0.0, 0.0], [1.0, 0.0], [7.0, rise], [7.0, rise + 1.0], [0.0, rise + 1.0]])
+    arm = CrossSection([outline]).extrude(4.0).rotate([90, 0, 0])
+    over = layers.overhangs(built(arm, step=0.1), 19.0)
+    assert bool((over.reach > 0.15).any()) == hangs
+
+
+# Chambers.
+
+
+def test_a_chamber_and_its_ways_out():
+    """A ball's hollow with a bore of 2 mm to the top and one of 1 mm to the side."""
+    hollow = box(14, 14, 14) - shapes.ball(5.0, 64)
+    body = hollow - shapes.cylinder(1.0, 0, 9, 32) - shapes.cylinder(0.5, 0, 9, 32).rotate([0, 90, 0])
+    found = drain.chambers(drain.room(columns(*arrays(body), 0.2))).found
+    assert len(found) == 1
+    assert found[0].volume == pytest.approx(4 / 3 * np.pi * 125, rel=0.02)
+    assert np.linalg.norm(found[0].place) < 0.7
+    top, side = found[0].openings
+    assert top.radius == pytest.approx(1.0, abs=0.15)
+    assert side.radius == pytest.approx(0.5, abs=0.2)
+    assert abs(top.along @ [0, 0, 1]) > 0.95
+    assert top.place == pytest.approx([0, 0, 6], abs=0.8)
+    assert side.place == pytest.approx([6, 0, 0], abs=0.8)
+
+
+def test_a_sealed_chamber_has_no_way_out_and_an_open_frame_is_no_chamber():
+    sealed = drain.chambers(drain.room(columns(*arrays(box(12, 12, 12) - shapes.ball(4.0, 48)), 0.25)))
+    assert [len(chamber.openings) for chamber in sealed.found] == [0]
+    assert sealed.hold(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 5.0]])).tolist() == [True, False]
+    frame = box(12, 12, 12) - box(9, 9, 14) - box(9, 14, 9) - box(14, 9, 9)
+    assert drain.chambers(drain.room(columns(*arrays(frame), 0.25))).found == []
+
+
+def test_the_shortest_cut_of_a_surface_is_its_waist():
+    """Two balls joined by a rod of 0.2 mm: the cut is the rod's girth."""
+    body = shapes.ball(3.0, 32) + shapes.ball(3.0, 32).translate([8, 0, 0])
+    body += shapes.cylinder(0.1, 2, 6, 16).rotate([0, 90, 0])
+    vertices, triangles = arrays(body)
+    x = vertices[triangles].mean(axis=1)[:, 0]
+    curves = necks(vertices, triangles, x < 0.0, x > 8.0)
+    assert len(curves) == 1
+    assert curves[0].mean(axis=0)[1:] == pytest.approx([0, 0], abs=0.02)
+    assert 2.5 < curves[0][:, 0].mean() < 5.5
+    assert np.hypot(*curves[0][:, 1:].T).max() < 0.11
+
+
+# Faces.
+
+
+def test_pieces_are_told_by_what_encloses_them():
+    hollow = arrays(box(10, 10, 10) - box(6, 6, 6))
+    loose = arrays(box(1, 1, 1).translate([8, 0, 0]))
+    within = arrays(box(1, 1, 1).translate([4, 0, 0]))
+    floating = arrays(box(2, 2, 2))
+    vertices, triangles = hollow
+    for more in (loose, within, floating):
+        triangles = np.concatenate([triangles, more[1] + len(vertices)])
+        vertices = np.concatenate([vertices, more[0]])
+    found = faces.pieces(vertices, triangles)
+    assert [round(s.volume) for s in found.bodies] == [1000, 8, 1]
+    assert [round(s.volume) for s in found.voids] == [-216]
+    assert [s.centroid[0] for s in found.nested] == pytest.approx([4.0])
+    assert found.inside_out == []
+
+
+def test_winding_counts_how_often_a_surface_goes_round():
+    vertices, triangles = arrays(shapes.ball(2.0, 24))
+    corners = vertices[triangles]
+    assert faces.winding(np.zeros(3), corners) == pytest.approx(1.0)
+    assert faces.winding(np.array([3.0, 1.0, 0.0]), corners) == pytest.approx(0.0, abs=1e-9)
+    assert faces.winding(np.zeros(3), corners[:, ::-1]) == pytest.approx(-1.0)
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.integers(0, 10_000))
+def test_near_pairs_are_those_whose_boxes_overlap(seed):
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform(0, 5, (60, 1, 3)) + rng.uniform(0, rng.choice([0.3, 2.0]), (60, 3, 3))
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    meet = ((low[:, None] <= high[None]) & (low[None] <= high[:, None])).all(axis=2)
+    expected = {(a, b) for a, b in np.argwhere(meet).tolist() if a < b}
+    found = [tuple(sorted(pair)) for pair in near_pairs(corners).tolist()]
+    assert len(found) == len(set(found))
+    assert set(found) == expected
+
+
+def test_crossing_bodies_cross_along_a_known_curve():
+    one, other = arrays(shapes.ball(2.0, 32)), arrays(shapes.ball(2.0, 32).translate([2.3, 0.2, 0.1]))
+    joined = np.concatenate([one[0], other[0]]), np.concatenate([one[1], other[1] + len(one[0])])
+    places = crossings(*joined)
+    assert len(places) > 20
+    for middle in ([0, 0, 0], [2.3, 0.2, 0.1]):
+        assert np.linalg.norm(places - middle, axis=1) == pytest.approx(2.0, abs=0.05)
+    assert len(crossings(*one)) == 0
+
+
+def test_places_are_gathered_by_groups_the_worst_first():
+    points = np.array([[0, 0, 0], [0.3, 0, 0], [5, 0, 0], [5.2, 0, 0], [5.4, 0, 0.0]])
+    assert gathered(points) == pytest.approx(np.array([[5.2, 0, 0], [0.15, 0, 0]]))
+    assert gathered(points, np.array([1.0, 9, 2, 3, 1])) == pytest.approx(
+        np.array([[0.3, 0, 0], [5.2, 0, 0]])
+    )
+
+
+# Build directions.
+
+
+def test_directions_are_those_of_a_cube_and_tilts_lean_as_far_as_they_should():
+    ways = directions()
+    assert len(np.unique(ways.round(9), axis=0)) == 26
+    assert np.linalg.norm(ways, axis=1) == pytest.approx(np.ones(26))
+    assert np.abs(ways[:6]).sum() == pytest.approx(6.0)
+    leaning = tilted(np.array([0.0, 1.0, 0.0]), 20.0)
+    assert leaning[:, 1] == pytest.approx(np.full(8, np.cos(np.radians(20))))
+
+
+def test_a_direction_is_beaten_by_one_that_is_as_good_in_all_and_better_in_one():
+    def way(cup, islands, support):
+        return Build((0.0, 0.0, 1.0), cup, islands, support, 0.0, 80.0, True)
+
+    cupless, few, beaten, small = (
+        way(0.0, 20, 500.0),
+        way(6.0, 5, 200.0),
+        way(6.0, 9, 300.0),
+        way(9.0, 9, 20.0),
+    )
+    order = ranked([beaten, small, few, cupless])
+    assert [b.cup_ml for b in order] == [0.0, 6.0, 6.0, 9.0]
+    assert [b.best_among for b in order] == [True, True, False, True]
+
+
+def test_a_part_may_be_turned_about_the_vertical_to_fit():
+    room = (200.0, 125.0, 210.0)
+    assert fits(np.array([120.0, 190.0, 50.0]), room)
+    assert not fits(np.array([130.0, 190.0, 50.0]), room)
+    assert not fits(np.array([10.0, 10.0, 211.0]), room)

@@ -1,0 +1,224 @@
+"""A body of the user's own: what is wrong with it is found, and where; a sound one holds the lattice."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mu_addon.design.anchors import window
+from mu_addon.design.body import (
+    Body,
+    body_of,
+    covering,
+    envelope,
+    flaws,
+    half,
+    inside,
+    misfits,
+    read_body,
+)
+from mu_addon.design.lattice import lattice_of
+from mu_addon.design.parameters import load_preset
+from mu_addon.design.solid import build_solid
+from mu_addon.design.steps import Given, Stack, along
+from mu_addon.design.surface import stl_bytes, volume
+from mu_addon.errors import InputError
+
+from .bodies import arrays, box, cylinder
+
+UNIT = load_preset("mu-1.0x")
+D = UNIT.dimensions
+
+
+@pytest.fixture(scope="module")
+def ellipse():
+    """As wide as the lattice's box, longer than the unit."""
+    return cylinder(18.75, 25.0, 6.25, -2.0, 80.0)
+
+
+def test_a_sound_body_has_no_flaws(ellipse):
+    assert flaws(ellipse) == []
+    assert misfits(ellipse, D) == []
+
+
+def test_it_is_cut_flat_at_the_units_ends(ellipse):
+    cut = envelope(ellipse, D)
+    assert cut.bounds[:, 2].tolist() == [0.0, D.height]
+    area = 32 * np.sin(2 * np.pi / 64) * 18.75 * 25.0  # of the polygon
+    # Vertices are rounded to 1e-5 mm.
+    assert volume(cut.vertices, cut.triangles) == pytest.approx(area * D.height, rel=1e-6)
+    again = envelope(cut, D)
+    assert volume(again.vertices, again.triangles) == volume(cut.vertices, cut.triangles)
+
+
+def test_holes_are_found_where_they_are(ellipse):
+    gone = 17
+    torn = Body(ellipse.vertices, np.delete(ellipse.triangles, gone, axis=0))
+    (flaw,) = flaws(torn)
+    corners = ellipse.vertices[ellipse.triangles[gone]]
+    middles = (corners + np.roll(corners, 1, axis=0)) / 2
+    assert "3 edges are open" in flaw.what
+    assert sorted(flaw.places.round(6).tolist()) == sorted(middles.round(6).tolist())
+    with pytest.raises(InputError, match="3 edges are open") as error:
+        envelope(torn, D)
+    assert "first at (" in error.value.where
+    assert "fill the holes" in error.value.remedy
+
+
+def test_one_face_that_looks_inward_is_found_and_all_of_them_are_turned(ellipse):
+    turned = ellipse.triangles.copy()
+    turned[5] = turned[5, ::-1]
+    (flaw,) = flaws(Body(ellipse.vertices, turned))
+    assert "3 edges are open or have neighbours facing the other way" in flaw.what
+    inside_out = body_of(ellipse.vertices, ellipse.triangles[:, ::-1])
+    assert volume(inside_out.vertices, inside_out.triangles) > 0
+    assert flaws(inside_out) == []
+
+
+def test_a_surface_that_cuts_itself_is_found_where_it_does():
+    left, right = box([-20, -20, 0], [5, 20, 75]), box([-5, -15, 10], [20, 15, 65])
+    both = Body(
+        np.concatenate([left.vertices, right.vertices]),
+        np.concatenate([left.triangles, right.triangles + len(left.vertices)]),
+    )
+    (flaw,) = flaws(both)
+    assert "cuts itself" in flaw.what
+    # Where they pass through each other: the face x = 5 of one, along the sides of the other.
+    assert np.allclose(flaw.places[:, 0], 5.0)
+    y, z = flaw.places[:, 1], flaw.places[:, 2]
+    assert (np.isclose(abs(y), 15) | np.isclose(z, 10) | np.isclose(z, 65)).all()
+
+
+def test_doubled_faces_and_separate_bodies_are_found(ellipse):
+    doubled = Body(ellipse.vertices, np.concatenate([ellipse.triangles, ellipse.triangles[:1]]))
+    assert any("more than two faces" in flaw.what for flaw in flaws(doubled))
+    far = box([100, 0, 0], [110, 10, 10])
+    two = Body(
+        np.concatenate([ellipse.vertices, far.vertices]),
+        np.concatenate([ellipse.triangles, far.triangles + len(ellipse.vertices)]),
+    )
+    (flaw,) = flaws(two)
+    assert "2 separate bodies" in flaw.what
+    assert np.allclose(flaw.places[np.argmax(flaw.places[:, 0])], [105, 5, 5])
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit"), [(1e-3, "metres"), (1 / 25.4, "inches"), (0.1, "centimetres"), (1e3, "micrometres")]
+)
+def test_a_wrong_unit_of_length_is_told(ellipse, factor, unit):
+    (flaw,) = misfits(Body(ellipse.vertices * factor, ellipse.triangles), D)
+    assert f"seems to be in {unit}" in flaw.what
+    assert f"{1 / factor:g}" in flaw.remedy
+
+
+def test_a_body_must_hold_the_chambers_from_end_to_end():
+    (flaw,) = misfits(cylinder(20.0, 20.0, 0.0, 0.0, 60.0), D)
+    assert "from z = 0 to 60 mm" in flaw.what
+    (flaw,) = misfits(cylinder(12.0, 20.0, 0.0, 0.0, 75.0), D)
+    # Six bladders of radius 12.5 come out on either side.
+    assert "in 12 places" in flaw.what
+    chamber = flaw.places[:, 2] / 12.5 - 0.5
+    assert np.abs(chamber - np.rint(chamber)).max() < 0.2
+    assert len(np.unique(np.rint(chamber))) == 6
+    # On the actuator and outside the body, or on both.
+    reach = np.hypot(flaw.places[:, 0] / 12.0, flaw.places[:, 1] / 20.0)
+    assert reach.min() > 1.0 - 1e-3
+    assert np.hypot(*flaw.places[:, :2].T).max() < 12.51
+    assert misfits(cylinder(12.7, 12.7, 0.0, 0.0, 75.0, 256), D) == []
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_inside_is_what_winding_says(seed):
+    from mu_addon.meshing.surface import Surface, winding_number
+
+    random = np.random.default_rng(seed)
+    body = cylinder(*random.uniform(5, 30, 2), random.uniform(-9, 9), -3.0, 40.0, int(random.integers(3, 30)))
+    points = random.uniform(-35, 45, (200, 3))
+    surface = Surface(body.vertices, body.triangles)
+    assert np.array_equal(inside(body, points), winding_number(surface, points) > 0.5)
+
+
+def test_inside_of_a_box_on_its_own_grid():
+    """Points straight above corners and edges of triangles, as lattice nodes are."""
+    body = box([-12.5, -12.5, 0.0], [12.5, 12.5, 75.0])
+    ticks = np.array([-18.75, -6.25, 0.0, 6.25, 12.4, 12.6])
+    points = np.stack(np.meshgrid(ticks, ticks, [-1.0, 1.0, 37.5, 74.0, 76.0]), axis=-1)
+    within = (abs(points[..., :2]) < 12.5).all(axis=-1) & (points[..., 2] > 0) & (points[..., 2] < 75)
+    assert np.array_equal(inside(body, points), within)
+
+
+def test_half_of_a_mirror_image_and_none_of_another(ellipse):
+    right = half(envelope(ellipse, D))
+    whole = volume(*arrays(envelope(ellipse, D).manifold))
+    assert volume(right.vertices, right.triangles) == pytest.approx(whole / 2, rel=1e-6)
+    assert right.bounds[0, 0] == 0.0
+    sheared = ellipse.vertices + 0.1 * ellipse.vertices[:, [1]] * [1.0, 0.0, 0.0]
+    assert half(envelope(Body(sheared, ellipse.triangles), D)) is None
+
+
+def test_files_bring_the_same_body(ellipse, tmp_path):
+    (tmp_path / "a.obj").write_text(ellipse.text())
+    (tmp_path / "a.stl").write_bytes(stl_bytes(ellipse.vertices, ellipse.triangles))
+    exact = read_body(tmp_path / "a.obj")
+    assert exact.hash == ellipse.hash
+    rounded = read_body(tmp_path / "a.stl")
+    assert flaws(rounded) == []
+    assert len(rounded.triangles) == len(ellipse.triangles)
+    assert np.abs(rounded.bounds - ellipse.bounds).max() < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [("none.stl", None), ("a.stl", b"not an stl"), ("a.obj", b"v 1 2"), ("a.txt", b"x"), ("empty.obj", b"")],
+)
+def test_files_without_a_body_are_refused(name, content, tmp_path):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError):
+        read_body(tmp_path / name)
+
+
+def test_too_fine_or_broken_arrays_are_refused():
+    with pytest.raises(InputError, match="no surface"):
+        body_of(np.zeros((0, 3)), np.zeros((0, 3)))
+    with pytest.raises(InputError, match="no number"):
+        body_of([[np.nan, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    with pytest.raises(InputError, match="60001 triangles"):
+        Body(np.zeros((3, 3)), np.tile([0, 1, 2], (60_001, 1)))
+
+
+def test_the_lattice_is_cut_to_the_body(ellipse):
+    cut = envelope(ellipse, D)
+    solid = build_solid(UNIT, window(UNIT, "alpha4"), body=cut)
+    assert solid.gates.components == 1
+    assert solid.window.name == "alpha4"
+    above = solid.vertices[solid.vertices[:, 2] > 1e-3]
+    reach = (above[:, 0] / 18.75) ** 2 + ((above[:, 1] - 6.25) / 25.0) ** 2
+    assert reach.max() < 1.0 + 1e-4
+    plain = build_solid(UNIT, window(UNIT, "alpha4"))
+    assert 0.7 < solid.gates.volume_mm3 / plain.gates.volume_mm3 < 0.95
+
+
+def test_cells_cover_a_body_wider_than_the_box():
+    wide = envelope(cylinder(40.0, 30.0, 0.0, -1.0, 76.0), D)
+    nodes = lattice_of(covering(D, wide)).nodes
+    assert nodes[:, 0].max() >= 40.0
+    assert nodes[:, 1].min() <= -30.0
+    assert np.allclose(nodes[:, 2].max(), D.height)
+
+
+def test_a_path_outside_the_body_is_refused():
+    narrow = envelope(cylinder(20.0, 20.0, 0.0, -1.0, 76.0), D)
+    with pytest.raises(InputError, match="waveguide along alpha4 comes out of the body"):
+        build_solid(UNIT, window(UNIT, "alpha4"), body=narrow)
+
+
+def test_steps_take_the_body(ellipse):
+    cut, stack = envelope(ellipse, D), Stack()
+    trimmed = stack.value("trim", Given(UNIT, body=cut))
+    ends = np.concatenate([along(trimmed.ends, t[:, None])[:, 0] for t in (trimmed.first, trimmed.last)])
+    assert ((ends[:, 0] / 18.75) ** 2 + ((ends[:, 1] - 6.25) / 25.0) ** 2).max() <= 1.0
+    before = dict(stack.counts)
+    stack.value("trim", Given(UNIT))
+    assert {name for name in stack.counts if stack.counts[name] > before[name]} == {"cells", "trim"}

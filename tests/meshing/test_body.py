@@ -1,0 +1,92 @@
+"""A body of the user's own in place of the envelope's box: meshed with the chambers inside, and bent."""
+
+import math
+
+import attrs
+import numpy as np
+import pytest
+
+from mu_addon.design.body import envelope
+from mu_addon.design.parameters import load_preset
+from mu_addon.design.profile import cavity_volume, outer_volume
+from mu_addon.design.surface import bad_edges, volume
+from mu_addon.errors import InputError
+from mu_addon.fem.equilibrium import Equilibrium
+from mu_addon.fem.kinematics import bending_angle_deg
+from mu_addon.fem.model import Model
+from mu_addon.fem.trajectory import simulate
+from mu_addon.fem.unit import materials_of
+from mu_addon.meshing import MeshSettings, mesh_unit, quality
+from mu_addon.meshing.mesh import boundary_faces
+from mu_addon.meshing.revolved import unit_surfaces
+
+from ..design.bodies import box, cylinder
+
+UNIT = load_preset("mu-1.0x")
+SHORT = attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=3))
+COARSE = MeshSettings(order=1, refine=0.4)
+
+
+@pytest.mark.parametrize("turn", [math.pi / 2, math.pi, 2 * math.pi])
+def test_surfaces_of_any_part_of_a_turn_are_closed_and_hold_its_volume(turn):
+    d = UNIT.dimensions
+    _, profile, cavity = unit_surfaces(d, turn, 1.5)
+    share = turn / (2 * math.pi)
+    for surface, exact in ((profile, outer_volume(d)), (cavity, cavity_volume(d))):
+        assert bad_edges(surface.triangles.astype(np.int64)) == 0
+        assert volume(surface.vertices, surface.triangles) == pytest.approx(share * exact, rel=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("shear", [0.0, 0.15])
+def test_a_body_is_meshed_as_a_half_or_a_whole(shear, tmp_path):
+    d = SHORT.dimensions
+    drawn = cylinder(18.75, 25.0, 6.25, -1.0, d.height + 1.0, 32)
+    drawn = attrs.evolve(drawn, vertices=drawn.vertices + shear * drawn.vertices[:, [1]] * [1.0, 0.0, 0.0])
+    body = envelope(drawn, d)
+    mesh = mesh_unit(SHORT, COARSE, cache=tmp_path, body=body)
+    assert mesh.symmetry == (() if shear else ("x",))
+    found = quality(mesh, SHORT, body)
+    assert found.inverted == 0
+    assert abs(found.lattice_volume_error) < 0.02
+    assert abs(found.cavity_volume_error) < 0.03  # a wall meshed to within a fifth of its thickness
+    assert np.allclose(mesh.nodes[mesh.tip, 2], d.height)
+    assert np.allclose(mesh.nodes[mesh.base, 2], 0.0)
+    if shear:
+        assert mesh.nodes[:, 0].min() < -15.0
+    else:
+        faces, _ = boundary_faces(mesh.tets)
+        assert (abs(mesh.nodes[faces, 0]) < 1e-12).all(axis=1).any()
+    again = mesh_unit(SHORT, COARSE, cache=tmp_path, body=body)
+    assert again.hash() == mesh.hash()
+
+
+@pytest.mark.slow
+def test_bodies_bend_as_their_shape_says(tmp_path):
+    """The box as a body bends as the box does; one that is round about the axis does not bend at all."""
+    d = SHORT.dimensions
+
+    def angle(mesh):
+        solver = Equilibrium(Model(mesh), materials_of(SHORT, mesh))
+        states = simulate(solver, np.array([0.0, 1.0]), np.array([0.0, 20.0])).states
+        return bending_angle_deg(mesh, states[-1].u)
+
+    def of_body(body):
+        return angle(mesh_unit(SHORT, COARSE, cache=tmp_path, body=envelope(body, d)))
+
+    drawn = angle(mesh_unit(SHORT, COARSE, mesher="pytetwild", cache=tmp_path))
+    low, high = np.array(d.bounds).T
+    assert drawn > 2.0
+    assert of_body(box(np.append(low[:2], -1.0), np.append(high[:2], d.height + 1.0))) == pytest.approx(
+        drawn, rel=0.1
+    )
+    # Round about the axis, it has no side to bend to; a mesh that is not round itself leaves a little.
+    assert abs(of_body(cylinder(22.0, 22.0, 0.0, -1.0, d.height + 1.0))) < 0.1 * drawn
+
+
+def test_meshers_that_cannot_take_a_body_are_refused():
+    body = envelope(cylinder(18.75, 25.0, 6.25, -1.0, 80.0), UNIT.dimensions)
+    with pytest.raises(InputError, match="meshed by pytetwild"):
+        mesh_unit(UNIT, COARSE, mesher="gmsh", body=body)
+    with pytest.raises(InputError, match="meshed by pytetwild"):
+        mesh_unit(UNIT, attrs.evolve(COARSE, fraction="quarter"), body=body)
