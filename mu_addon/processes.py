@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,6 +23,20 @@ def _wait_for_parent() -> None:
         os._exit(1)
 
 
+def end_with_input() -> None:
+    """End this process as soon as its standard input ends: who holds the other end was killed, or is done.
+
+    Works on every system and without a signal, for a child that was given a pipe and nothing in it.
+    """
+    threading.Thread(target=_wait_for_input, daemon=True).start()
+
+
+def _wait_for_input() -> None:
+    while os.read(0, 4096):
+        pass
+    os._exit(1)
+
+
 @contextmanager
 def one_thread_each() -> Iterator[None]:
     """Children inherit these: with a process a core, more threads a process only get in each other's way."""
@@ -35,3 +51,28 @@ def one_thread_each() -> Iterator[None]:
                 del os.environ[name]
             else:
                 os.environ[name] = value
+
+
+@contextmanager
+def ctrl_c_ignored() -> Iterator[None]:
+    """Children born inside inherit this: Ctrl-C reaches a terminal's every process, and one decides."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before if before is not None else signal.SIG_DFL)
+
+
+def limit_memory(megabytes: int) -> None:
+    """From now on, refuse this process and its children more memory of their own than that; 0 is no limit.
+
+    On Linux, where what was asked for and never touched counts as well; other systems count otherwise or not
+    at all, and there nothing is done.
+    """
+    if megabytes > 0 and sys.platform == "linux":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_DATA, (megabytes * 1_000_000, megabytes * 1_000_000))

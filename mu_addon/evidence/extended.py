@@ -7,12 +7,14 @@ import math
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import attrs
 
 from ..errors import InputError
 from ..files import write_text
+from ..homogenize.offset_response import OffsetResponse
 from .effect import LIBRARY
 from .verdict import Verdict
 
@@ -30,11 +32,16 @@ class Fitted:
 
 @attrs.frozen
 class ExtendedModel:
-    """Fitted parameters by effect and name, and nuisances by name; verdict: how sure the effects are."""
+    """Fitted parameters by effect and name, and nuisances by name; verdict: how sure the effects are.
+
+    lattice: how the block whose modulus was fitted answers to a print offset; None where slender struts stood
+    for it.
+    """
 
     verdict: str
     effects: Mapping[str, Mapping[str, Fitted]]
     nuisances: Mapping[str, Fitted]
+    lattice: OffsetResponse | None = None
 
     @property
     def values(self) -> dict[str, float]:
@@ -52,7 +59,16 @@ class ExtendedModel:
                 lines += [f"[effect.{effect}.{name}]", *_lines(f)]
         for name, f in self.nuisances.items():
             lines += ["", f"[nuisance.{name}]", *_lines(f)]
+        if self.lattice:
+            lines += [
+                "",
+                "# The block that was compressed, by print offset at 1.0x: modulus over the resin's.",
+            ]
+            lines += ["[lattice]", *(f"{n} = {getattr(self.lattice, n).tolist()}" for n in _RESPONSE)]
         write_text(path, "\n".join(lines) + "\n")
+
+
+_RESPONSE = tuple(a.name for a in attrs.fields(OffsetResponse))
 
 
 def _lines(f: Fitted) -> list[str]:
@@ -60,8 +76,11 @@ def _lines(f: Fitted) -> list[str]:
     return [f"{k} = {v!r}" for k, v in numbers.items() if math.isfinite(v)] + [f"unit = {json.dumps(f.unit)}"]
 
 
-def extended_model(verdict: Verdict) -> ExtendedModel:
-    """The model that a verdict leaves: the base with its nuisances fitted where no effect was named."""
+def extended_model(verdict: Verdict, units: Mapping[str, str] = MappingProxyType({})) -> ExtendedModel:
+    """The model that a verdict leaves: the base with its nuisances fitted where no effect was named.
+
+    units: of the nuisances, by name.
+    """
     found = verdict.selection
     fit = found.chosen if verdict.names else found.base
 
@@ -73,7 +92,7 @@ def extended_model(verdict: Verdict) -> ExtendedModel:
         e.name: {p.name: fitted(k, p.unit) for k, p in zip(e.keys, e.parameters, strict=True)}
         for e in fit.effects
     }
-    nuisances = {k: fitted(k) for k in fit.keys if "." not in k}
+    nuisances = {k: fitted(k, units.get(k, "")) for k in fit.keys if "." not in k}
     return ExtendedModel(verdict.kind, effects, nuisances)
 
 
@@ -93,7 +112,19 @@ def load_model(path: Path) -> ExtendedModel:
             raise InputError(f"no effect {name!r} is known", f"{path}, [effect.{name}]", ", ".join(LIBRARY))
         effects[name] = {p: _fitted(path, f"effect.{name}.{p}", table) for p, table in parameters.items()}
     nuisances = {n: _fitted(path, f"nuisance.{n}", t) for n, t in document.get("nuisance", {}).items()}
-    return ExtendedModel(str(document.get("verdict", "")), effects, nuisances)
+    lattice = _response(path, document["lattice"]) if "lattice" in document else None
+    return ExtendedModel(str(document.get("verdict", "")), effects, nuisances, lattice)
+
+
+def _response(path: Path, table: Any) -> OffsetResponse:
+    try:
+        return OffsetResponse(*(table[n] for n in _RESPONSE))
+    except (InputError, KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"[lattice] holds no response to a print offset: {error}",
+            str(path),
+            f"give {', '.join(_RESPONSE)}, or leave the table out",
+        ) from error
 
 
 def _fitted(path: Path, name: str, table: Any) -> Fitted:

@@ -18,7 +18,7 @@ Array = np.ndarray[Any, Any]
 
 ITERATIONS = 25
 # A step that gains less of chi squared than this ends a fit.
-GAIN = 1e-3
+GAIN = 1e-2
 # Group of what was known of values before any data.
 PRIOR = "known before"
 

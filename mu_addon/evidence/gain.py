@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -11,7 +11,7 @@ import numpy as np
 
 from ..measured import Experiment
 from .fit import Fit, Fitter
-from .record import Record, record
+from .record import KNOWN, Record, record
 
 Array = np.ndarray[Any, Any]
 
@@ -49,40 +49,73 @@ class Errors:
 
 @attrs.frozen
 class Gain:
-    """Errors on the experiments that were fitted, and on those held out, if there are any."""
+    """Errors on the experiments that were fitted, and on those held out, if there are any.
+
+    Of the first quantity, an angle before markers, that tells of the effects; by_quantity holds every one
+    ("unit_pressure angle"), fitted and held out, None where nothing of it was held out.
+    """
 
     fit: Errors
     held_out: Errors | None
+    by_quantity: Mapping[str, tuple[Errors, Errors | None]] = attrs.field(factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """As in verdict.json."""
-        return {"fit": self.fit.as_json(), "held_out": self.held_out.as_json() if self.held_out else None}
+        every = {
+            name: {"fit": fit.as_json(), "held_out": held.as_json() if held else None}
+            for name, (fit, held) in self.by_quantity.items()
+        }
+        held = self.held_out.as_json() if self.held_out else None
+        return {"fit": self.fit.as_json(), "held_out": held, "by_quantity": every}
 
 
 def gain(fitter: Fitter, base: Fit, extended: Fit, held_out: Sequence[Experiment]) -> Gain:
-    """Errors of the base and extended fits; the first quantity of a record (its angle, if any) is judged."""
-    on_fit = _errors(fitter, fitter.record, base, extended)
+    """Errors of the base and extended fits, on the record and on experiments held out, by quantity."""
+    fitted = _errors(fitter, fitter.record, base, extended)
     known = [e for e in held_out if fitter.simulator.knows(e)]
-    if not known:
-        return Gain(on_fit, None)
-    return Gain(on_fit, _errors(fitter, record(known, fitter.simulator), base, extended))
+    unseen = _errors(fitter, record(known, fitter.simulator), base, extended) if known else {}
+    every = {name: (errors, unseen.get(name)) for name, errors in fitted.items()}
+    first = _told_by(base, extended, fitter.record)
+    # What was held out may be of another kind altogether.
+    held = unseen.get(first) or next(iter(unseen.values()), None)
+    return Gain(fitted[first], held, every)
 
 
-def _errors(fitter: Fitter, judged: Record, base: Fit, extended: Fit) -> Errors:
-    group = judged.groups[0]
-    members = [s for s in judged.series if s.group == group]
-    rows = np.concatenate([np.arange(s.at.start, s.at.stop) for s in members])
-    unit = members[0].channel.rpartition("_")[2]
+def _told_by(base: Fit, extended: Fit, judged: Record) -> str:
+    """The first group of series to which the extended model owes a tenth of what it gains; else the first."""
+    gained = dict.fromkeys(judged.groups, 0.0)
+    for s in judged.series:
+        before, after = base.residual[s.at], extended.residual[s.at]
+        gained[s.group] += float(before @ before - after @ after)
+    most = sum(max(v, 0.0) for v in gained.values())
+    return next(
+        (group for group, v in gained.items() if extended.effects and v > 0.1 * most), judged.groups[0]
+    )
+
+
+def _errors(fitter: Fitter, judged: Record, base: Fit, extended: Fit) -> dict[str, Errors]:
+    """Errors by group of series of a record."""
     simulator = fitter.simulator
-    before = (judged.values - judged.predict(simulator, base.values))[rows]
-    after = (judged.values - judged.predict(simulator, extended.values))[rows]
-    if not extended.effects:
-        return Errors(_rms(before), _rms(after), unit)
+    before = judged.values - judged.predict(simulator, base.values)
+    after = judged.values - judged.predict(simulator, extended.values)
     many = sum(len(e.keys) for e in extended.effects)
-    blind = (judged.values - _black_box(fitter, judged, base, many))[rows]
-    permuted = (judged.values - _permuted(fitter, judged, base, extended))[rows]
-    low, high = _bootstrap(members, rows[0], before, after)
-    return Errors(_rms(before), _rms(after), unit, low, high, _rms(permuted), _rms(blind))
+    nulls = None
+    if extended.effects:
+        null_of = (_permuted(fitter, judged, base, extended), _black_box(fitter, judged, base, many))
+        nulls = [judged.values - null for null in null_of]
+    found = {}
+    for group in judged.groups:
+        members = [s for s in judged.series if s.group == group]
+        rows = slice(members[0].at.start, members[-1].at.stop)
+        # A record whose spread is known is one number, in such spreads.
+        unit = "spreads" if group == KNOWN else members[0].channel.rpartition("_")[2]
+        ends = _rms(before[rows]), _rms(after[rows])
+        if nulls is None:
+            found[group] = Errors(*ends, unit)
+            continue
+        low, high = _bootstrap(members, rows.start, before[rows], after[rows])
+        found[group] = Errors(*ends, unit, low, high, *(_rms(null[rows]) for null in nulls))
+    return found
 
 
 def _rms(r: Array) -> float:

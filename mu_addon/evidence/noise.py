@@ -157,17 +157,16 @@ def _estimate(
     longest = max(float(s.time_s[-1] - s.time_s[0]) for s in timed)
     short, every = (_some(members, most) for most in (FIRST_SERIES, SERIES))
     deviance = _deviance(record, group, short, residual, columns, (sample, longest))
-    size, best = 0.7, None
+    best = None
     for time in (3.0 * sample * block, 15.0 * sample * block):
-        x0 = np.array([math.log(total * 0.7 * math.sqrt(block)), math.log(total * 0.7), math.log(time)])
-        found = _minimum(deviance, x0, size)
+        found = _minimum(lambda x: deviance(x)[0], np.array([-0.5 * math.log(block), math.log(time)]), 0.7)
         if best is None or found.fun < best.fun:
             best = found
     assert best is not None
     if len(every) > len(short):
         deviance = _deviance(record, group, every, residual, columns, (sample, longest))
-        best = _minimum(deviance, best.x, 0.15)
-    return _source(best.x, sample, longest)
+        best = _minimum(lambda x: deviance(x)[0], best.x, 0.15)
+    return _source(best.x, sample, longest, deviance(best.x)[1])
 
 
 def _pure_error(record: Record, series: Sequence[Series], residual: Array) -> float | None:
@@ -202,7 +201,7 @@ def _some(members: Sequence[int], most: int) -> list[int]:
 def _minimum(deviance: Callable[[Array], float], x0: Array, size: float) -> Any:
     from scipy.optimize import minimize
 
-    simplex = x0 + size * np.vstack([np.zeros(3), np.eye(3)])
+    simplex = x0 + size * np.vstack([np.zeros(len(x0)), np.eye(len(x0))])
     options = {"initial_simplex": simplex, "xatol": 0.02, "fatol": 0.05, "maxfev": 120}
     return minimize(deviance, x0, method="Nelder-Mead", options=options)
 
@@ -214,8 +213,11 @@ def _deviance(
     residual: Array,
     columns: Sequence[Array],
     clock: tuple[float, float],
-) -> Callable[[Array], float]:
-    """Restricted deviance of the logarithms of white, slow and time_s, for some members of a group."""
+) -> Callable[[Array], tuple[float, float]]:
+    """Restricted deviance, for some members of a group, and the size of the noise at which it is least.
+
+    By the logarithms of slow over white noise and of time_s; the size of both together has a closed form.
+    """
     k = max(columns[i].shape[1] for i in members)
     places, series, start = [], [], 0
     for i in members:
@@ -229,23 +231,29 @@ def _deviance(
         stack[at, :many] = columns[i]
         stack[at, k] = residual[record.series[i].at]
 
-    def deviance(x: Array) -> float:
+    dof = max(start - sum(many for _, many in places), 1)
+
+    def deviance(x: Array) -> tuple[float, float]:
         factor, value = _factor(series, _source(x, *clock))
         w = _applied(factor, stack)
+        square = 0.0
         for at, many in places:
             b, r = w[at, :many], w[at, k]
             gram = b.T @ b
             lower = np.linalg.cholesky(gram + 1e-12 * np.trace(gram) * np.eye(many))
             half = np.linalg.solve(lower, b.T @ r)
-            value += 2.0 * float(np.log(np.diag(lower)).sum()) + float(r @ r - half @ half)
-        return value
+            value += 2.0 * float(np.log(np.diag(lower)).sum())
+            square += float(r @ r - half @ half)
+        size = math.sqrt(max(square, 1e-300) / dof)
+        return value + 2.0 * dof * math.log(size), size
 
     return deviance
 
 
-def _source(x: Array, sample_s: float, longest_s: float) -> Source:
+def _source(x: Array, sample_s: float, longest_s: float, size: float = 1.0) -> Source:
+    """White noise of `size`, times slow over white, and time_s, by the logarithms of the last two."""
     low, high = math.log(0.5 * sample_s), math.log(max(longest_s, 4.0 * sample_s))
-    return Source(math.exp(x[0]), math.exp(x[1]), math.exp(min(max(x[2], low), high)))
+    return Source(size, size * math.exp(min(max(x[0], -12.0), 12.0)), math.exp(min(max(x[1], low), high)))
 
 
 def span(record: Record, signatures: Array) -> list[Array]:

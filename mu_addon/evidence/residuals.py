@@ -73,9 +73,18 @@ CONDITIONS = (
 def dependence_table(fitter: Fitter, fit: Fit) -> list[Dependence]:
     """Every test of what a fit leaves, in a fixed order; what cannot vary in these data is left out.
 
-    Each is made twice. Under the noise that was estimated with every smooth cause set aside, whose slow part
-    the data then tell little of; there a dependence must gain more likelihood than the noise does when it
-    is estimated from the residual itself. And, where a test is no fit, under that second noise.
+    By the noise of the fitter, which was estimated with every smooth cause set aside: it shows what a model
+    misses, and now and then the slowest part of the noise, of which such data tell little.
+    """
+    spare = dict.fromkeys(fitter.deviance(fit), 0.0)
+    return [*_fitted_tests(fitter, fit, spare), *_plain_tests(fitter.record, fit.residual)]
+
+
+def strict_table(fitter: Fitter, fit: Fit) -> list[Dependence]:
+    """The same tests, of what cannot be noise: each is made twice, and the larger p counts.
+
+    A dependence must gain more likelihood than the noise does when it is estimated from the residual itself,
+    as if nothing in it had a cause. And, where a test is no fit, it is made under that second noise, too.
     """
     own, refitted = fitter.under_its_own_noise(fit)
     before, after = fitter.deviance(fit), own.deviance(refitted)

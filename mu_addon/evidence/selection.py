@@ -11,7 +11,7 @@ import numpy as np
 
 from .effect import Effect
 from .fit import PRIOR, Fit, Fitter, logarithmic
-from .residuals import Dependence, dependence_table, structure
+from .residuals import Dependence, dependence_table, strict_table, structure
 from .sensitivity import ABSORBED, Sensitivity
 
 Array = np.ndarray[Any, Any]
@@ -24,6 +24,11 @@ MOST_EFFECTS = 3
 # Models that the next effect is added to: the best one may be wrong while two effects are seen as one.
 SEEDS = 4
 DRAWS = 20000
+# An effect is told of by one experiment alone where this share of what is known of it comes from there.
+ALONE = 0.9
+# Chi squared that an effect must take from a fit's residual, to first order, to be fitted beside it: a small
+# part of what `CHANCE` asks for.
+PROMISING = 4.0
 
 
 @attrs.frozen(eq=False)
@@ -45,6 +50,8 @@ class Selection:
     """The base model, the chosen one, its causes, and what either leaves; p_best: of the best effect tried.
 
     singles: the fit of every single effect, best first. doubted: why the best was not accepted, if so.
+    table: what cannot be noise in what the chosen model leaves. table_base: all that the base model misses,
+    where anything is wrong; by the strict tests, as table, where nothing is.
     """
 
     base: Fit
@@ -85,11 +92,13 @@ def select(
             break
         p = _chance(fitter, chosen, seen, _gain(fitter, chosen, pool[0]))
         p_best = p if level == 0 else p_best
-        if p >= CHANCE:
-            break
-        if level:
+        # What looked best alone may be neither of two that act together.
+        if level and (p < CHANCE or structure(strict_table(fitter, chosen))):
             more = _extended(fitter, effects, levels[-1][1:SEEDS], progress)
             pool = sorted([*pool, *more], key=_cost)
+            p = _chance(fitter, chosen, seen, _gain(fitter, chosen, pool[0]))
+        if p >= CHANCE:
+            break
         if _loss(fitter, chosen, pool[0]) <= 0.0:
             doubted = f"{pool[0].names[-1]} fits, yet does not predict experiments left out"
             break
@@ -98,7 +107,9 @@ def select(
         levels.append(pool)
     doubted = doubted or _sudden(table_base, base, chosen)
     causes = _causes(fitter, effects, chosen, ps, levels)
-    table = table_base if chosen is base else tuple(dependence_table(fitter, chosen))
+    table = tuple(strict_table(fitter, chosen))
+    if chosen is base and not doubted and not structure(table):
+        table_base = table
     return Selection(base, chosen, causes, singles, table_base, table, p_best, doubted)
 
 
@@ -119,8 +130,37 @@ def reviewed(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) -> S
     doubted = doubted or _sudden(table_base, base, chosen)
     effects = [f.effects[0] for f in singles]
     causes = _causes(fitter, effects, chosen, ps, [singles])
-    table = tuple(dependence_table(fitter, chosen))
+    table = tuple(strict_table(fitter, chosen))
     return Selection(base, chosen, causes, singles, table_base, table, found.p_best, doubted)
+
+
+def one_more(
+    fitter: Fitter,
+    seen: Sequence[Sensitivity],
+    found: Selection,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Selection:
+    """A selection that left structure, with the effect added that takes all of it; as it was without such.
+
+    For noise that was estimated anew around the causes: what is smaller than the noise believed before may
+    be seen now. An effect that leaves structure too is one more name without a reason, so it is not taken;
+    nor is one that a single experiment tells of, since some effect bends as whatever that one leaves.
+    """
+    if found.doubted or not found.left or len(found.chosen.effects) >= MOST_EFFECTS:
+        return found
+    effects = tuple({s.effect.keys: s.effect for s in seen if s.worth_a_fit}.values())
+    pool = _extended(fitter, effects, [found.chosen], progress)
+    if not pool:
+        return found
+    best = pool[0]
+    p = _chance(fitter, found.chosen, seen, _gain(fitter, found.chosen, best))
+    if p >= CHANCE or max(_told(fitter, best).values()) > ALONE or _loss(fitter, found.chosen, best) <= 0.0:
+        return found
+    table = tuple(strict_table(fitter, best))
+    if structure(table) or _sudden(found.table_base, found.base, best):
+        return found
+    causes = _causes(fitter, effects, best, [*(c.p_value for c in found.causes), p], [pool])
+    return attrs.evolve(found, chosen=best, causes=causes, table=table)
 
 
 def _sudden(table: Sequence[Dependence], base: Fit, chosen: Fit) -> str:
@@ -151,11 +191,30 @@ def _extended(
     for seed in seeds:
         for e in effects:
             every = frozenset((*(o.keys for o in seed.effects), e.keys))
-            if e.name in seed.names or every in found:
+            if e.name in seed.names or every in found or not _promises(fitter, seed, e):
                 continue
             progress(" and ".join((*seed.names, e.name)))
             found[every] = fitter.best([*seed.effects, e], [{**seed.values, **s} for s in e.starts()])
     return sorted(found.values(), key=_cost)
+
+
+def _promises(fitter: Fitter, fit: Fit, effect: Effect) -> bool:
+    """Whether what an effect does, at any of its starts or in the small, has a part in what a fit leaves.
+
+    A fit of it, which takes many predictions, then is worth its time.
+    """
+    size = effect.parameters[0]
+    plain = fitter.predict(fit.values)
+    moved = [*effect.starts(), *({**s, effect.keys[0]: size.null + size.step} for s in effect.shapes())]
+    u = np.stack([fitter.predict({**fit.values, **m}) - plain for m in moved], axis=1)
+    u = fitter.project(u)
+    q = np.linalg.qr(fit.jacobian)[0]
+    before = np.linalg.norm(u, axis=0)
+    u -= q @ (q.T @ u)
+    length = np.linalg.norm(u, axis=0)
+    told = length > ABSORBED * np.maximum(before, 1e-300)
+    along = (u.T @ fit.residual)[told] / length[told]
+    return bool((along**2 > PROMISING).any())
 
 
 def _chance(fitter: Fitter, fit: Fit, seen: Sequence[Sensitivity], gain: float) -> float:
@@ -232,19 +291,23 @@ def _loss(fitter: Fitter, less: Fit, more: Fit) -> float:
     return lost
 
 
-def _folds(fitter: Fitter, fit: Fit) -> list[Array]:
+def _told(fitter: Fitter, fit: Fit) -> dict[int, float]:
+    """The share of what is known of the last effect's size that each experiment tells."""
     record = fitter.record
     every, own = np.vstack([fit.jacobian, fit.prior]), len(fit.effects[-1].keys)
     last = every[:, -own]
     q = np.linalg.qr(every[:, :-own])[0]
     told = ((last - q @ (q.T @ last)) ** 2)[: len(record)]
+    rows = {i: record.rows(i) for i in range(len(record.experiments))}
+    return {i: float(told[r].sum() / max(told.sum(), 1e-300)) for i, r in rows.items() if r.any()}
+
+
+def _folds(fitter: Fitter, fit: Fit) -> list[Array]:
+    record = fitter.record
     folds = []
-    for i, e in enumerate(record.experiments):
+    for i, share in _told(fitter, fit).items():
         rows = record.rows(i)
-        if not rows.any():
-            continue
-        share = float(told[rows].sum() / max(told.sum(), 1e-300))
-        if share < 0.6 or "time_s" not in e.columns or rows.sum() < 40:
+        if share < 0.6 or "time_s" not in record.experiments[i].columns or rows.sum() < 40:
             folds.append(rows)
             continue
         clock = np.zeros(len(record))

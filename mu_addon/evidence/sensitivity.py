@@ -113,7 +113,10 @@ def sensitivities(fitter: Fitter, values: Mapping[str, float]) -> list[Sensitivi
     for e in simulator.effects:
         size = e.parameters[0]
         for shape in e.shapes():
-            j = fitter.project(_slope(fitter, {**values, **shape}, e.keys[0], size), zeros=False)
+            slope = _slope(fitter, {**values, **shape}, e.keys[0], size)
+            if not slope.any():
+                slope = _secant(fitter, {**values, **shape}, e)
+            j = fitter.project(slope, zeros=False)
             j = np.concatenate([j, np.zeros(len(prior))])
             whole = float(np.linalg.norm(j))
             left: Array = j - q @ (q.T @ j)
@@ -159,6 +162,20 @@ def _slope(fitter: Fitter, values: Mapping[str, float], key: str, p: Parameter) 
     if p.low <= down <= p.high:
         return np.asarray((up - fitter.predict({**values, key: down})) / (2.0 * h))
     return np.asarray((up - fitter.predict({**values, key: at})) / h)
+
+
+def _secant(fitter: Fitter, values: Mapping[str, float], effect: Effect) -> Array:
+    """Mean slope (N,) up to the start that moves the prediction most, of an effect that only then begins.
+
+    A wall that a unit does not reach is at first no nearer for being moved.
+    """
+    size, plain = effect.parameters[0], fitter.predict(values)
+    slopes = [
+        (fitter.predict({**values, effect.keys[0]: start}) - plain) / (start - size.null)
+        for start in size.starts
+        if start != size.null
+    ]
+    return max(slopes, key=lambda slope: float(np.linalg.norm(slope)), default=np.zeros_like(plain))
 
 
 def _absorbers(n: Array, names: Sequence[Parameter], lengths: Array, j: Array) -> tuple[str, ...]:

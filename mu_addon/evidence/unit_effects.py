@@ -16,17 +16,19 @@ from ..errors import InputError
 from ..fem.clogged import CloggedModel
 from ..fem.descent import NewtonSettings
 from ..fem.lattice_law import LatticeLaw
-from ..fem.laws import Foam, Yeoh
+from ..fem.laws import Foam, Layered, Yeoh
 from ..fem.loads import gravity
 from ..fem.materials import Layer, Materials
 from ..fem.model import Model
+from ..fem.obstacle import CONTACT, Obstacle, Plane
 from ..fem.unit import materials_of
 from ..meshing.mesh import LATTICE, MEMBRANE, Mesh
 from ..meshing.morph import morphed
-from ..meshing.settings import MeshSettings
+from ..meshing.settings import CELL_MM, MeshSettings
 from ..meshing.unit import mesh_unit
 from .effect import Effect, Parameter
 from .prediction import beam, coupon, lattice
+from .prediction.wall import NAME as WALL
 
 Array = np.ndarray[Any, Any]
 
@@ -38,6 +40,10 @@ SMOOTH = NewtonSettings()
 # Where the tangent jumps at rest, even the smallest step ends away from where it was predicted.
 KINKED = NewtonSettings(surprise=3.0)
 TONNE_PER_MM3 = 1e-12  # in kg/m3
+# A wall's contact pressure is some kPa; there the gap is off by this much at 1.0x.
+WALL_MPa, WALL_mm = 0.005, 0.02
+# Faces of the envelope are some 20 mm long, and the tip's edge is what touches first.
+WALL_HALVINGS = 2
 
 
 @attrs.frozen
@@ -76,7 +82,8 @@ class UnitEffect:
     """A static effect: its parameter, the sizes (ascending, the null among them) that are run, what changes.
 
     body: of a body and a size; materials, model: of a body, its mesh and a size, the base's where None.
-    weighs: whether it depends on the direction of gravity. newton: of its runs.
+    weighs: whether it depends on the direction of gravity. newton: of its runs. length: the power of a
+    length by which the size of the same change grows with the unit, at the same moduli and pressures.
     """
 
     name: str
@@ -87,6 +94,7 @@ class UnitEffect:
     model: Callable[[Body, Mesh, float], Model] | None = None
     weighs: bool = False
     newton: NewtonSettings = SMOOTH
+    length: int = 0
 
     def __attrs_post_init__(self) -> None:
         p = self.parameter
@@ -115,6 +123,17 @@ def _clogged(body: Body, mesh: Mesh, share_lost: float) -> Model:
             f"{body.distal} of {d.count} chambers cannot be cut off", "clogged_chamber", "give 1 or more"
         )
     return CloggedModel(mesh, (d.count - body.distal) * d.cell, share_lost, threads=1)
+
+
+def walled(body: Body, mesh: Mesh, gap_mm: float) -> Model:
+    """The unit beside a flat wall along its axis, `gap_mm` from its outline at rest; below 0 toward -y."""
+    model = body.model(mesh)
+    away = math.copysign(1.0, gap_mm)
+    farthest = float((away * mesh.nodes[:, 1]).max())
+    wall = Plane((0.0, away * (farthest + abs(gap_mm)), 0.0), (0.0, -away, 0.0))
+    size = body.unit.dimensions.cell / CELL_MM
+    model.obstacles = (Obstacle(mesh, wall, WALL_MPa, WALL_mm * size, WALL_HALVINGS),)
+    return model
 
 
 def _printed(body: Body, **changes: float) -> Body:
@@ -194,6 +213,51 @@ def _asymmetric(body: Body, mesh: Mesh, excess: float) -> Materials:
     return Materials((*rest, *_shares(lattice_, min(1.0, 1.0 + excess)), foam))
 
 
+def layer_stiffness(ratio: float, shear_MPa: float, bulk_MPa: float) -> tuple[float, float]:
+    """What `Layered` adds along the layers in MPa, and the share of all, that make a wall's layers differ.
+
+    Beside an isotropic law of these moduli the modulus along the layers is then `ratio` times that across,
+    which stays what it was. Below 0: as much across them, with as much less of the isotropic law's shear,
+    which is the same at small strain.
+    """
+    from scipy.optimize import brentq
+
+    lame = bulk_MPa - 2 * shear_MPa / 3
+
+    def moduli(added: float) -> tuple[float, float]:
+        """Young's moduli along and across the layers."""
+        stiffness = np.full((3, 3), lame) + np.diag(2 * shear_MPa + added * np.array([1.0, 1.0, 0.0]))
+        compliance = np.linalg.inv(stiffness)
+        return 1 / compliance[0, 0], 1 / compliance[2, 2]
+
+    def off(added: float) -> float:
+        along, across = moduli(added)
+        return along / across - ratio
+
+    added = float(brentq(off, -1.999 * shear_MPa, 1e4 * shear_MPa, xtol=1e-12 * shear_MPa))
+    return added, moduli(0.0)[1] / moduli(added)[1]
+
+
+def _layered(body: Body, mesh: Mesh, in_plane: float) -> Materials:
+    """The wall stiffer along the print's layers, which lie across the axis; the lattice as it is.
+
+    All struts of a body-centred cell make one angle with the layers: to them it is another modulus.
+    """
+    wall, rest = parted(body.materials(mesh), mesh, MEMBRANE)
+    layered: list[Layer] = []
+    for layer in wall:
+        # The unit's membrane is neo-Hookean, alike everywhere.
+        shear, bulk = layer.parameters[0]
+        added, share = layer_stiffness(1 + in_plane, float(shear), float(bulk))
+        less = min(added, 0.0)
+        base = layer.parameters + np.array([less / 2, less / 3])
+        more = Layered.parameters(max(added, 0.0), -less, (0.0, 0.0, 1.0))
+        more = np.tile(more, (len(layer.elements), 1))
+        layered += _shares((attrs.evolve(layer, parameters=base),), share)
+        layered.append(Layer(Layered, layer.elements, more, share * layer.weight))
+    return Materials((*layered, *rest))
+
+
 def _shared(effects: Sequence[Effect], name: str) -> Parameter:
     """The parameter that another kind of experiment has for an effect: one effect, one value."""
     return next(e.parameters[0] for e in effects if e.name == name)
@@ -203,7 +267,12 @@ EFFECTS = {
     effect.name: effect
     for effect in (
         UnitEffect(
-            "gravity", _shared(beam.EFFECTS, "gravity"), (0.0, 1300.0, 4000.0), model=_weighed, weighs=True
+            "gravity",
+            _shared(beam.EFFECTS, "gravity"),
+            (0.0, 1300.0, 4000.0),
+            model=_weighed,
+            weighs=True,
+            length=-1,
         ),
         UnitEffect(
             "strain_stiffening",
@@ -212,10 +281,18 @@ EFFECTS = {
             materials=_stiffening,
         ),
         UnitEffect(
-            "overcure", _shared(lattice.EFFECTS, "overcure"), (0.0, 0.06, 0.14, 0.25), body=_overcured
+            "overcure",
+            _shared(lattice.EFFECTS, "overcure"),
+            (0.0, 0.06, 0.14, 0.25),
+            body=_overcured,
+            length=1,
         ),
         UnitEffect(
-            "skin_cure", _shared(lattice.EFFECTS, "skin_cure"), (0.0, 0.04, 0.1, 0.2, 0.4), body=_skinned
+            "skin_cure",
+            _shared(lattice.EFFECTS, "skin_cure"),
+            (0.0, 0.04, 0.1, 0.2, 0.4),
+            body=_skinned,
+            length=1,
         ),
         UnitEffect(
             "wall_thickness",
@@ -224,6 +301,12 @@ EFFECTS = {
             ),
             (0.8, 0.9, 1.0, 1.15, 1.3),
             body=_thickened,
+        ),
+        UnitEffect(
+            "anisotropy",
+            attrs.evolve(_shared(coupon.EFFECTS, "anisotropy"), low=-0.6, high=3.0),
+            (-0.6, -0.3, 0.0, 0.5, 1.3, 3.0),
+            materials=_layered,
         ),
         UnitEffect(
             "tension_compression_asymmetry",
@@ -235,7 +318,7 @@ EFFECTS = {
         UnitEffect(
             "clogged_chamber",
             Parameter("share_lost", "", 0.0, 1.0, 0.0, (0.1, 0.5), "of the pressure, in the last chambers"),
-            (0.0, 0.3, 1.0),
+            (0.0, 0.3, 0.65, 1.0),
             model=_clogged,
         ),
         UnitEffect(
@@ -246,3 +329,13 @@ EFFECTS = {
         ),
     )
 }
+
+# How a wall enters a run; where walls stand depends on how far the free unit gets, see prediction/wall.
+WALLED = UnitEffect(
+    WALL,
+    Parameter("gap_mm", "mm", -1e3, 1e3, 1e3, (), "signed: toward +y, below 0 toward -y"),
+    (1e3,),
+    model=walled,
+    newton=CONTACT,
+    length=1,
+)

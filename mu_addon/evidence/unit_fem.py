@@ -25,10 +25,12 @@ from ..measured import Experiment
 from ..meshing.mesh import AXES
 from ..meshing.settings import MeshSettings
 from ..meshing.unit import mesh_unit
-from ..processes import end_with_parent, one_thread_each
+from ..processes import ctrl_c_ignored, end_with_parent, one_thread_each
 from .markers import Marker, attached, followed
 from .prediction.unit import KIND, UnitResponse, Variant
-from .unit_effects import EFFECTS, SMOOTH, Body, UnitEffect
+from .prediction.wall import NAME as WALL
+from .prediction.wall import NEAREST, Side
+from .unit_effects import EFFECTS, SMOOTH, WALLED, Body, UnitEffect, walled
 
 Array = np.ndarray[Any, Any]
 Progress = Callable[[str, float], None]
@@ -41,6 +43,12 @@ FEWEST = 4
 # Along the meridian as fine as the default: there a coarser mesh misses most.
 COARSE = MeshSettings(refine=0.6, meridian_mm=0.9)
 FINE = MeshSettings()
+# Share of the progress that walls take.
+WALLS = 0.2
+# Walls as shares of how far the free unit gets, pressures as shares of the way on from where one is met.
+REACHES = (0.2, 0.5, NEAREST)
+SHARES = (0.15, 0.4, 0.7, 1.0)
+KNOWN = (*EFFECTS, WALL)
 
 
 class UnitResponseWarning(UserWarning):
@@ -61,7 +69,7 @@ class UnitSettings:
     finer: MeshSettings = FINE
     pressures: int = 12
     margin: float = 0.05
-    effects: tuple[str, ...] = tuple(EFFECTS)
+    effects: tuple[str, ...] = KNOWN
     distal: int = 1
     lattice: LatticeLaw | None = None
     farthest_mm: float = 4.0
@@ -69,11 +77,11 @@ class UnitSettings:
 
     def __attrs_post_init__(self) -> None:
         for name in self.effects:
-            if name not in EFFECTS:
+            if name not in KNOWN:
                 raise InputError(
                     f"the unit's model has no effect {name!r}",
                     "unit settings",
-                    f"known: {', '.join(EFFECTS)}",
+                    f"known: {', '.join(KNOWN)}",
                 )
         if self.pressures < FEWEST or self.workers < 1:
             raise InputError(
@@ -83,22 +91,35 @@ class UnitSettings:
             )
 
 
+def _effect(name: str) -> UnitEffect:
+    return WALLED if name == WALL else EFFECTS[name]
+
+
 @attrs.frozen
 class Run:
-    """One quasi-static run: a body, the effect on it and its size, pressures in kPa, points (p, 3) in mm."""
+    """One quasi-static run: a body, the effect on it and its size, pressures in kPa, points (p, 3) in mm.
+
+    outline: of the free unit, how far its outline moves toward +y and -y instead of angle and places.
+    """
 
     body: Body
     pressures_kPa: tuple[float, ...]
     points: tuple[tuple[float, float, float], ...] = ()
     effect: str = ""
     size: float = 0.0
+    outline: bool = False
+
+    @property
+    def rows(self) -> int:
+        """How many values a pressure has."""
+        return 2 if self.outline else 1 + 3 * len(self.points)
 
     @property
     def changed(self) -> tuple[Body, UnitEffect | None]:
         """The body with the effect on it, and the effect where it does more than that."""
         if not self.effect:
             return self.body, None
-        effect = EFFECTS[self.effect]
+        effect = _effect(self.effect)
         body = effect.body(self.body, self.size) if effect.body else self.body
         return body, effect if effect.materials or effect.model else None
 
@@ -108,7 +129,7 @@ class Run:
             body, effect = self.changed
         except InputError:
             # No such body: its failure is kept, too.
-            body, effect = self.body, EFFECTS[self.effect]
+            body, effect = self.body, _effect(self.effect)
         parts = [REVISION, body.unit.hash(), attrs.astuple(body.mesh), self.pressures_kPa, self.points]
         parts += [effect.newton if effect else SMOOTH, body.lattice.hash() if body.lattice else ""]
         if body.drawn:
@@ -117,24 +138,26 @@ class Run:
             parts += [effect.name, self.size]
             parts += [body.distal if effect.name == "clogged_chamber" else 0]
             parts += [body.orientation_deg if effect.weighs else 0.0]
+        if self.outline:
+            parts += ["outline"]
         return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
 
 
 @attrs.frozen(eq=False)
 class Result:
-    """What a run found: values (1 + 3 p, k), an angle in degrees and places in mm; where nan, why."""
+    """What a run found: values (rows, k), an angle in degrees and places in mm; where nan, why."""
 
     values: Array
     why: str = ""
 
 
 def run(case: Run, cache: Path | None = None) -> Result:
-    """Angle and places of points at every pressure, from rest outward.
+    """Angle and places of points at every pressure, from rest outward; or moves of the outline, see Run.
 
     cache: where a mesher that is not repeatable keeps its meshes. A pressure that cannot be reached, with
     those beyond it, is nan; so is all where the body cannot be drawn or meshed.
     """
-    values = np.full((1 + 3 * len(case.points), len(case.pressures_kPa)), np.nan)
+    values = np.full((case.rows, len(case.pressures_kPa)), np.nan)
     try:
         body, effect = case.changed
         mesh = body.meshed(cache)
@@ -145,7 +168,13 @@ def run(case: Run, cache: Path | None = None) -> Result:
         if effect and effect.model:
             model = effect.model(body, mesh, case.size)
         equilibrium = Equilibrium(model, materials, effect.newton if effect else SMOOTH)
+        # Out of reach, it only lends the points at which the unit would touch.
+        outline = walled(body, mesh, 1e6).obstacles[0] if case.outline else None
         for at, state in _states(equilibrium, np.array(case.pressures_kPa)):
+            if outline:
+                y, still = (outline.places(u)[..., 1] for u in (state.u, np.zeros_like(state.u)))
+                values[:, at] = y.max() - still.max(), still.min() - y.min()
+                continue
             values[0, at] = bending_angle_deg(mesh, state.u)
             values[1:, at] = points.at(state.u).ravel()
     except (InputError, MeshingError, ConvergenceError) as error:
@@ -233,10 +262,33 @@ def unit_responses(
         for m in plan.markers:
             say(f"marker {m.number} at {plan.scale:g}x lies {m.distance_mm:.2f} mm from its point", 0.0)
     cases = {case.key(): case for plan in plans for case in plan.runs(settings)}
-    found = _found(cases, settings.workers, cache, say)
-    responses = [r for plan in plans for r in plan.responses(settings, found)]
+    walled_too = WALL in settings.effects
+    part = 1 - WALLS if walled_too else 1.0
+    found = _found(cases, settings.workers, cache, lambda what, share: say(what, share * part))
+    if walled_too:
+        walls = {c.key(): c for plan in plans for _, _, c in plan.walls(found)}
+        more = _found(walls, settings.workers, cache, lambda what, share: say(what, 1 + WALLS * (share - 1)))
+        found |= more
+    responses = _counted_alike([r for plan in plans for r in plan.responses(settings, found)])
     # Whoever asks for the channels of all looks at the first.
     return tuple(sorted(responses, key=lambda r: -len(r.channels)))
+
+
+def _counted_alike(responses: Sequence[UnitResponse]) -> list[UnitResponse]:
+    """The responses with a wall's reach counted from where the free unit gets in any of them."""
+    farthest = {
+        s: max(r.walls[s].farthest_mm for r in responses if s in r.walls)
+        for s in {s for r in responses for s in r.walls}
+    }
+    return [
+        attrs.evolve(
+            r,
+            walls={
+                s: attrs.evolve(side, spare_mm=farthest[s] - side.farthest_mm) for s, side in r.walls.items()
+            },
+        )
+        for r in responses
+    ]
 
 
 def unit_markers(
@@ -248,12 +300,32 @@ def unit_markers(
     return {s: _Plan.of(unit, chosen, s, settings, None).markers for s in sorted({e.scale for e in chosen})}
 
 
+def similar(unit: Unit) -> Unit:
+    """The unit at 1.0x that moves as this one does, all lengths alike; this one where it cannot be drawn.
+
+    An elastic body has no length of its own: enlarged as a whole, at the same pressures and moduli, it turns
+    by the same angles. The printer's lengths do not grow with the unit, so here they shrink.
+    """
+    p, s = unit.print, unit.scale
+    try:
+        less = attrs.evolve(
+            p,
+            offset_xy_mm=p.offset_xy_mm / s,
+            offset_z_mm=p.offset_z_mm / s,
+            skin_depth_mm=p.skin_depth_mm / s,
+        )
+        return attrs.evolve(unit, scale=1.0, print=less)
+    except InputError:
+        return unit
+
+
 @attrs.frozen
 class _Plan:
-    """What is to be run for one scale."""
+    """What is to be run for one scale: `body`, similar to the unit, which is `enlarged` times as large."""
 
     body: Body
     scale: float
+    enlarged: float
     orientations: tuple[float, ...]
     pressures_kPa: tuple[float, ...]
     markers: tuple[Marker, ...]
@@ -271,14 +343,16 @@ class _Plan:
         here = [e for e in chosen if e.scale == scale]
         scaled = attrs.evolve(unit, scale=scale)
         readings = np.concatenate([e["pressure_kPa"] for e in here])
-        body = Body(scaled, settings.mesh, settings.finer, settings.distal, settings.lattice)
         mesh = mesh_unit(scaled, settings.mesh, cache=cache)
+        reduced = similar(scaled)
+        body = Body(reduced, settings.mesh, settings.finer, settings.distal, settings.lattice)
         markers = attached(mesh, here, settings.farthest_mm * scale)
         measured = {c for e in here for c, values in e.columns.items() if np.isfinite(values).any()}
         known = [ANGLE, *(f"marker{m.number}_{a}_mm" for m in markers for a in AXES)]
         return cls(
             body,
             scale,
+            scale / reduced.scale,
             tuple(sorted({e.orientation_deg % 360.0 for e in here})),
             pressures(readings, settings.pressures, settings.margin),
             markers,
@@ -286,19 +360,78 @@ class _Plan:
         )
 
     def case(self, effect: str = "", size: float = 0.0, orientation_deg: float = 0.0) -> Run:
-        points = tuple(tuple(m.point.tolist()) for m in self.markers)
+        points = tuple(tuple((m.point / self.enlarged).tolist()) for m in self.markers)
         body = attrs.evolve(self.body, orientation_deg=orientation_deg)
+        if effect:
+            size = size / self.enlarged ** _effect(effect).length
         return Run(body, self.pressures_kPa, points, effect, size)
 
     def runs(self, settings: UnitSettings) -> Iterator[Run]:
         """The base first, then what takes longest."""
         yield self.case()
-        for name in sorted(settings.effects, key=lambda n: n != "mesh_error"):
+        if WALL in settings.effects:
+            yield attrs.evolve(self.case(), outline=True)
+        for name in sorted(set(settings.effects) & set(EFFECTS), key=lambda n: (n != "mesh_error", n)):
             effect = EFFECTS[name]
             for orientation in self.orientations if effect.weighs else (0.0,):
                 for size in effect.sizes:
                     if size != effect.parameter.null:
                         yield self.case(name, size, orientation)
+
+    def free(self, found: dict[str, Result]) -> dict[int, tuple[Array, Array]]:
+        """By side, 1 for +y: the free unit's pressures from 0 on, and its outline's moves in mm."""
+        outline = found[attrs.evolve(self.case(), outline=True).key()].values * self.enlarged
+        at = np.array(self.pressures_kPa)
+        sides: dict[int, tuple[Array, Array]] = {}
+        for sign in (1, -1):
+            rows = np.flatnonzero((sign * at >= 0) & np.isfinite(outline[0]))
+            rows = rows[np.argsort(sign * at[rows])]
+            side = 1 if outline[0, rows[-1]] >= outline[1, rows[-1]] else -1
+            outward = outline[0 if side > 0 else 1, rows]
+            outward[0] = 0.0
+            if len(rows) > 2 and (np.diff(outward) > 0).all() and side not in sides:
+                sides[side] = at[rows], outward
+        return sides
+
+    def walls(self, found: dict[str, Result]) -> Iterator[tuple[int, float, Run]]:
+        """Side and reach in mm of each wall, and the unit's run against it."""
+        from scipy.interpolate import PchipInterpolator
+
+        for side, (pressure, outward) in self.free(found).items():
+            for reach in REACHES:
+                gap = (1 - reach) * outward[-1]
+                met = float(PchipInterpolator(outward, pressure)(gap))
+                steps = sorted(met + s * (pressure[-1] - met) for s in SHARES)
+                case = self.case(WALL, side * gap)
+                yield side, reach * outward[-1], attrs.evolve(case, pressures_kPa=tuple(steps))
+
+    def sides(self, found: dict[str, Result], base: Array, rows: Sequence[int]) -> dict[int, Side]:
+        """The response to walls by side; `base` (rows, k): all values of the free unit at its pressures."""
+        from scipy.interpolate import CubicSpline
+
+        reached = np.isfinite(base[0])
+        free = CubicSpline(np.array(self.pressures_kPa)[reached], base[:, reached], axis=1)
+        walls: dict[int, list[tuple[float, Array]]] = {}
+        for side, reach, case in self.walls(found):
+            values = found[case.key()].values
+            if not np.isfinite(values).all():
+                why = found[case.key()].why
+                _warn(f"a wall {reach:.3g} mm within reach at {self.scale:g}x is left out: {why}")
+                continue
+            change = self.larger * values - free(case.pressures_kPa)
+            # In the order of shares: the pressures ascend, those below 0 toward rest.
+            change = change[rows][:, :: 1 if case.pressures_kPa[-1] > 0 else -1].T
+            walls.setdefault(side, []).append((reach, change))
+        sides = self.free(found)
+        return {
+            side: Side(*sides[side], [r for r, _ in kept], SHARES, np.array([c for _, c in kept]))
+            for side, kept in walls.items()
+        }
+
+    @property
+    def larger(self) -> Array:
+        """What each row of a result is multiplied by: lengths grow with the unit, an angle has none."""
+        return np.array([1.0, *[self.enlarged] * (3 * len(self.markers))])[:, None]
 
     def responses(self, settings: UnitSettings, found: dict[str, Result]) -> Iterator[UnitResponse]:
         """The response in each orientation."""
@@ -315,9 +448,10 @@ class _Plan:
             missed = ", ".join(f"{p:g}" for p in np.array(self.pressures_kPa)[~reached])
             _warn(f"The unit at {self.scale:g}x does not reach {missed} kPa: {base.why}")
         kept = np.ix_(np.array(rows), np.flatnonzero(reached))
+        walls = self.sides(found, self.larger * base.values, rows) if WALL in settings.effects else {}
         for orientation in self.orientations:
             variants = {}
-            for name in settings.effects:
+            for name in (n for n in settings.effects if n in EFFECTS):
                 sizes, values = [], []
                 for size in EFFECTS[name].sizes:
                     if size == EFFECTS[name].parameter.null:
@@ -326,13 +460,14 @@ class _Plan:
                         result = found[self.case(name, size, orientation).key()]
                     if np.isfinite(result.values[kept]).all():
                         sizes.append(size)
-                        values.append(result.values[kept])
+                        values.append((self.larger * result.values)[kept])
                     else:
                         _warn(f"{name} = {size:g} at {self.scale:g}x is left out: {result.why}")
                 if len(sizes) > 1:
                     variants[name] = Variant(EFFECTS[name].parameter, np.array(sizes), np.array(values))
             at = np.array(self.pressures_kPa)[reached]
-            yield UnitResponse(self.channels, at, base.values[kept], variants, self.scale, orientation)
+            values_ = (self.larger * base.values)[kept]
+            yield UnitResponse(self.channels, at, values_, variants, self.scale, orientation, walls)
 
     def _rows(self) -> list[int]:
         order = [ANGLE, *(f"marker{m.number}_{a}_mm" for m in self.markers for a in AXES)]
@@ -357,7 +492,7 @@ def _found(cases: dict[str, Run], workers: int, cache: Path | None, say: Progres
             write_npz(_path(cache, key), {"values": result.values, "why": np.array(result.why)})
         case = cases[key]
         what = f"{case.effect} = {case.size:g}" if case.effect else "base"
-        say(f"unit at {case.body.unit.scale:g}x, {what}", len(found) / len(cases))
+        say(f"unit, {what}", len(found) / len(cases))
     return found
 
 
@@ -370,7 +505,8 @@ def _solved(missing: dict[str, Run], workers: int, cache: Path | None) -> Iterat
         return
     context = multiprocessing.get_context("spawn")
     with one_thread_each(), ProcessPoolExecutor(workers, context, end_with_parent) as pool:
-        waiting = {pool.submit(run, case, cache): key for key, case in rest_.items()}
+        with ctrl_c_ignored():
+            waiting = {pool.submit(run, case, cache): key for key, case in rest_.items()}
         try:
             for done in as_completed(waiting):
                 yield waiting[done], done.result()
@@ -395,5 +531,5 @@ def _stored(cache: Path | None, key: str, case: Run) -> Result | None:
     kept = read_npz(_path(cache, key))
     if kept is None or not {"values", "why"} <= set(kept):
         return None
-    shape = (1 + 3 * len(case.points), len(case.pressures_kPa))
+    shape = (case.rows, len(case.pressures_kPa))
     return Result(kept["values"], str(kept["why"])) if kept["values"].shape == shape else None

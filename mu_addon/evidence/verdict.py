@@ -15,7 +15,7 @@ from .gain import Gain, gain
 from .next_experiment import Proposal, next_experiment
 from .noise import Source, estimate, span
 from .record import Record, record
-from .selection import Selection, interval, reviewed, select
+from .selection import Selection, interval, one_more, reviewed, select
 from .sensitivity import ABSORBED, SEEN, Sensitivity, at_bounds, best_seen, sensitivities, signatures
 from .simulator import Composite
 
@@ -137,6 +137,9 @@ def diagnose(
         if any(_apart(sources[g], renewed[g]) for g in sources):
             sources, fitter = renewed, Fitter(measured, simulator, renewed)
             chosen = reviewed(fitter, seen, chosen)
+            if chosen.left:
+                seen = at_bounds(fitter, curved, sensitivities(fitter, curved))
+                chosen = one_more(fitter, seen, chosen, progress)
     kind = _kind(fitter, chosen)
     progress("gain")
     gained = gain(fitter, chosen.base, chosen.chosen, [e for e in experiments if e.role == "held_out"])

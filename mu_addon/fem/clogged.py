@@ -79,9 +79,7 @@ class CloggedModel(Model):
             at = self._element_blocks + self._beyond[:, None] * self._pairs + np.arange(self._pairs)
             parts[at.ravel()] += self._lost_blocks.numpy()
             self._block_parts.assign(parts)
-        inputs = [self._block_parts, *self._block_lists, self._blocks]
-        self._launch(kernels.gather_blocks, len(self._blocks), inputs)
-        return np.asarray(self._blocks.numpy().ravel()[self._scalar_map])
+        return self._gathered(u)
 
     def volume_beyond(self, u: Array) -> float:
         """Volume in mm3 that the cavity beyond the clog, the clog and the mirror planes enclose."""

@@ -104,7 +104,7 @@ class _Boundary:
         inner = np.array([tuple(f) in cavity for f in np.sort(faces, axis=1).tolist()])
         own = owner < len(mesh.tets)
         if mesh.order == 2:
-            faces = _with_middles(faces, whole.tets[owner])
+            faces = with_middles(faces, whole.tets[owner])
         self.facets = _facets(faces)
         repeats = len(self.facets) // len(faces)
         self._inner, self._own = np.tile(inner, repeats), np.tile(own, repeats)
@@ -163,7 +163,7 @@ class _Boundary:
         return Crossing(place, walls, (bool(one), bool(other)), len(pairs))
 
 
-def _with_middles(faces: Array, tets: Array) -> Array:
+def with_middles(faces: Array, tets: Array) -> Array:
     """Faces (f, 6) with their mid-edge nodes, of corner faces (f, 3) and their elements (f, 10)."""
     number = np.zeros((4, 4), int)
     for k, (a, b) in enumerate(TET_EDGES):

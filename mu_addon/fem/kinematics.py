@@ -41,7 +41,7 @@ def probe(mesh: Mesh, points: Array, tolerance: float = 1e-6) -> Probe:
         edges = (corners[near, 1:] - corners[near, :1]).transpose(0, 2, 1)
         local = np.linalg.solve(edges, (point - corners[near, 0])[:, :, None])[:, :, 0]
         if mesh.order == 2:
-            local = _invert(mesh.nodes[mesh.tets[near]], point, local)
+            local = invert(mesh.nodes[mesh.tets[near]], np.broadcast_to(point, local.shape), local)
         bary = np.column_stack([1 - local.sum(axis=1), local])
         best = int(np.argmax(bary.min(axis=1)))
         if not bary[best].min() >= -1e-4:
@@ -51,8 +51,11 @@ def probe(mesh: Mesh, points: Array, tolerance: float = 1e-6) -> Probe:
     return Probe(np.array(found), np.array(weights))
 
 
-def _invert(nodes: Array, point: Array, local: Array) -> Array:
-    """Reference coordinates (e, 3) of one point in curved elements with nodes (e, 10, 3)."""
+def invert(nodes: Array, points: Array, local: Array) -> Array:
+    """Reference coordinates (e, 3) of a point (e, 3) in each of e curved elements with nodes (e, 10, 3).
+
+    local: where to begin, changed in place. Newton's method; -1 where the map is singular on its way.
+    """
     for _ in range(8):
         bary = np.column_stack([1 - local.sum(axis=1), local])
         x = np.einsum("en,eni->ei", shape_functions(bary, 2), nodes)
@@ -60,7 +63,7 @@ def _invert(nodes: Array, point: Array, local: Array) -> Array:
         # A point far outside an element may meet a singular map; such an element is not its home.
         good = np.abs(np.linalg.det(jacobian)) > 1e-12
         local[~good] = -1.0
-        step = np.linalg.solve(jacobian[good], (point - x[good])[:, :, None])[:, :, 0]
+        step = np.linalg.solve(jacobian[good], (points - x)[good][:, :, None])[:, :, 0]
         local[good] += np.clip(step, -1, 1)
     return local
 

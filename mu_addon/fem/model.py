@@ -24,6 +24,7 @@ from .materials import Layer, Materials
 
 if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
+    from .obstacle import Obstacle
 
 Array = np.ndarray[Any, Any]
 
@@ -87,10 +88,10 @@ class Model:
     """Total Lagrangian body under follower pressure on its cavity; base fixed, mirror planes kept.
 
     mesh: tetrahedra of order 1 or 2 in mm. held: further supports, (n, 3) bool. load: dead forces on
-    the nodes, (n, 3) in N, or None. mean_dilatation, against locking of nearly incompressible bodies: the
-    part of each bulk modulus above POINTWISE_BULK shear moduli acts on the mean J of an element; every law
-    must then split the volume off. Displacements are (n, 3) in mm, pressure in MPa, energy in mJ (N mm),
-    forces in N. Free unknowns are numbered as in `free`.
+    the nodes, (n, 3) in N, or None. obstacles: rigid bodies it may touch. mean_dilatation, against locking of
+    nearly incompressible bodies: the part of each bulk modulus above POINTWISE_BULK shear moduli acts on the
+    mean J of an element; every law must then split the volume off. Displacements are (n, 3) in mm, pressure
+    in MPa, energy in mJ (N mm), forces in N. Free unknowns are numbered as in `free`.
     """
 
     def __init__(
@@ -109,6 +110,7 @@ class Model:
         # to 436k unknowns a load step is faster with the factor (docs/performance.md).
         self.solver = "factorisation" if device == "cpu" else "conjugate gradients"
         self.load: Array | None = None
+        self.obstacles: tuple[Obstacle, ...] = ()
         self._least_force = 0.0
         reference = reference_gradients(mesh.nodes, mesh.tets)
         self.volumes = reference.volumes.sum(axis=1)
@@ -169,6 +171,7 @@ class Model:
         self._block_lists = self._put(start, int), self._put(index, int)
         self._block_parts = wp.zeros(len(pairs), dtype=mat33, device=self.device)
         self._blocks = wp.empty(len(keys), dtype=mat33, device=self.device)
+        self._block_keys = keys
         block_rows, block_columns = keys % n, keys // n
 
         number = np.full(3 * n, -1)
@@ -297,6 +300,7 @@ class Model:
         work = pressure * self._volume()
         if self.load is not None:
             work += np.einsum("ij,ij->", self.load, u)
+        work -= sum(obstacle.energy_mJ(u) for obstacle in self.obstacles)
         return float(self._energy.numpy().sum() - work)
 
     def _volume(self) -> float:
@@ -328,6 +332,8 @@ class Model:
         inputs = [self._parts, *self._node_lists, self._residual]
         wp.launch(kernels.gather_vectors, len(self.mesh.nodes), inputs, device=self.device)
         residual: Array = self._residual.numpy().copy()
+        for obstacle in self.obstacles:
+            np.add.at(residual, *obstacle.forces(u))
         return residual if self.load is None else residual - self.load
 
     def force_scale(self) -> float:
@@ -346,9 +352,19 @@ class Model:
             inputs = [pressure, self._x, self._faces, *self._face_rule]
             inputs += [self._element_blocks, self._block_parts]
             wp.launch(kernels.pressure_stiffness, len(self.mesh.cavity), inputs, device=self.device)
+        return self._gathered(u)
+
+    def _gathered(self, u: Array) -> Array:
+        """The tangent's values (nnz,) of the blocks' parts, and of contact with obstacles."""
         inputs = [self._block_parts, *self._block_lists, self._blocks]
         self._launch(kernels.gather_blocks, len(self._blocks), inputs)
-        return self._blocks.numpy().ravel()[self._scalar_map]
+        blocks: Array = self._blocks.numpy()
+        for obstacle in self.obstacles:
+            pairs, added = obstacle.blocks(u)
+            # Nodes of a face share an element, so each pair has its block; it is symmetric, as the pair is.
+            keys = pairs.min(axis=1).astype(np.int64) * len(self.mesh.nodes) + pairs.max(axis=1)
+            np.add.at(blocks, np.searchsorted(self._block_keys, keys), added)
+        return np.asarray(blocks.ravel()[self._scalar_map])
 
     def matrix(self, values: Array) -> sparse.csc_matrix:
         """The whole symmetric tangent between free unknowns, of its lower triangle's values."""

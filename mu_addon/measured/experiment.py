@@ -47,14 +47,17 @@ class Experiment:
     specimen: str = ""
     temperature_C: float = math.nan
     source: str = ""
+    run_order: float | None = None
     mode: str | None = None
     axis: str | None = None
     section_mm: tuple[float, float] | None = None
     length_mm: float | None = None
     cells: tuple[int, int, int] | None = None
+    plates: str | None = None
     mass_g: float | None = None
     mass_sd_g: float | None = None
     added_mass_g: float | None = None
+    valve: str | None = None
     chamber_volume_mm3: float | None = None
 
     def __getitem__(self, column: str) -> Array:
@@ -66,6 +69,10 @@ class Experiment:
 
     @property
     def markers(self) -> dict[int, Array]:
-        """Positions (n, 3) in mm of each marker by its number; nan where a marker was not seen."""
+        """Positions (n, 3) in mm of each marker by its number; nan where a coordinate was not seen."""
         numbers = sorted({int(c[6 : c.index("_")]) for c in self.columns if c.startswith("marker")})
-        return {n: np.stack([self.columns[f"marker{n}_{a}_mm"] for a in "xyz"], axis=1) for n in numbers}
+        unseen = np.full(len(self), np.nan)
+        return {
+            n: np.stack([self.columns.get(f"marker{n}_{a}_mm", unseen) for a in "xyz"], axis=1)
+            for n in numbers
+        }

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import InputError
 from .experiment import Array, Experiment
-from .kinds import AXES, KINDS, MODES, ROLES, Kind
+from .kinds import AXES, KINDS, MODES, PLATES, ROLES, VALVES, Kind
 from .table import Remark, read_table
 
 FILE = "experiments.toml"
@@ -30,7 +30,7 @@ PRELOAD = 0.05
 
 @attrs.frozen
 class Measured:
-    """The experiments of a folder in their order, and what is to know about them."""
+    """The experiments of a folder in the order they were made, and what is to know about them."""
 
     folder: Path
     experiments: tuple[Experiment, ...]
@@ -69,7 +69,21 @@ def read_folder(folder: Path) -> Measured:
         _check_apart(found, experiments, at)
         experiments.append(found)
         remarks += told
-    return Measured(Path(folder), tuple(experiments), tuple(remarks))
+    return Measured(Path(folder), _as_run(experiments, path), tuple(remarks))
+
+
+def _as_run(experiments: Sequence[Experiment], path: Path) -> tuple[Experiment, ...]:
+    """Experiments in the order they were made: by run_order where it is given, else as they stand."""
+    without = [e.name for e in experiments if e.run_order is None]
+    if len(without) == len(experiments):
+        return tuple(experiments)
+    if without:
+        raise InputError(
+            f"run_order is given to some experiments, and not to {without[0]!r}",
+            str(path),
+            "give it to all of them, or to none where they stand in the order they were made",
+        )
+    return tuple(sorted(experiments, key=lambda e: e.run_order or 0.0))
 
 
 @attrs.frozen
@@ -103,7 +117,9 @@ def _experiment(entry: dict[str, Any], at: _Place) -> tuple[Experiment, list[Rem
         columns = _strained(columns, fields, kind, path, remarks)
         _check_strain(columns["strain"], table.rows, kind, path, remarks)
         _check_preload(columns, table.rows, path, remarks)
-        _check_spread(columns, table.rows, path)
+    for column in columns:
+        if "_sd_" in column:
+            _check_spread(columns[column], column, table.rows, path)
     if kind.name == "lattice_compression" and fields.get("mass_g") is not None:
         spread = fields.get("mass_sd_g") or MASS_SPREAD * fields["mass_g"]
         columns["mass_g"] = np.full(len(table.rows), fields["mass_g"])
@@ -129,6 +145,8 @@ def _described(entry: dict[str, Any], kind: Kind, at: _Place) -> dict[str, Any]:
         "orientation_deg": _number(entry.get("orientation_deg", 0.0), "orientation_deg", at, -360.0, 360.0),
         "temperature_C": math.nan,
     }
+    if "run_order" in entry:
+        fields["run_order"] = _number(entry["run_order"], "run_order", at, -1e15, 1e15)
     if "temperature_C" in entry:
         fields["temperature_C"] = _number(entry["temperature_C"], "temperature_C", at, -100.0, 300.0)
     for key, most in (("length_mm", 1e4), ("mass_g", 1e6), ("mass_sd_g", 1e6), ("chamber_volume_mm3", 1e9)):
@@ -138,6 +156,9 @@ def _described(entry: dict[str, Any], kind: Kind, at: _Place) -> dict[str, Any]:
         fields["added_mass_g"] = _number(entry["added_mass_g"], "added_mass_g", at, 0.0, 1e6)
     if "mode" in entry:
         fields["mode"] = _choice(entry, "mode", MODES, at)
+    for key, choices in (("plates", PLATES), ("valve", VALVES)):
+        if key in entry:
+            fields[key] = _choice(entry, key, choices, at)
     if "axis" in entry:
         fields["axis"] = _choice(entry, "axis", AXES, at)
     if "section_mm" in entry:
@@ -249,16 +270,15 @@ def _check_preload(columns: dict[str, Array], rows: Array, path: Path, remarks: 
         )
 
 
-def _check_spread(columns: dict[str, Array], rows: Array, path: Path) -> None:
-    """The spread of a record, where it is given, is somewhere and nowhere negative."""
-    spread = columns.get("stress_sd_kPa")
-    if spread is None or (spread.max() > 0 and spread.min() >= 0):
+def _check_spread(spread: Array, column: str, rows: Array, path: Path) -> None:
+    """The spread of a record is somewhere and nowhere negative."""
+    if spread.max() > 0 and spread.min() >= 0:
         return
     row = int(rows[np.argmin(spread)])
     raise InputError(
         "a standard deviation is negative, or none is above 0",
-        f"{path}, row {row}, column stress_sd_kPa",
-        "give the spread of the stress at each strain, or leave the column out",
+        f"{path}, row {row}, column {column}",
+        "give the spread of every reading, or leave the column out",
     )
 
 

@@ -9,6 +9,10 @@ import attrs
 
 MODES = ("uniaxial", "equibiaxial", "pure_shear")
 AXES = ("x", "y", "z")
+# Whether a block's faces stick to the machine's plates.
+PLATES = ("hold", "slide")
+# Whether gauge and unit are shut off from the supply together.
+VALVES = ("open", "shut")
 ROLES = ("fit", "held_out")
 
 # Every quantity is read in one unit, which its column's name ends with; "" has none.
@@ -16,6 +20,7 @@ UNITS = {
     "time": "s",
     "pressure": "kPa",
     "angle": "deg",
+    "angle_sd": "deg",
     "displacement": "mm",
     "force": "N",
     "strain": "",
@@ -30,7 +35,18 @@ MAY_BE_MISSING = ("angle_deg", "voltage_V", "marker")
 
 _MARKER = re.compile(r"marker([1-9]\d*)_([xyz])_mm")
 
-COMMON = ("name", "kind", "file", "role", "scale", "orientation_deg", "specimen", "temperature_C", "source")
+COMMON = (
+    "name",
+    "kind",
+    "file",
+    "role",
+    "run_order",
+    "scale",
+    "orientation_deg",
+    "specimen",
+    "temperature_C",
+    "source",
+)
 
 
 @attrs.frozen
@@ -74,8 +90,9 @@ KINDS = {
     for kind in (
         Kind(
             "unit_pressure",
-            (("pressure_kPa", "angle_deg"), ("pressure_kPa", "marker1_x_mm", "marker1_y_mm", "marker1_z_mm")),
-            may_have_keys=("added_mass_g", "chamber_volume_mm3"),
+            (("pressure_kPa", "angle_deg"), ("pressure_kPa", "marker1_y_mm", "marker1_z_mm")),
+            ("angle_sd_deg",),
+            may_have_keys=("added_mass_g", "chamber_volume_mm3", "valve"),
             marked=True,
         ),
         Kind(
@@ -83,7 +100,7 @@ KINDS = {
             _LOAD,
             ("time_s", "stress_sd_kPa"),
             timed=False,
-            may_have_keys=("section_mm", "length_mm", "cells", "axis", "mass_g", "mass_sd_g"),
+            may_have_keys=("section_mm", "length_mm", "cells", "plates", "axis", "mass_g", "mass_sd_g"),
         ),
         Kind(
             "coupon",

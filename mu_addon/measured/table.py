@@ -133,9 +133,10 @@ def _header(header: Sequence[str], kind: Kind, path: Path, remarks: list[Remark]
     if kind.timed and "time_s" not in names:
         raise InputError("column time_s is missing", _at(path), f"{kind.name} needs the time of every row")
     for number, axes in markers(names).items():
-        if len(axes) < 3:
-            gone = ", ".join(f"marker{number}_{a}_mm" for a in "xyz" if a not in axes)
-            raise InputError(f"marker {number} lacks {gone}", _at(path), "give x, y and z of every marker")
+        # A camera that looks along x does not see it.
+        if not {"y", "z"} <= axes:
+            gone = ", ".join(f"marker{number}_{a}_mm" for a in "yz" if a not in axes)
+            raise InputError(f"marker {number} lacks {gone}", _at(path), "give y and z, and x if measured")
     _check_needs(names, kind, path)
     return kept
 
@@ -144,7 +145,7 @@ def _check_needs(names: Sequence[str], kind: Kind, path: Path) -> None:
     have = set(names)
     if kind.marked and markers(names):
         # Any marker will do.
-        have |= {f"marker1_{a}_mm" for a in "xyz"}
+        have |= {f"marker1_{a}_mm" for a in "yz"}
     if any(have.issuperset(group) for group in kind.needs):
         return
     nearest = max(kind.needs, key=lambda group: len(have & set(group)) / len(group))

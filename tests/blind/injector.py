@@ -1,11 +1,18 @@
-"""A bench that hides what is wrong with it: `python -m tests.blind.injector FOLDER`, orders on stdin.
+"""A bench that hides what is wrong with it: `python -m tests.blind.injector`, an order a line of stdin.
 
-The order is one JSON line. It writes a folder of measured data, prints a commitment (sha256 of the
-answer with a salt), waits for the line `reveal`, and only then prints the answer.
+For each, it writes a folder of measured data, prints a commitment (sha256 of the answer with a salt), waits
+for the line `reveal`, and only then prints the answer and writes what the instruments would have read
+without noise, FOLDER-bare.
+
+An order is JSON; it holds a folder and a seed, and may hold: effect (a name, or several), times (its
+detection limit), values (sizes that are not drawn by what can be seen), unit ("written" or "simulated"),
+noise ("one" slow process beside white noise, "two", or "white"), count, most, dt, rho, level, held_out,
+dead_load, markers.
 """
 
 import hashlib
 import json
+import math
 import secrets
 import sys
 from pathlib import Path
@@ -15,94 +22,118 @@ import numpy as np
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.noise import Source
 from mu_addon.evidence.record import record
-from tests.blind.truth import observe
+from mu_addon.evidence.simulator import Composite
+from tests.blind.truth import UNITS, Simulated, observe
 from tests.evidence import analytic
 
 OUTSIDE = ("resonance", "marker_slip", "stick_slip", "torn_chamber", "camera_distortion")
+# Experiments without which an effect leaves no trace: the sixth is the first at another temperature.
+FEWEST = {"temperature_drift": 6}
+# Size of what is not in any library, and where it ends.
+SIZES = {
+    "resonance": ("resonance.size", 1.0),
+    "marker_slip": ("marker_slip.mm", 30.0),
+    "stick_slip": ("stick_slip.jump_kPa", 12.0),
+    "torn_chamber": ("torn_chamber.share", 1.0),
+    "camera_distortion": ("camera_distortion.per_mm2", 2e-3),
+}
+SHAPES = {
+    "viscoelasticity.time_s": (0.5, 50.0),
+    "rate_independent_hysteresis.threshold_kPa": (0.7, 9.0),
+    "mullins_softening.energy_share": (0.1, 0.6),
+    "resonance.hertz": (0.4, 1.2),
+    "resonance.damping": (0.02, 0.08),
+}
+# What a beam of the unit's resin, the same whatever a gauge of pressure reads, sags by.
+SAG_mm_PER_g = 0.4
 
 
-def bench(rng, count, dt):
-    """Experiments of a bench; order kept, since a specimen remembers."""
-    return analytic.protocols(dt, count)
+def held_out(dt):
+    """Experiments nobody fits: another rate, another orientation, another scale."""
+    middle = analytic.triangle(dt, 9.0, 3, 0.0, 33.0)
+    return [
+        ("later, another rate", *middle, {"role": "held_out"}),
+        ("later, another way up", *middle, {"role": "held_out", "orientation_deg": 270.0}),
+        ("later, larger", *middle, {"role": "held_out", "scale": 1.5, "specimen": "B"}),
+    ]
 
 
 def shape_of(rng, effect, total_s):
     """Parameters of an effect beside its size."""
-    if effect is None or effect in analytic.STATIC:
-        return {}
-    between = {
-        "viscoelasticity.time_s": (0.5, 50.0),
-        "rate_independent_hysteresis.threshold_kPa": (0.7, 9.0),
-        "mullins_softening.energy_share": (0.1, 0.6),
-        "resonance.hertz": (0.4, 1.2),
-        "resonance.damping": (0.02, 0.08),
-    }
     found = {
-        k: float(np.exp(rng.uniform(*np.log(v)))) for k, v in between.items() if k.startswith(effect + ".")
+        k: float(np.exp(rng.uniform(*np.log(v)))) for k, v in SHAPES.items() if k.startswith(effect + ".")
     }
     if effect in ("marker_slip", "torn_chamber"):
         found[f"{effect}.after"] = float(rng.uniform(0.2, 0.8) * total_s)
     return found
 
 
-SIZES = {
-    "resonance": ("resonance.size", 1.0, 0.05, 1.0),
-    "marker_slip": ("marker_slip.mm", 30.0, 0.1, 1.0),
-    "stick_slip": ("stick_slip.jump_kPa", 12.0, 0.5, 0.0),
-    "torn_chamber": ("torn_chamber.share", 1.0, 0.05, 1.0),
-    "camera_distortion": ("camera_distortion.per_mm2", 2e-3, 1e-6, 1.0),
-}
-
-
 def main():
-    folder = Path(sys.argv[1])
-    order = json.loads(sys.stdin.readline())
+    for line in sys.stdin:
+        hide(json.loads(line))
+
+
+def hide(order):
+    """Serve one order."""
+    folder = Path(order["folder"])
     rng = np.random.default_rng(order["seed"])
-    effect, times = order.get("effect"), order.get("times", 4.0)
-    dt = float(np.exp(rng.uniform(np.log(0.05), np.log(0.5))))
+    unit = UNITS[order.get("unit", "written")]()
+    effects = order.get("effect") or []
+    effects = [effects] if isinstance(effects, str) else effects
+    times = order.get("times", 4.0)
+    dt = float(np.exp(rng.uniform(np.log(0.1), np.log(0.5))))
     dt = round(order.get("dt", dt), 3)
     rho = float(rng.uniform(0.5, 0.97))
     rho = order.get("rho", rho)
-    count = int(order.get("count", rng.integers(3, order.get("most", 10) + 1)))
+    fewest = max([3, *(FEWEST.get(e, 3) for e in effects)])
+    count = int(order.get("count", rng.integers(fewest, max(order.get("most", 10), fewest) + 1)))
     level = float(np.exp(rng.uniform(np.log(0.03), np.log(0.2))))
+    level = order.get("level", level)
     slow_share = float(rng.uniform(0.3, 0.9))
-    tests = bench(rng, count, dt)
+    if order.get("noise") == "white":
+        slow_share = 0.0
+    tests = unit.bench(dt, count)
     total = sum(t[-1] - t[0] for _, t, _, _ in tests)
-    noise = {
-        c: (
-            level * (3.0 if c == "angle_deg" else 1.0) * np.sqrt(1 - slow_share),
-            level * (3.0 if c == "angle_deg" else 1.0) * np.sqrt(slow_share),
-            -dt / np.log(rho),
-        )
-        for c in analytic.CHANNELS
-    }
+    noise = {}
+    for c in analytic.CHANNELS:
+        sd = level * (3.0 if c == "angle_deg" else 1.0)
+        noise[c] = (sd * np.sqrt(1 - slow_share), sd * np.sqrt(slow_share), -dt / np.log(rho))
     base = {"modulus_factor": float(rng.uniform(0.9, 1.1))}
     zeros = rng.normal(0.0, 0.5, len(analytic.CHANNELS))
-    answer = {"effect": effect, "times": times, "values": dict(base), "count": count, "dt": dt, "rho": rho}
+    answer = {"effect": effects, "times": times, "count": len(tests), "dt": dt, "rho": rho, "level": level}
     values = base | order.get("values", {})
     # Sizes that were ordered are taken as they are; others are drawn by what can be seen.
-    drawn_ones = [] if "values" in order else [effect] if isinstance(effect, str) else (effect or [])
-    for name in drawn_ones:
-        found = sized(rng, tests, name, times, base, noise, total)
+    for name in effects if "values" not in order else []:
+        found = sized(rng, unit, tests, name, times, base, noise, total)
         if found is None:
             answer["impossible"] = True
             break
         values |= found
     answer["values"] = values
-    truth = observe(tests, values, analytic.STATIC)
-    write(folder, rng, tests, truth, zeros, noise, order)
+    if order.get("held_out"):
+        tests = tests + held_out(dt)
+    truth = observe(tests, values, unit)
+    clock = float(rng.uniform(0.0, 500.0))
+    write(folder, rng, tests, truth, zeros, noise, order, clock)
+    if order.get("dead_load"):
+        add_dead_load(folder, rng, values["modulus_factor"])
     sealed = json.dumps({**answer, "salt": secrets.token_hex(16)}, sort_keys=True)
     print(json.dumps({"commitment": hashlib.sha256(sealed.encode()).hexdigest()}), flush=True)
     if sys.stdin.readline().strip() == "reveal":
+        bare = folder.with_name(folder.name + "-bare")
+        write(bare, rng, tests, truth, zeros, None, order, clock)
         print(sealed, flush=True)
 
 
-def sized(rng, tests, effect, times, base, noise, total):
+def sized(rng, unit, tests, effect, times, base, noise, total):
     """Values of an effect at `times` its detection limit, by the noise that is to come; None if out of reach.
 
     The limit is that of a size whose change, nuisances fitted, is 4 standard deviations long once whitened.
     """
     shape = shape_of(rng, effect, total)
+    if effect == "mesh_error" and isinstance(unit, Simulated):
+        # The mesh settled that it is there, and how much of it; there is nothing to draw.
+        return {}
     # Channels that differ, since repeated ones are left out.
     bare = [
         analytic.experiment(
@@ -110,52 +141,60 @@ def sized(rng, tests, effect, times, base, noise, total):
         )
         for n, t, p, how in tests
     ]
-    model = analytic.simulator(bare)
+    model = judged_unit(unit, bare)
     data = record(bare, model)
     sources = {g: Source(*noise["angle_deg" if "angle" in g else "marker1_y_mm"]) for g in data.groups}
+    sources = {g: Source(s.white, max(s.slow, 1e-3 * s.white), s.time_s) for g, s in sources.items()}
     fitter = Fitter(data, model, sources)
-    plain = long(data, observe(tests, base, analytic.STATIC))
+    plain = long(data, observe(tests, base, unit, 4))
     other = dict(base) | {"modulus_factor": base["modulus_factor"] * 1.001}
-    tangent = fitter.project(long(data, observe(tests, other, analytic.STATIC)) - plain)
+    tangent = fitter.project(long(data, observe(tests, other, unit, 4)) - plain)
     tangent /= np.linalg.norm(tangent)
-
-    def length(size):
-        moved = long(data, observe(tests, base | shape | {key: size}, analytic.STATIC)) - plain
-        j = fitter.project(moved)
-        return float(np.linalg.norm(j - tangent * (tangent @ j)))
 
     sign = 1.0
     if effect in SIZES:
-        key, most, small, _ = SIZES[effect]
+        (key, most), null = SIZES[effect], 0.0
     else:
         e = next(e for e in model.effects if e.name == effect)
         p = e.parameters[0]
-        key = e.keys[0]
-        if p.null == p.low:
-            most = p.high
-        else:
-            sign = float(rng.choice([-1.0, 1.0]))
-            most = p.high if sign > 0 else -p.low
-        small = abs(p.step) * 10.0
+        key, null = e.keys[0], p.null
+        sign = float(rng.choice([s for s, bound in ((-1.0, p.low), (1.0, p.high)) if bound != null]))
+        most = abs((p.high if sign > 0 else p.low) - null)
+
+    def length(size):
+        values = base | shape | {key: null + sign * size}
+        j = fitter.project(long(data, observe(tests, values, unit, 4)) - plain)
+        return float(np.linalg.norm(j - tangent * (tangent @ j)))
+
     wanted = 4.0 * times
-    size = small
+    # What touches only at a large size shows nothing below it, and little again where it always touches.
+    low, high = 0.0, math.inf
+    for size in most * np.unique([*np.geomspace(1e-5, 1.0, 11), *np.linspace(0.1, 1.0, 10)]):
+        now = length(size)
+        if now >= wanted:
+            high = float(size)
+            break
+        low = float(size)
+    if math.isinf(high):
+        return None
+    size = high
     for _ in range(30):
-        now = length(sign * size)
-        if now <= 1e-9:
-            return None
-        new = (
-            size * wanted / now if effect != "stick_slip" else size * np.clip((wanted / now) ** 0.5, 0.5, 2.0)
-        )
-        new = min(max(new, size / 20.0), size * 20.0)
-        if new >= most:
-            if size >= most:
-                return None
-            new = most
-        done = abs(now / wanted - 1.0) < 0.03
-        size = new
-        if done:
-            return shape | {key: sign * size}
-    return shape | {key: sign * size} if abs(length(sign * size) / wanted - 1.0) < 0.3 else None
+        if abs(now / wanted - 1.0) < 0.03:
+            return shape | {key: null + sign * size}
+        # In proportion where that lies between the bounds, their middle otherwise.
+        guess = size * wanted / now if now > 0 else 0.0
+        size = guess if low < guess < high else 0.5 * (low + high)
+        now = length(size)
+        low, high = (size, high) if now < wanted else (low, size)
+    return shape | {key: null + sign * size} if abs(now / wanted - 1.0) < 0.3 else None
+
+
+def judged_unit(unit, experiments):
+    """The judge's simulator of unit_pressure experiments made with a unit."""
+    from mu_addon.evidence.prediction.unit import UnitPressure
+
+    kinds = sorted({(e.scale, e.orientation_deg) for e in experiments if e.kind == "unit_pressure"})
+    return Composite({"unit_pressure": UnitPressure(unit.responses(kinds), experiments)})
 
 
 def long(data, observed):
@@ -166,23 +205,26 @@ def long(data, observed):
     return found
 
 
-def write(folder, rng, tests, truth, zeros, noise, order):
-    """The folder of measured data, with metadata that mean nothing among those that do."""
+def write(folder, rng, tests, truth, zeros, noise, order, clock):
+    """The folder of measured data, with metadata that mean nothing among those that do; noise: or None."""
     folder.mkdir(parents=True, exist_ok=True)
     lines = []
-    shift = float(rng.uniform(0.0, 500.0))
+    many = order.get("noise") == "two"
     for k, ((name, time, pressure, how), y) in enumerate(zip(tests, truth, strict=True)):
-        columns = [time + shift, pressure]
-        head = ["time_s", "pressure_kPa"]
+        columns, head = [time + clock, pressure], ["time_s", "pressure_kPa"]
+
+        def read(values, c, time=time):
+            return values if noise is None else values + drawn(rng, time, *noise[c], many=many)
+
         for c, v, zero in zip(analytic.CHANNELS, y, zeros, strict=True):
             if order.get("markers", True) or c == "angle_deg":
                 head.append(c)
-                columns.append(v + zero + drawn(rng, time, *noise[c]))
+                columns.append(read(v + zero, c))
         for m in (1, 2, 3):
             if f"marker{m}_y_mm" in head:
                 # Out of the plane nothing moves; the camera sees noise there too.
                 head.append(f"marker{m}_x_mm")
-                columns.append(drawn(rng, time, *noise["marker1_y_mm"]))
+                columns.append(read(np.zeros(len(time)), "marker1_y_mm"))
         text = ["# bench record", ",".join(head)]
         text += [",".join(f"{v:.6f}" for v in row) for row in np.stack(columns, axis=1)]
         (folder / f"run{k}.csv").write_text("\n".join(text) + "\n")
@@ -191,9 +233,10 @@ def write(folder, rng, tests, truth, zeros, noise, order):
             f'name = "{name}"',
             'kind = "unit_pressure"',
             f'file = "run{k}.csv"',
-            'role = "fit"',
+            f'role = "{how.get("role", "fit")}"',
+            f"scale = {how.get('scale', 1.0)}",
             f"orientation_deg = {how.get('orientation_deg', 0.0)}",
-            'specimen = "A"',
+            f'specimen = "{how.get("specimen", "A")}"',
             f"temperature_C = {how.get('temperature_C', 23.0)}",
             f'source = "{rng.choice(["bench 1", "bench 2", "suspected leak", "new line, lag?"])}"',
             "",
@@ -201,15 +244,44 @@ def write(folder, rng, tests, truth, zeros, noise, order):
     (folder / "experiments.toml").write_text("\n".join(lines))
 
 
-def drawn(rng, time, white, slow, time_s):
-    """Slow and white noise: an AR(1) series run in from far before the record."""
+def add_dead_load(folder, rng, modulus_factor):
+    """Two more experiments: a beam of the same resin under known masses."""
+    mass = np.arange(0.0, 110.0, 10.0)
+    lines = []
+    for k in range(2):
+        sag = SAG_mm_PER_g * mass / modulus_factor + rng.normal(0.0, 0.05, len(mass))
+        rows = "\n".join(f"{m:.3f},{s:.6f}" for m, s in zip(mass, sag, strict=True))
+        (folder / f"beam{k}.csv").write_text(f"added_mass_g,tip_deflection_mm\n{rows}\n")
+        lines += [
+            "",
+            "[[experiment]]",
+            f'name = "dead load {k}"',
+            'kind = "beam_deadweight"',
+            f'file = "beam{k}.csv"',
+            'role = "fit"',
+            "section_mm = [10.0, 10.0]",
+            "length_mm = 60.0",
+        ]
+    with (folder / "experiments.toml").open("a") as stream:
+        stream.write("\n".join(lines) + "\n")
+
+
+def drawn(rng, time, white, slow, time_s, many=False):
+    """Slow and white noise; many: half of the slow part wanders eight times as slowly."""
+    found = rng.normal(0.0, white, len(time))
+    for share, longer in ((0.5, 1.0), (0.5, 8.0)) if many else ((1.0, 1.0),):
+        found = found + np.sqrt(share) * slow * wandering(rng, time, longer * time_s)
+    return found
+
+
+def wandering(rng, time, time_s):
+    """An AR(1) series of unit variance, run in from far before the record."""
     from scipy.signal import lfilter
 
     rho = float(np.exp(-(time[1] - time[0]) / time_s))
     before = int(20.0 / max(1.0 - rho, 1e-3))
     shocks = rng.normal(size=before + len(time)) * np.sqrt(1.0 - rho * rho)
-    series = lfilter([1.0], [1.0, -rho], shocks)[before:]
-    return slow * series + rng.normal(0.0, white, len(time))
+    return lfilter([1.0], [1.0, -rho], shocks)[before:]
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """The judge's side: orders a hidden bench from another process, judges its folder, then has it revealed."""
 
+import functools
 import hashlib
 import json
 import subprocess
@@ -8,56 +9,166 @@ import tempfile
 import time
 from pathlib import Path
 
+import attrs
+
+from mu_addon.evidence.fit import Fitter
+from mu_addon.evidence.prediction.unit import UnitPressure
+from mu_addon.evidence.record import record
+from mu_addon.evidence.selection import TOLD_APART
+from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
 from mu_addon.measured import read_folder
-from tests.evidence import analytic
+from tests.blind import unit_runs
+from tests.blind.truth import UNITS
+from tests.evidence import stand_ins
 
 ROOT = Path(__file__).parents[2]
+# What makes responses, which the battery has in a table, and what is made of a verdict.
+FEM = ("unit_fem", "unit_effects", "lattice_fem", "extended", "markers")
+CHANGES = ("later", "shuffled", "doubled marker", "every second sample", "no marker out of the plane")
+
+
+def fingerprint():
+    """Hash of the code that verdicts of the battery come from."""
+    engine = ROOT / "mu_addon" / "evidence"
+    code = [p for p in engine.glob("*.py") if p.stem not in FEM]
+    code += [engine / "prediction" / "unit.py", ROOT / "tests" / "evidence" / "analytic.py", unit_runs.TABLE]
+    code += [p for p in (ROOT / "tests" / "blind").glob("*.py") if p.stem != "test_blind"]
+    return hashlib.sha256(b"".join(c.read_bytes() for c in sorted(code))).hexdigest()[:12]
+
+
+@functools.cache
+def injector():
+    """The other process; it serves this one until this one ends."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "tests.blind.injector"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+    )
+
+
+def said(bench, words):
+    """The line that the injector answers a line with."""
+    bench.stdin.write((words if isinstance(words, str) else json.dumps(words)) + "\n")
+    bench.stdin.flush()
+    line = bench.stdout.readline()
+    if not line:
+        injector.cache_clear()
+        raise RuntimeError("the injector ended before its time")
+    return line
 
 
 def hidden(order, judge):
-    """Verdict of `judge(folder)` on an ordered bench, and the answer, whose commitment is checked."""
+    """What `judge(folder)` says of an ordered bench, the answer, and `told_apart`.
+
+    The commitment made before the verdict is checked.
+    """
+    bench = injector()
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place) / "measured"
-        process = subprocess.Popen(
-            [sys.executable, "-m", "tests.blind.injector", str(folder)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            cwd=ROOT,
-        )
-        assert process.stdin is not None
-        assert process.stdout is not None
-        process.stdin.write(json.dumps(order) + "\n")
-        process.stdin.flush()
-        commitment = json.loads(process.stdout.readline())["commitment"]
+        commitment = json.loads(said(bench, {**order, "folder": str(folder)}))["commitment"]
         verdict = judge(folder)
-        sealed, _ = process.communicate("reveal\n")
-    sealed = sealed.strip()
-    assert hashlib.sha256(sealed.encode()).hexdigest() == commitment
-    return verdict, json.loads(sealed)
+        sealed = said(bench, "reveal").strip()
+        assert hashlib.sha256(sealed.encode()).hexdigest() == commitment
+        answer = json.loads(sealed)
+        nearest = told_apart(order, Path(place) / "measured-bare", verdict, answer)
+    return verdict, answer, nearest
 
 
-def verdict_of(folder):
-    """The engine's verdict on a folder, with the analytic unit as its simulator."""
+def simulator_of(order, experiments):
+    """The judge's simulator: the unit as it is known to designers, and a beam where one was loaded."""
+    unit = UNITS[order.get("unit", "written")]()
+    bent = [e for e in experiments if e.kind == "unit_pressure"]
+    kinds = sorted({(e.scale, e.orientation_deg) for e in bent})
+    known = {"unit_pressure": UnitPressure(unit.responses(kinds), experiments)}
+    if len(bent) < len(experiments):
+        known["beam_deadweight"] = stand_ins.DeadLoad()
+    return Composite(known)
+
+
+def verdict_of(folder, order, change=None):
+    """The engine's verdict on a folder; change: of what must not matter to it."""
     experiments = read_folder(folder).experiments
-    return diagnose(experiments, analytic.simulator(experiments))
+    if change:
+        experiments = changed(experiments, change)
+    return diagnose(experiments, simulator_of(order, experiments))
+
+
+def told_apart(order, bare, verdict, answer):
+    """The explanation that comes next to the truth in data without noise: chi squared left, and its names.
+
+    By the noise of the verdict; of single effects for one true effect, and of any for a cause that the
+    library lacks. None where the verdict was right anyway, or none could be expected.
+    """
+    truth = set(answer["effect"])
+    if not truth or len(truth) > 1 or answer["times"] < 4 or answer.get("impossible"):
+        return None
+    if verdict.kind == "named" and set(verdict.names) == truth:
+        return None
+    experiments = [e for e in read_folder(bare).experiments if e.role == "fit"]
+    simulator = simulator_of(order, experiments)
+    data = record(experiments, simulator)
+    if any(g not in verdict.sources for g in data.groups):
+        return None
+    fitter = Fitter(data, simulator, verdict.sources)
+    base = fitter.fit()
+    least = (base.chi2, "nothing")
+    for e in simulator.effects:
+        if e.name not in truth:
+            fit = fitter.best([e], [{**base.values, **s} for s in e.starts()])
+            least = min(least, (fit.chi2, e.name))
+    return least
+
+
+def changed(experiments, change):
+    """The same experiments, told otherwise."""
+    if change == "shuffled":
+        # For effects that specimens do not remember; else the order is part of what was done to them.
+        return tuple(experiments[::-1])
+    found = []
+    for e in experiments:
+        columns, rows = dict(e.columns), e.rows
+        if change == "later":
+            columns["time_s"] = columns["time_s"] + 4321.0
+        if change == "doubled marker":
+            columns |= {f"marker4_{a}_mm": columns[f"marker1_{a}_mm"] for a in "yz"}
+        if change == "no marker out of the plane":
+            columns = {k: v for k, v in columns.items() if not k.endswith("_x_mm")}
+        if change == "every second sample":
+            columns, rows = {k: v[::2] for k, v in columns.items()}, rows[::2]
+        found.append(attrs.evolve(e, columns=columns, rows=rows))
+    return tuple(found)
 
 
 def judged(order):
     """One order as a row of plain data."""
     start = time.perf_counter()
-    verdict, answer = hidden(order, verdict_of)
-    effect, chosen = answer["effect"], verdict.selection.chosen
-    truth = {effect} if isinstance(effect, str) else set(effect or [])
+    again = []
+
+    def judge(folder):
+        verdict = verdict_of(folder, order)
+        for change in order.get("changes", ()):
+            other = verdict_of(folder, order, change)
+            again.append((change, other.kind, sorted(other.names), sorted(other.ambiguity)))
+        return verdict
+
+    verdict, answer, nearest = hidden(order, judge)
+    chosen = verdict.selection.chosen
+    truth = set(answer["effect"])
     inside = []
     for key, value in answer["values"].items():
         if key in verdict.intervals and key.split(".")[0] in truth:
             low, high = verdict.intervals[key]
             inside.append((key, value, chosen.values[key], (low, high), low <= value <= high))
+    held = verdict.gain.held_out
     return {
-        **{k: answer.get(k) for k in ("effect", "times", "count", "dt", "rho", "impossible")},
+        **{k: answer.get(k) for k in ("effect", "times", "count", "dt", "rho", "level", "impossible")},
+        "part": order.get("part", ""),
+        "unit": order.get("unit", "written"),
         "seed": order["seed"],
+        "code": fingerprint(),
         "verdict": verdict.kind,
         "names": list(verdict.names),
         "ambiguity": sorted(verdict.ambiguity),
@@ -67,20 +178,38 @@ def judged(order):
         "chosen": list(chosen.names),
         "p_best": verdict.selection.p_best,
         "parameters": inside,
+        "nearest": nearest,
+        "gain": held.as_json() if held else None,
+        "same": [(c, (k, n, a) == (verdict.kind, sorted(verdict.names), sorted(verdict.ambiguity)), k, n, a)
+                 for c, k, n, a in again],
         "seconds": time.perf_counter() - start,
-        "outcome": outcome(truth, verdict),
-    }
+        "outcome": outcome(truth, verdict, {"mesh_error"} if order.get("unit") == "simulated" else set()),
+    }  # fmt: skip
 
 
-def outcome(truth, verdict):
-    """exact, in_set, partly, missed, wrong (named and the truth is not among what it may be), or clean."""
-    names = set(verdict.names)
+IN_SET = ("exact", "exact_with_rivals", "in_set")
+# A rival whose chi squared, without noise, is less than this beats the truth's by `TOLD_APART` in fewer than
+# nine sets of ten, whoever judges: the difference is normal of variance four times its mean.
+TELLABLE = (1.28 + (1.28**2 + TOLD_APART) ** 0.5) ** 2
+
+
+def outcome(truth, verdict, allowed=frozenset()):
+    """What a verdict is worth beside the truth; allowed: what is true of every set beside it.
+
+    clean, or false: a name, or several to choose from, for nothing. exact; exact_with_rivals: leads a set of
+    rivals; in_set; partly: named, but not all; wrong: named with confidence, and not true; wrong_set: several
+    to choose from, not the truth; else the verdict's own kind.
+    """
+    names, kind = set(verdict.names), verdict.kind
+    more = names - truth - allowed
     if not truth:
-        return "false_name" if names else "clean"
-    if names == truth and verdict.kind == "named":
-        return "exact"
-    if truth <= verdict.ambiguity:
-        return "exact_with_rivals" if names == truth else "in_set"
-    if not names:
-        return "missed"
-    return "partly" if names < truth else "wrong"
+        if kind in ("none", "unidentifiable", "unexplained"):
+            return "clean" if kind == "none" else kind
+        return ("false" if kind == "named" else "false_set") if more else "clean"
+    if kind not in ("named", "ambiguous"):
+        return kind
+    if truth <= names and not more:
+        return "exact" if kind == "named" else "exact_with_rivals"
+    if kind == "named":
+        return "wrong" if more else "partly"
+    return "in_set" if truth <= verdict.ambiguity else "wrong_set"

@@ -141,7 +141,8 @@ def test_another_scaling_can_be_given():
         def mass(self, scale, offset_mm):
             return 1.0
 
-    found = LatticeStress(scaling=Stretched()).predict(block(2.0), {"overcure.offset_mm": 0.2})[0]
+    e = block(2.0)
+    found = LatticeStress(scalings={e.name: Stretched()}).predict(e, {"overcure.offset_mm": 0.2})[0]
     assert found[-1] / 0.4 == pytest.approx(30.0 * 1.1**2)
 
 
@@ -278,7 +279,7 @@ def test_the_papers_moduli_by_the_computed_cell():
     """The same verdict as by the power law, and the offset that the homogenization fits by itself."""
     experiments = read_folder(EXAMPLES / "paper-moduli").experiments
     cell = computed()
-    simulators = bench_simulators(experiments, cell)
+    simulators = bench_simulators(experiments, {e.name: cell for e in experiments})
     (overcure,) = (e for e in simulators["lattice_compression"].effects if e.name == "overcure")
     # 0.75x was computed up to there.
     assert overcure.parameters[0].high == pytest.approx(0.15)

@@ -160,7 +160,7 @@ def test_what_was_run_is_found_again(responses, cache, monkeypatch):
     path.write_bytes(path.read_bytes()[:-40])
     one = unit_responses(UNIT, [bench()], QUICK, cache, lambda stage, share: told.append((stage, share)))
     np.testing.assert_array_equal(one[0].values, responses[0].values)
-    assert [t for t in told if t[0].startswith("unit")] == [("unit at 1x, base", 1.0)]
+    assert [t for t in told if t[0].startswith("unit")] == [("unit, base", 1.0)]
     assert any("marker 1 at 1x lies 0.00 mm" in stage for stage, _ in told)
 
 

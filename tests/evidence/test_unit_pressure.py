@@ -40,6 +40,25 @@ def test_scaled_moduli_are_the_pressure_scaled():
     np.testing.assert_allclose(softer, MODEL.predict(ONE, {"pressure_gain.gain": -0.2}), atol=1e-12)
 
 
+def test_a_softer_unit_is_bent_more_by_its_weight():
+    """Equilibrium knows pressure and weight over modulus alone."""
+    softer = MODEL.predict(ONE, {"modulus_factor": 0.8, "gravity.density_kg_m3": 900.0})
+    same = blank(T, P / 0.8, orientation_deg=90.0)
+    np.testing.assert_allclose(
+        softer, MODEL.predict(same, {"gravity.density_kg_m3": 900.0 / 0.8}), atol=1e-12
+    )
+
+
+def test_behind_a_shut_valve_the_gauge_sees_what_leaks():
+    """Nothing flows between gauge and chambers, so neither the line's share nor its lag is lost."""
+    values = {"leak.conductance_ratio": 0.3, "line_lag.time_s": 0.5}
+    shut = blank(T, P, orientation_deg=90.0, valve="shut")
+    np.testing.assert_array_equal(MODEL.predict(shut, values), MODEL.predict(ONE, {}))
+    opened = blank(T, P, orientation_deg=90.0, valve="open")
+    np.testing.assert_array_equal(MODEL.predict(opened, values), MODEL.predict(ONE, values))
+    assert np.abs(MODEL.predict(ONE, values) - MODEL.predict(ONE, {})).max() > 1.0
+
+
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.01, 20.0), st.floats(0.02, 0.5))
 # Steps that differ by less than a thousandth.

@@ -13,6 +13,7 @@ from mu_addon.fem.laws import (
     Foam,
     Friction,
     Guccione,
+    Layered,
     MooneyRivlin,
     NeoHooke,
     Ogden,
@@ -39,11 +40,12 @@ ROWS = {
     Cubic: Cubic.parameters(3.0, 0.25, 0.4, FIBRE, [0, 1, 1])[0],
     CubicShear: np.array([0.7]),
     DiagonalStretch: np.array([0.5]),
+    Layered: Layered.parameters(0.7, 0.2, FIBRE)[0],
     Prony: np.array([0.3, -0.02, 0.004, 5.0, 0.5, 1.0, 0.3, 10.0, 0.0, 1.0]),
     OgdenRoxburgh: np.array([0.3, -0.02, 0.004, 5.0, 1.5, 0.05, 0.1]),
     Friction: np.array([0.4, 0.1]),
 }
-ANISOTROPIC = [Guccione, TransverselyIsotropic, Cubic, CubicShear]
+ANISOTROPIC = [Guccione, TransverselyIsotropic, Cubic, CubicShear, Layered]
 ISOTROPIC = [law for law in ROWS if law not in ANISOTROPIC]
 LAWS = pytest.mark.parametrize("law", ROWS, ids=lambda law: law.__name__)
 rotations = st.integers(0, 2**32 - 1).map(
@@ -103,6 +105,24 @@ def test_a_body_turned_before_loading_makes_no_difference_where_the_law_is_isotr
     Q = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))[0]
     F, row = gradients(), row_of(law, remembered=False)
     np.testing.assert_allclose(evaluate(law, F @ Q.T, row)[1], evaluate(law, F, row)[1] @ Q.T, atol=1e-11)
+
+
+def test_layers_resist_stretch_of_any_size_either_way():
+    """A stretch l along the normal costs across (l^2 + 1/l^2 - 2)/8, one in the plane in_plane times that."""
+    n = np.array(FIBRE) / np.linalg.norm(FIBRE)
+    along = np.cross(n, [0, 0, 1]) / np.linalg.norm(np.cross(n, [0, 0, 1]))
+    for direction, k in ((n, 0.2), (along, 0.7)):
+        for stretch in (0.3, 0.99, 1.01, 2.5):
+            F = np.eye(3) + (stretch - 1) * np.outer(direction, direction)
+            W, P, _ = evaluate(Layered, F[None], ROWS[Layered])
+            assert W[0] == pytest.approx(k * (stretch**2 + stretch**-2 - 2) / 8, rel=1e-9)
+            assert P[0] @ direction @ direction == pytest.approx(k * (stretch - stretch**-3) / 4, rel=1e-9)
+    # Layers that are as stiff across as along are isotropic.
+    row = Layered.parameters(0.5, 0.5, FIBRE)[0]
+    Q = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))[0]
+    F = gradients()
+    turned = evaluate(Layered, F @ Q.T, row)[1]
+    np.testing.assert_allclose(turned, evaluate(Layered, F, row)[1] @ Q.T, atol=1e-11)
 
 
 def isotropic_stiffness(mu, kappa):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from ...measured import Experiment
 from ..simulator import Simulator
@@ -10,17 +11,17 @@ from . import beam, coupon, hold, lattice, waveguide
 
 
 def bench_simulators(
-    experiments: Sequence[Experiment], scaling: lattice.Scaling | None = None
+    experiments: Sequence[Experiment], scalings: Mapping[str, lattice.Scaling] = MappingProxyType({})
 ) -> dict[str, Simulator]:
     """Simulators of the kinds among the experiments, by kind; of a unit under pressure there is none here.
 
-    scaling: of the printed lattice, a power law of slender struts where none is given.
+    scalings: of printed lattices, by experiment; a power law of slender struts where none is given.
     """
     every: dict[str, Simulator] = {
         beam.KIND: beam.BeamSag(),
         coupon.KIND: coupon.CouponStress(experiments),
         hold.KIND: hold.ChamberPressure(experiments),
-        lattice.KIND: lattice.LatticeStress(experiments, scaling),
+        lattice.KIND: lattice.LatticeStress(experiments, scalings),
         waveguide.KIND: waveguide.WaveguideVoltage(),
     }
     kinds = {e.kind for e in experiments}

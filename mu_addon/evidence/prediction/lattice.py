@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import attrs
@@ -116,20 +117,30 @@ class Struts:
         return math.inf
 
 
+SLENDER = Struts()
+
+
 @attrs.frozen
 class ComputedCell:
     """Stiffness and mass of a lattice's own cell, from virtual tests of it at several print offsets.
 
     A thin skin is, to first order of its depth, as good as its excess modulus times its depth of more resin
-    on the surface, so that it stiffens by the slope of the offset's response.
+    on the surface, so that it stiffens by the slope of the offset's response. reference: the block whose
+    modulus as drawn stiffness is told against, where it is not this one (another count of cells, say).
+    printed_mm, printed_excess_mm: offset and skin that the lattice has before any effect.
     """
 
     response: OffsetResponse
+    reference: OffsetResponse | None = None
+    printed_mm: float = 0.0
+    printed_excess_mm: float = 0.0
 
     def stiffness(self, scale: float, offset_mm: float, excess_mm: float) -> float:
-        """Modulus over that as drawn; raises InputError beyond the offsets that were computed."""
+        """Modulus over the reference's as drawn; raises InputError beyond the offsets that were computed."""
         modulus = self.response.modulus_MPa
-        found = float(modulus(scale, offset_mm, 1.0) / modulus(scale, 0.0, 1.0))
+        drawn = (self.reference or self.response).modulus_MPa
+        offset_mm, excess_mm = offset_mm + self.printed_mm, excess_mm + self.printed_excess_mm
+        found = float(modulus(scale, offset_mm, 1.0) / drawn(scale, 0.0, 1.0))
         if not excess_mm:
             return found
         low, high = (bound * scale for bound in self.response.range_mm)
@@ -141,11 +152,11 @@ class ComputedCell:
     def mass(self, scale: float, offset_mm: float) -> float:
         """Mass over that as drawn; raises InputError beyond the offsets that were computed."""
         density = self.response.relative_density
-        return float(density(scale, offset_mm) / density(scale, 0.0))
+        return float(density(scale, offset_mm + self.printed_mm) / density(1.0, 0.0))
 
     def largest_offset_mm(self, scale: float) -> float:
         """The last offset that was computed, enlarged as the lattice."""
-        return self.response.range_mm[1] * scale
+        return self.response.range_mm[1] * scale - self.printed_mm
 
 
 def _linear(strain: Array) -> Array:
@@ -157,8 +168,8 @@ class LatticeStress:
 
     A lattice scaled as a whole has no length of its own: as drawn, its modulus does not depend on scale.
     curve: stress (n,) over modulus at strain (n,), compression positive, of slope 1 at 0. Experiments, in the
-    order they were run, tell what each specimen went through. The mass needs columns mass_g and mass_sd_g,
-    and section_mm and length_mm.
+    order they were run, tell what each specimen went through. scalings: by experiment, slender struts where
+    one has none. The mass needs columns mass_g and mass_sd_g, and section_mm and length_mm.
     """
 
     nuisances = (MODULUS, DENSITY)
@@ -166,15 +177,23 @@ class LatticeStress:
     def __init__(
         self,
         experiments: Sequence[Experiment] = (),
-        scaling: Scaling | None = None,
+        scalings: Mapping[str, Scaling] = MappingProxyType({}),
         curve: Callable[[Array], Array] = _linear,
     ) -> None:
         self._pasts = pasts(experiments, KIND)
-        self._scaling = scaling or Struts()
-        smallest = min((e.scale for e in experiments if e.kind == KIND), default=1.0)
-        most = self._scaling.largest_offset_mm(smallest)
+        self.scalings = scalings
+        most = min(
+            (self._scaling(e).largest_offset_mm(e.scale) for e in experiments if e.kind == KIND),
+            default=math.inf,
+        )
         self.effects = tuple(_within(e, most) if e.name == "overcure" else e for e in EFFECTS)
         self._curve = curve
+
+    @property
+    def computed(self) -> OffsetResponse | None:
+        """The response of the block whose modulus as drawn is fitted; None where it is of slender struts."""
+        found = [s for s in self.scalings.values() if isinstance(s, ComputedCell)]
+        return (found[0].reference or found[0].response) if found else None
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
         """The nominal stress, and the mass where it is known."""
@@ -186,7 +205,8 @@ class LatticeStress:
         offset = values.get("overcure.offset_mm", 0.0)
         excess = values.get("skin_cure.excess_mm", 0.0)
         modulus = values.get(MODULUS.name, MODULUS.null)
-        modulus *= self._scaling.stiffness(experiment.scale, offset, excess)
+        scaling = self._scaling(experiment)
+        modulus *= scaling.stiffness(experiment.scale, offset, excess)
         closing = values.get("strain_stiffening.closing", 0.0)
 
         def law(strain: Array) -> Array:
@@ -197,9 +217,12 @@ class LatticeStress:
         found = [recorded(experiment, law, values, self._pasts.get(experiment.name, NEW))]
         if "mass_g" in self.channels(experiment):
             mass = values.get(DENSITY.name, DENSITY.null) * (_volume_cm3(experiment) or 0.0)
-            mass *= self._scaling.mass(experiment.scale, offset)
+            mass *= scaling.mass(experiment.scale, offset)
             found.append(np.full(len(experiment), mass))
         return np.stack(found)
+
+    def _scaling(self, experiment: Experiment) -> Scaling:
+        return self.scalings.get(experiment.name, SLENDER)
 
 
 def _within(effect: Effect, most: float) -> Effect:

@@ -13,6 +13,9 @@ import numpy as np
 from ...errors import InputError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
+from .wall import NAME as CONTACT
+from .wall import Side
+from .wall import effect as wall_effect
 
 Array = np.ndarray[Any, Any]
 
@@ -20,6 +23,8 @@ KIND = "unit_pressure"
 REFERENCE_C = 23.0
 # Smaller reversals are noise of the gauge.
 DEADBAND_kPa = 0.2
+# Times the last pressure computed, up to which the response is believed along its end's slope.
+BEYOND = 1.25
 
 
 def _float64(values: Any) -> Array:
@@ -51,7 +56,8 @@ class UnitResponse:
     """Quasi-static response of the unit: values (c, k) of channels at pressures (k,) in kPa ascending.
 
     channels: columns as measured (angle_deg, marker1_y_mm, ...). variants: by the name of their effect.
-    Interpolated by cubic splines, and along their end slopes beyond the last pressures.
+    walls: by the side of the unit they stand on, 1 for +y and -1 for -y. Interpolated by cubic splines, and
+    along their end slopes beyond the last pressures.
     """
 
     channels: tuple[str, ...]
@@ -60,6 +66,7 @@ class UnitResponse:
     variants: Mapping[str, Variant] = attrs.field(factory=dict)
     scale: float = 1.0
     orientation_deg: float = 0.0
+    walls: Mapping[int, Side] = attrs.field(factory=dict)
     _splines: Mapping[str, Any] = attrs.field(init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
@@ -87,7 +94,7 @@ class UnitResponse:
 
         c = self._splines[""]
         for name, size in sizes.items():
-            if size != self.variants[name].parameter.null:
+            if name in self.variants and size != self.variants[name].parameter.null:
                 c = c + self._splines[name](size)
         curve = PPoly.construct_fast(c, self.pressures_kPa, extrapolate=True, axis=0)
         low, high = self.pressures_kPa[0], self.pressures_kPa[-1]
@@ -97,7 +104,8 @@ class UnitResponse:
             ends = curve(np.array([low, high]), 1).T
             beyond = pressure_kPa - inside
             found = found + np.where(beyond < 0, ends[:, :1], ends[:, 1:]) * beyond
-        return found
+        side = self.walls.get(int(np.sign(sizes.get(CONTACT, 0.0))))
+        return found if side is None else found + side.change(pressure_kPa, abs(sizes[CONTACT]))
 
 
 @attrs.frozen
@@ -209,7 +217,8 @@ TIMED = (
 class UnitPressure:
     """Predicts unit_pressure experiments from responses of the unit, one a scale and orientation.
 
-    The gauge's reading becomes the pressure in the chambers (offset, gain, leak, lag), that becomes the
+    The gauge's reading becomes the pressure in the chambers (offset, gain, leak, lag; the last two where the
+    valve behind the gauge is open), that becomes the
     pressure at which the unmended unit would stand where the unit stands now (all moduli scaled alike are
     the pressure scaled inversely, at rest exactly and for moduli that relax alike to first order of the
     hereditary integral), and that is looked up in the response. Each record starts in equilibrium.
@@ -221,13 +230,36 @@ class UnitPressure:
         self._responses = tuple(responses)
         self._past = histories(experiments)
         self.channels_known = self._responses[0].channels
-        self.nuisances = nuisances(self.channels_known)
+        self.nuisances = self._bounded(nuisances(self.channels_known), experiments)
         static: dict[str, Effect] = {}
         for r in self._responses:
             for name, v in r.variants.items():
                 static.setdefault(name, Effect(name, (v.parameter,), (KIND,)))
+        walls = [wall for r in self._responses for wall in r.walls.items()]
+        if walls:
+            static[CONTACT] = wall_effect(walls, KIND)
         self.effects = (*TIMED, *static.values())
+        self._sizes = {e.name: e.keys[0] for e in static.values()}
         self._reference_kPa = max(float(np.abs(r.pressures_kPa).max()) for r in self._responses)
+
+    def _bounded(
+        self, free: tuple[Parameter, ...], experiments: Sequence[Experiment]
+    ) -> tuple[Parameter, ...]:
+        """The nuisances, with a modulus so low left out that the response would have to be guessed.
+
+        A softer unit stands where this one stands at a higher pressure: little beyond those computed, it may
+        balloon or collapse.
+        """
+        low = free[0].low
+        for e in experiments:
+            if e.kind != KIND:
+                continue
+            at, p = self._response(e).pressures_kPa, e["pressure_kPa"]
+            ends = ((p.min(), at[0]), (p.max(), at[-1]))
+            low = max([low, *(asked / (BEYOND * known) for asked, known in ends if asked * known > 0)])
+        low = min(low, 1.0)
+        modulus = attrs.evolve(free[0], low=low, source=f"batches of resin differ; above {low:.2g} computed")
+        return (modulus, *free[1:])
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
         """Columns of the experiment that the response knows."""
@@ -237,8 +269,10 @@ class UnitPressure:
         """Prediction (channels, n), see Simulator."""
         response = self._response(experiment)
         pressure = self.effective_kPa(experiment, values)
-        keys = {name: f"{name}.{v.parameter.name}" for name, v in response.variants.items()}
-        static = {name: values[key] for name, key in keys.items() if key in values}
+        static = {name: values[key] for name, key in self._sizes.items() if key in values}
+        if "gravity" in static:
+            # Weight bends a unit of stiffer resin by as much less.
+            static["gravity"] = static["gravity"] / values.get("modulus_factor", 1.0)
         y = response.at(pressure, static)
         y = y + np.array([values.get(_zero(c), 0.0) for c in response.channels])[:, None]
         if "angle_deg" in response.channels:
@@ -255,6 +289,9 @@ class UnitPressure:
             p = np.interp(t - delay, t, p)
         p = (p - get("pressure_offset.offset_kPa", 0.0)) / (1.0 + get("pressure_gain.gain", 0.0))
         leak, lag = get("leak.conductance_ratio", 0.0), get("line_lag.time_s", 0.0)
+        if experiment.valve == "shut":
+            # Nothing flows between gauge and chambers: what leaks is seen by both.
+            leak = lag = 0.0
         if leak:
             # The line feeds the leak: tau dp_c/dt = p - p_c - leak p_c.
             p, lag = p / (1.0 + leak), lag / (1.0 + leak)

@@ -7,6 +7,7 @@ from .foam import Foam
 from .friction import Friction
 from .guccione import Guccione
 from .law import Law
+from .layered import Layered
 from .mooney_rivlin import MooneyRivlin
 from .neo_hooke import NeoHooke
 from .ogden import Ogden
@@ -23,6 +24,7 @@ __all__ = [
     "Friction",
     "Guccione",
     "Law",
+    "Layered",
     "MooneyRivlin",
     "NeoHooke",
     "Ogden",

@@ -1,0 +1,170 @@
+"""The lattice's own response to a print offset, from virtual tests of blocks of it between plates."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import attrs
+
+from ..design.assets import asset_file, asset_names
+from ..design.parameters import Printing, Unit
+from ..design.strut_cell import StrutCell, relative_density, strut_cell
+from ..errors import InputError
+from ..files import read_npz, write_npz, write_text
+from ..homogenize.cell_mesh import CellMeshSettings, cell_materials, cell_mesh
+from ..homogenize.compression import Friction, compress
+from ..homogenize.modulus import modulus
+from ..homogenize.offset_response import OffsetResponse
+from ..homogenize.specimen import specimen
+from ..measured import Experiment
+from .prediction.lattice import KIND, ComputedCell, Scaling
+
+# Told of a block and the share that is done.
+Progress = Callable[[str, float], None]
+
+SHIPPED = "responses"
+# Part of every key: raise it when a change of the code changes what is computed.
+REVISION = 1
+# Of every surface at 1.0x. Smaller prints are looked up further out: 0.25 mm at 0.75x is 0.33 mm here.
+OFFSETS_mm = (-0.05, 0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
+# Order 2 with one element across a strut is within 2.5 % (docs/homogenize.md), the same at every offset.
+MESH = CellMeshSettings(per_diameter=1.0)
+STRAIN = 0.005
+# Only ratios of moduli are used.
+RESIN_MPa = 1.0
+FRICTION: dict[str, Friction] = {"hold": "stick", "slide": "slide"}
+HELD = "hold"
+
+
+@attrs.frozen
+class Block:
+    """A test to compute: the cell at 1.0x as drawn, cells a side, plates, Poisson's ratio of the resin."""
+
+    cell: StrutCell
+    cells: int
+    plates: str
+    poisson: float
+
+    def key(self) -> str:
+        """Hash of all that the response depends on."""
+        cell = {a.name: getattr(self.cell, a.name) for a in attrs.fields(StrutCell) if a.name != "kind"}
+        mesh = attrs.asdict(MESH)
+        parts = [REVISION, self.cell.kind.name, cell, self.cells, self.plates, self.poisson]
+        return hashlib.sha256(repr([*parts, OFFSETS_mm, mesh, STRAIN]).encode()).hexdigest()[:32]
+
+    def __str__(self) -> str:
+        return f"{self.cells} x {self.cells} x {self.cells} cells between plates that {self.plates} its faces"
+
+
+def _silent(what: str, share: float) -> None:
+    pass
+
+
+def response(block: Block, cache: Path | None = None, say: Progress = _silent) -> OffsetResponse:
+    """The block's response to a print offset: shipped, kept in the folder `cache`, or computed.
+
+    The paper's block of 27 cells takes a minute or two. Raises InputError for a cell that cannot be printed
+    so, MeshingError and ConvergenceError.
+    """
+    key = block.key()
+    for name in asset_names(SHIPPED):
+        kept = tomllib.loads(asset_file(SHIPPED, "response", name).read_text(encoding="utf-8"))
+        if kept["key"] == key:
+            return OffsetResponse(kept["offset_mm"], kept["modulus"], kept["density"])
+    path = cache / f"lattice-{key}.npz" if cache else None
+    stored = read_npz(path) if path else None
+    if stored is not None and set(stored) == {"offset_mm", "modulus", "density"}:
+        return OffsetResponse(stored["offset_mm"], stored["modulus"], stored["density"])
+    moduli, densities = [], []
+    for done, offset in enumerate(OFFSETS_mm):
+        say(f"block of {block} with {offset:g} mm of print offset", done / len(OFFSETS_mm))
+        relative, density = at_offset(block, offset, cache)
+        moduli.append(relative)
+        densities.append(density)
+    found = OffsetResponse(OFFSETS_mm, moduli, densities)
+    if path:
+        write_npz(path, {"offset_mm": found.offsets_mm, "modulus": found.modulus, "density": found.density})
+    return found
+
+
+def at_offset(block: Block, offset_mm: float, cache: Path | None = None) -> tuple[float, float]:
+    """Initial modulus of a block over the resin's, and its density, with an offset of every surface."""
+    cell = attrs.evolve(
+        block.cell,
+        offset_xy_mm=block.cell.offset_xy_mm + offset_mm,
+        offset_z_mm=block.cell.offset_z_mm + offset_mm,
+    )
+    mesh = cell_mesh(cell, MESH, cache)
+    materials = cell_materials(cell, mesh, RESIN_MPa, block.poisson)
+    test = compress(
+        specimen(mesh, block.cells, materials), (STRAIN,), FRICTION[block.plates], stability=False
+    )
+    return modulus(test.curve, "initial tangent") / RESIN_MPa, relative_density(cell)
+
+
+def save(found: OffsetResponse, block: Block, path: Path) -> None:
+    """Write a response as a file that `response` finds among those shipped; raises OutputError."""
+    lines = [
+        f"# Modulus over the resin's, and relative density, of {block},",
+        f"# the {block.cell.kind.name} lattice at 1.0x with a print offset of every surface.",
+        f"key = {json.dumps(block.key())}",
+        *(
+            f"{name} = {[float(f'{v:.6g}') for v in values]}"
+            for name, values in (
+                ("offset_mm", found.offsets_mm),
+                ("modulus", found.modulus),
+                ("density", found.density),
+            )
+        ),
+    ]
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def printed(print_: Printing) -> tuple[float, float]:
+    """Mean outward move of a print's surfaces in mm, and depth times excess modulus of its skin in mm."""
+    offset = (2 * print_.offset_xy_mm + print_.offset_z_mm) / 3
+    return offset, print_.skin_depth_mm * (print_.skin_factor - 1)
+
+
+def block_of(experiment: Experiment, unit: Unit) -> Block | None:
+    """The block that an experiment compressed, of a unit's lattice; None where it says no count of cells.
+
+    Plates hold the faces where nothing else is said. Raises InputError for a block that is no cube.
+    """
+    if experiment.cells is None:
+        return None
+    if len(set(experiment.cells)) > 1:
+        raise InputError(
+            f"a block of {experiment.cells} cells is no cube",
+            experiment.name,
+            "compress cubes, or leave out cells: its struts are then taken for slender ones",
+        )
+    cell = strut_cell(attrs.evolve(unit, scale=1.0, print=Printing()))
+    return Block(cell, experiment.cells[0], experiment.plates or HELD, unit.material.membrane_poisson)
+
+
+def scalings(
+    experiments: Sequence[Experiment],
+    unit: Unit,
+    cache: Path | None = None,
+    say: Progress = _silent,
+) -> tuple[dict[str, Scaling], list[str]]:
+    """How each block of lattice answers to printing, by experiment; and what is taken for granted, in words.
+
+    All moduli are told against that of the first block as drawn at 1.0x; the unit's own print offset and
+    skin come before any effect's.
+    """
+    blocks = {e.name: block_of(e, unit) for e in experiments if e.kind == KIND}
+    distinct = list(dict.fromkeys(b for b in blocks.values() if b is not None))
+    found = {b: response(b, cache, say) for b in distinct}
+    told = [f"lattice specimens are taken for {b}, as computed from their struts" for b in distinct]
+    if None in blocks.values():
+        told.append("lattice specimens without a count of cells are taken for slender struts that bend")
+    first = found[distinct[0]] if distinct else None
+    return {
+        n: ComputedCell(found[b], first, *printed(unit.print)) for n, b in blocks.items() if b is not None
+    }, told

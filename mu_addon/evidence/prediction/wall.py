@@ -1,0 +1,117 @@
+"""A wall beside the unit: from where on it stops the unit, and what that changes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...errors import InputError
+from ..effect import Effect, Parameter
+
+Array = np.ndarray[Any, Any]
+
+NAME = "contact"
+# A wall nearer than this share of the way that the free unit goes is not computed.
+NEAREST = 0.9
+
+
+def _float64(values: Any) -> Array:
+    return np.ascontiguousarray(values, np.float64)
+
+
+@attrs.frozen(eq=False)
+class Side:
+    """The unit's response to a flat wall on one side of it, along its axis.
+
+    pressures_kPa (k,): of the free unit, from 0 on to its last one on this side, up or down; outward_mm (k,):
+    how far it then leaves its outline at rest, ascending from 0. reaches_mm (m,): how far walls stand inside
+    the last of these, ascending; shares (t,): of the way from the pressure at which a wall is met to the last
+    one, ascending to 1; changes (m, t, c): of c channels. spare_mm: how much farther than here the free unit
+    gets in another of the experiments; sizes are counted from there. Raises InputError.
+    """
+
+    pressures_kPa: Array = attrs.field(converter=_float64)
+    outward_mm: Array = attrs.field(converter=_float64)
+    reaches_mm: Array = attrs.field(converter=_float64)
+    shares: Array = attrs.field(converter=_float64)
+    changes: Array = attrs.field(converter=_float64)
+    spare_mm: float = 0.0
+
+    def __attrs_post_init__(self) -> None:
+        rising = all((np.diff(v) > 0).all() for v in (self.outward_mm, self.reaches_mm, self.shares))
+        if not (rising and len(self.outward_mm) > 1 and self.outward_mm[0] == 0.0 and self.shares[-1] == 1.0):
+            raise InputError("places of walls do not ascend", "response to a wall", "order them from rest on")
+        walls, pressures = len(self.reaches_mm), len(self.shares)
+        if self.changes.shape[:2] != (walls, pressures):
+            raise InputError(
+                f"changes {self.changes.shape} do not fit {walls} walls at {pressures} pressures",
+                "response to a wall",
+                "give changes (walls, pressures, channels)",
+            )
+
+    @property
+    def farthest_mm(self) -> float:
+        """How far the free unit leaves its outline at the last pressure."""
+        return float(self.outward_mm[-1])
+
+    @cached_property
+    def _met(self) -> Any:
+        from scipy.interpolate import PchipInterpolator
+
+        return PchipInterpolator(self.outward_mm, self.pressures_kPa)
+
+    @cached_property
+    def _changed(self) -> Any:
+        from scipy.interpolate import CubicSpline
+
+        # Nothing changes without a wall, nor at the moment that one is met.
+        reaches = np.concatenate([[0.0], self.reaches_mm])
+        shares = np.concatenate([[0.0], self.shares])
+        changes = np.pad(self.changes, ((1, 0), (1, 0), (0, 0)))
+        return CubicSpline(reaches, CubicSpline(shares, changes, axis=1)(_EVEN), axis=0)
+
+    def met_kPa(self, reach_mm: float) -> float:
+        """Pressure at which a wall is met that stands so far inside the farthest place of all experiments."""
+        return float(self._met(self.farthest_mm - (reach_mm - self.spare_mm)))
+
+    def change(self, pressure_kPa: Array, reach_mm: float) -> Array:
+        """Change (c, n) of the channels at pressures (n,)."""
+        own, last = reach_mm - self.spare_mm, self.pressures_kPa[-1]
+        if own <= 0:
+            return np.zeros((self.changes.shape[2], len(pressure_kPa)))
+        met = self.met_kPa(reach_mm)
+        share = np.clip((pressure_kPa - met) / (last - met), 0.0, 1.0)
+        table = self._changed(min(own, self.reaches_mm[-1]))
+        return np.stack([np.interp(share, _EVEN, column) for column in table.T])
+
+
+# The spline over shares is read off a fine even grid, between whose points a straight line is as good.
+_EVEN = np.linspace(0.0, 1.0, 101)
+
+
+def effect(sides: Sequence[tuple[int, Side]], kind: str) -> Effect:
+    """Contact with a wall, its size in mm: above 0 on the side +y, below 0 on the other."""
+    farthest = {s: max((side.farthest_mm for t, side in sides if t == s), default=0.0) for s in (1, -1)}
+    starts = [round(s * share * far, 3) for s, far in farthest.items() for share in (0.25, 0.6) if far]
+    said = " or ".join(
+        f"{far:.1f} mm beyond its outline at rest toward {'+' if s > 0 else '-'}y"
+        for s, far in farthest.items()
+        if far
+    )
+    size = Parameter(
+        "reach_mm",
+        "mm",
+        -NEAREST * farthest[-1],
+        NEAREST * farthest[1],
+        0.0,
+        tuple(starts),
+        f"how far a wall stands inside the farthest place of the free unit, {said}; below 0 toward -y",
+    )
+    mechanism = (
+        f"the unit touches a flat wall along its axis, reach_mm inside of where it would get to: {said}"
+    )
+    return Effect(NAME, (size,), (kind,), mechanism)

@@ -1,0 +1,169 @@
+"""Any points carried along by a deformed mesh: a printable surface in the motion of the analysis mesh."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..meshing.mesh import TET_EDGES, Mesh, boundary_faces
+from .elements import shape_functions, shape_gradients
+from .kinematics import Probe, invert
+
+Array = np.ndarray[Any, Any]
+
+# A curved element may hold points that its corners do not, beyond them by a share of its size: most are
+# found with the first, the rest, where a thin element follows a bend, with the second.
+_BULGES = (0.1, 0.7)
+_INSIDE = 1e-6
+_BLOCK = 20_000
+_NEIGHBOURS = 16
+
+
+@attrs.frozen(eq=False)
+class Embedding(Probe):
+    """Points (p, 3) fixed in a mesh's material; outside_mm (p,) says how far each lies outside it, or 0.
+
+    mirrored (p,): whether a point lies on the other side of the mirror plane x = 0 of a half mesh.
+    """
+
+    outside_mm: Array
+    mirrored: Array
+
+    def displacement(self, u: Array) -> Array:
+        """Displacements (p, 3) in mm of the points, of nodal displacements (n, 3)."""
+        found = super().displacement(u)
+        found[self.mirrored, 0] *= -1.0
+        return found
+
+
+def embed(mesh: Mesh, points: Array) -> Embedding:
+    """Embed points (p, 3), in mm, in a mesh.
+
+    Inside, the shape functions at the point carry it. Outside, the displacement of the nearest point of the
+    surface goes on linearly, with its gradient there; points beyond the held base stand still as it does.
+    """
+    points = np.asarray(points, float)
+    mirrored = np.zeros(len(points), bool)
+    if "x" in mesh.symmetry:
+        side = 1.0 if mesh.nodes[:, 0].max() > -mesh.nodes[:, 0].min() else -1.0
+        mirrored = points[:, 0] * side < 0
+        points = points * np.where(mirrored[:, None], [-1.0, 1.0, 1.0], 1.0)
+    element, local = _elements(mesh, points)
+    inside = element >= 0
+    weights = np.empty((len(points), mesh.tets.shape[1]))
+    distance = np.zeros(len(points))
+    weights[inside] = shape_functions(_barycentric(local[inside]), mesh.order)
+    out = np.flatnonzero(~inside)
+    if len(out):
+        element[out], weights[out], distance[out] = _continued(mesh, points[out])
+    return Embedding(mesh.tets[element], weights, distance, mirrored)
+
+
+def _barycentric(local: Array) -> Array:
+    return np.column_stack([1 - local.sum(axis=1), local])
+
+
+def _elements(mesh: Mesh, points: Array) -> tuple[Array, Array]:
+    """For each point the element (p,) it lies in, or -1, and its reference coordinates there (p, 3)."""
+    nodes = mesh.nodes[mesh.tets]
+    inverse = np.linalg.inv((nodes[:, 1:4] - nodes[:, :1]).transpose(0, 2, 1))
+    curved = np.zeros(len(nodes), bool)
+    if mesh.order == 2:
+        middles = nodes[:, :4][:, TET_EDGES].mean(axis=2)
+        curved = np.abs(nodes[:, 4:] - middles).max(axis=(1, 2)) > _INSIDE
+    grid = _Grid(nodes.min(axis=1), nodes.max(axis=1))
+    element, local = np.full(len(points), -1), np.zeros((len(points), 3))
+    for bulge in _BULGES:
+        left = np.flatnonzero(element < 0)
+        for rows in np.array_split(left, len(left) // _BLOCK + 1):
+            point, tet = grid.pairs(points[rows])
+            point = rows[point]
+            at = np.einsum("kij,kj->ki", inverse[tet], points[point] - nodes[tet, 0])
+            depth = _barycentric(at).min(axis=1)
+            close = depth >= np.where(curved[tet], -bulge, -_INSIDE)
+            point, tet, at, depth = point[close], tet[close], at[close], depth[close]
+            bent = np.flatnonzero(curved[tet])
+            if len(bent):
+                at[bent] = invert(nodes[tet[bent]], points[point[bent]], at[bent])
+                depth[bent] = _barycentric(at[bent]).min(axis=1)
+            # Where elements meet, the one that a point lies deepest in.
+            order = np.lexsort((-depth, point))
+            best = order[np.unique(point[order], return_index=True)[1]]
+            best = best[depth[best] >= -_INSIDE]
+            element[point[best]], local[point[best]] = tet[best], at[best]
+    return element, local
+
+
+class _Grid:
+    """Boxes (m, 3) sorted into equal cells, to be found by points."""
+
+    def __init__(self, low: Array, high: Array) -> None:
+        self._origin, self._size = low.min(axis=0), float(np.median(high - low))
+        lower, upper = self._cells(low), self._cells(high)
+        self._shape = upper.max(axis=0) + 1
+        box, number = _counted((upper - lower + 1).prod(axis=1))
+        span = (upper - lower + 1)[box]
+        offset = np.column_stack(
+            [number // (span[:, 1] * span[:, 2]), number // span[:, 2] % span[:, 1], number % span[:, 2]]
+        )
+        keys = self._key(lower[box] + offset)
+        order = np.argsort(keys, kind="stable")
+        self._keys, self._boxes = keys[order], box[order]
+
+    def _cells(self, points: Array) -> Array:
+        return np.floor((points - self._origin) / self._size).astype(np.int64)
+
+    def _key(self, cells: Array) -> Array:
+        return np.ravel_multi_index(tuple(cells.T), tuple(self._shape))
+
+    def pairs(self, points: Array) -> tuple[Array, Array]:
+        """Numbers of points and boxes, (k,) each, that share a cell; ordered by point."""
+        cells = self._cells(points)
+        on = np.flatnonzero(((cells >= 0) & (cells < self._shape)).all(axis=1))
+        keys = self._key(cells[on])
+        start, end = (np.searchsorted(self._keys, keys, side=side) for side in ("left", "right"))
+        row, number = _counted(end - start)
+        return on[row], self._boxes[start[row] + number]
+
+
+def _counted(counts: Array) -> tuple[Array, Array]:
+    """Rows repeated by their counts (n,), and the number of each repetition within its row."""
+    row = np.repeat(np.arange(len(counts)), counts)
+    return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+def _continued(mesh: Mesh, points: Array) -> tuple[Array, Array, Array]:
+    """Elements (p,), weights (p, n) and distances (p,) in mm of points outside a mesh."""
+    from scipy.spatial import cKDTree
+    from trimesh.triangles import closest_point
+
+    faces, owner = boundary_faces(mesh.tets)
+    triangles = mesh.nodes[faces]
+    # What lies in a mirror plane is no surface of the body.
+    outer = np.ones(len(faces), bool)
+    if "x" in mesh.symmetry:
+        outer = ~(triangles[:, :, 0] == 0.0).all(axis=1)
+    faces, owner, triangles = faces[outer], owner[outer], triangles[outer]
+    near = cKDTree(triangles.mean(axis=1)).query(points, min(_NEIGHBOURS, len(faces)))[1]
+    near = near.reshape(len(points), -1)
+    at = closest_point(triangles[near].reshape(-1, 3, 3), np.repeat(points, near.shape[1], axis=0))
+    at = at.reshape(*near.shape, 3)
+    away = np.linalg.norm(at - points[:, None], axis=2)
+    rows, best = np.arange(len(points)), away.argmin(axis=1)
+    face, surface = near[rows, best], at[rows, best]
+    element = owner[face]
+    nodes = mesh.nodes[mesh.tets[element]]
+    edges = (nodes[:, 1:4] - nodes[:, :1]).transpose(0, 2, 1)
+    local = np.linalg.solve(edges, (surface - nodes[:, 0])[:, :, None])[:, :, 0]
+    if mesh.order == 2:
+        local = invert(nodes, surface, local)
+    barycentric = _barycentric(local)
+    weights = shape_functions(barycentric, mesh.order)
+    slope = shape_gradients(barycentric, mesh.order)
+    jacobian = np.einsum("eni,enj->eij", nodes, slope)
+    further = np.linalg.solve(jacobian, (points - surface)[:, :, None])[:, :, 0]
+    held = np.isin(faces[face], mesh.base).all(axis=1)
+    further[held] = 0.0
+    return element, weights + np.einsum("enj,ej->en", slope, further), away[rows, best]

@@ -1,0 +1,84 @@
+"""Stress and stretch of a deformed body: at its quadrature points, and from there at its nodes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..meshing.mesh import TET_EDGES
+from .elements import reference_gradients, tet_quadrature
+from .lattice_law import deformation_gradients
+from .point import stress
+
+if TYPE_CHECKING:
+    from ..meshing.mesh import Mesh
+    from .materials import Materials
+
+Array = np.ndarray[Any, Any]
+
+
+def cauchy(mesh: Mesh, u: Array, materials: Materials) -> tuple[Array, Array]:
+    """Cauchy stress (m, q, 3, 3) in MPa and deformation gradients (m, q, 3, 3) at the quadrature points.
+
+    u: displacements (n, 3) in mm. sigma = P F^T / det F, the laws of an element added by their weights.
+    Raises InputError for a law with history, whose stress is not that of the state alone.
+    """
+    F, _ = deformation_gradients(mesh, u, np.arange(len(mesh.tets)))
+    P = np.zeros_like(F)
+    points = F.shape[1]
+    for layer in materials.layers:
+        if layer.law.history:
+            raise InputError(
+                f"{layer.law.name}: its stress depends on how the state was reached",
+                remedy="ask for the stress of a body of elastic laws",
+            )
+        rows = np.repeat(layer.parameters, points, axis=0)
+        found = stress(layer.law, F[layer.elements].reshape(-1, 3, 3), rows).reshape(-1, points, 3, 3)
+        P[layer.elements] += layer.weight[:, None, None, None] * found
+    return P @ np.swapaxes(F, -1, -2) / np.linalg.det(F)[..., None, None], F
+
+
+def von_mises(sigma: Array) -> Array:
+    """Von Mises stress (...) of stress tensors (..., 3, 3), in their unit: sqrt(3/2 s:s), s the deviator."""
+    mean = np.trace(sigma, axis1=-2, axis2=-1)[..., None, None] / 3.0
+    deviator = sigma - mean * np.eye(3)
+    return np.asarray(np.sqrt(1.5 * np.einsum("...ij,...ij->...", deviator, deviator)))
+
+
+class NodalMean:
+    """Values at the quadrature points of some elements (e,) of a mesh, carried to the nodes.
+
+    They go on linearly from the points to an element's nodes (its mean where it has one point) and are
+    averaged over the elements around a node, by volume.
+    """
+
+    def __init__(self, mesh: Mesh, elements: Array) -> None:
+        tets = mesh.tets[elements]
+        self._elements = elements
+        points, _ = tet_quadrature(mesh.order)
+        corners = np.ones((4, 1)) if mesh.order == 1 else np.linalg.inv(points)
+        middles = corners[TET_EDGES].mean(axis=1)
+        self._to_nodes = corners if mesh.order == 1 else np.vstack([corners, middles])
+        volumes = reference_gradients(mesh.nodes, tets).volumes.sum(axis=1)
+        self.nodes, place = np.unique(tets, return_inverse=True)
+        self._place = place.reshape(tets.shape)
+        self._share = (
+            volumes[:, None]
+            / np.bincount(self._place.ravel(), np.repeat(volumes, tets.shape[1]), len(self.nodes))[
+                self._place
+            ]
+        )
+
+    def __call__(self, values: Array) -> Array:
+        """Means (k, ...) at `nodes` (k,) of values (m, q, ...) at all elements' points.
+
+        Of tensors take the mean first and invariants then: those of the mean are possible ones.
+        """
+        mine = values[self._elements]
+        flat = mine.reshape(*mine.shape[:2], -1)
+        at_nodes = self._share[..., None] * np.einsum("nq,eqc->enc", self._to_nodes, flat)
+        place, count = self._place.ravel(), len(self.nodes)
+        means = [np.bincount(place, column, count) for column in at_nodes.reshape(len(place), -1).T]
+        return np.stack(means, axis=1).reshape(count, *values.shape[2:])

@@ -1,0 +1,140 @@
+"""Effects found one after the other, and what a renewed noise lets be seen."""
+
+import math
+
+import attrs
+import numpy as np
+import pytest
+
+from mu_addon.evidence.fit import Fitter
+from mu_addon.evidence.gain import gain
+from mu_addon.evidence.noise import Source
+from mu_addon.evidence.prediction.unit import UnitPressure
+from mu_addon.evidence.record import record
+from mu_addon.evidence.residuals import dependence_table, strict_table, structure
+from mu_addon.evidence.selection import one_more, reviewed, select
+from mu_addon.evidence.sensitivity import sensitivities
+from mu_addon.evidence.simulator import Composite, effect_named
+from tests.evidence import analytic, stand_ins
+
+RUBBING = {"rate_independent_hysteresis.share": 0.25, "rate_independent_hysteresis.threshold_kPa": 3.0}
+HEAVY = {"gravity.density_kg_m3": 150.0}
+
+
+def fitter_of(values, noise=1.0, seed=0):
+    """A fitter of a bench whose noise is believed to be so many times what it is."""
+    made = analytic.measured(np.random.default_rng(seed), {"modulus_factor": 1.05} | values, dt=0.4, count=5)
+    model = analytic.simulator(made)
+    data = record(made, model)
+    level = {"unit_pressure angle": 0.3, "unit_pressure marker": 0.1}
+    sources = {
+        g: Source(noise * v * math.sqrt(0.3), noise * v * math.sqrt(0.7), -0.4 / math.log(0.9))
+        for g, v in level.items()
+    }
+    return Fitter(data, model, sources)
+
+
+def few(fitter, *names):
+    """What those effects do to the data."""
+    seen = sensitivities(fitter, {"modulus_factor": 1.05})
+    return [s for s in seen if s.effect.name in names]
+
+
+LIBRARY = ("rate_independent_hysteresis", "gravity", "overcure", "pressure_offset")
+
+
+@pytest.mark.parametrize(
+    ("hidden", "found"),
+    [
+        (RUBBING | HEAVY, {"rate_independent_hysteresis", "gravity"}),
+        (RUBBING, {"rate_independent_hysteresis"}),
+    ],
+    ids=["a second effect", "no second effect"],
+)
+def test_what_a_smaller_noise_shows_is_looked_for_and_nothing_else(hidden, found):
+    loud, quiet = fitter_of(hidden, noise=15.0), fitter_of(hidden)
+    before = select(loud, few(loud, *LIBRARY))
+    assert before.chosen.names == ("rate_independent_hysteresis",)
+    seen = few(quiet, *LIBRARY)
+    again = reviewed(quiet, seen, before)
+    assert bool(again.left) == (len(found) > 1)
+    after = one_more(quiet, seen, again)
+    assert set(after.chosen.names) == found
+    assert not after.left
+    assert {c.effect.name for c in after.causes} == found
+
+
+def test_an_effect_that_leaves_structure_is_not_added():
+    quiet = fitter_of(RUBBING | {"gravity.density_kg_m3": 300.0})
+    seen = few(quiet, "rate_independent_hysteresis", "pressure_offset")
+    base = select(quiet, few(quiet, "rate_independent_hysteresis"))
+    assert base.left
+    assert one_more(quiet, seen, base) is base
+
+
+def test_the_base_model_s_table_shows_what_the_data_depend_on():
+    """By the noise that is believed: estimated from the residual itself it would hide nearly all of it."""
+    fitter = fitter_of(RUBBING)
+    found = select(fitter, few(fitter, "rate_independent_hysteresis", "overcure"))
+    assert found.chosen.names == ("rate_independent_hysteresis",)
+    assert "loading_direction" in structure(found.table_base)
+    assert not structure(found.table)
+    clean = fitter_of({})
+    none = select(clean, few(clean, "rate_independent_hysteresis", "overcure"))
+    assert not structure(none.table_base)
+
+
+def test_strict_tests_doubt_what_a_slower_noise_would_do():
+    """Noise five times as slow as is believed looks like structure; re-estimated, it does not."""
+    made = analytic.measured(np.random.default_rng(3), {}, dt=0.4, count=4, rho=0.98, slow_share=0.9)
+    model = analytic.simulator(made)
+    data = record(made, model)
+    wrong = {g: Source(s, s, 1.0) for g, s in zip(data.groups, (0.2, 0.07), strict=True)}
+    fitter = Fitter(data, model, wrong)
+    base = fitter.fit()
+    fitted = {"pressure", "time", "loading_direction", "pressure_rate", "cycle", "largest_angle"}
+    plain, strict = (structure(t(fitter, base)) for t in (dependence_table, strict_table))
+    assert fitted & set(plain)
+    assert not fitted & set(strict)
+
+
+@pytest.fixture(scope="module")
+def both_kinds():
+    """A dead load beside the unit: its sag comes first by name, and no friction of the unit changes it."""
+    made = analytic.measured(np.random.default_rng(0), RUBBING, dt=0.4, count=3)
+    mass = np.arange(0.0, 60.0, 10.0)
+    sag = 0.4 * mass + np.random.default_rng(1).normal(0.0, 0.05, len(mass))
+    load = stand_ins.made("load", "beam_deadweight", {"added_mass_g": mass, "tip_deflection_mm": sag})
+    held = [attrs.evolve(e, name=f"{e.name}, later", role="held_out") for e in (made[0], load)]
+    simulators = {
+        "unit_pressure": UnitPressure([analytic.response()], made),
+        "beam_deadweight": stand_ins.DeadLoad(),
+    }
+    model = Composite(simulators)
+    data = record([*made, load], model)
+    level = {"beam_deadweight tip": 0.05, "unit_pressure angle": 0.3, "unit_pressure marker": 0.1}
+    sources = {g: Source(level.get(g, 0.05), 1e-3, 1.0) for g in data.groups}
+    return Fitter(data, model, sources), held
+
+
+def test_a_gain_is_told_of_every_quantity_and_first_of_one_that_changed(both_kinds):
+    fitter, held = both_kinds
+    rubbing = effect_named(fitter.simulator.effects, "rate_independent_hysteresis")
+    base, extended = fitter.fit(), fitter.best([rubbing], list(rubbing.starts()))
+    assert fitter.record.groups[0].startswith("beam_deadweight")
+    found = gain(fitter, base, extended, held)
+    assert found.fit.unit == found.held_out.unit == "deg"
+    assert set(found.by_quantity) == set(fitter.record.groups)
+    for name, (fit, unseen) in found.by_quantity.items():
+        if name.startswith("unit_pressure"):
+            assert fit.after < 0.9 * fit.before
+            assert unseen.after < 0.9 * unseen.before
+    sag = found.by_quantity[fitter.record.groups[0]][1]
+    assert sag.unit == "mm"
+    assert sag.after == pytest.approx(0.05, rel=0.5)
+    written = found.as_json()
+    assert written["by_quantity"]["unit_pressure angle"]["held_out"] == written["held_out"]
+    # A kind of which nothing was held out has no error there.
+    alone = gain(fitter, base, extended, held[1:])
+    assert alone.by_quantity["unit_pressure angle"][1] is None
+    assert alone.held_out == alone.by_quantity[fitter.record.groups[0]][1]
