@@ -8,6 +8,8 @@ import io
 import json
 import math
 import os
+import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -31,6 +33,7 @@ _REMEDY = {
     errno.EISDIR: "a folder of that name is in the way: remove it or choose another name",
     errno.ENAMETOOLONG: "choose a shorter folder name",
     errno.EFBIG: "raise the limit on the size of a file, or choose another disk",
+    errno.ELOOP: "a link is in the way: remove it, or choose another folder",
     errno.EIO: "the disk reports a fault: try another one",
 }
 
@@ -109,14 +112,40 @@ def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]])
     write_text(path, stream.getvalue())
 
 
-def read_npz(path: Path) -> dict[str, Any] | None:
-    """Arrays by name of an NPZ file, or None where there is none that can be read whole."""
+# What a changed byte can raise, depending on where in the archive it lies.
+_DAMAGED = (
+    OSError, ValueError, EOFError, KeyError, IndexError, RuntimeError, OverflowError, MemoryError,
+    SyntaxError, TypeError, struct.error, zipfile.BadZipFile, zlib.error, tokenize.TokenError,
+)  # fmt: skip
+
+
+def read_npz(path: Path, most_bytes: int = 1 << 32) -> dict[str, Any] | None:
+    """Arrays by name of an NPZ file, or None where there is none that can be read whole.
+
+    Nothing of the file is run, and nothing is set aside for an array before the archive is known to hold as
+    many bytes as the array's header claims, and no more than `most_bytes` in all.
+    """
     try:
+        with zipfile.ZipFile(path) as archive:
+            if sum(member.file_size for member in archive.infolist()) > most_bytes:
+                return None
+            for member in archive.infolist():
+                _check_header(archive, member)
         with np.load(path, allow_pickle=False) as stored:
             return {name: stored[name] for name in stored.files}
-    # What a changed byte can raise, depending on where in the archive it lies.
-    except (OSError, ValueError, EOFError, KeyError, NotImplementedError, zipfile.BadZipFile, zlib.error):
+    except _DAMAGED:
         return None
+
+
+def _check_header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> None:
+    """Raise ValueError unless a member is one array, of plain numbers or text, that fills it exactly."""
+    with archive.open(member) as stream:
+        version = np.lib.format.read_magic(stream)
+        if version != (1, 0):
+            raise ValueError("a header that is never written here")
+        shape, _, dtype = np.lib.format.read_array_header_1_0(stream)
+        if dtype.hasobject or math.prod(shape) * dtype.itemsize != member.file_size - stream.tell():
+            raise ValueError("the header claims what the archive does not hold")
 
 
 def write_npz(path: Path, arrays: Mapping[str, Any]) -> None:

@@ -44,12 +44,19 @@ class Sweep:
         """
         equilibrium = self._lockstep.alone(number)
         states = equilibrium.path(pressures_MPa, rest(equilibrium.model.mesh))
-        return np.array([self._points + self._probe.displacement(s.u) for s in states])
+        return self.points(states)
 
     def at(self, state: State) -> Array:
         """Monitored points (sensors, p, 3) in mm, at the pressure of one of Model A's states.
 
         Raises ConvergenceError where a sensor's unit has no equilibrium that continues Model A's.
         """
-        states = self._lockstep.at(state)
+        return self.points(self.states(state))
+
+    def states(self, state: State) -> list[State]:
+        """Every sensor's own state at the pressure of one of Model A's. Raises ConvergenceError, as `at`."""
+        return self._lockstep.at(state)
+
+    def points(self, states: Sequence[State]) -> Array:
+        """Monitored points (s, p, 3) in mm of some states."""
         return np.array([self._points + self._probe.displacement(s.u) for s in states])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,10 @@ REVISION = 1
 
 def key(*parts: Any) -> str:
     """Hash of text, numbers, tuples and arrays; equal inputs give equal keys in every process."""
+    return _digest(parts).hexdigest()[:32]
+
+
+def _digest(parts: Iterable[Any]) -> hashlib._Hash:
     digest = hashlib.sha256(str(REVISION).encode())
     for part in parts:
         if isinstance(part, np.ndarray):
@@ -25,11 +30,15 @@ def key(*parts: Any) -> str:
         else:
             digest.update(repr(part).encode())
         digest.update(b"\0")
-    return digest.hexdigest()[:32]
+    return digest
+
+
+# The array of an entry that tells whether it is the one that was put there.
+SEAL = "seal"
 
 
 class Cache:
-    """A folder of NPZ files named by kind and key. A damaged file counts as missing."""
+    """A folder of NPZ files named by kind and key. A damaged file, or another entry's, counts as missing."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -40,8 +49,22 @@ class Cache:
 
     def get(self, kind: str, name: str) -> dict[str, Array] | None:
         """The arrays of an entry, or None where there is none that can be read whole."""
-        return read_npz(self.path(kind, name))
+        found = read_npz(self.path(kind, name))
+        if found is None or not np.array_equal(found.pop(SEAL, None), _seal(kind, name, found)):
+            return None
+        return found
+
+    def has(self, kind: str, name: str) -> bool:
+        """Whether `get` would find an entry."""
+        return self.path(kind, name).exists() and self.get(kind, name) is not None
 
     def put(self, kind: str, name: str, arrays: dict[str, Any]) -> None:
         """Store an entry whole. Raises OutputError."""
-        write_npz(self.path(kind, name), arrays)
+        kept = {key: np.asarray(value) for key, value in arrays.items()}
+        write_npz(self.path(kind, name), {**kept, SEAL: _seal(kind, name, kept)})
+
+
+def _seal(kind: str, name: str, arrays: dict[str, Array]) -> Array:
+    """Digest (32,) of an entry: its place, its arrays and their names."""
+    parts = [part for key in sorted(arrays) for part in (key, arrays[key])]
+    return np.frombuffer(bytes.fromhex(_digest((kind, name, *parts)).hexdigest()), np.uint8)

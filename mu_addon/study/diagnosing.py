@@ -8,6 +8,7 @@ import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ from ..design.parameters import Unit, load_preset, to_toml
 from ..errors import InputError
 from ..evidence.effect import Parameter
 from ..evidence.extended import ExtendedModel, extended_model
+from ..evidence.prediction import lattice
 from ..evidence.prediction import unit as unit_pressure
 from ..evidence.prediction.bench import bench_simulators
 from ..evidence.selection import Cause
@@ -28,7 +30,7 @@ from ..files import write_csv, write_json
 from ..measured import Experiment, Measured, read_folder
 from ..measured.folder import FILE
 from .ending import Ending
-from .folder import claim, keep_inputs
+from .folder import begin
 from .progress import Progress
 
 if TYPE_CHECKING:
@@ -39,6 +41,8 @@ Array = np.ndarray[Any, Any]
 HEADER = "# The inputs of this diagnosis; the measured data are named by the SHA-256 of their files."
 RESULTS = ("verdict.json", "model.toml", "residuals.csv", "report.html")
 UNIT = "unit.toml"
+# Of the table of dependences: the size of what is left against the data's own spread.
+SPREAD = "spread"
 PRESET = "mu-1.0x"
 
 
@@ -94,12 +98,13 @@ def diagnose_folder(
     progress: Progress,
     ending: Ending,
     settings: UnitSettings | None = None,
-) -> Diagnosis:
+) -> Diagnosis | None:
     """Judge the model by a folder of measured data; results in `out`.
 
-    unit: what unit_pressure experiments were made with, whatever its scale; the preset `PRESET` without one;
-    settings: how it is simulated. Writes verdict.json, model.toml, residuals.csv, report.html. Raises
-    InputError, OutputError.
+    unit: what unit_pressure experiments and blocks of counted cells are of, whatever its scale; the preset
+    `PRESET` without one; settings: how it is simulated. Writes verdict.json, model.toml, residuals.csv,
+    report.html. Where `out` holds this program's verdict on these inputs, nothing is done again, and None is
+    returned. Raises InputError, OutputError.
     """
     from .diagnosis_report import publish
 
@@ -108,25 +113,31 @@ def diagnose_folder(
         raise InputError(
             "every experiment is held out", str(measured.folder / FILE), 'give role = "fit" to some'
         )
-    if any(e.kind == unit_pressure.KIND for e in measured.experiments):
-        unit = unit or load_preset(PRESET)
-    else:
-        unit = None
-    more = [] if settings is None else [f"settings = {json.dumps(repr(settings))}"]
+    unit = unit_behind(measured.experiments, unit)
+    more = [f"program_sha256 = {json.dumps(_program())}"]
+    more += [] if settings is None else [f"settings = {json.dumps(repr(settings))}"]
     inputs = folder_inputs("diagnose.toml", HEADER, measured, unit, more)
-    claim(out, HEADER, inputs, RESULTS, optional=(UNIT,))
-    ending.open_folder(out)
-    keep_inputs(out, inputs)
+    kept = _kept(out, inputs)
+    begin(ending, out, HEADER, inputs, RESULTS, optional=(UNIT,))
     for remark in measured.remarks:
         progress.warning(remark.what, remark.where, remark.remedy)
+    if kept:
+        with progress.stage("verdict of the same data, kept"):
+            ending.summary |= kept
+        return None
     simulators, told = simulators_of(measured.experiments, unit, out / "cache", progress, settings)
     simulator = Composite(simulators)
     with _stages(progress, simulator) as tell:
         verdict = diagnose(measured.experiments, simulator, tell)
+    model, block = _told_by(verdict, simulator), simulators.get(lattice.KIND)
+    if isinstance(block, lattice.LatticeStress) and block.computed:
+        model = attrs.evolve(model, lattice=block.computed)
+        told += _resin(model, unit)
+    told += _bounds_met(verdict, simulator)
     remarks = [*(f"{r.what} ({_place(r.where)})" for r in measured.remarks), *told]
     unknown = dict.fromkeys(e.kind for e in measured.experiments if not simulator.knows(e))
     remarks += [f"nothing predicts {kind}: its experiments were left out" for kind in unknown]
-    found = Diagnosis(measured, simulator, verdict, _told_by(verdict), unit, tuple(remarks))
+    found = Diagnosis(measured, simulator, verdict, model, unit, tuple(remarks))
     write_json(out / "verdict.json", verdict.as_json())
     found.model.save(out / "model.toml")
     _write_residuals(found, out / "residuals.csv")
@@ -134,6 +145,40 @@ def diagnose_folder(
     with progress.stage("report", expected_s=5.0):
         publish(found, out, ending)
     return found
+
+
+@cache
+def _program() -> str:
+    """SHA-256 of the code that a verdict comes from."""
+    package = Path(__file__).resolve().parents[1]
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        name = path.relative_to(package).as_posix()
+        if not name.startswith("blender/"):
+            digest.update(name.encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+def _kept(out: Path, inputs: Mapping[str, str]) -> dict[str, Any]:
+    """The summary of a verdict on the same inputs that a folder holds whole; empty where it does not."""
+    try:
+        same = all((out / name).read_text(encoding="utf-8") == text for name, text in inputs.items())
+        found = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    if not (same and found.get("status") == "complete" and all((out / n).is_file() for n in RESULTS)):
+        return {}
+    return {k: v for k, v in found.items() if k != "status"}
+
+
+def unit_behind(experiments: Sequence[Experiment], unit: Unit | None = None) -> Unit | None:
+    """The unit that experiments are of, the preset where none is given; None where none of them is of one.
+
+    A block of lattice is a unit's where its cells are counted.
+    """
+    if any(e.kind == unit_pressure.KIND or e.cells for e in experiments):
+        return unit or load_preset(PRESET)
+    return None
 
 
 def simulators_of(
@@ -145,9 +190,18 @@ def simulators_of(
 ) -> tuple[dict[str, Simulator], list[str]]:
     """Simulators of every kind among the experiments, by kind; and what could not be simulated, in words.
 
-    The unit is followed by finite elements; its runs are kept in the folder `cache`.
+    The unit is followed by finite elements, and so are blocks of its lattice; the runs are kept in the
+    folder `cache`. What was taken for granted is among the words.
     """
-    found, told = bench_simulators(experiments), []
+    told: list[str] = []
+    scalings: Mapping[str, lattice.Scaling] = {}
+    if any(e.cells for e in experiments):
+        assert unit is not None
+        from ..evidence.lattice_fem import scalings as computed
+
+        with progress.stage("lattice"):
+            scalings, told = computed(experiments, unit, cache, lambda _, share: progress.update(share))
+    found = bench_simulators(experiments, scalings)
     bent = [e for e in experiments if e.kind == unit_pressure.KIND]
     if bent:
         assert unit is not None
@@ -157,19 +211,43 @@ def simulators_of(
             warnings.simplefilter("always")
             responses = unit_responses(unit, bent, settings, cache, lambda _, share: progress.update(share))
         # Where and what to do, on further lines, is of a simulation that nobody asked for.
-        told = [str(warning.message).partition("\n")[0] for warning in heard]
-        for words in told:
+        left_out = [str(warning.message).partition("\n")[0] for warning in heard]
+        for words in left_out:
             progress.warning(words, "unit")
+        told += left_out
         found[unit_pressure.KIND] = unit_pressure.UnitPressure(responses, experiments)
     return found, told
 
 
-def _told_by(verdict: Verdict) -> ExtendedModel:
+def _told_by(verdict: Verdict, simulator: Composite) -> ExtendedModel:
     """The extended model, without nuisances that these data say nothing of."""
-    model = extended_model(verdict)
+    model = extended_model(verdict, {p.name: p.unit for p in simulator.nuisances})
     fit = verdict.selection.chosen if verdict.names else verdict.selection.base
     seen = {k for k, column in zip(fit.keys, fit.jacobian.T, strict=True) if column.any()}
     return attrs.evolve(model, nuisances={k: f for k, f in model.nuisances.items() if k in seen})
+
+
+def _resin(model: ExtendedModel, unit: Unit | None) -> list[str]:
+    """What resin the fitted modulus of a computed block asks for, in words."""
+    fitted = model.nuisances.get(lattice.MODULUS.name)
+    if fitted is None or model.lattice is None or unit is None:
+        return []
+    drawn = float(model.lattice.modulus_MPa(1.0, 0.0, 1.0))
+    return [
+        f"the lattice's modulus as drawn, {fitted.value:.3g} kPa, is that of a resin of "
+        f"{fitted.value / 1e3 / drawn:.3g} MPa; the unit's walls have "
+        f"{unit.material.membrane_modulus_kPa / 1e3:.3g} MPa"
+    ]
+
+
+def _bounds_met(verdict: Verdict, simulator: Composite) -> list[str]:
+    """Which fitted values of the base model ended at a bound, in words."""
+    values = verdict.selection.base.values
+    return [
+        f"fitted without any effect, {spoken(p.name)} ends at its bound, {values[p.name]:.3g} ({p.source})"
+        for p in simulator.nuisances
+        if any(math.isclose(values.get(p.name, p.null), end, rel_tol=1e-6) for end in (p.low, p.high))
+    ]
 
 
 @contextmanager
@@ -274,6 +352,8 @@ def sized(verdict: Verdict, cause: Cause) -> str:
         unit = f" {p.unit}" if p.unit else ""
         value = verdict.selection.chosen.values[key]
         said.append(f"{bare(p)} {value:.3g}{unit} (95 %: {between(low, high)})")
+        if (cause.effect.name, p.name) == ("overcure", "offset_mm"):
+            said.append(f"of every surface, so that struts and walls are {2 * value:.2g} mm thicker")
     return ", ".join(said)
 
 
@@ -303,8 +383,9 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
             "The model follows the data only with a fitted value far from what is known of it. Whatever is "
             "behind that, these data could not show it, however many of their kind there were.",
         )
-    where = [spoken(n) for n in found.left]
-    tried = f"What it leaves depends on {listed(where)}. " if where else ""
+    where = [spoken(n) for n in found.left if n != SPREAD]
+    tried = "What it leaves is more than the spread that the data give. " if SPREAD in found.left else ""
+    tried += f"What it leaves depends on {listed(where)}. " if where else ""
     if found.doubted:
         tried += f"{_upper(spoken(found.doubted))}. "
     if found.chosen.effects:
@@ -325,7 +406,7 @@ def advice(verdict: Verdict) -> str:
     if verdict.kind == "named":
         return f"To confirm it on fresh data: {'; '.join(c.effect.reveals for c in found.causes)}."
     if verdict.kind == "unexplained":
-        places = [d for d in found.table if d.against in found.left and d.where]
+        places = [d for d in found.table if d.against in found.left and d.where and d.against != SPREAD]
         places.sort(key=lambda d: d.p_value)
         at = f" It is strongest at: {places[0].where}." if places else ""
         return f"Repeat an experiment and change nothing: what does not come back is not the model's.{at}"

@@ -14,7 +14,8 @@ from typing import Any
 import attrs
 
 from ..errors import MuError
-from ..files import make_folder, write_json
+from ..files import write_json
+from .lock import FolderLock
 from .progress import Progress, log_file
 
 DONE, UNEXPECTED, INTERRUPTED, TERMINATED = 0, 70, 130, 143
@@ -48,15 +49,36 @@ class Ending:
     status: int = DONE
     # Called with the reason when a run stops early, to save what there is: a partial report, say.
     on_stop: Callable[[dict[str, str]], None] | None = None
+    _lock: FolderLock | None = None
+
+    def lock_folder(self, folder: Path) -> None:
+        """Keep other processes out of `folder` until the run ends. Raises InUseError and OutputError."""
+        if self._lock is not None and self._lock.path.parent == folder:
+            return
+        self.unlock()
+        self._lock = FolderLock(folder)
+        if not self._lock.held:
+            self.progress.warning(
+                "this disk offers no locks: nothing keeps a second run out of the folder",
+                str(folder),
+                "start no other run with the same folder",
+            )
+
+    def unlock(self) -> None:
+        """Give the folder free."""
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None
 
     def open_folder(self, folder: Path) -> Path:
-        """Make `folder` the run's: log.ndjson starts there, and summary.json says "running" until the end.
+        """Make `folder` the run's: locked, with log.ndjson, and "running" in summary.json until the end.
 
-        So a run that was killed, or overtaken by a new one, never passes for complete. Raises OutputError.
+        So a run that was killed, or overtaken by a new one, never passes for complete. Raises InUseError and
+        OutputError.
         """
-        make_folder(folder)
+        self.lock_folder(folder)
         self.progress.sinks.append(log_file(folder / "log.ndjson"))
-        write_json(folder / "summary.json", {"status": "running"})
+        write_json(folder / "summary.json", {"status": "running", **self.summary})
         self.folder = folder
         return folder
 
@@ -80,6 +102,9 @@ def run_to_end(progress: Progress) -> Iterator[Ending]:
             _stop(ending, _Interrupted("stopped by Ctrl-C", remedy=_kept(ending)))
         except MuError as error:
             _stop(ending, error)
+        except MemoryError:
+            what = "there was not enough memory"
+            _stop(ending, MuError(what, _kept(ending), "take a coarser mesh, fewer workers or more memory"))
         except Exception as error:  # noqa: BLE001 - the last resort: told, logged and turned into exit status 70
             _log_traceback(ending, error)
             fault = _Unexpected(
@@ -87,6 +112,8 @@ def run_to_end(progress: Progress) -> Iterator[Ending]:
                 remedy="report it with log.ndjson, which holds the details" if ending.folder else "report it",
             )
             _stop(ending, fault)
+        finally:
+            ending.unlock()
 
 
 def _kept(ending: Ending) -> str:
@@ -114,7 +141,7 @@ def _stop(ending: Ending, error: MuError) -> None:
 
 
 def _write_summary(ending: Ending, state: dict[str, Any]) -> None:
-    seconds = {"seconds": {**ending.progress.seconds}}
+    seconds = {"seconds": {**ending.summary.get("seconds", {}), **ending.progress.seconds}}
     # Twice, so that the state is read first and yet overrides an older one.
     ending.summary = {**state, **ending.summary, **state, **seconds}
     if ending.folder is not None:

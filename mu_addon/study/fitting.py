@@ -19,7 +19,7 @@ from ..materials.forms import FORMS, form
 from ..materials.library import Material, write_material
 from ..measured import Measured, read_folder
 from .ending import Ending
-from .folder import claim, keep_inputs
+from .folder import begin
 from .progress import Progress
 
 HEADER = "# The inputs of this fit; the measured data are named by the SHA-256 of their files."
@@ -73,9 +73,7 @@ def fit_material(
     measured = read_folder(Path(folder))
     fitted, held = _coupons(measured, held_out_modes)
     inputs = {"fit.toml": _inputs(measured, [f.name for f in forms], held_out_modes, weights)}
-    claim(out, HEADER, inputs, RESULTS)
-    ending.open_folder(out)
-    keep_inputs(out, inputs)
+    begin(ending, out, HEADER, inputs, RESULTS)
     for remark in measured.remarks:
         progress.warning(remark.what, remark.where, remark.remedy)
     with progress.stage("fit", expected_s=2.0 * len(forms)):

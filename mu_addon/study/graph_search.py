@@ -25,6 +25,7 @@ from ..placement.influence import (
 from ..placement.response import response
 from ..placement.search import SearchSettings, front, search
 from ..placement.whole import whole_body
+from .motion import write_sensitivity
 from .results import LatticePath, LatticeSearch
 from .vtk_out import write_fields
 
@@ -60,6 +61,7 @@ def sensitivity_map(study: Study) -> Array:
             "modulus_MPa": modulus,
         }
         write_fields(study.folder / MAP, study.mesh, fields)
+        write_sensitivity(study.folder, study.mesh, dJ / modulus)
     study.ending.summary["sensitivity"] = {"file": MAP, "largest_mm": float(dJ.max())}
     return dJ
 

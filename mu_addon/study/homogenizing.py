@@ -28,7 +28,7 @@ from ..materials.library import Material, load_material
 from ..meshing.mesh import Mesh
 from .cache import Cache, key
 from .ending import Ending
-from .folder import claim, keep_inputs
+from .folder import begin
 from .progress import Progress
 from .vtk_out import write_mesh
 
@@ -160,9 +160,7 @@ class Homogenisation:
     def open(cls, job: Job, folder: Path, progress: Progress, ending: Ending) -> Homogenisation:
         """Make the folder this run's; results of other inputs are moved to stale/. Raises InputError."""
         texts = job.texts()
-        claim(folder, HEADER, texts, RESULTS)
-        ending.open_folder(folder)
-        keep_inputs(folder, texts)
+        begin(ending, folder, HEADER, texts, RESULTS)
         ending.summary["inputs"] = {"cell": cell_table(job.cell), "resin": attrs.asdict(job.resin)}
         return cls(job, folder, progress, ending)
 

@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
-import hashlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import attrs
 
 from ..design.assets import asset_root
-from ..design.parameters import Unit, to_toml
+from ..design.body import Body, read_body
+from ..design.parameters import Unit, read_unit, to_toml
+from ..design.solid import QUALITY
 from ..errors import InputError
 from ..fem.protocol import Protocol, read_protocol
 from ..fem.unit import materials_of
-from ..homogenize.effective import Effective
+from ..homogenize.effective import Effective, read_effective
 from ..meshing.settings import MeshSettings
 from ..placement.graph import Limits
 from ..placement.inclusion import RULES
+from .study_file import FILES, NAME, STAGES, Tables, compose, digest, holds
+from .study_file import read as read_tables
 
 if TYPE_CHECKING:
     from ..fem.materials import Materials
     from ..meshing.mesh import Mesh
 
 GRASP = "protocols/grasp.csv"
-# The first line of study.toml, by which a study's folder is known.
-HEADER = "# The inputs of this study; unit.toml and protocol.csv beside it belong to them."
-LATTICE_LAW = "effective.toml"
+LATTICE_LAW = FILES["lattice"]
 
 
 def _whole(low: int, high: int, what: str) -> Any:
@@ -34,6 +36,11 @@ def _whole(low: int, high: int, what: str) -> Any:
             raise InputError(f"{what} is {value}", field.name, f"give a whole number from {low} to {high}")
 
     return check
+
+
+def _rules(_: object, field: attrs.Attribute[Any], value: tuple[str, ...]) -> None:
+    if not value or any(rule not in RULES for rule in value):
+        raise InputError(f"the rules are {value!r}", field.name, f"give some of {', '.join(RULES)}")
 
 
 @attrs.frozen
@@ -46,20 +53,24 @@ class Job:
     unit: Unit
     protocol: Protocol
     mesh: MeshSettings = attrs.field(factory=MeshSettings)
-    mesher: str = "auto"
+    mesher: str = attrs.field(default="auto", validator=attrs.validators.in_(("auto", "gmsh", "pytetwild")))
     times: int = attrs.field(default=13, validator=_whole(2, 1001, "the number of time samples"))
     stations: int = attrs.field(default=51, validator=_whole(2, 10_001, "the number of stations"))
-    rules: tuple[str, ...] = RULES
-    quality: str = "interactive"
+    rules: tuple[str, ...] = attrs.field(default=RULES, validator=_rules)
+    quality: str = attrs.field(default="interactive", validator=attrs.validators.in_(tuple(QUALITY)))
     workers: int = attrs.field(default=2, validator=_whole(1, 256, "the number of workers"))
     # Whether a second, coarser mesh is solved to tell how far the mesh moves a ranking.
-    mesh_check: bool = True
+    mesh_check: bool = attrs.field(default=True, validator=attrs.validators.instance_of(bool))
     # Which paths: the windows of anchors alone, or the whole lattice graph besides.
     paths: str = attrs.field(default="windows", validator=attrs.validators.in_(("windows", "graph")))
     limits: Limits = attrs.field(factory=Limits)
     most_checks: int = attrs.field(default=100, validator=_whole(2, 100_000, "the number of checks"))
     # The lattice's law, by homogenizing its cell, in place of the unit's one modulus for it.
     lattice: Effective | None = None
+    # A sound body that takes the place of the lattice's box.
+    body: Body | None = None
+    # What is run of it: the first, the first two or all.
+    stages: tuple[str, ...] = STAGES
 
     def __attrs_post_init__(self) -> None:
         _, pressure = self.protocol.sample(self.times)
@@ -70,38 +81,34 @@ class Job:
                 "give more samples, or a protocol that leaves 0 kPa",
             )
 
-    def text(self) -> str:
-        """study.toml: everything that decides the results (not `workers`, which does not)."""
-        rules = ", ".join(f'"{rule}"' for rule in self.rules)
-        mesh = attrs.asdict(self.mesh)
-        lines = [
-            HEADER,
-            "format = 1",
-            'unit = "unit.toml"',
-            'protocol = "protocol.csv"',
-            f"times = {self.times}",
-            f"stations = {self.stations}",
-            f"rules = [{rules}]",
-            f'quality = "{self.quality}"',
-            f'mesher = "{self.mesher}"',
-            f"mesh_check = {str(self.mesh_check).lower()}",
-            f'paths = "{self.paths}"',
-            *self._lattice_lines(),
-            "",
-            "[mesh]",
-            *(f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {v}" for k, v in mesh.items()),
-        ]
-        if self.paths == "graph":
-            limits = attrs.asdict(self.limits) | {"most_checks": self.most_checks}
-            lines += ["", "[search]", *(f"{k} = {v}" for k, v in limits.items())]
-        return "\n".join(lines) + "\n"
+    def tables(self) -> Tables:
+        """Everything that decides the results, a table a stage, as study.toml has it.
 
-    def _lattice_lines(self) -> list[str]:
-        text = self.lattice_text()
-        if text is None:
-            return []
-        digest = hashlib.sha256(text.encode()).hexdigest()
-        return [f'lattice = "{LATTICE_LAW}"', f'lattice_sha256 = "{digest}"']
+        Not `workers`, which decides nothing.
+        """
+        mesh = attrs.asdict(self.mesh)
+        tables: Tables = {
+            "design": _named("unit", self.unit_text())
+            | _named("body", self.body_text())
+            | {"quality": self.quality},
+            "simulate": _named("protocol", self.protocol_text())
+            | {"times": self.times, "mesher": self.mesher}
+            | _named("lattice", self.lattice_text())
+            | {"mesh": mesh},
+            "place": {
+                "stations": self.stations,
+                "rules": list(self.rules),
+                "mesh_check": self.mesh_check,
+                "paths": self.paths,
+            },
+        }
+        if self.paths == "graph":
+            tables["place"]["search"] = attrs.asdict(self.limits) | {"most_checks": self.most_checks}
+        return {stage: tables[stage] for stage in self.stages}
+
+    def text(self) -> str:
+        """study.toml, see `tables`."""
+        return compose(self.tables())
 
     def materials(self, mesh: Mesh) -> Materials:
         """Materials of the unit's mesh."""
@@ -109,17 +116,41 @@ class Job:
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; study.toml is the first."""
-        found = {
-            "study.toml": self.text(),
-            "unit.toml": self.unit_text(),
-            "protocol.csv": self.protocol_text(),
-        }
-        lattice = self.lattice_text()
-        return found if lattice is None else found | {LATTICE_LAW: lattice}
+        found = {NAME: self.text(), "unit.toml": self.unit_text()}
+        body = self.body_text()
+        if body is not None:
+            found[FILES["body"]] = body
+        if "simulate" in self.stages:
+            found["protocol.csv"] = self.protocol_text()
+            lattice = self.lattice_text()
+            if lattice is not None:
+                found[LATTICE_LAW] = lattice
+        return found
+
+    def texts_in(self, folder: Path) -> tuple[dict[str, str], bool]:
+        """As `texts`, for a folder: with the inputs of further stages that lie there and are still good.
+
+        So `design` in the folder of a `place` of the same unit leaves what that found. And whether what lies
+        in the folder belongs to these inputs. Raises InputError for a study.toml that cannot be used.
+        """
+        own = self.tables()
+        old = read_tables(folder)
+        if old is None or any(old[stage] != own[stage] for stage in own if stage in old):
+            return self.texts(), False
+        files = holds(folder, old)
+        if files is None:
+            return self.texts(), False
+        merged = old | own
+        tables = {stage: merged[stage] for stage in STAGES if stage in merged}
+        return {**self.texts(), **files, NAME: compose(tables)}, True
 
     def lattice_text(self) -> str | None:
         """effective.toml: the lattice's law and where it is from, or None where it is the unit's modulus."""
         return None if self.lattice is None else self.lattice.text()
+
+    def body_text(self) -> str | None:
+        """body.obj: the body in place of the lattice's box, or None where there is none."""
+        return None if self.body is None else self.body.text()
 
     def unit_text(self) -> str:
         """unit.toml: the unit's parameters with units, meaning and source."""
@@ -127,8 +158,90 @@ class Job:
 
     def protocol_text(self) -> str:
         """protocol.csv: corner points of the pressure protocol."""
-        rows = zip(self.protocol.time_s, self.protocol.pressure_kPa, strict=True)
-        return "time_s,pressure_kPa\n" + "".join(f"{float(t)!r},{float(p)!r}\n" for t, p in rows)
+        return protocol_text(self.protocol)
+
+
+def protocol_text(protocol: Protocol) -> str:
+    """The corner points of a protocol as CSV, to their last digit."""
+    rows = zip(protocol.time_s, protocol.pressure_kPa, strict=True)
+    return "time_s,pressure_kPa\n" + "".join(f"{float(t)!r},{float(p)!r}\n" for t, p in rows)
+
+
+def _named(key: str, text: str | None) -> dict[str, str]:
+    """How a table of study.toml names a file of inputs."""
+    return {} if text is None else {key: FILES[key], f"{key}_sha256": digest(text)}
+
+
+def read_job(folder: Path, workers: int = 2) -> Job:
+    """The job that a study's folder describes; raises InputError where it cannot be used, and OutputError."""
+    where = str(folder / NAME)
+    tables = read_tables(folder)
+    if tables is None:
+        raise InputError("there is no study in this folder", where, "give a folder that holds study.toml")
+    if holds(folder, tables) is None:
+        raise InputError(
+            "a file of inputs is not the one that this study was made with",
+            str(folder),
+            "put it back, or start a new study with it: --unit, --protocol, --lattice",
+        )
+    return job_of(tables, folder, workers)
+
+
+def job_of(tables: Mapping[str, Mapping[str, Any]], folder: Path, workers: int = 2) -> Job:
+    """The job of study.toml's tables and the files beside it; raises InputError that names an unknown key."""
+    where = str(folder / NAME)
+    job: dict[str, Any] = {"unit": read_unit(folder / FILES["unit"]), "protocol": grasp()}
+    if "body" in tables["design"]:
+        job["body"] = read_body(folder / FILES["body"])
+    if "simulate" in tables:
+        job["protocol"] = read_protocol(folder / FILES["protocol"])
+        if "lattice" in tables["simulate"]:
+            job["lattice"] = read_effective(folder / FILES["lattice"])
+    return job_with(tables, where, workers=workers, **job)
+
+
+def job_with(tables: Mapping[str, Mapping[str, Any]], where: str, **given: Any) -> Job:
+    """The job of the settings in tables like study.toml's, and of what is given beside them; InputError."""
+    job = dict(given)
+    for stage, table in tables.items():
+        values = {k: v for k, v in table.items() if k not in FILES and not k.endswith("_sha256")}
+        for key, kind in (("mesh", MeshSettings), ("search", Limits)):
+            if key in values:
+                inner = _inner(values.pop(key), f"{where}, [{stage}.{key}]")
+                if key == "search" and "most_checks" in inner:
+                    job["most_checks"] = inner.pop("most_checks")
+                job["limits" if key == "search" else key] = _built(kind, inner, f"{where}, [{stage}.{key}]")
+        known = SETTINGS[stage]
+        for key in values:
+            if key not in known:
+                raise InputError(f"unknown key {key!r}", f"{where}, [{stage}]", f"known: {', '.join(known)}")
+        job |= values
+    if isinstance(job.get("rules"), list):
+        job["rules"] = tuple(job["rules"])
+    return _built(Job, {**job, "stages": tuple(tables)}, where)
+
+
+def _inner(value: Any, where: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise InputError(f"{value!r} is not a table", where, "write it as a table")
+    return dict(value)
+
+
+# Keys of each stage's table besides files and inner tables.
+SETTINGS = {
+    "design": ("quality",),
+    "simulate": ("times", "mesher"),
+    "place": ("stations", "rules", "mesh_check", "paths"),
+}
+
+
+def _built(kind: Any, values: dict[str, Any], where: str) -> Any:
+    try:
+        return kind(**values)
+    except TypeError as error:
+        raise InputError(f"this is no study: {error}", where, "correct that key") from error
+    except ValueError as error:
+        raise InputError(f"a value is not offered: {error.args[0]}", where, "correct that key") from error
 
 
 def grasp() -> Protocol:

@@ -8,11 +8,14 @@ from pathlib import Path
 
 import attrs
 
-from ..design.parameters import Unit
+from ..design.parameters import Printing, Unit
+from ..design.strut_cell import strut_cell
 from ..errors import InputError
 from ..evidence.extended import ExtendedModel, Fitted, load_model
-from ..evidence.prediction.lattice import Struts
+from ..evidence.lattice_fem import printed
+from ..evidence.prediction.lattice import SLENDER, ComputedCell
 from ..evidence.unit_effects import EFFECTS, Body
+from ..homogenize.effective import Effective
 from ..meshing.settings import MeshSettings
 from .diagnosing import spoken
 
@@ -77,6 +80,25 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
     return Extended(unit, tuple(applied), tuple(left_out))
 
 
+def require_same_print(unit: Unit, lattice: Effective, origin: str | Path) -> None:
+    """Raise InputError where a law of the lattice is of another print than a unit with a model in it.
+
+    Offset and skin change struts as they change walls: a law of struts as drawn would leave half of the
+    model out.
+    """
+    own = strut_cell(unit)
+    for name in (f.name for f in attrs.fields(Printing)):
+        if name not in lattice.cell:
+            continue
+        law, mine = float(lattice.cell[name]), float(getattr(own, name))
+        if not math.isclose(law, mine, rel_tol=1e-6, abs_tol=1e-9):
+            raise InputError(
+                f"the model prints {name} = {mine:.4g}, and the lattice's law is of struts with {law:.4g}",
+                f"--model {origin} with --lattice",
+                f"homogenize the lattice with --model {origin} too, and give --lattice what that finds",
+            )
+
+
 def _put(unit: Unit, origin: str, key: str, fitted: Fitted, put: Put) -> tuple[Unit, str]:
     try:
         return put(unit, fitted.value)
@@ -119,7 +141,12 @@ def _as_printed(model: ExtendedModel) -> Put:
     excess = values.get("skin_cure.excess_mm", 0.0)
 
     def put(unit: Unit, drawn_kPa: float) -> tuple[Unit, str]:
-        modulus = drawn_kPa * Struts().stiffness(unit.scale, offset, excess)
+        if model.lattice:
+            # The unit has the effects by now, beside what it had of them before.
+            factor = ComputedCell(model.lattice, None, *printed(unit.print)).stiffness(unit.scale, 0.0, 0.0)
+        else:
+            factor = SLENDER.stiffness(unit.scale, offset, excess)
+        modulus = drawn_kPa * factor
         if not math.isfinite(modulus):
             raise InputError(f"its lattice's modulus would be {modulus}", "lattice_modulus_kPa", "")
         material = attrs.evolve(unit.material, lattice_modulus_kPa=modulus)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
-import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -23,7 +22,7 @@ from ..meshing.mesh import Mesh
 from ..placement.candidates import Candidate, roi
 from ..placement.inclusion import sensor_share
 from ..placement.sweep import Sweep
-from ..processes import end_with_parent, one_thread_each
+from ..processes import ctrl_c_ignored, end_with_parent, one_thread_each
 
 Array = np.ndarray[Any, Any]
 
@@ -32,7 +31,8 @@ Array = np.ndarray[Any, Any]
 class Setting:
     """What a sweep is about; plain data, so that it travels to another process.
 
-    jobs: candidates and the inclusion rule of each; anchors (p, 3) in mm are the monitored points.
+    jobs: candidates and the inclusion rule of each; anchors (p, 3) in mm are the monitored points. whole:
+    the jobs, by number, whose displacement of the whole mesh is wanted, too.
     """
 
     mesh: Mesh
@@ -41,6 +41,17 @@ class Setting:
     jobs: tuple[tuple[Candidate, str], ...]
     radius_mm: float
     sensor_MPa: float
+    whole: tuple[int, ...] = ()
+
+
+class Moved(NamedTuple):
+    """What all jobs do at one state: anchors (jobs, p, 3) in mm, and of the `whole` ones the differences.
+
+    whole: displacements (w, n, 3) in mm against Model A's, single precision.
+    """
+
+    anchors: Array
+    whole: Array
 
 
 class Evaluator:
@@ -52,10 +63,13 @@ class Evaluator:
         shares = [sensor_share(rule, found[c.name]) for c, rule in s.jobs]
         monitored = s.anchors, probe(s.mesh, s.anchors)
         self._sweep = Sweep(Model(s.mesh, threads=threads), s.materials, monitored, shares, s.sensor_MPa)
+        self._whole = s.whole
 
-    def __call__(self, state: State) -> Array:
-        """Moved anchors (jobs, p, 3) in mm. Raises ConvergenceError."""
-        return self._sweep.at(state)
+    def __call__(self, state: State) -> Moved:
+        """What all jobs do at a state of Model A. Raises ConvergenceError."""
+        states = self._sweep.states(state)
+        apart = [(states[job].u - state.u).astype(np.float32) for job in self._whole]
+        return Moved(self._sweep.points(states), np.array(apart, np.float32).reshape(-1, *state.u.shape))
 
     def alone(self, job: int, pressures_MPa: Array) -> Array:
         """Anchors (s, p, 3) in mm that a job moves along its path from rest. Raises ConvergenceError."""
@@ -71,7 +85,7 @@ def _start(setting: Setting) -> None:
     _evaluator = Evaluator(setting, threads=1)
 
 
-def _work(state: State) -> Array:
+def _work(state: State) -> Moved:
     assert _evaluator is not None
     return _evaluator(state)
 
@@ -88,19 +102,6 @@ def _survive_broken_pipes() -> None:
     """
     if hasattr(signal, "SIGPIPE"):
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)
-
-
-@contextmanager
-def _ctrl_c_ignored() -> Iterator[None]:
-    """Children born inside inherit this: Ctrl-C reaches a terminal's every process, and one decides."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before if before is not None else signal.SIG_DFL)
 
 
 @contextmanager
@@ -122,20 +123,20 @@ class Sweeper:
         self.setting, self.workers = setting, workers
         self._alone: Evaluator | None = None
         self._pool: ProcessPoolExecutor | None = None
-        self._submitted: dict[float, Future[Array]] = {}
+        self._submitted: dict[float, Future[Moved]] = {}
 
     def submit(self, state: State) -> None:
         """Have a process solve a state; needs two workers or more."""
         if state.pressure_MPa not in self._submitted:
             self._submitted[state.pressure_MPa] = self._submit(_work, state)
 
-    def _submit(self, work: Any, *arguments: Any) -> Future[Array]:
+    def _submit(self, work: Any, *arguments: Any) -> Future[Any]:
         with one_thread_each():
             _survive_broken_pipes()
             if self._pool is None:
                 context = multiprocessing.get_context("spawn")
                 self._pool = ProcessPoolExecutor(self.workers, context, _start, (self.setting,))
-            with _ctrl_c_ignored(), _worker_errors():
+            with ctrl_c_ignored(), _worker_errors():
                 return self._pool.submit(work, *arguments)
 
     def alone(self, tasks: Sequence[tuple[int, Array]]) -> list[Array]:
@@ -147,8 +148,8 @@ class Sweeper:
         with _worker_errors():
             return [done.result() for done in waiting]
 
-    def solve(self, states: Sequence[State]) -> Iterator[tuple[int, Array]]:
-        """Number of each state as it is done, and the anchors (jobs, p, 3) in mm that all jobs move there.
+    def solve(self, states: Sequence[State]) -> Iterator[tuple[int, Moved]]:
+        """Number of each state as it is done, and what all jobs do there.
 
         The same for any `workers`. Raises the first ConvergenceError of any.
         """

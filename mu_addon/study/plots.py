@@ -280,9 +280,7 @@ def seconds(stages: Mapping[str, float]) -> str:
 @contextmanager
 def canvas(width: float, height: float) -> Iterator[tuple[Figure, Callable[[], str]]]:
     """A figure of that many inches, and a function that gives its SVG text once the body has drawn it."""
-    from matplotlib import rc_context
     from matplotlib.backends.backend_svg import FigureCanvasSVG
-    from matplotlib.figure import Figure
 
     stream = io.StringIO()
 
@@ -291,8 +289,17 @@ def canvas(width: float, height: float) -> Iterator[tuple[Figure, Callable[[], s
         text = stream.getvalue()
         return text[text.index("<svg") :]
 
-    with rc_context(_STYLE):
-        figure = Figure(figsize=(width, height))
+    with styled(width, height) as figure:
         FigureCanvasSVG(figure)
         yield figure, svg
         figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
+
+
+@contextmanager
+def styled(width: float, height: float) -> Iterator[Figure]:
+    """A figure of that many inches in the house's style."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    with rc_context(_STYLE):
+        yield Figure(figsize=(width, height))

@@ -2,7 +2,8 @@
 
 A `Progress` makes messages, plain dictionaries with a `type`, and hands each to its sinks:
 
-- progress: stage, state ("start" | "run" | "end"), fraction (0..1 or None), seconds, seconds_left (or None)
+- progress: stage, state ("start" | "run" | "end"), fraction (0..1 or None), seconds, seconds_left (or None),
+  and detail where there is something to say of what was just done
 - warning: what, where, what_to_do
 - result: whatever the run found; the last message of a run that succeeded
 - error: what, where, what_to_do, status; the last message of a run that did not
@@ -55,10 +56,13 @@ class Progress:
             self.seconds[name] = self.seconds.get(name, 0.0) + elapsed
             self._stage = ""
 
-    def update(self, fraction: float) -> None:
-        """Tell that `fraction` (0..1) of the present stage is done; outside a stage, nothing is told."""
+    def update(self, fraction: float, detail: str = "") -> None:
+        """Tell that `fraction` (0..1) of the present stage is done; outside a stage, nothing is told.
+
+        detail: a few words on what was just done, a load step and its residual, say.
+        """
         if self._stage:
-            self._tell("run", min(max(float(fraction), 0.0), 1.0))
+            self._tell("run", min(max(float(fraction), 0.0), 1.0), detail)
 
     def warning(self, what: str, where: str = "", what_to_do: str = "") -> None:
         """Tell something the user should know that does not end the run."""
@@ -89,7 +93,7 @@ class Progress:
         for sink in self.sinks:
             sink(message)
 
-    def _tell(self, state: str, fraction: float | None) -> None:
+    def _tell(self, state: str, fraction: float | None, detail: str = "") -> None:
         elapsed = self._clock() - self._start
         self.emit(
             {
@@ -99,6 +103,7 @@ class Progress:
                 "fraction": fraction,
                 "seconds": elapsed,
                 "seconds_left": _seconds_left(elapsed, fraction, self._expected),
+                **({"detail": detail} if detail else {}),
             }
         )
 

@@ -10,19 +10,18 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..design.parameters import Unit, load_preset
+from ..design.parameters import Unit
 from ..errors import InputError
 from ..evidence.fit import Fitter
 from ..evidence.noise import Source
-from ..evidence.prediction import unit as unit_pressure
 from ..evidence.record import KNOWN, Record, record
 from ..evidence.sensitivity import Sensitivity, sensitivities, similarity
 from ..evidence.simulator import Composite
 from ..files import write_csv, write_text
 from ..measured import Experiment, read_folder
-from .diagnosing import PRESET, UNIT, bare, folder_inputs, listed, simulators_of, spoken
+from .diagnosing import UNIT, bare, folder_inputs, listed, simulators_of, spoken, unit_behind
 from .ending import Ending
-from .folder import claim, keep_inputs
+from .folder import begin
 from .page import facts_table, note, page, table
 from .progress import Progress
 from .publish import package_versions
@@ -88,14 +87,11 @@ def design_experiments(
     and report.html. Raises InputError, OutputError.
     """
     measured = read_folder(Path(folder))
-    bent = any(e.kind == unit_pressure.KIND for e in measured.experiments)
-    unit = (unit or load_preset(PRESET)) if bent else None
+    unit = unit_behind(measured.experiments, unit)
     inputs = folder_inputs(
         "protocols.toml", HEADER, measured, unit, [f"{k} = {v!r}" for k, v in noise.items()]
     )
-    claim(out, HEADER, inputs, RESULTS, optional=(UNIT,))
-    ending.open_folder(out)
-    keep_inputs(out, inputs)
+    begin(ending, out, HEADER, inputs, RESULTS, optional=(UNIT,))
     simulators, told = simulators_of(measured.experiments, unit, out / "cache", progress)
     simulator = Composite(simulators)
     with progress.stage("sensitivities", expected_s=5.0):

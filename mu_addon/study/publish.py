@@ -36,24 +36,47 @@ FILES = {
     "deviation.csv": "deviation and rank of every path and rule",
     "delta.npz": "deviation over time and length of every path and rule, mm",
     "sensitivity.vtu": "how much stiffening each element alone would disturb the motion, mm (ParaView)",
+    "signals.csv": "what light along each path would tell of bending, beside how much it disturbs",
     "paths.csv": "every path of the lattice: length, predicted and, where it was solved, exact deviation",
+    "motion": "displacements, stress and stretch of every state, with and without a sensor, to look at",
     "summary.json": "every figure of this run",
     "log.ndjson": "what was said while it ran",
 }
 
 
 def publish(study: Study, stopped: str = "") -> None:
-    """Write report.html (and unit.png); `stopped` says why a study that is not complete stopped."""
+    """Write report.html (and unit.png); `stopped` says why a study that is not complete stopped.
+
+    A report that tells of more stages than were run now, from the same inputs, is left as it is.
+    """
     from .report import write_report
 
+    if study.has_more and (study.folder / "report.html").is_file():
+        return
     with study.progress.stage("report", expected_s=15.0):
         versions = package_versions()
-        study.ending.summary["versions"] = versions
         view, pictures = _pictures(study)
         if pictures:
             write_bytes(study.folder / "unit.png", pictures[0].png)
+        _panel_pictures(study)
         data = report_data(study, view, pictures, versions, stopped, _search_picture(study))
         write_report(study.folder / "report.html", data)
+
+
+def _panel_pictures(study: Study) -> None:
+    """The study's answers as pictures beside its motion, as far as the study came."""
+    from .panel_pictures import write_angle, write_delta
+
+    if study.trajectory is None or study.mesh is None:
+        return
+    states = study.trajectory.states
+    angles = np.array([bending_angle_deg(study.mesh, s.u) for s in states])
+    write_angle(study.folder, np.array([s.pressure_MPa * 1e3 for s in states]), angles)
+    rule = study.headline_rule
+    found = [e for e in study.evaluations.values() if e.rule == rule]
+    top = max((float(e.deviation.delta.max()) for e in found), default=0.0)
+    for e in found:
+        write_delta(study.folder, e.name, e.deviation.delta, study.trajectory.time_s, top)
 
 
 def report_data(
@@ -85,6 +108,7 @@ def report_data(
         headline_rule=study.headline_rule,
         search=study.search,
         search_picture=search_picture,
+        light=study.light,
         pressure_kPa=np.array([s.pressure_MPa * 1e3 for s in states]),
         angle_deg=np.array([bending_angle_deg(study.mesh, s.u) for s in states if study.mesh]),
         protocol_s=time if states else np.zeros(0),

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from ..sensing.signal import Law, Response
+    from ..sensing.tracing import Optics
 
 Floats = NDArray[np.floating[Any]]
 
@@ -85,6 +89,24 @@ class LatticeSearch:
 
 
 @attrs.frozen(eq=False)
+class Signals:
+    """What light would tell along each path, in the order of the study's windows.
+
+    at_rest: share of the light that arrives at rest; front: whether no path disturbs less and tells more;
+    sets: the pairs of paths that tell most of how bending is spread along the unit, best first.
+    """
+
+    optics: Optics
+    law: Law
+    names: tuple[str, ...]
+    responses: tuple[Response, ...]
+    at_rest: Floats
+    j_hat: Floats
+    front: tuple[bool, ...]
+    sets: tuple[tuple[tuple[str, ...], float], ...]
+
+
+@attrs.frozen(eq=False)
 class Picture:
     """An image with the words that go with it."""
 
@@ -118,6 +140,7 @@ class ReportData:
     headline_rule: str = "volume_fraction"  # whose chosen path is the answer
     search: LatticeSearch | None = None
     search_picture: Picture | None = None
+    light: Signals | None = None
     pressure_kPa: Floats = attrs.field(factory=lambda: np.zeros(0))  # per converged state
     angle_deg: Floats = attrs.field(factory=lambda: np.zeros(0))
     protocol_s: Floats = attrs.field(factory=lambda: np.zeros(0))

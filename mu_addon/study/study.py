@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import warnings
 from contextlib import closing
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 
 from ..design.anchors import Window, anchors, windows
 from ..design.export import write_nodes, write_stl
+from ..design.parameters import Material
 from ..design.solid import Solid, build_solid
 from ..design.strut_cell import strut_cell
 from ..errors import ConvergenceError, MeshingError
@@ -32,10 +34,15 @@ from ..placement.candidates import Candidate, Evaluation, candidates
 from ..placement.deviation import rank
 from .cache import Cache, key
 from .ending import Ending
-from .folder import claim, keep_inputs
-from .job import HEADER, LATTICE_LAW, Job
+from .folder import begin, keep_inputs, require_space
+from .job import Job
+from .motion import FOLDER as MOTION
+from .motion import write_model_a, write_path
 from .progress import Progress
-from .results import LatticeSearch
+from .publish import package_versions
+from .results import LatticeSearch, Signals
+from .study_file import FILES, HEADER, STAGES
+from .study_file import NAME as STUDY
 from .sweeping import PATH_DIFFERENCE_MM, Sweep
 from .vtk_out import write_mesh, write_trajectory
 
@@ -50,10 +57,17 @@ RESULTS = (
     "deviation.csv",
     "delta.npz",
     "sensitivity.vtu",
+    "signals.csv",
     "paths.csv",
     "report.html",
     "unit.png",
+    MOTION,
 )
+# Figures of summary.json that tell that a stage was run.
+_TELLS = {"design": "gates", "simulate": "angle_deg", "place": "chosen"}
+# What a study writes, with as much to spare: so much anyway, and so much a node and distinct pressure.
+_BYTES = {"interactive": 30_000_000, "export": 150_000_000}
+_BYTES_A_NODE = {"simulate": 300, "place": 1000}
 # A coarser twin of the mesh, to tell how far the mesh moves a ranking.
 COARSER = 0.7
 
@@ -76,26 +90,58 @@ class Study:
     warnings: list[str] = attrs.field(factory=list)
     solver: dict[str, Any] = attrs.field(factory=dict)
     search: LatticeSearch | None = None
+    light: Signals | None = None
     _ahead: Sweep | None = None
 
     @classmethod
     def open(cls, job: Job, folder: Path, progress: Progress, ending: Ending) -> Study:
-        """Make the folder a study's; results of other inputs are moved to stale/, never shown as current."""
-        texts = job.texts()
-        claim(folder, HEADER, texts, (*RESULTS, "unit_alpha[0-9]*.stl", "model_a"), optional=[LATTICE_LAW])
-        ending.open_folder(folder)
+        """Make the folder a study's; results of other inputs are moved to stale/, never shown as current.
+
+        What a job of more stages found there from the same inputs is kept. Raises InputError, also where
+        another process works in the folder, and OutputError, also where the disk has too little room.
+        """
+        ending.lock_folder(folder)
+        texts, current = job.texts_in(folder)
+        if current:
+            # Further stages of the same inputs make study.toml longer, and nothing stale.
+            keep_inputs(folder, {STUDY: texts[STUDY]})
+            ending.summary = _earlier(folder) | ending.summary
+        optional = [name for name in FILES.values() if name not in texts]
+        begin(ending, folder, HEADER, texts, (*RESULTS, "unit_alpha[0-9]*.stl", "model_a"), optional)
         study = cls(job, folder, progress, ending)
-        keep_inputs(folder, texts)
+        study._require_space(_expected_nodes(job) if "simulate" in job.stages else 0)
+        ending.summary["versions"] = package_versions()
         ending.summary["parameters"] = attrs.asdict(job.unit)
-        ending.summary["study"] = {"times": job.times, "stations": job.stations, "rules": job.rules}
-        ending.summary["study"] |= {"mesh": attrs.asdict(job.mesh), "mesher": job.mesher}
-        if job.lattice is not None:
-            ending.summary["study"]["lattice"] = attrs.asdict(job.lattice)
-            study._warn_of_another_cell()
-        study._warn_of_missed_corners()
-        if job.mesh.order == 1:
-            study.warn("Linear elements lock in thin walls: these answers are for a quick look only.")
+        if job.body is not None:
+            low, high = job.body.bounds.tolist()
+            ending.summary["body"] = {"low_mm": low, "high_mm": high, "triangles": len(job.body.triangles)}
+        if "simulate" in job.stages:
+            study._tell_settings()
         return study
+
+    def _tell_settings(self) -> None:
+        """Settings of the simulation in the summary, and warnings of what they leave out."""
+        job, summary = self.job, self.ending.summary
+        summary["study"] = {"times": job.times, "stations": job.stations, "rules": job.rules}
+        summary["study"] |= {"mesh": attrs.asdict(job.mesh), "mesher": job.mesher}
+        if job.lattice is not None:
+            summary["study"]["lattice"] = attrs.asdict(job.lattice)
+            self._warn_of_another_cell()
+        self._warn_of_missed_corners()
+        if job.mesh.order == 1:
+            self.warn("Linear elements lock in thin walls: these answers are for a quick look only.")
+
+    def _require_space(self, nodes: int) -> None:
+        """Raise OutputError where the disk has less room than a study with so many nodes takes."""
+        _, pressure = self.job.protocol.sample(self.job.times)
+        per_node = _BYTES_A_NODE["place" if "place" in self.job.stages else "simulate"]
+        require_space(self.folder, _BYTES[self.job.quality] + nodes * per_node * len(np.unique(pressure)))
+
+    @property
+    def has_more(self) -> bool:
+        """Whether the folder has the results of a further stage than this job's, from the same inputs."""
+        further = STAGES[len(self.job.stages) :]
+        return any(_TELLS[stage] in self.ending.summary for stage in further)
 
     @property
     def cache(self) -> Cache:
@@ -123,7 +169,7 @@ class Study:
         """Printable solid, its STL and the lattice nodes; with a window, the unit with that waveguide."""
         name = "unit.stl" if window is None else f"unit_{window.name}.stl"
         with self.progress.stage("solid" if window is None else f"solid with {window.name}", 3.0):
-            solid = build_solid(self.job.unit, window, self.job.quality)
+            solid = build_solid(self.job.unit, window, self.job.quality, self.job.body)
             write_stl(solid, self.folder / name)
             write_nodes(self.job.unit, self.folder / "anchors.txt")
         gates = {**attrs.asdict(solid.gates), "inner_volume_error": solid.gates.inner_volume_error}
@@ -136,14 +182,18 @@ class Study:
         """Analysis mesh and its quality; kept, since one of its meshers is not repeatable."""
         with self.progress.stage("mesh"):
             self.mesh = self._mesh(self.job.mesh)
-            self.quality = quality(self.mesh, self.job.unit)
+            self._require_space(len(self.mesh.nodes))
+            self.quality = quality(self.mesh, self.job.unit, self.job.body)
             modulus, _ = self.job.materials(self.mesh).small_strain(len(self.mesh.tets))
             write_mesh(self.folder / "mesh.vtu", self.mesh, modulus)
         self.ending.summary["mesh"] = {**attrs.asdict(self.quality), "hash": self.mesh.hash()}
         return self.mesh
 
     def _mesh(self, settings: MeshSettings) -> Mesh:
-        name = key(self.job.unit.hash(), attrs.astuple(settings), self.job.mesher)
+        # Only the shape: what it is made of, or called, leaves a mesh as it is.
+        shape = attrs.evolve(self.job.unit, name="shape", material=Material())
+        body = [] if self.job.body is None else [self.job.body.hash]
+        name = key(shape.hash(), attrs.astuple(settings), self.job.mesher, *body)
         found = self.cache.get("mesh", name)
         fields = [f.name for f in attrs.fields(Mesh)]
         if found is not None and set(found) == set(fields):
@@ -157,6 +207,7 @@ class Study:
                 lambda _, share: self.progress.update(share),
                 self.job.mesher,
                 self.cache.folder,
+                self.job.body,
             )
         fallback = [w for w in caught if issubclass(w.category, MeshingWarning)]
         for warning in fallback:
@@ -177,7 +228,9 @@ class Study:
         with self.progress.stage("Model A"):
             model = Model(self.mesh)
             if candidates_beside and self.job.workers > 1:
-                self._ahead = Sweep(self.job, self.cache, self.mesh, self._jobs(), pressure)
+                self._ahead = Sweep(
+                    self.job, self.cache, self.mesh, self._jobs(), pressure, self.headline_rule
+                )
             try:
                 self.trajectory = self._model_a(model, time, pressure, self._reached)
             except BaseException:
@@ -186,6 +239,7 @@ class Study:
                 self._keep_partial_motion()
                 raise
             self._write_motion(self.trajectory.states)
+            write_model_a(self.folder, self.mesh, self.job.materials(self.mesh), self.trajectory)
             self._look_for_contact(self.trajectory.states)
             self._look_beyond_the_fit(self.trajectory.states)
         states = [s for s in self.trajectory.states if s.pressure_MPa]
@@ -216,7 +270,9 @@ class Study:
         def keep(state: State) -> None:
             nonlocal done
             done += 1
-            self.progress.update(done / total)
+            self.progress.update(
+                done / total, f"{state.pressure_MPa * 1e3:.4g} kPa, residual {state.residual:.1e}"
+            )
             on_state(state)
 
         return simulate(
@@ -352,10 +408,16 @@ class Study:
         under_way: Sweep | None = None,
         verify: bool = False,
     ) -> list[Evaluation]:
-        """Evaluation of every (candidate, rule) on a mesh against its Model A; see `sweeping`."""
-        sweep = under_way or Sweep(self.job, self.cache, mesh, jobs, trajectory.pressure_kPa)
+        """Evaluation of every (candidate, rule) on a mesh against its Model A; see `sweeping`.
+
+        verify: of the study's own mesh; the paths' motion is then kept to be looked at, too.
+        """
+        whole = self.headline_rule if verify else ""
+        sweep = under_way or Sweep(self.job, self.cache, mesh, jobs, trajectory.pressure_kPa, whole)
         with closing(sweep):
             found = sweep.evaluations(trajectory, self.progress.update, verify)
+            for name, pressure_kPa, difference_mm in sweep.whole(trajectory):
+                write_path(self.folder, name, pressure_kPa, difference_mm)
         if sweep.path_difference_mm > PATH_DIFFERENCE_MM:
             self.warn(
                 "A candidate started from Model A's states was not where its own path from rest leads "
@@ -463,3 +525,22 @@ def extremes(pressure_kPa: Array) -> Array:
     """The pressures, ascending, that stand for a protocol: its extremes, without 0."""
     found = np.unique([pressure_kPa.min(), pressure_kPa.max()])
     return found[found != 0]
+
+
+def _earlier(folder: Path) -> dict[str, Any]:
+    """Figures of a folder's last run, as far as this version of the program found them."""
+    try:
+        found = json.loads((folder / "summary.json").read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return {}
+    if not isinstance(found, dict) or found.get("versions") != package_versions():
+        return {}
+    return {name: value for name, value in found.items() if name not in ("status", "reason", "warnings")}
+
+
+def _expected_nodes(job: Job) -> int:
+    """How many nodes a mesh will have, from those of mu-1.0x: 18 500 at a refinement of 1, 71 000 at 1.8."""
+    share = {"quarter": 0.5, "half": 1.0, "full": 2.0}[job.mesh.fraction]
+    of_order = {1: 0.15, 2: 1.0}[job.mesh.order]
+    units = job.unit.dimensions.count / 6
+    return int(share * of_order * units * (4_000 + 17_000 * job.mesh.refine**2.3))

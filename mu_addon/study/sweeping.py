@@ -30,11 +30,18 @@ PATH_DIFFERENCE_MM = 1e-5
 class Sweep:
     """Candidates, each under an inclusion rule, through a protocol's distinct pressures (s,) in kPa.
 
-    What is solved is kept in the cache. Close it, also when Model A failed.
+    What is solved is kept in the cache. Close it, also when Model A failed. whole: the rule whose
+    candidates' displacements of the whole mesh are kept, too, to be looked at.
     """
 
     def __init__(
-        self, job: Job, cache: Cache, mesh: Mesh, jobs: list[tuple[Candidate, str]], pressure_kPa: Array
+        self,
+        job: Job,
+        cache: Cache,
+        mesh: Mesh,
+        jobs: list[tuple[Candidate, str]],
+        pressure_kPa: Array,
+        whole: str = "",
     ) -> None:
         self._job, self._cache, self._mesh, self._jobs = job, cache, mesh, jobs
         unit = job.unit
@@ -42,8 +49,10 @@ class Sweep:
         self._radius = unit.dimensions.inclusion_radius
         sensor = unit.material.sensor_modulus_kPa / 1e3
         materials = job.materials(mesh)
+        self._whole = tuple(i for i, (_, rule) in enumerate(jobs) if rule == whole)
         self._sweeper = Sweeper(
-            Setting(mesh, materials, self._anchors, tuple(jobs), self._radius, sensor), job.workers
+            Setting(mesh, materials, self._anchors, tuple(jobs), self._radius, sensor, self._whole),
+            job.workers,
         )
         self._key = key(
             mesh.hash(),
@@ -68,8 +77,13 @@ class Sweep:
     def reached(self, state: State) -> None:
         """Start on a state that Model A has just reached, beside Model A's next one."""
         wanted = any(abs(state.pressure_MPa - p) < 1e-12 for p in self._certain)
-        if wanted and not self._cache.path("sweep", self._name(state)).exists():
+        if wanted and not all(self._cache.has(kind, self._name(state)) for kind in self._kinds):
             self._sweeper.submit(state)
+
+    @property
+    def _kinds(self) -> tuple[str, ...]:
+        """What is kept of a state."""
+        return ("sweep", "whole") if self._whole else ("sweep",)
 
     def evaluations(
         self, trajectory: Trajectory, on_progress: Callable[[float], None], verify: bool = False
@@ -144,15 +158,36 @@ class Sweep:
         """Number of each of some states and the anchors moved by every job, from the cache where there."""
         missing = []
         for number in numbers:
-            kept = self._cache.get("sweep", self._name(trajectory.states[number]))
-            if kept is None:
+            name = self._name(trajectory.states[number])
+            kept = self._cache.get("sweep", name)
+            if kept is None or not all(self._cache.has(kind, name) for kind in self._kinds):
                 missing.append(number)
             else:
                 yield number, kept["moved_mm"]
-        for position, points in self._sweeper.solve([trajectory.states[n] for n in missing]):
+        for position, moved in self._sweeper.solve([trajectory.states[n] for n in missing]):
             number = missing[position]
-            self._cache.put("sweep", self._name(trajectory.states[number]), {"moved_mm": points})
-            yield number, points
+            name = self._name(trajectory.states[number])
+            if self._whole:
+                self._cache.put("whole", name, {"difference_mm": moved.whole})
+            self._cache.put("sweep", name, {"moved_mm": moved.anchors})
+            yield number, moved.anchors
+
+    def whole(self, trajectory: Trajectory) -> Iterator[tuple[str, Array, Array]]:
+        """Name of each path whose displacement was kept, pressures (r,) in kPa and differences (r, n, 3).
+
+        In mm against Model A's, at the pressures that were solved from its states; none where every path was
+        solved from rest instead.
+        """
+        found = {
+            s.pressure_MPa * 1e3: self._cache.get("whole", self._name(s))
+            for s in trajectory.states
+            if any(abs(s.pressure_MPa * 1e3 - p) < 1e-9 for p in self.solved_kPa)
+        }
+        if self.path_difference_mm > PATH_DIFFERENCE_MM or not found:
+            return
+        kept = {p: arrays["difference_mm"] for p, arrays in found.items() if arrays is not None}
+        for row, job in enumerate(self._whole if len(kept) == len(found) else ()):
+            yield self._jobs[job][0].name, np.array(list(kept)), np.array([d[row] for d in kept.values()])
 
     def close(self) -> None:
         """End the processes."""

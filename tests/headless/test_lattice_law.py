@@ -19,7 +19,7 @@ def test_a_run_with_a_law_of_the_lattice_keeps_and_reports_it(tmp_path):
     write_effective(law, body_centred())
     done = run("simulate", *SMALL, "--out", folder, "--lattice", law)
     assert done.returncode == 0, done.stderr
-    study = tomllib.loads((folder / "study.toml").read_text())
+    study = tomllib.loads((folder / "study.toml").read_text())["simulate"]
     assert study["lattice"] == "effective.toml"
     assert len(study["lattice_sha256"]) == 64
     assert read_effective(folder / "effective.toml") == body_centred()

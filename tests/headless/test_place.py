@@ -47,6 +47,7 @@ def test_every_file_is_there(finished):
         "deviation.csv",
         "delta.npz",
         "sensitivity.vtu",
+        "signals.csv",
         "summary.json",
         "report.html",
         "study.toml",
@@ -85,6 +86,23 @@ def test_delta_agrees_with_the_table(finished):
         np.testing.assert_allclose(pressure, [0, -20, 0, 20, 40, 20, 0])
     J = [float(row["J_hat_mm"]) for row in rows(folder) if row["rule"] == "intersect"]
     np.testing.assert_allclose(delta.mean(axis=(1, 2)), J, rtol=1e-8)
+
+
+def test_light_is_weighed_beside_disturbance(finished):
+    folder, _ = finished
+    with (folder / "signals.csv").open(newline="") as file:
+        found = {row["path"]: row for row in csv.DictReader(file)}
+    assert list(found) == [f"alpha{k}" for k in range(1, 11)]
+    front = [row for row in found.values() if row["pareto"] == "1"]
+    least = min(found.values(), key=lambda row: float(row["J_hat_mm"]))
+    most = max(found.values(), key=lambda row: abs(float(row["sensitivity_per_deg"])))
+    assert least in front
+    assert most in front
+    for row in found.values():
+        # Wells on the stretched side lose light as the unit bends away from it.
+        assert float(row["sensitivity_per_deg"]) > 0
+        assert float(row["monotonic_from_deg"]) < 0 < float(row["monotonic_to_deg"])
+        assert 0 < float(row["transmitted_at_rest"]) < 1
 
 
 def test_summary_tells_what_a_reader_needs(finished):

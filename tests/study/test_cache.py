@@ -4,6 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mu_addon.files import write_npz
 from mu_addon.study.cache import Cache, key
 
 
@@ -33,6 +34,17 @@ def test_a_damaged_entry_is_missing_or_whole(tmp_path_factory, data):
     found = cache.get("state", "a")
     if found is not None and "u" in found:
         np.testing.assert_array_equal(found["u"], expected)
+
+
+def test_another_entry_under_this_name_is_missing(tmp_path):
+    cache = Cache(tmp_path)
+    cache.put("mesh", "a", {"x": np.arange(5.0)})
+    cache.path("mesh", "a").replace(cache.path("mesh", "b"))
+    assert cache.get("mesh", "b") is None
+    write_npz(cache.path("mesh", "a"), {"x": np.arange(5.0)})
+    assert not cache.has("mesh", "a")
+    cache.put("mesh", "a", {"x": np.arange(5.0)})
+    assert cache.has("mesh", "a")
 
 
 def test_keys_tell_inputs_apart():

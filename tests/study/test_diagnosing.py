@@ -15,6 +15,7 @@ from mu_addon.evidence import unit_fem
 from mu_addon.evidence.extended import load_model
 from mu_addon.evidence.prediction.lattice import LatticeStress
 from mu_addon.measured import read_folder
+from mu_addon.study import diagnosing
 from mu_addon.study.diagnosing import answer, diagnose_folder
 from mu_addon.study.ending import Ending, run_to_end
 from mu_addon.study.model_file import read_extended
@@ -110,6 +111,22 @@ def test_equal_data_leave_equal_bytes(overcured, tmp_path):
         assert (tmp_path / name).read_bytes() == (out / name).read_bytes()
 
 
+def test_the_same_data_are_not_judged_twice(overcured, tmp_path, monkeypatch):
+    folder, out, summary, _ = overcured
+    shutil.copytree(out, tmp_path / "out")
+    monkeypatch.setattr(diagnosing, "diagnose", None)
+    ending, told = run(folder, tmp_path / "out")
+    assert ending.status == 0
+    assert answer(ending.summary) == answer(summary)
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["status"] == "complete"
+    assert [m["stage"] for m in told if m["type"] == "progress" and m["state"] == "end"] == [
+        "verdict of the same data, kept"
+    ]
+    # A result that is gone is made again.
+    (tmp_path / "out" / "report.html").unlink()
+    assert run(folder, tmp_path / "out")[0].status != 0
+
+
 def test_other_data_set_the_old_results_aside(overcured, tmp_path):
     _, out, _, _ = overcured
     shutil.copytree(out, tmp_path / "out")
@@ -143,6 +160,8 @@ def test_three_moduli_of_the_paper_are_not_enough_to_tell(tmp_path):
     ):
         extended = read_extended(load_preset(preset), tmp_path / "model.toml").unit
         assert extended.material.lattice_modulus_kPa == pytest.approx(kPa, abs=spread)
+    assert load_model(tmp_path / "model.toml").nuisances["lattice_modulus_kPa"].unit == "kPa"
+    assert any("3 x 3 x 3 cells between plates that hold" in words for words in ending.summary["remarks"])
 
 
 def test_a_unit_is_judged_by_its_angle_and_markers(tmp_path, monkeypatch):

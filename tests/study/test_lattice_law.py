@@ -9,7 +9,7 @@ from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
 from mu_addon.homogenize.effective import read_effective
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.study.ending import Ending
+from mu_addon.study.ending import Ending, run_to_end
 from mu_addon.study.job import Job
 from mu_addon.study.progress import Progress
 from mu_addon.study.study import Study
@@ -27,9 +27,11 @@ JOB = Job(
 
 def simulated(folder, lattice):
     progress = Progress([])
-    study = Study.open(attrs.evolve(JOB, lattice=lattice), folder, progress, Ending(progress))
-    study.make_mesh()
-    study.simulate()
+    with run_to_end(progress) as ending:
+        study = Study.open(attrs.evolve(JOB, lattice=lattice), folder, progress, ending)
+        study.make_mesh()
+        study.simulate()
+    assert ending.status == 0
     return study
 
 

@@ -10,8 +10,10 @@ from mu_addon.design.parameters import Unit, load_preset
 from mu_addon.errors import InputError
 from mu_addon.evidence.extended import ExtendedModel, Fitted
 from mu_addon.evidence.prediction.lattice import LatticeStress
+from mu_addon.homogenize.offset_response import OffsetResponse
 from mu_addon.measured import Experiment
-from mu_addon.study.model_file import extend, read_extended
+from mu_addon.study.model_file import extend, read_extended, require_same_print
+from tests.homogenize.lattice_laws import body_centred
 
 
 def model(verdict="named", **values):
@@ -102,8 +104,32 @@ def test_a_unit_that_breaks_a_rule_with_it_is_refused_by_the_models_name():
     assert caught.value.where == "there/model.toml"
 
 
+def test_a_computed_block_hands_its_stiffness_to_the_unit():
+    """By its own response, not by slender struts; and the unit's print has the offset too."""
+    response = OffsetResponse([0.0, 0.1, 0.2, 0.3], [0.004, 0.006, 0.008, 0.01], [0.1, 0.12, 0.14, 0.16])
+    known = model(lattice_modulus_kPa=10.0, overcure__offset_mm=0.15)
+    found = extend(load_preset("mu-0.75x"), attrs.evolve(known, lattice=response)).unit
+    # 0.15 mm at 0.75x is 0.2 mm at 1.0x: twice as stiff as drawn.
+    assert found.material.lattice_modulus_kPa == pytest.approx(20.0, rel=1e-9)
+    assert found.print.offset_xy_mm == 0.15
+
+
+def test_a_law_of_struts_as_drawn_is_refused_beside_a_model_that_prints_them_thicker():
+    unit = extend(Unit(), model(overcure__offset_mm=0.1)).unit
+    drawn, printed = (
+        attrs.evolve(body_centred(), cell={"offset_xy_mm": o, "offset_z_mm": o}) for o in (0.0, 0.1)
+    )
+    require_same_print(unit, printed, "model.toml")
+    with pytest.raises(InputError, match=r"offset_xy_mm = 0\.1, .*struts with 0") as caught:
+        require_same_print(unit, drawn, "model.toml")
+    assert "homogenize" in caught.value.remedy
+
+
 def test_a_model_is_the_same_from_its_file(tmp_path):
-    known = model(overcure__offset_mm=0.05, modulus_factor=1.2)
+    response = OffsetResponse([0.0, 0.1, 0.2, 0.3], [0.004, 0.006, 0.008, 0.01], [0.1, 0.12, 0.14, 0.16])
+    known = attrs.evolve(
+        model(overcure__offset_mm=0.05, modulus_factor=1.2, lattice_modulus_kPa=12.0), lattice=response
+    )
     known.save(tmp_path / "model.toml")
     assert read_extended(Unit(), tmp_path / "model.toml") == extend(Unit(), known)
     with pytest.raises(InputError, match="cannot read"):

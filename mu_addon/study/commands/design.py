@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from .options import add_unit
-from .study import EXAMPLE, add_solid, answer, run
+from .study import EXAMPLE, add_body, add_solid, answer, run
 
 if TYPE_CHECKING:
     from .options import Commands
@@ -18,6 +18,7 @@ def add(commands: Commands[Any]) -> None:
     command = commands.add_parser("design", help="printable solid, STL and lattice nodes", epilog=EXAMPLE)
     add_unit(command)
     add_solid(command)
+    add_body(command)
     command.add_argument(
         "--path", metavar="NAME", help="also the unit with a waveguide along this path, alpha1 .."
     )

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Any
 from .options import modelled_unit
 
 if TYPE_CHECKING:
+    from ...design.anchors import Window
+    from ...design.body import Body
+    from ...design.parameters import Unit
     from ..ending import Ending
     from ..progress import Progress
     from ..study import Study
@@ -23,6 +26,16 @@ def add_solid(command: argparse.ArgumentParser) -> None:
         choices=("interactive", "export"),
         default="interactive",
         help="facets of the STL (interactive)",
+    )
+
+
+def add_body(command: argparse.ArgumentParser) -> None:
+    """A body of the user's own around the chambers."""
+    command.add_argument(
+        "--body",
+        metavar="FILE",
+        help="closed surface (STL, OBJ or PLY; mm, in the unit's frame) that the lattice fills in place of "
+        "its box; cut off flat at the unit's ends",
     )
 
 
@@ -61,6 +74,7 @@ def _open(options: argparse.Namespace, progress: Progress, ending: Ending) -> St
     from ...meshing.settings import MeshSettings
     from ...placement.graph import Limits
     from ..job import Job, protocol_of
+    from ..model_file import require_same_print
     from ..study import Study
 
     unit = modelled_unit(options, progress, ending)
@@ -83,9 +97,32 @@ def _open(options: argparse.Namespace, progress: Progress, ending: Ending) -> St
             "limits": Limits(options.shortest_cells, options.longest_cells, options.bend_deg),
             "most_checks": options.checks,
         }
+    if extra.get("lattice") is not None and ending.summary.get("model", {}).get("applied"):
+        require_same_print(unit, extra["lattice"], options.model)
     protocol = protocol_of(getattr(options, "protocol", None))
-    job = Job(unit=unit, protocol=protocol, quality=options.quality, **extra)
+    if getattr(options, "body", None) is not None:
+        extra["body"] = _body(options, unit)
+    job = Job(unit=unit, protocol=protocol, quality=options.quality, stages=options.stages, **extra)
     return Study.open(job, Path(options.out), progress, ending)
+
+
+def _body(options: argparse.Namespace, unit: Unit) -> Body:
+    """The body of --body, cut to the unit's length; raises InputError, also where a path leaves it."""
+    from ...design.anchors import windows
+    from ...design.body import envelope, read_body, require_path_inside
+    from ...errors import InputError
+
+    body = envelope(read_body(options.body), unit.dimensions)
+    if "place" in options.stages:
+        if options.paths == "graph":
+            raise InputError(
+                "the search of the whole lattice knows the lattice's box only",
+                "--body, --paths graph",
+                "leave one of them out",
+            )
+        for window in windows(unit.chambers.count):
+            require_path_inside(body, unit, window)
+    return body
 
 
 def _run(study: Study, options: argparse.Namespace) -> None:
@@ -98,21 +135,32 @@ def _run(study: Study, options: argparse.Namespace) -> None:
         from ..graph_search import chains_within
 
         chains_within(study.job)
+    run_stages(study, path)
+    publish(study)
+
+
+def run_stages(study: Study, path: Window | None = None) -> None:
+    """Every stage of a study's job; path: also the unit with a waveguide along it."""
+    from ...design.anchors import window
+
     study.design()
     if path is not None:
         study.design(path)
-    if "simulate" in options.stages:
+    stages = study.job.stages
+    if "simulate" in stages:
         study.make_mesh()
-        study.simulate(candidates_beside="place" in options.stages)
-    if "place" in options.stages:
+        study.simulate(candidates_beside="place" in stages)
+    if "place" in stages:
+        from ...sensing.tracing import Optics
         from ..graph_search import search_graph, sensitivity_map
+        from ..signals import signals
 
         chosen = study.place()
         sensitivity_map(study)
+        signals(study, Optics())
         if study.job.paths == "graph":
             search_graph(study)
         study.design(window(study.job.unit, chosen[study.headline_rule]))
-    publish(study)
 
 
 def answer(summary: dict[str, Any]) -> list[str]:

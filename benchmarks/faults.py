@@ -1,0 +1,314 @@
+"""Faults done to a study, to its process, its disk and its files, and the digits that it finds after them.
+
+    python benchmarks/faults.py                 # all, 50 kills
+    python benchmarks/faults.py --kills 5 disk  # some of them
+
+The study is the main job on a coarse mesh. Whatever is done to it, the same command must then find the same
+deviations, to the last digit, as a run that nothing happened to.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
+
+from circumstances import circumstances  # noqa: E402
+
+from mu_addon.design.parameters import load_preset  # noqa: E402
+from mu_addon.meshing.settings import MeshSettings  # noqa: E402
+from mu_addon.study.commands.study import run_stages  # noqa: E402
+from mu_addon.study.ending import run_to_end  # noqa: E402
+from mu_addon.study.folder import keep_inputs  # noqa: E402
+from mu_addon.study.job import Job, grasp  # noqa: E402
+from mu_addon.study.progress import Progress  # noqa: E402
+from mu_addon.study.study import Study  # noqa: E402
+
+JOB = Job(
+    load_preset("mu-1.0x"),
+    grasp(),
+    mesh=MeshSettings(refine=0.4, order=1),
+    times=7,
+    stations=11,
+    rules=("volume_fraction",),
+    mesh_check=False,
+)
+SEED = 20
+
+
+def new(folder):
+    keep_inputs(folder, JOB.texts())
+    return folder
+
+
+def start(folder, **options):
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *options.pop("path", [])])}
+    command = [
+        sys.executable,
+        str(ROOT / "headless" / "run.py"),
+        "resume",
+        str(folder),
+        "--no-report",
+        "--json",
+    ]
+    return subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+        env=environment, **options,
+    )  # fmt: skip
+
+
+def finish(folder, **options):
+    """Exit status of a run to its end, and its last message."""
+    process = start(folder, **options)
+    said, _ = process.communicate()
+    lines = said.splitlines()
+    return process.returncode, json.loads(lines[-1]) if lines else {}
+
+
+def digits(folder):
+    """Every array that the study found, by name."""
+    with np.load(folder / "delta.npz") as stored:
+        return {name: stored[name].tobytes() for name in stored.files}
+
+
+def mended(folder, reference):
+    """Whether the same command goes on to the same digits."""
+    status, _ = finish(folder)
+    return "same digits" if status == 0 and digits(folder) == reference else f"FAILED (exit {status})"
+
+
+def kills(work, reference, count):
+    """SIGKILL at moments spread evenly over a run, again and again until each run is through.
+
+    Each run is a fork of this process, which has imported all there is to import: that alone would otherwise
+    take most of the time, and most of the kills.
+    """
+    rng = np.random.default_rng(SEED)
+    begun = time.monotonic()
+    assert os.waitstatus_to_exitcode(os.waitpid(forked(new(work / "timed")), 0)[1]) == 0
+    seconds = time.monotonic() - begun
+    folder, number, done, stages, sound = new(work / "kill0"), 0, 0, Counter(), 0
+    while done < count:
+        child, end = forked(folder), time.monotonic() + rng.uniform(0, seconds)
+        ended = 0
+        while not ended and time.monotonic() < end:
+            time.sleep(0.005)
+            ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
+            sound += same(folder, reference, os.waitstatus_to_exitcode(status))
+            number += 1
+            folder = new(work / f"kill{number}")
+        else:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+            done += 1
+            stages[stage_of(folder)] += 1
+    status, _ = finish(folder)
+    sound += same(folder, reference, status)
+    where = ", ".join(f"{name} {n}" for name, n in stages.most_common())
+    yield (
+        f"kill -9 at {count} random moments ({where})",
+        f"{sound} of the {number + 1} studies that they hit came to an end with the same digits",
+    )
+
+
+def forked(folder):
+    """Process number of a run of the folder's study, a fork of this process."""
+    child = os.fork()
+    if child:
+        return child
+    status = 70
+    try:
+        with run_to_end(Progress()) as ending:
+            run_stages(Study.open(attrs.evolve(JOB, workers=1), folder, ending.progress, ending))
+        status = ending.status
+    finally:
+        os._exit(status)
+
+
+def same(folder, reference, status):
+    return status == 0 and digits(folder) == reference
+
+
+def stage_of(folder):
+    try:
+        messages = [json.loads(line) for line in (folder / "log.ndjson").read_text().splitlines()]
+    except (OSError, ValueError):
+        return "start"
+    running = [m["stage"] for m in messages if m["type"] == "progress" and m["state"] in ("start", "run")]
+    return running[-1] if running else "start"
+
+
+def wait_for(process, folder, pattern):
+    """Until the study has written a file of that pattern."""
+    while process.poll() is None and not list(folder.glob(pattern)):
+        time.sleep(0.01)
+
+
+def disk(work, reference):
+    """A disk of its own, filled or made read-only while the study runs on it."""
+    mount = work / "disk"
+    mount.mkdir()
+    made = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=60M", "none", mount], capture_output=True)
+    if made.returncode:
+        yield "a full disk", "not tried: no right to mount one"
+        yield "a disk made read-only", "not tried: no right to mount one"
+        return
+    try:
+        (mount / "filler").write_bytes(b"x" * 40_000_000)
+        status, told = finish(new(mount / "study"))
+        yield "20 MB free before it starts", f'exit {status} at once, "{told["what"]}"'
+        (mount / "filler").unlink()
+        subprocess.run(["mount", "-o", "remount,ro", mount], check=True)
+        status, told = finish(mount / "study")
+        subprocess.run(["mount", "-o", "remount,rw", mount], check=True)
+        yield "the disk is read-only before it starts", f'exit {status}, "{told["what"]}"'
+        for pattern, what in (("cache/mesh-*", "after the mesh"), ("cache/sweep-*", "among the candidates")):
+            folder = new(mount / what.split()[-1])
+            process = start(folder)
+            wait_for(process, folder, pattern)
+            fill(mount / "filler")
+            told = json.loads(process.communicate()[0].splitlines()[-1])
+            half = [p.name for p in folder.rglob("*.part*")]
+            (mount / "filler").unlink()
+            outcome = f'exit {process.returncode}, "{told["what"]}"; {len(half)} half files'
+            yield f"the disk is full {what}", f"{outcome}; then {mended(folder, reference)}"
+            shutil.rmtree(folder)
+        folder = new(mount / "again")
+        process = start(folder)
+        wait_for(process, folder, "cache/state-*")
+        # Busy while a file is open for writing: tried until it is not.
+        while subprocess.run(["mount", "-o", "remount,ro", mount], capture_output=True).returncode:
+            time.sleep(0.005)
+            if process.poll() is not None:
+                break
+        told = json.loads(process.communicate()[0].splitlines()[-1])
+        subprocess.run(["mount", "-o", "remount,rw", mount], check=True)
+        yield (
+            "the disk is made read-only while it runs",
+            f'exit {process.returncode}, "{told["what"]}"; then {mended(folder, reference)}',
+        )
+    finally:
+        subprocess.run(["umount", mount], check=False)
+
+
+def fill(path):
+    with path.open("wb", buffering=0) as stream:
+        try:
+            while True:
+                stream.write(b"x" * 65536)
+        except OSError:
+            pass
+
+
+def small_files(work, reference):
+    """A limit on the size of a file, below what the solid needs."""
+    folder = new(work / "small")
+    limit = 1_000_000
+    status, told = finish(
+        folder, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+    )
+    yield "no file may exceed 1 MB", f'exit {status}, "{told["what"]}"; then {mended(folder, reference)}'
+
+
+def damage(work, reference):
+    """Every file of a finished study's cache cut short, or with one bit flipped."""
+    rng = np.random.default_rng(SEED)
+    for what in ("cut short", "one bit flipped"):
+        folder = shutil.copytree(work / "reference", work / what.replace(" ", "-"))
+        files = list((folder / "cache").glob("*.npz"))
+        for path in files:
+            whole = bytearray(path.read_bytes())
+            if what == "cut short":
+                del whole[int(rng.integers(len(whole))) :]
+            else:
+                whole[int(rng.integers(len(whole)))] ^= 1 << int(rng.integers(8))
+            path.write_bytes(whole)
+        yield f"all {len(files)} files of the cache {what}", mended(folder, reference)
+
+
+BACKWARDS = """
+import time
+real, begun = time.time, time.monotonic()
+time.time = lambda: real() - (86400 if time.monotonic() - begun > 3 else 0)
+"""
+
+
+def clock(work, reference):
+    """The clock a day back 3 s into the run, and files from the future."""
+    folder = new(work / "clock")
+    (work / "backwards").mkdir()
+    (work / "backwards" / "sitecustomize.py").write_text(BACKWARDS)
+    process = start(folder, path=[str(work / "backwards")])
+    wait_for(process, folder, "cache/sweep-*")
+    process.kill()
+    process.communicate()
+    future = time.time() + 3e7
+    for path in folder.rglob("*"):
+        os.utime(path, (future, future))
+    yield "the clock set back a day, files from next year, and a kill", mended(folder, reference)
+
+
+def two_at_once(work, reference):
+    folder = new(work / "two")
+    first = start(folder)
+    wait_for(first, folder, "cache/mesh-*")
+    status, told = finish(folder)
+    first.communicate()
+    yield (
+        "a second run in the same folder",
+        f'exit {status}, "{told["what"].split(":")[0]}"; the first: {mended(folder, reference)}',
+    )
+
+
+FAULTS = {
+    "kills": kills,
+    "disk": disk,
+    "small_files": small_files,
+    "damage": damage,
+    "clock": clock,
+    "two_at_once": two_at_once,
+}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("faults", nargs="*", choices=[*FAULTS, []], help=", ".join(FAULTS))
+    parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument("--reference", type=Path, help="a folder of this study, finished, to compare with")
+    given = parser.parse_args()
+    print(circumstances())
+    with tempfile.TemporaryDirectory() as name:
+        work = Path(name)
+        if given.reference is None:
+            before = time.monotonic()
+            status, told = finish(new(work / "reference"))
+            assert status == 0, told
+            print(f"A run that nothing happens to takes {time.monotonic() - before:.0f} s.\n")
+        else:
+            shutil.copytree(given.reference, work / "reference")
+        reference = digits(work / "reference")
+        print("| fault | what came of it |\n| --- | --- |")
+        for fault in given.faults or FAULTS:
+            more = (given.kills,) if fault == "kills" else ()
+            for what, outcome in FAULTS[fault](work, reference, *more):
+                print(f"| {what} | {outcome} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,192 @@
+"""A run in a process of its own, which tells one JSON message a line; no thread, no bpy.
+
+The child writes to files and `poll` reads what has been added since: nothing blocks, nothing fills up, and
+what the child said is still there when its parent is not. Blender's panels and sweeps watch their runs by it.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ..errors import MuError
+from ..files import make_folder, output_error
+
+PATIENCE_S = 20.0
+"""Seconds that a child which was asked to stop may take to write what it has, before it is killed."""
+MESSAGES, ERRORS = "messages.ndjson", "stderr.txt"
+RUNNING, DONE, FAILED, CANCELLED = "running", "done", "failed", "cancelled"
+
+
+class Child:
+    """One process and what it has said; `state` is running, done, failed or cancelled.
+
+    progress: its latest such message; warnings: texts; result, error: its last message, whichever.
+    """
+
+    def __init__(
+        self,
+        command: Sequence[str],
+        folder: Path,
+        environment: Mapping[str, str],
+        ends_with_parent: bool = False,
+    ) -> None:
+        """Start `command`, its words kept in `folder`: messages.ndjson and stderr.txt. Raises MuError.
+
+        ends_with_parent: hold the child's standard input open, by whose end `processes.end_with_input` knows
+        that this process is gone.
+        """
+        make_folder(folder)
+        self.folder = folder
+        self.state = RUNNING
+        self.progress: dict[str, Any] = {}
+        self.warnings: list[str] = []
+        self.result: dict[str, Any] | None = None
+        self.error: dict[str, Any] | None = None
+        self.started = time.monotonic()
+        self.seconds = 0.0
+        self.garbage = 0
+        self._asked: float | None = None
+        self._rest = b""
+        try:
+            out, err = (folder / MESSAGES).open("wb"), (folder / ERRORS).open("wb")
+            self._stream = (folder / MESSAGES).open("rb")
+        except OSError as error:
+            raise output_error(error, folder / MESSAGES) from error
+        with out, err:
+            try:
+                self._process = subprocess.Popen(
+                    list(command),
+                    stdin=subprocess.PIPE if ends_with_parent else subprocess.DEVNULL,
+                    stdout=out,
+                    stderr=err,
+                    env=dict(environment),
+                    start_new_session=True,
+                )
+            except OSError as error:
+                self._stream.close()
+                raise MuError(
+                    f"the process cannot start: {error.strerror or error}",
+                    str(command[0]),
+                    "reinstall mu_addon; in Blender, the extension built for this Blender and system",
+                ) from error
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._process.pid
+
+    @property
+    def stopping(self) -> bool:
+        """Whether it was asked to stop and has not stopped yet."""
+        return self.state == RUNNING and self._asked is not None
+
+    def poll(self) -> bool:
+        """Read what is new; returns whether there was anything. Never waits."""
+        if self.state != RUNNING:
+            return False
+        self.seconds = time.monotonic() - self.started
+        # Asked first: what an ended child has said is then all there.
+        status = self._process.poll()
+        new = self._read()
+        if self._asked is not None and status is None and time.monotonic() - self._asked > PATIENCE_S:
+            self._process.kill()
+        if status is not None:
+            self._end(status)
+            return True
+        return new
+
+    def cancel(self) -> None:
+        """Ask it to stop; it keeps what it has finished. One that does not answer is killed later."""
+        if self.state == RUNNING and self._asked is None:
+            self._asked = time.monotonic()
+            self._process.terminate()
+
+    def tell(self, words: str) -> None:
+        """Write a line to its standard input, which `ends_with_parent` holds open; the ended hear nothing."""
+        if self.state == RUNNING and self._process.stdin is not None:
+            # It ended this moment: the next poll says so.
+            with suppress(OSError):
+                self._process.stdin.write(f"{words}\n".encode())
+                self._process.stdin.flush()
+
+    def kill(self) -> None:
+        """End it at once."""
+        if self.state == RUNNING:
+            self._process.kill()
+            self._end(self._process.wait())
+
+    def _read(self) -> bool:
+        added = self._stream.read()
+        *lines, self._rest = (self._rest + added).split(b"\n")
+        for line in lines:
+            self._hear(line)
+        return bool(added)
+
+    def _hear(self, line: bytes) -> None:
+        if not line.strip():
+            return
+        try:
+            message = json.loads(line)
+        except ValueError:
+            message = None
+        kind = message.get("type") if isinstance(message, dict) else None
+        if kind == "progress":
+            self.progress = message
+        elif kind == "warning":
+            self.warnings.append(str(message.get("what", "")))
+        elif kind == "result":
+            self.result = message
+        elif kind == "error":
+            self.error = message
+        else:
+            # Blender and libraries write to standard output, too: that is in the file, and no reason to stop.
+            self.garbage += 1
+
+    def _end(self, status: int) -> None:
+        self._read()
+        self._stream.close()
+        if self._process.stdin is not None:
+            with suppress(OSError):
+                self._process.stdin.close()
+        if self._asked is not None:
+            self.state = CANCELLED
+        elif self.result is not None and status == 0:
+            self.state = DONE
+        else:
+            self.state = FAILED
+            if self.error is None:
+                self.error = self._wordless(status)
+
+    def _wordless(self, status: int) -> dict[str, Any]:
+        tail = " / ".join(_last_lines(self.folder / ERRORS, 3)) or "it left no message"
+        return {
+            "what": f"the process ended without a word ({_ending(status)}): {tail}",
+            "where": str(self.folder / ERRORS),
+            "what_to_do": "open the log; run again, it resumes where it stopped. If memory was short, close "
+            "other programs first",
+            "status": status,
+        }
+
+
+def _ending(status: int) -> str:
+    if status >= 0:
+        return f"exit status {status}"
+    try:
+        return f"ended by {signal.Signals(-status).name}"
+    except ValueError:
+        return f"ended by signal {-status}"
+
+
+def _last_lines(path: Path, count: int) -> list[str]:
+    try:
+        text = path.read_bytes()[-4000:].decode("utf-8", "replace")
+    except OSError:
+        return []
+    return [line.strip() for line in text.splitlines() if line.strip()][-count:]

@@ -1,0 +1,41 @@
+"""Point caches in the PC2 format, which animation programs play: positions of one mesh, sample by sample."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..files import write_bytes
+
+Array = np.ndarray[Any, Any]
+
+_HEADER = "<12siiffi"
+_MAGIC = b"POINTCACHE2\0"
+
+
+def write_pc2(path: Path, positions: Array, start_s: float, step_s: float) -> None:
+    """Write positions (k, p, 3) at k samples, `step_s` apart from `start_s` on. Raises OutputError.
+
+    Little-endian, single precision: 12 letters, version 1, points, start, step, samples, then the points.
+    """
+    samples, points, _ = positions.shape
+    head = struct.pack(_HEADER, _MAGIC, 1, points, start_s, step_s, samples)
+    write_bytes(path, head + np.ascontiguousarray(positions, "<f4").tobytes())
+
+
+def read_pc2(path: Path) -> tuple[Array, float, float]:
+    """Positions (k, p, 3), start and step in s of a PC2 file; raises InputError where it is none."""
+    try:
+        data = path.read_bytes()
+        magic, version, points, start, step, samples = struct.unpack_from(_HEADER, data)
+    except (OSError, struct.error) as error:
+        raise InputError(f"cannot read the point cache: {error}", str(path)) from None
+    size = struct.calcsize(_HEADER)
+    if magic != _MAGIC or version != 1 or len(data) != size + 12 * points * samples:
+        raise InputError("not a whole point cache of version 1", str(path), "write it again")
+    positions = np.frombuffer(data, "<f4", offset=size).reshape(samples, points, 3)
+    return positions, start, step

@@ -1,0 +1,138 @@
+"""The second aim of a placement: how well light along each candidate path would tell the bending."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+from ..fem.kinematics import bending_angle_deg, probe
+from ..files import write_csv
+from ..sensing.guide import Centreline
+from ..sensing.signal import Guided, Law, best_sets, fit_law, pareto, response, through
+from ..sensing.tracing import Optics
+from .cache import key
+from .results import Signals
+
+if TYPE_CHECKING:
+    from .study import Study
+
+Array = np.ndarray[Any, Any]
+
+TABLE = "signals.csv"
+# Of what is read, as a share of the light: a photodiode and a 10 bit converter.
+NOISE = 0.005
+# How much the curvature of one cell of the backbone varies, 1/mm: a fifth of the unit's at 40 degrees.
+SPREAD = 0.002
+
+
+def optics_of(words: Sequence[str]) -> Optics:
+    """The resin's optics with what NAME=VALUE pairs change; raises InputError."""
+    names = [field.name for field in attrs.fields(Optics)]
+    values: dict[str, float] = {}
+    for word in words:
+        name, _, value = word.partition("=")
+        try:
+            values[name] = float(value)
+        except ValueError:
+            name = ""
+        if name not in names:
+            raise InputError(f"{word!r} is not understood", "--light", f"NAME=VALUE with {', '.join(names)}")
+    return Optics(**values)
+
+
+def signals(study: Study, optics: Optics) -> Signals:
+    """Follow light along every candidate path through the motion of Model A, after the paths were ranked."""
+    assert study.mesh is not None
+    assert study.trajectory is not None
+    d = study.job.unit.printed
+    with study.progress.stage("light", expected_s=10.0):
+        law = _law(study, optics)
+        monitor = probe(study.mesh, study.anchors)
+        states = study.trajectory.states
+        angle = np.array([bending_angle_deg(study.mesh, s.u) for s in states])
+        nodes = np.array([study.anchors + monitor.displacement(s.u) for s in states])
+        responses, at_rest, slopes = [], [], []
+        for window in study.windows:
+            path = study.anchors[window.indices]
+            lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+            guided = Guided.straight(d, float(lengths[-1]) + 2 * d.waveguide_end)
+            lines = [through(now[window.indices], lengths, d.waveguide_end) for now in nodes]
+            shares = np.array([law.transmitted(guided, line) for line in lines])
+            responses.append(response(angle, shares))
+            at_rest.append(float(np.interp(0.0, responses[-1].angle_deg, responses[-1].transmitted)))
+            slopes.append(_by_cell(law, guided, lines[0], study.anchors, path, d.waveguide_end))
+    J = np.array([study.evaluations[w.name, study.headline_rule].deviation.J_hat for w in study.windows])
+    names = tuple(w.name for w in study.windows)
+    sets = best_sets(SPREAD * np.array(slopes), NOISE, 2) if len(names) > 1 else []
+    found = Signals(
+        optics=optics,
+        law=law,
+        names=names,
+        responses=tuple(responses),
+        at_rest=np.array(at_rest),
+        j_hat=J,
+        front=tuple(pareto(J.tolist(), [r.sensitivity_per_deg for r in responses])),
+        sets=tuple((tuple(names[i] for i in chosen), value) for chosen, value in sets),
+    )
+    study.light = found
+    _write(study, found)
+    return found
+
+
+def _law(study: Study, optics: Optics) -> Law:
+    """The fast law of this unit's waveguide, from the cache if it was fitted before."""
+    d = study.job.unit.printed
+    sizes = (
+        d.cell, d.waveguide_section, d.well_width, d.well_depth, d.well_pitch, d.waveguide_end,
+        d.junction_diameter,
+    )  # fmt: skip
+    name = key("light", sizes, attrs.astuple(optics))
+    stored = study.cache.get("light", name)
+    if stored is None:
+        law = fit_law(d, optics, on_trace=study.progress.update)
+        study.cache.put("light", name, {"coefficients": law.coefficients, "rms": np.array(law.rms)})
+        return law
+    return Law(stored["coefficients"], float(stored["rms"]))
+
+
+def _by_cell(law: Law, guided: Guided, line: Centreline, anchors: Array, path: Array, end: float) -> Array:
+    """d log(light) by the curvature of each cell along the anchors, (n,) in mm, at rest."""
+    wells = np.asarray(guided.wells) - end + path[0, 2]
+    edges = np.concatenate([[-np.inf], (anchors[1:, 2] + anchors[:-1, 2]) / 2, [np.inf]])
+    return -law.coefficients[3] * np.histogram(wells, edges)[0]
+
+
+def _write(study: Study, found: Signals) -> None:
+    rows = []
+    for k, name in enumerate(found.names):
+        r = found.responses[k]
+        rows.append(
+            (
+                name,
+                f"{found.j_hat[k]:.9g}",
+                f"{r.sensitivity_per_deg:.6g}",
+                f"{r.monotonic_deg[0]:.4g}",
+                f"{r.monotonic_deg[1]:.4g}",
+                f"{r.span:.6g}",
+                f"{found.at_rest[k]:.6g}",
+                int(found.front[k]),
+            )
+        )
+    columns = [
+        "path", "J_hat_mm", "sensitivity_per_deg", "monotonic_from_deg", "monotonic_to_deg", "span",
+        "transmitted_at_rest", "pareto",
+    ]  # fmt: skip
+    write_csv(study.folder / TABLE, columns, rows)
+    by_name = dict(zip(found.names, found.responses, strict=True))
+    study.ending.summary["light"] = {
+        "optics": attrs.asdict(found.optics),
+        "law_rms": found.law.rms,
+        "sensitivity_per_deg": {n: r.sensitivity_per_deg for n, r in by_name.items()},
+        "monotonic_deg": {n: r.monotonic_deg for n, r in by_name.items()},
+        "pareto": [n for n, on in zip(found.names, found.front, strict=True) if on],
+        "pairs": [{"paths": names, "information": value} for names, value in found.sets],
+    }

@@ -1,0 +1,50 @@
+"""What a study's summary says as the columns of a sweep's table: figures with their unit in the name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+Row = dict[str, Any]
+
+
+def figures(summary: Mapping[str, Any], density_g_per_ml: float) -> Row:
+    """Figures of a study as far as its stages went; angle_deg at every pressure has a column of its own."""
+    found: Row = {}
+    solid = (summary.get("gates") or {}).get("unit.stl") or {}
+    if "volume_mm3" in solid:
+        found["volume_mm3"] = solid["volume_mm3"]
+        found["mass_g"] = solid["volume_mm3"] * density_g_per_ml / 1e3
+    mesh = summary.get("mesh") or {}
+    for name in ("cavity_volume_mm3", "nodes"):
+        if name in mesh:
+            found[name] = mesh[name]
+    angles = {float(p): a for p, a in (summary.get("angle_deg") or {}).items()}
+    if angles:
+        found["angle_lowest_deg"], found["angle_highest_deg"] = min(angles.values()), max(angles.values())
+        found["angle_range_deg"] = max(angles.values()) - min(angles.values())
+        found |= {f"angle_deg at {p:g} kPa": angles[p] for p in sorted(angles) if p}
+        crossed = summary.get("walls_cross_at_kPa") or {}
+        found["walls_cross_at_kPa"] = " ".join(sorted(crossed, key=float))
+    for rule, name in (summary.get("chosen") or {}).items():
+        found[f"chosen {rule}"] = name
+        found[f"J_hat_mm {rule}"] = summary["J_hat_mm"][rule][name]
+        found[f"tied {rule}"] = " ".join(summary["tied_with_chosen"][rule])
+    best = (summary.get("search") or {}).get("best")
+    if best:
+        found |= {"J_hat_mm lattice": best["J_hat_mm"], "length_mm lattice": best["length_mm"]}
+    return found
+
+
+def columns(rows: Sequence[Row]) -> list[str]:
+    """Names of all columns, in the order in which rows first have them."""
+    return list(dict.fromkeys(name for row in rows for name in row))
+
+
+def cell(value: Any) -> Any:
+    """A value as it stands in the table: lists as words, nothing as nothing."""
+    if value is None:
+        return ""
+    if isinstance(value, list | tuple):
+        return " ".join(map(str, value))
+    return value

@@ -1,0 +1,46 @@
+"""Points of a sweep in the unit cube: more can be added later, and those that were there stay."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, Any]
+
+METHODS = ("grid", "latin_hypercube", "sobol")
+
+
+def sample(method: str, count: int, dimensions: int, seed: int, before: Array | None = None) -> Array:
+    """Points (count, d) in [0, 1)^d, the first of them `before` (n, d), made by the same method and seed.
+
+    sobol: a scrambled Sobol sequence, whose longer beginnings contain the shorter. latin_hypercube: n points
+    lie in n strata of every axis; what is added goes into strata that are still empty, so that twice (three
+    times ...) as many points are a Latin hypercube again (Sallaberry, Helton, Hora 2008).
+    """
+    from scipy.stats import qmc
+
+    known = np.empty((0, dimensions)) if before is None else before
+    if len(known) >= count:
+        return known
+    if method == "sobol":
+        # A power of two is what the sequence is balanced for; less of it is a beginning.
+        whole = qmc.Sobol(dimensions, rng=seed).random_base2(math.ceil(math.log2(max(count, 2))))
+        return np.concatenate([known, whole[len(known) : count]])
+    if not len(known):
+        return np.asarray(qmc.LatinHypercube(dimensions, rng=seed).random(count))
+    return np.concatenate(
+        [known, _into_empty_strata(known, count, np.random.default_rng([seed, len(known)]))]
+    )
+
+
+def _into_empty_strata(known: Array, count: int, rng: np.random.Generator) -> Array:
+    """Points (count - n, d), each axis of which lies in strata of width 1 / count that no point is in."""
+    added = np.empty((count - len(known), known.shape[1]))
+    for axis, values in enumerate(known.T):
+        # At least so many are empty; more where two points share one.
+        empty = np.setdiff1d(np.arange(count), np.floor(values * count).astype(int))
+        strata = rng.permutation(rng.choice(empty, len(added), replace=False))
+        added[:, axis] = (strata + rng.random(len(added))) / count
+    return added

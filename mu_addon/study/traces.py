@@ -1,0 +1,83 @@
+"""Channels over the last seconds as they are drawn: their extremes in every column of pixels, nothing lost.
+
+A sample is looked at once, when it comes: what is drawn costs the same at 10 Hz and at 10 kHz, and a spike of
+one sample still shows.
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, Any]
+
+
+class Traces:
+    """Extremes of `channels` values over the last `seconds`, in `bins` equal steps of time."""
+
+    def __init__(self, channels: int, seconds: float, bins: int) -> None:
+        self.step_s = seconds / bins
+        self.end_s = -np.inf
+        """Time of the latest sample."""
+        self._newest = 0
+        self._low = np.full((channels, bins), np.nan)
+        self._high = np.full((channels, bins), np.nan)
+
+    @property
+    def bins(self) -> int:
+        """Steps of time."""
+        return self._low.shape[1]
+
+    def copy(self) -> Traces:
+        """The same, on its own."""
+        return copy.deepcopy(self)
+
+    def add(self, time_s: Array, values: Array) -> None:
+        """Take in samples: times (n,) in s and values (n, channels); what is not a number is left out."""
+        if not len(time_s):
+            return
+        place = np.floor(time_s / self.step_s).astype(np.int64)
+        newest = int(place.max())
+        if not np.isfinite(self.end_s):
+            self._newest = newest
+        first = max(self._newest + 1, newest - self.bins + 1)
+        emptied = np.arange(first, newest + 1) % self.bins
+        self._low[:, emptied] = self._high[:, emptied] = np.nan
+        self._newest = max(self._newest, newest)
+        self.end_s = max(self.end_s, float(time_s.max()))
+        kept = place > self._newest - self.bins
+        at = place[kept] % self.bins
+        for k, column in enumerate(values[kept].T):
+            np.fmin.at(self._low[k], at, column)
+            np.fmax.at(self._high[k], at, column)
+
+    def extremes(self) -> tuple[Array, Array, Array]:
+        """Age (b,) in s of every step that holds samples, oldest first, and lowest and highest (channels, b).
+
+        The latest sample's age is 0, of those before it negative.
+        """
+        number = np.arange(self._newest - self.bins + 1, self._newest + 1)
+        order = number % self.bins
+        seen = np.isfinite(self._low[:, order]).any(axis=0)
+        age = (number[seen] + 0.5) * self.step_s - self.end_s
+        return np.minimum(age, 0.0), self._low[:, order][:, seen], self._high[:, order][:, seen]
+
+
+def unbroken(age_s: Array, gap_s: float) -> list[slice]:
+    """Stretches of times (b,) in s, ascending, without a gap longer than that."""
+    cuts = np.flatnonzero(np.diff(age_s) > gap_s) + 1
+    ends = [0, *cuts.tolist(), len(age_s)]
+    return [slice(a, b) for a, b in zip(ends, ends[1:], strict=False) if b > a]
+
+
+def steady_range(before: tuple[float, float] | None, low: float, high: float) -> tuple[float, float]:
+    """A range around low .. high that stays as it was while that fits and fills a third of it."""
+    if not (np.isfinite(low) and np.isfinite(high)):
+        return before or (0.0, 1.0)
+    if before is not None and before[0] <= low and high <= before[1]:
+        if high - low >= (before[1] - before[0]) / 3 or before[1] - before[0] <= 2e-3 * abs(high):
+            return before
+    room = max(0.15 * (high - low), 5e-4 * max(abs(low), abs(high)), 1e-6)
+    return low - room, high + room

@@ -1,0 +1,81 @@
+"""`resume`: a folder is enough to go on with a study, after kill -9 too; one process has it at a time."""
+
+import json
+import subprocess
+import time
+
+import numpy as np
+import pytest
+
+from mu_addon.design.parameters import load_preset
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.study.folder import keep_inputs
+from mu_addon.study.job import Job, grasp
+
+from .processes import assert_clear_failure, command, run
+
+JOB = Job(
+    load_preset("mu-1.0x"),
+    grasp(),
+    mesh=MeshSettings(refine=0.4, order=1),
+    times=7,
+    stations=11,
+    rules=("volume_fraction",),
+    mesh_check=False,
+)
+
+
+def resumed(folder):
+    done = run("resume", folder, "--no-report", "--workers", "1", "--json")
+    assert done.returncode == 0, done.stdout
+    return json.loads(done.stdout.splitlines()[-1])["summary"]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("resume") / "whole"
+    keep_inputs(folder, JOB.texts())
+    return folder, resumed(folder)
+
+
+@pytest.mark.parametrize("pattern", ["unit.stl", "cache/mesh-*", "cache/state-*", "cache/sweep-*"])
+def test_killed_at_any_stage_it_goes_on_to_the_same_digits(whole, tmp_path, pattern):
+    reference, expected = whole
+    keep_inputs(tmp_path, JOB.texts())
+    words = command("resume", tmp_path, "--no-report")
+    process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while not list(tmp_path.glob(pattern)):
+        assert process.poll() is None
+        time.sleep(0.002)
+    process.kill()
+    process.wait()
+    kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cache").glob("*.npz")}
+    found = resumed(tmp_path)
+    assert found["J_hat_mm"] == expected["J_hat_mm"]
+    assert found["angle_deg"] == expected["angle_deg"]
+    with np.load(tmp_path / "delta.npz") as a, np.load(reference / "delta.npz") as b:
+        assert a.files == b.files
+        assert all(np.array_equal(a[name], b[name]) for name in a.files)
+    # What was finished was not computed again.
+    for name, written in kept.items():
+        assert (tmp_path / "cache" / name).stat().st_mtime_ns == written, name
+
+
+def test_a_second_run_in_the_folder_is_refused_and_names_the_first(tmp_path):
+    keep_inputs(tmp_path, JOB.texts())
+    first = subprocess.Popen(
+        command("resume", tmp_path, "--no-report"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    while not list(tmp_path.glob("cache/mesh-*")):
+        assert first.poll() is None
+        time.sleep(0.01)
+    second = run("design", "--preset", "mu-0.75x", "--out", tmp_path)
+    assert first.poll() is None
+    assert_clear_failure(second, 2, "another run works in this folder", f"process {first.pid} ", "what to do")
+    assert not (tmp_path / "stale").exists()
+    first.kill()
+    first.wait()
+
+
+def test_a_folder_without_a_study_is_told(tmp_path):
+    assert_clear_failure(run("resume", tmp_path), 2, "no study in this folder", "study.toml")
