@@ -4,6 +4,8 @@
     python .ci/extension.py FOLDER --bundle   one .zip a platform with the wheels of every Blender's Python
                                               inside, and index.json: FOLDER can then be hosted as it is
 
+Beside them it puts sample.blend, the sample scene.
+
 Blender wants the manifest beside the package's `__init__.py`; the checkout keeps them apart so that the core
 is an ordinary package. What ships is copied together first. Wheels come from pip, unmodified, and are kept in
 FOLDER/wheels; numpy is never among them, since Blender has its own and a second one would replace it.
@@ -136,6 +138,10 @@ def main(arguments: list[str]) -> int:
         return 2
     out = options.folder.resolve()
     out.mkdir(parents=True, exist_ok=True)
+    sample = [sys.executable, str(ROOT / ".ci" / "sample.py"), str(out / "sample.blend")]
+    if subprocess.run(sample, check=False).returncode:
+        sys.stderr.write("the sample scene could not be built\n")
+        return 1
     if not options.bundle:
         return build(tool, out, None, [])
     for platform in options.platform:

@@ -31,9 +31,51 @@ def unregister() -> None:
 
 def _modules():
     """Modules with something to register, in the order they need each other."""
-    from . import live, menus, operators, panels, properties, simulation
+    from . import (
+        bench,
+        evidence,
+        evidence_panel,
+        legend,
+        live,
+        menus,
+        motion_parts,
+        motion_properties,
+        operators,
+        panels,
+        properties,
+        results_panel,
+        sensor,
+        sensor_panel,
+        sensor_plot,
+        simulation,
+        stack_panel,
+        thumbnails,
+        track_panel,
+        twin,
+    )
 
-    return [properties, live, simulation, operators, panels, menus]
+    return [
+        properties,
+        motion_properties,
+        evidence,
+        bench,
+        live,
+        motion_parts,
+        simulation,
+        twin,
+        sensor,
+        thumbnails,
+        operators,
+        panels,
+        stack_panel,
+        results_panel,
+        evidence_panel,
+        sensor_panel,
+        track_panel,
+        legend,
+        sensor_plot,
+        menus,
+    ]
 
 
 def _remove(modules):

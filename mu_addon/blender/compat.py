@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 
 PACKAGE = __package__.rpartition(".")[0]
 """Name of the whole extension: `bl_ext.<repository>.mu_addon` when installed, `mu_addon` from source."""
@@ -86,3 +87,21 @@ def _identifier(modifier: Any, name: str) -> str:
         if socket.name == name:
             return str(socket.identifier)
     raise KeyError(name)
+
+
+def set_curve(obj: Any, path: str, index: int, frames: Any, values: Any, constant: bool = False) -> None:
+    """Let one channel of an object's property (index -1: the only one) follow values (n,) at frames (n,).
+
+    Between them it is linear, or stays with `constant`. Through the slot of a layered action, which every
+    version here has; actions lost their own curves with 5.0.
+    """
+    obj.keyframe_insert(path, index=index, frame=float(frames[0]))
+    action, slot = obj.animation_data.action, obj.animation_data.action_slot
+    curves = action.layers[0].strips[0].channelbag(slot).fcurves
+    points = curves.find(path, index=max(index, 0)).keyframe_points
+    points.add(len(frames) - len(points))
+    points.foreach_set("co", np.stack([frames, values], axis=1).astype(np.float32).ravel())
+    kinds = type(points[0]).bl_rna.properties["interpolation"].enum_items
+    kind = kinds["CONSTANT" if constant else "LINEAR"].value
+    points.foreach_set("interpolation", np.full(len(frames), kind, np.int32))
+    curves.find(path, index=max(index, 0)).update()

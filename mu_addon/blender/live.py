@@ -78,6 +78,11 @@ def redraw() -> None:
 
 @persistent
 def _catch_up(*_):
+    catch_up()
+
+
+def catch_up() -> None:
+    """Have every preview rebuilt that is behind its parameters or its study."""
     from . import unit_object
 
     for root in unit_object.roots():

@@ -43,7 +43,22 @@ def _add(self, context):
     self.layout.operator("mu.add", icon="OUTLINER_OB_LATTICE")
 
 
-CLASSES = (MU_MT_presets, MU_MT_presets_remove)
+class MU_MT_more(bpy.types.Menu):
+    """Sample scene, node groups for curves of your own, and the asset browser"""
+
+    bl_idname = "MU_MT_more"
+    bl_label = "More"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.operator("mu.sample", icon="SCENE_DATA")
+        layout.operator_menu_enum("mu.skin", "group", text="Skin with Nodes", icon="GEOMETRY_NODES")
+        layout.separator()
+        layout.operator("mu.assets", icon="ASSET_MANAGER")
+        layout.operator("mu.assets_remove")
+
+
+CLASSES = (MU_MT_presets, MU_MT_presets_remove, MU_MT_more)
 
 
 def register() -> None:

@@ -10,9 +10,9 @@ import bpy
 from ..design.anchors import windows
 from ..design.parameters import SECTIONS
 from ..design.quantity import describe
+from ..study.client import CANCELLED, DONE, FAILED, RUNNING
 from ..study.progress import spell
-from . import simulation, studies, unit_object
-from .child import CANCELLED, DONE, FAILED, RUNNING
+from . import bodies, simulation, studies, unit_object
 from .operators.acting import NO_UNIT
 from .operators.path import selected_candidate
 from .operators.unit import in_millimetres
@@ -82,6 +82,7 @@ class MU_PT_unit(_Panel, bpy.types.Panel):
         if root is None:
             wrapped(layout, NO_UNIT, "INFO")
             layout.operator("mu.add", text="Add Monolithic Unit", icon="ADD")
+            layout.menu("MU_MT_more", icon="DOWNARROW_HLT")
             return
         if not in_millimetres(context.scene):
             box = layout.box()
@@ -90,6 +91,7 @@ class MU_PT_unit(_Panel, bpy.types.Panel):
         row = layout.row(align=True)
         row.menu("MU_MT_presets", text=root.mu_unit.title, icon="PRESET")
         row.operator("mu.preset_save", text="", icon="ADD")
+        row.menu("MU_MT_more", text="", icon="DOWNARROW_HLT")
         layout.row(align=True).prop(root.mu_unit, "show", expand=True)
         row = layout.row()
         row.enabled = root.mu_unit.show != unit_object.SOLID
@@ -121,7 +123,21 @@ class MU_PT_lattice(_OfUnit, bpy.types.Panel):
     bl_label = "Lattice"
 
     def show(self, layout, context, root):
+        envelope = unit_object.part(root, bodies.ENVELOPE)
         parameters(layout, root.mu_unit, "lattice")
+        if envelope is not None:
+            wrapped(layout, f"The lattice fills {envelope.name}; counts of cells are not used", "INFO")
+        header, body = layout.panel("MU_own_body", default_closed=True)
+        header.label(text="Body of Your Own")
+        if body:
+            row = body.row(align=True)
+            row.operator("mu.body_check", icon="VIEWZOOM")
+            row.operator("mu.body", text="Use as Envelope", icon="MESH_MONKEY").role = "envelope"
+            body.operator("mu.body", text="Use as Obstacle").role = "obstacle"
+            for obstacle in bodies.obstacles(root):
+                wrapped(body, f"Obstacle: {obstacle.name}, shown and not simulated", "ERROR")
+            if envelope is not None or bodies.obstacles(root) or unit_object.part(root, bodies.FLAWS):
+                body.operator("mu.body_remove", icon="X")
 
 
 class MU_PT_path(_OfUnit, bpy.types.Panel):
@@ -184,7 +200,7 @@ class MU_PT_simulate(_OfUnit, bpy.types.Panel):
             row.scale_y = 1.4
             row.operator("mu.simulate", icon="PLAY")
         if child is not None:
-            _running(layout, child) if child.state == RUNNING else _ended(layout, child)
+            running(layout, child) if child.state == RUNNING else ended(layout, child, "see Results")
         others = [uuid for uuid in simulation.running() if uuid != root.mu_unit.uuid]
         if others:
             wrapped(layout, f"{len(others)} other simulation(s) running", "INFO")
@@ -195,23 +211,27 @@ class MU_PT_simulate(_OfUnit, bpy.types.Panel):
             body.prop(study, "folder")
 
 
-def _running(layout, child) -> None:
+def running(layout, child, job: str = "") -> None:
+    """Stage, time left and Cancel of a child; `job` begins the names of its operators."""
     fraction = child.progress.get("fraction")
     text = "stopping ..." if child.stopping else simulation.spell_left(child)
     layout.progress(factor=fraction or 0.0, text=text)
+    if child.progress.get("detail"):
+        layout.label(text=str(child.progress["detail"]))
     row = layout.row()
     row.label(text=f"running for {spell(child.seconds)}")
-    row.operator("mu.cancel", icon="CANCEL")
+    row.operator(f"mu.{job}cancel", icon="CANCEL")
     for warning in child.warnings[-2:]:
         wrapped(layout, warning, "ERROR")
 
 
-def _ended(layout, child) -> None:
+def ended(layout, child, where: str, job: str = "") -> None:
+    """How a child ended, and where its results are shown; see `running`."""
     box = layout.box()
     if child.state == DONE:
-        wrapped(box, f"Done in {spell(child.seconds)}: see Results", "CHECKMARK")
+        wrapped(box, f"Done in {spell(child.seconds)}: {where}", "CHECKMARK")
     elif child.state == CANCELLED:
-        wrapped(box, "Cancelled. What was finished is kept: simulate again to go on", "CANCEL")
+        wrapped(box, "Cancelled. What was finished is kept: start it again to go on", "CANCEL")
     elif child.state == FAILED:
         box.alert = True
         error = child.error or {}
@@ -221,9 +241,9 @@ def _ended(layout, child) -> None:
                 wrapped(box, str(error[key]))
     row = box.row(align=True)
     if child.state == FAILED:
-        row.operator("mu.open", text="Log").what = "log"
-        row.operator("mu.open", text="Errors").what = "errors"
-    row.operator("mu.dismiss")
+        row.operator(f"mu.{job}open", text="Log").what = "log"
+        row.operator(f"mu.{job}open", text="Errors").what = "errors"
+    row.operator(f"mu.{job}dismiss")
 
 
 class MU_PT_results(_OfUnit, bpy.types.Panel):

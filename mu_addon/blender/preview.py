@@ -1,4 +1,4 @@
-"""The core's curves as arrays to draw: actuator, lattice, anchors, waveguide and candidate paths.
+"""Values of the design's steps as arrays to draw, and candidate paths.
 
 Everything here is for the eye and takes milliseconds; what is printed or simulated comes from the core.
 """
@@ -11,25 +11,24 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from ..design.anchors import Window, anchors, windows
-from ..design.lattice import lattice_of
-from ..design.parameters import Dimensions, Unit
-from ..design.profile import cavity_polygon, outer_polygon, outer_radius
-from ..design.waveguide import waveguide
+from ..design.anchors import anchors, windows
+from ..design.block import FACES
+from ..design.lattice import Graph
+from ..design.parameters import Unit
+from ..design.steps import Path, Section, Struts, Trimmed, along
+from ..design.waveguide import Bar
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 AROUND = 48
 """Flat pieces around the axis."""
-ALONG = 4
-"""Flat pieces along a quarter of a chamber."""
 ALONG_STRUT = 4
 """Straight pieces of a strut, enough to see its taper."""
-FINE = np.linspace(0.0, 1.0, 33)
-"""Places along a strut where it is asked whether it is still inside the actuator."""
 LADDER_STEP = 0.45
 """Distance, in cells, between candidate paths drawn side by side outside the lattice."""
+_CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+_CUBE_EDGES = np.array([[a, b] for a in range(8) for b in range(a) if np.abs(_CUBE[a] - _CUBE[b]).sum() == 1])
 
 
 @attrs.frozen(eq=False)
@@ -48,64 +47,85 @@ class Skeleton:
     inputs: dict[str, Any] = attrs.field(factory=dict)
 
 
-def actuator(d: Dimensions, cut: bool) -> Skeleton:
+def outline(profile: Floats) -> Skeleton:
+    """The outer profile as a line in the bending plane, on the side with more lattice."""
+    points = np.column_stack([np.zeros(len(profile)), profile])
+    return Skeleton(points, _polylines(1, len(points)))
+
+
+def cavity(polygon: Floats | None, cut: bool) -> Skeleton | None:
+    """Surface of the cavity; with `cut`, its half x <= 0."""
+    return None if polygon is None else _revolved(polygon[::-1], closed=not cut)
+
+
+def actuator(section: Section | None, cut: bool) -> Skeleton | None:
     """Surface of the actuator with its inlet; with `cut`, the half x <= 0 and its section."""
-    outer = outer_polygon(d, ALONG)[1:]
-    boss = d.inlet_radius + d.inlet_wall
-    inlet = np.array([[d.inlet_radius, -d.inlet_length], [boss, -d.inlet_length], [boss, 0.0]])
+    if section is None:
+        return None
+    outer = section.outer[1:]
     if not cut:
-        bore = np.array([[d.inlet_radius, d.base_cap]])
-        return _revolved(np.concatenate([bore, inlet, outer]), closed=True)
-    cavity = cavity_polygon(d, ALONG)[::-1]
-    bore = np.array([[d.inlet_radius, d.base_cap]])
-    section = np.concatenate([inlet, outer, cavity[:-1], bore])
-    half = _revolved(np.concatenate([section, section[:1]]), closed=False)
-    return _with_section(half, section)
+        return _revolved(np.concatenate([section.inlet, outer]), closed=True)
+    bore = section.inlet[:1]
+    inner = bore * [0.0, 1.0] if section.cavity is None else section.cavity[:0:-1]
+    loop = np.concatenate([section.inlet[1:], outer, inner, bore])
+    half = _revolved(np.concatenate([loop, loop[:1]]), closed=False)
+    return _with_section(half, loop)
 
 
-def lattice(d: Dimensions, cut: bool) -> Skeleton:
-    """Struts as polylines with their radius; with `cut`, what is at x <= 0 and outside the actuator."""
-    found = lattice_of(d)
-    ends = found.nodes[found.struts]
-    first, last = np.zeros(len(ends)), np.ones(len(ends))
-    if cut:
-        ends = ends[(ends[:, :, 0] <= 1e-6).all(axis=1)]
-        outside = _outside(d, _along(ends, FINE))
-        ends, outside = ends[outside.any(axis=1)], outside[outside.any(axis=1)]
-        first = FINE[outside.argmax(axis=1)]
-        last = FINE[len(FINE) - 1 - outside[:, ::-1].argmax(axis=1)]
-    t = first[:, None] + (last - first)[:, None] * np.linspace(0.0, 1.0, ALONG_STRUT + 1)
-    edges = _polylines(len(ends), ALONG_STRUT + 1)
-    return Skeleton(_along(ends, t).reshape(-1, 3), edges, attributes={"radius": found.radius(t).ravel()})
+def boxes(graph: Graph | None) -> Skeleton | None:
+    """Edges of the lattice's cells, those that neighbours share once."""
+    if graph is None:
+        return None
+    whole = graph.kind.divisions
+    corners = graph.cells[:, None] + whole * _CUBE
+    points, index = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    edges = index.reshape(-1, 8)[:, _CUBE_EDGES].reshape(-1, 2)
+    return Skeleton(points * (graph.cell / whole), np.unique(np.sort(edges, axis=1), axis=0))
 
 
-def _along(ends: Floats, t: Floats) -> Floats:
-    """Points (e, n, 3) at fractions t, (n,) or (e, n), of the way between ends (e, 2, 3)."""
-    return np.asarray(ends[:, :1] + t[..., None] * (ends[:, 1:] - ends[:, :1]))
+def lines(trimmed: Trimmed | None, cut: bool) -> Skeleton | None:
+    """Axes of the struts that show; with `cut`, those at x <= 0."""
+    return None if trimmed is None else lattice(Struts(trimmed, None), cut)
 
 
-def _outside(d: Dimensions, points: Floats) -> NDArray[np.bool_]:
-    """Whether a strut's axis at points (..., 3) is so far outside the actuator that none shows inside."""
-    clear = 0.15 * d.junction_diameter
-    return np.asarray(np.hypot(points[..., 0], points[..., 1]) >= outer_radius(d, points[..., 2]) + clear)
+def lattice(struts: Struts | None, cut: bool) -> Skeleton | None:
+    """Struts as polylines with their radius, or without one as lines; with `cut`, those at x <= 0."""
+    if struts is None:
+        return None
+    shown = struts.trimmed
+    here = (shown.ends[:, :, 0] <= 1e-6).all(axis=1) if cut else np.full(len(shown.ends), True)
+    ends, first, last = shown.ends[here], shown.first[here], shown.last[here]
+    pieces = 1 if struts.lattice is None else ALONG_STRUT
+    t = first[:, None] + (last - first)[:, None] * np.linspace(0.0, 1.0, pieces + 1)
+    radius = {} if struts.lattice is None else {"radius": struts.lattice.radius(t).ravel()}
+    edges = _polylines(len(ends), pieces + 1)
+    return Skeleton(along(ends, t).reshape(-1, 3), edges, attributes=radius)
 
 
-def anchor_points(unit: Unit) -> Skeleton:
+def anchor_points(points: Floats | None, struts: Struts | None) -> Skeleton | None:
     """Anchors as points, a little wider than the junctions they are in."""
-    at = anchors(unit)
-    radius = 0.62 * max(unit.dimensions.junction_diameter, unit.dimensions.midspan_diameter)
-    return Skeleton(at, attributes={"radius": np.full(len(at), radius)})
+    if points is None:
+        return None
+    thick = struts is not None and struts.lattice is not None
+    widest = max(struts.lattice.junction_radius, struts.lattice.midspan_radius) if thick else 0.8
+    return Skeleton(points, attributes={"radius": np.full(len(points), 1.24 * widest)})
 
 
-def bar(unit: Unit, window: Window) -> Skeleton:
-    """The waveguide's bar (slot 0) with its wells (slot 1)."""
-    found = waveguide(unit, window)
-    boxes = [found.box, *found.wells]
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-    sides = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
-    vertices = np.concatenate([box[corners, np.arange(3)] for box in boxes])
-    faces = np.concatenate([sides + 8 * number for number in range(len(boxes))])
-    return Skeleton(vertices, faces=(faces,), slots=np.repeat(np.arange(len(boxes)) > 0, 6).astype(np.int64))
+def line_through(path: Path | None) -> Skeleton | None:
+    """The path as a line through its anchors."""
+    return None if path is None else Skeleton(path.points, _polylines(1, len(path.points)))
+
+
+def bar(found: Bar | None) -> Skeleton | None:
+    """The waveguide's bar and seats (slot 0) with what is cut out of them (slot 1)."""
+    if found is None:
+        return None
+    solid = [*found.legs, *(seat.body.corners for seat in found.seats)]
+    hollow = [block.corners for block in found.cuts]
+    corners = np.array([*solid, *hollow])
+    faces = np.concatenate([FACES + 8 * number for number in range(len(corners))])
+    slots = np.repeat(np.arange(len(corners)) >= len(solid), 6).astype(np.int64)
+    return Skeleton(corners.reshape(-1, 3), faces=(faces,), slots=slots)
 
 
 def candidates(unit: Unit) -> dict[str, Skeleton]:

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 from bpy.props import (
     BoolProperty,
+    CollectionProperty,
     EnumProperty,
     FloatProperty,
     IntProperty,
@@ -46,9 +47,14 @@ def tooltip(d: Description) -> str:
     return f"{d.text[:1].upper()}{d.text[1:]}{allowed}{fixed}.\nSource: {d.source}"
 
 
-def blender_property(d: Description, update):
+def blender_property(d: Description, update=None, options=frozenset()):
     """The Blender property of one parameter."""
-    shared = {"name": label(d), "description": tooltip(d), "update": update}
+    shared = {
+        "name": label(d),
+        "description": tooltip(d),
+        "update": update,
+        "options": {"ANIMATABLE", *options},
+    }
     if d.choices:
         items = [
             (name, name.replace("-", " ").capitalize(), textwrap.shorten(d.text, 60)) for name in d.choices
@@ -91,6 +97,7 @@ class MU_PG_study(bpy.types.PropertyGroup):
 
     command: EnumProperty(
         name="Job",
+        description="What is simulated",
         items=[
             ("place", "Place the Sensor", "Motion of the unit and the ranking of all sensor paths"),
             ("simulate", "Motion Only", "Motion of the unit without a sensor"),
@@ -99,6 +106,7 @@ class MU_PG_study(bpy.types.PropertyGroup):
     )
     detail: EnumProperty(
         name="Detail",
+        description="How fine the mesh is, and of which order its elements",
         items=[
             ("full", "Full", "Quadratic elements on the default mesh: what a design is decided by"),
             (
@@ -127,6 +135,15 @@ def _show_changed(group, context):
     live.show(group.id_data)
 
 
+class MU_PG_step(bpy.types.PropertyGroup):
+    """One step of the design in a unit's stack; its name is the core's."""
+
+    muted: BoolProperty(
+        name="Mute", description="Leave this step out: what it would change is passed on", update=_changed
+    )
+    shown: BoolProperty(name="Show", description="Show what this step gives in the preview", update=_changed)
+
+
 class MU_PG_unit(bpy.types.PropertyGroup):
     """One Monolithic Unit, kept on its root object."""
 
@@ -140,8 +157,13 @@ class MU_PG_unit(bpy.types.PropertyGroup):
             update=_changed,
         ),
         "scale": blender_property(_HEAD["scale"], _changed),
-        **{name: PointerProperty(type=group) for name, group in GROUPS.items()},
-        "study": PointerProperty(type=MU_PG_study),
+        **{
+            name: PointerProperty(type=group, description=textwrap.shorten(group.__doc__ or name, 200))
+            for name, group in GROUPS.items()
+        },
+        "study": PointerProperty(type=MU_PG_study, description="What the next simulation is asked to do"),
+        "stack": CollectionProperty(type=MU_PG_step, description="Steps of the design, in their order"),
+        "step": IntProperty(name="Step", description="The step whose parameters are shown"),
         "path": StringProperty(
             name="Sensor Path", description="Window of anchors that the waveguide follows", update=_changed
         ),
@@ -157,6 +179,7 @@ class MU_PG_unit(bpy.types.PropertyGroup):
         ),
         "show": EnumProperty(
             name="Show",
+            description="Whether the unit is seen as it is being designed or as it will be printed",
             items=[
                 ("preview", "Preview", "Skeleton of the design, follows every slider"),
                 ("solid", "Solid", "The printable solid that was built last"),
@@ -170,7 +193,7 @@ class MU_PG_unit(bpy.types.PropertyGroup):
     }
 
 
-CLASSES = (*GROUPS.values(), MU_PG_study, MU_PG_unit)
+CLASSES = (*GROUPS.values(), MU_PG_study, MU_PG_step, MU_PG_unit)
 
 
 def section_of(props, section: str) -> dict:

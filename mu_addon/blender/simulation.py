@@ -17,12 +17,12 @@ import bpy
 
 from ..design.parameters import Unit, write_unit
 from ..errors import InputError
+from ..study.client import RUNNING, Child
 from . import live
-from .child import RUNNING, Child
 
 INTERVAL_S = 0.2
 WORKER = Path(__file__).with_name("worker.py")
-NEEDED = ("warp", "scipy", "cvxopt", "pymetis", "meshio", "matplotlib")
+NEEDED = ("warp", "scipy", "cvxopt", "meshio", "matplotlib")
 """Modules that a simulation cannot do without."""
 
 _children: dict[str, Child] = {}
@@ -78,9 +78,14 @@ def start(uuid: str, unit: Unit, folder: Path, arguments: list[str]) -> Child:
     write_unit(unit, own / "unit.toml")
     command, *options = arguments
     line = [command, "--unit", str(own / "unit.toml"), "--out", str(folder), "--json", *options]
+    return launch(uuid, of_worker(line), own)
+
+
+def of_worker(line: list[str]) -> list[str]:
+    """The command that runs a line of the core's command line in a process of its own."""
     prefix = interpreter()
     separator = ["--"] if prefix[-1] == "--python" else []
-    return launch(uuid, [*prefix, str(WORKER), *separator, *line], own)
+    return [*prefix, str(WORKER), *separator, *line]
 
 
 def launch(uuid: str, command: list[str], folder: Path) -> Child:
@@ -107,8 +112,12 @@ def poll() -> bool:
 
 
 def _poll() -> float | None:
+    before = running()
     if poll():
         live.redraw()
+    if running() != before:
+        # What the study has found shows on the candidate paths.
+        live.catch_up()
     return INTERVAL_S if running() else None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 from pathlib import Path
@@ -12,6 +13,7 @@ import bpy
 
 from ..design.parameters import read_unit
 from ..errors import MuError
+from . import bodies
 from .compat import user_folder
 from .properties import to_unit
 
@@ -68,13 +70,7 @@ def settle(root: Any) -> Path:
     """The unit's study folder, from now on kept with the unit, relative to the .blend file if possible."""
     folder = folder_of(root)
     if not root.mu_unit.study.folder:
-        text = str(folder)
-        if bpy.data.filepath:
-            try:
-                text = bpy.path.relpath(text)
-            except ValueError:  # on another drive
-                pass
-        root.mu_unit.study.folder = text
+        root.mu_unit.study.folder = relative(folder)
     return folder
 
 
@@ -92,12 +88,33 @@ def findings(root: Any) -> Findings | None:
     if kept is None or kept[0] != times:
         try:
             summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-            kept = times, summary if isinstance(summary, dict) else {}, read_unit(folder / "unit.toml").hash()
+            inputs = read_unit(folder / "unit.toml").hash(), _body_hash(folder)
+            kept = times, summary if isinstance(summary, dict) else {}, inputs
         except (OSError, ValueError, MuError):
             return None
         _read[folder] = kept
     try:
-        stale = to_unit(root.mu_unit).hash() != kept[2]
+        unit = to_unit(root.mu_unit)
+        body = bodies.envelope_in(root, unit)
+        stale = (unit.hash(), "" if body is None else body.hash) != kept[2]
     except MuError:
         stale = True
     return Findings(folder, str(kept[1].get("status", "")), stale, kept[1])
+
+
+def _body_hash(folder: Path) -> str:
+    """Hash of the body that a study was made with, as `Body.hash` has it; nothing where there was none."""
+    try:
+        return hashlib.sha256((folder / "body.obj").read_bytes()).hexdigest()
+    except OSError:
+        return ""
+
+
+def relative(path: Path) -> str:
+    """A path as Blender keeps it: relative to the .blend file where there is one on the same drive."""
+    if not bpy.data.filepath:
+        return str(path)
+    try:
+        return bpy.path.relpath(str(path))
+    except ValueError:
+        return str(path)

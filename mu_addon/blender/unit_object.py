@@ -8,20 +8,30 @@ from __future__ import annotations
 
 import json
 import uuid
+from collections.abc import Callable
 from typing import Any
 
 import attrs
 import bpy
+import numpy as np
 
 from ..design.anchors import Window, windows
+from ..design.body import Body
 from ..design.parameters import Unit
+from ..design.solid import Solid
 from ..errors import InputError, MuError
-from . import materials, nodes, preview
+from . import bodies, materials, nodes, preview, ranking, stack
 from .compat import set_modifier_input
 from .live import held
 from .properties import from_unit, to_unit
 
 PART = "mu_part"
+MOTION = "mu_motion"
+"""Marks the parts that show a study's motion, see `motion_parts`."""
+EVIDENCE = "mu_evidence_part"
+"""Marks the parts that show measured motion, see `evidence_motion`."""
+TWIN = "mu_twin"
+"""Marks the parts that move as the real unit does, see `twin`."""
 CANDIDATE = "candidate:"
 SOLID = "solid"
 
@@ -68,6 +78,7 @@ def create(context: Any, unit: Unit) -> Any:
     root.location = context.scene.cursor.location
     with held():
         root.mu_unit.uuid = uuid.uuid4().hex
+        stack.fill(root.mu_unit)
         from_unit(root.mu_unit, unit)
     rebuild(root)
     for other in context.selected_objects:
@@ -79,22 +90,24 @@ def create(context: Any, unit: Unit) -> Any:
 
 def delete(root: Any) -> None:
     """Remove a unit with all its parts."""
-    for child in list(root.children):
-        if child.get(PART):
-            _remove(child)
+    for child in root.children_recursive:
+        if any(child.get(mark) for mark in (PART, MOTION, EVIDENCE, TWIN)):
+            remove_part(child)
     bpy.data.objects.remove(root)
 
 
-def _remove(obj: Any) -> None:
+def remove_part(obj: Any) -> None:
     """Remove a part and, where nothing else uses it, its mesh."""
     mesh = obj.data
     bpy.data.objects.remove(obj)
-    if not mesh.users:
+    if mesh is not None and not mesh.users:
         bpy.data.meshes.remove(mesh)
 
 
 def chosen_window(root: Any, unit: Unit) -> Window | None:
-    """The window of the chosen sensor path; None where none is chosen or the unit has no such path."""
+    """The window of the chosen sensor path; None without one, where it is muted, or unknown to the unit."""
+    if "path" in stack.muted(root.mu_unit):
+        return None
     return next((w for w in windows(unit.dimensions.count) if w.name == root.mu_unit.path), None)
 
 
@@ -107,6 +120,8 @@ def rebuild(root: Any) -> bool:
     """Build the preview from the parameters; where they break a rule the last good one stays."""
     props = root.mu_unit
     _own_uuid(root)
+    with held():
+        stack.fill(props)
     try:
         unit = to_unit(props)
         _draw(root, unit)
@@ -138,37 +153,67 @@ def _fingerprint(root: Any) -> str:
         unit = to_unit(props)
     except InputError as error:
         return error.what
-    return f"{unit.hash()}|{props.path}|{props.cut}|{props.candidates}"
+    steps = "".join(f"{entry.name}{entry.muted:d}{entry.shown:d}" for entry in props.stack)
+    known = ranking.ranked(root) if props.candidates else {}
+    shown = unit.hash(), props.path, props.cut, props.candidates, steps, bodies.fingerprint(root), known
+    return "|".join(map(str, shown))
 
 
 def _draw(root: Any, unit: Unit) -> None:
-    props, d = root.mu_unit, unit.dimensions
-    window = chosen_window(root, unit)
-    shapes = {
-        "actuator": preview.actuator(d, props.cut),
-        "lattice": preview.lattice(d, props.cut),
-        "anchors": preview.anchor_points(unit),
-    }
+    props = root.mu_unit
+    given = stack.given(root, unit)
+    shown = [entry.name for entry in props.stack if entry.shown]
+    shapes = {}
     try:
+        for step in shown:
+            if step in DRAWN:
+                name, draw = DRAWN[step]
+                skeleton = draw(stack.STACK.value(step, given), given, props.cut)
+                if skeleton is not None:
+                    shapes[name] = skeleton
         if props.candidates:
             paths = preview.candidates(unit)
             shapes |= {CANDIDATE + name: skeleton for name, skeleton in paths.items()}
-        if window is not None:
-            shapes["waveguide"] = preview.bar(unit, window)
     finally:
         for name, skeleton in shapes.items():
             _put(root, name, skeleton)
+        tubes = {n.removeprefix(CANDIDATE): part(root, n) for n in shapes if n.startswith(CANDIDATE)}
+        ranking.dress(root, tubes)
         for child in list(root.children):
-            if child.get(PART) not in (None, SOLID, *shapes):
-                _remove(child)
+            name = child.get(PART)
+            if name not in (None, SOLID, *bodies.PARTS, *shapes) and not name.startswith(bodies.OBSTACLE):
+                remove_part(child)
     show_parts(root)
 
+
+DRAWN: dict[str, tuple[str, Callable[[Any, Any, bool], preview.Skeleton | None]]] = {
+    "profile": ("profile", lambda value, given, cut: preview.outline(value)),
+    "chambers": ("chambers", lambda value, given, cut: preview.cavity(value, cut)),
+    "membranes": ("actuator", lambda value, given, cut: preview.actuator(value, cut)),
+    "cells": ("cells", lambda value, given, cut: preview.boxes(value)),
+    "trim": ("trim", lambda value, given, cut: preview.lines(value, cut)),
+    "struts": ("lattice", lambda value, given, cut: preview.lattice(value, cut)),
+    "anchors": (
+        "anchors",
+        lambda value, given, cut: preview.anchor_points(value, stack.STACK.value("struts", given)),
+    ),
+    "path": ("path", lambda value, given, cut: preview.line_through(value)),
+    "wells": ("waveguide", lambda value, given, cut: preview.bar(value)),
+}
+"""The part that a step's value becomes, and how it is drawn: from the value, what was given, the cut."""
 
 _LOOKS = {
     "actuator": ("Actuator", ("MU Membrane", "MU Section"), ""),
     "lattice": ("Lattice", ("MU Lattice",), "MU Tubes"),
     "anchors": ("Anchors", ("MU Anchors",), "MU Balls"),
     "waveguide": ("Waveguide", ("MU Waveguide", "MU Wells"), ""),
+    "profile": ("Profile", ("MU Membrane",), ""),
+    "chambers": ("Chambers", ("MU Section",), ""),
+    "cells": ("Cells", ("MU Lattice",), ""),
+    "trim": ("Strut Axes", ("MU Lattice",), ""),
+    "path": ("Path", ("MU Waveguide",), ""),
+    bodies.ENVELOPE: ("Envelope", ("MU Lattice",), ""),
+    bodies.FLAWS: ("Flaws", ("MU Flaws",), "MU Balls"),
     SOLID: ("Solid", ("MU Solid",), ""),
 }
 
@@ -187,7 +232,9 @@ def _put(root: Any, name: str, skeleton: preview.Skeleton) -> None:
     if name.startswith(CANDIDATE):
         chosen = name == CANDIDATE + root.mu_unit.path
         obj.data.materials[0] = materials.material("MU Waveguide" if chosen else "MU Candidate")
-    if group:
+    if not skeleton.attributes:
+        obj.modifiers.clear()  # struts without thickness stay lines
+    elif group:
         modifier = nodes.skin(obj, group)
         for socket, value in {"Material": obj.data.materials[0], **skeleton.inputs}.items():
             set_modifier_input(modifier, socket, value)
@@ -212,6 +259,7 @@ def put_solid(root: Any, solid: Any, unit: Unit) -> Any:
     materials.assign(obj.data, "MU Solid")
     obj["mu_unit_hash"] = unit.hash()
     obj["mu_path"] = solid.window.name if solid.window else ""
+    obj["mu_body"] = bodies.fingerprint(root)
     obj["mu_quality"] = solid.quality
     obj["mu_gates"] = json.dumps(attrs.asdict(solid.gates))
     with held():
@@ -221,13 +269,49 @@ def put_solid(root: Any, solid: Any, unit: Unit) -> Any:
 
 
 def solid_is_current(root: Any, obj: Any) -> bool:
-    """Whether the solid was built from the parameters and the path that the root has now."""
+    """Whether the solid was built from the parameters, the path and the body that the root has now."""
     try:
         unit = to_unit(root.mu_unit)
     except InputError:
         return False
     window = chosen_window(root, unit)
-    return bool(obj["mu_unit_hash"] == unit.hash() and obj["mu_path"] == (window.name if window else ""))
+    now = unit.hash(), window.name if window else "", bodies.fingerprint(root)
+    return now == (obj["mu_unit_hash"], obj["mu_path"], obj.get("mu_body", ""))
+
+
+def solid_of(root: Any, unit: Unit, quality: str = "interactive") -> Solid:
+    """The printable solid of a unit in the scene; raises InputError and GateError."""
+    solid: Solid = stack.STACK.value("solid", stack.given(root, unit, quality))
+    return solid
+
+
+def put_body(root: Any, name: str, body: Body) -> Any:
+    """Keep a body of the user's as a part of the unit: a wire, and hidden where the lattice shows it."""
+    obj = part(root, name) or _new_part(root, name, body.name)
+    preview.write(obj.data, preview.Skeleton(body.vertices, faces=(body.triangles,)), smooth=False)
+    obj.display_type = "WIRE"
+    obj.hide_render = True
+    obj.hide_set(name == bodies.ENVELOPE)
+    return obj
+
+
+def remove_bodies(root: Any) -> None:
+    """Take every body of the user's out of the unit, and the marks of flaws."""
+    for child in list(root.children):
+        name = child.get(PART, "")
+        if name in bodies.PARTS or name.startswith(bodies.OBSTACLE):
+            remove_part(child)
+
+
+def mark(root: Any, places: list[Any]) -> None:
+    """Put a red ball at every place (3,) in mm of the unit's frame, in place of those that were there."""
+    old = part(root, bodies.FLAWS)
+    if old is not None:
+        remove_part(old)
+    if len(places):
+        radius = np.full(len(places), 0.08 * to_unit(root.mu_unit).dimensions.cell)
+        _put(root, bodies.FLAWS, preview.Skeleton(np.array(places), attributes={"radius": radius}))
+        part(root, bodies.FLAWS).show_in_front = True
 
 
 def show_parts(root: Any) -> None:

@@ -12,6 +12,8 @@ import sys
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[1]
+WITHOUT_SOLVER = ("record", "replay", "calibrate", "check", "export", "specimens")
+"""Commands for the sensor on the bench and for the printer: they start at once, also without the solver."""
 
 
 def _provide_package():
@@ -62,8 +64,9 @@ def _trouble():
 
 
 def main(arguments):
-    """Exit status of one command line of the core; `check` only tells whether the solver loads."""
-    trouble = _trouble()
+    """Exit status of one command line of the core; `check` alone only tells whether the solver loads."""
+    solves = len(arguments) < 2 or arguments[0] not in WITHOUT_SOLVER
+    trouble = _trouble() if solves else None
     if trouble is not None:
         sys.stdout.write(json.dumps(trouble) + "\n")
         return 1

@@ -69,14 +69,19 @@ class Ring:
         # Counted after they are there, so that who looks sees whole rows.
         struct.pack_into("<Q", self._map, _COUNT_AT, count + len(rows))
 
-    def latest(self, n: int) -> Array:
-        """A copy (m, columns) of the last rows, at most n and at most half of the ring.
+    def since(self, row: int) -> tuple[Array, int]:
+        """A copy (m, columns) of the rows from number `row` on, and the number that comes next.
 
-        The other half is what the writer may overwrite while this copies.
+        At most half of the ring, the latest: the other half is what the writer may overwrite while this
+        copies.
         """
         count, capacity = self.written, len(self.rows)
-        m = min(n, count, capacity // 2)
-        return self.rows[np.arange(count - m, count) % capacity]
+        m = min(max(count - row, 0), capacity // 2)
+        return self.rows[np.arange(count - m, count) % capacity], count
+
+    def latest(self, n: int) -> Array:
+        """A copy (m, columns) of the last rows, at most n and at most half of the ring."""
+        return self.since(max(0, self.written - n))[0][-n:]
 
     def close(self) -> None:
         """Let go of the file."""

@@ -11,6 +11,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -273,7 +274,9 @@ class _View:
         if self._ring is not None:
             self._ring.close()
         for path in self.folder.glob("live-*.bin"):
-            path.unlink(missing_ok=True)
+            # Windows keeps a file that somebody looks into.
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
         return status
 
     def _write_status(self, status: Mapping[str, Any]) -> None:

@@ -17,7 +17,7 @@ def module(name):
 
 
 unit_object, simulation = module("blender.unit_object"), module("blender.simulation")
-studies, child_module = module("blender.studies"), module("blender.child")
+studies, child_module = module("blender.studies"), module("study.client")
 
 assert "mu_addon" not in sys.modules, "the core was imported under a second name"
 assert bpy.ops.mu.add(preset="mu-0.75x") == {"FINISHED"}
@@ -65,6 +65,10 @@ assert not any("gmsh" in warning for warning in child.warnings), child.warnings
 found = studies.findings(root)
 assert (found.status, found.stale, found.quick) == ("complete", False, True)
 assert len(found.ranking(found.rule)) == 10
+for whose, what in (("model_a", "mesh"), ("alpha4", "mesh"), ("model_a", "print")):
+    assert bpy.ops.mu.motion(name=whose, what=what) == {"FINISHED"}
+bpy.context.scene.frame_set(193)
+assert len(module("blender.motion_parts").parts(root)) == 5
 bpy.ops.wm.save_mainfile()
 bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
 (root,) = unit_object.roots()

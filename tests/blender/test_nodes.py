@@ -112,3 +112,162 @@ def test_a_group_that_is_there_is_not_built_again(tmp_path):
         """,
         tmp_path,
     )
+
+
+CURVES = """
+
+def drawn(points, kind="POLY"):
+    curve = bpy.data.curves.new("own", "CURVE")
+    curve.dimensions = "3D"
+    spline = curve.splines.new(kind)
+    spline.points.add(len(points) - 1)
+    for point, at in zip(spline.points, points):
+        point.co = (*at, 1.0)
+    obj = bpy.data.objects.new("own", curve)
+    bpy.context.collection.objects.link(obj)
+    return obj
+
+
+def closed_volume(obj):
+    import bmesh
+    bpy.context.view_layer.update()
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    solid = bmesh.new()
+    solid.from_mesh(mesh)
+    assert all(edge.is_manifold for edge in solid.edges)
+    return solid.calc_volume()
+
+"""
+
+
+def curves(code, tmp_path, *arguments):
+    from .session import PRELUDE
+
+    return blender(code, tmp_path, *arguments, prelude=PRELUDE + EDGES + CURVES)
+
+
+def test_a_users_own_curve_gets_tubes(tmp_path):
+    curves(
+        """
+        obj = drawn([(0, 0, 0), (0, 0, 10), (0, 0, 40)])
+        bpy.context.view_layer.objects.active = obj
+        assert bpy.ops.mu.skin(group="MU Tubes") == {"FINISHED"}
+        points = skinned(obj)
+        assert len(points) == 24 and np.allclose(np.hypot(points[:, 0], points[:, 1]), 1.0, atol=1e-5)
+        obj.data.splines[0].points[2].radius = 0.5  # alt S, in edit mode
+        set_modifier_input(obj.modifiers[0], "Radius", 3.0)
+        points = skinned(obj)
+        wide = np.hypot(points[:, 0], points[:, 1])
+        assert np.allclose(wide[points[:, 2] < 1], 3.0, atol=1e-5)
+        assert np.allclose(wide[points[:, 2] > 39], 1.5, atol=1e-5)
+        """,
+        tmp_path,
+    )
+
+
+def test_a_waveguide_on_a_curve_has_whole_wells_at_a_constant_pitch(tmp_path):
+    curves(
+        """
+        obj = drawn([(0, 0, 0), (0, 0, 40)])
+        modifier = nodes.skin(obj, "MU Waveguide")
+        bar = 1.5 * 1.5 * 40
+
+        def wells():
+            return (bar - closed_volume(obj)) / (1.5 * 0.65 * 1.0)
+
+        assert abs(wells() - 12) < 1e-3  # 11 pitches of 3.125 mm, and half a pitch or more at either end
+        set_modifier_input(modifier, "Pitch", 8.0)
+        assert abs(wells() - 5) < 1e-3
+        set_modifier_input(modifier, "Pitch", 50.0)
+        assert abs(wells() - 1) < 1e-3
+        set_modifier_input(modifier, "Pitch", 8.0)
+        set_modifier_input(modifier, "Cut", False)
+        points = skinned(obj)
+        assert len(points) == 8 + 5 * 8
+        boxes = points[(points[:, 2] > 0.01) & (points[:, 2] < 39.99)]  # the bar has its vertices at its ends
+        middles = boxes.reshape(5, 8, 3).mean(axis=1)
+        assert np.allclose(np.diff(middles[:, 2]), 8.0, atol=1e-4)
+        assert np.allclose(middles[:, 2].mean(), 20.0, atol=1e-4)
+        # In one face: all on one side of the axis, by half the section less half a well.
+        side = np.abs(middles[:, :2]).max(axis=1)
+        assert np.allclose(side, 0.75 - 0.325 + 0.03, atol=1e-4)
+        assert np.allclose(middles[:, :2], middles[0, :2], atol=1e-5)
+        """,
+        tmp_path,
+    )
+
+
+def test_a_group_of_an_older_version_in_a_file_is_upgraded(tmp_path):
+    curves(
+        """
+        # As version 1 was: a radius that replaced the attribute's, and edges only.
+        tree = bpy.data.node_groups.new("MU Tubes", "GeometryNodeTree")
+        tree.is_modifier = True
+        tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+        tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+        tree.interface.new_socket("Sides", in_out="INPUT", socket_type="NodeSocketInt")
+        tree["mu_version"] = 1
+        tree.asset_mark()
+        obj = drawn([(0, 0, 0), (0, 0, 40)])
+        modifier = obj.modifiers.new("MU Tubes", "NODES")
+        modifier.node_group = tree
+        set_modifier_input(modifier, "Sides", 5)
+        path = sys.argv[1] + "/older.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+        obj = bpy.data.objects["own"]
+        assert bpy.data.node_groups["MU Tubes"]["mu_version"] == 1
+        add()  # whatever needs the group brings it up to date
+        tree = obj.modifiers[0].node_group
+        assert tree["mu_version"] == nodes.GROUPS["MU Tubes"].VERSION > 1
+        assert tree.asset_data.catalog_id == nodes.CATALOGUE
+        assert modifier_input(obj.modifiers[0], "Sides") == 5
+        assert len(skinned(obj)) == 10
+        """,
+        tmp_path,
+        tmp_path,
+    )
+
+
+def test_the_groups_become_an_asset_library_of_the_users(tmp_path):
+    curves(
+        """
+        from mu_addon.blender import library
+
+        names = lambda: {entry.name for entry in bpy.context.preferences.filepaths.asset_libraries}
+        assert bpy.ops.mu.assets() == {"FINISHED"}
+        assert bpy.ops.mu.assets() == {"FINISHED"}  # a second time adds no second entry
+        libraries = bpy.context.preferences.filepaths.asset_libraries
+        assert [entry.name for entry in libraries].count("Monolithic Units") == 1
+        assert len(bpy.data.node_groups) == 0, "groups that this file does not use were left in it"
+        folder = library.user_folder("assets")
+        assert nodes.CATALOGUE in (folder / "blender_assets.cats.txt").read_text()
+        assert sorted(p.name for p in folder.iterdir()) == ["blender_assets.cats.txt", "mu-nodes.blend"]
+        with bpy.data.libraries.load(str(folder / "mu-nodes.blend"), assets_only=True) as (there, here):
+            assert set(there.node_groups) == set(nodes.GROUPS)
+            here.node_groups = ["MU Tubes"]
+        tree = bpy.data.node_groups["MU Tubes"]
+        assert tree.asset_data.catalog_id == nodes.CATALOGUE
+        obj = drawn([(0, 0, 0), (0, 0, 40)])
+        assert nodes.skin(obj, "MU Tubes").node_group == tree and len(skinned(obj)) == 16
+        assert bpy.ops.mu.assets_remove() == {"FINISHED"}
+        assert "Monolithic Units" not in names() and list(folder.iterdir()) == []
+        """,
+        tmp_path,
+    )
+
+
+def test_the_sample_scene(tmp_path):
+    curves(
+        """
+        from mu_addon.blender import bodies
+
+        assert bpy.ops.mu.sample() == {"FINISHED"}
+        whole, opened, bodied = (bpy.data.objects[n] for n in ("Whole", "Cut Open", "In a Body of Its Own"))
+        assert {r.mu_unit.trouble for r in (whole, opened, bodied)} == {""}
+        assert opened.mu_unit.cut and opened.mu_unit.path == "alpha4"
+        assert unit_object.part(bodied, bodies.ENVELOPE) is not None
+        assert closed_volume(bpy.data.objects["Waveguide on a Curve"]) > 0
+        """,
+        tmp_path,
+    )

@@ -69,9 +69,11 @@ def test_cut_open_shows_the_wall(tmp_path):
         from mu_addon.blender import preview
         from mu_addon.design.profile import cavity_polygon, outer_polygon
 
-        core = load_preset("mu-1.0x")
-        d = core.dimensions
-        cut = preview.actuator(d, cut=True)
+        from mu_addon.design.steps import ALONG, Given, Stack
+
+        given, made = Given(load_preset("mu-1.0x")), Stack()
+        d = given.unit.dimensions
+        cut = preview.actuator(made.value("membranes", given), cut=True)
         assert cut.vertices[:, 0].max() < 1e-9
         section = cut.faces[-1]
         assert (cut.slots == 1).sum() == len(section)
@@ -83,10 +85,10 @@ def test_cut_open_shows_the_wall(tmp_path):
             x, z = polygon.T
             return abs(np.sum(x * np.roll(z, -1) - z * np.roll(x, -1))) / 2
 
-        wall = area(outer_polygon(d, preview.ALONG)) - area(cavity_polygon(d, preview.ALONG))
+        wall = area(outer_polygon(d, ALONG)) - area(cavity_polygon(d, ALONG))
         wall += d.inlet_wall * d.inlet_length - d.inlet_radius * d.base_cap
         assert abs(normals[:, 0].sum() / (2 * wall) - 1) < 1e-6, (normals[:, 0].sum(), 2 * wall)
-        assert preview.lattice(d, cut=True).vertices[:, 0].max() < 1e-6
+        assert preview.lattice(made.value("struts", given), cut=True).vertices[:, 0].max() < 1e-6
         """,
         tmp_path,
     )

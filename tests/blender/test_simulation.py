@@ -9,7 +9,7 @@ from .session import PRELUDE, blender, needs_bpy
 
 pytestmark = needs_bpy
 
-FAKE = Path(__file__).with_name("fake_worker.py")
+FAKE = Path(__file__).parents[1] / "study" / "fake_worker.py"
 
 WATCHING = """
 import time

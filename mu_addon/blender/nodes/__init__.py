@@ -7,9 +7,12 @@ from types import ModuleType
 import bpy
 
 from ..compat import input_defaults, modifier_inputs, set_modifier_input
-from . import balls, field, labelled, tubes
+from . import balls, field, labelled, tubes, waveguide
 
-GROUPS: dict[str, ModuleType] = {module.NAME: module for module in (tubes, balls, labelled, field)}
+GROUPS: dict[str, ModuleType] = {module.NAME: module for module in (tubes, balls, labelled, waveguide, field)}
+
+CATALOGUE = "6f0f3a5e-5f0b-4a37-9a39-0c2f7c1b9d21"
+"""Identifier of the catalogue that the groups are listed under in the asset browser."""
 
 
 def group(name: str):
@@ -20,7 +23,6 @@ def group(name: str):
         found = bpy.data.node_groups.new(name, "GeometryNodeTree")
         found.is_modifier = True
         found.asset_mark()
-        found.asset_data.description = module.TEXT
     if found.get("mu_version") != module.VERSION:
         _build(found, module)
     return found
@@ -33,6 +35,9 @@ def _build(tree, module: ModuleType) -> None:
     tree.nodes.clear()
     tree.interface.clear()
     module.build(tree, *(group(name) for name in getattr(module, "USES", ())))
+    if tree.asset_data is not None:  # the user may have taken the mark off
+        tree.asset_data.description = module.TEXT
+        tree.asset_data.catalog_id = CATALOGUE
     tree["mu_version"] = module.VERSION
     for modifier, values in zip(users, kept, strict=True):
         for name, default in input_defaults(tree).items():

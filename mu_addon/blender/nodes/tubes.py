@@ -1,4 +1,4 @@
-"""Tubes along edges, their radius from an attribute: struts, candidate paths, and any edges of a user's."""
+"""Tubes along edges and curves, their radius from an attribute: struts, paths, curves of a user's."""
 
 from __future__ import annotations
 
@@ -6,29 +6,30 @@ from ..compat import link_radius
 from .wiring import Wiring
 
 NAME = "MU Tubes"
-VERSION = 1
-TEXT = "Tubes along the edges of a mesh; the point attribute `radius` gives their radius"
+VERSION = 2
+TEXT = "Tubes along curves and edges; the point attribute `radius`, or a curve's own, gives their radius"
 
 
 def build(tree) -> None:
-    """Edges to curves, a circle swept along them, scaled by `radius` or, where there is none, by Radius."""
+    """Edges as curves, and curves as they are: a circle swept along them, scaled by `radius` times Radius."""
     w = Wiring(tree)
     w.socket("Geometry", "Geometry")
     w.socket("Sides", "Int", 8, 3, 64, "Flat pieces around a tube")
-    w.socket("Radius", "Float", 1.0, 0.0, 1000.0, "Radius where the geometry has no attribute `radius`")
+    w.socket("Radius", "Float", 1.0, 0.0, 1000.0, "Radius, or factor on the point attribute `radius`")
     w.socket("Material", "Material")
+    curve = w.curves(w.given("Geometry"))
     radius = w.node("GeometryNodeInputNamedAttribute", {"data_type": "FLOAT"}, Name="radius")
-    chosen = w.node(
+    own = w.node(
         "GeometryNodeSwitch",
         {"input_type": "FLOAT"},
         Switch=radius.outputs["Exists"],
-        False_=w.given("Radius"),
+        False_=1.0,
         True_=radius.outputs["Attribute"],
     ).outputs[0]
-    curve = w.node("GeometryNodeMeshToCurve", Mesh=w.given("Geometry"))
+    scaled = w.math("MULTIPLY", own, w.given("Radius"))
     circle = w.node("GeometryNodeCurvePrimitiveCircle", Resolution=w.given("Sides"), Radius=1.0)
     sweep = w.node("GeometryNodeCurveToMesh", Profile_Curve=circle.outputs["Curve"], Fill_Caps=True)
-    link_radius(tree, sweep, curve.outputs["Curve"], chosen)
+    link_radius(tree, sweep, curve, scaled)
     smooth = w.smooth(sweep.outputs["Mesh"])
     painted = w.node("GeometryNodeSetMaterial", Geometry=smooth, Material=w.given("Material"))
     w.output(painted.outputs["Geometry"])

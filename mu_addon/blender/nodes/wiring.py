@@ -48,6 +48,25 @@ class Wiring:
                 socket.default_value = value
         return node
 
+    def curves(self, geometry: Any):
+        """Every curve of a geometry, and the edges of its mesh as curves."""
+        parts = self.node("GeometryNodeSeparateComponents", Geometry=geometry)
+        edges = self.node("GeometryNodeMeshToCurve", Mesh=parts.outputs["Mesh"])
+        both = self.node("GeometryNodeJoinGeometry")
+        for source in (parts.outputs["Curve"], edges.outputs["Curve"]):
+            self.tree.links.new(source, both.inputs[0])
+        return both.outputs[0]
+
+    def math(self, operation: str, *values: Any):
+        """A number from one or two others, each a socket or a value."""
+        node = self.node("ShaderNodeMath", {"operation": operation})
+        for socket, value in zip(node.inputs, values, strict=False):
+            if hasattr(value, "is_output"):
+                self.tree.links.new(value, socket)
+            else:
+                socket.default_value = value
+        return node.outputs[0]
+
     def smooth(self, mesh: Any):
         """The mesh, shaded smooth; the node's first input is called Geometry before 5.0 and Mesh since."""
         node = self.node("GeometryNodeSetShadeSmooth")

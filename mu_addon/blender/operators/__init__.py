@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from . import path, preset, simulate, solid, unit
+from . import body, evidence, library, motion, path, preset, sensor, simulate, solid, step, track, unit
 
-CLASSES = (*unit.CLASSES, *preset.CLASSES, *path.CLASSES, *simulate.CLASSES, *solid.CLASSES)
+MODULES = (unit, preset, path, simulate, motion, solid, step, body, library, evidence, track, sensor)
+CLASSES = tuple(cls for module in MODULES for cls in module.CLASSES)
 
 
 def register() -> None:

@@ -7,8 +7,8 @@ from pathlib import Path
 import bpy
 from bpy.props import EnumProperty
 
-from .. import live, simulation, studies, unit_object
-from ..child import ERRORS, RUNNING
+from ...study.client import ERRORS, RUNNING
+from .. import bodies, live, simulation, studies, unit_object
 from ..properties import to_unit
 from .acting import OnSoundUnit, OnUnit, telling
 
@@ -47,7 +47,9 @@ class MU_OT_simulate(OnSoundUnit, bpy.types.Operator):
             arguments += QUICK + (QUICK_PLACE if settings.command == "place" else [])
         if settings.protocol:
             arguments += ["--protocol", bpy.path.abspath(settings.protocol)]
-        simulation.start(root.mu_unit.uuid, core, studies.settle(root), arguments)
+        folder = studies.settle(root)
+        arguments += bodies.arguments(root, core, folder / "blender")
+        simulation.start(root.mu_unit.uuid, core, folder, arguments)
         live.redraw()
         return {"FINISHED"}
 
@@ -96,6 +98,7 @@ class MU_OT_open(OnUnit, bpy.types.Operator):
 
     what: EnumProperty(
         name="What",
+        description="File or folder of the study to open",
         items=[
             ("report", "Report", "Report of the study, in the browser"),
             ("log", "Log", "Every message of the run, as a text in Blender"),
@@ -112,13 +115,18 @@ class MU_OT_open(OnUnit, bpy.types.Operator):
         if not path.exists():
             self.report({"ERROR"}, f"There is no {path} yet: simulate first")
             return {"CANCELLED"}
-        if self.what == "report":
-            bpy.ops.wm.url_open(url=path.as_uri())
-        elif self.what == "folder":
-            bpy.ops.wm.path_open(filepath=str(path))
-        else:
-            _show_text(context, path)
+        open_file(context, path, self.what)
         return {"FINISHED"}
+
+
+def open_file(context, path: Path, what: str) -> None:
+    """Open a report in the browser, a folder where folders are shown, anything else as a text in Blender."""
+    if what == "report":
+        bpy.ops.wm.url_open(url=path.as_uri())
+    elif what == "folder":
+        bpy.ops.wm.path_open(filepath=str(path))
+    else:
+        _show_text(context, path)
 
 
 def _show_text(context, path: Path) -> None:

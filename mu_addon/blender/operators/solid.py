@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ...design.export import write_nodes, write_stl
-from ...design.solid import QUALITY, build_solid
+from ...design.solid import QUALITY
 from .. import unit_object
 from ..properties import to_unit
 from .acting import OnSoundUnit, telling
@@ -18,6 +18,7 @@ _QUALITY = [
     (name, name.capitalize(), f"{f.around_axis} facets around the axis, {f.around_strut} around a strut")
     for name, f in QUALITY.items()
 ]
+_FACETS = "How finely round parts are cut into flat ones"
 
 
 class MU_OT_solid(OnSoundUnit, bpy.types.Operator):
@@ -27,13 +28,13 @@ class MU_OT_solid(OnSoundUnit, bpy.types.Operator):
     bl_label = "Build Solid"
     bl_options = {"REGISTER", "UNDO"}
 
-    quality: EnumProperty(name="Quality", items=_QUALITY, default="interactive")
+    quality: EnumProperty(name="Quality", description=_FACETS, items=_QUALITY, default="interactive")
 
     @telling
     def execute(self, context):
         root = unit_object.active_root(context)
         core = to_unit(root.mu_unit)
-        solid = build_solid(core, unit_object.chosen_window(root, core), self.quality)
+        solid = unit_object.solid_of(root, core, self.quality)
         unit_object.put_solid(root, solid, core)
         gates = solid.gates
         self.report({"INFO"}, f"Watertight, {gates.triangles} triangles, {gates.volume_mm3 / 1000:.2f} cm3")
@@ -49,7 +50,7 @@ class MU_OT_export_stl(OnSoundUnit, bpy.types.Operator, ExportHelper):
 
     filename_ext = ".stl"
     filter_glob: StringProperty(default="*.stl", options={"HIDDEN"})
-    quality: EnumProperty(name="Quality", items=_QUALITY, default="export")
+    quality: EnumProperty(name="Quality", description=_FACETS, items=_QUALITY, default="export")
     nodes: BoolProperty(
         name="Lattice Nodes as Text", description="Also write the nodes' coordinates beside it", default=False
     )
@@ -65,7 +66,7 @@ class MU_OT_export_stl(OnSoundUnit, bpy.types.Operator, ExportHelper):
         root = unit_object.active_root(context)
         core = to_unit(root.mu_unit)
         target = Path(bpy.path.abspath(self.filepath))
-        write_stl(build_solid(core, unit_object.chosen_window(root, core), self.quality), target)
+        write_stl(unit_object.solid_of(root, core, self.quality), target)
         if self.nodes:
             write_nodes(core, target.with_suffix(".txt"))
         self.report({"INFO"}, f"Written: {target}")

@@ -1,0 +1,67 @@
+"""Mouse and keys for a Blender with a window of 1600 x 900, and sessions of steps that use them."""
+
+import importlib
+import os
+import traceback
+from pathlib import Path
+
+import bpy
+
+TOLD = Path(os.environ["MU_TEST_FOLDER"]) / "told.txt"
+(package,) = (name for name, _ in bpy.context.preferences.addons.items() if name.endswith(".mu_addon"))
+place = [800, 400]
+
+
+def module(name):
+    """A module of the installed extension."""
+    return importlib.import_module(f"{package}.{name}")
+
+
+def parts():
+    """The window, its 3D view, and the view's sidebar."""
+    window = bpy.context.window_manager.windows[0]
+    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
+    return window, area, next(region for region in area.regions if region.type == "UI")
+
+
+def event(kind, value, **rest):
+    """One event where the mouse is."""
+    parts()[0].event_simulate(type=kind, value=value, x=int(place[0]), y=int(place[1]), **rest)
+
+
+def key(kind, **rest):
+    """A key pressed and let go."""
+    event(kind, "PRESS", **rest)
+    event(kind, "RELEASE")
+
+
+def move(x, y):
+    """Move the mouse to a place in the window, in pixels from its lower left."""
+    place[:] = [x, y]
+    event("MOUSEMOVE", "NOTHING")
+
+
+def called(operator, how="EXEC_DEFAULT", **settings):
+    """An operator called as the interface would, in the 3D view and with an undo step."""
+    window, area, _ = parts()
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        return operator(how, True, **settings)
+
+
+def run(session):
+    """Run a generator; each number it yields is how many seconds Blender gets before it goes on."""
+    bpy.context.preferences.view.show_splash = False
+    steps = session()
+
+    def step():
+        try:
+            return next(steps)
+        except StopIteration:
+            TOLD.write_text("all went well")
+        except Exception:  # noqa: BLE001 - told to the test, which fails with it
+            TOLD.write_text(traceback.format_exc())
+        bpy.ops.wm.quit_blender()
+        return None
+
+    bpy.app.timers.register(step, first_interval=2.0)
