@@ -81,16 +81,17 @@ def gain(fitter: Fitter, base: Fit, extended: Fit, held_out: Sequence[Experiment
     return Gain(fitted[first], held, every)
 
 
+# A gain of chi squared of four standard deviations.
+_CLEAR = 16.0
+
+
 def _told_by(base: Fit, extended: Fit, judged: Record) -> str:
-    """The first group of series to which the extended model owes a tenth of what it gains; else the first."""
+    """The first group of series that the extended model clearly serves better; else the first."""
     gained = dict.fromkeys(judged.groups, 0.0)
     for s in judged.series:
         before, after = base.residual[s.at], extended.residual[s.at]
         gained[s.group] += float(before @ before - after @ after)
-    most = sum(max(v, 0.0) for v in gained.values())
-    return next(
-        (group for group, v in gained.items() if extended.effects and v > 0.1 * most), judged.groups[0]
-    )
+    return next((g for g, v in gained.items() if extended.effects and v > _CLEAR), judged.groups[0])
 
 
 def _errors(fitter: Fitter, judged: Record, base: Fit, extended: Fit) -> dict[str, Errors]:

@@ -15,7 +15,8 @@ from scipy.interpolate import CubicSpline
 from ..design.parameters import Dimensions
 from ..errors import InputError
 from .guide import Array, Centreline, arc, swept
-from .tracing import Optics, lambertian, trace
+from .optics import Optics
+from .tracing import lambertian, trace
 
 RAYS = 4000
 _STEPS_A_MM = 4

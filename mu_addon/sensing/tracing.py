@@ -13,29 +13,11 @@ import attrs
 import numpy as np
 import warp as wp
 
-from ..errors import InputError
 from .guide import Guide
+from .optics import Optics
 from .rays import ABSORBED, DETECTED, FATES, follow
 
 Array = np.ndarray[Any, Any]
-
-
-@attrs.frozen
-class Optics:
-    """What the resin does to light at one wavelength.
-
-    index: of refraction; around: that of what surrounds it; attenuation_per_mm: natural logarithm of the loss
-    a mm; roughness: standard deviation of the wall's slope.
-    """
-
-    index: float = 1.5
-    attenuation_per_mm: float = 0.01
-    roughness: float = 0.02
-    around: float = 1.0
-
-    def __attrs_post_init__(self) -> None:
-        if not (self.around >= 1 and 1 <= self.index <= 4 and self.attenuation_per_mm >= 0 <= self.roughness):
-            raise InputError(f"no resin is like {self}", "optics", "index 1 to 4, no negative losses")
 
 
 @attrs.frozen

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ from ..homogenize.effective import Effective, read_effective
 from ..meshing.settings import MeshSettings
 from ..placement.graph import Limits
 from ..placement.inclusion import RULES
+from ..sensing.optics import Optics
 from .study_file import FILES, NAME, STAGES, Tables, compose, digest, holds
 from .study_file import read as read_tables
 
@@ -64,6 +65,8 @@ class Job:
     # Which paths: the windows of anchors alone, or the whole lattice graph besides.
     paths: str = attrs.field(default="windows", validator=attrs.validators.in_(("windows", "graph")))
     limits: Limits = attrs.field(factory=Limits)
+    # What the resin does to light, for the signal beside each path's disturbance.
+    optics: Optics = attrs.field(factory=Optics)
     most_checks: int = attrs.field(default=100, validator=_whole(2, 100_000, "the number of checks"))
     # The lattice's law, by homogenizing its cell, in place of the unit's one modulus for it.
     lattice: Effective | None = None
@@ -102,6 +105,8 @@ class Job:
                 "paths": self.paths,
             },
         }
+        if self.optics != Optics():
+            tables["place"]["optics"] = attrs.asdict(self.optics)
         if self.paths == "graph":
             tables["place"]["search"] = attrs.asdict(self.limits) | {"most_checks": self.most_checks}
         return {stage: tables[stage] for stage in self.stages}
@@ -205,7 +210,7 @@ def job_with(tables: Mapping[str, Mapping[str, Any]], where: str, **given: Any) 
     job = dict(given)
     for stage, table in tables.items():
         values = {k: v for k, v in table.items() if k not in FILES and not k.endswith("_sha256")}
-        for key, kind in (("mesh", MeshSettings), ("search", Limits)):
+        for key, kind in (("mesh", MeshSettings), ("search", Limits), ("optics", Optics)):
             if key in values:
                 inner = _inner(values.pop(key), f"{where}, [{stage}.{key}]")
                 if key == "search" and "most_checks" in inner:
@@ -252,3 +257,18 @@ def grasp() -> Protocol:
 def protocol_of(path: str | Path | None) -> Protocol:
     """The protocol in a CSV file, or the one that comes with the package. Raises InputError."""
     return grasp() if path is None else read_protocol(Path(path))
+
+
+def optics_of(words: Sequence[str]) -> Optics:
+    """The resin's optics with what NAME=VALUE pairs change; raises InputError."""
+    names = [field.name for field in attrs.fields(Optics)]
+    values: dict[str, float] = {}
+    for word in words:
+        name, _, value = word.partition("=")
+        try:
+            values[name] = float(value)
+        except ValueError:
+            name = ""
+        if name not in names:
+            raise InputError(f"{word!r} is not understood", "--light", f"NAME=VALUE with {', '.join(names)}")
+    return Optics(**values)

@@ -1,7 +1,7 @@
 """The simulated unit at a measured bending angle: between Model A's states, and never beyond them.
 
-Under pressure alone the elastic unit has one state a pressure. Where its angle rises with pressure all the way
-from rest, an angle belongs to one state; beyond the first turn it would belong to two, so that there the
+Under pressure alone the elastic unit has one state a pressure. Where its angle rises with pressure all the
+way from rest, an angle belongs to one state; beyond the first turn it would belong to two, so that there the
 twin has nothing to show. Between two states displacements go straight, as the motion on the timeline does.
 """
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from ..sensing.optics import Optics
     from ..sensing.signal import Law, Response
-    from ..sensing.tracing import Optics
 
 Floats = NDArray[np.floating[Any]]
 

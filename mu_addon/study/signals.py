@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
-from ..errors import InputError
 from ..fem.kinematics import bending_angle_deg, probe
 from ..files import write_csv
 from ..sensing.guide import Centreline
+from ..sensing.optics import Optics
 from ..sensing.signal import Guided, Law, best_sets, fit_law, pareto, response, through
-from ..sensing.tracing import Optics
 from .cache import key
 from .results import Signals
 
@@ -27,21 +25,6 @@ TABLE = "signals.csv"
 NOISE = 0.005
 # How much the curvature of one cell of the backbone varies, 1/mm: a fifth of the unit's at 40 degrees.
 SPREAD = 0.002
-
-
-def optics_of(words: Sequence[str]) -> Optics:
-    """The resin's optics with what NAME=VALUE pairs change; raises InputError."""
-    names = [field.name for field in attrs.fields(Optics)]
-    values: dict[str, float] = {}
-    for word in words:
-        name, _, value = word.partition("=")
-        try:
-            values[name] = float(value)
-        except ValueError:
-            name = ""
-        if name not in names:
-            raise InputError(f"{word!r} is not understood", "--light", f"NAME=VALUE with {', '.join(names)}")
-    return Optics(**values)
 
 
 def signals(study: Study, optics: Optics) -> Signals:

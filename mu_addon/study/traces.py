@@ -7,6 +7,7 @@ one sample still shows.
 from __future__ import annotations
 
 import copy
+import itertools
 from typing import Any
 
 import numpy as np
@@ -69,7 +70,7 @@ def unbroken(age_s: Array, gap_s: float) -> list[slice]:
     """Stretches of times (b,) in s, ascending, without a gap longer than that."""
     cuts = np.flatnonzero(np.diff(age_s) > gap_s) + 1
     ends = [0, *cuts.tolist(), len(age_s)]
-    return [slice(a, b) for a, b in zip(ends, ends[1:], strict=False) if b > a]
+    return [slice(a, b) for a, b in itertools.pairwise(ends) if b > a]
 
 
 def steady_range(before: tuple[float, float] | None, low: float, high: float) -> tuple[float, float]:
@@ -77,7 +78,9 @@ def steady_range(before: tuple[float, float] | None, low: float, high: float) ->
     if not (np.isfinite(low) and np.isfinite(high)):
         return before or (0.0, 1.0)
     if before is not None and before[0] <= low and high <= before[1]:
-        if high - low >= (before[1] - before[0]) / 3 or before[1] - before[0] <= 2e-3 * abs(high):
+        wide = before[1] - before[0]
+        # As narrow as it gets, or filled.
+        if wide <= 2e-3 * max(abs(low), abs(high)) or high - low >= wide / 3:
             return before
     room = max(0.15 * (high - low), 5e-4 * max(abs(low), abs(high)), 1e-6)
     return low - room, high + room

@@ -1,4 +1,4 @@
-"""A sensor's session seen from another process: its status, and its samples as they come; waits for nothing."""
+"""A sensor's session seen from another process: its status, and its samples as they come. Nothing waits."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = np.ndarray[Any, Any]
 
 
 class Watched:
-    """The session that records into `folder`; `status` is what it last said, empty before it says anything."""
+    """The session that records into `folder`; `status` is what it said last, empty before that."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.sensing.guide import arc
+from mu_addon.sensing.optics import Optics
 from mu_addon.sensing.signal import (
     Guided,
     Law,
@@ -23,7 +24,6 @@ from mu_addon.sensing.signal import (
     through,
     transmitted,
 )
-from mu_addon.sensing.tracing import Optics
 
 D = load_preset("mu-1.0x").dimensions
 

@@ -8,7 +8,8 @@ import trimesh
 
 from mu_addon.errors import InputError
 from mu_addon.sensing.guide import Centreline, Guide, arc, swept
-from mu_addon.sensing.tracing import Optics, beam, lambertian, trace
+from mu_addon.sensing.optics import Optics
+from mu_addon.sensing.tracing import beam, lambertian, trace
 
 
 def solid(guide: Guide) -> trimesh.Trimesh:

@@ -47,6 +47,13 @@ def add(commands: Commands[Any]) -> None:
         default="windows",
         help="graph: search the whole lattice for the best path, bent ones too (windows)",
     )
+    command.add_argument(
+        "--light",
+        nargs="+",
+        default=(),
+        metavar="NAME=VALUE",
+        help="the resin's optics: index, attenuation_per_mm, roughness (1.5, 0.01, 0.02, assumed)",
+    )
     search = command.add_argument_group("limits of --paths graph")
     search.add_argument(
         "--shortest-cells", type=float, default=2.0, metavar="C", help="shortest path, in cells (2)"

@@ -73,7 +73,7 @@ def _open(options: argparse.Namespace, progress: Progress, ending: Ending) -> St
     from ...homogenize.effective import read_effective
     from ...meshing.settings import MeshSettings
     from ...placement.graph import Limits
-    from ..job import Job, protocol_of
+    from ..job import Job, optics_of, protocol_of
     from ..model_file import require_same_print
     from ..study import Study
 
@@ -96,6 +96,7 @@ def _open(options: argparse.Namespace, progress: Progress, ending: Ending) -> St
             "paths": options.paths,
             "limits": Limits(options.shortest_cells, options.longest_cells, options.bend_deg),
             "most_checks": options.checks,
+            "optics": optics_of(options.light),
         }
     if extra.get("lattice") is not None and ending.summary.get("model", {}).get("applied"):
         require_same_print(unit, extra["lattice"], options.model)
@@ -151,13 +152,12 @@ def run_stages(study: Study, path: Window | None = None) -> None:
         study.make_mesh()
         study.simulate(candidates_beside="place" in stages)
     if "place" in stages:
-        from ...sensing.tracing import Optics
         from ..graph_search import search_graph, sensitivity_map
         from ..signals import signals
 
         chosen = study.place()
         sensitivity_map(study)
-        signals(study, Optics())
+        signals(study, study.job.optics)
         if study.job.paths == "graph":
             search_graph(study)
         study.design(window(study.job.unit, chosen[study.headline_rule]))

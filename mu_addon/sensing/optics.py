@@ -1,0 +1,26 @@
+"""What a printed resin does to light."""
+
+from __future__ import annotations
+
+import attrs
+
+from ..errors import InputError
+
+
+@attrs.frozen
+class Optics:
+    """What the resin does to light at one wavelength; for Elastic 50A at 850 nm nobody has published it.
+
+    index: of refraction; around: that of what surrounds it; attenuation_per_mm: natural logarithm of the loss
+    a mm; roughness: standard deviation of the wall's slope. The defaults are assumed: a silicone-like
+    index, a tenth of the light lost in a centimetre, walls as smooth as layers of 0.1 mm with rounded steps.
+    """
+
+    index: float = 1.5
+    attenuation_per_mm: float = 0.01
+    roughness: float = 0.02
+    around: float = 1.0
+
+    def __attrs_post_init__(self) -> None:
+        if not (self.around >= 1 and 1 <= self.index <= 4 and self.attenuation_per_mm >= 0 <= self.roughness):
+            raise InputError(f"no resin is like {self}", "optics", "index 1 to 4, no negative losses")
