@@ -36,6 +36,9 @@ _TABLE = 2001
 # Beyond this the light has faded to nothing within a day.
 _MOST_DRIFT_PER_H = 1.0
 _FEWEST = 8
+# Singular values of the spline's basis: 0.2 of the largest or more where angles are swept, however many
+# intervals; 0.03 or less where intervals outnumber the angles held.
+_DETERMINED = 0.05
 # A drift is believed if it leaves less than this share of the mean square in left-out sweeps.
 _CLEARLY = 0.25
 
@@ -165,10 +168,22 @@ def calibrate(sweeps: Sequence[Sweep], channel: str, dark: str | float = 0.0) ->
 
 def _best(sweeps: Sequence[Sweep], drift: float) -> tuple[float, int, list[Array]]:
     """Mean square in left-out sweeps, the number of intervals that makes it least, and what is left."""
-    tried = [(m, _left_out(sweeps, m, drift)) for m in _INTERVALS]
+    tried = [(m, _left_out(sweeps, m, drift)) for m in _INTERVALS if m == 1 or _determined(sweeps, m)]
     squares = [float(np.mean(np.concatenate(off) ** 2)) for _, off in tried]
     best = int(np.argmin(squares))
     return squares[best], *tried[best]
+
+
+def _determined(sweeps: Sequence[Sweep], intervals: int) -> bool:
+    """Whether the angles that were visited say each coefficient of a spline of so many intervals.
+
+    Sweeps that hold a few angles say nothing of those between, and sweeps left out hold the same few: they
+    cannot tell that a spline goes there in steps.
+    """
+    knots = _knots(sweeps, intervals)
+    basis = BSpline.design_matrix(np.concatenate([s.angle_deg for s in sweeps]), knots, _DEGREE).toarray()
+    values = np.linalg.svd(basis, compute_uv=False)
+    return len(basis) >= basis.shape[1] and bool(values[-1] > _DETERMINED * values[0])
 
 
 def _require(sweeps: Sequence[Sweep]) -> None:

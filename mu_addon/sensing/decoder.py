@@ -58,7 +58,7 @@ class Layout:
 class Samples:
     """Samples of one layout in the order they came.
 
-    host_s (n,): seconds on the host's clock; device_s (n,): the device's own, without wraps, or nan;
+    host_s (n,): seconds on the host's clock, rising; device_s (n,): the device's own, without wraps, or nan;
     sequence (n,): running number without wraps, counted on where the device sends none; values (n, c).
     """
 
@@ -76,6 +76,8 @@ class Samples:
 _Row = tuple[float | None, float | None, list[float]]
 # A device says what its frames hold about once a second; samples that come before wait for it.
 _PATIENCE_S = 1.5
+# Least step of the host's time from sample to sample, the last digit that a recording has.
+_TICK_S = 1e-6
 # A device that starts anew soon after its start looks like one that repeats itself.
 _REPEATS = 20
 
@@ -101,6 +103,7 @@ class Decoder:
         self._clock, self._tick_s, self._device_s = Endless(None), 1.0, 0.0
         self._repeats = 0
         self._at = math.inf
+        self._told = -math.inf
 
     def interrupted(self) -> None:
         """The line was cut: what is half read is gone, and what comes next may begin in the middle."""
@@ -331,6 +334,10 @@ class Decoder:
         if timed.any():
             self._host.learn(float(device[timed][-1]), at)
             host[timed] = self._host.of(device[timed])
+        # A mapping that has learned better may be a little behind what was told before.
+        rising = _TICK_S * np.arange(len(kept))
+        host = np.maximum.accumulate(np.maximum(host - rising, self._told)) + rising
+        self._told = float(host[-1]) + _TICK_S if len(kept) else self._told
         width = len(layout.channels)
         table = np.array([row[2] for row in kept], dtype=float).reshape(len(kept), width)
         return Samples(layout, host, device, sequence, table)

