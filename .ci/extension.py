@@ -30,10 +30,10 @@ PLATFORMS = {
     "windows-x64": ["win_amd64"],
     "macos-arm64": [f"macosx_{major}_0_arm64" for major in (15, 14, 13, 12, 11)],
 }
-LEFT_OUT = ("numpy", "trimesh")
-"""numpy is Blender's; trimesh serves the tests alone."""
+LEFT_OUT = ("numpy",)
+"""numpy is Blender's own."""
 UNAVAILABLE = {"windows-x64": ("pymetis",)}
-"""No wheel for a platform: the extension designs and exports there, and says why it cannot simulate."""
+"""No wheel for a platform; without METIS systems are ordered by minimum degree."""
 
 
 def blender_ext() -> Path | None:

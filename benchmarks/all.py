@@ -27,6 +27,7 @@ SCRIPTS = {
     "cell": ["cell.py"],
     "specimen": ["specimen.py", "size"],
     "moduli": ["moduli.py"],
+    "print": ["print.py"],
     "gpu": ["gpu.py"],
 }
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import textwrap
 
 import bpy
@@ -286,44 +285,6 @@ class MU_PT_results(_OfUnit, bpy.types.Panel):
         row.operator("mu.open", text="Folder", icon="FILE_FOLDER").what = "folder"
 
 
-class MU_PT_print(_OfUnit, bpy.types.Panel):
-    """The printable solid, its gates and its files"""
-
-    bl_idname = "MU_PT_print"
-    bl_label = "Print"
-
-    def show(self, layout, context, root):
-        row = layout.row()
-        row.scale_y = 1.4
-        row.operator("mu.solid", icon="MESH_DATA")
-        solid = unit_object.part(root, unit_object.SOLID)
-        if solid is None:
-            wrapped(layout, "No solid built yet", "INFO")
-        else:
-            _gates(layout, root, solid)
-        layout.operator("mu.export_stl", icon="EXPORT")
-        header, body = layout.panel("MU_printing", default_closed=True)
-        header.label(text="How It Prints")
-        if body:
-            parameters(body, root.mu_unit, "print")
-
-
-def _gates(layout, root, solid) -> None:
-    box = layout.box()
-    if not unit_object.solid_is_current(root, solid):
-        wrapped(box, "Built from earlier parameters: build it again", "ERROR")
-    g = json.loads(solid["mu_gates"])
-    for text in (
-        f"Lattice genus {g['lattice_genus']}, as E - V + 1",
-        f"{g['components']} body, {g['bad_edges_after_stl']} open edges in its STL",
-        f"{g['inner_shells']} cavity of {g['inner_volume_mm3'] / 1000:.2f} cm3",
-        f"{g['volume_mm3'] / 1000:.2f} cm3 of resin, {g['triangles']} triangles",
-    ):
-        box.label(text=text, icon="CHECKMARK")
-    if solid["mu_path"]:
-        box.label(text=f"Waveguide along {solid['mu_path']}", icon="CHECKMARK")
-
-
 CLASSES = (
     MU_PT_unit,
     MU_PT_design,
@@ -331,7 +292,6 @@ CLASSES = (
     MU_PT_path,
     MU_PT_simulate,
     MU_PT_results,
-    MU_PT_print,
 )
 
 

@@ -7,7 +7,7 @@ import math
 
 import bpy
 
-from ..study.client import DONE, FAILED, RUNNING
+from ..study.client import FAILED, RUNNING
 from . import printing, simulation, unit_object
 from .panels import _OfUnit, ended, parameters, running, wrapped
 
@@ -170,7 +170,7 @@ def _directions(layout, settings, found) -> None:
     choice = [build for build in builds if build["best_among"]][:DIRECTIONS]
     for build in choice:
         box = body.box()
-        row = box.row()
+        row = box.split(factor=0.66)
         row.label(text=", ".join(f"{x:.2f}" for x in build["direction"]), icon="SORT_DESC")
         same = sum(a * b for a, b in zip(build["direction"], settings.up, strict=True)) > 0.9999
         button = row.operator("mu.print_up", text="Chosen" if same else "Take", depress=same)
@@ -195,14 +195,20 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
         layout.prop(settings, "compensate")
         if settings.compensate == "gauge":
             layout.prop(settings, "gauge")
+        if settings.compensate != "none" and settings.formats & {"3mf-beams", "step"}:
+            wrapped(layout, "Beams and STEP stay of nominal size", "INFO")
         path = root.mu_unit.path
-        wrapped(layout, f"With the waveguide along {path}" if path else "Without a waveguide: no path chosen", "INFO")
+        wrapped(
+            layout,
+            f"With the waveguide along {path}" if path else "Without a waveguide: no path chosen",
+            "INFO",
+        )
         _said(layout, found)
         row = layout.row()
         row.scale_y = 1.4
         row.operator("mu.print_export", icon="EXPORT")
         _written(layout, printing.exported(root))
-        layout.operator("mu.export_stl", text="STL to ...", icon="FILE_FOLDER")
+        layout.operator("mu.export_stl", text="Export STL As ...", icon="FILE_FOLDER")
         row = layout.row(align=True)
         row.operator("mu.print_specimens", icon="OUTLINER_OB_LATTICE")
         row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = printing.SPECIMENS

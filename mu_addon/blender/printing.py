@@ -10,6 +10,7 @@ import importlib.util
 import json
 import tomllib
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -54,10 +55,11 @@ MANIFEST = "manifest.json"
 FAULTS = ("error", "warning")
 OWN = "own.json"
 """Says of which unit and body the STL is that was handed to a check."""
-MARK = "mu_check"
-"""Marks the objects that show where a check found something; its value is the finding's number."""
+MARK = unit_object.CHECK
+"""Its value on a marker is the finding's number, and `UP` on the arrow along the build direction."""
 UP = "up"
-"""Value of that mark on the arrow along the build direction."""
+LARGER = 1.8
+"""How much larger the ball at the place that is looked at is."""
 OF = "mu_check_of"
 """On that arrow: digest of the check that is marked."""
 MATERIAL = {"error": "MU Flaws", "warning": "MU Doubt"}
@@ -70,8 +72,15 @@ class MU_PG_print(bpy.types.PropertyGroup):
         name="Printer",
         description="Whose limits the check compares with",
         items=[
-            *((name, name.replace("-", " ").title(), "Comes with the extension") for name in asset_names("printers")),
-            (OWN_PRINTER, "Own File", "A TOML file of your own; start from printer.toml in the check's folder"),
+            *(
+                (name, name.replace("-", " ").title(), "Comes with the extension")
+                for name in asset_names("printers")
+            ),
+            (
+                OWN_PRINTER,
+                "Own File",
+                "A TOML file of your own; start from printer.toml in the check's folder",
+            ),
         ],
         default=DEFAULT,
     )
@@ -83,7 +92,7 @@ class MU_PG_print(bpy.types.PropertyGroup):
     )
     up: FloatVectorProperty(
         name="Up",
-        description="Build direction in the unit's frame, away from the platform. 0 0 1: inlet toward the platform",
+        description="Build direction in the unit's frame, away from the platform. 0 0 1: inlet down",
         subtype="XYZ",
         default=(0.0, 0.0, 1.0),
     )
@@ -97,7 +106,10 @@ class MU_PG_print(bpy.types.PropertyGroup):
     quality: EnumProperty(
         name="Facets",
         description="How finely round parts are cut into flat ones",
-        items=[("export", "Fine", "The quality to print"), ("interactive", "Coarse", "Quicker, smaller files")],
+        items=[
+            ("export", "Fine", "The quality to print"),
+            ("interactive", "Coarse", "Quicker, smaller files"),
+        ],
     )
     compensate: EnumProperty(
         name="Compensate",
@@ -130,7 +142,7 @@ class MU_PG_print(bpy.types.PropertyGroup):
 
 @attrs.frozen(eq=False)
 class Checked:
-    """What a check found: check.json, its findings of interest first; stale: why it is not of the unit now."""
+    """What a check found: check.json and its digest; stale: why it is not one of the unit as it is now."""
 
     folder: Path
     stale: str
@@ -168,10 +180,19 @@ def printer_of(root: Any) -> Printer:
     """The printer that is chosen; raises InputError for a file that is none."""
     settings = root.mu_print
     if settings.printer != OWN_PRINTER:
-        return load_printer(settings.printer)
+        return _shipped(settings.printer)
     if not settings.printer_file:
-        raise InputError("no file with the printer's limits was chosen", "Print", "choose one, or a shipped printer")
-    return load_printer(bpy.path.abspath(settings.printer_file))
+        raise InputError(
+            "no file with the printer's limits was chosen", "Print", "choose one, or a shipped printer"
+        )
+    path = bpy.path.abspath(settings.printer_file)
+    # Panels ask often: read again only when the file changes, or to say what is wrong with it.
+    return _kept([Path(path)], lambda: load_printer(path)) or load_printer(path)
+
+
+@cache
+def _shipped(name: str) -> Printer:
+    return load_printer(name)
 
 
 def path_of(root: Any, unit: Unit) -> str:
@@ -200,10 +221,12 @@ def trouble(root: Any, command: str) -> str:
         if not settings.formats:
             return "Choose at least one kind of file"
         if own_body(root):
-            return "With a body of your own only STL is written: use Export STL"
+            return "With a body of your own only STL is written: use Export STL As"
         if settings.compensate == "gauge" and not settings.gauge:
             return "Choose the gauge's sheet with the sizes that were measured"
-        if settings.compensate == "unit" and not any((root.mu_unit.print.offset_xy_mm, root.mu_unit.print.offset_z_mm)):
+        if settings.compensate == "unit" and not any(
+            (root.mu_unit.print.offset_xy_mm, root.mu_unit.print.offset_z_mm)
+        ):
             return "The unit has no offsets to take off: set them under How It Prints"
     return ""
 
@@ -231,7 +254,12 @@ def words(root: Any, unit: Unit, command: str) -> list[str]:
         if name == OWN_PRINTER:
             name = bpy.path.abspath(settings.printer_file)
         return [*line, "--printer", name, "--up", *(f"{x:.6g}" for x in settings.up)]
-    line += ["--formats", *(name for name, _, _ in FORMATS if name in settings.formats), "--quality", settings.quality]
+    line += [
+        "--formats",
+        *(name for name, _, _ in FORMATS if name in settings.formats),
+        "--quality",
+        settings.quality,
+    ]
     if settings.compensate == "unit":
         line.append("--compensate")
     elif settings.compensate == "gauge":
@@ -328,8 +356,13 @@ class Exported:
 def exported(root: Any) -> Exported | None:
     """What the unit's folder of exports holds, or None where there is nothing whole."""
     path = folder_of(root, EXPORT) / MANIFEST
-    found = _kept([path], lambda: json.loads(path.read_text(encoding="utf-8")))
-    if not isinstance(found, dict):
+
+    def read() -> dict[str, Any]:
+        said = json.loads(path.read_text(encoding="utf-8"))
+        return {name: said[name] for name in ("unit", "path", "resin", "files", "refused")}
+
+    found = _kept([path], read)
+    if found is None:
         return None
     of = [found["unit"]["sha256"], (found["path"] or {}).get("name", ""), ""]
     try:
@@ -391,12 +424,16 @@ def _marker(root: Any, name: str, data: Any, value: str) -> Any:
 
 
 def resize(root: Any) -> None:
-    """Give the markers the radius that is set."""
+    """Give the markers the radius that is set, and the place that is looked at a larger one."""
+    settings = root.mu_print
     for obj in marks(root):
-        if obj.data is not None:
-            values = np.full(len(obj.data.vertices), root.mu_print.marker, np.float32)
-            obj.data.attributes["radius"].data.foreach_set("value", values)
-            obj.data.update()
+        if obj.data is None:
+            continue
+        values = np.full(len(obj.data.vertices), settings.marker, np.float32)
+        if obj[MARK] == str(settings.finding):
+            values[settings.place % len(values)] *= LARGER
+        obj.data.attributes["radius"].data.foreach_set("value", values)
+        obj.data.update()
 
 
 def frame(context: Any, root: Any, place: Any, reach: float) -> None:

@@ -1,8 +1,8 @@
 """The real sensor beside its unit: one session a unit in a process of its own, looked into by a timer.
 
 What runs is kept here, in Python, and never in the .blend file; recordings and calibrations are files in the
-unit's study folder. So undo, loading a file and a render leave the session alone, and nothing is lost with it.
-The process ends with Blender, whose end it notices at its standard input.
+unit's study folder. So undo, loading a file and a render leave the session alone. The process ends with
+Blender, whose end it notices at its standard input.
 """
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
@@ -179,7 +179,7 @@ class Session:
     trouble: str = ""
     """Why the calibration cannot read this stream."""
     _shown: tuple[Any, ...] = ()
-    _posed: float = 0.0
+    read_at: float = 0.0
 
     @property
     def running(self) -> bool:
@@ -327,7 +327,7 @@ def disconnect(uuid: str) -> None:
 
 
 def chosen(root: Any) -> tuple[str, str | float]:
-    """Channel of the light, and that of the dark level or its volts: as the user says, else by their names."""
+    """Channel of the light, and that of the dark level or its volts: as the user says, or by their names."""
     settings, session = root.mu_sensor, of(root)
     channels = session.channels if session else ()
     light = next((c for c in channels if c.startswith("light")), channels[0] if channels else "")
@@ -442,8 +442,8 @@ def poll() -> tuple[bool, bool]:
             if guide.finished and root is not None:
                 said |= _finish(root, session)
         now = time.monotonic()
-        if root is not None and now - session._posed >= TWIN_S:
-            session._posed = now
+        if root is not None and now - session.read_at >= TWIN_S:
+            session.read_at = now
             session.read(found, *chosen(root))
             if not _rendering:
                 said |= twin.follow(root, session.reading, session.fresh)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
+from math import isfinite
 
 import bpy
 
 from ..study.client import FAILED, RUNNING
-from . import sensor, simulation, twin
+from . import sensor, simulation, studies, twin
 from .operators.acting import OnUnit
 from .panels import ended, running, wrapped
 from .unit_object import active_root
@@ -127,6 +128,11 @@ def _session(layout, settings, session):
         row = column.row()
         row.label(text=name)
         row.label(text="-" if value is None else f"{value:.4f}")
+    reading = session.reading
+    if session.fresh and reading is not None and isfinite(reading.angle_deg):
+        row = column.row()
+        row.label(text=f"angle {reading.angle_deg:.1f}°", icon="NONE" if reading.possible else "ERROR")
+        row.label(text=f"{reading.low_deg:.1f} to {reading.high_deg:.1f}°")
     if session.trouble:
         box.alert = True
         wrapped(box, session.trouble, "ERROR")
@@ -158,7 +164,7 @@ def _plot(layout, settings, session):
 
 def _calibration(layout, root, session):
     settings = root.mu_sensor
-    header, body = layout.panel("MU_sensor_calibration", default_closed=True)
+    header, body = layout.panel("MU_sensor_calibration")
     header.label(text="Calibration")
     if not body:
         return
@@ -174,8 +180,9 @@ def _calibration(layout, root, session):
         )
     else:
         wrapped(body, trouble or "Not calibrated: voltages only", "ERROR" if trouble else "INFO")
-    body.prop(settings, "channel")
-    body.prop(settings, "dark")
+    light, dark = sensor.chosen(root)
+    body.prop(settings, "channel", placeholder=light)
+    body.prop(settings, "dark", placeholder=str(dark))
     body.prop(settings, "calibration")
     child = simulation.of(sensor.calibrating(root))
     if child is not None:
@@ -214,7 +221,7 @@ def _guide(layout, guide):
 
 
 def _twin(layout, root):
-    header, body = layout.panel("MU_sensor_twin", default_closed=True)
+    header, body = layout.panel("MU_sensor_twin")
     header.label(text="Twin")
     if not body:
         return
@@ -227,6 +234,9 @@ def _twin(layout, root):
         if state == twin.OUTSIDE:
             body.alert = True
         wrapped(body, words, {twin.LIVE: "CHECKMARK", twin.OUTSIDE: "ERROR"}.get(state, "INFO"))
+        found = studies.findings(root)
+        if found is not None and found.stale:
+            wrapped(body, "It moves as a unit of other parameters: simulate again", "ERROR")
 
 
 def register() -> None:

@@ -53,9 +53,7 @@ def _draw() -> None:
         return
     traces = session.frozen or session.traces
     if traces is not None:
-        gpu.state.blend_set("ALPHA")
         _plot(context, root.mu_sensor, session, traces, scale)
-        gpu.state.blend_set("NONE")
 
 
 def shown(settings: Any, session: sensor.Session) -> list[tuple[int, str]]:
@@ -89,7 +87,7 @@ def _plot(context: Any, settings: Any, session: sensor.Session, traces: Any, sca
     if channels:
         axes.append(("channels", [(k, name, COLOURS[k % len(COLOURS)]) for k, name in channels], None))
     if np.isfinite(low[n:]).any():
-        axes.append(("angle", [(n, "angle [°], 95 % band", ANGLE)], (n + 1, n + 2)))
+        axes.append(("angle", [(n, "angle in °, with its 95 % band:", ANGLE)], (n + 1, n + 2)))
     bottom = BOTTOM * scale
     for title, curves, band in axes:
         top = bottom + HEIGHT * scale
@@ -97,12 +95,13 @@ def _plot(context: Any, settings: Any, session: sensor.Session, traces: Any, sca
         before = session.ranges.get(title)
         ends = _least(low[places]), _most(high[places])
         session.ranges[title] = frame = steady_range(before, *ends)
-        y = (frame[0], (top - bottom) / (frame[1] - frame[0]), bottom)
-        _paper(left, right, bottom, top, frame, seconds, scale)
+        upward = (top - bottom) / (frame[1] - frame[0])
+        low_y, high_y = (bottom + (values - frame[0]) * upward for values in (low, high))
+        _paper((left, right), (bottom, top), frame, seconds, scale, title == axes[0][0])
         if band:
-            _area(x, y, low[band[0]], high[band[1]], runs, BAND)
+            _between("TRI_STRIP", x, low_y[band[0]], high_y[band[1]], runs, BAND)
         for k, _, colour in curves:
-            _curve(x, y, low[k], high[k], runs, colour)
+            _between("LINE_STRIP", x, low_y[k], high_y[k], runs, colour)
         at = left
         for k, name, colour in curves:
             now = "" if len(age) == 0 else f" {(low[k, -1] + high[k, -1]) / 2:.4g}"
@@ -122,11 +121,16 @@ def _most(values: Any) -> float:
 
 
 def _paper(
-    left: float, right: float, bottom: float, top: float, frame: tuple[float, float], seconds: float, s: float
+    across: tuple[float, float],
+    up: tuple[float, float],
+    frame: tuple[float, float],
+    seconds: float,
+    s: float,
+    lowest: bool,
 ) -> None:
-    """Ground, grid, and values of both axes."""
-    corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
-    _fill(_flat(np.array(corners)), [(0, 1, 2), (0, 2, 3)], PAPER)
+    """Ground, grid, and values: of time below the lowest axes only."""
+    (left, right), (bottom, top) = across, up
+    _shape("TRI_STRIP", [(left, bottom), (right, bottom), (left, top), (right, top)], PAPER)
     size = round(10 * s)
     lines: list[tuple[float, float]] = []
     for value in ticks(*frame):
@@ -138,52 +142,34 @@ def _paper(
     for value in ticks(-seconds, 0.0):
         x = left + (1 + value / seconds) * (right - left)
         lines += [(x, bottom), (x, top)]
-        text = f"{value:g} s"
-        blf.size(0, size)
-        write(text, x - blf.dimensions(0, text)[0] / 2, bottom - 1.3 * size, size)
-    _lines("LINES", _flat(np.array(lines)), GRID)
+        if lowest:
+            text = f"{value:g} s"
+            blf.size(0, size)
+            write(text, x - blf.dimensions(0, text)[0] / 2, bottom - 1.3 * size, size)
+    _shape("LINES", lines, GRID)
 
 
-def _curve(x: Any, y: tuple[float, float, float], low: Any, high: Any, runs: list[slice], colour: Any) -> None:
-    """From lowest to highest and on to the next: a line where they are the same, a band where they are not."""
-    for run in runs:
-        seen = np.isfinite(low[run])
-        points = np.empty((2 * np.count_nonzero(seen), 2))
-        points[:, 0] = np.repeat(x[run][seen], 2)
-        points[0::2, 1], points[1::2, 1] = low[run][seen], high[run][seen]
-        points[:, 1] = y[2] + (points[:, 1] - y[0]) * y[1]
-        if len(points):
-            _lines("LINE_STRIP", _flat(points), colour)
-
-
-def _area(x: Any, y: tuple[float, float, float], low: Any, high: Any, runs: list[slice], colour: Any) -> None:
+def _between(kind: str, x: Any, low: Any, high: Any, runs: list[slice], colour: Any) -> None:
+    """From low to high and on to the next: a line that is a band where the two differ, or the area itself."""
     for run in runs:
         seen = np.isfinite(low[run]) & np.isfinite(high[run])
-        points = np.empty((2 * np.count_nonzero(seen), 2))
-        points[:, 0] = np.repeat(x[run][seen], 2)
+        if np.count_nonzero(seen) < 2:
+            continue
+        points = np.repeat(x[run][seen], 2)[:, None].repeat(2, axis=1)
         points[0::2, 1], points[1::2, 1] = low[run][seen], high[run][seen]
-        points[:, 1] = y[2] + (points[:, 1] - y[0]) * y[1]
-        if len(points) >= 4:
-            shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-            shader.uniform_float("color", colour)
-            batch_for_shader(shader, "TRI_STRIP", {"pos": _flat(points)}).draw(shader)
+        _shape(kind, points, colour)
 
 
-def _flat(points: Any) -> Any:
-    """Points (n, 2) as the graphics card takes them, (n, 3)."""
-    return np.column_stack([points, np.zeros(len(points))]).astype(np.float32)
-
-
-def _lines(kind: str, points: Any, colour: Any) -> None:
+def _shape(kind: str, points: Any, colour: Any) -> None:
+    """Draw points (n, 2) in pixels as lines, a strip of lines or of triangles."""
+    # Each time: writing text ends blending.
+    gpu.state.blend_set("ALPHA")
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     shader.uniform_float("color", colour)
-    batch_for_shader(shader, kind, {"pos": points}).draw(shader)
-
-
-def _fill(points: Any, triangles: Any, colour: Any) -> None:
-    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    shader.uniform_float("color", colour)
-    batch_for_shader(shader, "TRIS", {"pos": points}, indices=triangles).draw(shader)
+    flat = np.zeros((len(points), 3), np.float32)
+    flat[:, :2] = points
+    batch_for_shader(shader, kind, {"pos": flat}).draw(shader)
+    gpu.state.blend_set("NONE")
 
 
 def _over_twin(context: Any, root: Any, scale: float) -> None:
@@ -193,7 +179,7 @@ def _over_twin(context: Any, root: Any, scale: float) -> None:
         return
     corners = [Vector(corner) for corner in part.bound_box]
     top = max(corner.z for corner in corners)
-    middle = sum((corner.y for corner in corners)) / len(corners)
+    middle = sum(corner.y for corner in corners) / len(corners)
     at = part.matrix_world @ Vector((0.0, middle, 1.12 * top))
     place = location_3d_to_region_2d(context.region, context.region_data, at)
     if place is None:

@@ -1,7 +1,7 @@
 """The twin: the simulated unit, beside the design, bent as far as the sensor says the real one is.
 
-It moves between Model A's states and never beyond them: a signal that cannot come from the calibration or from
-the simulated motion leaves the last pose, in red, with the reason above it.
+It moves between Model A's states and never beyond them: a signal that cannot come from the calibration or
+from the simulated motion leaves the last pose, in red, with the reason above it.
 """
 
 from __future__ import annotations
@@ -127,10 +127,11 @@ def _bend(root: Any, shape: _Shape, reading: Any) -> tuple[str, str]:
     first, second, share = place
     for part in parts(root):
         moved = shape.vertices[part[TWIN]]
-        if len(part.data.vertices) == moved.shape[1]:
-            now = moved[first] + np.float32(share) * (moved[second] - moved[first])
-            part.data.attributes["position"].data.foreach_set("vector", now.ravel())
-            part.data.update()
+        if len(part.data.vertices) != moved.shape[1]:
+            return WAITING, "the simulation is another one now: show the twin again"
+        now = moved[first] + np.float32(share) * (moved[second] - moved[first])
+        part.data.attributes["position"].data.foreach_set("vector", now.ravel())
+        part.data.update()
     pressure = shape.poses.pressure_at(reading.angle_deg)
     half = (reading.high_deg - reading.low_deg) / 2
     return LIVE, f"{reading.angle_deg:.1f} ± {half:.1f}°, Model A at {pressure:.1f} kPa"

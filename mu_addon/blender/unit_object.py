@@ -30,6 +30,8 @@ MOTION = "mu_motion"
 """Marks the parts that show a study's motion, see `motion_parts`."""
 EVIDENCE = "mu_evidence_part"
 """Marks the parts that show measured motion, see `evidence_motion`."""
+CHECK = "mu_check"
+"""Marks the objects that show what a print check found, see `printing`."""
 TWIN = "mu_twin"
 """Marks the parts that move as the real unit does, see `twin`."""
 CANDIDATE = "candidate:"
@@ -91,7 +93,7 @@ def create(context: Any, unit: Unit) -> Any:
 def delete(root: Any) -> None:
     """Remove a unit with all its parts."""
     for child in root.children_recursive:
-        if any(child.get(mark) for mark in (PART, MOTION, EVIDENCE, TWIN)):
+        if any(child.get(mark) for mark in (PART, MOTION, EVIDENCE, CHECK, TWIN)):
             remove_part(child)
     bpy.data.objects.remove(root)
 

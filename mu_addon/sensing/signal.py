@@ -1,7 +1,8 @@
 """What a waveguide's light tells of bending: traced rays, a law fitted to them, and the figures of a sensor.
 
-The law: the logarithm of the light's loss is linear in what bending does to the guide: its length now, its
-wells' curvature (signed: a well on the stretched side opens), and the curvature squared along it (bend loss).
+The law: the logarithm of the light's loss is linear in how long the guide is, how many wells and junctions it
+has, by how much it is stretched, its wells' curvature (signed: a well on the stretched side opens), and the
+curvature squared along it (bend loss).
 """
 
 from __future__ import annotations
@@ -18,10 +19,11 @@ from .guide import Array, Centreline, arc, swept
 from .optics import Optics
 from .tracing import lambertian, trace
 
-RAYS = 4000
+RAYS = 6000
 _STEPS_A_MM = 4
 # Curvatures the law is fitted to, in 1/mm; the unit's own at 60 degrees over its length is 0.014.
 _MOST_CURVATURE = 0.02
+_STRETCH = (0.94, 1.1)
 
 
 @attrs.frozen(eq=False)
@@ -75,19 +77,27 @@ def transmitted(guided: Guided, line: Centreline, optics: Optics, rays: int = RA
 
 
 def features(guided: Guided, line: Centreline) -> Array:
-    """What the law is linear in, (6,): 1, length, wells, sums of wells' curvature and its square, bending."""
+    """What the law is linear in, (8,): see FEATURES."""
     curvature = line.curvature
     at_wells = np.interp(guided.wells, line.s, curvature)
     return np.array(
         [
             1.0,
-            _area(line.stretch, line.s),
+            float(line.s[-1]),
             float(len(guided.wells)),
+            float(len(guided.junctions)),
+            _area(line.stretch - 1, line.s),
             float(at_wells.sum()),
             float((at_wells**2).sum()),
             _area(curvature**2, line.s),
         ]
     )
+
+
+FEATURES = (
+    "one", "length_mm", "wells", "junctions", "elongation_mm", "curvature_of_wells", "its_square", "bending",
+)  # fmt: skip
+CURVATURE_OF_WELLS = FEATURES.index("curvature_of_wells")
 
 
 def _area(values: Array, s: Array) -> float:
@@ -96,21 +106,29 @@ def _area(values: Array, s: Array) -> float:
 
 @attrs.frozen(eq=False)
 class Law:
-    """-log(transmitted) = coefficients (6,) times `features`; rms: of what it misses in traces left out."""
+    """-log(transmitted) = coefficients (8,) times `features`, fitted to traces.
+
+    covariance (8, 8) of the coefficients; rms: of what it misses in traces left out.
+    """
 
     coefficients: Array
+    covariance: Array
     rms: float
 
     def transmitted(self, guided: Guided, line: Centreline) -> float:
         """Share of the light that arrives."""
         return float(np.exp(-self.coefficients @ features(guided, line)))
 
+    def error(self, change: Array) -> float:
+        """Standard error of the log of the light for a change of features (8,)."""
+        return float(np.sqrt(change @ self.covariance @ change))
+
 
 def fit_law(
     d: Dimensions,
     optics: Optics,
     rays: int = RAYS,
-    traces: int = 36,
+    traces: int = 160,
     seed: int = 0,
     on_trace: Callable[[float], None] = lambda fraction: None,
 ) -> Law:
@@ -120,13 +138,14 @@ def fit_law(
     for k in range(traces):
         length = float(random.uniform(2.5, 6.0)) * d.cell + 2 * d.waveguide_end
         guided = Guided.straight(d, length)
-        line = _bent(length, random.uniform(-_MOST_CURVATURE, _MOST_CURVATURE, 2))
+        curvature = random.uniform(-_MOST_CURVATURE, _MOST_CURVATURE, 2)
+        line = _bent(length, curvature, random.uniform(*_STRETCH))
         share = transmitted(guided, line, optics, rays, seed + k)
         if share > 0:
             rows.append(features(guided, line))
             logs.append(-np.log(share))
         on_trace((k + 1) / traces)
-    if len(rows) < 12:
+    if len(rows) < 3 * len(FEATURES):
         raise InputError(
             "hardly any light arrives in the waveguides of this unit",
             "optics",
@@ -138,20 +157,23 @@ def fit_law(
     inverse = np.linalg.pinv(A / scale)
     coefficients = inverse @ y
     hat = np.einsum("ij,ji->i", A / scale, inverse)
-    left_out = (y - A / scale @ coefficients) / np.maximum(1 - hat, 1e-6)
-    return Law(coefficients / scale, float(np.sqrt(np.mean(left_out**2))))
+    off = y - A / scale @ coefficients
+    variance = float(off @ off) / (len(y) - A.shape[1])
+    covariance = variance * (inverse @ inverse.T) / np.outer(scale, scale)
+    rms = float(np.sqrt(np.mean((off / np.maximum(1 - hat, 1e-6)) ** 2)))
+    return Law(coefficients / scale, covariance, rms)
 
 
-def _bent(length: float, curvature: Array) -> Centreline:
-    """A planar guide whose curvature goes linearly between its ends' (2,), in 1/mm."""
+def _bent(length: float, curvature: Array, stretch: float = 1.0) -> Centreline:
+    """A planar guide whose curvature goes linearly between its ends' (2,), in 1/mm when straight."""
     steps = max(8, int(_STEPS_A_MM * length))
     s = np.linspace(0, length, steps + 1)
     first, last = curvature
     turn = first * s + (last - first) * s**2 / (2 * length)
     middle = (turn[1:] + turn[:-1]) / 2
     points = np.zeros((steps + 1, 3))
-    points[1:, 1] = np.cumsum(-np.sin(middle)) * length / steps
-    points[1:, 2] = np.cumsum(np.cos(middle)) * length / steps
+    points[1:, 1] = np.cumsum(-np.sin(middle)) * stretch * length / steps
+    points[1:, 2] = np.cumsum(np.cos(middle)) * stretch * length / steps
     return Centreline(s, points, np.column_stack([0 * s, np.cos(turn), np.sin(turn)]))
 
 

@@ -232,8 +232,9 @@ def _light(r: ReportData) -> str:
     way = "rises" if mine.sensitivity_per_deg < 0 else "falls"
     html = (
         f"<p>Along <strong>{escape(label(s.names[index]))}</strong> the light at the detector changes by "
-        f"{100 * abs(mine.sensitivity_per_deg):.2f}&nbsp;% a degree about rest, and {way} without a turn "
-        f"from {signed(f'{low:.0f}')} to {high:.0f} degrees. Light is followed along each path by a law "
+        f"{100 * abs(mine.sensitivity_per_deg):.2f} ± {100 * s.errors_per_deg[index]:.2f}&nbsp;% a degree "
+        f"about rest, and {way} without a turn from {signed(f'{low:.0f}')} to {high:.0f} degrees. Light is "
+        f"followed along each path by a law "
         f"fitted to traced rays, which it misses by {100 * s.law.rms:.0f}&nbsp;%; wells on the stretched "
         f"side open and let light out. The resin's optics are assumed, since nobody has published them: "
         f"index {o.index:g}, attenuation {o.attenuation_per_mm:g} a mm, slopes of the walls "
@@ -242,7 +243,7 @@ def _light(r: ReportData) -> str:
         f"{figure(response_chart(s, chosen), 'The chosen path in colour.', 'light against angle')}</div>"
     )
     head = [
-        ("path", ""), ("Ĵ [mm]", "n"), ("signal [%/deg]", "n"), ("one way from [deg]", "n"),
+        ("path", ""), ("Ĵ [mm]", "n"), ("signal [%/deg]", "n"), ("±", "n"), ("one way from [deg]", "n"),
         ("to [deg]", "n"), ("light at rest [%]", "n"), ("beaten by none", ""),
     ]  # fmt: skip
     rows = [
@@ -250,7 +251,8 @@ def _light(r: ReportData) -> str:
             [
                 label(name),
                 f"{s.j_hat[k]:.4f}",
-                signed(f"{100 * s.responses[k].sensitivity_per_deg:.3f}"),
+                signed(f"{100 * s.responses[k].sensitivity_per_deg:.2f}"),
+                f"{100 * s.errors_per_deg[k]:.2f}",
                 signed(f"{s.responses[k].monotonic_deg[0]:.1f}"),
                 f"{s.responses[k].monotonic_deg[1]:.1f}",
                 f"{100 * s.at_rest[k]:.1f}",

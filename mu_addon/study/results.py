@@ -92,7 +92,8 @@ class LatticeSearch:
 class Signals:
     """What light would tell along each path, in the order of the study's windows.
 
-    at_rest: share of the light that arrives at rest; front: whether no path disturbs less and tells more;
+    errors_per_deg: what the law's own error makes of a response's slope; at_rest: share of the light that
+    arrives at rest; front: whether no path disturbs less and tells more;
     sets: the pairs of paths that tell most of how bending is spread along the unit, best first.
     """
 
@@ -100,6 +101,7 @@ class Signals:
     law: Law
     names: tuple[str, ...]
     responses: tuple[Response, ...]
+    errors_per_deg: Floats
     at_rest: Floats
     j_hat: Floats
     front: tuple[bool, ...]

@@ -11,7 +11,17 @@ from ..fem.kinematics import bending_angle_deg, probe
 from ..files import write_csv
 from ..sensing.guide import Centreline
 from ..sensing.optics import Optics
-from ..sensing.signal import Guided, Law, best_sets, fit_law, pareto, response, through
+from ..sensing.signal import (
+    CURVATURE_OF_WELLS,
+    Guided,
+    Law,
+    best_sets,
+    features,
+    fit_law,
+    pareto,
+    response,
+    through,
+)
 from .cache import key
 from .results import Signals
 
@@ -38,7 +48,7 @@ def signals(study: Study, optics: Optics) -> Signals:
         states = study.trajectory.states
         angle = np.array([bending_angle_deg(study.mesh, s.u) for s in states])
         nodes = np.array([study.anchors + monitor.displacement(s.u) for s in states])
-        responses, at_rest, slopes = [], [], []
+        responses, errors, at_rest, slopes = [], [], [], []
         for window in study.windows:
             path = study.anchors[window.indices]
             lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
@@ -46,6 +56,9 @@ def signals(study: Study, optics: Optics) -> Signals:
             lines = [through(now[window.indices], lengths, d.waveguide_end) for now in nodes]
             shares = np.array([law.transmitted(guided, line) for line in lines])
             responses.append(response(angle, shares))
+            # Over the whole motion: the law's error grows with what changes.
+            ends = [features(guided, lines[int(i)]) for i in (angle.argmin(), angle.argmax())]
+            errors.append(law.error(ends[1] - ends[0]) / float(np.ptp(angle)))
             at_rest.append(float(np.interp(0.0, responses[-1].angle_deg, responses[-1].transmitted)))
             slopes.append(_by_cell(law, guided, lines[0], study.anchors, path, d.waveguide_end))
     J = np.array([study.evaluations[w.name, study.headline_rule].deviation.J_hat for w in study.windows])
@@ -56,6 +69,7 @@ def signals(study: Study, optics: Optics) -> Signals:
         law=law,
         names=names,
         responses=tuple(responses),
+        errors_per_deg=np.array(errors),
         at_rest=np.array(at_rest),
         j_hat=J,
         front=tuple(pareto(J.tolist(), [r.sensitivity_per_deg for r in responses])),
@@ -73,20 +87,21 @@ def _law(study: Study, optics: Optics) -> Law:
         d.cell, d.waveguide_section, d.well_width, d.well_depth, d.well_pitch, d.waveguide_end,
         d.junction_diameter,
     )  # fmt: skip
-    name = key("light", sizes, attrs.astuple(optics))
+    name = key("light", 2, sizes, attrs.astuple(optics))
     stored = study.cache.get("light", name)
     if stored is None:
         law = fit_law(d, optics, on_trace=study.progress.update)
-        study.cache.put("light", name, {"coefficients": law.coefficients, "rms": np.array(law.rms)})
+        arrays = {"coefficients": law.coefficients, "covariance": law.covariance, "rms": np.array(law.rms)}
+        study.cache.put("light", name, arrays)
         return law
-    return Law(stored["coefficients"], float(stored["rms"]))
+    return Law(stored["coefficients"], stored["covariance"], float(stored["rms"]))
 
 
 def _by_cell(law: Law, guided: Guided, line: Centreline, anchors: Array, path: Array, end: float) -> Array:
     """d log(light) by the curvature of each cell along the anchors, (n,) in mm, at rest."""
     wells = np.asarray(guided.wells) - end + path[0, 2]
     edges = np.concatenate([[-np.inf], (anchors[1:, 2] + anchors[:-1, 2]) / 2, [np.inf]])
-    return -law.coefficients[3] * np.histogram(wells, edges)[0]
+    return -law.coefficients[CURVATURE_OF_WELLS] * np.histogram(wells, edges)[0]
 
 
 def _write(study: Study, found: Signals) -> None:
@@ -98,6 +113,7 @@ def _write(study: Study, found: Signals) -> None:
                 name,
                 f"{found.j_hat[k]:.9g}",
                 f"{r.sensitivity_per_deg:.6g}",
+                f"{found.errors_per_deg[k]:.3g}",
                 f"{r.monotonic_deg[0]:.4g}",
                 f"{r.monotonic_deg[1]:.4g}",
                 f"{r.span:.6g}",
@@ -106,8 +122,8 @@ def _write(study: Study, found: Signals) -> None:
             )
         )
     columns = [
-        "path", "J_hat_mm", "sensitivity_per_deg", "monotonic_from_deg", "monotonic_to_deg", "span",
-        "transmitted_at_rest", "pareto",
+        "path", "J_hat_mm", "sensitivity_per_deg", "its_error", "monotonic_from_deg", "monotonic_to_deg",
+        "span", "transmitted_at_rest", "pareto",
     ]  # fmt: skip
     write_csv(study.folder / TABLE, columns, rows)
     by_name = dict(zip(found.names, found.responses, strict=True))

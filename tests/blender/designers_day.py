@@ -46,6 +46,21 @@ def watch(child):
         time.sleep(0.1)
 
 
+printing = module("blender.printing")
+assert bpy.ops.mu.print_check() == {"FINISHED"}
+child = simulation.of(printing.job(root))
+watch(child)
+assert child.state == child_module.DONE, child.error
+assert printing.checked(root).stale == ""
+assert bpy.ops.mu.print_show(finding=0) == {"FINISHED"}
+root.mu_print.formats, root.mu_print.quality = {name for name, *_ in printing.FORMATS}, "interactive"
+assert bpy.ops.mu.print_export() == {"FINISHED"}
+child = simulation.of(printing.job(root))
+watch(child)
+assert child.state == child_module.DONE, child.error
+names = {entry["file"] for entry in printing.exported(root).manifest["files"]}
+assert {"unit.stl", "unit.3mf", "unit-beams.3mf", "waveguide.step", "nodes.txt"} <= names, names
+
 assert simulation.missing() == []
 root.mu_unit.study.detail = "quick"
 assert bpy.ops.mu.simulate() == {"FINISHED"}

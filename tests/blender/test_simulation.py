@@ -32,18 +32,18 @@ def watch(until, seconds=300):
 # What panels draw into: it takes every call and keeps what was said.
 DRAWN = """
 from unittest.mock import MagicMock
-from mu_addon.blender import panels
+from mu_addon.blender import panels, print_panel
 
 def drawn():
     said = []
     layout = MagicMock()
     layout.panel.return_value = (layout, layout)
-    for name in ("row", "column", "box"):
+    for name in ("row", "column", "box", "split"):
         getattr(layout, name).return_value = layout
     layout.label.side_effect = lambda text="", **_: said.append(text)
     layout.progress.side_effect = lambda factor, text: said.append(f"{factor:.2f} {text}")
     layout.operator.side_effect = lambda name, text="", **_: said.append(text or name) or MagicMock()
-    for cls in panels.CLASSES:
+    for cls in (*panels.CLASSES, *print_panel.CLASSES):
         if getattr(cls, "poll", lambda _: True)(bpy.context):
             seat = MagicMock(layout=layout)
             seat.show = lambda *a, c=cls: c.show(seat, *a)

@@ -11,13 +11,14 @@ from hypothesis import strategies as st
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
-from mu_addon.sensing.guide import arc
+from mu_addon.sensing.guide import Centreline, arc
 from mu_addon.sensing.optics import Optics
 from mu_addon.sensing.signal import (
     Guided,
     Law,
     arc_response,
     best_sets,
+    features,
     fit_law,
     pareto,
     response,
@@ -26,6 +27,11 @@ from mu_addon.sensing.signal import (
 )
 
 D = load_preset("mu-1.0x").dimensions
+
+
+@pytest.fixture(scope="module")
+def law_of_d() -> Law:
+    return fit_law(D, Optics())
 
 
 def test_wells_keep_clear_of_junctions_and_ends() -> None:
@@ -47,8 +53,8 @@ def test_a_sensor_tells_which_way_it_bends() -> None:
     assert found.delta[-1] > 0.1
 
 
-def test_the_law_follows_traces_it_never_saw() -> None:
-    law = fit_law(D, Optics(), rays=6000, traces=24)
+def test_the_law_follows_traces_it_never_saw(law_of_d: Law) -> None:
+    law = law_of_d
     assert law.rms < 0.25
     length = 3 * D.cell + 5
     guided = Guided.straight(D, length)
@@ -61,12 +67,30 @@ def test_the_law_follows_traces_it_never_saw() -> None:
 
 def test_a_law_of_known_coefficients_is_exact() -> None:
     guided = Guided.straight(D, 30)
-    line = arc(30, 30)
+    bent = arc(30, 30)
+    line = Centreline(bent.s, 1.02 * bent.points, bent.normals)
     kappa = np.radians(30) / 30
-    law = Law(np.array([0.1, 0.02, 0.03, 4.0, 50.0, 60.0]), 0.0)
-    n = len(guided.wells)
-    expected = 0.1 + 0.02 * 30 + n * (0.03 + 4 * kappa + 50 * kappa**2) + 60 * kappa**2 * 30
+    law = Law(np.array([0.1, 0.02, 0.03, 0.05, 0.2, 4.0, 50.0, 60.0]), np.eye(8), 0.0)
+    n, m = len(guided.wells), len(guided.junctions)
+    expected = 0.1 + 0.02 * 30 + n * (0.03 + 4 * kappa + 50 * kappa**2) + 0.05 * m
+    expected += 0.2 * 0.02 * 30 + 60 * kappa**2 * 30
     assert -np.log(law.transmitted(guided, line)) == pytest.approx(expected, rel=2e-3)
+    assert law.error(np.array([0, 0, 0, 0, 3.0, 4.0, 0, 0])) == 5.0
+
+
+def test_a_stretched_guide_loses_by_its_stretch_and_not_as_a_longer_one(law_of_d: Law) -> None:
+    """Wells that open and a longer way through resin cost light; more wells and junctions would cost more."""
+    length = 3 * D.cell + 5
+    guided = Guided.straight(D, length)
+    rest = arc(length, 0)
+    longer = Centreline(rest.s, 1.08 * rest.points, rest.normals)
+    traced = [transmitted(guided, line, Optics(), rays=30_000) for line in (rest, longer)]
+    told = [law_of_d.transmitted(guided, line) for line in (rest, longer)]
+    change = features(guided, longer) - features(guided, rest)
+    # Each trace's own error is some 3 %.
+    assert np.log(told[1] / told[0]) == pytest.approx(
+        np.log(traced[1] / traced[0]), abs=3 * law_of_d.error(change) + 0.1
+    )
 
 
 def test_a_centreline_through_nodes() -> None:

@@ -4,9 +4,37 @@ from __future__ import annotations
 
 import bpy
 
-from . import body, evidence, library, motion, path, preset, sensor, simulate, solid, step, track, unit
+from . import (
+    body,
+    evidence,
+    library,
+    motion,
+    path,
+    preset,
+    printing,
+    sensor,
+    simulate,
+    solid,
+    step,
+    track,
+    unit,
+)
 
-MODULES = (unit, preset, path, simulate, motion, solid, step, body, library, evidence, track, sensor)
+MODULES = (
+    unit,
+    preset,
+    path,
+    simulate,
+    motion,
+    solid,
+    printing,
+    step,
+    body,
+    library,
+    evidence,
+    track,
+    sensor,
+)
 CLASSES = tuple(cls for module in MODULES for cls in module.CLASSES)
 
 

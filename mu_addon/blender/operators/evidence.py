@@ -5,10 +5,10 @@
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from ...study.client import ERRORS, RUNNING
+from ...study.client import ERRORS
 from .. import evidence, evidence_motion, live, simulation, studies, unit_object
 from ..properties import from_unit, to_unit
-from .acting import OnSoundUnit, OnUnit, telling
+from .acting import CancelsJob, DismissesJob, OnSoundUnit, OnUnit, telling
 from .simulate import open_file
 
 NO_DATA = "Choose a folder of measured data first"
@@ -60,39 +60,23 @@ class MU_OT_evidence_diagnose(OnSoundUnit, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_evidence_cancel(OnUnit, bpy.types.Operator):
+class MU_OT_evidence_cancel(CancelsJob, bpy.types.Operator):
     """Stop the diagnosis; the simulations it has finished are kept, and the next one goes on from there"""
 
     bl_idname = "mu.evidence_cancel"
     bl_label = "Cancel"
     bl_options = {"REGISTER"}
-
-    @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        child = simulation.of(evidence.job(unit_object.active_root(context)))
-        if child is None or child.state != RUNNING:
-            cls.poll_message_set("Nothing is being diagnosed")
-            return False
-        return True
-
-    def execute(self, context):
-        simulation.of(evidence.job(unit_object.active_root(context))).cancel()
-        live.redraw()
-        return {"FINISHED"}
+    idle = "Nothing is being diagnosed"
+    job_of = staticmethod(evidence.job)
 
 
-class MU_OT_evidence_dismiss(OnUnit, bpy.types.Operator):
+class MU_OT_evidence_dismiss(DismissesJob, bpy.types.Operator):
     """Take the message of an ended diagnosis off the panel"""
 
     bl_idname = "mu.evidence_dismiss"
     bl_label = "Dismiss"
     bl_options = {"REGISTER"}
-
-    def execute(self, context):
-        simulation.forget(evidence.job(unit_object.active_root(context)))
-        return {"FINISHED"}
+    job_of = staticmethod(evidence.job)
 
 
 class MU_OT_evidence_open(OnUnit, bpy.types.Operator):

@@ -9,7 +9,7 @@ from ...design.parameters import write_unit
 from ...study.client import ERRORS, RUNNING
 from .. import live, printing, simulation, studies, unit_object
 from ..properties import to_unit
-from .acting import OnSoundUnit, OnUnit, telling
+from .acting import CancelsJob, DismissesJob, OnSoundUnit, OnUnit, telling
 from .simulate import open_file
 
 NOT_CHECKED = "Check the print first"
@@ -82,7 +82,7 @@ class MU_OT_print_export(_Job, bpy.types.Operator):
 
 
 class MU_OT_print_specimens(_Job, bpy.types.Operator):
-    """Write lattice cubes, coupons and a gauge to print and measure, with a sheet and a folder that takes the data"""
+    """Write lattice cubes, coupons and a gauge to print, a sheet of what to measure, a folder for the data"""
 
     bl_idname = "mu.print_specimens"
     bl_label = "Export Specimens"
@@ -90,39 +90,23 @@ class MU_OT_print_specimens(_Job, bpy.types.Operator):
     job = printing.SPECIMENS
 
 
-class MU_OT_print_cancel(OnUnit, bpy.types.Operator):
+class MU_OT_print_cancel(CancelsJob, bpy.types.Operator):
     """Stop the check or the export; files that were whole stay"""
 
     bl_idname = "mu.print_cancel"
     bl_label = "Cancel"
     bl_options = {"REGISTER"}
-
-    @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        child = simulation.of(printing.job(unit_object.active_root(context)))
-        if child is None or child.state != RUNNING:
-            cls.poll_message_set("Nothing for the printer runs")
-            return False
-        return True
-
-    def execute(self, context):
-        simulation.of(printing.job(unit_object.active_root(context))).cancel()
-        live.redraw()
-        return {"FINISHED"}
+    idle = "Nothing for the printer runs"
+    job_of = staticmethod(printing.job)
 
 
-class MU_OT_print_dismiss(OnUnit, bpy.types.Operator):
+class MU_OT_print_dismiss(DismissesJob, bpy.types.Operator):
     """Take the message of an ended check or export off the panel"""
 
     bl_idname = "mu.print_dismiss"
     bl_label = "Dismiss"
     bl_options = {"REGISTER"}
-
-    def execute(self, context):
-        simulation.forget(printing.job(unit_object.active_root(context)))
-        return {"FINISHED"}
+    job_of = staticmethod(printing.job)
 
 
 class MU_OT_print_open(OnUnit, bpy.types.Operator):
@@ -218,11 +202,20 @@ class MU_OT_print_show(_OfCheck, bpy.types.Operator):
     bl_label = "Show Finding"
     bl_options = {"REGISTER", "UNDO"}
 
-    finding: IntProperty(name="Finding", description="Its number in the list, from 0", min=0)
-    place: IntProperty(
-        name="Place", description="Number of the place, from 0; -1: the one after that shown", default=-1, min=-1
+    # Not kept from the last call: a click on a row is about that row alone.
+    finding: IntProperty(
+        name="Finding", description="Its number in the list, from 0", min=0, options={"SKIP_SAVE"}
     )
-    view: BoolProperty(name="Turn the View", description="Turn the 3D views to the place", default=True)
+    place: IntProperty(
+        name="Place",
+        description="Number of the place, from 0; -1: the one after that shown",
+        default=-1,
+        min=-1,
+        options={"SKIP_SAVE"},
+    )
+    view: BoolProperty(
+        name="Turn the View", description="Turn the 3D views to it", default=True, options={"SKIP_SAVE"}
+    )
 
     @telling
     def execute(self, context):
@@ -241,6 +234,7 @@ class MU_OT_print_show(_OfCheck, bpy.types.Operator):
             printing.mark(root, found)
         settings.finding = self.finding
         settings.place = (next_one if self.place < 0 else self.place) % max(len(places), 1)
+        printing.resize(root)
         if len(places):
             for obj in context.selected_objects:
                 obj.select_set(False)
@@ -261,7 +255,11 @@ class MU_OT_print_up(OnUnit, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     direction: FloatVectorProperty(
-        name="Up", description="Away from the platform, in the unit's frame", subtype="XYZ", default=(0.0, 0.0, 1.0)
+        name="Up",
+        description="Away from the platform, in the unit's frame",
+        subtype="XYZ",
+        default=(0.0, 0.0, 1.0),
+        options={"SKIP_SAVE"},
     )
 
     def execute(self, context):

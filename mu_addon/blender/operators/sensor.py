@@ -8,9 +8,9 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ...errors import InputError
-from ...study.client import ERRORS, RUNNING
+from ...study.client import ERRORS
 from .. import live, sensor, simulation, studies, twin, unit_object
-from .acting import OnUnit, telling
+from .acting import CancelsJob, DismissesJob, OnUnit, telling
 from .motion import OnMotion
 from .simulate import open_file
 
@@ -109,7 +109,7 @@ class MU_OT_sensor_disconnect(OnUnit, bpy.types.Operator):
 
 
 class MU_OT_sensor_pause(OnSession, bpy.types.Operator):
-    """Give the port to another program, to load firmware for example, or take it again; the session goes on"""
+    """Give the port to another program, for firmware say, or take it again; the session goes on"""
 
     bl_idname = "mu.sensor_pause"
     bl_label = "Give Port"
@@ -257,35 +257,27 @@ class MU_OT_sensor_calibrate(OnUnit, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_sensor_cancel(OnUnit, bpy.types.Operator):
+class MU_OT_sensor_cancel(CancelsJob, bpy.types.Operator):
     """Stop calibrating; the calibration that was there stays"""
 
     bl_idname = "mu.sensor_cancel"
     bl_label = "Cancel"
     bl_options = {"REGISTER"}
-
-    def execute(self, context):
-        child = simulation.of(sensor.calibrating(unit_object.active_root(context)))
-        if child is None or child.state != RUNNING:
-            return {"CANCELLED"}
-        child.cancel()
-        return {"FINISHED"}
+    idle = "Nothing is being calibrated"
+    job_of = staticmethod(sensor.calibrating)
 
 
-class MU_OT_sensor_dismiss(OnUnit, bpy.types.Operator):
+class MU_OT_sensor_dismiss(DismissesJob, bpy.types.Operator):
     """Take the message of an ended calibration off the panel"""
 
     bl_idname = "mu.sensor_dismiss"
     bl_label = "Dismiss"
     bl_options = {"REGISTER"}
-
-    def execute(self, context):
-        simulation.forget(sensor.calibrating(unit_object.active_root(context)))
-        return {"FINISHED"}
+    job_of = staticmethod(sensor.calibrating)
 
 
 class MU_OT_sensor_zero(OnSession, bpy.types.Operator):
-    """Tell the calibration at which angle the unit is now: light that grew weaker or stronger is made up for"""
+    """Say at which angle the unit is now, to make up for light that grew weaker or stronger"""
 
     bl_idname = "mu.sensor_zero"
     bl_label = "Zero"

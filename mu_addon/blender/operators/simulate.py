@@ -7,10 +7,10 @@ from pathlib import Path
 import bpy
 from bpy.props import EnumProperty
 
-from ...study.client import ERRORS, RUNNING
+from ...study.client import ERRORS
 from .. import bodies, live, simulation, studies, unit_object
 from ..properties import to_unit
-from .acting import OnSoundUnit, OnUnit, telling
+from .acting import CancelsJob, DismissesJob, OnSoundUnit, OnUnit, telling
 
 # A quick look: linear elements on a mesh of half the fineness, one rule, no second mesh.
 QUICK = ["--order", "1", "--refine", "0.5"]
@@ -54,39 +54,20 @@ class MU_OT_simulate(OnSoundUnit, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_cancel(OnUnit, bpy.types.Operator):
+class MU_OT_cancel(CancelsJob, bpy.types.Operator):
     """Stop the simulation; what it has finished is kept, and the next one goes on from there"""
 
     bl_idname = "mu.cancel"
     bl_label = "Cancel"
     bl_options = {"REGISTER"}
 
-    @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        child = simulation.of(unit_object.active_root(context).mu_unit.uuid)
-        if child is None or child.state != RUNNING:
-            cls.poll_message_set("Nothing runs for this unit")
-            return False
-        return True
 
-    def execute(self, context):
-        simulation.of(unit_object.active_root(context).mu_unit.uuid).cancel()
-        live.redraw()
-        return {"FINISHED"}
-
-
-class MU_OT_dismiss(OnUnit, bpy.types.Operator):
+class MU_OT_dismiss(DismissesJob, bpy.types.Operator):
     """Take the message of an ended simulation off the panel"""
 
     bl_idname = "mu.dismiss"
     bl_label = "Dismiss"
     bl_options = {"REGISTER"}
-
-    def execute(self, context):
-        simulation.forget(unit_object.active_root(context).mu_unit.uuid)
-        return {"FINISHED"}
 
 
 class MU_OT_open(OnUnit, bpy.types.Operator):

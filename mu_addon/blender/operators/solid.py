@@ -10,7 +10,7 @@ from bpy_extras.io_utils import ExportHelper
 
 from ...design.export import write_nodes, write_stl
 from ...design.solid import QUALITY
-from .. import unit_object
+from .. import printing, unit_object
 from ..properties import to_unit
 from .acting import OnSoundUnit, telling
 
@@ -59,6 +59,9 @@ class MU_OT_export_stl(OnSoundUnit, bpy.types.Operator, ExportHelper):
         root = unit_object.active_root(context)
         path = root.mu_unit.path
         self.filepath = f"{root.mu_unit.title}{'-' + path if path else ''}.stl"
+        found = printing.checked(root)
+        if found is not None and not found.stale and found.errors:
+            self.report({"WARNING"}, f"The check found: {found.errors[0]['check']}. Do not print this")
         return ExportHelper.invoke(self, context, event)
 
     @telling

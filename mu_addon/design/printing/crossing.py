@@ -14,6 +14,7 @@ DEPTH = 2e-3
 """Passing through by less (mm) is rounding: vertices lie on a grid of 1e-4 mm, and layers are 0.1 mm."""
 
 _AT_ONCE = 4_000_000
+_PAIRS_AT_ONCE = 200_000
 
 
 def crossings(vertices: Vertices, triangles: Triangles) -> Points:
@@ -24,8 +25,10 @@ def crossings(vertices: Vertices, triangles: Triangles) -> Points:
     pairs = near_pairs(vertices[triangles])
     shared = (triangles[pairs[:, 0]][:, :, None] == triangles[pairs[:, 1]][:, None, :]).sum(axis=(1, 2))
     pairs = pairs[shared < 2]
-    found = [_through(vertices, triangles, pairs[:, 0], pairs[:, 1])]
-    found.append(_through(vertices, triangles, pairs[:, 1], pairs[:, 0]))
+    found = []
+    for part in np.array_split(pairs, len(pairs) // _PAIRS_AT_ONCE + 1):
+        one, other = part.T
+        found += [_through(vertices, triangles, one, other), _through(vertices, triangles, other, one)]
     return np.concatenate(found)
 
 

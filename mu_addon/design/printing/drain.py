@@ -15,6 +15,10 @@ DEEP = 6.0
 NARROWING = 0.55
 """A pocket is a chamber if its way out is narrower than this share of its own greatest radius."""
 MOST_OPENINGS = 12
+NEAR = 12.0
+"""How far in mm around a pocket its ways out are sought first."""
+
+Box = tuple[slice, ...]
 
 
 @attrs.frozen(eq=False)
@@ -127,54 +131,133 @@ def chambers(space: Room, smallest_radius: float = 1.0) -> Chambers:
             at = np.array(np.unravel_index(depth.argmax(), depth.shape)) + [s.start for s in box]
             seed = tuple(at.tolist())
             openings: list[Opening] = []
+            around = _grown(box, NEAR, step, d.shape)
             while len(openings) < MOST_OPENINGS:
-                cells, radius = _narrowest(d, seed, step)
+                cells, radius, around = _way_out(d, wide, outside, seed, t, around, step)
                 if not len(cells):
                     break
                 openings.append(_opening(space, cells, radius))
                 _block(d, cells, radius + 2.5 * step, step)
-            inside, _ = label(d > 0.0)
-            inside = inside == inside[seed]
+            else:
+                around = _grown(box, np.inf, step, d.shape)
+            inside, _ = label(d[around] > 0.0)
+            inside = inside == inside[_within(seed, around)]
             volume = float(np.count_nonzero(inside)) * space.columns.cell_volume
-            d[inside] = 0.0
+            d[around][inside] = 0.0
             if volume < 2.0 * greatest**3:  # half a ball: what blocking left over, no chamber
                 continue
-            within |= inside
+            within[around] |= inside
             found.append(Chamber(space.columns.points(at), greatest, volume, openings))
     found.sort(key=lambda chamber: -chamber.volume)
     return Chambers(found, space.columns, within, space.distance > 0.0)
 
 
-def _narrowest(d: NDArray[np.float32], seed: tuple[int, ...], step: float) -> tuple[NDArray[np.int64], float]:
-    """Cells (n, 3) where the widest way from the seed to the outside is narrowest, and its radius there."""
+def _way_out(
+    d: NDArray[np.float32],
+    wide: NDArray[np.int32],
+    outside: int,
+    seed: tuple[int, ...],
+    t: float,
+    around: Box,
+    step: float,
+) -> tuple[NDArray[np.int64], float, Box]:
+    """Cells (n, 3) of the widest way from the seed to the outside where it is narrowest, none if there is
+    none; its radius there; and the part of the grid in which that is sure.
+
+    wide: pieces of d > t as it was, with `outside` and the seed in two of them. Only `around` is looked at.
+    There a way that leaves it counts as a way out: as long as that is the better one, more is looked at.
+    """
+    while True:
+        part, at = d[around], _within(seed, around)
+        out, edge = _outside(part, wide[around] == outside, t, around, d.shape)
+        cells, radius, sure = _narrowest(part, out, edge, at, t, step)
+        if sure:
+            return cells + [side.start for side in around], radius, around
+        around = _grown(around, max(side.stop - side.start for side in around) * step, step, d.shape)
+
+
+def _grown(box: Box, reach: float, step: float, shape: tuple[int, ...]) -> Box:
+    """A box of cells and all that lies within `reach` mm of it."""
+    pad = int(min(np.ceil(reach / step), max(shape)))
+    return tuple(slice(max(s.start - pad, 0), min(s.stop + pad, n)) for s, n in zip(box, shape, strict=True))
+
+
+def _within(cell: tuple[int, ...], box: Box) -> tuple[int, ...]:
+    return tuple(k - side.start for k, side in zip(cell, box, strict=True))
+
+
+def _outside(
+    part: NDArray[np.float32], known: NDArray[np.bool_], t: float, box: Box, shape: tuple[int, ...]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Of a box's cells those wider than t that are outside, and those by which one could leave the box.
+
+    known: outside before openings were blocked; what blocking cut off does not reach the box's faces.
+    """
     from scipy.ndimage import label
 
-    low, high = 0.0, float(d[seed])
-    wide, _ = label(d > low)
-    if wide[seed] != wide[0, 0, 0] or d[seed] <= 0.0:
-        return np.empty((0, 3), np.int64), 0.0
+    named, count = label(known & (part > t))
+    reaches = np.zeros(count + 1, bool)
+    edge = np.zeros(part.shape, bool)
+    for axis, side in enumerate(box):
+        for face, rim in ((0, side.start == 0), (-1, side.stop == shape[axis])):
+            at = (slice(None),) * axis + (face,)
+            reaches[np.unique(named[at])] = True
+            if not rim:
+                edge[at] = part[at] > 0.0
+    reaches[0] = False
+    return reaches[named], edge
+
+
+def _narrowest(
+    d: NDArray[np.float32],
+    out: NDArray[np.bool_],
+    edge: NDArray[np.bool_],
+    seed: tuple[int, ...],
+    t: float,
+    step: float,
+) -> tuple[NDArray[np.int64], float, bool]:
+    """Cells (n, 3) where the widest way from the seed to `out` is narrowest, its radius there, and whether
+    no way over `edge` can be wider."""
+    from scipy.ndimage import label
+
+    def reached(radius: float) -> tuple[bool, bool]:
+        named, _ = label(d > radius)
+        mine = named == named[seed]
+        return bool((mine & out).any()), bool((mine & edge).any())
+
+    none = np.empty((0, 3), np.int64)
+    if d[seed] <= 0.0:
+        return none, 0.0, True
+    low, high = 0.0, t
+    found, left = reached(low)
+    if not found:
+        return none, 0.0, not left
     while high - low > step / 8.0:
         middle = 0.5 * (low + high)
-        wide, _ = label(d > middle)
-        if wide[seed] == wide[0, 0, 0]:
-            low = middle
+        ways = reached(middle)
+        if any(ways):
+            low, found = middle, ways[0]
         else:
             high = middle
+    if not found:
+        return none, 0.0, False
     wide, _ = label(d > high)
-    path = _passage(d > low, wide == wide[seed], wide == wide[0, 0, 0])
-    return path, 0.5 * (low + high)
+    outer = np.isin(wide, np.unique(wide[out]))
+    return _passage(d > low, wide == wide[seed], outer & (wide > 0)), 0.5 * (low + high), True
 
 
 def _passage(
     free: NDArray[np.bool_], inner: NDArray[np.bool_], outer: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
     """Cells (n, 3) of a shortest way from `outer` to `inner` through what is free, with its ends in them."""
+    # A rim of cells that are not free, so that no ring runs over the edge.
+    free, inner, outer = (np.pad(mask, 1) for mask in (free, inner, outer))
     offsets = np.array([1, -1], np.int64)[:, None] * np.array(
         [free.shape[1] * free.shape[2], free.shape[2], 1]
     )
     offsets = offsets.ravel()
     flat_free, flat_outer = free.ravel(), outer.ravel()
-    # Rings around the inner part; the grid's rim is outside, so that no ring runs over its edge.
+    # Rings around the inner part.
     ring = np.where(inner.ravel(), np.int16(0), np.int16(-1))
     cells = np.flatnonzero(ring == 0)
     cells = cells[(ring[cells[:, None] + offsets] < 0).any(axis=1)]  # its surface
@@ -192,7 +275,7 @@ def _passage(
         steps = steps[0] + offsets
         steps = steps[ring[steps] == level][:1]
         way.append(int(steps[0]))
-    return np.stack(np.unravel_index(np.array(way), free.shape), axis=1)
+    return np.stack(np.unravel_index(np.array(way), free.shape), axis=1) - 1
 
 
 def _opening(space: Room, cells: NDArray[np.int64], radius: float) -> Opening:

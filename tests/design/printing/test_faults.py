@@ -47,7 +47,7 @@ def test_a_sound_unit_has_none_of_them():
     assert np.abs(by_name["islands"].places[:, 2]).max() < 0.1
 
 
-@pytest.mark.parametrize("diameter", [0.8, 0.1])
+@pytest.mark.parametrize("diameter", [pytest.param(0.8, marks=pytest.mark.slow), 0.1])
 def test_a_hole_in_the_wall(diameter):
     """A cell of the grid shows the large one; the small one is found as the shortest curve to cut."""
     found = faults(parts.drilled(diameter), "chambers", unit=parts.small_unit())
@@ -57,6 +57,7 @@ def test_a_hole_in_the_wall(diameter):
         assert "0.8 mm wide" in found["leaks"].what
 
 
+@pytest.mark.slow
 def test_a_hole_is_a_second_way_out_of_a_part_that_nobody_knows():
     found = faults(parts.drilled(0.8), "chambers")
     assert found["leaks"].severity == "warning"
@@ -79,6 +80,7 @@ def test_a_closed_drain():
     assert abs(alone["sealed voids"].places[0][:2]).max() < 0.1
 
 
+@pytest.mark.slow
 def test_a_narrow_drain():
     found = faults(parts.narrowed(1.5), "chambers", unit=parts.small_unit())
     assert set(found) == {"drain"}
@@ -140,7 +142,10 @@ def test_self_intersection():
     assert abs(place[1] - middle[1]) < 3.0
 
 
-@pytest.mark.parametrize(("factor", "words"), [(1 / 25.4, "mm for inches"), (25.4, "inches for mm")])
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [(25.4, "inches for mm"), pytest.param(1 / 25.4, "mm for inches", marks=pytest.mark.slow)],
+)
 def test_inches_for_millimetres(factor, words):
     solid = parts.small_solid()
     found = faults((factor * solid.vertices, solid.triangles), unit=parts.small_unit())

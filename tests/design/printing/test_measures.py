@@ -207,6 +207,22 @@ def test_a_chamber_and_its_ways_out():
     assert side.place == pytest.approx([6, 0, 0], abs=0.8)
 
 
+@pytest.mark.parametrize("near", [0.5, 12.0, 1000.0])
+def test_a_way_out_is_the_widest_however_far_it_leads(near, monkeypatch):
+    """A bore of 2 mm, 30 mm long, is found before one of 1 mm to the side, wherever the search begins."""
+    monkeypatch.setattr(drain, "NEAR", near)
+    hollow = box(12, 12, 42).translate([0, 0, 14]) - shapes.ball(4.0, 48)
+    body = hollow - shapes.cylinder(1.0, 0, 40, 24) - shapes.cylinder(0.5, 0, 9, 24).rotate([0, 90, 0])
+    (found,) = drain.chambers(drain.room(columns(*arrays(body), 0.25))).found
+    far, side = found.openings
+    assert [far.radius, side.radius] == pytest.approx([1.0, 0.5], abs=0.2)
+    assert far.place[:2] == pytest.approx([0, 0], abs=0.3)
+    assert 4.0 < far.place[2] < 35.0
+    assert side.place == pytest.approx([5, 0, 0], abs=1.2)
+    # The bores are ways, as narrow at their inner ends as anywhere.
+    assert found.volume == pytest.approx(4 / 3 * np.pi * 64, rel=0.06)
+
+
 def test_a_sealed_chamber_has_no_way_out_and_an_open_frame_is_no_chamber():
     sealed = drain.chambers(drain.room(columns(*arrays(box(12, 12, 12) - shapes.ball(4.0, 48)), 0.25)))
     assert [len(chamber.openings) for chamber in sealed.found] == [0]
