@@ -225,9 +225,9 @@ def response(angle_deg: Array, share: Array) -> Response:
     angle, light = np.asarray(angle_deg, float)[order], np.asarray(share, float)[order]
     keep = np.r_[True, np.diff(angle) > 1e-9]
     angle, light = angle[keep], light[keep]
-    if len(angle) < 3 or not angle[0] <= 0 <= angle[-1]:
+    if len(angle) < 2 or not angle[0] <= 0 <= angle[-1]:
         raise InputError(
-            "a response needs three angles or more, on either side of 0 or at it", "angle_deg", ""
+            "the unit does not bend, or was not seen at rest", "angle_deg", "a protocol that bends it"
         )
     delta = 1 - light / np.interp(0.0, angle, light)
     slope = np.diff(delta) / np.diff(angle)

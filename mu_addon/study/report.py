@@ -263,12 +263,13 @@ def _light(r: ReportData) -> str:
         for k, name in enumerate(s.names)
     ]
     html += table("Disturbance and signal of every path", head, rows)
-    if s.sets:
-        names, _ = s.sets[0]
-        html += (
-            f"<p>Of all pairs {escape(' and '.join(label(n) for n in names))} together tell most of how the "
-            "bending is spread along the unit.</p>"
-        )
+    best = {len(names): names for names, _ in reversed(s.sets)}
+    for size, word in ((2, "pairs"), (3, "triples")):
+        if size in best:
+            html += (
+                f"<p>Of all {word} {escape(_listed([label(n) for n in best[size]]))} together tell most of "
+                "how the bending is spread along the unit.</p>"
+            )
     return html
 
 

@@ -94,7 +94,7 @@ class Signals:
 
     errors_per_deg: what the law's own error makes of a response's slope; at_rest: share of the light that
     arrives at rest; front: whether no path disturbs less and tells more;
-    sets: the pairs of paths that tell most of how bending is spread along the unit, best first.
+    sets: pairs, then triples, of paths that tell most of how bending is spread along the unit, best first.
     """
 
     optics: Optics

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from ..errors import InputError
 from ..fem.kinematics import bending_angle_deg, probe
 from ..files import write_csv
 from ..sensing.guide import Centreline
@@ -37,8 +38,19 @@ NOISE = 0.005
 SPREAD = 0.002
 
 
-def signals(study: Study, optics: Optics) -> Signals:
-    """Follow light along every candidate path through the motion of Model A, after the paths were ranked."""
+def signals(study: Study, optics: Optics) -> Signals | None:
+    """Follow light along every candidate path through the motion of Model A, after the paths were ranked.
+
+    None, and a warning, where there is nothing to follow: a unit that does not bend, a resin too dark.
+    """
+    try:
+        return _signals(study, optics)
+    except InputError as error:
+        study.warn(f"What the light would tell is not known: {error.what} ({error.where}).")
+        return None
+
+
+def _signals(study: Study, optics: Optics) -> Signals:
     assert study.mesh is not None
     assert study.trajectory is not None
     d = study.job.unit.printed
@@ -46,8 +58,9 @@ def signals(study: Study, optics: Optics) -> Signals:
         law = _law(study, optics)
         monitor = probe(study.mesh, study.anchors)
         states = study.trajectory.states
-        angle = np.array([bending_angle_deg(study.mesh, s.u) for s in states])
-        nodes = np.array([study.anchors + monitor.displacement(s.u) for s in states])
+        # Rest comes first, whether or not a sample meets it.
+        angle = np.array([0.0, *(bending_angle_deg(study.mesh, s.u) for s in states)])
+        nodes = np.array([study.anchors, *(study.anchors + monitor.displacement(s.u) for s in states)])
         responses, errors, at_rest, slopes = [], [], [], []
         for window in study.windows:
             path = study.anchors[window.indices]
@@ -63,7 +76,8 @@ def signals(study: Study, optics: Optics) -> Signals:
             slopes.append(_by_cell(law, guided, lines[0], study.anchors, path, d.waveguide_end))
     J = np.array([study.evaluations[w.name, study.headline_rule].deviation.J_hat for w in study.windows])
     names = tuple(w.name for w in study.windows)
-    sets = best_sets(SPREAD * np.array(slopes), NOISE, 2) if len(names) > 1 else []
+    sizes = [size for size in (2, 3) if size <= len(names)]
+    sets = [best for size in sizes for best in best_sets(SPREAD * np.array(slopes), NOISE, size)]
     found = Signals(
         optics=optics,
         law=law,
@@ -133,5 +147,5 @@ def _write(study: Study, found: Signals) -> None:
         "sensitivity_per_deg": {n: r.sensitivity_per_deg for n, r in by_name.items()},
         "monotonic_deg": {n: r.monotonic_deg for n, r in by_name.items()},
         "pareto": [n for n, on in zip(found.names, found.front, strict=True) if on],
-        "pairs": [{"paths": names, "information": value} for names, value in found.sets],
+        "sets": [{"paths": names, "information": value} for names, value in found.sets],
     }

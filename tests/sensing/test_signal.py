@@ -114,8 +114,12 @@ def test_figures_of_a_response() -> None:
     assert found.span == pytest.approx(0.6)
     folded = response(angle, np.array([0.8, 0.7, 0.9, 1.0, 1.1, 1.2, 1.1]))
     assert folded.monotonic_deg == (-20, 20)
-    with pytest.raises(InputError):
+    with pytest.raises(InputError, match="not seen at rest"):
         response(angle[:3], np.ones(3))
+    with pytest.raises(InputError, match="does not bend"):
+        response(np.zeros(3), np.ones(3))
+    two = response(np.array([0.0, 8.0]), np.array([0.5, 0.4]))
+    assert two.sensitivity_per_deg == pytest.approx(0.2 / 8)
 
 
 @given(
