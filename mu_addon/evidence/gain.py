@@ -86,12 +86,17 @@ _CLEAR = 16.0
 
 
 def _told_by(base: Fit, extended: Fit, judged: Record) -> str:
-    """The first group of series that the extended model clearly serves better; else the first."""
+    """The first group of series of a kind that an effect is about and that is clearly served better.
+
+    Others gain as well, where the modulus no longer makes up for what was missing. The first of all, if none.
+    """
     gained = dict.fromkeys(judged.groups, 0.0)
     for s in judged.series:
         before, after = base.residual[s.at], extended.residual[s.at]
         gained[s.group] += float(before @ before - after @ after)
-    return next((g for g, v in gained.items() if extended.effects and v > _CLEAR), judged.groups[0])
+    about = {kind for effect in extended.effects for kind in effect.kinds}
+    told = (g for g, v in gained.items() if v > _CLEAR and g.split()[0] in about)
+    return next(told, judged.groups[0])
 
 
 def _errors(fitter: Fitter, judged: Record, base: Fit, extended: Fit) -> dict[str, Errors]:
