@@ -405,9 +405,8 @@ def main():
     todo = [o for o in todo if key_of(o) not in rows]
     failed = 0
     if todo and args.minutes > 0:
-        until = time.time() + 60.0 * args.minutes
         with workers(args.scheduler, args.workers) as client:
-            failed = run(client, todo, args.rows, until)
+            failed = run(client, todo, args.rows, time.time() + 60.0 * args.minutes)
     found = [r for r in known(args.rows, code).values() if r["part"] in parts]
     print(f"{began}; judged by {code}\n")
     if not found:

@@ -160,5 +160,5 @@ def test_the_battery_runs_on_dask_and_goes_on_where_it_was(tmp_path, monkeypatch
     monkeypatch.setattr("sys.argv", [*command, "--minutes", "0"])
     assert blind.main() == 0
     assert len(rows.read_text().splitlines()) == done
-    assert "mesh_error" in capsys.readouterr().out
+    assert "clean: a cause named" in capsys.readouterr().out
     assert (tmp_path / "evidence-confusion.png").stat().st_size > 5000
