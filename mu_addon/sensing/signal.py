@@ -8,6 +8,7 @@ curvature squared along it (bend loss).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import combinations
 
 import attrs
 import numpy as np
@@ -264,8 +265,6 @@ def best_sets(signals: Array, noise: float, size: int, most: int = 5) -> list[tu
     signals (n, q): each sensor's derivative by q independent ways to bend, each of unit spread; noise: of a
     reading. D-optimality with a unit prior: log det(1 + S^T S / noise^2) / 2, in natural units.
     """
-    from itertools import combinations
-
     n, q = signals.shape
     if not 1 <= size <= n:
         raise InputError(f"no set of {size} among {n} sensors", "size", f"1 to {n}")
@@ -274,6 +273,16 @@ def best_sets(signals: Array, noise: float, size: int, most: int = 5) -> list[tu
         rows = signals[list(chosen)] / noise
         scored.append((chosen, 0.5 * float(np.linalg.slogdet(np.eye(q) + rows.T @ rows)[1])))
     return sorted(scored, key=lambda item: -item[1])[:most]
+
+
+def differential_pairs(sensitivity: Sequence[float], most: int = 5) -> list[tuple[tuple[int, int], float]]:
+    """Pairs of sensors whose difference changes most with bending, best first, and by how much.
+
+    sensitivity (n,): relative change of each one's light by bending. What dims both alike, such as a light
+    source that warms, is not in the difference of their logarithms.
+    """
+    pairs = [((i, j), sensitivity[i] - sensitivity[j]) for i, j in combinations(range(len(sensitivity)), 2)]
+    return sorted(pairs, key=lambda pair: -abs(pair[1]))[:most]
 
 
 def arc_response(

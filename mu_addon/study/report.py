@@ -263,6 +263,13 @@ def _light(r: ReportData) -> str:
         for k, name in enumerate(s.names)
     ]
     html += table("Disturbance and signal of every path", head, rows)
+    if s.differential:
+        names, slope = s.differential[0]
+        html += (
+            f"<p>Read against each other, {escape(_listed([label(n) for n in names]))} differ by "
+            f"{100 * abs(slope):.2f}&nbsp;% more a degree; what dims both alike, such as a light source that "
+            "warms, is not in their difference.</p>"
+        )
     best = {len(names): names for names, _ in reversed(s.sets)}
     for size, word in ((2, "pairs"), (3, "triples")):
         if size in best:

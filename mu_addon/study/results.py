@@ -95,6 +95,7 @@ class Signals:
     errors_per_deg: what the law's own error makes of a response's slope; at_rest: share of the light that
     arrives at rest; front: whether no path disturbs less and tells more;
     sets: pairs, then triples, of paths that tell most of how bending is spread along the unit, best first.
+    differential: pairs read one against the other, with the slope of their difference a degree, best first.
     """
 
     optics: Optics
@@ -106,6 +107,7 @@ class Signals:
     j_hat: Floats
     front: tuple[bool, ...]
     sets: tuple[tuple[tuple[str, ...], float], ...]
+    differential: tuple[tuple[tuple[str, ...], float], ...]
 
 
 @attrs.frozen(eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -17,6 +18,7 @@ from ..sensing.signal import (
     Guided,
     Law,
     best_sets,
+    differential_pairs,
     features,
     fit_law,
     pareto,
@@ -78,6 +80,7 @@ def _signals(study: Study, optics: Optics) -> Signals:
     names = tuple(w.name for w in study.windows)
     sizes = [size for size in (2, 3) if size <= len(names)]
     sets = [best for size in sizes for best in best_sets(SPREAD * np.array(slopes), NOISE, size)]
+    pairs = differential_pairs([r.sensitivity_per_deg for r in responses])
     found = Signals(
         optics=optics,
         law=law,
@@ -87,11 +90,16 @@ def _signals(study: Study, optics: Optics) -> Signals:
         at_rest=np.array(at_rest),
         j_hat=J,
         front=tuple(pareto(J.tolist(), [r.sensitivity_per_deg for r in responses])),
-        sets=tuple((tuple(names[i] for i in chosen), value) for chosen, value in sets),
+        sets=_named(names, sets),
+        differential=_named(names, pairs),
     )
     study.light = found
     _write(study, found)
     return found
+
+
+def _named(names: Sequence[str], chosen: Any) -> tuple[tuple[tuple[str, ...], float], ...]:
+    return tuple((tuple(names[i] for i in numbers), float(value)) for numbers, value in chosen)
 
 
 def _law(study: Study, optics: Optics) -> Law:
@@ -147,5 +155,8 @@ def _write(study: Study, found: Signals) -> None:
         "sensitivity_per_deg": {n: r.sensitivity_per_deg for n, r in by_name.items()},
         "monotonic_deg": {n: r.monotonic_deg for n, r in by_name.items()},
         "pareto": [n for n, on in zip(found.names, found.front, strict=True) if on],
+        "differential_pairs": [
+            {"paths": names, "sensitivity_per_deg": value} for names, value in found.differential
+        ],
         "sets": [{"paths": names, "information": value} for names, value in found.sets],
     }

@@ -18,6 +18,7 @@ from mu_addon.sensing.signal import (
     Law,
     arc_response,
     best_sets,
+    differential_pairs,
     features,
     fit_law,
     pareto,
@@ -140,5 +141,7 @@ def test_sets_of_sensors() -> None:
     (best, information), *_ = best_sets(signals, noise=0.1, size=2)
     assert best == (0, 2)
     assert information == pytest.approx(0.5 * np.log((1 + 100) * (1 + 36)))
+    assert differential_pairs([0.01, -0.004, 0.002])[0] == ((0, 1), pytest.approx(0.014))
+    assert differential_pairs([0.01]) == []
     with pytest.raises(InputError, match="no set of 4"):
         best_sets(signals, 0.1, 4)
