@@ -17,13 +17,12 @@ from mathutils import Vector
 
 from ..study.motion import MODEL_A
 from . import fields, motion_parts, studies, unit_object
+from .overlay import Overlay
 
 PIECES = 48
 """Flat pieces of the drawn ramp."""
 WIDTH, HEIGHT, LEFT, BOTTOM = 18, 190, 24, 60
 TEXT = (0.92, 0.92, 0.92, 1.0)
-
-_handle: Any = None
 
 
 def ticks(low: float, high: float) -> list[float]:
@@ -121,16 +120,5 @@ def write(text: str, x: float, y: float, size: int, colour: tuple[float, ...] = 
     blf.disable(0, blf.SHADOW)
 
 
-def register() -> None:
-    """Draw in every 3D viewport; in background there is none."""
-    global _handle
-    if not bpy.app.background:
-        _handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL")
-
-
-def unregister() -> None:
-    """Draw no more."""
-    global _handle
-    if _handle is not None:
-        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
-        _handle = None
+_overlay = Overlay(_draw)
+register, unregister = _overlay.register, _overlay.unregister

@@ -54,7 +54,9 @@ class _Panel:
     bl_category = "MU"
 
 
-class _OfUnit(_Panel):
+class OfUnit(_Panel):
+    """A panel of the active unit; `show(layout, context, root)` fills it."""
+
     bl_parent_id = "MU_PT_unit"
     bl_options = {"DEFAULT_CLOSED"}
 
@@ -102,7 +104,7 @@ class MU_PT_unit(_Panel, bpy.types.Panel):
             wrapped(layout, "The preview shows the last design that was possible", "INFO")
 
 
-class MU_PT_design(_OfUnit, bpy.types.Panel):
+class MU_PT_design(OfUnit, bpy.types.Panel):
     """Chambers: number, profile, wall, caps and inlet"""
 
     bl_idname = "MU_PT_design"
@@ -115,7 +117,7 @@ class MU_PT_design(_OfUnit, bpy.types.Panel):
         parameters(layout, root.mu_unit, "design")
 
 
-class MU_PT_lattice(_OfUnit, bpy.types.Panel):
+class MU_PT_lattice(OfUnit, bpy.types.Panel):
     """Cells of the lattice and its struts"""
 
     bl_idname = "MU_PT_lattice"
@@ -139,7 +141,7 @@ class MU_PT_lattice(_OfUnit, bpy.types.Panel):
                 body.operator("mu.body_remove", icon="X")
 
 
-class MU_PT_path(_OfUnit, bpy.types.Panel):
+class MU_PT_path(OfUnit, bpy.types.Panel):
     """Candidate paths and the waveguide along the chosen one"""
 
     bl_idname = "MU_PT_path"
@@ -173,7 +175,7 @@ class MU_PT_path(_OfUnit, bpy.types.Panel):
         parameters(layout, props, "path")
 
 
-class MU_PT_simulate(_OfUnit, bpy.types.Panel):
+class MU_PT_simulate(OfUnit, bpy.types.Panel):
     """Motion and ranking of paths, in a process of its own"""
 
     bl_idname = "MU_PT_simulate"
@@ -245,7 +247,7 @@ def ended(layout, child, where: str, job: str = "") -> None:
     row.operator(f"mu.{job}dismiss")
 
 
-class MU_PT_results(_OfUnit, bpy.types.Panel):
+class MU_PT_results(OfUnit, bpy.types.Panel):
     """What the study has found"""
 
     bl_idname = "MU_PT_results"

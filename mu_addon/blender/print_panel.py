@@ -9,7 +9,7 @@ import bpy
 
 from ..study.client import FAILED, RUNNING
 from . import printing, simulation, unit_object
-from .panels import _OfUnit, ended, parameters, running, wrapped
+from .panels import OfUnit, ended, parameters, running, wrapped
 
 JOB = "print_"
 ICONS = {"error": "CANCEL", "warning": "ERROR", "info": "INFO", "pass": "CHECKMARK"}
@@ -19,7 +19,7 @@ NOT_PRINTABLE = 6
 """Exit status of a check that went well and found an error."""
 
 
-class MU_PT_print(_OfUnit, bpy.types.Panel):
+class MU_PT_print(OfUnit, bpy.types.Panel):
     """The printable solid, its check and its files"""
 
     bl_idname = "MU_PT_print"
@@ -65,7 +65,7 @@ def _gates(layout, root, solid) -> None:
         box.label(text=f"Waveguide along {solid['mu_path']}", icon="CHECKMARK")
 
 
-class _OfPrint(_OfUnit):
+class _OfPrint(OfUnit):
     bl_parent_id = "MU_PT_print"
 
 

@@ -2,33 +2,23 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import bpy
 
 from ..study.motion import FOLDER, MODEL_A
 from ..study.panel_pictures import ANGLE, delta_name
 from . import fields, motion_parts, studies, thumbnails, unit_object
 from .operators.motion import NO_MOTION
-from .panels import wrapped
+from .panels import OfUnit, wrapped
 
 PICTURE = 13.0
 """Side of a picture, in heights of a button."""
 
 
-class _OfResults:
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "MU"
+class _OfResults(OfUnit):
     bl_parent_id = "MU_PT_results"
-
-    @classmethod
-    def poll(cls, context):
-        return unit_object.active_root(context) is not None
-
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        self.show(layout, context, unit_object.active_root(context))
+    bl_options: ClassVar[set[str]] = set()
 
 
 class MU_PT_motion(_OfResults, bpy.types.Panel):

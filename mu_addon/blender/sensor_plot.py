@@ -19,6 +19,7 @@ from mathutils import Vector
 from ..study.traces import steady_range, unbroken
 from . import sensor, twin, unit_object
 from .legend import TEXT, ticks, write
+from .overlay import Overlay
 
 COLOURS = (
     (1.0, 0.58, 0.15, 1.0),
@@ -36,8 +37,6 @@ WARNING = (1.0, 0.35, 0.3, 1.0)
 HEIGHT, GAP, LEFT, RIGHT, BOTTOM, WIDEST = 92, 26, 110, 20, 24, 900
 GAP_S = 0.5
 """A curve is not drawn across a pause that long, or five samples'."""
-
-_handle: Any = None
 
 
 def _draw() -> None:
@@ -193,16 +192,5 @@ def _over_twin(context: Any, root: Any, scale: float) -> None:
         write(text, place.x - blf.dimensions(0, text)[0] / 2, place.y + 1.5 * size * line, size, colour)
 
 
-def register() -> None:
-    """Draw in every 3D viewport; in background there is none."""
-    global _handle
-    if not bpy.app.background:
-        _handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL")
-
-
-def unregister() -> None:
-    """Draw no more."""
-    global _handle
-    if _handle is not None:
-        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
-        _handle = None
+_overlay = Overlay(_draw)
+register, unregister = _overlay.register, _overlay.unregister

@@ -6,7 +6,7 @@ import bpy
 
 from ..design.steps import STEPS
 from . import stack, unit_object
-from .panels import _OfUnit, wrapped
+from .panels import OfUnit, wrapped
 
 
 class MU_UL_steps(bpy.types.UIList):
@@ -28,7 +28,7 @@ class MU_UL_steps(bpy.types.UIList):
         mute.prop(item, "muted", text="", emboss=False, icon=state)
 
 
-class MU_PT_stack(_OfUnit, bpy.types.Panel):
+class MU_PT_stack(OfUnit, bpy.types.Panel):
     """The design step by step: each can be shown, muted, changed and made again on its own"""
 
     bl_idname = "MU_PT_stack"

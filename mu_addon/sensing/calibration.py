@@ -95,8 +95,7 @@ class Calibration:
         volts = np.asarray(BSpline(self.knots, self.coefficients, _DEGREE)(angles))
         if volts[-1] < volts[0]:
             volts, angles = volts[::-1], angles[::-1]
-        first, _ = _interval(volts, angles, voltage)
-        _, last = _interval(volts, angles, voltage)
+        first, last = _interval(volts, angles, voltage)
         near, _ = _interval(volts, angles, voltage - self.band_V)
         _, far = _interval(volts, angles, voltage + self.band_V)
         slack = self.band_V + 1e-9 * (volts[-1] - volts[0])

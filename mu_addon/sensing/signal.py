@@ -39,22 +39,21 @@ class Guided:
     junctions: tuple[tuple[float, float], ...] = ()
 
     @classmethod
-    def straight(cls, d: Dimensions, length: float, junction_pitch: float | None = None) -> Guided:
+    def straight(cls, d: Dimensions, length: float) -> Guided:
         """The guide of a straight path of `length` mm from its first node's end face to its last one's.
 
-        Wells lie at whole pitches from the first node, clear of its ends; junctions, a strut's diameter
-        wide, at every `junction_pitch` (the cell's size if not given).
+        Junctions, a strut's diameter wide, lie at every cell; wells at whole pitches from half a pitch beyond
+        the first node, clear of them.
         """
         first = d.waveguide_end
         inner = length - 2 * first
         if inner <= 0:
             raise InputError(f"a waveguide of {length:g} mm has no room between its ends", "path", "longer")
         wells = first + (np.arange(int(inner / d.well_pitch + 1e-9)) + 0.5) * d.well_pitch
-        step = d.cell if junction_pitch is None else junction_pitch
         half = d.junction_diameter / 2
         spans = tuple(
             (float(max(0.0, node - half)), float(min(length, node + half)))
-            for node in first + np.arange(int(inner / step + 1e-9) + 1) * step
+            for node in first + np.arange(int(inner / d.cell + 1e-9) + 1) * d.cell
         )
         room = d.well_width / 2 + 0.1
         clear = tuple(float(w) for w in wells if all(not a - room < w < b + room for a, b in spans))
