@@ -19,6 +19,10 @@ from .model import Model
 
 Array = np.ndarray[Any, Any]
 
+# How much friction may still change with its lagged bound, as a share of it, and how often it may lag.
+FRICTION_TOLERANCE = 1e-4
+MOST_LAGS = 40
+
 
 @attrs.frozen(eq=False)
 class State:
@@ -63,19 +67,43 @@ class Equilibrium:
     def newton(self, u: Array, pressure: float, reach_mm: float = np.inf) -> State:
         """Stable equilibrium at a pressure in MPa, from a start (n, 3) that obeys the supports.
 
-        Raises ConvergenceError where elements invert, progress stops, the equilibrium found is
-        unstable, or it lies farther from the start than `reach_mm`.
+        With friction, one whose bound belongs to it. Raises ConvergenceError where elements invert, progress
+        stops, the equilibrium found is unstable, or it lies farther from the start than `reach_mm`.
         """
-        s = self.settings
-        search = Descent(self.model, self.parameters, pressure, u, s)
-        factorisations, stale, definite = 0, True, True
+        obstacles, state = self.model.obstacles, State(pressure, u)
+        for obstacle in obstacles:
+            obstacle.lag_from_memory()
+        for number in range(MOST_LAGS):
+            # The last factor is still about right where only friction's bound has moved.
+            state = self._descend(state, factored=number > 0)
+            if np.abs(state.u - u).max() > reach_mm:
+                raise ConvergenceError("the unit snaps to a distant equilibrium (limit point)")
+            unsettled = max((obstacle.unsettled(state.u) for obstacle in obstacles), default=0.0)
+            if unsettled <= FRICTION_TOLERANCE:
+                return state
+            for obstacle in obstacles:
+                obstacle.settle(state.u)
+        raise ConvergenceError(f"friction does not settle: it still changes by {unsettled:.1e} of its bound")
+
+    def _descend(self, start: State, factored: bool) -> State:
+        """The equilibrium from a start, friction's bound held; its cost is added to the start's.
+
+        factored: whether the factor that is there belongs to a definite tangent of about this start.
+        """
+        s, pressure = self.settings, start.pressure_MPa
+        search = Descent(self.model, self.parameters, pressure, start.u, s)
+        factorisations, stale, definite = 0, not factored, True
         for iteration in range(s.max_iterations + 1):
             if search.converged:
-                if np.abs(search.u - u).max() > reach_mm:
-                    raise ConvergenceError("the unit snaps to a distant equilibrium (limit point)")
                 if not definite and not self._factorise(search.u, pressure):
                     raise ConvergenceError("the equilibrium is unstable (limit point or buckling)")
-                return State(pressure, search.u, search.residual, iteration, factorisations)
+                return State(
+                    pressure,
+                    search.u,
+                    search.residual,
+                    start.iterations + iteration,
+                    start.factorisations + factorisations,
+                )
             if stale:
                 if factorisations == s.max_factorisations:
                     break

@@ -23,12 +23,16 @@ SMALLEST = 1e-4
 
 
 @attrs.frozen(eq=False)
-class _Instant:
-    """A converged state, when it holds in s, and the rate in mm/s at which it was reached, if any."""
+class Instant:
+    """A converged state, when it holds in s, and the rate in mm/s at which it was reached, if any.
+
+    contacts: what each of the model's obstacles remembers of it, see `Obstacle.kept`; filled in to be stored.
+    """
 
     time_s: float
     state: State
     rate: Array | None = None
+    contacts: tuple[dict[str, Array], ...] = ()
 
 
 def march(
@@ -37,30 +41,44 @@ def march(
     pressure_kPa: Array,
     on_state: Callable[[State], None] | None = None,
     max_step_s: float = np.inf,
+    load: Callable[[int], Instant | None] = lambda number: None,
+    store: Callable[[int, Instant], None] = lambda number, instant: None,
 ) -> Trajectory:
     """Equilibria of a body with history at k instants, time in s ascending and pressure in kPa.
 
     The body starts at rest without history; the first instant's pressure comes at once. Pressure is
     linear between instants, in steps of at most `max_step_s` and the settings' largest pressure step, halved
-    where they do not converge. Raises ConvergenceError naming instant and cause.
+    where they do not converge; obstacles with a path are where they are at each step's time. `on_state` is
+    called when its instant is the last that materials and contacts remember. `load` gives an instant of an
+    earlier run by its number, if it kept one with `store`; for bodies whose materials have no history, which
+    is not kept. Raises ConvergenceError naming instant and cause.
     """
     time, pressure = np.asarray(time_s, float), np.asarray(pressure_kPa, float) / 1e3
     if (np.diff(time) < 0).any():
         raise InputError(
             "time runs backward", f"instant {int(np.argmax(np.diff(time) < 0)) + 1} of the protocol"
         )
-    equilibrium.parameters.forget()
-    last = _Instant(time[0], rest(equilibrium.model.mesh))
+    equilibrium.model.forget(float(time[0]), equilibrium.parameters)
+    last = Instant(time[0], rest(equilibrium.model.mesh))
     states = []
-    for t, p in zip(time, pressure, strict=True):
-        last = _interval(equilibrium, last, t, p, max_step_s)
+    obstacles = equilibrium.model.obstacles
+    for number, (t, p) in enumerate(zip(time, pressure, strict=True)):
+        kept = load(number)
+        if kept is None:
+            last = _interval(equilibrium, last, t, p, max_step_s)
+            store(number, attrs.evolve(last, contacts=tuple(o.kept() for o in obstacles)))
+        else:
+            last = kept
+            equilibrium.model.move_obstacles(t)
+            for obstacle, memory in zip(obstacles, kept.contacts, strict=True):
+                obstacle.restore(kept.state.u, memory)
         states.append(last.state)
         if on_state:
             on_state(last.state)
     return Trajectory(time, np.asarray(pressure_kPa, float), tuple(states), np.arange(len(states)))
 
 
-def _interval(eq: Equilibrium, start: _Instant, time: float, pressure: float, max_step_s: float) -> _Instant:
+def _interval(eq: Equilibrium, start: Instant, time: float, pressure: float, max_step_s: float) -> Instant:
     """March to an instant, in equal shares of the interval where one step is too much."""
     span, rise = time - start.time_s, pressure - start.state.pressure_MPa
     if span == 0 and rise == 0:
@@ -89,25 +107,31 @@ def _interval(eq: Equilibrium, start: _Instant, time: float, pressure: float, ma
     return last
 
 
-def _step(eq: Equilibrium, last: _Instant, time: float, pressure: float) -> _Instant:
-    """One step, committed to the materials' history when it has converged."""
+def _step(eq: Equilibrium, last: Instant, time: float, pressure: float) -> Instant:
+    """One step, committed to what materials and contacts remember when it has converged."""
     m, u = eq.parameters, last.state.u
     m.dt_s = time - last.time_s
+    eq.model.move_obstacles(time)
     if last.rate is not None and m.dt_s > 0:
         guess = u + m.dt_s * last.rate
     else:
         guess = _along_tangent(eq, u, pressure)
     try:
-        state = eq.newton(guess, pressure, LEAP * float(np.abs(guess - u).max()))
+        state = eq.newton(guess, pressure, _reach(eq, u, guess))
     except ConvergenceError:
         if last.rate is None:
             raise
         # Pressure may have turned round: the rate so far says nothing of what comes.
         guess = _along_tangent(eq, u, pressure)
-        state = eq.newton(guess, pressure, LEAP * float(np.abs(guess - u).max()))
+        state = eq.newton(guess, pressure, _reach(eq, u, guess))
     eq.model.commit(state.u, m)
     rate = (state.u - u) / m.dt_s if m.dt_s > 0 else None
-    return _Instant(time, state, rate)
+    return Instant(time, state, rate)
+
+
+def _reach(eq: Equilibrium, u: Array, guess: Array) -> float:
+    """How far in mm from a prediction a state may lie: an obstacle pushes as far as it overlaps, besides."""
+    return LEAP * (float(np.abs(guess - u).max()) + eq.model.deepest_mm(guess))
 
 
 def _along_tangent(eq: Equilibrium, u: Array, pressure: float) -> Array:

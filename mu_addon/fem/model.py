@@ -254,13 +254,36 @@ class Model:
         return np.maximum(kappa - POINTWISE_BULK * mu, 0.0)
 
     def commit(self, u: Array, m: MaterialData) -> None:
-        """Make a converged state, `m.dt_s` after the one before, part of the materials' history."""
+        """Make a converged state, `m.dt_s` after the one before, part of what materials and contacts know."""
+        for obstacle in self.obstacles:
+            obstacle.commit(u)
         self._place(u)
         for layer in m.layers:
             if layer.kernels.advance:
                 inputs = [layer.elements, layer.rows, layer.mean_kappa, layer.history, m.dt_s]
                 inputs += [self._u, self._tets, self._gradients]
                 self._launch(layer.kernels.advance, len(layer.elements), inputs)
+
+    def forget(self, time_s: float, m: MaterialData) -> None:
+        """Take materials and contacts back to rest without history, obstacles to where they are then."""
+        m.forget()
+        self.move_obstacles(time_s)
+        for obstacle in self.obstacles:
+            obstacle.begin()
+
+    def move_obstacles(self, time_s: float) -> None:
+        """Put obstacles with a path where they are at a time in s."""
+        for obstacle in self.obstacles:
+            obstacle.move(time_s)
+
+    @property
+    def rubs(self) -> bool:
+        """Whether an obstacle has friction, so that a state depends on those before it."""
+        return any(obstacle.friction for obstacle in self.obstacles)
+
+    def deepest_mm(self, u: Array) -> float:
+        """How deep the body is in an obstacle at most, in mm."""
+        return max((obstacle.deepest_mm(u) for obstacle in self.obstacles), default=0.0)
 
     def _launch_layers(self, kind: str, m: MaterialData, outputs: list[Any]) -> None:
         """Run one kind of element kernel over every layer; the first to cover an element sets its output."""

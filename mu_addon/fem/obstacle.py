@@ -1,8 +1,9 @@
-"""Rigid bodies that a deforming body may touch: frictionless contact by a penalty of stated depth."""
+"""Contact of a deforming body with rigid ones: a penalty of stated depth, and Coulomb's friction."""
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from collections.abc import Callable
+from typing import Any
 
 import attrs
 import numpy as np
@@ -10,170 +11,270 @@ import numpy as np
 from ..errors import InputError
 from ..meshing.mesh import AXES, TRIANGLE_EDGES, Mesh, boundary_faces
 from ..meshing.quality import shapes
+from . import friction
 from .contact import with_middles
 from .descent import NewtonSettings
 from .elements import triangle_quadrature
+from .friction import Lag, Memory
+from .rigid import Box, Plane, Pose, Rigid, Sphere
+
+__all__ = ["CONTACT", "Box", "Contact", "Obstacle", "Plane", "Pose", "Rigid", "Sphere", "outer_faces"]
 
 Array = np.ndarray[Any, Any]
 
 # Points that begin to touch change the tangent, so an old factor is soon of no use; and a body that is
 # stopped ends far from where it was predicted.
 CONTACT = NewtonSettings(keep_factor=0.2, max_factorisations=40, surprise=3.0)
-
-
-def _float64(values: Any) -> Array:
-    return np.ascontiguousarray(values, np.float64)
-
-
-class Rigid(Protocol):
-    """A rigid body in its own frame: a signed distance and its first two derivatives."""
-
-    def distance(self, x: Array) -> tuple[Array, Array, Array]:
-        """Distance (k,) of points (k, 3), negative inside, its gradient (k, 3) and its bend (k, 3, 3)."""
-        ...
-
-
-def _unit(vector: Any) -> Array:
-    v = _float64(vector)
-    length = float(np.linalg.norm(v))
-    if v.shape != (3,) or not length > 0:
-        raise InputError(f"{vector!r} is no direction", "obstacle", "give three numbers, not all of them 0")
-    return v / length
+# A point slides where its friction is at least this share of its bound, which lags by less than the rest.
+_AT_BOUND = 0.999
 
 
 @attrs.frozen(eq=False)
-class Plane:
-    """A half-space through `point` (3,) in mm; `normal` (3,) points out of it, to the free side."""
+class Contact:
+    """What a state's contact with one obstacle is; forces are of the meshed body on the obstacle, (3,) in N.
 
-    point: Array = attrs.field(converter=_float64)
-    normal: Array = attrs.field(converter=_unit)
-
-    def distance(self, x: Array) -> tuple[Array, Array, Array]:
-        """See Rigid."""
-        return (x - self.point) @ self.normal, np.tile(self.normal, (len(x), 1)), np.zeros((len(x), 3, 3))
-
-
-@attrs.frozen(eq=False)
-class Sphere:
-    """A ball about `centre` (3,) of `radius` in mm."""
-
-    centre: Array = attrs.field(converter=_float64)
-    radius: float
-
-    def distance(self, x: Array) -> tuple[Array, Array, Array]:
-        """See Rigid."""
-        away = x - self.centre
-        length = np.maximum(np.linalg.norm(away, axis=1), 1e-12 * self.radius)
-        normal = away / length[:, None]
-        return length - self.radius, normal, _round(normal, length)
-
-
-@attrs.frozen(eq=False)
-class Box:
-    """A box about `centre` (3,) with half sides (3,) in mm along the axes.
-
-    Outside it the distance is that of its faces, edges and corners; inside, of the nearest face.
+    area_mm2: of the surface that touches, undeformed; sticking: the share of it that does not slide, 1 where
+    nothing touches. deepest_mm: the error of the gap. slid_mm (f, q): what each point has slid so far, those
+    of `Obstacle.places`; lost_mJ: what that has cost.
     """
 
-    centre: Array = attrs.field(converter=_float64)
-    half_mm: Array = attrs.field(converter=_float64)
+    normal_N: Array
+    tangential_N: Array
+    area_mm2: float
+    sticking: float
+    deepest_mm: float
+    slid_mm: Array
+    lost_mJ: float
 
-    def distance(self, x: Array) -> tuple[Array, Array, Array]:
-        """See Rigid."""
-        away = x - self.centre
-        beyond = np.abs(away) - self.half_mm
-        sign = np.where(away < 0, -1.0, 1.0)
-        past = np.maximum(beyond, 0.0)
-        length = np.linalg.norm(past, axis=1)
-        outside = length > 0
-        nearest = beyond.argmax(axis=1)
-        normal = np.zeros_like(x)
-        rows = np.arange(len(x))
-        normal[rows, nearest] = sign[rows, nearest]
-        distance = beyond[rows, nearest]
-        bend = np.zeros((len(x), 3, 3))
-        normal[outside] = sign[outside] * past[outside] / length[outside, None]
-        distance[outside] = length[outside]
-        # Only directions that point past a face turn the normal.
-        turning = (past > 0).astype(float)
-        bend[outside] = _round(normal[outside], length[outside], turning[outside])
-        return distance, normal, bend
-
-
-def _round(normal: Array, radius: Array, within: Array | None = None) -> Array:
-    """Second derivative (k, 3, 3) of the distance from a point, edge (`within` two axes) or face."""
-    eye = np.eye(3) if within is None else np.einsum("ki,ij->kij", within, np.eye(3))
-    return np.asarray((eye - normal[:, :, None] * normal[:, None, :]) / radius[:, None, None])
-
-
-@attrs.frozen(eq=False)
-class Pose:
-    """Where a rigid body is: turned by `rotation` (3, 3), then moved by `shift` (3,) in mm."""
-
-    rotation: Array = attrs.field(converter=_float64, factory=lambda: np.eye(3))
-    shift: Array = attrs.field(converter=_float64, factory=lambda: np.zeros(3))
-
-    def __attrs_post_init__(self) -> None:
-        r = self.rotation
-        if r.shape != (3, 3) or not np.allclose(r @ r.T, np.eye(3), atol=1e-9) or np.linalg.det(r) < 0:
-            raise InputError("the matrix of a pose is no rotation", "obstacle", "give one of determinant 1")
+    @property
+    def force_N(self) -> Array:
+        """Both forces together, (3,)."""
+        return np.asarray(self.normal_N + self.tangential_N)
 
 
 class Obstacle:
-    """Frictionless contact of a mesh's outer surface with a rigid body, as a term of `Model.obstacles`.
+    """Contact of a mesh's outer surface with a rigid body, as a term of `Model.obstacles`.
 
     Where a point of the surface is a depth s inside, the obstacle presses on it with k s^2/(2 d) for s < d
     and k (s - d/2) beyond, in MPa on the undeformed area, along the distance's gradient. d is `depth_mm`, k
     such that at `pressure_MPa` the depth is d: that is the gap's error, `deepest_mm` what a state has of it.
-    Force and tangent are continuous, and the energy is a potential of the displacement. `pose` may be set
-    between equilibria, as an obstacle that moves has it. Faces of the base, the cavity and mirror planes do
-    not touch. halvings: of a face's sides, before the quadrature's points are laid on the pieces: large faces
-    feel an obstacle up to near their edges only with some. Raises InputError.
+    Force and tangent are continuous, and the energy is a potential of the displacement.
+
+    friction: Coulomb's coefficient. The traction grows with the slip since the last committed state, and what
+    was elastic of the slip before, up to `friction` times the pressure; at `pressure_MPa` a slip of
+    `stick_mm` (of None: depth_mm) gets there. Slip is relative to the obstacle, in its own frame. The bound
+    lags: `Equilibrium.newton` finds an equilibrium with pressure and normal of an earlier one, and again
+    until friction changes by less than equilibrium.FRICTION_TOLERANCE of its bound, so that energy, force
+    and symmetric tangent belong together. Such a body has memory: `marching.march` solves it, and commits.
+
+    `pose` may be set between equilibria, as an obstacle that moves has it; `path`, a function of time in s,
+    does so in `march`. Faces of the base, the cavity and mirror planes do not touch. halvings: of a face's
+    sides, before the quadrature's points are laid on the pieces: large faces feel an obstacle up to near
+    their edges only with some. faces: those of `outer_faces` that can touch, where others cannot: it saves
+    time. Raises InputError.
     """
 
     def __init__(
-        self, mesh: Mesh, rigid: Rigid, pressure_MPa: float, depth_mm: float, halvings: int = 0
+        self,
+        mesh: Mesh,
+        rigid: Rigid,
+        pressure_MPa: float,
+        depth_mm: float,
+        halvings: int = 0,
+        friction: float = 0.0,
+        stick_mm: float | None = None,
+        pose: Pose | None = None,
+        path: Callable[[float], Pose] | None = None,
+        faces: Array | None = None,
     ) -> None:
+        stick_mm = depth_mm if stick_mm is None else stick_mm
         if not (pressure_MPa > 0 and depth_mm > 0):
             raise InputError(
                 f"a contact of {pressure_MPa:g} MPa at {depth_mm:g} mm of depth",
                 "obstacle",
                 "give both above 0: the contact pressure to expect, and how deep it may press in there",
             )
-        self.rigid, self.pose = rigid, Pose()
-        self.depth_mm = depth_mm
+        if not (0 <= friction < np.inf and stick_mm > 0):
+            raise InputError(
+                f"a friction coefficient of {friction:g} that {stick_mm:g} mm of slip reach",
+                "obstacle",
+                "give a coefficient of 0 or more, and a slip above 0",
+            )
+        self.rigid, self.pose, self.path = rigid, pose or Pose(), path
+        self.depth_mm, self.friction = depth_mm, friction
         self.stiffness = 2 * pressure_MPa / depth_mm
+        self.stick_stiffness = friction * pressure_MPa / stick_mm
         self._rest = mesh.nodes
-        self.faces = outer_faces(mesh)
+        self.faces = outer_faces(mesh) if faces is None else faces
         points, weight = _subdivided(*triangle_quadrature(mesh.order), halvings)
         self._shape, derivative = shapes(points, TRIANGLE_EDGES, mesh.order)
         tangents = np.einsum("fni,qnk->kfqi", mesh.nodes[self.faces], derivative)
         self._area = np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=-1) * weight
         self._pairs = np.stack(np.triu_indices(self.faces.shape[1]), axis=1)
+        self.begin()
+
+    def move(self, time_s: float) -> None:
+        """Go to where `path` has the obstacle, if it has one."""
+        if self.path is not None:
+            self.pose = self.path(time_s)
+
+    def begin(self, u: Array | None = None) -> None:
+        """Forget what was: the body comes to displacement (n, 3), else to rest, without any slip there."""
+        if not self.friction:
+            return
+        y, g, n, _ = self._points(np.zeros_like(self._rest) if u is None else u)
+        self.recall(Memory(y, g, n, self._pressure(g)[0], np.zeros_like(y), np.zeros_like(g)))
+
+    def recall(self, memory: Memory) -> None:
+        """Take a committed state's memory for the last one."""
+        self.memory = memory
+        self.lag_from_memory()
+
+    def kept(self) -> dict[str, Array]:
+        """What the memory has beyond the displacement it was committed with, as arrays to store."""
+        if not self.friction:
+            return {}
+        m = self.memory
+        at = np.flatnonzero((m.pressure > 0) | (m.slid > 0))
+        parts = {"normal": m.normal, "pressure": m.pressure, "slip": m.slip, "slid": m.slid}
+        found = {name: a.reshape(-1, *a.shape[2:])[at] for name, a in parts.items()}
+        return {"point": at, "lost_mJ": np.array(m.lost_mJ), **found}
+
+    def restore(self, u: Array, kept: dict[str, Array]) -> None:
+        """The memory as it was when `kept` was stored and displacement u (n, 3) the last committed one."""
+        if not self.friction:
+            return
+        y, g, n, _ = self._points(u)
+        pressure, slip, slid = np.zeros_like(g), np.zeros_like(y), np.zeros_like(g)
+        for name, a in (("normal", n), ("pressure", pressure), ("slip", slip), ("slid", slid)):
+            a.reshape(-1, *a.shape[2:])[kept["point"]] = kept[name]
+        self.recall(Memory(y, g, n, pressure, slip, slid, float(kept["lost_mJ"])))
+
+    def lag_from_memory(self) -> None:
+        """Let friction's bound be the last committed state's."""
+        if self.friction:
+            m = self.memory
+            self.lag = Lag(m.pressure, m.normal, np.ones_like(m.pressure))
+
+    def unsettled(self, u: Array) -> float:
+        """How much friction at displacement u would change with the lag, as a share of its bound."""
+        if not self.friction:
+            return 0.0
+        face = self._near(u)
+        y, g, n, _ = self._points(u, face)
+        memory, old = self._of(face)
+        new = self._lagged(memory, y, g, n)
+        most = float((self._area[face] * self.friction * new.pressure).sum())
+        less, more = (self._tractions(y, memory, lag) for lag in (old, new))
+        change = float((self._area[face] * np.linalg.norm(more - less, axis=-1)).sum())
+        return change / most if most else float(change > 0)
+
+    def settle(self, u: Array) -> None:
+        """Let the lag follow to displacement u (n, 3)."""
+        if not self.friction:
+            return
+        face, m = self._near(u), self.memory
+        y, g, n, _ = self._points(u, face)
+        new = self._lagged(self._of(face)[0], y, g, n)
+        self.lag = Lag(np.zeros_like(m.pressure), m.normal.copy(), np.ones_like(m.pressure))
+        self.lag.pressure[face], self.lag.normal[face] = new.pressure, new.normal
+        self.lag.counts[face] = new.counts
+
+    def commit(self, u: Array) -> None:
+        """Make a converged state part of the memory: what is beyond the bound has slid."""
+        if not self.friction:
+            return
+        y, g, _, _ = self._points(u)
+        old, touches = self.memory, g < 0
+        e = friction.slip(old, self.lag, y)
+        elastic: Array = (
+            e * friction.kept(e, self.friction * self.lag.pressure, self.stick_stiffness)[..., None]
+        )
+        # What leaves loses what it had stored, and does not slide on.
+        elastic[~touches], e[~touches] = 0.0, old.slip[~touches]
+        slid = e - elastic
+        # Friction has changed within the step: its mean is that of both ends.
+        lost = self.stick_stiffness / 2 * ((old.slip + elastic) * slid).sum(axis=-1)
+        self.recall(
+            Memory(
+                y,
+                g,
+                self.lag.normal,
+                np.where(touches, self.lag.pressure, 0.0),
+                elastic,
+                old.slid + np.where(touches, np.linalg.norm(slid, axis=-1), 0.0),
+                old.lost_mJ + float((self._area * lost).sum()),
+            )
+        )
 
     def energy_mJ(self, u: Array) -> float:
-        """Energy stored in the contact at displacement (n, 3) in mm."""
-        s = np.maximum(-self._gaps(u)[0], 0.0)
+        """Energy stored in the contact at displacement (n, 3) in mm, with what sliding costs in this step."""
+        face = self._near(u)
+        y, g, _, _ = self._points(u, face)
+        s = np.maximum(-g, 0.0)
         d, k = self.depth_mm, self.stiffness
-        density = np.where(s < d, s**3 / (6 * d), s**2 / 2 - d * s / 2 + d**2 / 6)
-        return float((self._area * k * density).sum())
+        density = k * np.where(s < d, s**3 / (6 * d), s**2 / 2 - d * s / 2 + d**2 / 6)
+        if self.friction:
+            memory, lag = self._of(face)
+            e = friction.slip(memory, lag, y)
+            density += friction.energy(e, self.friction * lag.pressure, self.stick_stiffness) / lag.counts
+        return float((self._area[face] * density).sum())
 
     def forces(self, u: Array) -> tuple[Array, Array]:
         """Nodes (j,) of faces in contact, and the energy's derivative by their displacement (j, 3) in N."""
-        face, area, pressure, _, normal, _ = self._touching(u)
-        of_nodes = -np.einsum("fq,qa,fqi->fai", area * pressure, self._shape, normal)
+        face, y, g, n, _ = self._touching(u)
+        at_points = -self._pressure(g)[0][..., None] * n
+        if self.friction:
+            at_points += self._tractions(y, *self._of(face))
+        at_points = at_points @ self.pose.rotation.T
+        of_nodes = np.einsum("fq,qa,fqi->fai", self._area[face], self._shape, at_points)
         return self.faces[face].ravel(), of_nodes.reshape(-1, 3)
 
     def blocks(self, u: Array) -> tuple[Array, Array]:
         """Second derivative of the energy: pairs (j, 2) of nodes of one face, each once, blocks (j, 3, 3)."""
-        face, area, pressure, slope, normal, bend = self._touching(u)
-        at_points = slope[..., None, None] * normal[..., :, None] * normal[..., None, :]
-        at_points -= pressure[..., None, None] * bend
+        face, y, g, n, h = self._touching(u)
+        pressure, slope = self._pressure(g)
+        at_points = slope[..., None, None] * n[..., :, None] * n[..., None, :] - pressure[..., None, None] * h
+        if self.friction:
+            memory, lag = self._of(face)
+            e = friction.slip(memory, lag, y)
+            bound = self.friction * lag.pressure
+            rubbing = friction.tangent(e, bound, self.stick_stiffness, lag.normal)
+            at_points += lag.counts[..., None, None] * rubbing
+        r = self.pose.rotation
+        at_points = r @ at_points @ r.T
         a, b = self._pairs.T
-        shapes = self._shape[:, a] * self._shape[:, b]
-        blocks = np.einsum("fq,qp,fqij->fpij", area, shapes, at_points)
+        both = self._shape[:, a] * self._shape[:, b]
+        blocks = np.einsum("fq,qp,fqij->fpij", self._area[face], both, at_points)
         pairs = self.faces[face][:, self._pairs]
         return pairs.reshape(-1, 2), blocks.reshape(-1, 3, 3)
+
+    def contact(self, u: Array) -> Contact:
+        """What a state's contact is; with friction, of the last committed one or one found since."""
+        face = self._near(u)
+        y, g, n, _ = self._points(u, face)
+        area, pressure = self._area[face], self._pressure(g)[0]
+        touching = pressure > 0
+        r = self.pose.rotation
+        normal = -(area * pressure)[..., None] * n
+        rubbing, sliding = np.zeros_like(y), touching
+        slid, lost = np.zeros(self._area.shape), 0.0
+        if self.friction:
+            memory, lag = self._of(face)
+            rubbing = area[..., None] * self._tractions(y, memory, lag)
+            most = area * self.friction * lag.pressure
+            sliding = touching & (np.linalg.norm(rubbing, axis=-1) >= _AT_BOUND * most)
+            slid, lost = self.memory.slid, self.memory.lost_mJ
+        touched = float(area[touching].sum())
+        return Contact(
+            normal.sum(axis=(0, 1)) @ r.T,
+            rubbing.sum(axis=(0, 1)) @ r.T,
+            touched,
+            1 - float(area[sliding].sum()) / touched if touched else 1.0,
+            max(0.0, -float(g.min(initial=np.inf))),
+            slid,
+            lost,
+        )
 
     def force_N(self, u: Array) -> Array:
         """Force (3,) of the meshed body on the obstacle; of a half mesh, of that half."""
@@ -186,35 +287,79 @@ class Obstacle:
 
     def gap_mm(self, u: Array) -> float:
         """Least distance of the surface's points from the obstacle, negative where they touch."""
-        return float(self._gaps(u)[0].min())
+        return float(self._points(u)[1].min())
 
     def deepest_mm(self, u: Array) -> float:
         """How deep the surface is in the obstacle at most: the error of the gap."""
-        return max(0.0, -self.gap_mm(u))
+        return max(0.0, -float(self._points(u, self._near(u))[1].min(initial=np.inf)))
+
+    def deepest_place(self, u: Array) -> Array:
+        """Place (3,) in mm of the surface's point that is deepest in the obstacle, or nearest to it."""
+        return np.asarray(self.places(u).reshape(-1, 3)[self._points(u)[1].argmin()])
 
     def pressures_MPa(self, u: Array) -> tuple[Array, Array]:
         """Places (k, 3) in mm of the surface's points in contact, and the pressure (k,) on each."""
-        face, _, pressure, *_ = self._touching(u)
-        x = np.einsum("qa,fai->fqi", self._shape, (self._rest + u)[self.faces[face]])
+        face = self._near(u)
+        pressure = self._pressure(self._points(u, face)[1])[0]
         on = pressure > 0
+        x = np.einsum("qa,fai->fqi", self._shape, (self._rest + u)[self.faces[face]])
         return x[on], pressure[on]
 
-    def _gaps(self, u: Array, faces: Array | None = None) -> tuple[Array, Array, Array]:
-        """Distance (f, q), gradient (f, q, 3) and second derivative (f, q, 3, 3) at points of faces."""
-        chosen = self.faces if faces is None else faces
+    def _points(self, u: Array, faces: Array | None = None) -> tuple[Array, Array, Array, Array]:
+        """In the obstacle's frame, at points of faces: place (f, q, 3), distance (f, q), its derivatives."""
+        chosen = self.faces if faces is None else self.faces[faces]
         x = np.einsum("qa,fai->fqi", self._shape, (self._rest + u)[chosen])
-        r, shift = self.pose.rotation, self.pose.shift
-        g, n, h = self.rigid.distance((x.reshape(-1, 3) - shift) @ r)
+        y = (x - self.pose.shift) @ self.pose.rotation
+        g, n, h = self.rigid.distance(y.reshape(-1, 3))
         shape = x.shape[:2]
-        return g.reshape(shape), (n @ r.T).reshape(*shape, 3), (r @ h @ r.T).reshape(*shape, 3, 3)
+        return y, g.reshape(shape), n.reshape(*shape, 3), h.reshape(*shape, 3, 3)
 
     def _touching(self, u: Array) -> tuple[Array, ...]:
-        """Faces in contact (f,); at their points area, pressure, its slope, gradient, second derivative."""
-        face = np.flatnonzero((self._gaps(u)[0] < 0).any(axis=1))
-        g, n, h = self._gaps(u, self.faces[face])
-        s, d, k = np.maximum(-g, 0.0), self.depth_mm, self.stiffness
-        pressure = np.where(s < d, k * s**2 / (2 * d), k * (s - d / 2))
-        return face, self._area[face], pressure, np.where(s < d, k * s / d, k), n, h
+        """Faces (f,) that press or rub, and what `_points` says of them."""
+        near = self._near(u)
+        y, g, n, h = self._points(u, near)
+        on = (g < 0).any(axis=1)
+        if self.friction:
+            on |= (self.lag.pressure[near] > 0).any(axis=1)
+        return near[on], y[on], g[on], n[on], h[on]
+
+    def _near(self, u: Array) -> Array:
+        """Faces (f,) that may press, by the distance of a ball around each, or rub.
+
+        No point of a face is farther from its nodes' mean than they, times the sum of its shapes' sizes.
+        """
+        x = (self._rest + u)[self.faces]
+        middle = x.mean(axis=1)
+        reach = (
+            np.linalg.norm(x - middle[:, None], axis=2).max(axis=1) * np.abs(self._shape).sum(axis=1).max()
+        )
+        y = (middle - self.pose.shift) @ self.pose.rotation
+        on = self.rigid.distance(y)[0] < reach
+        if self.friction:
+            on |= (self.lag.pressure > 0).any(axis=1)
+        return np.flatnonzero(on)
+
+    def _pressure(self, gap: Array) -> tuple[Array, Array]:
+        """Pressure in MPa, and its slope by depth in MPa/mm, at distances of any shape."""
+        s, d, k = np.maximum(-gap, 0.0), self.depth_mm, self.stiffness
+        return np.where(s < d, k * s**2 / (2 * d), k * (s - d / 2)), np.where(s < d, k * s / d, k)
+
+    def _lagged(self, memory: Memory, y: Array, gap: Array, normal: Array) -> Lag:
+        return Lag(self._pressure(gap)[0], normal, friction.met(memory.gap, gap))
+
+    def _of(self, face: Array) -> tuple[Memory, Lag]:
+        """Memory and lag of some faces."""
+        m, lag = self.memory, self.lag
+        place, gap, normal, pressure, slip, slid = (
+            a[face] for a in (m.place, m.gap, m.normal, m.pressure, m.slip, m.slid)
+        )
+        memory = Memory(place, gap, normal, pressure, slip, slid)
+        return memory, Lag(lag.pressure[face], lag.normal[face], lag.counts[face])
+
+    def _tractions(self, y: Array, memory: Memory, lag: Lag) -> Array:
+        """Friction (f, q, 3) in MPa at places in the obstacle's frame."""
+        e = friction.slip(memory, lag, y)
+        return friction.traction(e, self.friction * lag.pressure, self.stick_stiffness)
 
 
 def _subdivided(points: Array, weight: Array, halvings: int) -> tuple[Array, Array]:

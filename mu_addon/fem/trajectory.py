@@ -8,6 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..errors import InputError
 from .equilibrium import Equilibrium, State, rest
 
 Array = np.ndarray[Any, Any]
@@ -50,8 +51,11 @@ def simulate(
 
     `load` gives a state of an earlier run at a pressure in MPa, if it kept one with `store`; a resumed
     run finds the same states to the last digit, since each starts from those before it alone. Raises
-    ConvergenceError where a pressure cannot be reached; `on_state` has then seen all before it.
+    ConvergenceError where a pressure cannot be reached; `on_state` has then seen all before it, and
+    InputError for a body with friction.
     """
+    if equilibrium.model.rubs:
+        raise InputError("a body with friction remembers", "trajectory.simulate", "use marching.march")
     distinct, sides = branches(pressure_kPa)
     found = {0.0: rest(equilibrium.model.mesh)}
     for side in sides:

@@ -1,0 +1,97 @@
+"""Coulomb friction at points of a surface: slip that gives a little, then slides, under a bound that lags."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+Array = np.ndarray[Any, Any]
+
+# Of a step's share in contact: an energy is divided by it.
+_LEAST = 1e-6
+
+
+@attrs.frozen(eq=False)
+class Memory:
+    """What points (f, q) of a surface know of an obstacle from their last committed state, in its frame.
+
+    place (f, q, 3) in mm; gap (f, q), their distance, in mm; normal (f, q, 3), its gradient, and pressure
+    (f, q) in MPa that bound friction; slip (f, q, 3), what the contact gives without sliding, in mm; slid
+    (f, q), the length slid so far, in mm. lost_mJ: what sliding has cost so far.
+    """
+
+    place: Array
+    gap: Array
+    normal: Array
+    pressure: Array
+    slip: Array
+    slid: Array
+    lost_mJ: float = 0.0
+
+
+@attrs.frozen(eq=False)
+class Lag:
+    """What friction takes from an earlier iterate: pressure (f, q), normal (f, q, 3), and `counts` (f, q).
+
+    counts: the share of the way since the last committed state that is in contact, see `met`.
+    """
+
+    pressure: Array
+    normal: Array
+    counts: Array
+
+
+def met(before: Array, gap: Array) -> Array:
+    """Share (f, q) of a step that is in contact, of the distances in mm at both its ends.
+
+    The distance is taken to be linear over the step, so that a point which comes nearer aslant does not slip
+    before it touches. 1 out of contact, where it is of no account.
+    """
+    away = np.maximum(before, 0.0)
+    share = gap / np.where(gap < 0, gap - away, 1.0)
+    return np.where(gap < 0, np.maximum(share, _LEAST), 1.0)
+
+
+def slip(memory: Memory, lag: Lag, place: Array) -> Array:
+    """Slip (f, q, 3) in mm in the lagged tangent plane, had nothing slid since the last committed state."""
+    e: Array = memory.slip + lag.counts[..., None] * (place - memory.place)
+    return np.asarray(e - (e * lag.normal).sum(axis=-1, keepdims=True) * lag.normal)
+
+
+def energy(e: Array, bound: Array, stiffness: float) -> Array:
+    """Energy (...) in mJ/mm2 whose derivative by slip e (..., 3) in mm is `traction`: Huber's function.
+
+    bound (...) of the traction and stiffness in MPa and MPa/mm. With the bound held, a step's energy is that
+    of elastic slip and what sliding costs: Coulomb's law as an incremental potential, as in Li et al., ACM
+    Trans. Graph. 39 (2020) 49, but of elastic slip in place of velocity, so that what sticks does not creep.
+    """
+    size = np.linalg.norm(e, axis=-1)
+    least = bound / stiffness
+    return np.where(size < least, stiffness * size**2 / 2, bound * (size - least / 2))
+
+
+def traction(e: Array, bound: Array, stiffness: float) -> Array:
+    """Traction (..., 3) in MPa along slip e (..., 3) in mm: stiffness times slip, up to the bound (...)."""
+    return stiffness * kept(e, bound, stiffness)[..., None] * e
+
+
+def kept(e: Array, bound: Array, stiffness: float) -> Array:
+    """Share (...) of slip e that is elastic: 1 where it sticks, 0 without pressure."""
+    size = np.linalg.norm(e, axis=-1)
+    least = bound / stiffness
+    return np.where(size > least, least / np.maximum(size, 1e-300), np.where(bound > 0, 1.0, 0.0))
+
+
+def tangent(e: Array, bound: Array, stiffness: float, normal: Array) -> Array:
+    """Derivative (..., 3, 3) of `traction` by slip within the plane across `normal` (..., 3), in MPa/mm."""
+    size = np.linalg.norm(e, axis=-1)
+    along = e / np.maximum(size, 1e-300)[..., None]
+    plane = np.eye(3) - normal[..., :, None] * normal[..., None, :]
+    share = kept(e, bound, stiffness)
+    # What slides resists a turn of its direction only.
+    turning = (
+        plane - np.where(share < 1, 1.0, 0.0)[..., None, None] * along[..., :, None] * along[..., None, :]
+    )
+    return np.asarray(stiffness * share[..., None, None] * turning)

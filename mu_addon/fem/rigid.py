@@ -1,0 +1,113 @@
+"""Rigid bodies by their signed distance, and where they are."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+
+Array = np.ndarray[Any, Any]
+
+
+def _float64(values: Any) -> Array:
+    return np.ascontiguousarray(values, np.float64)
+
+
+class Rigid(Protocol):
+    """A rigid body in its own frame: a signed distance and its first two derivatives."""
+
+    def distance(self, x: Array) -> tuple[Array, Array, Array]:
+        """Distance (k,) of points (k, 3), negative inside, its gradient (k, 3) and its bend (k, 3, 3)."""
+        ...
+
+
+def _unit(vector: Any) -> Array:
+    v = _float64(vector)
+    length = float(np.linalg.norm(v))
+    if v.shape != (3,) or not length > 0:
+        raise InputError(f"{vector!r} is no direction", "obstacle", "give three numbers, not all of them 0")
+    return v / length
+
+
+@attrs.frozen(eq=False)
+class Plane:
+    """A half-space through `point` (3,) in mm; `normal` (3,) points out of it, to the free side."""
+
+    point: Array = attrs.field(converter=_float64)
+    normal: Array = attrs.field(converter=_unit)
+
+    def distance(self, x: Array) -> tuple[Array, Array, Array]:
+        """See Rigid."""
+        return (x - self.point) @ self.normal, np.tile(self.normal, (len(x), 1)), np.zeros((len(x), 3, 3))
+
+
+@attrs.frozen(eq=False)
+class Sphere:
+    """A ball about `centre` (3,) of `radius` in mm."""
+
+    centre: Array = attrs.field(converter=_float64)
+    radius: float
+
+    def distance(self, x: Array) -> tuple[Array, Array, Array]:
+        """See Rigid."""
+        away = x - self.centre
+        length = np.maximum(np.linalg.norm(away, axis=1), 1e-12 * self.radius)
+        normal = away / length[:, None]
+        return length - self.radius, normal, round_bend(normal, length)
+
+
+@attrs.frozen(eq=False)
+class Box:
+    """A box about `centre` (3,) with half sides (3,) in mm along the axes.
+
+    Outside it the distance is that of its faces, edges and corners; inside, of the nearest face.
+    """
+
+    centre: Array = attrs.field(converter=_float64)
+    half_mm: Array = attrs.field(converter=_float64)
+
+    def distance(self, x: Array) -> tuple[Array, Array, Array]:
+        """See Rigid."""
+        away = x - self.centre
+        beyond = np.abs(away) - self.half_mm
+        sign = np.where(away < 0, -1.0, 1.0)
+        past = np.maximum(beyond, 0.0)
+        length = np.linalg.norm(past, axis=1)
+        outside = length > 0
+        nearest = beyond.argmax(axis=1)
+        normal = np.zeros_like(x)
+        rows = np.arange(len(x))
+        normal[rows, nearest] = sign[rows, nearest]
+        distance = beyond[rows, nearest]
+        bend = np.zeros((len(x), 3, 3))
+        normal[outside] = sign[outside] * past[outside] / length[outside, None]
+        distance[outside] = length[outside]
+        # Only directions that point past a face turn the normal.
+        turning = np.einsum("ki,ij->kij", past > 0, np.eye(3))
+        bend[outside] = round_bend(normal[outside], length[outside], turning[outside])
+        return distance, normal, bend
+
+
+def round_bend(normal: Array, radius: Array, within: Array | None = None) -> Array:
+    """Second derivative (k, 3, 3) of the distance from a point, or from an edge, at a `radius` (k,) in mm.
+
+    within (k, 3, 3): the projection on the plane across the edge; the radius is below 0 for what is inside.
+    """
+    plane = np.eye(3) if within is None else within
+    return np.asarray((plane - normal[:, :, None] * normal[:, None, :]) / radius[:, None, None])
+
+
+@attrs.frozen(eq=False)
+class Pose:
+    """Where a rigid body is: turned by `rotation` (3, 3), then moved by `shift` (3,) in mm."""
+
+    rotation: Array = attrs.field(converter=_float64, factory=lambda: np.eye(3))
+    shift: Array = attrs.field(converter=_float64, factory=lambda: np.zeros(3))
+
+    def __attrs_post_init__(self) -> None:
+        r = self.rotation
+        if r.shape != (3, 3) or not np.allclose(r @ r.T, np.eye(3), atol=1e-9) or np.linalg.det(r) < 0:
+            raise InputError("the matrix of a pose is no rotation", "obstacle", "give one of determinant 1")

@@ -1,0 +1,10 @@
+"""Two processes run the tests side by side, a file each at a time; `-n 0` runs them in one, to debug."""
+
+from __future__ import annotations
+
+import os
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # Read when numpy is loaded, and by every process that a test starts: one core each.
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
