@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq, minimize_scalar
-from scipy.stats import chi2 as chi_squared
+from scipy.special import chdtri
 
 from ..design.strut_cell import StrutCell, relative_density
 from ..errors import InputError
@@ -130,7 +130,7 @@ def fit_offset(
     )
     best = float(found.x)
     least, E = left(best)
-    limit = least + float(chi_squared.ppf(0.95, 1))
+    limit = least + float(chdtri(1, 0.05))
 
     def edge(end: float) -> float:
         if left(end)[0] <= limit:

@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import attrs
 import numpy as np
-from scipy import optimize, stats
+from scipy import optimize
+from scipy.special import stdtrit
 
 from .coupon import Array
 from .forms import EXPONENTS, Form
@@ -54,7 +55,7 @@ def intervals(
     if independent > 0 and p:
         # Half an interval squared, of a parameter whose column of J has length 1 and is square to the rest.
         variance = float(residual @ residual) / (n - p) * memory
-        margin = variance * float(stats.t.ppf(0.975, independent)) ** 2
+        margin = variance * float(stdtrit(independent, 0.975)) ** 2
         size = np.linalg.norm(J, axis=0)
         _, s, V = np.linalg.svd(J / size, full_matrices=False)
         if s[-1] > 1e-7 * s[0]:

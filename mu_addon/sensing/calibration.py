@@ -22,7 +22,7 @@ import attrs
 import numpy as np
 from scipy.interpolate import BSpline
 from scipy.optimize import minimize_scalar, nnls
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from ..errors import InputError
 from ..files import write_text
@@ -287,7 +287,7 @@ def _band(off: Sequence[Array]) -> float:
     if B + E == 0:
         return 0.0
     freedom = (B + E) ** 2 / (B**2 / max(len(whole) - 1, 1) + E**2 / max(readings, 1.0))
-    return math.sqrt(B + E) * float(student.ppf(0.975, max(freedom, 1.0)))
+    return math.sqrt(B + E) * float(stdtrit(max(freedom, 1.0), 0.975))
 
 
 def _independent(off: Array) -> float:

@@ -82,10 +82,11 @@ def swept(
 ) -> Guide:
     """The surface of a bar of that section, in mm, along a centreline, with wells centred at lengths `wells`.
 
-    width is measured across, height along the normals; wells are cut into the outer face over the whole
-    width. Cross-sections stay plane and square to the axis, so that a well opens as its side is stretched:
-    (1 + height curvature / 2) times. junctions: (start, end) lengths over which the two side faces open into
-    struts. edge: longest step along the axis. Raises InputError for wells that overlap or leave the bar.
+    width is measured across, height along the normals, both of the bar at rest; wells are cut into the outer
+    face over the whole width. Cross-sections stay plane and square to the axis, so that a well opens as its
+    side is stretched: (1 + height curvature / 2) times. They shrink as the axis is stretched, since the resin
+    keeps its volume. junctions: (start, end) lengths over which the two side faces open into struts. edge:
+    longest step along the axis. Raises InputError for wells that overlap or leave the bar.
     """
     total = float(line.s[-1])
     cuts = sorted((at - well_width / 2, at + well_width / 2) for at in wells)
@@ -132,8 +133,9 @@ def _rings(line: Centreline, stations: Array, width: float, levels: tuple[float,
     axis /= np.linalg.norm(axis, axis=1)[:, None]
     normal = normal - axis * np.einsum("ni,ni->n", axis, normal)[:, None]
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    across = np.cross(normal, axis) * width / 2
-    low, floor, top = (point + level * normal for level in levels)
+    thinner = 1 / np.sqrt(np.interp(stations, line.s, line.stretch))[:, None]
+    across = np.cross(normal, axis) * thinner * width / 2
+    low, floor, top = (point + level * thinner * normal for level in levels)
     return np.stack(
         [low - across, low + across, floor + across, top + across, top - across, floor - across], axis=1
     )

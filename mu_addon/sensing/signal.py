@@ -1,201 +1,102 @@
-"""What a waveguide's light tells of bending: traced rays, a law fitted to them, and the figures of a sensor.
+"""What a waveguide's light tells of a body's bending: its signal over a motion, and the figures of a sensor.
 
-The law: the logarithm of the light's loss is linear in how long the guide is, how many wells and junctions it
-has, by how much it is stretched, its wells' curvature (signed: a well on the stretched side opens), and the
-curvature squared along it (bend loss).
+`signal_of_states` is the one door for a path's signal from states of a finite-element mesh.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import combinations
+from typing import Any
 
 import attrs
 import numpy as np
-from scipy.interpolate import CubicSpline
+from numpy.typing import ArrayLike
 
-from ..design.parameters import Dimensions
+from ..design.anchors import Window, anchors
+from ..design.parameters import Unit
+from ..design.waveguide import waveguide
 from ..errors import InputError
-from .guide import Array, Centreline, arc, swept
+from ..meshing.mesh import Mesh
+from .held import Held, Joints, held
+from .law import Law, features, fit_law, traced
 from .optics import Optics
-from .tracing import lambertian, trace
 
-RAYS = 6000
-_STEPS_A_MM = 4
-# Curvatures the law is fitted to, in 1/mm; the unit's own at 60 degrees over its length is 0.014.
-_MOST_CURVATURE = 0.02
-_STRETCH = (0.94, 1.1)
+Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)
-class Guided:
-    """A waveguide's fixed part: section and wells in mm, lengths of wells' centres and of open junctions."""
+class Signal:
+    """A waveguide's light in states of its body: transmitted (k,), the share of the source's that arrives.
 
-    width: float
-    height: float
-    wells: tuple[float, ...]
-    well_width: float
-    well_depth: float
-    junctions: tuple[tuple[float, float], ...] = ()
-
-    @classmethod
-    def straight(cls, d: Dimensions, length: float) -> Guided:
-        """The guide of a straight path of `length` mm from its first node's end face to its last one's.
-
-        Junctions, a strut's diameter wide, lie at every cell; wells at whole pitches from half a pitch beyond
-        the first node, clear of them.
-        """
-        first = d.waveguide_end
-        inner = length - 2 * first
-        if inner <= 0:
-            raise InputError(f"a waveguide of {length:g} mm has no room between its ends", "path", "longer")
-        wells = first + (np.arange(int(inner / d.well_pitch + 1e-9)) + 0.5) * d.well_pitch
-        half = d.junction_diameter / 2
-        spans = tuple(
-            (float(max(0.0, node - half)), float(min(length, node + half)))
-            for node in first + np.arange(int(inner / d.cell + 1e-9) + 1) * d.cell
-        )
-        room = d.well_width / 2 + 0.1
-        clear = tuple(float(w) for w in wells if all(not a - room < w < b + room for a, b in spans))
-        section = d.waveguide_section
-        return cls(section, section, clear, d.well_width, d.well_depth, spans)
-
-
-def transmitted(guided: Guided, line: Centreline, optics: Optics, rays: int = RAYS, seed: int = 0) -> float:
-    """Share of a diffuse source's light that reaches the detector through the bent guide, by traced rays."""
-    guide = swept(
-        line,
-        guided.width,
-        guided.height,
-        guided.wells,
-        guided.well_width,
-        guided.well_depth,
-        guided.junctions,
-        edge=1.0 / _STEPS_A_MM,
-    )
-    return trace(guide, optics, lambertian(guide, rays, seed), seed).detected
-
-
-def features(guided: Guided, line: Centreline) -> Array:
-    """What the law is linear in, (8,): see FEATURES."""
-    curvature = line.curvature
-    at_wells = np.interp(guided.wells, line.s, curvature)
-    return np.array(
-        [
-            1.0,
-            float(line.s[-1]),
-            float(len(guided.wells)),
-            float(len(guided.junctions)),
-            _area(line.stretch - 1, line.s),
-            float(at_wells.sum()),
-            float((at_wells**2).sum()),
-            _area(curvature**2, line.s),
-        ]
-    )
-
-
-FEATURES = (
-    "one", "length_mm", "wells", "junctions", "elongation_mm", "curvature_of_wells", "its_square", "bending",
-)  # fmt: skip
-CURVATURE_OF_WELLS = FEATURES.index("curvature_of_wells")
-
-
-def _area(values: Array, s: Array) -> float:
-    return float(((values[1:] + values[:-1]) / 2 * np.diff(s)).sum())
-
-
-@attrs.frozen(eq=False)
-class Law:
-    """-log(transmitted) = coefficients (8,) times `features`, fitted to traces.
-
-    covariance (8, 8) of the coefficients; rms: of what it misses in traces left out.
+    at_rest: the same of the body at rest; errors (k,): standard error of log(transmitted / at_rest).
     """
 
-    coefficients: Array
-    covariance: Array
-    rms: float
+    transmitted: Array
+    at_rest: float
+    errors: Array
 
-    def transmitted(self, guided: Guided, line: Centreline) -> float:
-        """Share of the light that arrives."""
-        return float(np.exp(-self.coefficients @ features(guided, line)))
-
-    def error(self, change: Array) -> float:
-        """Standard error of the log of the light for a change of features (8,)."""
-        return float(np.sqrt(change @ self.covariance @ change))
+    @property
+    def delta(self) -> Array:
+        """Delta V / V_f (k,): the share of the light at rest that is lost; negative where light is gained."""
+        return 1 - self.transmitted / self.at_rest
 
 
-def fit_law(
-    d: Dimensions,
-    optics: Optics,
-    rays: int = RAYS,
-    traces: int = 160,
-    seed: int = 0,
-    on_trace: Callable[[float], None] = lambda fraction: None,
-) -> Law:
-    """Trace rays through guides of many lengths and bends, and fit the law; the rms is by leave-one-out."""
-    random = np.random.default_rng(seed)
-    rows, logs = [], []
-    for k in range(traces):
-        length = float(random.uniform(2.5, 6.0)) * d.cell + 2 * d.waveguide_end
-        guided = Guided.straight(d, length)
-        curvature = random.uniform(-_MOST_CURVATURE, _MOST_CURVATURE, 2)
-        line = _bent(length, curvature, random.uniform(*_STRETCH))
-        share = transmitted(guided, line, optics, rays, seed + k)
-        if share > 0:
-            rows.append(features(guided, line))
-            logs.append(-np.log(share))
-        on_trace((k + 1) / traces)
-    if len(rows) < 3 * len(FEATURES):
+def signal_of_states(
+    unit: Unit,
+    path: Window | ArrayLike,
+    mesh: Mesh,
+    displacements: Sequence[Array],
+    optics: Optics | None = None,
+    law: Law | None = None,
+    rays: int | None = None,
+) -> Signal:
+    """The signal of a unit's waveguide in a sequence of its states, in their order.
+
+    path: a window of anchors, or lattice nodes (h, 3) in mm; mesh: the unit's own, in its own frame, whole
+    or halved; displacements: k arrays (nodes, 3) in mm. law: one fitted to the unit's printed dimensions and
+    the optics (`fit_law`, some seconds); without it it is fitted here. rays: follow so many through the bent
+    bar in place of the law, see `traced_signal`. Raises InputError for a path that no waveguide can follow.
+    """
+    optics = Optics() if optics is None else optics
+    nodes = anchors(unit)[list(path.indices)] if isinstance(path, Window) else np.asarray(path, float)
+    joints = Joints.of(mesh, nodes, unit.dimensions.cell)
+    guide = held(waveguide(unit, path), nodes, unit.printed)
+    moved = [joints.moved(u) for u in displacements]
+    if rays is not None:
+        return traced_signal(guide, moved, optics, rays)
+    return signal_of_nodes(fit_law(unit.printed, optics) if law is None else law, guide, moved)
+
+
+def signal_of_nodes(law: Law, guide: Held, moved: Sequence[tuple[Array, Array]]) -> Signal:
+    """The signal of a held bar in states of its nodes: positions (h, 3) in mm and rotations (h, 3, 3)."""
+    rest = features(guide.guided, guide.at_rest)
+    found = [features(guide.guided, guide.legs(*state)) for state in moved]
+    return Signal(
+        np.array([np.exp(-law.coefficients @ row) for row in found]),
+        float(np.exp(-law.coefficients @ rest)),
+        np.array([law.error(row - rest) for row in found]),
+    )
+
+
+def traced_signal(
+    guide: Held, moved: Sequence[tuple[Array, Array]], optics: Optics, rays: int = 60_000, seed: int = 0
+) -> Signal:
+    """The same as `signal_of_nodes`, by rays through the bent bar itself instead of the law.
+
+    Its errors are those of the number of rays. Raises InputError for a bar that is not straight at rest.
+    """
+    if len(guide.at_rest) > 1:
         raise InputError(
-            "hardly any light arrives in the waveguides of this unit",
-            "optics",
-            "a clearer resin or less loss",
+            "rays are followed through straight waveguides only",
+            "path",
+            "choose a path without a bend, or take the law's signal",
         )
-    A, y = np.array(rows), np.array(logs)
-    # Columns differ by orders of magnitude.
-    scale = np.maximum(np.abs(A).max(axis=0), 1e-12)
-    inverse = np.linalg.pinv(A / scale)
-    coefficients = inverse @ y
-    hat = np.einsum("ij,ji->i", A / scale, inverse)
-    off = y - A / scale @ coefficients
-    variance = float(off @ off) / (len(y) - A.shape[1])
-    covariance = variance * (inverse @ inverse.T) / np.outer(scale, scale)
-    rms = float(np.sqrt(np.mean((off / np.maximum(1 - hat, 1e-6)) ** 2)))
-    return Law(coefficients / scale, covariance, rms)
-
-
-def _bent(length: float, curvature: Array, stretch: float = 1.0) -> Centreline:
-    """A planar guide whose curvature goes linearly between its ends' (2,), in 1/mm when straight."""
-    steps = max(8, int(_STEPS_A_MM * length))
-    s = np.linspace(0, length, steps + 1)
-    first, last = curvature
-    turn = first * s + (last - first) * s**2 / (2 * length)
-    middle = (turn[1:] + turn[:-1]) / 2
-    points = np.zeros((steps + 1, 3))
-    points[1:, 1] = np.cumsum(-np.sin(middle)) * stretch * length / steps
-    points[1:, 2] = np.cumsum(np.cos(middle)) * stretch * length / steps
-    return Centreline(s, points, np.column_stack([0 * s, np.cos(turn), np.sin(turn)]))
-
-
-def through(nodes: Array, lengths: Array, end: float) -> Centreline:
-    """A centreline through path nodes (k, 3) in mm, at lengths (k,) when straight, and `end` mm beyond.
-
-    The path lies in a plane x = const, as windows of anchors do; its wells look toward +y at rest.
-    """
-    spline = CubicSpline(lengths, nodes)
-    s = np.linspace(lengths[0], lengths[-1], max(8, int(_STEPS_A_MM * (lengths[-1] - lengths[0]))) + 1)
-    inner = spline(s)
-    slope = spline(s, 1)
-    step = max(2, int(_STEPS_A_MM * end))
-    before = np.linspace(-end, 0, step, endpoint=False)
-    after = np.linspace(0, end, step + 1)[1:]
-    points = np.vstack([inner[0] + before[:, None] * slope[0], inner, inner[-1] + after[:, None] * slope[-1]])
-    tangent = np.vstack([np.tile(slope[0], (step, 1)), slope, np.tile(slope[-1], (step, 1))])
-    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
-    normals = np.cross(tangent, [1.0, 0.0, 0.0])
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
-    whole = np.concatenate([s[0] + before, s, s[-1] + after])
-    return Centreline(whole - whole[0], points, normals)
+    every = [guide.at_rest, *(guide.legs(*state) for state in moved)]
+    lights = [traced(guide.guided, leg, optics, rays, seed) for (leg,) in every]
+    share = np.array([light.detected for light in lights])
+    error = np.array([light.error for light in lights]) / np.maximum(share, 1e-12)
+    return Signal(share[1:], float(share[0]), np.hypot(error[1:], error[0]))
 
 
 @attrs.frozen(eq=False)
@@ -282,13 +183,3 @@ def differential_pairs(sensitivity: Sequence[float], most: int = 5) -> list[tupl
     """
     pairs = [((i, j), sensitivity[i] - sensitivity[j]) for i, j in combinations(range(len(sensitivity)), 2)]
     return sorted(pairs, key=lambda pair: -abs(pair[1]))[:most]
-
-
-def arc_response(
-    d: Dimensions, optics: Optics, length: float, angles_deg: Array, rays: int = RAYS
-) -> Response:
-    """The traced response of a straight path bent to circles' arcs, as around a mandrel on the bench."""
-    guided = Guided.straight(d, length)
-    return response(
-        angles_deg, np.array([transmitted(guided, arc(length, a), optics, rays) for a in angles_deg])
-    )

@@ -37,7 +37,7 @@ def front_chart(found: Signals, chosen: str) -> str:
 
 
 def response_chart(found: Signals, chosen: str) -> str:
-    """Share of light lost against bending angle, the chosen path in colour."""
+    """Share of light lost against bending angle, the chosen path in colour, dots where rays were followed."""
     with canvas(WIDTH, 2.8) as (figure, svg):
         axes = figure.add_axes((0.13, 0.18, 0.83, 0.78))
         for k, name in enumerate(found.names):
@@ -45,6 +45,10 @@ def response_chart(found: Signals, chosen: str) -> str:
             mine = name == chosen
             style: dict[str, Any] = {"color": CHOSEN if mine else QUIET, "lw": 1.8 if mine else 0.8}
             axes.plot(r.angle_deg, 100 * r.delta, zorder=2 if mine else 1, **style)
+        c = found.checks
+        axes.errorbar(
+            c.angle_deg, 100 * c.delta, 200 * c.errors, fmt="o", ms=4, color=INK, elinewidth=0.8, zorder=3
+        )
         axes.axhline(0, color=QUIET, lw=0.6)
         axes.set_xlabel("bending angle [deg]")
         axes.set_ylabel("light lost [% of that at rest]")

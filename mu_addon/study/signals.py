@@ -8,25 +8,16 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from ..design.waveguide import waveguide
 from ..errors import InputError
-from ..fem.kinematics import bending_angle_deg, probe
+from ..fem.kinematics import bending_angle_deg
 from ..files import write_csv
-from ..sensing.guide import Centreline
+from ..sensing.held import Held, Joints, held
+from ..sensing.law import CURVATURE_OF_WELLS, Law, features, fit_law
 from ..sensing.optics import Optics
-from ..sensing.signal import (
-    CURVATURE_OF_WELLS,
-    Guided,
-    Law,
-    best_sets,
-    differential_pairs,
-    features,
-    fit_law,
-    pareto,
-    response,
-    through,
-)
+from ..sensing.signal import best_sets, differential_pairs, pareto, response, signal_of_nodes, traced_signal
 from .cache import key
-from .results import Signals
+from .results import Checks, Signals
 
 if TYPE_CHECKING:
     from .study import Study
@@ -38,6 +29,7 @@ TABLE = "signals.csv"
 NOISE = 0.005
 # How much the curvature of one cell of the backbone varies, 1/mm: a fifth of the unit's at 40 degrees.
 SPREAD = 0.002
+_CHECKS = 5
 
 
 def signals(study: Study, optics: Optics) -> Signals | None:
@@ -55,47 +47,76 @@ def signals(study: Study, optics: Optics) -> Signals | None:
 def _signals(study: Study, optics: Optics) -> Signals:
     assert study.mesh is not None
     assert study.trajectory is not None
-    d = study.job.unit.printed
+    unit = study.job.unit
     with study.progress.stage("light", expected_s=10.0):
         law = _law(study, optics)
-        monitor = probe(study.mesh, study.anchors)
         states = study.trajectory.states
         # Rest comes first, whether or not a sample meets it.
         angle = np.array([0.0, *(bending_angle_deg(study.mesh, s.u) for s in states)])
-        nodes = np.array([study.anchors, *(study.anchors + monitor.displacement(s.u) for s in states)])
-        responses, errors, at_rest, slopes = [], [], [], []
-        for window in study.windows:
-            path = study.anchors[window.indices]
-            lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-            guided = Guided.straight(d, float(lengths[-1]) + 2 * d.waveguide_end)
-            lines = [through(now[window.indices], lengths, d.waveguide_end) for now in nodes]
-            shares = np.array([law.transmitted(guided, line) for line in lines])
-            responses.append(response(angle, shares))
+        joints = Joints.of(study.mesh, study.anchors, unit.dimensions.cell)
+        moved = [joints.moved(u) for u in (np.zeros_like(study.mesh.nodes), *(s.u for s in states))]
+        bars = _bars(study)
+        own = {name: [(at[i], turned[i]) for at, turned in moved] for name, (i, _) in bars.items()}
+        found = {name: signal_of_nodes(law, bar, own[name]) for name, (_, bar) in bars.items()}
+        responses = [response(angle, signal.transmitted) for signal in found.values()]
+        errors, slopes = [], []
+        for name, (_, bar) in bars.items():
             # Over the whole motion: the law's error grows with what changes.
-            ends = [features(guided, lines[int(i)]) for i in (angle.argmin(), angle.argmax())]
+            ends = [features(bar.guided, bar.legs(*own[name][i])) for i in (angle.argmin(), angle.argmax())]
             errors.append(law.error(ends[1] - ends[0]) / float(np.ptp(angle)))
-            at_rest.append(float(np.interp(0.0, responses[-1].angle_deg, responses[-1].transmitted)))
-            slopes.append(_by_cell(law, guided, lines[0], study.anchors, path, d.waveguide_end))
-    J = np.array([study.evaluations[w.name, study.headline_rule].deviation.J_hat for w in study.windows])
-    names = tuple(w.name for w in study.windows)
+            slopes.append(_by_cell(law, bar, study.anchors))
+        names = tuple(bars)
+        J = np.array([study.evaluations[name, study.headline_rule].deviation.J_hat for name in names])
+        best = names[int(J.argmin())]
+        checks = _checked(bars[best][1], own[best], angle, optics)
     sizes = [size for size in (2, 3) if size <= len(names)]
     sets = [best for size in sizes for best in best_sets(SPREAD * np.array(slopes), NOISE, size)]
     pairs = differential_pairs([r.sensitivity_per_deg for r in responses])
-    found = Signals(
+    told = Signals(
         optics=optics,
         law=law,
         names=names,
         responses=tuple(responses),
         errors_per_deg=np.array(errors),
-        at_rest=np.array(at_rest),
+        at_rest=np.array([signal.at_rest for signal in found.values()]),
+        checks=checks,
         j_hat=J,
         front=tuple(pareto(J.tolist(), [r.sensitivity_per_deg for r in responses])),
         sets=_named(names, sets),
         differential=_named(names, pairs),
     )
-    study.light = found
-    _write(study, found)
+    study.light = told
+    _write(study, told)
+    return told
+
+
+def _bars(study: Study) -> dict[str, tuple[list[int], Held]]:
+    """Anchors' numbers and waveguide of every candidate path; one without room for it is left out and told.
+
+    Raises InputError where there is room for none.
+    """
+    unit = study.job.unit
+    found, why = {}, None
+    for window in study.windows:
+        numbers = list(window.indices)
+        try:
+            bar = waveguide(unit, window)
+        except InputError as error:
+            why = error
+            study.warn(f"What light along {window.name} would tell is not known: {error.what}.")
+            continue
+        found[window.name] = numbers, held(bar, study.anchors[numbers], unit.printed)
+    if why is not None and not found:
+        raise why
     return found
+
+
+def _checked(bar: Held, moved: list[tuple[Array, Array]], angle: Array, optics: Optics) -> Checks:
+    """Rays through a bar at rest, at its ends of the motion and between them; `moved` begins with rest."""
+    order = np.argsort(angle, kind="stable")
+    some = order[np.unique(np.linspace(0, len(order) - 1, _CHECKS).astype(int))]
+    light = traced_signal(bar, [moved[i] for i in some], optics)
+    return Checks(angle[some], light.delta, light.errors * (1 - light.delta))
 
 
 def _named(names: Sequence[str], chosen: Any) -> tuple[tuple[tuple[str, ...], float], ...]:
@@ -109,7 +130,7 @@ def _law(study: Study, optics: Optics) -> Law:
         d.cell, d.waveguide_section, d.well_width, d.well_depth, d.well_pitch, d.waveguide_end,
         d.junction_diameter,
     )  # fmt: skip
-    name = key("light", 2, sizes, attrs.astuple(optics))
+    name = key("light", 3, sizes, attrs.astuple(optics))
     stored = study.cache.get("light", name)
     if stored is None:
         law = fit_law(d, optics, on_trace=study.progress.update)
@@ -119,9 +140,9 @@ def _law(study: Study, optics: Optics) -> Law:
     return Law(stored["coefficients"], stored["covariance"], float(stored["rms"]))
 
 
-def _by_cell(law: Law, guided: Guided, line: Centreline, anchors: Array, path: Array, end: float) -> Array:
+def _by_cell(law: Law, bar: Held, anchors: Array) -> Array:
     """d log(light) by the curvature of each cell along the anchors, (n,) in mm, at rest."""
-    wells = np.asarray(guided.wells) - end + path[0, 2]
+    wells = np.asarray(bar.guided.wells) + bar.points[0, 2]
     edges = np.concatenate([[-np.inf], (anchors[1:, 2] + anchors[:-1, 2]) / 2, [np.inf]])
     return -law.coefficients[CURVATURE_OF_WELLS] * np.histogram(wells, edges)[0]
 
@@ -158,5 +179,10 @@ def _write(study: Study, found: Signals) -> None:
         "differential_pairs": [
             {"paths": names, "sensitivity_per_deg": value} for names, value in found.differential
         ],
+        "traced": {
+            "angle_deg": found.checks.angle_deg.tolist(),
+            "delta": found.checks.delta.tolist(),
+            "error": found.checks.errors.tolist(),
+        },
         "sets": [{"paths": names, "information": value} for names, value in found.sets],
     }

@@ -1,110 +1,72 @@
-"""Signals: the fast law against traces, the figures of a response, Pareto sets and sets of sensors."""
+"""Signals: of states of a mesh, the figures of a response, Pareto sets and sets of sensors."""
 
 from __future__ import annotations
-
-import itertools
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mu_addon.design.anchors import window
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
-from mu_addon.sensing.guide import Centreline, arc
+from mu_addon.sensing.law import FEATURES, Law, features
 from mu_addon.sensing.optics import Optics
 from mu_addon.sensing.signal import (
-    Guided,
-    Law,
-    arc_response,
     best_sets,
     differential_pairs,
-    features,
-    fit_law,
     pareto,
     response,
-    through,
-    transmitted,
+    signal_of_states,
+    traced_signal,
 )
 
-D = load_preset("mu-1.0x").dimensions
+from .bars import bent_to_a_circle, body, of_window
+
+UNIT = load_preset("mu-1.0x")
+# Light is lost by elongation, 0.02 a mm, and gained by curvature of wells toward them.
+LAW = Law(np.array([3.0, 0, 0, 0, 0.02, 0, 4.0, 0]), np.zeros((8, 8)), 0.0)
 
 
-@pytest.fixture(scope="module")
-def law_of_d() -> Law:
-    return fit_law(D, Optics())
+def test_the_signal_of_states_of_a_mesh() -> None:
+    """A block bent about x to a circle's arc: each well turns with it, and its axis keeps its length."""
+    mesh = body(UNIT)
+    bent = bent_to_a_circle(mesh.nodes, np.radians(20) / 75, y=25.0) - mesh.nodes
+    found = signal_of_states(UNIT, window(UNIT, "alpha4"), mesh, [0 * bent, bent], Optics(), LAW)
+    guide = of_window("alpha4").guided
+    # Bent toward +y the wells' face is the inner one.
+    expected = -4.0 * len(guide.wells) * np.radians(20) / 75
+    assert np.log(found.transmitted[1] / found.at_rest) == pytest.approx(-expected, rel=0.02)
+    assert found.delta[0] == pytest.approx(0, abs=1e-9)
+    assert found.delta[1] < -0.05
+    assert found.errors[0] == 0 < found.errors[1]
 
 
-def test_wells_keep_clear_of_junctions_and_ends() -> None:
-    guided = Guided.straight(D, 3 * D.cell + 2 * D.waveguide_end)
-    assert len(guided.junctions) == 4
-    for well, (a, b) in itertools.product(guided.wells, guided.junctions):
-        assert not a - D.well_width / 2 < well < b + D.well_width / 2
-    # The number of wells follows the path's length.
-    longer = Guided.straight(D, 5 * D.cell + 2 * D.waveguide_end)
-    assert len(longer.wells) / len(guided.wells) == pytest.approx(5 / 3, rel=0.1)
+def test_a_stretched_body_stretches_its_waveguide() -> None:
+    mesh = body(UNIT)
+    longer = mesh.nodes * [0, 0, 0.03]
+    found = signal_of_states(UNIT, window(UNIT, "alpha1"), mesh, [longer], Optics(), LAW)
+    # Between its end nodes, two cells; beyond them it is free.
+    assert np.log(found.transmitted[0] / found.at_rest) == pytest.approx(-0.02 * 0.03 * 25, rel=1e-3)
+    by_rays = signal_of_states(UNIT, window(UNIT, "alpha1"), mesh, [longer], rays=30_000)
+    assert by_rays.delta[0] > 2 * by_rays.errors[0]
 
 
-def test_a_sensor_tells_which_way_it_bends() -> None:
-    """Wells on the stretched side open and let light out: more loss one way, less the other."""
-    found = arc_response(D, Optics(), 2 * D.cell + 5, np.array([-40.0, -20, 0, 20, 40]), rays=8000)
-    assert found.monotonic_deg == (-40, 40)
-    assert found.sensitivity_per_deg > 0
-    assert found.delta[0] < -0.1
-    assert found.delta[-1] > 0.1
-
-
-def test_the_law_follows_traces_it_never_saw(law_of_d: Law) -> None:
-    law = law_of_d
-    assert law.rms < 0.25
-    length = 3 * D.cell + 5
-    guided = Guided.straight(D, length)
-    for angle in (-45, 0, 45):
-        traced = transmitted(guided, arc(length, angle), Optics(), rays=20_000)
-        assert np.log(law.transmitted(guided, arc(length, angle)) / traced) == pytest.approx(
-            0, abs=3 * law.rms
-        )
-
-
-def test_a_law_of_known_coefficients_is_exact() -> None:
-    guided = Guided.straight(D, 30)
-    bent = arc(30, 30)
-    line = Centreline(bent.s, 1.02 * bent.points, bent.normals)
-    kappa = np.radians(30) / 30
-    law = Law(np.array([0.1, 0.02, 0.03, 0.05, 0.2, 4.0, 50.0, 60.0]), np.eye(8), 0.0)
-    n, m = len(guided.wells), len(guided.junctions)
-    expected = 0.1 + 0.02 * 30 + n * (0.03 + 4 * kappa + 50 * kappa**2) + 0.05 * m
-    expected += 0.2 * 0.02 * 30 + 60 * kappa**2 * 30
-    assert -np.log(law.transmitted(guided, line)) == pytest.approx(expected, rel=2e-3)
-    assert law.error(np.array([0, 0, 0, 0, 3.0, 4.0, 0, 0])) == 5.0
-
-
-def test_a_stretched_guide_loses_by_its_stretch_and_not_as_a_longer_one(law_of_d: Law) -> None:
-    """Wells that open and a longer way through resin cost light; more wells and junctions would cost more."""
-    length = 3 * D.cell + 5
-    guided = Guided.straight(D, length)
-    rest = arc(length, 0)
-    longer = Centreline(rest.s, 1.08 * rest.points, rest.normals)
-    traced = [transmitted(guided, line, Optics(), rays=30_000) for line in (rest, longer)]
-    told = [law_of_d.transmitted(guided, line) for line in (rest, longer)]
-    change = features(guided, longer) - features(guided, rest)
-    # Each trace's own error is some 3 %.
-    assert np.log(told[1] / told[0]) == pytest.approx(
-        np.log(traced[1] / traced[0]), abs=3 * law_of_d.error(change) + 0.1
-    )
-
-
-def test_a_centreline_through_nodes() -> None:
-    bent = arc(37.5, 45)
-    lengths = np.array([0, 12.5, 25, 37.5])
-    nodes = np.column_stack([np.interp(lengths, bent.s, c) for c in bent.points.T])
-    line = through(nodes, lengths, 2.5)
-    assert line.s[-1] == pytest.approx(37.5 + 5)
-    middle = len(line.s) // 2
-    assert line.curvature[middle] == pytest.approx(np.radians(45) / 37.5, rel=0.1)
-    np.testing.assert_allclose(line.normals[middle], bent.normals[len(bent.s) // 2], atol=0.01)
-    straight = through(np.column_stack([0 * lengths, 0 * lengths + 25, lengths]), lengths, 2.5)
-    np.testing.assert_allclose(straight.normals, np.tile([0, 1.0, 0], (len(straight.s), 1)), atol=1e-12)
+def test_rays_in_place_of_the_law() -> None:
+    """Bent toward its wells a bar keeps light, bent away it loses some, by rays as by the law."""
+    bar = of_window("alpha4")
+    turned = np.tile(np.eye(3), (3, 1, 1))
+    moved = []
+    for curvature in (0.012, -0.012):
+        at = bent_to_a_circle(bar.nodes, curvature, y=25.0)
+        for k, angle in enumerate(curvature * bar.nodes[:, 2]):
+            turned[k, 1:, 1:] = [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
+        moved.append((at, turned.copy()))
+    inward, outward = traced_signal(bar, moved, Optics(), rays=30_000).delta
+    assert inward < -0.08
+    assert outward > 0.08
+    signed = [features(bar.guided, bar.legs(*state))[FEATURES.index("curvature_of_wells")] for state in moved]
+    assert signed == pytest.approx([-0.012 * 6, 0.012 * 6], rel=1e-2)
 
 
 def test_figures_of_a_response() -> None:

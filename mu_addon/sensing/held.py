@@ -1,0 +1,181 @@
+"""A printed waveguide in a body that deforms: its lattice's nodes move and turn, and it bends between them.
+
+A bar is joined to the lattice at its path's nodes alone. There the struts hold it in place and direction;
+between two nodes it is a beam without a load, whose axis is the cubic through both ends with their
+directions (Euler and Bernoulli). Its own stiffness, which holds the lattice back a little, is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..design.parameters import Dimensions
+from ..design.waveguide import Bar
+from ..fem.embedding import Embedding, embed
+from ..meshing.mesh import Mesh
+from .guide import Centreline
+
+Array = np.ndarray[Any, Any]
+
+_STEPS_A_MM = 4
+_STRAIGHT = 1e-6
+
+
+@attrs.frozen(eq=False)
+class Guided:
+    """A waveguide's fixed part: section and wells in mm, lengths of wells' centres and of open junctions.
+
+    Lengths count from the entry's end face along the axis at rest.
+    """
+
+    width: float
+    height: float
+    wells: tuple[float, ...]
+    well_width: float
+    well_depth: float
+    junctions: tuple[tuple[float, float], ...] = ()
+
+
+@attrs.frozen(eq=False)
+class Held:
+    """A printed bar's axis at rest, by the lattice's nodes that hold it.
+
+    nodes (h, 3) in mm; points (m, 3): the nodes, and before and after them the end faces; s (m,): lengths
+    along the axis; joint (m,): number of the node that holds each point; normals (m - 1, 3): of the face with
+    the wells, a piece.
+    """
+
+    guided: Guided
+    nodes: Array
+    points: Array
+    s: Array
+    joint: Array
+    normals: Array
+
+    @property
+    def at_rest(self) -> tuple[Centreline, ...]:
+        """The axis as it is printed, see `legs`."""
+        return self.legs(self.nodes, np.tile(np.eye(3), (len(self.nodes), 1, 1)))
+
+    def legs(self, positions: Array, rotations: Array) -> tuple[Centreline, ...]:
+        """The axis where the nodes are at positions (h, 3) in mm, turned by rotations (h, 3, 3).
+
+        One centreline from each bend of the bar at rest to the next; s goes on from one to the next.
+        """
+        way = np.diff(self.points, axis=0) / np.diff(self.s)[:, None]
+        found: list[list[tuple[Array, Array, Array]]] = []
+        for k in range(len(way)):
+            if not found or np.linalg.norm(way[k] - way[k - 1]) > _STRAIGHT:
+                found.append([])
+            found[-1].append(self._piece(k, way[k], positions, rotations))
+        return tuple(_joined(pieces) for pieces in found)
+
+    def _piece(self, k: int, way: Array, positions: Array, rotations: Array) -> tuple[Array, Array, Array]:
+        """Lengths (n,), points (n, 3) and normals (n, 3) of one piece."""
+        length = self.s[k + 1] - self.s[k]
+        t = np.linspace(0.0, 1.0, max(3, int(_STEPS_A_MM * length)) + 1)[:, None]
+        first, last = self.joint[k], self.joint[k + 1]
+        begin, end = rotations[first] @ way, rotations[last] @ way
+        normals = (1 - t) * (rotations[first] @ self.normals[k]) + t * (rotations[last] @ self.normals[k])
+        if first == last:
+            # Beyond an end node nothing holds it: it goes on straight.
+            at_node = self.s[k + 1] if first == 0 else self.s[k]
+            points = positions[first] + (self.s[k] + t * length - at_node) * begin
+        else:
+            a, b = positions[first], positions[last]
+            now = float(np.linalg.norm(b - a))
+            points = (
+                (1 + 2 * t) * (1 - t) ** 2 * a
+                + t * (1 - t) ** 2 * now * begin
+                + t**2 * (3 - 2 * t) * b
+                - t**2 * (1 - t) * now * end
+            )
+        tangent = np.gradient(points, axis=0, edge_order=2)
+        tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+        normals -= tangent * np.einsum("ni,ni->n", tangent, normals)[:, None]
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        return self.s[k] + t[:, 0] * length, points, normals
+
+
+def _joined(pieces: Sequence[tuple[Array, Array, Array]]) -> Centreline:
+    first = pieces[0]
+    rest = [tuple(values[1:] for values in piece) for piece in pieces[1:]]
+    return Centreline(*(np.concatenate(values) for values in zip(first, *rest, strict=True)))
+
+
+def held(bar: Bar, nodes: Array, d: Dimensions) -> Held:
+    """A printed bar with its own wells, held by its path's lattice nodes (h, 3) in mm.
+
+    d: the sizes of section, wells and struts as they are printed. Struts open the bar's sides over their
+    diameter at every node.
+    """
+    corners = _lengths(bar.points)
+    first = float(np.linalg.norm(nodes[0] - bar.points[0]))
+    at_nodes = first + _lengths(nodes)
+    points, s, joint = nodes, at_nodes, np.arange(len(nodes))
+    if first > _STRAIGHT:
+        points, s, joint = np.vstack([bar.points[:1], points]), np.r_[0.0, s], np.r_[0, joint]
+    if corners[-1] - s[-1] > _STRAIGHT:
+        points, s = np.vstack([points, bar.points[-1:]]), np.r_[s, corners[-1]]
+        joint = np.r_[joint, joint[-1]]
+    leg = np.searchsorted(corners, (s[1:] + s[:-1]) / 2, side="right") - 1
+    half = max(d.junction_diameter, d.waveguide_section) / 2
+    total = float(corners[-1])
+    guided = Guided(
+        d.waveguide_section,
+        d.waveguide_section,
+        tuple(_along(bar.points, corners, well.centre) for well in bar.wells),
+        d.well_width,
+        d.well_depth,
+        tuple((max(0.0, at - half), min(total, at + half)) for at in at_nodes.tolist()),
+    )
+    return Held(guided, nodes, points, s, joint, bar.normals[leg])
+
+
+def _lengths(points: Array) -> Array:
+    """Lengths (n,) along a polyline (n, 3)."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def _along(points: Array, corners: Array, centre: Array) -> float:
+    """Length along a polyline (n, 3) with corners at lengths (n,) that is nearest to a well's centre."""
+    nearest, found = np.inf, 0.0
+    for (a, b), start in zip(pairwise(points), corners, strict=False):
+        length = float(np.linalg.norm(b - a))
+        along = float(np.clip((centre - a) @ (b - a) / length, 0.0, length))
+        away = float(np.linalg.norm(a + along / length * (b - a) - centre))
+        if away < nearest - 1e-9:
+            nearest, found = away, float(start) + along
+    return found
+
+
+@attrs.frozen(eq=False)
+class Joints:
+    """Nodes (n, 3) of a lattice in a mesh that stands for it: each moves and turns as the body around it."""
+
+    nodes: Array
+    reach: float
+    _around: Embedding
+
+    @classmethod
+    def of(cls, mesh: Mesh, nodes: Array, cell: float) -> Joints:
+        """Joints at nodes (n, 3) in mm; the body around one is half a cell wide, to even out elements."""
+        reach = cell / 4
+        offsets = np.concatenate([np.zeros((1, 3)), reach * np.eye(3), -reach * np.eye(3)])
+        return cls(nodes, reach, embed(mesh, (nodes[:, None] + offsets).reshape(-1, 3)))
+
+    def moved(self, u: Array) -> tuple[Array, Array]:
+        """Positions (n, 3) in mm and rotations (n, 3, 3) after displacements (nodes of the mesh, 3) in mm.
+
+        The rotation is that of the mean deformation around the node (polar decomposition): a symmetric
+        strain turns no node whose struts are arranged alike in all three directions.
+        """
+        at = self._around.displacement(u).reshape(len(self.nodes), 7, 3)
+        F = np.eye(3) + np.swapaxes(at[:, 1:4] - at[:, 4:7], 1, 2) / (2 * self.reach)
+        left, _, right = np.linalg.svd(F)
+        return self.nodes + at[:, 0], left @ right
