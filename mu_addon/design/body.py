@@ -34,7 +34,7 @@ _UNITS = {1000.0: "metres", 25.4: "inches", 10.0: "centimetres", 0.001: "microme
 
 @attrs.frozen
 class Flaw:
-    """Why a body cannot be an envelope: what, the places (n, 3) in mm where it shows, and what to do."""
+    """Why a body cannot serve: what, the places (n, 3) in mm where it shows, and what to do."""
 
     what: str
     remedy: str
@@ -208,6 +208,26 @@ def misfits(body: Body, d: Dimensions) -> list[Flaw]:
     return found
 
 
+def overlaps(body: Body, d: Dimensions, own: Body | None = None) -> list[Flaw]:
+    """Where a sound body stands in a unit of these dimensions: in its box or own envelope, or its chambers.
+
+    The lattice counts as filled, since that is how it is simulated.
+    """
+    lattice = shapes.box(*np.transpose(d.bounds)) if own is None else own.manifold
+    common = (lattice + shapes.revolved(outer_polygon(d, 6), AROUND)) ^ body.manifold
+    pieces = [piece for piece in common.decompose() if piece.volume() > 1e-9 * d.cell**3]
+    if not pieces:
+        return []
+    deep = max(float(np.ptp(np.reshape(p.bounding_box(), (2, 3)), axis=0).min()) for p in pieces)
+    return [
+        Flaw(
+            f"it stands in the unit, up to {deep:.2g} mm deep",
+            "move it away until they do not touch",
+            np.array([_middle(piece) for piece in pieces]),
+        )
+    ]
+
+
 def envelope(body: Body, d: Dimensions) -> Body:
     """The body between the unit's end planes, z = 0 and the height; InputError names its first flaw."""
     require_sound(body, [*flaws(body)] or misfits(body, d))
@@ -216,12 +236,12 @@ def envelope(body: Body, d: Dimensions) -> Body:
     return _body_from(body.manifold ^ slab, body.name, d.height)
 
 
-def require_sound(body: Body, found: list[Flaw]) -> None:
+def require_sound(body: Body, found: list[Flaw], role: str = "an envelope") -> None:
     """Raise InputError for the first of these flaws, with the first of its places."""
     if found:
         flaw = found[0]
         at = ", first at ({:.2f}, {:.2f}, {:.2f}) mm".format(*flaw.places[0]) if len(flaw.places) else ""
-        raise InputError(f"the body cannot be an envelope: {flaw.what}", f"{body.name}{at}", flaw.remedy)
+        raise InputError(f"the body cannot be {role}: {flaw.what}", f"{body.name}{at}", flaw.remedy)
 
 
 def require_path_inside(body: Body, unit: Unit, window: Window) -> None:

@@ -20,7 +20,8 @@ from ..fem.laws import Foam, Layered, Yeoh
 from ..fem.loads import gravity
 from ..fem.materials import Layer, Materials
 from ..fem.model import Model
-from ..fem.obstacle import CONTACT, Obstacle, Plane
+from ..fem.obstacle import CONTACT, Obstacle
+from ..fem.rigid import Plane
 from ..fem.unit import materials_of
 from ..meshing.mesh import LATTICE, MEMBRANE, Mesh
 from ..meshing.morph import morphed
@@ -36,7 +37,8 @@ Array = np.ndarray[Any, Any]
 SKIN_MM = 0.1
 # Of a foam that resists one side only, its share on the other: laws ask for more than none.
 NEXT_TO_NOTHING = 1e-3
-SMOOTH = NewtonSettings()
+# A size whose path ends before the last pressure is of no use: it need not be followed to its very end.
+SMOOTH = NewtonSettings(min_step_MPa=1e-3)
 # Where the tangent jumps at rest, even the smallest step ends away from where it was predicted.
 KINKED = NewtonSettings(surprise=3.0)
 TONNE_PER_MM3 = 1e-12  # in kg/m3
@@ -83,7 +85,8 @@ class UnitEffect:
 
     body: of a body and a size; materials, model: of a body, its mesh and a size, the base's where None.
     weighs: whether it depends on the direction of gravity. newton: of its runs. length: the power of a
-    length by which the size of the same change grows with the unit, at the same moduli and pressures.
+    length by which the size of the same change grows with the unit, at the same moduli and pressures; sizes
+    are those at 1.0x, and larger are more of them, for units at whose scale the bound is beyond the last.
     """
 
     name: str
@@ -95,11 +98,19 @@ class UnitEffect:
     weighs: bool = False
     newton: NewtonSettings = SMOOTH
     length: int = 0
+    larger: tuple[float, ...] = ()
 
     def __attrs_post_init__(self) -> None:
         p = self.parameter
         if p.null not in self.sizes or not all(p.low <= s <= p.high for s in self.sizes):
             raise InputError(f"{self.name}: sizes miss the null or leave the bounds", "unit effects")
+
+    def sizes_at(self, enlarged: float) -> tuple[float, ...]:
+        """Sizes at 1.0x that a unit so many times as large needs to reach the bound at its own."""
+        every = (*self.sizes, *self.larger)
+        needed = self.parameter.high / enlarged**self.length
+        beyond = sum(s < needed * (1 - 1e-9) for s in every)
+        return every[: beyond + 1]
 
 
 def down(orientation_deg: float) -> Array:
@@ -273,6 +284,7 @@ EFFECTS = {
             model=_weighed,
             weighs=True,
             length=-1,
+            larger=(6000.0, 9000.0),
         ),
         UnitEffect(
             "strain_stiffening",
@@ -286,6 +298,7 @@ EFFECTS = {
             (0.0, 0.06, 0.14, 0.25),
             body=_overcured,
             length=1,
+            larger=(0.34,),
         ),
         UnitEffect(
             "skin_cure",
@@ -293,6 +306,7 @@ EFFECTS = {
             (0.0, 0.04, 0.1, 0.2, 0.4),
             body=_skinned,
             length=1,
+            larger=(0.54,),
         ),
         UnitEffect(
             "wall_thickness",

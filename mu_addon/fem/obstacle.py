@@ -16,9 +16,7 @@ from .contact import with_middles
 from .descent import NewtonSettings
 from .elements import triangle_quadrature
 from .friction import Lag, Memory
-from .rigid import Box, Plane, Pose, Rigid, Sphere
-
-__all__ = ["CONTACT", "Box", "Contact", "Obstacle", "Plane", "Pose", "Rigid", "Sphere", "outer_faces"]
+from .rigid import Pose, Rigid
 
 Array = np.ndarray[Any, Any]
 

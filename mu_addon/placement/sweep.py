@@ -11,8 +11,10 @@ from ..fem.equilibrium import State, rest
 from ..fem.kinematics import Probe
 from ..fem.laws import NeoHooke
 from ..fem.lockstep import Lockstep, Variant
+from ..fem.marching import march
 from ..fem.materials import Materials
 from ..fem.model import Model
+from ..fem.obstacle import CONTACT
 
 Array = np.ndarray[Any, Any]
 
@@ -45,6 +47,15 @@ class Sweep:
         equilibrium = self._lockstep.alone(number)
         states = equilibrium.path(pressures_MPa, rest(equilibrium.model.mesh))
         return self.points(states)
+
+    def marched(self, number: int, time_s: Array, pressure_kPa: Array) -> Array:
+        """Monitored points (k, p, 3) in mm of one sensor's unit at k instants, beside the model's obstacles.
+
+        Its whole motion is solved in the order of time, as friction remembers. Raises ConvergenceError.
+        """
+        equilibrium = self._lockstep.alone(number)
+        equilibrium.settings = CONTACT
+        return self.points(march(equilibrium, time_s, pressure_kPa).states)
 
     def at(self, state: State) -> Array:
         """Monitored points (sensors, p, 3) in mm, at the pressure of one of Model A's states.

@@ -11,6 +11,7 @@ import attrs
 from ..design.assets import asset_root
 from ..design.body import Body, read_body
 from ..design.parameters import Unit, read_unit, to_toml
+from ..design.rigid_body import RigidBody, mirrored, read_rigid_bodies, to_obj
 from ..design.solid import QUALITY
 from ..errors import InputError
 from ..fem.protocol import Protocol, read_protocol
@@ -72,10 +73,18 @@ class Job:
     lattice: Effective | None = None
     # A sound body that takes the place of the lattice's box.
     body: Body | None = None
+    # Rigid bodies that the unit may touch, fixed in its frame.
+    obstacles: tuple[RigidBody, ...] = attrs.field(default=(), converter=tuple)
     # What is run of it: the first, the first two or all.
     stages: tuple[str, ...] = STAGES
 
     def __attrs_post_init__(self) -> None:
+        if self.obstacles and "place" in self.stages and self.paths == "graph":
+            raise InputError(
+                "the search of the whole lattice knows a unit that touches nothing",
+                "obstacles, paths",
+                "leave one of them out",
+            )
         _, pressure = self.protocol.sample(self.times)
         if not pressure.any():
             raise InputError(
@@ -97,6 +106,8 @@ class Job:
             "simulate": _named("protocol", self.protocol_text())
             | {"times": self.times, "mesher": self.mesher}
             | _named("lattice", self.lattice_text())
+            | _named("obstacles", self.obstacles_text())
+            | ({"friction": [o.friction for o in self.obstacles]} if self.obstacles else {})
             | {"mesh": mesh},
             "place": {
                 "stations": self.stations,
@@ -130,6 +141,9 @@ class Job:
             lattice = self.lattice_text()
             if lattice is not None:
                 found[LATTICE_LAW] = lattice
+            obstacles = self.obstacles_text()
+            if obstacles is not None:
+                found[FILES["obstacles"]] = obstacles
         return found
 
     def texts_in(self, folder: Path) -> tuple[dict[str, str], bool]:
@@ -156,6 +170,16 @@ class Job:
     def body_text(self) -> str | None:
         """body.obj: the body in place of the lattice's box, or None where there is none."""
         return None if self.body is None else self.body.text()
+
+    def obstacles_text(self) -> str | None:
+        """obstacles.obj: the rigid bodies that the unit may touch, or None where there are none."""
+        return to_obj(self.obstacles) if self.obstacles else None
+
+    def mesh_settings(self, settings: MeshSettings) -> MeshSettings:
+        """Settings of a mesh for these obstacles: of the whole unit where one is not its own mirror image."""
+        if not self.obstacles or settings.fraction == "full":
+            return settings
+        return attrs.evolve(settings, fraction="half" if mirrored(self.obstacles) else "full")
 
     def unit_text(self) -> str:
         """unit.toml: the unit's parameters with units, meaning and source."""
@@ -187,7 +211,7 @@ def read_job(folder: Path, workers: int = 2) -> Job:
         raise InputError(
             "a file of inputs is not the one that this study was made with",
             str(folder),
-            "put it back, or start a new study with it: --unit, --protocol, --lattice",
+            "put it back, or start a new study with it: --unit, --protocol, --lattice, --obstacle",
         )
     return job_of(tables, folder, workers)
 
@@ -202,6 +226,9 @@ def job_of(tables: Mapping[str, Mapping[str, Any]], folder: Path, workers: int =
         job["protocol"] = read_protocol(folder / FILES["protocol"])
         if "lattice" in tables["simulate"]:
             job["lattice"] = read_effective(folder / FILES["lattice"])
+        if "obstacles" in tables["simulate"]:
+            friction = tables["simulate"].get("friction")
+            job["obstacles"] = read_rigid_bodies(folder / FILES["obstacles"], friction)
     return job_with(tables, where, workers=workers, **job)
 
 
@@ -209,7 +236,8 @@ def job_with(tables: Mapping[str, Mapping[str, Any]], where: str, **given: Any) 
     """The job of the settings in tables like study.toml's, and of what is given beside them; InputError."""
     job = dict(given)
     for stage, table in tables.items():
-        values = {k: v for k, v in table.items() if k not in FILES and not k.endswith("_sha256")}
+        own = (*FILES, *OF_FILES)
+        values = {k: v for k, v in table.items() if k not in own and not k.endswith("_sha256")}
         for key, kind in (("mesh", MeshSettings), ("search", Limits), ("optics", Optics)):
             if key in values:
                 inner = _inner(values.pop(key), f"{where}, [{stage}.{key}]")
@@ -232,6 +260,8 @@ def _inner(value: Any, where: str) -> dict[str, Any]:
     return dict(value)
 
 
+# Keys that belong to a file of inputs beside them.
+OF_FILES = ("friction",)
 # Keys of each stage's table besides files and inner tables.
 SETTINGS = {
     "design": ("quality",),

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -23,6 +23,11 @@ from ..placement.candidates import Candidate, roi
 from ..placement.inclusion import sensor_share
 from ..placement.sweep import Sweep
 from ..processes import ctrl_c_ignored, end_with_parent, one_thread_each
+from .contact import obstacles_of
+
+if TYPE_CHECKING:
+    from ..design.parameters import Unit
+    from ..design.rigid_body import RigidBody
 
 Array = np.ndarray[Any, Any]
 
@@ -32,7 +37,8 @@ class Setting:
     """What a sweep is about; plain data, so that it travels to another process.
 
     jobs: candidates and the inclusion rule of each; anchors (p, 3) in mm are the monitored points. whole:
-    the jobs, by number, whose displacement of the whole mesh is wanted, too.
+    the jobs, by number, whose displacement of the whole mesh is wanted, too. beside: the unit, and the rigid
+    bodies that it may touch.
     """
 
     mesh: Mesh
@@ -42,6 +48,7 @@ class Setting:
     radius_mm: float
     sensor_MPa: float
     whole: tuple[int, ...] = ()
+    beside: tuple[Unit, tuple[RigidBody, ...]] | None = None
 
 
 class Moved(NamedTuple):
@@ -62,7 +69,11 @@ class Evaluator:
         found = {c.name: roi(s.mesh, c, s.radius_mm) for c, _ in s.jobs}
         shares = [sensor_share(rule, found[c.name]) for c, rule in s.jobs]
         monitored = s.anchors, probe(s.mesh, s.anchors)
-        self._sweep = Sweep(Model(s.mesh, threads=threads), s.materials, monitored, shares, s.sensor_MPa)
+        model = Model(s.mesh, threads=threads)
+        if s.beside is not None:
+            unit, bodies = s.beside
+            model.obstacles = obstacles_of(bodies, unit, s.mesh)
+        self._sweep = Sweep(model, s.materials, monitored, shares, s.sensor_MPa)
         self._whole = s.whole
 
     def __call__(self, state: State) -> Moved:
@@ -74,6 +85,10 @@ class Evaluator:
     def alone(self, job: int, pressures_MPa: Array) -> Array:
         """Anchors (s, p, 3) in mm that a job moves along its path from rest. Raises ConvergenceError."""
         return self._sweep.alone(job, pressures_MPa)
+
+    def marched(self, job: int, time_s: Array, pressure_kPa: Array) -> Array:
+        """Anchors (k, p, 3) in mm that a job moves at k instants, beside obstacles; ConvergenceError."""
+        return self._sweep.marched(job, time_s, pressure_kPa)
 
 
 _evaluator: Evaluator | None = None
@@ -93,6 +108,11 @@ def _work(state: State) -> Moved:
 def _work_alone(job: int, pressures_MPa: Array) -> Array:
     assert _evaluator is not None
     return _evaluator.alone(job, pressures_MPa)
+
+
+def _work_marched(job: int, time_s: Array, pressure_kPa: Array) -> Array:
+    assert _evaluator is not None
+    return _evaluator.marched(job, time_s, pressure_kPa)
 
 
 def _survive_broken_pipes() -> None:
@@ -147,6 +167,19 @@ class Sweeper:
         waiting = [self._submit(_work_alone, *task) for task in tasks]
         with _worker_errors():
             return [done.result() for done in waiting]
+
+    def marched(self, jobs: Sequence[int], time_s: Array, pressure_kPa: Array) -> Iterator[tuple[int, Array]]:
+        """Each of some jobs, by number, as it is done, and anchors (k, p, 3) in mm it moves at k instants."""
+        if self.workers == 1:
+            for job in jobs:
+                self._alone = self._alone or Evaluator(self.setting, threads=1)
+                yield job, self._alone.marched(job, time_s, pressure_kPa)
+            return
+        waiting = {self._submit(_work_marched, job, time_s, pressure_kPa): job for job in jobs}
+        for done in as_completed(waiting):
+            with _worker_errors():
+                found = done.result()
+            yield waiting[done], found
 
     def solve(self, states: Sequence[State]) -> Iterator[tuple[int, Moved]]:
         """Number of each state as it is done, and what all jobs do there.

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..design.parameters import Dimensions
 from ..design.profile import outer_radius
+from ..design.rigid_body import RigidBody
 from ..meshing.mesh import LATTICE, MEMBRANE, Mesh, boundary_faces
 from .markers import ball, tube
 from .render import Camera, Cut, Floats, Image, Part, fit, png, render
@@ -18,6 +19,7 @@ MEMBRANE_COLOR = (0.93, 0.78, 0.58)
 LATTICE_COLOR = (0.62, 0.69, 0.77)
 PATH_COLOR = (0.835, 0.369, 0.0)  # plots.CHOSEN
 ANCHOR_COLOR = (0.10, 0.11, 0.16)
+OBSTACLE_COLOR = (0.47, 0.45, 0.43)
 SAGITTAL = Cut((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), color=(0.95, 0.86, 0.72))
 WHITE = (1.0, 1.0, 1.0)
 
@@ -66,10 +68,16 @@ def _framed(parts: Sequence[Part], towards: tuple[float, float, float]) -> tuple
     return fit(left, towards, aspect=aspect, margin=0.015), aspect
 
 
-def motion(mesh: Mesh, states: Sequence[tuple[Floats, str, str]], width: int = 560) -> list[Picture]:
+def motion(
+    mesh: Mesh,
+    states: Sequence[tuple[Floats, str, str]],
+    width: int = 560,
+    beside: Sequence[RigidBody] = (),
+) -> list[Picture]:
     """One picture a state, all to one scale, of the mesh cut open along its sagittal plane.
 
-    A state is displacement (n, 3) in mm, caption and text for those who cannot see it.
+    A state is displacement (n, 3) in mm, caption and text for those who cannot see it. Rigid bodies beside
+    the unit are shown as far as they lie behind that plane and within the picture.
     """
     skins = {region: skin(mesh.tets[mesh.region == region]) for region in (MEMBRANE, LATTICE)}
     colors = {MEMBRANE: MEMBRANE_COLOR, LATTICE: LATTICE_COLOR}
@@ -87,12 +95,13 @@ def motion(mesh: Mesh, states: Sequence[tuple[Floats, str, str]], width: int = 5
             ]
         )
     every = [part for scene in scenes for part in scene]
+    standing = _behind(beside)
     camera, aspect = _framed(every, (1.0, 0.25, 0.12))
     return [
         Picture(
             png(
                 render(
-                    scene,
+                    [*scene, *standing],
                     camera,
                     width,
                     round(width / aspect),
@@ -105,6 +114,19 @@ def motion(mesh: Mesh, states: Sequence[tuple[Floats, str, str]], width: int = 5
         )
         for scene, (_, caption, alt) in zip(scenes, states, strict=True)
     ]
+
+
+def _behind(bodies: Sequence[RigidBody]) -> list[Part]:
+    """What of some bodies lies at x <= 0, where the cut unit is."""
+    found = []
+    for rigid in bodies:
+        mesh = rigid.body.manifold.trim_by_plane([-1.0, 0.0, 0.0], 0.0).to_mesh64()
+        if len(mesh.tri_verts):
+            vertices = np.array(mesh.vert_properties)[:, :3]
+            found.append(
+                Part(vertices, np.asarray(mesh.tri_verts).astype(np.int64), OBSTACLE_COLOR, whole=True)
+            )
+    return found
 
 
 def skin(tets: NDArray[np.integer]) -> NDArray[np.int64]:

@@ -152,6 +152,21 @@ def angle_against_pressure(pressure_kPa: Floats, angle_deg: Floats) -> str:
     return svg()
 
 
+def contact_force(time_s: Floats, normal_N: Floats, friction_N: Floats) -> str:
+    """Sizes of a contact's normal force and friction over time."""
+    with canvas(WIDTH, 2.6) as (figure, svg):
+        axes = figure.add_axes((0.14, 0.19, 0.82, 0.74))
+        for values, color, style, name in (
+            (normal_N, BY_LENGTH[0], "-o", "normal"),
+            (friction_N, INK, "--", "friction"),
+        ):
+            axes.plot(time_s, values, style, color=color, markersize=3.5, linewidth=1.6, label=name)
+        axes.legend(frameon=False, fontsize=8, loc="upper left")
+        axes.set(xlabel="time [s]", ylabel="force [N]")
+        axes.set_ylim(bottom=0)
+    return svg()
+
+
 def protocol(time_s: Floats, pressure_kPa: Floats) -> str:
     """Pressure against time."""
     with canvas(WIDTH, 2.3) as (figure, svg):

@@ -28,11 +28,13 @@ FILES = {
     "unit.toml": "parameters of the unit",
     "protocol.csv": "pressure protocol",
     "effective.toml": "law of the lattice, from its struts and resin",
+    "obstacles.obj": "rigid bodies that the unit may touch, mm",
     "unit.stl": "printable unit without a sensor, mm",
     "anchors.txt": "lattice nodes and anchors, mm",
     "mesh.vtu": "analysis mesh with regions and moduli",
     "model_a.pvd": "motion without a sensor, a state a sample (ParaView)",
-    "angle.csv": "bending angle of every converged pressure",
+    "angle.csv": "bending angle of every converged state",
+    "contact.csv": "what the unit touches, with what force, how deep and how far it slides, at every instant",
     "deviation.csv": "deviation and rank of every path and rule",
     "delta.npz": "deviation over time and length of every path and rule, mm",
     "sensitivity.vtu": "how much stiffening each element alone would disturb the motion, mm (ParaView)",
@@ -93,7 +95,9 @@ def report_data(
     complete = all((w.name, rule) in study.evaluations for w in windows for rule in job.rules)
     time, pressure = job.protocol.sample(job.times)
     states = study.trajectory.states if study.trajectory else tuple(study.states)
-    states = tuple(sorted(states, key=lambda s: s.pressure_MPa))
+    if not job.obstacles:
+        # One state a pressure; beside obstacles one an instant, in the order of time.
+        states = tuple(sorted(states, key=lambda s: s.pressure_MPa))
     rules = {rule: _rule_result(study, rule) for rule in job.rules} if complete else {}
     return ReportData(
         title=f"Sensor path for {job.unit.name}" if rules else f"Monolithic Unit {job.unit.name}",
@@ -109,6 +113,7 @@ def report_data(
         search=study.search,
         search_picture=search_picture,
         light=study.light,
+        contact=study.contact,
         pressure_kPa=np.array([s.pressure_MPa * 1e3 for s in states]),
         angle_deg=np.array([bending_angle_deg(study.mesh, s.u) for s in states if study.mesh]),
         protocol_s=time if states else np.zeros(0),
@@ -240,7 +245,7 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
         )
     ]
     if study.trajectory is not None and study.mesh is not None:
-        states = study.trajectory.states
+        states = sorted(study.trajectory.states, key=lambda s: s.pressure_MPa)
         shown = [states[0], min(states, key=lambda s: abs(s.pressure_MPa)), states[-1]]
         shown = list({state.pressure_MPa: state for state in shown}.values())
         texts = []
@@ -248,7 +253,7 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
             angle = bending_angle_deg(study.mesh, state.u) + 0.0
             words = f"{state.pressure_MPa * 1e3:g} kPa: {angle:.1f}°"
             texts.append((state.u, words, f"The analysis mesh at {words}."))
-        pictures += motion(study.mesh, texts)
+        pictures += motion(study.mesh, texts, beside=study.job.obstacles)
     return side_view(parts, study.anchors, path, radius), pictures
 
 

@@ -49,6 +49,7 @@ def _sections(r: ReportData) -> list[tuple[str, str, str]]:
         ("search", "The whole lattice", _search(r)),
         ("light", "What the light would tell", _light(r)),
         ("motion", "How the unit moves", _motion(r)),
+        ("contact", "What the unit touches", _contact(r)),
         ("where", "Where and when each path disturbs the motion", _heatmaps(r)),
         ("marginals", "Along the unit, and over time", _marginals(r)),
         ("mesh", "Solid, mesh and solver", _mesh(r)),
@@ -229,18 +230,21 @@ def _light(r: ReportData) -> str:
     mine = s.responses[index]
     low, high = mine.monotonic_deg
     front = "No path disturbs less and tells more than those joined by the line."
+    told = "The chosen path in colour; dots are rays through its bent waveguide, bars twice their error."
     way = "rises" if mine.sensitivity_per_deg < 0 else "falls"
     html = (
         f"<p>Along <strong>{escape(label(s.names[index]))}</strong> the light at the detector changes by "
         f"{100 * abs(mine.sensitivity_per_deg):.2f} ± {100 * s.errors_per_deg[index]:.2f}&nbsp;% a degree "
         f"about rest, and {way} without a turn from {signed(f'{low:.0f}')} to {high:.0f} degrees. Light is "
         f"followed along each path by a law "
-        f"fitted to traced rays, which it misses by {100 * s.law.rms:.0f}&nbsp;%; wells on the stretched "
-        f"side open and let light out. The resin's optics are assumed, since nobody has published them: "
+        f"fitted to traced rays, which it misses by {100 * s.law.rms:.0f}&nbsp;%. Two things work "
+        f"against each other: light runs along the outer side of a bend, away from wells on its inner side; "
+        f"and a bar that is pulled gives way at its wells, and loses light there. The resin's optics are "
+        f"assumed, since nobody has published them: "
         f"index {o.index:g}, attenuation {o.attenuation_per_mm:g} a mm, slopes of the walls "
         f"{o.roughness:g}.</p>"
         f'<div class="pair">{figure(front_chart(s, chosen), front, "disturbance against sensitivity")}'
-        f"{figure(response_chart(s, chosen), 'The chosen path in colour.', 'light against angle')}</div>"
+        f"{figure(response_chart(s, chosen), told, 'light against angle')}</div>"
     )
     head = [
         ("path", ""), ("Ĵ [mm]", "n"), ("signal [%/deg]", "n"), ("±", "n"), ("one way from [deg]", "n"),
@@ -286,7 +290,8 @@ def _motion(r: ReportData) -> str:
         low, high = float(r.pressure_kPa.min()), float(r.pressure_kPa.max())
         html += figure(
             plots.angle_against_pressure(r.pressure_kPa, r.angle_deg),
-            "Bending angle of the tip against the base, without a sensor; each dot is a converged state.",
+            "Bending angle of the tip against the base, without a sensor; each dot is a converged state"
+            + (", in the order of time: friction makes the way back another." if r.contact else "."),
             f"Bending angle against pressure from {low:g} to {high:g} kPa.",
         )
     if len(r.protocol_s):
@@ -301,6 +306,43 @@ def _motion(r: ReportData) -> str:
             '<div class="triple">' + "".join(picture_figure(picture) for picture in r.pictures[1:]) + "</div>"
         )
     return html
+
+
+def _contact(r: ReportData) -> str:
+    c = r.contact
+    if c is None:
+        return ""
+    if not c.force_N.any():
+        return f"<p>The unit does not reach {escape(_listed(c.names))}.</p>"
+    rows, charts = [], ""
+    for b, name in enumerate(c.names):
+        k = int(c.force_N[b].argmax())
+        rows.append(
+            [
+                name,
+                f"{c.friction[b]:g}",
+                f"{c.force_N[b, k]:.3g}",
+                signed(f"{c.time_s[k]:g} s, {c.pressure_kPa[k]:g} kPa"),
+                f"{c.deepest_mm[b].max():.2g}",
+                f"{c.slid_mm[b].max():.2g}",
+                f"{c.lost_mJ[b].max():.2g}",
+            ]
+        )
+        if c.force_N[b].any():
+            sizes = (np.linalg.norm(force[b], axis=1) for force in (c.normal_N, c.tangential_N))
+            charts += figure(
+                plots.contact_force(c.time_s, *sizes),
+                f"Force of the unit on {escape(name)}.",
+                f"Normal force and friction on {name} over time.",
+            )
+    columns = ["friction", "largest force [N]", "when", "gap error [mm]", "slid [mm]", "lost [mJ]"]
+    head = [("obstacle", ""), *((name, "n") for name in columns)]
+    return (
+        "<p>The obstacles are rigid and fixed; friction is Coulomb's. The gap error is how deep the unit is "
+        "let into one at most.</p>"
+        + table("What the unit may touch", head, [(row, False) for row in rows])
+        + f'<div class="pair">{charts}</div>'
+    )
 
 
 def _heatmaps(r: ReportData) -> str:

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from ..sensing.law import Law
     from ..sensing.optics import Optics
-    from ..sensing.signal import Law, Response
+    from ..sensing.signal import Response
+    from .contact import ContactHistory
 
 Floats = NDArray[np.floating[Any]]
 
@@ -89,11 +91,21 @@ class LatticeSearch:
 
 
 @attrs.frozen(eq=False)
+class Checks:
+    """Rays through a bent waveguide: angle_deg, Delta V / V_f and its error by their number, (k,) each."""
+
+    angle_deg: Floats
+    delta: Floats
+    errors: Floats
+
+
+@attrs.frozen(eq=False)
 class Signals:
     """What light would tell along each path, in the order of the study's windows.
 
     errors_per_deg: what the law's own error makes of a response's slope; at_rest: share of the light that
-    arrives at rest; front: whether no path disturbs less and tells more;
+    arrives at rest; checks: of the law for the least disturbing path, by rays; front: whether no path
+    disturbs less and tells more;
     sets: pairs, then triples, of paths that tell most of how bending is spread along the unit, best first.
     differential: pairs read one against the other, with the slope of their difference a degree, best first.
     """
@@ -104,6 +116,7 @@ class Signals:
     responses: tuple[Response, ...]
     errors_per_deg: Floats
     at_rest: Floats
+    checks: Checks
     j_hat: Floats
     front: tuple[bool, ...]
     sets: tuple[tuple[tuple[str, ...], float], ...]
@@ -145,6 +158,7 @@ class ReportData:
     search: LatticeSearch | None = None
     search_picture: Picture | None = None
     light: Signals | None = None
+    contact: ContactHistory | None = None
     pressure_kPa: Floats = attrs.field(factory=lambda: np.zeros(0))  # per converged state
     angle_deg: Floats = attrs.field(factory=lambda: np.zeros(0))
     protocol_s: Floats = attrs.field(factory=lambda: np.zeros(0))

@@ -22,7 +22,10 @@ from ..fem.descent import NewtonSettings
 from ..fem.equilibrium import Equilibrium, State, rest
 from ..fem.kinematics import bending_angle_deg
 from ..fem.lattice_law import deformation_gradients, stretches
+from ..fem.marching import Instant, march
 from ..fem.model import Model
+from ..fem.obstacle import CONTACT
+from ..fem.obstacle import Contact as Touch
 from ..fem.trajectory import Trajectory, branches, simulate
 from ..files import write_csv, write_npz
 from ..homogenize.foam_response import ellipticity
@@ -33,17 +36,21 @@ from ..meshing.unit import MeshingWarning, mesh_unit
 from ..placement.candidates import Candidate, Evaluation, candidates
 from ..placement.deviation import rank
 from .cache import Cache, key
+from .contact import COLUMNS as CONTACT_COLUMNS
+from .contact import ContactHistory, history, obstacles_of
 from .ending import Ending
 from .folder import begin, keep_inputs, require_space
 from .job import Job
 from .motion import FOLDER as MOTION
-from .motion import write_model_a, write_path
+from .motion import write_model_a
+from .path_motion import keep_motion
 from .progress import Progress
 from .publish import package_versions
 from .results import LatticeSearch, Signals
 from .study_file import FILES, HEADER, STAGES
 from .study_file import NAME as STUDY
 from .sweeping import PATH_DIFFERENCE_MM, Sweep
+from .touching import evaluations
 from .vtk_out import write_mesh, write_trajectory
 
 Array = np.ndarray[Any, Any]
@@ -54,6 +61,7 @@ RESULTS = (
     "mesh.vtu",
     "model_a.pvd",
     "angle.csv",
+    "contact.csv",
     "deviation.csv",
     "delta.npz",
     "sensitivity.vtu",
@@ -89,6 +97,7 @@ class Study:
     uncertainty_mm: dict[str, float] = attrs.field(factory=dict)
     warnings: list[str] = attrs.field(factory=list)
     solver: dict[str, Any] = attrs.field(factory=dict)
+    contact: ContactHistory | None = None
     search: LatticeSearch | None = None
     light: Signals | None = None
     _ahead: Sweep | None = None
@@ -190,6 +199,7 @@ class Study:
         return self.mesh
 
     def _mesh(self, settings: MeshSettings) -> Mesh:
+        settings = self.job.mesh_settings(settings)
         # Only the shape: what it is made of, or called, leaves a mesh as it is.
         shape = attrs.evolve(self.job.unit, name="shape", material=Material())
         body = [] if self.job.body is None else [self.job.body.hash]
@@ -227,7 +237,7 @@ class Study:
         time, pressure = self.job.protocol.sample(self.job.times)
         with self.progress.stage("Model A"):
             model = Model(self.mesh)
-            if candidates_beside and self.job.workers > 1:
+            if candidates_beside and self.job.workers > 1 and not self.job.obstacles:
                 self._ahead = Sweep(
                     self.job, self.cache, self.mesh, self._jobs(), pressure, self.headline_rule
                 )
@@ -239,6 +249,7 @@ class Study:
                 self._keep_partial_motion()
                 raise
             self._write_motion(self.trajectory.states)
+            self._write_contact()
             write_model_a(self.folder, self.mesh, self.job.materials(self.mesh), self.trajectory)
             self._look_for_contact(self.trajectory.states)
             self._look_beyond_the_fit(self.trajectory.states)
@@ -261,6 +272,8 @@ class Study:
     def _model_a(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
         """Model A's trajectory on a model's mesh, load step by load step from the cache where it is there."""
         materials = self.job.materials(model.mesh)
+        if self.job.obstacles:
+            return self._touching(model, time, pressure, on_state)
         # A state's last digits depend on the pressures visited before it.
         visited = np.unique(pressure)
         name = key(model.mesh.hash(), materials.hash(), visited, NewtonSettings())
@@ -286,20 +299,65 @@ class Study:
             ),
         )
 
+    def _touching(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
+        """Model A beside obstacles: instant by instant, since friction remembers, from the cache likewise."""
+        job, materials = self.job, self.job.materials(model.mesh)
+        model.obstacles = obstacles_of(job.obstacles, job.unit, model.mesh)
+        parts = [(o.depth_mm, o.stiffness, o.stick_stiffness, o.friction) for o in model.obstacles]
+        name = key(
+            model.mesh.hash(), materials.hash(), time, pressure, CONTACT, job.obstacles_text() or "", parts
+        )
+        found: list[list[Touch]] = []
+
+        def keep(state: State) -> None:
+            found.append([o.contact(state.u) for o in model.obstacles])
+            force = sum(float(np.linalg.norm(c.force_N)) for c in found[-1])
+            self.progress.update(
+                len(found) / len(time), f"{state.pressure_MPa * 1e3:.4g} kPa, contact {force:.3g} N"
+            )
+            on_state(state)
+
+        motion = march(
+            Equilibrium(model, materials, CONTACT),
+            time,
+            pressure,
+            keep,
+            load=lambda number: self._kept_instant(key(name, number), model),
+            store=lambda number, instant: self._keep_instant(key(name, number), instant),
+        )
+        if model.mesh is self.mesh:
+            self.contact = history(job.obstacles, model.mesh, time, pressure, found)
+        return motion
+
+    def _keep_instant(self, name: str, instant: Instant) -> None:
+        arrays = attrs.asdict(instant.state, recurse=False) | {"time_s": instant.time_s}
+        if instant.rate is not None:
+            arrays["rate"] = instant.rate
+        for number, memory in enumerate(instant.contacts):
+            arrays |= {f"{number} {part}": values for part, values in memory.items()}
+        self.cache.put("instant", name, arrays)
+
+    def _kept_instant(self, name: str, model: Model) -> Instant | None:
+        found = self.cache.get("instant", name)
+        if found is None or found.get("u", np.empty(0)).shape != model.mesh.nodes.shape:
+            return None
+        contacts = [
+            {part.partition(" ")[2]: a for part, a in found.items() if part.startswith(f"{number} ")}
+            for number in range(len(model.obstacles))
+        ]
+        return Instant(float(found["time_s"]), _state(found), found.get("rate"), tuple(contacts))
+
     def _stored(self, name: str, pressure_MPa: float, model: Model) -> State | None:
         found = self.cache.get("state", key(name, pressure_MPa))
         if found is None or found.get("u", np.empty(0)).shape != model.mesh.nodes.shape:
             return None
-        return State(
-            float(found["pressure_MPa"]),
-            found["u"],
-            float(found["residual"]),
-            int(found["iterations"]),
-            int(found["factorisations"]),
-        )
+        return _state(found)
 
     def _write_motion(self, states: Any) -> None:
         assert self.mesh is not None
+        if self.job.obstacles:
+            self._write_march(states)
+            return
         ordered = sorted(states, key=lambda s: s.pressure_MPa)
         angles = [bending_angle_deg(self.mesh, s.u) for s in ordered]
         pressures = [s.pressure_MPa * 1e3 for s in ordered]
@@ -313,6 +371,29 @@ class Study:
         time, pressure = self.job.protocol.sample(self.job.times)
         reached = [(t, by_pressure[p]) for t, p in zip(time, pressure, strict=True) if p in by_pressure]
         write_trajectory(self.folder / "model_a.pvd", self.mesh, reached)
+
+    def _write_march(self, states: Any) -> None:
+        """As `_write_motion`, of states an instant: what touches moves otherwise on the way back."""
+        assert self.mesh is not None
+        time, _ = self.job.protocol.sample(self.job.times)
+        reached = list(zip(time.tolist(), states, strict=False))
+        angles = [bending_angle_deg(self.mesh, s.u) for _, s in reached]
+        rows = [
+            (f"{t:.9g}", f"{s.pressure_MPa * 1e3:.6g}", f"{a:.6g}")
+            for (t, s), a in zip(reached, angles, strict=True)
+        ]
+        write_csv(self.folder / "angle.csv", ["time_s", "pressure_kPa", "angle_deg"], rows)
+        # Of a pressure met twice, what it was the first time.
+        first = {p: float(a) for _, p, a in reversed(rows)}
+        self.ending.summary["angle_deg"] = dict(sorted(first.items(), key=lambda item: float(item[0])))
+        write_trajectory(self.folder / "model_a.pvd", self.mesh, reached)
+
+    def _write_contact(self) -> None:
+        """What the unit touched, where it may touch something."""
+        if self.contact is None:
+            return
+        write_csv(self.folder / "contact.csv", CONTACT_COLUMNS, self.contact.rows())
+        self.ending.summary["contact"] = self.contact.summary()
 
     def _look_for_contact(self, states: tuple[State, ...]) -> None:
         """Name the first pressure, on either side, at which walls pass through each other, and which."""
@@ -377,7 +458,8 @@ class Study:
     def _keep_partial_motion(self) -> None:
         """What was found before a failure is kept; summary.json says that it is partial."""
         if self.mesh is not None and self.states:
-            self._write_motion([rest(self.mesh), *self.states])
+            start = [] if self.job.obstacles else [rest(self.mesh)]
+            self._write_motion([*start, *self.states])
 
     def _jobs(self) -> list[tuple[Candidate, str]]:
         return [(c, rule) for rule in self.job.rules for c in candidates(self.anchors, self.windows)]
@@ -388,7 +470,7 @@ class Study:
         assert self.trajectory is not None
         jobs = self._jobs()
         with self.progress.stage("candidates"):
-            found = self.sweep(self.mesh, self.trajectory, jobs, self._ahead, verify=True)
+            found = self.sweep(self.mesh, self.trajectory, jobs, self._ahead, verify=True, to_look_at=True)
         self.evaluations = {(e.name, e.rule): e for e in found}
         every = candidates(self.anchors, self.windows)
         chosen = self._write_ranking(every)
@@ -407,17 +489,21 @@ class Study:
         jobs: list[tuple[Candidate, str]],
         under_way: Sweep | None = None,
         verify: bool = False,
+        to_look_at: bool = False,
     ) -> list[Evaluation]:
         """Evaluation of every (candidate, rule) on a mesh against its Model A; see `sweeping`.
 
-        verify: of the study's own mesh; the paths' motion is then kept to be looked at, too.
+        to_look_at: whether the paths' motion is kept, too; of the study's own mesh or the whole body's.
         """
-        whole = self.headline_rule if verify else ""
+        if self.job.obstacles:
+            self.ending.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = {"along_paths": True}
+            return evaluations(self.job, self.cache, mesh, trajectory, jobs, self.progress.update)
+        whole = self.headline_rule if to_look_at else ""
         sweep = under_way or Sweep(self.job, self.cache, mesh, jobs, trajectory.pressure_kPa, whole)
         with closing(sweep):
             found = sweep.evaluations(trajectory, self.progress.update, verify)
-            for name, pressure_kPa, difference_mm in sweep.whole(trajectory):
-                write_path(self.folder, name, pressure_kPa, difference_mm)
+            if to_look_at:
+                keep_motion(self, mesh, trajectory, sweep, jobs)
         if sweep.path_difference_mm > PATH_DIFFERENCE_MM:
             self.warn(
                 "A candidate started from Model A's states was not where its own path from rest leads "
@@ -441,10 +527,15 @@ class Study:
         _, pressure = self.job.protocol.sample(self.job.times)
         chosen = extremes(pressure)
         instants = [int(np.flatnonzero(pressure == p)[0]) for p in chosen]
+        time = np.arange(len(chosen), dtype=float)
+        if self.job.obstacles:
+            # What friction remembers is of the whole protocol.
+            time, chosen = self.job.protocol.sample(self.job.times)
+            instants = list(range(len(time)))
         with self.progress.stage("mesh check"):
             mesh = self._mesh(coarse)
             model = Model(mesh)
-            trajectory = self._model_a(model, np.arange(len(chosen), dtype=float), chosen, lambda _: None)
+            trajectory = self._model_a(model, time, chosen, lambda _: None)
             ratio: dict[str, list[float]] = {rule: [] for rule in self.job.rules}
             for found in self.sweep(mesh, trajectory, jobs):
                 fine = self.evaluations[found.name, found.rule].deviation
@@ -519,6 +610,17 @@ class Study:
         if text not in self.warnings:
             self.warnings.append(text)
             self.progress.warning(text)
+
+
+def _state(arrays: dict[str, Array]) -> State:
+    """The state that the cache kept."""
+    return State(
+        float(arrays["pressure_MPa"]),
+        arrays["u"],
+        float(arrays["residual"]),
+        int(arrays["iterations"]),
+        int(arrays["factorisations"]),
+    )
 
 
 def extremes(pressure_kPa: Array) -> Array:

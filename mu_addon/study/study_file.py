@@ -19,8 +19,14 @@ FORMAT = 2
 # In the order they need each other; a study has the first, the first two or all.
 STAGES = ("design", "simulate", "place")
 # Files of inputs that a stage's table names, each under the key that names it.
-FILES = {"unit": "unit.toml", "body": "body.obj", "protocol": "protocol.csv", "lattice": "effective.toml"}
-_FILES_OF = {"design": ("unit", "body"), "simulate": ("protocol", "lattice"), "place": ()}
+FILES = {
+    "unit": "unit.toml",
+    "body": "body.obj",
+    "protocol": "protocol.csv",
+    "lattice": "effective.toml",
+    "obstacles": "obstacles.obj",
+}
+_FILES_OF = {"design": ("unit", "body"), "simulate": ("protocol", "lattice", "obstacles"), "place": ()}
 # Far more than any study.toml has: a file this long is not one.
 _LONGEST = 100_000
 

@@ -39,20 +39,21 @@ def write_fields(path: Path, mesh: Mesh, fields: dict[str, Array]) -> None:
 
 
 def write_trajectory(path: Path, mesh: Mesh, states: Sequence[tuple[float, State]]) -> None:
-    """Write `states`, each with its time in s, to the .pvd `path` and one .vtu a pressure beside it.
+    """Write `states`, each with its time in s, to the .pvd `path` and one .vtu a state beside it.
 
-    They lie in a folder of the .pvd's name; an earlier run's are removed. Raises OutputError.
+    A state that holds at several times is written once. They lie in a folder of the .pvd's name; an earlier
+    run's are removed. Raises OutputError.
     """
     folder = make_folder(path.with_suffix(""))
-    files: dict[float, str] = {}
+    files: dict[int, str] = {}
     lines = []
     for time, state in states:
-        # A protocol passes the same pressure several times, and an elastic unit the same state with it.
-        if state.pressure_MPa not in files:
-            name = files[state.pressure_MPa] = f"{len(files):04d}.vtu"
+        # Not by its pressure: with friction one pressure has several states.
+        if id(state) not in files:
+            name = files[id(state)] = f"{len(files):04d}.vtu"
             moved = {"displacement_mm": state.u.astype(np.float32)}
             _write(folder / name, mesh, moved, {"region": mesh.region.astype(np.int32)})
-        file = quoteattr(f"{folder.name}/{files[state.pressure_MPa]}")
+        file = quoteattr(f"{folder.name}/{files[id(state)]}")
         pressure = f"{state.pressure_MPa * 1e3:.9g} kPa"
         lines.append(f'    <DataSet timestep="{time:.9g}" name="{pressure}" file={file}/>')
     write_text(

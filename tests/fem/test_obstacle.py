@@ -12,7 +12,8 @@ from mu_addon.errors import InputError
 from mu_addon.fem.equilibrium import Equilibrium, rest
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.fem.obstacle import CONTACT, Box, Obstacle, Plane, Pose, Sphere
+from mu_addon.fem.obstacle import CONTACT, Obstacle
+from mu_addon.fem.rigid import Box, Plane, Pose, Sphere
 
 from .bodies import box, make
 

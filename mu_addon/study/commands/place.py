@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from .options import add_model, add_unit
-from .study import EXAMPLE, add_body, add_simulation, add_solid, answer, run
+from .study import EXAMPLE, add_body, add_obstacles, add_simulation, add_solid, answer, run
 
 if TYPE_CHECKING:
     from .options import Commands
@@ -22,6 +22,7 @@ def add(commands: Commands[Any]) -> None:
     add_model(command)
     add_solid(command)
     add_body(command)
+    add_obstacles(command)
     add_simulation(command)
     command.add_argument(
         "--stations", type=int, default=51, metavar="J", help="stations along the backbone (51)"

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from ...design.anchors import Window
     from ...design.body import Body
     from ...design.parameters import Unit
+    from ...design.rigid_body import RigidBody
     from ..ending import Ending
     from ..progress import Progress
     from ..study import Study
@@ -37,6 +38,43 @@ def add_body(command: argparse.ArgumentParser) -> None:
         help="closed surface (STL, OBJ or PLY; mm, in the unit's frame) that the lattice fills in place of "
         "its box; cut off flat at the unit's ends",
     )
+
+
+def add_obstacles(command: argparse.ArgumentParser) -> None:
+    """Rigid bodies that the unit may touch, each with its friction."""
+    command.add_argument(
+        "--obstacle",
+        action=_Obstacle,
+        dest="obstacles",
+        default=[],
+        metavar="FILE",
+        help="closed surface (STL, OBJ or PLY; mm, in the unit's frame) of something rigid and fixed that "
+        "the unit may touch; give it again for each",
+    )
+    command.add_argument(
+        "--friction",
+        action=_Friction,
+        type=float,
+        metavar="MU",
+        help="coefficient of friction of the obstacle before it (0.5, assumed)",
+    )
+
+
+class _Obstacle(argparse.Action):
+    """Adds a file of an obstacle, its friction still unsaid."""
+
+    def __call__(self, parser: Any, namespace: Any, value: Any, option: Any = None) -> None:
+        namespace.obstacles = [*namespace.obstacles, (value, None)]
+
+
+class _Friction(argparse.Action):
+    """Says the friction of the obstacle before it."""
+
+    def __call__(self, parser: Any, namespace: Any, value: Any, option: Any = None) -> None:
+        if not namespace.obstacles or namespace.obstacles[-1][1] is not None:
+            parser.error("--friction: give it after the --obstacle that it belongs to")
+        *before, (path, _) = namespace.obstacles
+        namespace.obstacles = [*before, (path, value)]
 
 
 def add_simulation(command: argparse.ArgumentParser) -> None:
@@ -103,6 +141,8 @@ def _open(options: argparse.Namespace, progress: Progress, ending: Ending) -> St
     protocol = protocol_of(getattr(options, "protocol", None))
     if getattr(options, "body", None) is not None:
         extra["body"] = _body(options, unit)
+    if getattr(options, "obstacles", None):
+        extra["obstacles"] = _obstacles(options, unit, extra.get("body"))
     job = Job(unit=unit, protocol=protocol, quality=options.quality, stages=options.stages, **extra)
     return Study.open(job, Path(options.out), progress, ending)
 
@@ -124,6 +164,16 @@ def _body(options: argparse.Namespace, unit: Unit) -> Body:
         for window in windows(unit.chambers.count):
             require_path_inside(body, unit, window)
     return body
+
+
+def _obstacles(options: argparse.Namespace, unit: Unit, own: Body | None) -> tuple[RigidBody, ...]:
+    """The bodies of --obstacle; raises InputError, also where one stands in the unit at rest."""
+    from ...design.body import read_body
+    from ...design.rigid_body import FRICTION, RigidBody, require_beside
+
+    found = [RigidBody(read_body(f), FRICTION if mu is None else mu) for f, mu in options.obstacles]
+    require_beside(found, unit.dimensions, own)
+    return tuple(found)
 
 
 def _run(study: Study, options: argparse.Namespace) -> None:
@@ -156,8 +206,14 @@ def run_stages(study: Study, path: Window | None = None) -> None:
         from ..signals import signals
 
         chosen = study.place()
-        sensitivity_map(study)
-        signals(study, study.job.optics)
+        if study.job.obstacles:
+            study.warn(
+                "Beside obstacles neither the map of what each element would disturb nor what light would "
+                "tell is known: both take a unit with one state a pressure."
+            )
+        else:
+            sensitivity_map(study)
+            signals(study, study.job.optics)
         if study.job.paths == "graph":
             search_graph(study)
         study.design(window(study.job.unit, chosen[study.headline_rule]))

@@ -1,0 +1,94 @@
+"""Rigid bodies that stand beside a unit, fixed in its frame: what they are, and one file for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+from .body import Body, flaws, half, overlaps, require_sound
+from .parameters import Dimensions
+
+FRICTION = 0.5
+"""Assumed: published coefficients of dry elastomers on hard plastics are mostly 0.5 to 1 and above, and the
+cautious end is taken."""
+
+
+def _coefficient(_: object, field: attrs.Attribute[float], value: float) -> None:
+    if not 0.0 <= value <= 5.0:
+        raise InputError(f"a friction coefficient of {value:g}", field.name, "give 0 to 5")
+
+
+@attrs.frozen(eq=False)
+class RigidBody:
+    """A closed surface in mm, in the unit's frame, and Coulomb's coefficient of friction between both."""
+
+    body: Body
+    friction: float = attrs.field(default=FRICTION, validator=_coefficient)
+
+    @property
+    def name(self) -> str:
+        """The surface's name."""
+        return self.body.name
+
+
+def require_beside(bodies: Sequence[RigidBody], d: Dimensions, own: Body | None = None) -> None:
+    """Raise InputError for a surface that bounds no body, or that stands in a unit at rest: where, how deep.
+
+    own: a body that takes the place of the lattice's box.
+    """
+    for rigid in bodies:
+        found = flaws(rigid.body)
+        require_sound(rigid.body, found or overlaps(rigid.body, d, own), "an obstacle")
+
+
+def mirrored(bodies: Sequence[RigidBody]) -> bool:
+    """Whether every one of some sound bodies is its own mirror image across x = 0."""
+    return all(low < 0.0 < high and half(r.body) is not None for r in bodies for low, high in [_across(r)])
+
+
+def _across(rigid: RigidBody) -> tuple[float, float]:
+    low, high = rigid.body.bounds[:, 0]
+    return float(low), float(high)
+
+
+def to_obj(bodies: Sequence[RigidBody]) -> str:
+    """All surfaces as one Wavefront OBJ in mm, an object each, with every digit."""
+    lines, first = ["# rigid bodies beside the unit, millimetres"], 1
+    for number, rigid in enumerate(bodies, 1):
+        v, t = rigid.body.vertices, rigid.body.triangles
+        lines.append(f"o {number} {' '.join(rigid.name.split())}")
+        lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in v.tolist()]
+        lines += [f"f {a} {b} {c}" for a, b, c in (t + first).tolist()]
+        first += len(v)
+    return "\n".join(lines) + "\n"
+
+
+def read_rigid_bodies(path: Path, friction: Any) -> tuple[RigidBody, ...]:
+    """The bodies of a file by `to_obj`, with the coefficient of each; raises InputError."""
+    remedy = "leave the file as the study wrote it"
+    found: list[tuple[str, list[list[float]], list[list[int]]]] = []
+    before = 0
+    try:
+        for line in path.read_text(encoding="utf-8").splitlines():
+            kind, _, words = line.partition(" ")
+            if kind == "o":
+                before += len(found[-1][1]) if found else 0
+                found.append((words.partition(" ")[2], [], []))
+            elif kind == "v":
+                found[-1][1].append([float(w) for w in words.split()])
+            elif kind == "f":
+                found[-1][2].append([int(w) - 1 - before for w in words.split()])
+        surfaces = [(np.array(v, float), np.array(t, np.int64), name) for name, v, t in found]
+        for v, t, _ in surfaces:
+            if v.shape[1:] != (3,) or t.shape[1:] != (3,) or not 0 <= t.min() <= t.max() < len(v):
+                raise ValueError
+    except (OSError, ValueError, IndexError):
+        raise InputError("the obstacles cannot be read", str(path), remedy) from None
+    if not isinstance(friction, list) or len(friction) != len(surfaces):
+        raise InputError(f"friction = {friction!r} is not a coefficient an obstacle", str(path), remedy)
+    return tuple(RigidBody(Body(*s), float(mu)) for s, mu in zip(surfaces, friction, strict=True))
