@@ -184,6 +184,8 @@ def test_the_inputs_are_written_as_toml_that_says_the_same(tmp_path):
         ("points = 8", "minimize = 3", "list of names"),
         ("times = 7", "times = 1", "time samples"),
         ("times = 7", "tmies = 7", "unknown key 'tmies'"),
+        ("times = 7", 'times = 7\nobstacles = "post.obj"', "takes no obstacles"),
+        ("times = 7", 'times = 7\nlattice = "effective.toml"', "takes no lattice"),
         ("refine = 0.4", "refine = 99.0", "refine"),
         ("mesh = {", "mesh = 3 #", "not a table"),
         ("low = 0.8, high = 1.2", "low = 1.2, high = 0.8", "no range"),

@@ -15,8 +15,8 @@ from ...design.parameters import Unit, load_preset, read_unit, to_toml
 from ...design.toml_text import nearest
 from ...errors import InputError, MuError
 from ...fem.protocol import Protocol
-from ..job import Job, job_with, protocol_of, protocol_text
-from ..study_file import STAGES, table_lines, toml_value
+from ..job import OF_FILES, Job, job_with, protocol_of, protocol_text
+from ..study_file import FILES, STAGES, table_lines, toml_value
 from .sampling import METHODS, sample
 from .variable import FILE, Inputs, Variable, put, variable
 
@@ -207,6 +207,13 @@ def _settings(document: Mapping[str, Any], stage: str, where: str) -> dict[str, 
     found = document.get(stage, {})
     if not isinstance(found, dict):
         raise InputError(f"{stage} is not a table", where, f"write it as [{stage}]")
+    for key in found:
+        if key in FILES or key in OF_FILES:
+            raise InputError(
+                f"a sweep takes no {key}",
+                f"{where}, [{stage}]",
+                "leave it out; unit and protocol stand at the top of the file",
+            )
     return dict(found)
 
 
