@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 from ..errors import InputError
@@ -21,18 +22,28 @@ def asset_root() -> Path:
     )
 
 
-def asset_names(folder: str) -> list[str]:
-    """Names of the TOML files shipped in a folder of `assets`, sorted."""
-    return sorted(path.stem for path in (asset_root() / folder).glob("*.toml"))
+def asset_names(folder: str, kind: str = "") -> list[str]:
+    """Names of the TOML files of a `kind` shipped in a folder of `assets`, sorted; most files name none."""
+    paths = (asset_root() / folder).glob("*.toml")
+    return sorted(path.stem for path in paths if _kind(path) == kind)
 
 
-def asset_file(folder: str, what: str, name: str) -> Path:
+def asset_file(folder: str, what: str, name: str, kind: str = "") -> Path:
     """The shipped TOML file of that name; InputError lists the names there are, `what` says of what."""
-    names = asset_names(folder)
-    if name not in names:
-        raise InputError(
-            f"there is no {what} {name!r}{nearest(name, names)}",
-            what,
-            f"choose one of {', '.join(names)}, or give the path of a TOML file",
-        )
-    return asset_root() / folder / f"{name}.toml"
+    names = asset_names(folder, kind)
+    files = {path.stem: path for path in (asset_root() / folder).glob("*.toml")}
+    if name in names:
+        return files[name]
+    if name in files:
+        what_it_is = f"{name!r} is a {_kind(files[name])}" if _kind(files[name]) else f"{name!r} is no {what}"
+        raise InputError(what_it_is, what, f"choose one of {', '.join(names)}")
+    raise InputError(
+        f"there is no {what} {name!r}{nearest(name, names)}",
+        what,
+        f"choose one of {', '.join(names)}, or give the path of a TOML file",
+    )
+
+
+def _kind(path: Path) -> str:
+    """What a TOML file says it describes by `kind = ...`; nothing where it does not say."""
+    return str(tomllib.loads(path.read_text(encoding="utf-8")).get("kind", ""))

@@ -129,6 +129,11 @@ def search_graph(study: Study) -> LatticeSearch:
     _write(study, every)
     study.search = LatticeSearch(rule, every[: len(outcome.checked)], len(chains), outcome.risk)
     first = every[0]
+    # A motion to look at is of a whole mesh, or of a half and its image.
+    if study.mesh.symmetry in ((), ("x",)):
+        with study.progress.stage("motion of the best path"):
+            alone = Candidate(first.name, 0, first.points)
+            study.sweep(mesh, trajectory, [(alone, rule)], to_look_at=True)
     study.ending.summary["search"] = {
         "rule": rule,
         "paths": len(chains),

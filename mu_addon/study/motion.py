@@ -6,7 +6,9 @@ Written as the study finds them, in single precision, and read again by whatever
   and `REGION_cut` (t,), whether a triangle lies in the mirror plane of a half mesh
 - model_a.npz: `time_s`, `pressure_kPa` and `state`, (k,) each, at the protocol's samples; `state_kPa` (s,),
   `displacement_mm` (s, n, 3) and, at the surfaces, `REGION_FIELD` (s, v)
-- NAME.npz, of a sensor path: `state_kPa` (r,) and `difference_mm` (r, n, 3) from Model A
+- NAME.npz, of a sensor path: `state_kPa` (r,), and differences from Model A: `difference_mm` (r, n, 3) and
+  `REGION_FIELD` (r, v); of a path off the mirror plane of a half mesh also those of the nodes' images,
+  reflected into that half, `image_mm` and `image_REGION_FIELD`
 - sensitivity.npz: `REGION_dJ_by_modulus_mm_per_MPa` (v,)
 """
 
@@ -37,7 +39,9 @@ PLAYED = "played"
 """What is made from these files to be played: point caches and embeddings."""
 REGIONS = {"membrane": MEMBRANE, "lattice": LATTICE}
 SENSITIVITY = "dJ_by_modulus_mm_per_MPa"
-# Of Model A's states, at the nodes of each region's surface. Stresses are Cauchy's.
+IMAGE = "image_"
+"""Begins the names of what is of the nodes' images in the mirror plane."""
+# Of a state, at the nodes of each region's surface. Stresses are Cauchy's.
 FIELDS = ("von_mises_kPa", "largest_principal_stress_kPa", "largest_stretch", "smallest_stretch")
 # A path's motion is written only where its own file is named so.
 _NOT_PATHS = ("mesh", MODEL_A, "sensitivity")
@@ -64,10 +68,24 @@ class Skin:
     mirror: Array
     triangles: Array
 
-    def of_nodes(self, vectors: Array) -> Array:
-        """Vectors (..., v, 3) at the vertices of vectors (..., n, 3) at the nodes."""
+    def of_nodes(self, vectors: Array, image: Array | None = None) -> Array:
+        """Vectors (..., v, 3) at the vertices of vectors (..., n, 3) at the nodes.
+
+        image (..., n, 3): those of the nodes' images, reflected into the half mesh, where they differ.
+        """
         found: Array = vectors[..., self.node, :].copy()
+        if image is not None:
+            there = self.mirror < 0
+            found[..., there, :] = image[..., self.node[there], :]
         found[..., 0] *= self.mirror
+        return found
+
+    def of_surface(self, values: Array, image: Array | None = None) -> Array:
+        """Values (..., v) at the vertices of values (..., w) of the region's surface; image as above."""
+        found: Array = values[..., self.place].copy()
+        if image is not None:
+            there = self.mirror < 0
+            found[..., there] = image[..., self.place[there]]
         return found
 
 
@@ -120,15 +138,49 @@ class Motion:
         A path's are polynomials in the pressure between the states that were solved, as its deviation is.
         Raises InputError where there is no such motion.
         """
+        return self.sides(name)[0]
+
+    def sides(self, name: str) -> tuple[Array, Array | None]:
+        """As `displacement`, and that of the nodes' images, reflected into the half, where it differs."""
         if name == MODEL_A:
-            return self.model_a
+            return self.model_a, None
+        found = self._path(name)
+        own, image = (self._between(found, key) for key in ("difference_mm", "image_mm"))
+        assert own is not None
+        return self.model_a + own, None if image is None else self.model_a + image
+
+    def field(self, name: str, region: str, field: str, skin: Skin) -> Array | None:
+        """A field (s, v) of Model A or of a path's unit at a skin's vertices; None where it is not known."""
+        still = self.fields[region][field]
+        if name == MODEL_A:
+            return skin.of_surface(still)
+        found = self._path(name)
+        own, image = (self._between(found, f"{side}{region}_{field}") for side in ("", IMAGE))
+        return None if own is None else skin.of_surface(still + own, None if image is None else still + image)
+
+    def _path(self, name: str) -> dict[str, Array]:
         found = read_npz(self.folder / f"{name}.npz")
         if found is None or found["difference_mm"].shape[1:] != self.model_a.shape[1:]:
             raise InputError(
                 f"there is no motion of {name}", str(self.folder), "simulate again: Place the Sensor"
             )
-        weights = polynomials(found["state_kPa"], self.state_kPa)
-        return self.model_a + np.tensordot(weights.astype(np.float32), found["difference_mm"], axes=1)
+        return found
+
+    def _between(self, found: dict[str, Array], key: str) -> Array | None:
+        """A path's differences at all of Model A's states, or None where its file has none of that name."""
+        if key not in found:
+            return None
+        weights = polynomials(found["state_kPa"], self.state_kPa).astype(np.float32)
+        return np.asarray(np.tensordot(weights, found[key], axes=1))
+
+    def carried(self, name: str, embedding: Embedding) -> Array:
+        """Displacements (s, p, 3) in mm of embedded points at Model A's states, of Model A or of a path."""
+        own, image = self.sides(name)
+        moved = np.array([embedding.displacement(u) for u in own], np.float32)
+        if image is not None:
+            far = np.array([embedding.displacement(u) for u in image], np.float32)
+            moved[:, embedding.mirrored] = far[:, embedding.mirrored]
+        return moved
 
     def embedding(self, points: Array) -> Embedding:
         """Points (p, 3) in mm embedded in the mesh; kept, since it takes seconds. Raises OutputError."""
@@ -149,26 +201,13 @@ class Motion:
 
 def write_model_a(folder: Path, mesh: Mesh, materials: Materials, trajectory: Trajectory) -> None:
     """Write mesh.npz and model_a.npz of a finished Model A into `folder`/motion. Raises OutputError."""
-    from ..fem.lattice_law import stretches
-    from ..fem.stress import NodalMean, cauchy, von_mises
-
     arrays = {f.name: getattr(mesh, f.name) for f in attrs.fields(Mesh)}
     arrays["symmetry"] = np.array(mesh.symmetry, dtype="U1")
-    means, places = {}, {}
-    for name, region in REGIONS.items():
-        surface = _surface(mesh, region)
+    surfaces = {name: surface_of(mesh, region) for name, region in REGIONS.items()}
+    for name, surface in surfaces.items():
         arrays |= {f"{name}_{part}": values for part, values in attrs.asdict(surface).items()}
-        means[name] = NodalMean(mesh, np.flatnonzero(mesh.region == region))
-        places[name] = np.searchsorted(means[name].nodes, surface.node)
-    found: dict[str, list[Array]] = {f"{region}_{field}": [] for region in REGIONS for field in FIELDS}
-    for state in trajectory.states:
-        sigma, F = cauchy(mesh, state.u, materials)
-        for name in REGIONS:
-            stress_kPa = 1e3 * means[name](sigma)[places[name]]
-            stretch = stretches(means[name](F)[places[name]])
-            values = von_mises(stress_kPa), np.linalg.eigvalsh(stress_kPa)[:, 2], stretch[:, 2], stretch[:, 0]
-            for field, value in zip(FIELDS, values, strict=True):
-                found[f"{name}_{field}"].append(value)
+    looked = SurfaceFields(mesh, {name: surface.node for name, surface in surfaces.items()})
+    found = looked.of_states([state.u for state in trajectory.states], materials)
     write_npz(folder / FOLDER / "mesh.npz", arrays)
     write_npz(
         folder / FOLDER / f"{MODEL_A}.npz",
@@ -178,12 +217,41 @@ def write_model_a(folder: Path, mesh: Mesh, materials: Materials, trajectory: Tr
             "state": trajectory.index,
             "state_kPa": np.array([s.pressure_MPa * 1e3 for s in trajectory.states]),
             "displacement_mm": np.array([s.u for s in trajectory.states], np.float32),
-            **{name: np.array(values, np.float32) for name, values in found.items()},
+            **found,
         },
     )
 
 
-def _surface(mesh: Mesh, region: int) -> Surface:
+class SurfaceFields:
+    """Stress and stretch of a mesh's states at some nodes (v,) of each region, given by its name."""
+
+    def __init__(self, mesh: Mesh, nodes: dict[str, Array]) -> None:
+        from ..fem.stress import NodalMean
+
+        self._mesh = mesh
+        self._means = {r: NodalMean(mesh, np.flatnonzero(mesh.region == REGIONS[r])) for r in nodes}
+        self._places = {r: np.searchsorted(self._means[r].nodes, node) for r, node in nodes.items()}
+
+    def of_states(self, displacements: list[Array], materials: Materials) -> dict[str, Array]:
+        """Fields `REGION_FIELD` (s, v) of states, each given by its displacement (n, 3) in mm."""
+        from ..fem.lattice_law import stretches
+        from ..fem.stress import cauchy, von_mises
+
+        found: dict[str, list[Array]] = {f"{r}_{field}": [] for r in self._means for field in FIELDS}
+        for u in displacements:
+            sigma, F = cauchy(self._mesh, u, materials)
+            for region, mean in self._means.items():
+                stress_kPa = 1e3 * mean(sigma)[self._places[region]]
+                stretch = stretches(mean(F)[self._places[region]])
+                principal = np.linalg.eigvalsh(stress_kPa)[:, 2]
+                values = von_mises(stress_kPa), principal, stretch[:, 2], stretch[:, 0]
+                for field, value in zip(FIELDS, values, strict=True):
+                    found[f"{region}_{field}"].append(value)
+        return {name: np.array(values, np.float32) for name, values in found.items()}
+
+
+def surface_of(mesh: Mesh, region: int) -> Surface:
+    """Surface of a region of a mesh."""
     from .pictures import skin
 
     triangles = skin(mesh.tets[mesh.region == region])
@@ -194,10 +262,14 @@ def _surface(mesh: Mesh, region: int) -> Surface:
     return Surface(node.astype(np.int32), numbered.reshape(-1, 3).astype(np.int32), cut)
 
 
-def write_path(folder: Path, name: str, state_kPa: Array, difference_mm: Array) -> None:
-    """Write a path's difference (r, n, 3) in mm from Model A at pressures (r,) in kPa. Raises OutputError."""
-    arrays = {"state_kPa": state_kPa, "difference_mm": np.asarray(difference_mm, np.float32)}
-    write_npz(folder / FOLDER / f"{name}.npz", arrays)
+def write_path(folder: Path, name: str, state_kPa: Array, difference_mm: Array, **differences: Array) -> None:
+    """Write a path's difference (r, n, 3) in mm from Model A at pressures (r,) in kPa. Raises OutputError.
+
+    differences: further ones, (r, ...), by the names that the module's text gives.
+    """
+    arrays = {"difference_mm": difference_mm, **differences}
+    single = {key: np.asarray(values, np.float32) for key, values in arrays.items()}
+    write_npz(folder / FOLDER / f"{name}.npz", {"state_kPa": state_kPa, **single})
 
 
 def write_sensitivity(folder: Path, mesh: Mesh, by_modulus: Array) -> None:
@@ -209,7 +281,7 @@ def write_sensitivity(folder: Path, mesh: Mesh, by_modulus: Array) -> None:
     for name, region in REGIONS.items():
         mean = NodalMean(mesh, np.flatnonzero(mesh.region == region))
         values = mean(np.repeat(by_modulus[:, None], points, axis=1))
-        arrays[f"{name}_{SENSITIVITY}"] = values[np.searchsorted(mean.nodes, _surface(mesh, region).node)]
+        arrays[f"{name}_{SENSITIVITY}"] = values[np.searchsorted(mean.nodes, surface_of(mesh, region).node)]
     write_npz(folder / FOLDER / "sensitivity.npz", {n: a.astype(np.float32) for n, a in arrays.items()})
 
 

@@ -32,6 +32,7 @@ def test_presets_are_listed():
         "mu-0.75x",
         "mu-1.0x",
         "mu-1.5x",
+        "gripper",
     ]
 
 

@@ -1,5 +1,7 @@
 """The motion that a study keeps to be looked at: surfaces, states, sensor paths, point caches, pictures."""
 
+from types import SimpleNamespace
+
 import attrs
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from PIL import Image
+from scipy.spatial import KDTree
 
 from mu_addon.design.anchors import anchors, windows
 from mu_addon.design.parameters import load_preset
@@ -21,7 +24,8 @@ from mu_addon.files import write_npz
 from mu_addon.meshing.mesh import mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.placement.candidates import candidates
+from mu_addon.placement.candidates import Candidate, candidates, roi, with_sensor
+from mu_addon.placement.whole import whole_body
 from mu_addon.study.cache import Cache
 from mu_addon.study.job import Job
 from mu_addon.study.motion import (
@@ -29,12 +33,14 @@ from mu_addon.study.motion import (
     MODEL_A,
     REGIONS,
     SENSITIVITY,
+    SurfaceFields,
     read_motion,
+    surface_of,
     write_model_a,
-    write_path,
     write_sensitivity,
 )
 from mu_addon.study.panel_pictures import ANGLE, delta_name, write_angle, write_delta
+from mu_addon.study.path_motion import keep_motion
 from mu_addon.study.point_cache import read_pc2, write_pc2
 from mu_addon.study.sweeping import Sweep
 
@@ -62,12 +68,18 @@ def study(tmp_path_factory):
     trajectory = simulate(Equilibrium(Model(mesh), materials), TIMES, PRESSURES)
     write_model_a(folder, mesh, materials, trajectory)
     write_sensitivity(folder, mesh, mesh.nodes[mesh.corners].mean(axis=1)[:, 2])
-    sweep = Sweep(JOB, Cache(folder / "cache"), mesh, JOBS, PRESSURES, "volume_fraction")
+    sweep, evaluations = swept(folder, mesh, mesh, trajectory, JOBS)
+    return folder, mesh, trajectory, sweep, evaluations
+
+
+def swept(folder, mesh, solved_on, trajectory, jobs):
+    """The sweep of some jobs on a mesh, the motion of its paths written, and its evaluations."""
+    sweep = Sweep(JOB, Cache(folder / "cache"), solved_on, jobs, PRESSURES, "volume_fraction")
     evaluations = sweep.evaluations(trajectory, lambda _: None)
     sweep.close()
-    for name, pressure_kPa, difference_mm in sweep.whole(trajectory):
-        write_path(folder, name, pressure_kPa, difference_mm)
-    return folder, mesh, trajectory, sweep, evaluations
+    of = SimpleNamespace(job=JOB, headline_rule="volume_fraction", mesh=mesh, folder=folder)
+    keep_motion(of, solved_on, trajectory, sweep, jobs)
+    return sweep, evaluations
 
 
 @pytest.fixture(scope="module")
@@ -140,6 +152,61 @@ def test_a_paths_motion_is_what_its_deviation_was_found_from(study, motion):
         assert apart.max() > 1e-3
     with pytest.raises(InputError, match="no motion of alpha99"):
         motion.displacement("alpha99")
+
+
+def test_stress_is_that_of_the_sensors_own_material(study):
+    """With one Poisson's ratio neo-Hookean stress goes as the modulus; without a sensor it is as it was."""
+    _, mesh, trajectory, *_ = study
+    materials, material = materials_of(UNIT, mesh), UNIT.material
+    nodes = {region: surface_of(mesh, number).node for region, number in REGIONS.items()}
+    looked, bent = SurfaceFields(mesh, nodes), [trajectory.states[-1].u]
+    before = looked.of_states(bent, materials)
+    share = (mesh.region == REGIONS["lattice"]).astype(float)
+    filled = looked.of_states(bent, with_sensor(materials, share, material.sensor_modulus_kPa / 1e3))
+    ratio = material.sensor_modulus_kPa / material.lattice_modulus_kPa
+    for field in FIELDS[:2]:
+        assert np.allclose(filled[f"lattice_{field}"], ratio * before[f"lattice_{field}"], rtol=1e-4)
+        assert np.array_equal(filled[f"membrane_{field}"], before[f"membrane_{field}"])
+
+
+def test_the_lattice_bears_more_where_the_sensor_is(study, motion):
+    _, mesh, *_ = study
+    path = max(PATHS, key=lambda c: c.length)
+    found = roi(mesh, path, UNIT.dimensions.inclusion_radius)
+    skin = motion.skin("lattice", True)
+    most = int(motion.state_kPa.argmax())
+    own, without = (motion.field(n, "lattice", "von_mises_kPa", skin)[most] for n in (path.name, MODEL_A))
+    near = np.isin(skin.node, mesh.tets[found.share > 0.1])
+    assert near.sum() > 10
+    assert np.median(own[near] / without[near]) > 1.1 > 1.02 > np.median(own[~near] / without[~near])
+
+
+def test_a_path_off_the_mirror_plane_moves_both_sides_apart(study, tmp_path):
+    """Solved on the whole body, shown by its half and the half's image: both are where the whole body is."""
+    _, mesh, trajectory, *_ = study
+    whole, there = whole_body(mesh, trajectory)
+    aside = Candidate("aside", 0, anchors(UNIT)[:4] + np.array([0.9 * UNIT.dimensions.cell, 0.0, 0.0]))
+    write_model_a(tmp_path, mesh, materials_of(UNIT, mesh), trajectory)
+    sweep, _ = swept(tmp_path, mesh, whole, there, [(aside, "volume_fraction")])
+    found = read_motion(tmp_path)
+    ((_, pressure_kPa, difference_mm),) = sweep.whole(there)
+    number = int(np.argmax(np.abs(pressure_kPa)))
+    state = int(np.flatnonzero(found.state_kPa == pressure_kPa[number])[0])
+    moved = whole.nodes + there.states[state].u + difference_mm[number]
+    skin = found.skin("lattice", False)
+    shown = skin.of_nodes(mesh.nodes) + skin.of_nodes(*found.sides("aside"))[state]
+    _, nearest = KDTree(whole.nodes).query(skin.of_nodes(mesh.nodes))
+    assert np.allclose(shown, moved[nearest], atol=1e-4)
+    own, image = found.sides("aside")
+    assert np.abs(own[state] - image[state]).max() > 1e-3, "not a mirror image of itself"
+    stress = found.field("aside", "lattice", "von_mises_kPa", skin)[state]
+    sided = [stress[skin.mirror == side].max() for side in (1, -1)]
+    assert abs(sided[0] / sided[1] - 1) > 0.05, "the sensor is on one side"
+    # An embedded body goes with its own side.
+    inside = whole.nodes[whole.tets[::50, :4]].mean(axis=1)
+    carried = found.embedding(inside)
+    weights = (there.states[state].u + difference_mm[number])[whole.tets[::50, :4]].mean(axis=1)
+    assert np.allclose(found.carried("aside", carried)[state], weights, atol=1e-4)
 
 
 def test_states_between_the_samples(motion):
