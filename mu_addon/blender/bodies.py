@@ -15,7 +15,6 @@ from ..errors import InputError
 from ..files import write_text
 
 ENVELOPE = "envelope"
-OBSTACLE = "obstacle:"
 FLAWS = "flaws"
 PARTS = (ENVELOPE, FLAWS)
 """Parts of a unit that are the user's, and that no rebuild removes."""
@@ -39,9 +38,9 @@ def of_object(obj: Any, root: Any) -> Body:
     return body_of(vertices @ to_unit[:3, :3].T + to_unit[:3, 3], triangles, obj.name)
 
 
-def examined(body: Body, d: Dimensions | None) -> list[Flaw]:
-    """Flaws of a body; those of its fit as an envelope, too, where dimensions are given."""
-    return flaws(body) or ([] if d is None else misfits(body, d))
+def examined(body: Body, d: Dimensions) -> list[Flaw]:
+    """Why a body cannot be the envelope of a unit of these dimensions."""
+    return flaws(body) or misfits(body, d)
 
 
 def envelope_in(root: Any, unit: Unit) -> Body | None:
@@ -68,28 +67,13 @@ def fingerprint(root: Any) -> str:
 
 
 def arguments(root: Any, unit: Unit, folder: Path) -> list[str]:
-    """Words of the command line that hand the user's envelope over, its file in `folder`.
-
-    Raises InputError where there are obstacles, which no simulation here knows, and OutputError.
-    """
-    names = [obj.name for obj in obstacles(root)]
-    if names:
-        raise InputError(
-            f"obstacles are not simulated yet: {', '.join(names)}",
-            "Lattice, Body of Your Own",
-            "take them out with Remove Body; what the unit would meet is left out of the answer then",
-        )
+    """Words of the command line that hand the user's envelope over, a file in `folder`; or OutputError."""
     body = envelope_in(root, unit)
     if body is None:
         return []
     path = folder / "body.obj"
     write_text(path, body.text())
     return ["--body", str(path)]
-
-
-def obstacles(root: Any) -> list[Any]:
-    """Objects that the user made obstacles of a unit."""
-    return [child for child in root.children if child.get("mu_part", "").startswith(OBSTACLE)]
 
 
 def _part(root: Any, name: str) -> Any:

@@ -6,11 +6,8 @@ from pathlib import Path
 
 import bpy
 
-from ..study.client import RUNNING
 from . import evidence, evidence_motion, simulation
-from .operators.acting import OnUnit
-from .panels import ended, running, wrapped
-from .unit_object import active_root
+from .panels import OfUnit, start, told, wrapped
 
 JOB = "evidence_"
 ROWS = 5
@@ -24,22 +21,13 @@ def spoken(name: str) -> str:
     return name.replace("_", " ")
 
 
-class MU_PT_evidence(OnUnit, bpy.types.Panel):
+class MU_PT_evidence(OfUnit, bpy.types.Panel):
     """Measured data against the simulation: what is wrong, why, and what mending it gains"""
 
     bl_idname = "MU_PT_evidence"
     bl_label = "Evidence"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "MU"
-    bl_parent_id = "MU_PT_unit"
-    bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        root = active_root(context)
+    def show(self, layout, context, root):
         layout.prop(root.mu_evidence, "folder")
         found = evidence.checked(root)
         if found is None:
@@ -55,15 +43,8 @@ class MU_PT_evidence(OnUnit, bpy.types.Panel):
             return
         _experiments(layout, context, root, found.measured)
         child = simulation.of(evidence.job(root))
-        if child is None or child.state != RUNNING:
-            row = layout.row()
-            row.scale_y = 1.4
-            row.operator("mu.evidence_diagnose", icon="VIEWZOOM")
-        if child is not None:
-            if child.state == RUNNING:
-                running(layout, child, JOB)
-            else:
-                ended(layout, child, "see below", JOB)
+        start(layout, child, "mu.evidence_diagnose", "VIEWZOOM")
+        told(layout, child, "see below", JOB)
         judged = evidence.said(root)
         if judged is None or not judged.name:
             wrapped(

@@ -42,17 +42,15 @@ FIELDS = (
         "mm",
         "Distance between the unit with the sensor and Model A, point by point",
     ),
-    Field(
-        "von_mises_kPa", "Von Mises Stress", "kPa", "Of Cauchy's stress, averaged at the nodes; of Model A"
-    ),
+    Field("von_mises_kPa", "Von Mises Stress", "kPa", "Of Cauchy's stress, averaged at the nodes"),
     Field(
         "largest_principal_stress_kPa",
         "Largest Principal Stress",
         "kPa",
-        "Of Cauchy's stress, tension positive, averaged at the nodes; of Model A",
+        "Of Cauchy's stress, tension positive, averaged at the nodes",
     ),
-    Field("largest_stretch", "Largest Stretch", "", "Largest principal stretch; of Model A"),
-    Field("smallest_stretch", "Smallest Stretch", "", "Smallest principal stretch; of Model A"),
+    Field("largest_stretch", "Largest Stretch", "", "Largest principal stretch"),
+    Field("smallest_stretch", "Smallest Stretch", "", "Smallest principal stretch"),
     Field(
         "dJ_by_modulus_mm_per_MPa",
         "Sensitivity dJ/dE",
@@ -94,6 +92,30 @@ def _make(name: str) -> Any:
     shader.inputs["Roughness"].default_value = 0.7
     made.diffuse_color = (0.13, 0.57, 0.55, 1.0)
     return made
+
+
+def legend_material_of(root: Any) -> Any:
+    """The material of a unit's legend in the scene: the field's ramp as it is now, by `share`, unlit."""
+    name = f"MU Legend {root.mu_unit.uuid[:8]}"
+    made = bpy.data.materials.get(name) or bpy.data.materials.new(name)
+    materials.shining(made)
+    tree = made.node_tree
+    share, ramp = tree.nodes.new("ShaderNodeAttribute"), tree.nodes.new("ShaderNodeValToRGB")
+    share.attribute_name, share.attribute_type = "share", "GEOMETRY"
+    _copy_ramp(material_of(root).node_tree.nodes["Ramp"].color_ramp, ramp.color_ramp)
+    tree.links.new(share.outputs["Fac"], ramp.inputs["Fac"])
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    tree.links.new(ramp.outputs["Color"], emission.inputs["Color"])
+    return made
+
+
+def _copy_ramp(source: Any, target: Any) -> None:
+    target.interpolation, target.color_mode = source.interpolation, source.color_mode
+    while len(target.elements) > 1:
+        target.elements.remove(target.elements[-1])
+    for number, element in enumerate(source.elements):
+        own = target.elements.new(element.position) if number else target.elements[0]
+        own.position, own.color = element.position, element.color
 
 
 def of_map(share: float) -> tuple[float, float, float, float]:

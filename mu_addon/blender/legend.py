@@ -1,6 +1,7 @@
 """What the colours of a motion mean, drawn over the viewport: ramp, values, unit, time and pressure.
 
-Names stand above what is shown. It is drawn with the viewport and is not part of a render.
+Names stand above what is shown. It is drawn with the viewport and is not part of a render; where the legend
+stands in the scene (`legend_object`), names alone are drawn.
 """
 
 from __future__ import annotations
@@ -40,6 +41,9 @@ def words(root: Any, motion: Any, scene: Any) -> list[str]:
     pressure = float(np.interp(time, motion.time_s, motion.pressure_kPa))
     found = [f"{field.label} [{field.unit}]" if field.unit else field.label]
     found.append(f"{np.clip(time, motion.time_s[0], motion.time_s[-1]):.2f} s, {pressure + 0.0:.1f} kPa")
+    for touch in studies.touches(root):
+        force = float(np.interp(time, touch.time_s, touch.force_N))
+        found.append(f"{touch.name}: {force:.2f} N")
     findings = studies.findings(root)
     if findings is None or findings.stale:
         found.append("stale: of other parameters")
@@ -58,17 +62,26 @@ def _draw() -> None:
     if motion is None:
         return
     scale = context.preferences.system.ui_scale
-    if any(root.mu_motion.field in part.data.attributes for part in shown):
-        _ramp(root, scale)
     size = round(12 * scale)
-    for line, text in enumerate(reversed(words(root, motion, context.scene))):
-        write(text, LEFT * scale, (BOTTOM + HEIGHT + 14) * scale + 1.5 * size * line, size)
+    in_scene = any(child.get(unit_object.LEGEND) and child.visible_get() for child in root.children)
+    if not in_scene:
+        left = _beside_tools(context.area) + LEFT * scale
+        if any(root.mu_motion.field in part.data.attributes for part in shown):
+            _ramp(root, scale, left)
+        for line, text in enumerate(reversed(words(root, motion, context.scene))):
+            write(text, left, (BOTTOM + HEIGHT + 14) * scale + 1.5 * size * line, size)
     _names(context, root, motion, size)
 
 
-def _ramp(root: Any, scale: float) -> None:
+def _beside_tools(area: Any) -> float:
+    """Width in pixels of the toolbar that lies over the viewport's left, 0 where there is none."""
+    tools = next((region for region in area.regions if region.type == "TOOLS"), None)
+    return 0.0 if tools is None or tools.width <= 1 else float(tools.width)
+
+
+def _ramp(root: Any, scale: float, left: float) -> None:
     settings = root.mu_motion
-    x0, x1 = LEFT * scale, (LEFT + WIDTH) * scale
+    x0, x1 = left, left + WIDTH * scale
     heights = (BOTTOM + HEIGHT * np.linspace(0.0, 1.0, PIECES + 1)) * scale
     corners = [(x, y) for y in heights for x in (x0, x1)]
     low, high = settings.low, settings.high

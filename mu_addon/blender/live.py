@@ -6,6 +6,7 @@ taken; handlers look for such units and rebuild them.
 
 from __future__ import annotations
 
+import time
 from contextlib import contextmanager
 
 import bpy
@@ -14,6 +15,7 @@ from bpy.app.handlers import persistent
 INTERVAL_S = 0.03
 
 _held = 0
+_flushed = 0.0
 _pending: set[str] = set()
 
 
@@ -28,6 +30,11 @@ def held():
         _held -= 1
 
 
+def holds() -> bool:
+    """Whether parameters are being set that must start no rebuild."""
+    return _held > 0
+
+
 def schedule(root) -> None:
     """Have the preview of a unit rebuilt soon; at once in background, where timers never fire."""
     if _held or not root.mu_unit.uuid:
@@ -37,7 +44,9 @@ def schedule(root) -> None:
         return
     _pending.add(root.mu_unit.uuid)
     if not bpy.app.timers.is_registered(_flush):
-        bpy.app.timers.register(_flush, first_interval=INTERVAL_S)
+        # The first change is followed at once, those that come after it while a slider moves at intervals.
+        wait = max(0.0, INTERVAL_S - (time.monotonic() - _flushed))
+        bpy.app.timers.register(_flush, first_interval=wait)
 
 
 def show(root) -> None:
@@ -51,6 +60,7 @@ def show(root) -> None:
 def _flush():
     from . import unit_object
 
+    global _flushed
     pending, names = set(_pending), []
     _pending.clear()
     # By UUID: undo may have deleted the object that asked, or brought back another in its place.
@@ -60,6 +70,7 @@ def _flush():
             names.append(root.name)
     if names:
         redraw()
+    _flushed = time.monotonic()
 
 
 def _rebuild(root) -> None:

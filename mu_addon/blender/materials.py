@@ -19,6 +19,9 @@ COLOURS = {
     "MU Model": (0.12, 0.45, 1.0, 1.0),
     "MU Extended Model": (0.05, 0.75, 0.35, 1.0),
     "MU Dial": (0.75, 0.75, 0.75, 1.0),
+    "MU Legend Text": (0.80, 0.80, 0.80, 1.0),
+    "MU Plate": (0.50, 0.53, 0.56, 1.0),
+    "MU Obstacle": (0.42, 0.36, 0.30, 1.0),
     "MU Twin": (0.05, 0.55, 0.28, 1.0),
     "MU Twin Waiting": (0.45, 0.45, 0.45, 1.0),
     "MU Out of Range": (0.85, 0.03, 0.03, 1.0),
@@ -35,6 +38,23 @@ def material(name: str):
         surface = found.node_tree.nodes.get("Principled BSDF") if found.node_tree else None
         if surface is not None:
             surface.inputs["Base Color"].default_value = COLOURS[name]
+    return found
+
+
+def unlit(name: str):
+    """As `material`, but it shines by itself, so that light does not change what its colour says."""
+    return bpy.data.materials.get(name) or shining(material(name))
+
+
+def shining(found):
+    """Turn a material's surface into a plain emission of its colour."""
+    if found.node_tree is None:  # before 5.0
+        found.use_nodes = True
+    nodes = found.node_tree.nodes
+    nodes.clear()
+    emission, output = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeOutputMaterial")
+    emission.inputs["Color"].default_value = found.diffuse_color
+    found.node_tree.links.new(emission.outputs["Emission"], output.inputs["Surface"])
     return found
 
 

@@ -41,6 +41,7 @@ class MU_MT_presets_remove(bpy.types.Menu):
 
 def _add(self, context):
     self.layout.operator("mu.add", icon="OUTLINER_OB_LATTICE")
+    self.layout.operator("mu.gripper_add", icon="MOD_MIRROR")
 
 
 class MU_MT_more(bpy.types.Menu):
@@ -52,6 +53,7 @@ class MU_MT_more(bpy.types.Menu):
     def draw(self, context):
         layout = self.layout
         layout.operator("mu.sample", icon="SCENE_DATA")
+        layout.operator("mu.gripper_add", text="Gripper of This Unit", icon="MOD_MIRROR").of_unit = True
         layout.operator_menu_enum("mu.skin", "group", text="Skin with Nodes", icon="GEOMETRY_NODES")
         layout.separator()
         layout.operator("mu.assets", icon="ASSET_MANAGER")

@@ -17,7 +17,7 @@ from bpy.app.handlers import persistent
 
 from ..errors import InputError
 from ..study.motion import FIELDS, FOLDER, MODEL_A, PLAYED, REGIONS, SENSITIVITY, Motion, Skin, read_motion
-from ..study.point_cache import write_pc2
+from ..study.point_cache import read_pc2, write_pc2
 from . import fields, preview, studies, unit_object
 from .properties import to_unit
 from .unit_object import MOTION
@@ -131,7 +131,7 @@ def _show_region(root: Any, motion: Motion, name: str, region: str) -> None:
     skin = motion.skin(region, cut)
     rest = skin.of_nodes(motion.mesh.nodes)
     file = motion.folder / PLAYED / f"{name}-{region}{'-cut' if cut else ''}.pc2"
-    _write_cache(file, motion, rest, skin.of_nodes(motion.displacement(name)))
+    _write_cache(file, motion, rest, skin.of_nodes(*motion.sides(name)))
     part = _part(root, name, region)
     preview.write(part.data, preview.Skeleton(rest, faces=(skin.triangles,)))
     _play(part, motion, file)
@@ -152,8 +152,7 @@ def _show_print(root: Any, motion: Motion, name: str) -> None:
         root.mu_unit.show = "preview"
     rest = vertices_of(solid.data)
     carried = motion.embedding(rest)
-    moved = np.array([carried.displacement(u) for u in motion.displacement(name)], np.float32)
-    still = np.array([carried.displacement(u) for u in motion.model_a], np.float32)
+    moved, still = (motion.carried(whose, carried) for whose in (name, MODEL_A))
     file = motion.folder / PLAYED / f"{name}-{PRINT}.pc2"
     _write_cache(file, motion, rest, moved)
     part = _part(root, name, PRINT)
@@ -203,24 +202,34 @@ def _write_cache(file: Path, motion: Motion, rest: Any, displacement: Any) -> No
 
 def _play(part: Any, motion: Motion, file: Path) -> None:
     """Have an object play a point cache of its vertices."""
+    play(part, file, float(motion.time_s[1] - motion.time_s[0]))
+
+
+def play(part: Any, file: Path, step_s: float) -> None:
+    """Have an object play a point cache of its vertices, samples `step_s` apart, in its own time."""
     modifier = part.modifiers.get("Motion") or part.modifiers.new("Motion", "MESH_CACHE")
     modifier.cache_format = "PC2"
     modifier.filepath = studies.relative(file)
     modifier.time_mode = "FRAME"
     modifier.play_mode = "SCENE"
     modifier.interpolation = "LINEAR"
-    _keep_time(part, motion, bpy.context.scene)
+    _keep_time(part, step_s, bpy.context.scene)
 
 
-def _keep_time(part: Any, motion: Motion, scene: Any) -> None:
-    """Have a part play the protocol in its own time at the scene's frame rate.
+def step_of(file: Path) -> float:
+    """Time in s between the samples of a point cache; raises InputError."""
+    return read_pc2(file)[2]
+
+
+def _keep_time(part: Any, step_s: float, scene: Any) -> None:
+    """Have a part play its cache in its own time at the scene's frame rate.
 
     Blender takes sample number `frame_scale` frame - `frame_start`; its mode in seconds divides by the rate
     twice.
     """
     modifier = part.modifiers.get("Motion")
     rate = scene.render.fps / scene.render.fps_base
-    samples = 1.0 / (rate * float(motion.time_s[1] - motion.time_s[0]))
+    samples = 1.0 / (rate * step_s)
     wanted = np.float32(samples), np.float32(samples * scene.frame_start)
     if modifier is not None and (modifier.frame_scale, modifier.frame_start) != wanted:
         modifier.frame_scale, modifier.frame_start = wanted
@@ -247,11 +256,13 @@ def _distances(moved: Any, still: Any) -> dict[str, Any]:
 
 def _fields_of(motion: Motion, name: str, region: str, skin: Skin) -> dict[str, Any]:
     still = skin.of_nodes(motion.model_a)
-    found = _distances(skin.of_nodes(motion.displacement(name)), still)
-    if name == MODEL_A:
-        found |= {field: motion.fields[region][field][:, skin.place] for field in FIELDS}
-        if region in motion.sensitivity:
-            found[SENSITIVITY] = motion.sensitivity[region][skin.place]
+    found = _distances(skin.of_nodes(*motion.sides(name)), still)
+    for field in FIELDS:
+        values = motion.field(name, region, field, skin)
+        if values is not None:
+            found[field] = values
+    if name == MODEL_A and region in motion.sensitivity:
+        found[SENSITIVITY] = motion.sensitivity[region][skin.place]
     return found
 
 
@@ -280,11 +291,10 @@ def _replayed(root: Any, part: Any, motion: Motion) -> Played | None:
     if kept is None or kept.motion is not motion:
         carried = motion.embedding(vertices_of(part.data))
         try:
-            moved = motion.displacement(_what(part)[0])
+            moved, still = (motion.carried(whose, carried) for whose in (_what(part)[0], MODEL_A))
         except InputError:
             return None
-        both = (np.array([carried.displacement(u) for u in us], np.float32) for us in (moved, motion.model_a))
-        kept = _prints[key] = Played(motion, _distances(*both))
+        kept = _prints[key] = Played(motion, _distances(moved, still))
     return kept
 
 
@@ -303,7 +313,10 @@ def refresh(root: Any) -> None:
 
 def colour(root: Any) -> None:
     """Write the fields of the scene's frame, and their colours by the range as it is."""
+    from . import legend_object
+
     _write(root, bpy.context.scene)
+    legend_object.update(root)
     field = root.mu_motion.field
     fields.paint(root, [(part, field in part.data.attributes) for part in parts(root)])
 
@@ -327,7 +340,7 @@ def _write(root: Any, scene: Any) -> None:
         found = played(root, part)
         if found is None:
             continue
-        _keep_time(part, found.motion, scene)
+        _keep_time(part, float(found.motion.time_s[1] - found.motion.time_s[0]), scene)
         first, second, share = found.motion.at(time_of(found.motion, scene))
         for name, values in found.fields.items():
             now = values if values.ndim == 1 else (1 - share) * values[first] + share * values[second]

@@ -11,7 +11,7 @@ from ..design.parameters import SECTIONS
 from ..design.quantity import describe
 from ..study.client import CANCELLED, DONE, FAILED, RUNNING
 from ..study.progress import spell
-from . import bodies, simulation, studies, unit_object
+from . import bodies, gripper_object, simulation, studies, unit_object
 from .operators.acting import NO_UNIT
 from .operators.path import selected_candidate
 from .operators.unit import in_millimetres
@@ -48,34 +48,46 @@ def parameters(layout, props, place: str) -> None:
                 column.prop(group, d.name)
 
 
-class _Panel:
+class InTab:
+    """A panel in the sidebar tab MU."""
+
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "MU"
 
 
-class OfUnit(_Panel):
-    """A panel of the active unit; `show(layout, context, root)` fills it."""
-
-    bl_parent_id = "MU_PT_unit"
-    bl_options = {"DEFAULT_CLOSED"}
+class OfOne(InTab):
+    """A panel of what `seek` finds active; `show(layout, context, root)` fills it."""
 
     @classmethod
     def poll(cls, context):
-        return unit_object.active_root(context) is not None
+        return cls.seek(context) is not None
 
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        self.show(layout, context, unit_object.active_root(context))
+        self.show(layout, context, self.seek(context))
 
 
-class MU_PT_unit(_Panel, bpy.types.Panel):
+class OfUnit(OfOne):
+    """A panel of the active unit."""
+
+    bl_parent_id = "MU_PT_unit"
+    bl_options = {"DEFAULT_CLOSED"}
+    seek = staticmethod(unit_object.active_root)
+
+
+class MU_PT_unit(InTab, bpy.types.Panel):
     """The unit that is worked on"""
 
     bl_idname = "MU_PT_unit"
     bl_label = "Monolithic Unit"
+
+    @classmethod
+    def poll(cls, context):
+        # Where only a gripper is there, its own panel has the word.
+        return unit_object.active_root(context) is not None or gripper_object.active(context) is None
 
     def draw(self, context):
         layout = self.layout
@@ -133,11 +145,8 @@ class MU_PT_lattice(OfUnit, bpy.types.Panel):
         if body:
             row = body.row(align=True)
             row.operator("mu.body_check", icon="VIEWZOOM")
-            row.operator("mu.body", text="Use as Envelope", icon="MESH_MONKEY").role = "envelope"
-            body.operator("mu.body", text="Use as Obstacle").role = "obstacle"
-            for obstacle in bodies.obstacles(root):
-                wrapped(body, f"Obstacle: {obstacle.name}, shown and not simulated", "ERROR")
-            if envelope is not None or bodies.obstacles(root) or unit_object.part(root, bodies.FLAWS):
+            row.operator("mu.body", icon="MESH_MONKEY")
+            if envelope is not None or unit_object.part(root, bodies.FLAWS):
                 body.operator("mu.body_remove", icon="X")
 
 
@@ -193,15 +202,13 @@ class MU_PT_simulate(OfUnit, bpy.types.Panel):
             )
         study = root.mu_unit.study
         layout.prop(study, "command")
+        if study.command == "place":
+            layout.prop(study, "paths")
         layout.prop(study, "detail")
         layout.prop(study, "protocol")
         child = simulation.of(root.mu_unit.uuid)
-        if child is None or child.state != RUNNING:
-            row = layout.row()
-            row.scale_y = 1.4
-            row.operator("mu.simulate", icon="PLAY")
-        if child is not None:
-            running(layout, child) if child.state == RUNNING else ended(layout, child, "see Results")
+        start(layout, child, "mu.simulate", "PLAY")
+        told(layout, child, "see Results")
         others = [uuid for uuid in simulation.running() if uuid != root.mu_unit.uuid]
         if others:
             wrapped(layout, f"{len(others)} other simulation(s) running", "INFO")
@@ -212,8 +219,25 @@ class MU_PT_simulate(OfUnit, bpy.types.Panel):
             body.prop(study, "folder")
 
 
-def running(layout, child, job: str = "") -> None:
-    """Stage, time left and Cancel of a child; `job` begins the names of its operators."""
+def start(layout, child, operator: str, icon: str) -> None:
+    """The button that starts a job, unless its child runs."""
+    if child is None or child.state != RUNNING:
+        row = layout.row()
+        row.scale_y = 1.4
+        row.operator(operator, icon=icon)
+
+
+def told(layout, child, where: str, job: str = "") -> None:
+    """What a job's child says, if there is one, while it runs and when it has ended.
+
+    where: where its results are shown; job: what the names of its operators begin with.
+    """
+    if child is not None:
+        _running(layout, child, job) if child.state == RUNNING else _ended(layout, child, where, job)
+
+
+def _running(layout, child, job: str) -> None:
+    """Stage, time left and Cancel of a child."""
     fraction = child.progress.get("fraction")
     text = "stopping ..." if child.stopping else simulation.spell_left(child)
     layout.progress(factor=fraction or 0.0, text=text)
@@ -226,8 +250,8 @@ def running(layout, child, job: str = "") -> None:
         wrapped(layout, warning, "ERROR")
 
 
-def ended(layout, child, where: str, job: str = "") -> None:
-    """How a child ended, and where its results are shown; see `running`."""
+def _ended(layout, child, where: str, job: str) -> None:
+    """How a child ended, and where its results are shown."""
     box = layout.box()
     if child.state == DONE:
         wrapped(box, f"Done in {spell(child.seconds)}: {where}", "CHECKMARK")
@@ -271,6 +295,14 @@ class MU_PT_results(OfUnit, bpy.types.Panel):
         for pressure, angle in found.angles:
             if pressure in (found.angles[0][0], found.angles[-1][0]):
                 column.label(text=f"{angle:+.1f} deg at {pressure:g} kPa")
+        for touch in studies.touches(root):
+            most = int(touch.force_N.argmax())
+            words = (
+                f"{touch.force_N[most]:.2f} N at {touch.time_s[most]:.1f} s"
+                if touch.force_N[most]
+                else "not met"
+            )
+            column.label(text=f"{touch.name}: {words}", icon="CUBE")
         ranking = found.ranking(found.rule)
         if ranking:
             best, j = ranking[0]
@@ -282,6 +314,13 @@ class MU_PT_results(OfUnit, bpy.types.Panel):
                 column.label(text="It is the chosen one", icon="CHECKMARK")
             elif not found.stale:
                 layout.operator("mu.path", text=f"Use {best}", icon="CON_FOLLOWPATH").name = best
+        search = found.summary.get("search")
+        if search:
+            best = search["best"]
+            column.label(text=f"Whole lattice: {best['name']}, J {best['J_hat_mm']:.4f} mm")
+            column.label(
+                text=f"{best['length_mm']:.0f} mm long, {search['checked']} of {search['paths']} solved"
+            )
         row = layout.row(align=True)
         row.operator("mu.open", text="Report", icon="URL").what = "report"
         row.operator("mu.open", text="Folder", icon="FILE_FOLDER").what = "folder"

@@ -9,7 +9,7 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..design.anchors import anchors, windows
 from ..design.block import FACES
@@ -28,6 +28,7 @@ ALONG_STRUT = 4
 LADDER_STEP = 0.45
 """Distance, in cells, between candidate paths drawn side by side outside the lattice."""
 _CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+_CUBE_FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
 _CUBE_EDGES = np.array([[a, b] for a in range(8) for b in range(a) if np.abs(_CUBE[a] - _CUBE[b]).sum() == 1])
 
 
@@ -146,6 +147,23 @@ def candidates(unit: Unit) -> dict[str, Skeleton]:
         edges = _polylines(1, len(points))
         found[window.name] = Skeleton(points, edges, attributes={"radius": radius}, inputs=name)
     return found
+
+
+def box(low: ArrayLike, high: ArrayLike) -> Skeleton:
+    """A box between two corners (3,) in mm, its faces outward."""
+    corners = np.asarray(low, float) + (np.asarray(high, float) - np.asarray(low, float)) * _CUBE
+    return Skeleton(corners, faces=(_CUBE_FACES,))
+
+
+def free_path(points: Floats, name: str, cell: float) -> Skeleton:
+    """A path through any nodes of the lattice, points (h, 3) in mm, where it lies, and its name."""
+    at = (float(points[0, 0]) + 0.3 * cell, float(points[0, 1]) + 0.15 * cell, float(points[0, 2]))
+    return Skeleton(
+        points,
+        _polylines(1, len(points)),
+        attributes={"radius": np.full(len(points), 0.1 * cell)},
+        inputs={"Label": name, "At": at, "Size": 0.3 * cell},
+    )
 
 
 def _polylines(count: int, points: int) -> Integers:

@@ -7,9 +7,9 @@ import math
 
 import bpy
 
-from ..study.client import FAILED, RUNNING
+from ..study.client import FAILED
 from . import printing, simulation, unit_object
-from .panels import OfUnit, ended, parameters, running, wrapped
+from .panels import OfUnit, parameters, told, wrapped
 
 JOB = "print_"
 ICONS = {"error": "CANCEL", "warning": "ERROR", "info": "INFO", "pass": "CHECKMARK"}
@@ -35,18 +35,16 @@ class MU_PT_print(OfUnit, bpy.types.Panel):
         else:
             _gates(layout, root, solid)
         child = simulation.of(printing.job(root))
-        if child is None:
-            return
-        if child.state == RUNNING:
-            running(layout, child, JOB)
-        elif child.state == FAILED and (child.error or {}).get("status") == NOT_PRINTABLE:
+        refused = child is not None and child.state == FAILED
+        if refused and (child.error or {}).get("status") == NOT_PRINTABLE:
             box = layout.box()
             box.alert = True
             wrapped(box, "Checked: do not print it, see Check", "ERROR")
             box.operator("mu.print_dismiss")
         else:
             where = {printing.CHECK: "see Check", printing.EXPORT: "see Files"}
-            ended(layout, child, where.get(child.folder.parent.name, "its folder opens below"), JOB)
+            name = child.folder.parent.name if child is not None else ""
+            told(layout, child, where.get(name, "its folder opens below"), JOB)
 
 
 def _gates(layout, root, solid) -> None:

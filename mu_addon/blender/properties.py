@@ -104,6 +104,18 @@ class MU_PG_study(bpy.types.PropertyGroup):
         ],
         default="place",
     )
+    paths: EnumProperty(
+        name="Paths",
+        description="Which sensor paths are ranked",
+        items=[
+            ("windows", "Along the Anchors", "Paths through neighbouring anchors, alpha1 and on"),
+            (
+                "graph",
+                "Whole Lattice",
+                "Besides, the path along any struts that disturbs the motion least: minutes to hours more",
+            ),
+        ],
+    )
     detail: EnumProperty(
         name="Detail",
         description="How fine the mesh is, and of which order its elements",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
+import numpy as np
 
 from . import fields, studies
 from .compat import set_modifier_input
@@ -16,6 +17,13 @@ def ranked(root: Any) -> dict[str, tuple[float, int]]:
     if found is None or found.stale:
         return {}
     return {name: (j, rank) for rank, (name, j) in enumerate(found.ranking(found.rule), 1)}
+
+
+def free(root: Any) -> tuple[str, float, Any] | None:
+    """Name, J_hat in mm and points (h, 3) in mm of the whole lattice's best path; None if not known."""
+    found = studies.findings(root)
+    best = None if found is None or found.stale else (found.summary.get("search") or {}).get("best")
+    return (best["name"], best["J_hat_mm"], np.array(best["points_mm"])) if best else None
 
 
 def dress(root: Any, candidates: dict[str, Any]) -> None:

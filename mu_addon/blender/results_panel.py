@@ -8,7 +8,7 @@ import bpy
 
 from ..study.motion import FOLDER, MODEL_A
 from ..study.panel_pictures import ANGLE, delta_name
-from . import fields, motion_parts, studies, thumbnails, unit_object
+from . import fields, legend_object, motion_parts, studies, thumbnails, unit_object
 from .operators.motion import NO_MOTION
 from .panels import OfUnit, wrapped
 
@@ -91,7 +91,11 @@ class MU_PT_field(_OfResults, bpy.types.Panel):
         row.prop(settings, "lock", toggle=True, icon="LOCKED" if settings.lock else "UNLOCKED", text="Lock")
         row.prop(settings, "symmetric", toggle=True)
         row.operator("mu.motion_range", text="Fit")
-        layout.prop(settings, "legend")
+        row = layout.row(align=True)
+        row.use_property_split = False
+        row.prop(settings, "legend", toggle=True)
+        there = legend_object.bar_of(root) is not None
+        row.operator("mu.motion_legend", text="In Renders", icon="RENDER_STILL", depress=there).on = not there
 
 
 class MU_PT_pictures(_OfResults, bpy.types.Panel):

@@ -38,7 +38,7 @@ def build(context: Any) -> list[Any]:
     body.select_set(True)
     context.view_layer.objects.active = bodied
     context.view_layer.update()
-    bpy.ops.mu.body(role="envelope")
+    bpy.ops.mu.body()
     _curve(context, cursor + _beside(3))
     context.view_layer.objects.active = whole
     return roots

@@ -7,11 +7,9 @@ from math import isfinite
 
 import bpy
 
-from ..study.client import FAILED, RUNNING
+from ..study.client import FAILED
 from . import sensor, simulation, studies, twin
-from .operators.acting import OnUnit
-from .panels import ended, running, wrapped
-from .unit_object import active_root
+from .panels import OfUnit, told, wrapped
 
 LOSSES = {
     "lost": "lost",
@@ -34,27 +32,18 @@ STATES = {
 }
 
 
-class MU_PT_sensor(OnUnit, bpy.types.Panel):
+class MU_PT_sensor(OfUnit, bpy.types.Panel):
     """The real sensor: connect, record, calibrate, and bend the twin by it"""
 
     bl_idname = "MU_PT_sensor"
     bl_label = "Sensor"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "MU"
-    bl_parent_id = "MU_PT_unit"
-    bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+    def show(self, layout, context, root):
         missing = sensor.missing()
         if missing:
             box = layout.box()
             wrapped(box, f"Not in this Blender: {', '.join(missing)}. Install the built extension", "ERROR")
             return
-        root = active_root(context)
         session = sensor.of(root)
         if session is None or not session.running:
             _source(layout, root.mu_sensor)
@@ -184,10 +173,7 @@ def _calibration(layout, root, session):
     body.prop(settings, "channel", placeholder=light)
     body.prop(settings, "dark", placeholder=str(dark))
     body.prop(settings, "calibration")
-    child = simulation.of(sensor.calibrating(root))
-    if child is not None:
-        job = "sensor_"
-        running(body, child, job) if child.state == RUNNING else ended(body, child, "it is applied", job)
+    told(body, simulation.of(sensor.calibrating(root)), "it is applied", "sensor_")
     guide = session.guide if session is not None and session.running else None
     if guide is None:
         column = body.column(align=True)

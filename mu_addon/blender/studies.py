@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import json
 import re
@@ -10,15 +11,22 @@ from typing import Any
 
 import attrs
 import bpy
+import numpy as np
 
 from ..design.parameters import read_unit
+from ..design.rigid_body import read_rigid_bodies
 from ..errors import MuError
-from . import bodies
+from ..study import study_file
+from ..study.client import ERRORS
+from . import bodies, obstacles
 from .compat import user_folder
 from .properties import to_unit
 
 LOG = "log.ndjson"
 REPORT = "report.html"
+CONTACT = "contact.csv"
+FILES = {"report": REPORT, "log": LOG, "errors": f"blender/{ERRORS}", "folder": ""}
+"""What a job that was started here leaves in its folder, the folder itself last, by what it is asked for."""
 
 
 @attrs.frozen
@@ -57,9 +65,14 @@ class Findings:
 def folder_of(root: Any) -> Path:
     """Folder of the unit's study: the one it names, else beside the .blend file, else the user's own."""
     props = root.mu_unit
-    if props.study.folder:
-        return Path(bpy.path.abspath(props.study.folder))
-    name = f"{re.sub(r'[^A-Za-z0-9._-]+', '-', props.title).strip('-.') or 'unit'}-{props.uuid[:8]}"
+    return place_of(props.study.folder, props.title, props.uuid)
+
+
+def place_of(named: str, title: str, uuid: str) -> Path:
+    """The folder that is named, else one for a title beside the .blend file, else in the user's own."""
+    if named:
+        return Path(bpy.path.abspath(named))
+    name = f"{re.sub(r'[^A-Za-z0-9._-]+', '-', title).strip('-.') or 'unit'}-{uuid[:8]}"
     if bpy.data.filepath:
         blend = Path(bpy.data.filepath)
         return blend.with_name(f"{blend.stem}.mu") / name
@@ -74,7 +87,7 @@ def settle(root: Any) -> Path:
     return folder
 
 
-_read: dict[Path, tuple[tuple[float, float], dict[str, Any], str]] = {}
+_read: dict[Path, tuple[tuple[float, float], dict[str, Any], Any]] = {}
 
 
 def findings(root: Any) -> Findings | None:
@@ -88,7 +101,7 @@ def findings(root: Any) -> Findings | None:
     if kept is None or kept[0] != times:
         try:
             summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-            inputs = read_unit(folder / "unit.toml").hash(), _body_hash(folder)
+            inputs = read_unit(folder / "unit.toml").hash(), _body_hash(folder), _obstacles(folder)
             kept = times, summary if isinstance(summary, dict) else {}, inputs
         except (OSError, ValueError, MuError):
             return None
@@ -96,7 +109,7 @@ def findings(root: Any) -> Findings | None:
     try:
         unit = to_unit(root.mu_unit)
         body = bodies.envelope_in(root, unit)
-        stale = (unit.hash(), "" if body is None else body.hash) != kept[2]
+        stale = (unit.hash(), "" if body is None else body.hash, obstacles.given(root)) != kept[2]
     except MuError:
         stale = True
     return Findings(folder, str(kept[1].get("status", "")), stale, kept[1])
@@ -108,6 +121,53 @@ def _body_hash(folder: Path) -> str:
         return hashlib.sha256((folder / "body.obj").read_bytes()).hexdigest()
     except OSError:
         return ""
+
+
+@attrs.frozen(eq=False)
+class Touch:
+    """Force (k,) in N of a study's unit on one obstacle at times (k,) in s, friction and all."""
+
+    name: str
+    time_s: Any
+    force_N: Any
+
+
+_touches: dict[Path, tuple[float, list[Touch]]] = {}
+
+
+def touches(root: Any) -> list[Touch]:
+    """What the study's unit met, and how hard it pressed; empty where it met nothing."""
+    path = folder_of(root) / CONTACT
+    try:
+        time = path.stat().st_mtime
+    except OSError:
+        return []
+    kept = _touches.get(path)
+    if kept is None or kept[0] != time:
+        try:
+            kept = _touches[path] = time, _read_touches(path)
+        except (OSError, ValueError, KeyError):
+            return []
+    return kept[1]
+
+
+def _read_touches(path: Path) -> list[Touch]:
+    with path.open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    found: dict[str, list[tuple[float, float]]] = {}
+    for row in rows:
+        force = np.linalg.norm([float(row[f"force_{axis}_N"]) for axis in "xyz"])
+        found.setdefault(Path(row["obstacle"]).stem, []).append((float(row["time_s"]), float(force)))
+    return [Touch(name, *np.array(values).T) for name, values in found.items()]
+
+
+def _obstacles(folder: Path) -> list[tuple[str, float]]:
+    """Obstacles that a study was made with, as `obstacles.given` has them; raises InputError."""
+    asked = (study_file.read(folder) or {}).get("simulate", {})
+    if "obstacles" not in asked:
+        return []
+    met = read_rigid_bodies(folder / study_file.FILES["obstacles"], asked.get("friction"))
+    return sorted((rigid.body.hash, rigid.friction) for rigid in met)
 
 
 def relative(path: Path) -> str:

@@ -32,9 +32,13 @@ EVIDENCE = "mu_evidence_part"
 """Marks the parts that show measured motion, see `evidence_motion`."""
 CHECK = "mu_check"
 """Marks the objects that show what a print check found, see `printing`."""
+LEGEND = "mu_legend"
+"""Marks the objects of a legend in the scene, see `legend_object`."""
 TWIN = "mu_twin"
 """Marks the parts that move as the real unit does, see `twin`."""
 CANDIDATE = "candidate:"
+FREE = "free"
+"""The best path of the whole lattice, where a study has looked for it."""
 SOLID = "solid"
 
 
@@ -73,37 +77,48 @@ def part(root: Any, name: str) -> Any | None:
 
 def create(context: Any, unit: Unit) -> Any:
     """A new unit at the 3D cursor of the scene, with its preview, selected and active."""
-    root = bpy.data.objects.new("Monolithic Unit", None)
-    root.empty_display_type = "ARROWS"
-    root.empty_display_size = unit.dimensions.cell
-    context.collection.objects.link(root)
-    root.location = context.scene.cursor.location
+    root = new_root(context, "Monolithic Unit", unit.dimensions.cell)
     with held():
         root.mu_unit.uuid = uuid.uuid4().hex
         stack.fill(root.mu_unit)
         from_unit(root.mu_unit, unit)
     rebuild(root)
+    make_active(context, root)
+    return root
+
+
+def new_root(context: Any, title: str, size: float) -> Any:
+    """A root object, to hold parameters and parts, at the scene's 3D cursor; size in mm of its axes."""
+    root = bpy.data.objects.new(title, None)
+    root.empty_display_type = "ARROWS"
+    root.empty_display_size = size
+    context.collection.objects.link(root)
+    root.location = context.scene.cursor.location
+    return root
+
+
+def make_active(context: Any, obj: Any) -> None:
+    """Select an object, alone, and make it the active one."""
     for other in context.selected_objects:
         other.select_set(False)
-    root.select_set(True)
-    context.view_layer.objects.active = root
-    return root
+    obj.select_set(True)
+    context.view_layer.objects.active = obj
 
 
 def delete(root: Any) -> None:
     """Remove a unit with all its parts."""
     for child in root.children_recursive:
-        if any(child.get(mark) for mark in (PART, MOTION, EVIDENCE, CHECK, TWIN)):
+        if any(child.get(mark) for mark in (PART, MOTION, EVIDENCE, CHECK, TWIN, LEGEND)):
             remove_part(child)
     bpy.data.objects.remove(root)
 
 
 def remove_part(obj: Any) -> None:
-    """Remove a part and, where nothing else uses it, its mesh."""
-    mesh = obj.data
+    """Remove a part and, where nothing else uses it, its mesh or text."""
+    data = obj.data
     bpy.data.objects.remove(obj)
-    if mesh is not None and not mesh.users:
-        bpy.data.meshes.remove(mesh)
+    if data is not None and not data.users:
+        (bpy.data.curves if isinstance(data, bpy.types.Curve) else bpy.data.meshes).remove(data)
 
 
 def chosen_window(root: Any, unit: Unit) -> Window | None:
@@ -156,7 +171,7 @@ def _fingerprint(root: Any) -> str:
     except InputError as error:
         return error.what
     steps = "".join(f"{entry.name}{entry.muted:d}{entry.shown:d}" for entry in props.stack)
-    known = ranking.ranked(root) if props.candidates else {}
+    known = (ranking.ranked(root), ranking.free(root)) if props.candidates else ()
     shown = unit.hash(), props.path, props.cut, props.candidates, steps, bodies.fingerprint(root), known
     return "|".join(map(str, shown))
 
@@ -176,6 +191,10 @@ def _draw(root: Any, unit: Unit) -> None:
         if props.candidates:
             paths = preview.candidates(unit)
             shapes |= {CANDIDATE + name: skeleton for name, skeleton in paths.items()}
+            free = ranking.free(root)
+            if free is not None:
+                name, _, points = free
+                shapes[FREE] = preview.free_path(points, name, unit.dimensions.cell)
     finally:
         for name, skeleton in shapes.items():
             _put(root, name, skeleton)
@@ -183,7 +202,7 @@ def _draw(root: Any, unit: Unit) -> None:
         ranking.dress(root, tubes)
         for child in list(root.children):
             name = child.get(PART)
-            if name not in (None, SOLID, *bodies.PARTS, *shapes) and not name.startswith(bodies.OBSTACLE):
+            if name not in (None, SOLID, *bodies.PARTS, *shapes):
                 remove_part(child)
     show_parts(root)
 
@@ -214,6 +233,7 @@ _LOOKS = {
     "cells": ("Cells", ("MU Lattice",), ""),
     "trim": ("Strut Axes", ("MU Lattice",), ""),
     "path": ("Path", ("MU Waveguide",), ""),
+    FREE: ("Free Path", ("MU Waveguide",), "MU Labelled Tube"),
     bodies.ENVELOPE: ("Envelope", ("MU Lattice",), ""),
     bodies.FLAWS: ("Flaws", ("MU Flaws",), "MU Balls"),
     SOLID: ("Solid", ("MU Solid",), ""),
@@ -234,6 +254,18 @@ def _put(root: Any, name: str, skeleton: preview.Skeleton) -> None:
     if name.startswith(CANDIDATE):
         chosen = name == CANDIDATE + root.mu_unit.path
         obj.data.materials[0] = materials.material("MU Waveguide" if chosen else "MU Candidate")
+    _skin(obj, group, skeleton)
+
+
+def draw_part(obj: Any, name: str, skeleton: preview.Skeleton) -> None:
+    """Draw a skeleton as the part of that name looks, on any object with a mesh of its own."""
+    _, colours, group = _LOOKS[name]
+    preview.write(obj.data, skeleton, smooth=name != "waveguide")
+    materials.assign(obj.data, *colours)
+    _skin(obj, group, skeleton)
+
+
+def _skin(obj: Any, group: str, skeleton: preview.Skeleton) -> None:
     if not skeleton.attributes:
         obj.modifiers.clear()  # struts without thickness stay lines
     elif group:
@@ -287,21 +319,20 @@ def solid_of(root: Any, unit: Unit, quality: str = "interactive") -> Solid:
     return solid
 
 
-def put_body(root: Any, name: str, body: Body) -> Any:
-    """Keep a body of the user's as a part of the unit: a wire, and hidden where the lattice shows it."""
-    obj = part(root, name) or _new_part(root, name, body.name)
+def put_envelope(root: Any, body: Body) -> Any:
+    """Keep a body of the user's as the unit's envelope: a wire, hidden, since the lattice shows it."""
+    obj = part(root, bodies.ENVELOPE) or _new_part(root, bodies.ENVELOPE, body.name)
     preview.write(obj.data, preview.Skeleton(body.vertices, faces=(body.triangles,)), smooth=False)
     obj.display_type = "WIRE"
     obj.hide_render = True
-    obj.hide_set(name == bodies.ENVELOPE)
+    obj.hide_set(True)
     return obj
 
 
 def remove_bodies(root: Any) -> None:
-    """Take every body of the user's out of the unit, and the marks of flaws."""
+    """Take the user's envelope out of the unit, and the marks of flaws."""
     for child in list(root.children):
-        name = child.get(PART, "")
-        if name in bodies.PARTS or name.startswith(bodies.OBSTACLE):
+        if child.get(PART, "") in bodies.PARTS:
             remove_part(child)
 
 

@@ -89,6 +89,32 @@ bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
 (root,) = unit_object.roots()
 assert len(studies.findings(root).ranking("volume_fraction")) == 10
 
+# Something in the way, and the gripper to print; the active object says which is worked on.
+assert bpy.ops.mu.add(preset="mu-0.75x") == {"FINISHED"}
+stopped = unit_object.active_root(bpy.context)
+stopped.mu_unit.study.command, stopped.mu_unit.study.detail = "simulate", "quick"
+assert bpy.ops.mu.obstacle_box(size=(20, 12, 12), gap=0.6) == {"FINISHED"}
+bpy.context.view_layer.update()
+assert bpy.ops.mu.simulate() == {"FINISHED"}
+child = simulation.of(stopped.mu_unit.uuid)
+watch(child)
+assert child.state == child_module.DONE, child.error
+(touch,) = studies.touches(stopped)
+assert touch.force_N.max() > 0
+assert not studies.findings(stopped).stale
+grasps = module("blender.grasps")
+assert bpy.ops.mu.gripper_add() == {"FINISHED"}
+gripper = module("blender.gripper_object").active(bpy.context)
+gripper.mu_gripper.detail = "part"
+assert bpy.ops.mu.grasp() == {"FINISHED"}
+child = simulation.of(grasps.job(gripper))
+watch(child)
+assert child.state == child_module.DONE, child.error
+assert (grasps.folder_of(gripper) / "gripper.3mf").is_file()
+assert bpy.ops.mu.gripper_delete() == {"FINISHED"}
+bpy.context.view_layer.objects.active = stopped
+assert bpy.ops.mu.delete() == {"FINISHED"}
+
 uuid = root.mu_unit.uuid
 bpy.ops.preferences.addon_disable(module=package)
 assert not [name for name in dir(bpy.types) if name.startswith("MU_")]

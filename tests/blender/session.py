@@ -1,4 +1,7 @@
-"""Blender in a process of its own: its state is one per process, and a crash there must not end the tests."""
+"""Blender in a process of its own: its state is one per process, and a crash there must not end the tests.
+
+MU_BPY names further Pythons that have bpy, those of other versions (`conftest.py`); separated as in PATH.
+"""
 
 import importlib.util
 import os
@@ -10,6 +13,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+python = sys.executable
+"""The Python that sessions run in; the fixture `each_bpy` sets it."""
+OTHERS = [path for path in os.environ.get("MU_BPY", "").split(os.pathsep) if path]
 needs_bpy = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="bpy is not installed")
 
 PRELUDE = """
@@ -34,6 +40,48 @@ def refused(operator, **settings):
     except RuntimeError as error:
         return str(error)
     raise AssertionError("it was not refused")
+
+"""
+
+# A child that says what a test wants, and the wait for it; the fake's file is the session's first argument.
+FAKE = ROOT / "tests" / "study" / "fake_worker.py"
+WATCHING = """
+import time
+from mu_addon.blender import simulation, studies
+
+def launch(root, how):
+    command = [sys.executable, sys.argv[1], how]
+    return simulation.launch(root.mu_unit.uuid, command, studies.folder_of(root) / "blender")
+
+def watch(until, seconds=300):
+    # Timers never fire in background: the test is the timer.
+    end = time.monotonic() + seconds
+    while not until():
+        assert time.monotonic() < end
+        simulation.poll()
+        time.sleep(0.05)
+
+"""
+
+# What panels draw into takes every call and keeps what was said. A test names its panels in PANELS.
+DRAWN = """
+from unittest.mock import MagicMock
+
+def drawn():
+    said, layout = [], MagicMock()
+    layout.panel.return_value = (layout, layout)
+    for name in ("row", "column", "box", "split", "grid_flow"):
+        getattr(layout, name).return_value = layout
+    layout.label.side_effect = lambda text="", **_: said.append(text)
+    layout.progress.side_effect = lambda factor, text: said.append(f"{factor:.2f} {text}")
+    layout.operator.side_effect = lambda name, text="", **_: said.append(text or name) or MagicMock()
+    layout.template_icon.side_effect = lambda icon, scale: said.append("a picture")
+    for cls in PANELS:
+        if getattr(cls, "poll", lambda _: True)(bpy.context):
+            seat = MagicMock(layout=layout, seek=getattr(cls, "seek", None))
+            seat.show = lambda *a, c=cls: c.show(seat, *a)
+            cls.draw(seat, bpy.context)
+    return " ".join(said)
 
 """
 
@@ -64,7 +112,7 @@ def blender(code, folder, *arguments, prelude=PRELUDE):
         "PYTHONPATH": str(ROOT),
     }
     done = subprocess.run(
-        [sys.executable, "-c", DRIVER, *map(str, arguments)],
+        [python, "-c", DRIVER, *map(str, arguments)],
         input=prelude + textwrap.dedent(code),
         capture_output=True,
         text=True,

@@ -12,26 +12,14 @@ from tests.evidence import analytic
 from tests.study.diagnosis_data import bent_unit, weighed_blocks
 from tests.study.test_diagnosing import run as diagnosed
 
-from .session import PRELUDE, blender, needs_bpy
-from .test_simulation import FAKE, WATCHING
+from .session import DRAWN, FAKE, PRELUDE, WATCHING, blender, needs_bpy
 
 pytestmark = needs_bpy
 
 SEEN = """
-from unittest.mock import MagicMock
 from mu_addon.blender import evidence, evidence_motion, evidence_panel
 
-def drawn():
-    said = []
-    layout = MagicMock()
-    layout.panel.return_value = (layout, layout)
-    for name in ("row", "column", "box"):
-        getattr(layout, name).return_value = layout
-    layout.label.side_effect = lambda text="", **_: said.append(text)
-    layout.progress.side_effect = lambda factor, text: said.append(f"{factor:.2f} {text}")
-    layout.operator.side_effect = lambda name, text="", **_: said.append(text or name) or MagicMock()
-    evidence_panel.MU_PT_evidence.draw(MagicMock(layout=layout), bpy.context)
-    return " ".join(said)
+PANELS = [evidence_panel.MU_PT_evidence]
 
 def diagnose(root):
     assert bpy.ops.mu.evidence_diagnose() == {"FINISHED"}
@@ -46,7 +34,7 @@ def parts(root):
 
 
 def session(code, tmp_path, *arguments):
-    return blender(code, tmp_path, FAKE, *arguments, prelude=PRELUDE + WATCHING + SEEN)
+    return blender(code, tmp_path, FAKE, *arguments, prelude=PRELUDE + WATCHING + DRAWN + SEEN)
 
 
 def test_a_folder_is_checked_as_it_is_chosen(tmp_path):
@@ -150,7 +138,7 @@ def test_a_diagnosis_that_fails_and_one_that_is_stopped(tmp_path):
         assert bpy.ops.mu.evidence_cancel() == {"FINISHED"}
         watch(lambda: child.state != "running")
         assert "Cancelled" in drawn() and not bpy.ops.mu.evidence_cancel.poll()
-        assert "There is no" in refused(bpy.ops.mu.evidence_open, what="report")
+        assert "there is no such file" in refused(bpy.ops.mu.evidence_open, what="report")
         """,
         tmp_path,
         tmp_path / "data",

@@ -28,6 +28,11 @@ if not BLENDER:
 
 
 @pytest.fixture(scope="module")
+def each_bpy():
+    """None here: these tests are of a whole Blender."""
+
+
+@pytest.fixture(scope="module")
 def home(tmp_path_factory):
     return tmp_path_factory.mktemp("home")
 

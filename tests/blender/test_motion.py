@@ -6,15 +6,17 @@ import sys
 
 import pytest
 
-from .session import PRELUDE, ROOT, blender, needs_bpy
+from .session import DRAWN, PRELUDE, ROOT, blender, needs_bpy
 
 pytestmark = needs_bpy
 
 COARSE = ["--order", "1", "--refine", "0.5", "--rule", "volume_fraction", "--no-mesh-check", "--workers", "1"]
+GRAPH = ["--paths", "graph", "--longest-cells", "2.5", "--checks", "2"]
 
 SEEN = """
 import numpy as np
 from mu_addon.blender import fields, motion_parts, studies
+PANELS = []
 
 def started():
     root = add(preset="mu-0.75x")
@@ -45,7 +47,7 @@ def moved(part):
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study") / "out"
     line = [sys.executable, ROOT / "headless" / "run.py", "place", "--preset", "mu-0.75x", "--out", folder]
-    done = subprocess.run([*map(str, line), *COARSE], capture_output=True, text=True, check=False)
+    done = subprocess.run([*map(str, line), *COARSE, *GRAPH], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -53,7 +55,7 @@ def study(tmp_path_factory):
 def session(code, tmp_path, study):
     own = tmp_path / "study"
     shutil.copytree(study, own, ignore=shutil.ignore_patterns("cache", "played"))
-    return blender(code, tmp_path, own, prelude=PRELUDE + SEEN)
+    return blender(code, tmp_path, own, prelude=PRELUDE + DRAWN + SEEN)
 
 
 def test_motion_plays_in_its_own_time_and_carries_its_fields(tmp_path, study):
@@ -83,7 +85,8 @@ def test_motion_plays_in_its_own_time_and_carries_its_fields(tmp_path, study):
             between = (1 - share) * mises[first] + share * mises[second]
             assert np.allclose(values(part.data, "von_mises_kPa"), between, atol=1e-3)
         other = motion_parts.one(root, "alpha4", "mesh")
-        assert "von_mises_kPa" not in other.data.attributes
+        stress = [values(mesh, "von_mises_kPa") for mesh in (other.data, part.data)]
+        assert not np.allclose(*stress, rtol=0.02)
         assert values(other.data, "deviation_mm").max() > 1e-3 and not values(part.data, "deviation_mm").any()
         assert other.location.y < part.location.y < 0.0
         root.mu_motion.apart = 0.0
@@ -113,6 +116,7 @@ def test_colours_follow_the_range_and_grey_is_what_is_not_known(tmp_path, study)
             assert settings.low < settings.high
             assert known.data.materials[0] == material
             there = field.name in unknown.data.attributes
+            assert there == (field.name != "dJ_by_modulus_mm_per_MPa")
             assert (unknown.data.materials[0] == material) == there, field.name
         settings.field = "largest_principal_stress_kPa"
         low, high = settings.low, settings.high
@@ -132,6 +136,69 @@ def test_colours_follow_the_range_and_grey_is_what_is_not_known(tmp_path, study)
         expected = fields.colours(root, u)
         assert np.allclose(colours.reshape(-1, 4), expected) and len(np.unique(expected, axis=0)) > 10
         assert bpy.ops.mu.motion_range() == {"FINISHED"} and settings.high < 10.0
+        """,
+        tmp_path,
+        study,
+    )
+
+
+def test_the_legend_stands_in_the_scene(tmp_path, study):
+    session(
+        """
+        from mu_addon.blender import legend_object
+        root = started()
+        show(name="model_a")
+        root.mu_motion.field = "displacement_mm"
+        assert bpy.ops.mu.motion_legend() == {"FINISHED"}
+        bar = legend_object.bar_of(root)
+
+        def said(what):
+            return [text.data.body for text in bar.children if text["mu_legend"] == what]
+
+        assert not bar.hide_render
+        for frame, state in ((1, "0.00 s, 0.0 kPa"), (193, "8.00 s, 40.0 kPa")):
+            bpy.context.scene.frame_set(frame)
+            said_then = f"Displacement [mm]\\n{state}\\nquick look: linear elements lock"
+            assert said("head") == [said_then], said("head")
+        root.mu_motion.lock = True
+        root.mu_motion.low, root.mu_motion.high = 0.0, 4.0
+        assert said("tick") == ["0", "1", "2", "3", "4"]
+        # At a tick's height the bar has the colour that the model has there.
+        ramp = [n for n in bar.data.materials[0].node_tree.nodes if n.type == "VALTORGB"][0].color_ramp
+        field = fields.material_of(root).node_tree.nodes["Ramp"].color_ramp
+        assert np.allclose(ramp.evaluate(0.3), field.evaluate(0.3))
+        bar.location.y = 99.0  # moved by the user, it stays there
+        root.mu_motion.field = "von_mises_kPa"
+        assert said("head")[0].startswith("Von Mises Stress [kPa]") and bar.location.y == 99.0
+        count = len(bpy.data.objects)
+        assert bpy.ops.mu.motion_legend(on=False) == {"FINISHED"} and legend_object.bar_of(root) is None
+        assert bpy.ops.mu.motion_legend() == {"FINISHED"} and len(bpy.data.objects) == count
+        bpy.ops.mu.delete()
+        assert not bpy.data.objects and not bpy.data.curves
+        """,
+        tmp_path,
+        study,
+    )
+
+
+def test_a_path_of_the_whole_lattice_moves_and_is_shown_where_it_lies(tmp_path, study):
+    session(
+        """
+        from mu_addon.blender import live, ranking
+        root = started()
+        name, j, points = ranking.free(root)
+        assert name in motion_parts.motion_of(root).paths and 0 < j < 1
+        root.mu_unit.candidates = True
+        tube = unit_object.part(root, "free")
+        assert np.allclose(motion_parts.vertices_of(tube.data), points, atol=1e-4)
+        show(name=name)
+        show(name=name, what="print")
+        bpy.context.scene.frame_set(193)
+        for part in motion_parts.parts(root):
+            assert np.allclose(moved(part), values(part.data, "displacement_mm"), atol=1e-4)
+            assert values(part.data, "deviation_mm").max() > 1e-3
+        root.mu_unit.chambers.wall_mm = 1.0
+        assert ranking.free(root) is None and unit_object.part(root, "free") is None
         """,
         tmp_path,
         study,
@@ -254,20 +321,8 @@ def test_candidates_say_their_rank(tmp_path, study):
 def test_panels_show_the_motion(tmp_path, study):
     session(
         """
-        from unittest.mock import MagicMock
         from mu_addon.blender import results_panel, thumbnails
-
-        def drawn():
-            said, layout = [], MagicMock()
-            for name in ("row", "column", "box", "grid_flow"):
-                getattr(layout, name).return_value = layout
-            layout.label.side_effect = lambda text="", **_: said.append(text)
-            layout.operator.side_effect = lambda name, text="", **_: said.append(text or name) or MagicMock()
-            layout.template_icon.side_effect = lambda icon, scale: said.append("a picture")
-            for cls in results_panel.CLASSES:
-                if cls.poll(bpy.context):
-                    cls.show(None, layout, bpy.context, unit_object.active_root(bpy.context))
-            return " ".join(said)
+        PANELS.extend(results_panel.CLASSES)
 
         root = add(preset="mu-0.75x")
         assert "simulate this unit first" in drawn() and "No pictures yet" in drawn()
@@ -278,7 +333,7 @@ def test_panels_show_the_motion(tmp_path, study):
         bpy.ops.mu.path(name="alpha4")
         assert drawn().count("a picture") == 2
         show(name="alpha4")
-        root.mu_motion.field = "von_mises_kPa"
+        root.mu_motion.field = "dJ_by_modulus_mm_per_MPa"
         said = drawn()
         assert "Play" in said and "Not known of alpha4" in said
         """,

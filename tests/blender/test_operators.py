@@ -48,11 +48,13 @@ def test_operators_without_a_unit_say_what_is_missing(tmp_path):
             name = cls.bl_idname.split(".")[1]
             operator = getattr(bpy.ops.mu, name)
             free = {"add", "millimetres", "preset_remove", "assets", "assets_remove"}
-            free |= {"sample", "sensor_ports"}
+            free |= {"sample", "sensor_ports", "gripper_add"}
             if name in free:
                 assert operator.poll()
             elif name.startswith("track"):
                 assert "Open a clip of the bench in the Movie Clip Editor" in refused(operator)
+            elif name.startswith(("grasp", "gripper")):
+                assert "Add > Mesh > Monolithic Gripper" in refused(operator), name
             elif name == "skin":
                 assert "Select a curve or a mesh" in refused(operator)
             else:
@@ -78,7 +80,7 @@ def test_what_changes_the_file_is_one_undo_step(tmp_path):
         outside |= {"sensor_ports", "sensor_connect", "sensor_disconnect", "sensor_pause"}
         outside |= {"sensor_mark", "sensor_freeze", "sensor_sweep", "sensor_hold"}
         outside |= {"sensor_calibrate", "sensor_cancel", "sensor_dismiss", "sensor_zero"}
-        outside |= {"sensor_open"}
+        outside |= {"sensor_open", "grasp", "grasp_cancel", "grasp_dismiss", "grasp_open"}
         for cls in CLASSES:
             assert ("UNDO" in cls.bl_options) == (cls.bl_idname.split(".")[1] not in outside), cls
             assert "REGISTER" in cls.bl_options

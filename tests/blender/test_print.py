@@ -8,31 +8,16 @@ import pytest
 from mu_addon.design.surface import bad_edges, stl_surface
 from mu_addon.study.exporting import FORMATS, MANIFEST
 
-from .session import PRELUDE, blender, needs_bpy
-from .test_simulation import FAKE, WATCHING
+from .session import DRAWN, FAKE, PRELUDE, WATCHING, blender, needs_bpy
 
 pytestmark = needs_bpy
 
 SEEN = """
-from unittest.mock import MagicMock
 from mu_addon.blender import print_panel, printing
 import pathlib
 import numpy as np
 
-def drawn():
-    said = []
-    layout = MagicMock()
-    layout.panel.return_value = (layout, layout)
-    for name in ("row", "column", "box", "split"):
-        getattr(layout, name).return_value = layout
-    layout.label.side_effect = lambda text="", **_: said.append(text)
-    layout.progress.side_effect = lambda factor, text: said.append(f"{factor:.2f} {text}")
-    layout.operator.side_effect = lambda name, text="", **_: said.append(text or name) or MagicMock()
-    for cls in print_panel.CLASSES:
-        seat = MagicMock(layout=layout)
-        seat.show = lambda *a, c=cls: c.show(seat, *a)
-        cls.draw(seat, bpy.context)
-    return " ".join(said)
+PANELS = print_panel.CLASSES
 
 def done(root, *, state="done"):
     child = simulation.of(printing.job(root))
@@ -74,7 +59,9 @@ def write_check(root, findings, up=(0, 0, 1), builds=()):
 
 
 def session(code, tmp_path, *arguments):
-    return blender(code, tmp_path, FAKE, tmp_path, *arguments, prelude=PRELUDE + WATCHING + SEEN + WRITTEN)
+    return blender(
+        code, tmp_path, FAKE, tmp_path, *arguments, prelude=PRELUDE + WATCHING + DRAWN + SEEN + WRITTEN
+    )
 
 
 def test_a_check_from_start_to_markers(tmp_path):
@@ -298,7 +285,7 @@ def test_jobs_that_fail_and_one_that_is_stopped(tmp_path):
         assert bpy.ops.mu.print_cancel() == {"FINISHED"}
         watch(lambda: child.state != "running")
         assert "Cancelled" in drawn() and not bpy.ops.mu.print_cancel.poll()
-        assert "There is no" in refused(bpy.ops.mu.print_open, what="report")
+        assert "there is no such file" in refused(bpy.ops.mu.print_open, what="report")
         # A torn file is no check.
         folder = printing.folder_of(root, "check")
         (folder / "check.json").write_text('{"findings": [')

@@ -16,7 +16,7 @@ from mu_addon.sensing.calibration import Sweep, calibrate, write_calibration
 from mu_addon.sensing.recording import read_recording
 from tests.study.bent_motion import write_bent_motion
 
-from .session import PRELUDE, blender, needs_bpy
+from .session import DRAWN, PRELUDE, blender, needs_bpy
 
 pytestmark = needs_bpy
 
@@ -24,7 +24,6 @@ SENDER = Path(__file__).parents[1] / "sensing" / "sender.py"
 
 SEEN = """
 import pathlib, time
-from unittest.mock import MagicMock
 from mu_addon.blender import motion_parts, sensor, sensor_panel, simulation, studies, twin
 
 def watch(until, seconds=120):
@@ -35,17 +34,7 @@ def watch(until, seconds=120):
         simulation.poll()
         time.sleep(0.02)
 
-def drawn():
-    said = []
-    layout = MagicMock()
-    layout.panel.return_value = (layout, layout)
-    for name in ("row", "column", "box", "grid_flow"):
-        getattr(layout, name).return_value = layout
-    layout.label.side_effect = lambda text="", **_: said.append(text)
-    layout.progress.side_effect = lambda factor, text: said.append(text)
-    layout.operator.side_effect = lambda name, text="", **_: said.append(text or name) or MagicMock()
-    sensor_panel.MU_PT_sensor.draw(MagicMock(layout=layout), bpy.context)
-    return " ".join(said)
+PANELS = [sensor_panel.MU_PT_sensor]
 
 def started(source="simulated", **settings):
     root = add(preset="mu-0.75x")
@@ -69,7 +58,7 @@ def ended(session):
 
 
 def session(code, tmp_path, *arguments):
-    return blender(code, tmp_path, tmp_path / "study", *arguments, prelude=PRELUDE + SEEN)
+    return blender(code, tmp_path, tmp_path / "study", *arguments, prelude=PRELUDE + DRAWN + SEEN)
 
 
 def calibrated(path, channel="light_V", dark="dark_V", top=45.0):

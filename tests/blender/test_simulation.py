@@ -5,58 +5,20 @@ from pathlib import Path
 
 import pytest
 
-from .session import PRELUDE, blender, needs_bpy
+from .session import DRAWN, FAKE, PRELUDE, WATCHING, blender, needs_bpy
 
 pytestmark = needs_bpy
 
-FAKE = Path(__file__).parents[1] / "study" / "fake_worker.py"
-
-WATCHING = """
-import time
-from mu_addon.blender import simulation, studies
-
-def launch(root, how):
-    command = [sys.executable, sys.argv[1], how]
-    return simulation.launch(root.mu_unit.uuid, command, studies.folder_of(root) / "blender")
-
-def watch(until, seconds=300):
-    # Timers never fire in background: the test is the timer.
-    end = time.monotonic() + seconds
-    while not until():
-        assert time.monotonic() < end
-        simulation.poll()
-        time.sleep(0.05)
-
-"""
-
-# What panels draw into: it takes every call and keeps what was said.
-DRAWN = """
-from unittest.mock import MagicMock
-from mu_addon.blender import panels, print_panel
-
-def drawn():
-    said = []
-    layout = MagicMock()
-    layout.panel.return_value = (layout, layout)
-    for name in ("row", "column", "box", "split"):
-        getattr(layout, name).return_value = layout
-    layout.label.side_effect = lambda text="", **_: said.append(text)
-    layout.progress.side_effect = lambda factor, text: said.append(f"{factor:.2f} {text}")
-    layout.operator.side_effect = lambda name, text="", **_: said.append(text or name) or MagicMock()
-    for cls in (*panels.CLASSES, *print_panel.CLASSES):
-        if getattr(cls, "poll", lambda _: True)(bpy.context):
-            seat = MagicMock(layout=layout)
-            seat.show = lambda *a, c=cls: c.show(seat, *a)
-            cls.draw(seat, bpy.context)
-    for menu in (bpy.types.MU_MT_presets, bpy.types.MU_MT_presets_remove):
-        menu.draw(MagicMock(layout=layout), bpy.context)
-    return " ".join(said)
+SEEN = """
+from mu_addon.blender import obstacle_panel, panels, print_panel
+PANELS = [*panels.CLASSES, obstacle_panel.MU_PT_obstacles, *print_panel.CLASSES]
+PANELS += [bpy.types.MU_MT_presets, bpy.types.MU_MT_presets_remove]
 
 """
 
 
 def session(code, tmp_path, *arguments):
-    return blender(code, tmp_path, FAKE, *arguments, prelude=PRELUDE + WATCHING + DRAWN)
+    return blender(code, tmp_path, FAKE, *arguments, prelude=PRELUDE + WATCHING + DRAWN + SEEN)
 
 
 def test_panels_tell_what_a_child_says(tmp_path):
@@ -90,7 +52,7 @@ def test_panels_tell_what_a_child_says(tmp_path):
         watch(lambda: not simulation.running())
         assert "thicker wall" in drawn() and "at 12 kPa" in drawn()
         assert bpy.ops.mu.open(what="errors") == {"FINISHED"}
-        assert "There is no" in refused(bpy.ops.mu.open, what="report")
+        assert "there is no such file" in refused(bpy.ops.mu.open, what="report")
 
         root.mu_unit.chambers.wall_mm = 3.0
         assert "too thick" in drawn() and "last design that was possible" in drawn()

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from functools import wraps
+from pathlib import Path
 
-from ...errors import MuError
+import bpy
+
+from ...errors import InputError, MuError
 from ...study.client import RUNNING
-from .. import live, simulation
+from .. import live, simulation, studies
 from ..unit_object import active_root
 
 NO_UNIT = "Select a Monolithic Unit, or add one: Add > Mesh > Monolithic Unit"
@@ -15,10 +18,13 @@ NO_UNIT = "Select a Monolithic Unit, or add one: Add > Mesh > Monolithic Unit"
 class OnUnit:
     """An operator on the active unit; greyed, with the reason, where there is none."""
 
+    seek = staticmethod(active_root)
+    lacking = NO_UNIT
+
     @classmethod
     def poll(cls, context):
-        if active_root(context) is None:
-            cls.poll_message_set(NO_UNIT)
+        if cls.seek(context) is None:
+            cls.poll_message_set(cls.lacking)
             return False
         return True
 
@@ -55,14 +61,14 @@ class CancelsJob(OnJob):
     def poll(cls, context):
         if not super().poll(context):
             return False
-        child = simulation.of(cls.job_of(active_root(context)))
+        child = simulation.of(cls.job_of(cls.seek(context)))
         if child is None or child.state != RUNNING:
             cls.poll_message_set(cls.idle)
             return False
         return True
 
     def execute(self, context):
-        simulation.of(self.job_of(active_root(context))).cancel()
+        simulation.of(self.job_of(self.seek(context))).cancel()
         live.redraw()
         return {"FINISHED"}
 
@@ -71,8 +77,17 @@ class DismissesJob(OnJob):
     """Takes the message of an ended job off the panel."""
 
     def execute(self, context):
-        simulation.forget(self.job_of(active_root(context)))
+        simulation.forget(self.job_of(self.seek(context)))
         return {"FINISHED"}
+
+
+RUN_FILES = [
+    ("report", "Report", "Report of the run, in the browser"),
+    ("log", "Log", "Every message of the run, as a text in Blender"),
+    ("errors", "Errors", "What the process wrote to its error output, as a text in Blender"),
+    ("folder", "Folder", "Folder of the run"),
+]
+"""What can be opened of a job's run: the keys of `studies.FILES`."""
 
 
 def telling(execute):
@@ -87,3 +102,45 @@ def telling(execute):
             return {"CANCELLED"}
 
     return told
+
+
+class OpensFile(OnUnit):
+    """Opens what a job has left: `path_of(root)` says which file or folder, `first` what makes it."""
+
+    first = ""
+
+    @telling
+    def execute(self, context):
+        path = self.path_of(self.seek(context))
+        if not path.exists():
+            raise InputError("there is no such file yet", str(path), self.first)
+        open_file(context, path)
+        return {"FINISHED"}
+
+
+class OpensRun(OpensFile):
+    """Opens a file of a job's run, one of `RUN_FILES`, `what`; `folder_of(root)` is the run's folder."""
+
+    def path_of(self, root) -> Path:
+        """The file or folder that `what` stands for."""
+        return self.folder_of(root) / studies.FILES[self.what]
+
+
+def open_file(context, path: Path) -> None:
+    """Open a page in the browser, a folder where folders are shown, anything else as a text in Blender."""
+    if path.is_dir():
+        bpy.ops.wm.path_open(filepath=str(path))
+    elif path.suffix == ".html":
+        bpy.ops.wm.url_open(url=path.as_uri())
+    else:
+        _show_text(context, path)
+
+
+def _show_text(context, path: Path) -> None:
+    """Put a file into a text of Blender's, and show it where a text editor is open."""
+    name = f"MU {path.name}"
+    text = bpy.data.texts.get(name) or bpy.data.texts.new(name)
+    text.from_string(path.read_text(encoding="utf-8", errors="replace"))
+    for area in context.screen.areas if context.screen else ():
+        if area.type == "TEXT_EDITOR":
+            area.spaces.active.text = text

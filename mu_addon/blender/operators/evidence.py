@@ -5,11 +5,9 @@
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from ...study.client import ERRORS
 from .. import evidence, evidence_motion, live, simulation, studies, unit_object
 from ..properties import from_unit, to_unit
-from .acting import CancelsJob, DismissesJob, OnSoundUnit, OnUnit, telling
-from .simulate import open_file
+from .acting import RUN_FILES, CancelsJob, DismissesJob, OnSoundUnit, OnUnit, OpensRun, telling
 
 NO_DATA = "Choose a folder of measured data first"
 
@@ -79,34 +77,16 @@ class MU_OT_evidence_dismiss(DismissesJob, bpy.types.Operator):
     job_of = staticmethod(evidence.job)
 
 
-class MU_OT_evidence_open(OnUnit, bpy.types.Operator):
+class MU_OT_evidence_open(OpensRun, bpy.types.Operator):
     """Open a file of the unit's diagnosis"""
 
     bl_idname = "mu.evidence_open"
     bl_label = "Open"
     bl_options = {"REGISTER"}
+    first = "diagnose first"
+    folder_of = staticmethod(evidence.folder_of)
 
-    what: EnumProperty(
-        name="What",
-        description="Which of its files",
-        items=[
-            ("report", "Report", "Verdict, pictures and figures, in the browser"),
-            ("log", "Log", "Every message of the run, as a text in Blender"),
-            ("errors", "Errors", "What the process wrote to its error output, as a text in Blender"),
-            ("folder", "Folder", "Folder of the diagnosis"),
-        ],
-    )
-
-    @telling
-    def execute(self, context):
-        folder = evidence.folder_of(unit_object.active_root(context))
-        names = {"report": evidence.REPORT, "log": studies.LOG, "errors": f"blender/{ERRORS}", "folder": ""}
-        path = folder / names[self.what]
-        if not path.exists():
-            self.report({"ERROR"}, f"There is no {path} yet: diagnose first")
-            return {"CANCELLED"}
-        open_file(context, path, self.what)
-        return {"FINISHED"}
+    what: EnumProperty(name="What", description="File or folder of the diagnosis to open", items=RUN_FILES)
 
 
 class MU_OT_evidence_apply(OnSoundUnit, bpy.types.Operator):

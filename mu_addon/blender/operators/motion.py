@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ...errors import InputError
 from ...study.motion import FOLDER, MODEL_A
-from .. import motion_parts, studies, unit_object
+from .. import legend_object, motion_parts, studies, unit_object
 from .acting import OnUnit, telling
 
 NO_MOTION = "No motion yet: simulate this unit first"
@@ -88,6 +88,7 @@ class MU_OT_motion_clear(OnUnit, bpy.types.Operator):
         root = unit_object.active_root(context)
         for name, what in motion_parts.shown(root):
             motion_parts.hide(root, name, what)
+        legend_object.hide(root)
         return {"FINISHED"}
 
 
@@ -120,6 +121,22 @@ class MU_OT_motion_range(OnMotion, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class MU_OT_motion_legend(OnMotion, bpy.types.Operator):
+    """Stand the legend in the scene beside the unit, where renders see it, or take it away"""
+
+    bl_idname = "mu.motion_legend"
+    bl_label = "Legend in Renders"
+    bl_options = {"REGISTER", "UNDO"}
+
+    on: BoolProperty(name="Show", description="Show it, or take it away", default=True)
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        legend_object.show(root) if self.on else legend_object.hide(root)
+        return {"FINISHED"}
+
+
 class MU_OT_picture(OnUnit, bpy.types.Operator):
     """Open a picture of the study in an image editor of its own"""
 
@@ -146,4 +163,11 @@ class MU_OT_picture(OnUnit, bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (MU_OT_motion, MU_OT_motion_clear, MU_OT_motion_update, MU_OT_motion_range, MU_OT_picture)
+CLASSES = (
+    MU_OT_motion,
+    MU_OT_motion_clear,
+    MU_OT_motion_update,
+    MU_OT_motion_range,
+    MU_OT_motion_legend,
+    MU_OT_picture,
+)

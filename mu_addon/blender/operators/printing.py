@@ -6,11 +6,10 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatVectorProperty, IntProperty
 
 from ...design.parameters import write_unit
-from ...study.client import ERRORS, RUNNING
+from ...study.client import RUNNING
 from .. import live, printing, simulation, studies, unit_object
 from ..properties import to_unit
-from .acting import CancelsJob, DismissesJob, OnSoundUnit, OnUnit, telling
-from .simulate import open_file
+from .acting import RUN_FILES, CancelsJob, DismissesJob, OnSoundUnit, OnUnit, OpensFile, telling
 
 NOT_CHECKED = "Check the print first"
 
@@ -109,12 +108,13 @@ class MU_OT_print_dismiss(DismissesJob, bpy.types.Operator):
     job_of = staticmethod(printing.job)
 
 
-class MU_OT_print_open(OnUnit, bpy.types.Operator):
+class MU_OT_print_open(OpensFile, bpy.types.Operator):
     """Open what a check or an export has left"""
 
     bl_idname = "mu.print_open"
     bl_label = "Open"
     bl_options = {"REGISTER"}
+    first = "check or export first"
 
     what: EnumProperty(
         name="What",
@@ -123,28 +123,18 @@ class MU_OT_print_open(OnUnit, bpy.types.Operator):
             ("report", "Report", "Every finding with pictures, and the build directions, in the browser"),
             ("export", "Files", "Folder of the exported files"),
             ("specimens", "Specimens", "Folder of the specimens, their sheet and the folder for the data"),
-            ("log", "Log", "Every message of the latest job, as a text in Blender"),
-            ("errors", "Errors", "What the latest job wrote to its error output, as a text in Blender"),
+            *RUN_FILES[1:3],
         ],
     )
 
-    @telling
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def path_of(self, root):
+        """The file or folder that `what` stands for; log and errors are the latest job's."""
+        if self.what in (printing.EXPORT, printing.SPECIMENS):
+            return printing.folder_of(root, self.what)
         child = simulation.of(printing.job(root))
-        latest = printing.folder_of(root, printing.CHECK) if child is None else child.folder.parent
-        path = {
-            "report": printing.folder_of(root, printing.CHECK) / studies.REPORT,
-            "export": printing.folder_of(root, printing.EXPORT),
-            "specimens": printing.folder_of(root, printing.SPECIMENS),
-            "log": latest / studies.LOG,
-            "errors": latest / "blender" / ERRORS,
-        }[self.what]
-        if not path.exists():
-            self.report({"ERROR"}, f"There is no {path} yet")
-            return {"CANCELLED"}
-        open_file(context, path, self.what if path.is_file() else "folder")
-        return {"FINISHED"}
+        checks = printing.folder_of(root, printing.CHECK)
+        folder = checks if self.what == "report" or child is None else child.folder.parent
+        return folder / studies.FILES[self.what]
 
 
 class _OfCheck(OnUnit):

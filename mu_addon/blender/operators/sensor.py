@@ -8,11 +8,9 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ...errors import InputError
-from ...study.client import ERRORS
 from .. import live, sensor, simulation, studies, twin, unit_object
-from .acting import CancelsJob, DismissesJob, OnUnit, telling
+from .acting import RUN_FILES, CancelsJob, DismissesJob, OnUnit, OpensFile, telling
 from .motion import OnMotion
-from .simulate import open_file
 
 NOT_CONNECTED = "Connect the sensor first"
 
@@ -307,40 +305,27 @@ class MU_OT_sensor_twin(OnMotion, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_sensor_open(OnUnit, bpy.types.Operator):
+class MU_OT_sensor_open(OpensFile, bpy.types.Operator):
     """Open what was recorded, or how it was calibrated"""
 
     bl_idname = "mu.sensor_open"
     bl_label = "Open"
     bl_options = {"REGISTER"}
+    first = "connect, or calibrate"
 
     what: EnumProperty(
         name="What",
-        description="Which file or folder",
-        items=[
-            ("recording", "Recording", "Folder of the recording"),
-            ("report", "Report", "Report of the latest calibration, in the browser"),
-            ("log", "Log", "Messages of the latest calibration, as a text in Blender"),
-            ("errors", "Errors", "Error output of the latest calibration, as a text in Blender"),
-        ],
+        description="Which file or folder; a report, log or errors of the latest calibration",
+        items=[("recording", "Recording", "Folder of the recording"), *RUN_FILES[:3]],
     )
 
-    @telling
-    def execute(self, context):
-        root = unit_object.active_root(context)
-        session = sensor.of(root)
+    def path_of(self, root):
+        """The file or folder that `what` stands for."""
+        session, folder = sensor.of(root), studies.folder_of(root)
         if self.what == "recording":
-            path = session.watched.folder if session else studies.folder_of(root) / sensor.RECORDINGS
-        else:
-            names = {"report": "report.html", "log": studies.LOG, "errors": f"blender/{ERRORS}"}
-            latest = max((studies.folder_of(root) / sensor.CALIBRATIONS).glob("*/"), default=None)
-            if latest is None:
-                raise InputError("this unit was not calibrated yet", remedy="calibrate it first")
-            path = latest / names[self.what]
-        if not path.exists():
-            raise InputError("there is no such file", str(path), "connect, or calibrate again")
-        open_file(context, path, "folder" if self.what == "recording" else self.what)
-        return {"FINISHED"}
+            return session.watched.folder if session else folder / sensor.RECORDINGS
+        made = folder / sensor.CALIBRATIONS
+        return max(made.glob("*/"), default=made) / studies.FILES[self.what]
 
 
 CLASSES = (

@@ -150,11 +150,7 @@ class MU_OT_select(OnUnit, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
-        root = unit_object.active_root(context)
-        for other in context.selected_objects:
-            other.select_set(False)
-        root.select_set(True)
-        context.view_layer.objects.active = root
+        unit_object.make_active(context, unit_object.active_root(context))
         return {"FINISHED"}
 
 

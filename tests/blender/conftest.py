@@ -1,0 +1,33 @@
+"""Every session of these tests once more with each further bpy that MU_BPY names; see `session`."""
+
+import subprocess
+import sys
+import warnings
+
+import pytest
+
+from . import session
+
+if not session.OTHERS:
+    warnings.warn("NOT TESTED with bpy 4.5: set MU_BPY to a Python that has it", stacklevel=1)
+
+
+def _version(python):
+    """`bpy 4.5`: what a Python has."""
+    asked = "import bpy, os; print('version %d.%d' % bpy.app.version[:2], flush=True); os._exit(0)"
+    told = subprocess.run([python, "-c", asked], capture_output=True, text=True, check=False)
+    assert "version " in told.stdout, f"MU_BPY: {python} has no bpy that loads\n{told.stderr}"
+    return f"bpy {told.stdout.split('version ')[1].split()[0]}"
+
+
+@pytest.fixture(
+    autouse=True,
+    scope="module",
+    params=[sys.executable, *session.OTHERS] if session.OTHERS else None,
+    ids=["bpy", *map(_version, session.OTHERS)] if session.OTHERS else None,
+)
+def each_bpy(request):
+    """Sessions of a test run in one Python after another."""
+    before, session.python = session.python, getattr(request, "param", sys.executable)
+    yield
+    session.python = before
