@@ -1,0 +1,96 @@
+"""What `reproduce` is asked to do, and the sets of values that it knows."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from ...design.assets import asset_root
+from ...design.parameters import Unit, load_preset
+from ...errors import InputError
+from ...meshing.settings import MeshSettings
+from .open_values import with_values
+
+HEADER = "# The inputs of a reproduction of the paper's table."
+DEFAULT = "default"
+FOLDER = "reproduce"
+
+
+def _between(low: int, high: int) -> Any:
+    def check(_: object, field: attrs.Attribute[Any], value: float) -> None:
+        if not low <= value <= high:
+            raise InputError(f"{value:g} is out of bounds", f"--{field.name}", f"give {low} to {high}")
+
+    return check
+
+
+@attrs.frozen
+class Settings:
+    """What decides a reproduction. Raises InputError.
+
+    values: of the set that all columns share, beside the preset's own. held_cells: the height from the base,
+    in cells, up to which the three units are held fast. mesh: of the table. meshes: random ones a family,
+    points: sets of open values; where 0, those that come with the package are shown.
+    """
+
+    values: Mapping[str, Any] = attrs.field(factory=dict)
+    values_name: str = DEFAULT
+    held_cells: float = attrs.field(default=0.0, validator=_between(0, 5))
+    mesh: MeshSettings = attrs.field(factory=MeshSettings)
+    meshes: int = attrs.field(default=12, validator=_between(0, 1000))
+    points: int = attrs.field(default=0, validator=_between(0, 4096))
+    # Whether the paper's fourth column is found, too.
+    gripper: bool = True
+    workers: int = attrs.field(default=2, validator=_between(1, 256))
+
+    @property
+    def unit(self) -> Unit:
+        """The unit at 1.0x with the set's values. Raises InputError where it breaks a rule."""
+        return with_values(load_preset("mu-1.0x"), self.values)
+
+    def text(self) -> str:
+        """reproduce.toml: all that decides the results."""
+        lines = [HEADER, "format = 1", f'set = "{self.values_name}"', f"meshes = {self.meshes}"]
+        lines += [
+            f"held_cells = {self.held_cells:g}",
+            f"points = {self.points}",
+            f"gripper = {str(self.gripper).lower()}",
+            "",
+            "[values]",
+        ]
+        lines += [f'"{name}" = {_toml(value)}' for name, value in sorted(self.values.items())]
+        lines += ["", "[mesh]", *(f"{k} = {_toml(v)}" for k, v in attrs.asdict(self.mesh).items())]
+        return "\n".join(lines) + "\n"
+
+
+def _toml(value: Any) -> str:
+    return f'"{value}"' if isinstance(value, str) else str(value).lower()
+
+
+def read_set(name: str) -> dict[str, Any]:
+    """`values` and `held_cells` of Settings from a set that comes with the package, or a TOML file.
+
+    Raises InputError.
+    """
+    if name == DEFAULT:
+        return {}
+    path = Path(name) if name.endswith(".toml") else asset_root() / FOLDER / f"{name}.toml"
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError:
+        names = ", ".join([DEFAULT, *sorted(p.stem for p in (asset_root() / FOLDER).glob("*.toml"))])
+        raise InputError(
+            f"there is no set of values {name!r}", "--set", f"choose one of {names}, or give a TOML file"
+        ) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"the set of values is no TOML: {error}", str(path), "correct that line") from error
+    values, held_cells = tables.get("values", {}), tables.get("held_cells", 0.0)
+    if set(tables) - {"values", "held_cells"} or not isinstance(values, dict):
+        raise InputError("a set has held_cells and a table [values]", str(path), "leave out what else it has")
+    if isinstance(held_cells, bool) or not isinstance(held_cells, int | float):
+        raise InputError(f"held_cells = {held_cells!r} is no number", str(path), "give a number of cells")
+    return {"values": values, "held_cells": float(held_cells)}
