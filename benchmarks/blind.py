@@ -22,9 +22,21 @@ from mu_addon.processes import one_thread_each
 from tests.blind import unit_runs
 from tests.blind.injector import OUTSIDE
 from tests.blind.judge import CHANGES, IN_SET, TELLABLE, fingerprint, judged
+from tests.blind.machines import BENCHES
 from tests.evidence.analytic import STATIC
 
-PARTS = ("clean", "one", "two", "outside", "unidentifiable", "mesh", "invariance", "gain", "coverage")
+PARTS = (
+    "clean",
+    "one",
+    "two",
+    "outside",
+    "unidentifiable",
+    "mesh",
+    "invariance",
+    "gain",
+    "coverage",
+    "kinds",
+)
 # Absorbed by modulus and zeros whatever their size, so that they have no detection limit.
 REFUSED = {
     "pressure_gain": {"pressure_gain.gain": 0.08},
@@ -95,6 +107,13 @@ def orders(sets, seed, parts, times, most):
         if "coverage" in parts:
             for k, e in enumerate(EFFECTS):
                 add("coverage", 100 + k, i, effect=e, times=10.0)
+        if "kinds" in parts:
+            for b, (kind, bench) in enumerate(BENCHES.items()):
+                for k, colour in enumerate(("one", "two")):
+                    add("kinds", 200 + 20 * b, 10 * i + k, unit=kind, noise=colour)
+                for k, e in enumerate(bench.effects, 1):
+                    for t, size in enumerate(times):
+                        add("kinds", 200 + 20 * b + k, 10 * i + t, unit=kind, effect=e, times=size)
     return found
 
 
@@ -230,6 +249,22 @@ def report(rows):
         line(f"{times:g} x: wrong with confidence", rate(here, ("wrong",)))
         line(f"{times:g} x: wrong set", rate(here, ("wrong_set",)))
         line(f"{times:g} x: missed (none)", rate(here, ("none",)))
+    kinds = by["kinds"]
+    line(
+        "other kinds, clean: a cause named",
+        rate([r for r in kinds if not r["effect"]], ("false", "false_set")),
+    )
+    for times in sorted({r["times"] for r in kinds if r["effect"]}):
+        here = [r for r in kinds if r["effect"] and r["times"] == times]
+        line(f"other kinds, {times:g} x: exact", rate(here, RIGHT))
+        if times >= 4:
+            fair = [
+                r for r in here if r["outcome"] in RIGHT or not r["nearest"] or r["nearest"][0] >= TELLABLE
+            ]
+            line(f"other kinds, {times:g} x: exact, where no rival fits without noise", rate(fair, RIGHT))
+        line(f"other kinds, {times:g} x: truth in the set", rate(here, IN_SET))
+        line(f"other kinds, {times:g} x: wrong with confidence", rate(here, ("wrong",)))
+        line(f"other kinds, {times:g} x: missed (none)", rate(here, ("none",)))
     for what, pairs in (("near", NEAR), ("far", FAR)):
         own = [r for r in by["two"] if tuple(r["effect"]) in pairs]
         line(f"two effects, {what}: exact", rate(own, RIGHT))
@@ -264,7 +299,7 @@ def report(rows):
     line("held-out rate, orientation, scale: better than base and all nulls", counted(sum(better), len(own)))
     parameters = [
         p
-        for r in (*by["one"], *by["coverage"])
+        for r in (*by["one"], *by["coverage"], *kinds)
         if r["outcome"] in RIGHT and r["times"] >= 4
         for p in r["parameters"]
     ]
@@ -273,7 +308,7 @@ def report(rows):
         counted(sum(p[4] for p in parameters), len(parameters)),
     )
     lines += ["", "| effect | unit | exact | in the set | called |", "| --- | --- | --- | --- | --- |"]
-    strong = [r for r in (*by["one"], *by["coverage"]) if r["times"] >= 4]
+    strong = [r for r in (*by["one"], *by["coverage"], *kinds) if r["effect"] and r["times"] >= 4]
     for name, unit in sorted({(r["effect"][0], r["unit"]) for r in strong}):
         own = [r for r in strong if r["effect"][0] == name and r["unit"] == unit]
         hits = [sum(r["outcome"] in o for r in own) for o in (RIGHT, IN_SET)]
@@ -285,40 +320,64 @@ def report(rows):
     return "\n".join(lines)
 
 
-def confusion_picture(rows, path):
-    """What was true against what was called, at four times the limit and more."""
+def unit_confusion(rows, path):
+    """What was true against what was called of the unit, at four times the limit and more."""
+    parts = ("clean", "one", "outside", "coverage", "mesh")
+    known = [*dict.fromkeys(EFFECTS), *(s for s in unit_runs.SIZES if s not in EFFECTS)]
+    confusion_picture(
+        [r for r in rows if r["part"] in parts],
+        path,
+        ["clean", *known, *OUTSIDE],
+        known,
+        lambda r: r["effect"][0] if r["effect"] else "clean",
+        "; below the line: outside the library",
+    )
+
+
+def kinds_confusion(rows, path):
+    """The same of the other kinds of experiment."""
+
+    def truth(unit, effect):
+        return f"{unit.partition('_')[0]}: {effect}"
+
+    truths = [truth(kind, e) for kind, bench in BENCHES.items() for e in ("clean", *bench.effects)]
+    known = list(dict.fromkeys(e for bench in BENCHES.values() for e in bench.effects))
+    confusion_picture(
+        [r for r in rows if r["part"] == "kinds"],
+        path,
+        truths,
+        known,
+        lambda r: truth(r["unit"], r["effect"][0] if r["effect"] else "clean"),
+    )
+
+
+def confusion_picture(rows, path, truths, known, truth_of, more=""):
+    """Shares of the sets of each truth that were called each known effect."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
     import numpy as np
 
-    rows = [
-        r
-        for r in rows
-        if r["part"] in ("clean", "one", "outside", "coverage", "mesh") and not r["impossible"]
-    ]
-    rows = [r for r in rows if not r["effect"] or r["times"] >= 4]
-    truths = [*dict.fromkeys(EFFECTS), *(s for s in unit_runs.SIZES if s not in EFFECTS)]
-    answers = ["none", *truths, "unexplained"]
-    truths = ["clean", *truths, *OUTSIDE]
-    counts = np.zeros((len(truths), len(answers) + 1))
-    answers.append("in a set of rivals")
+    rows = [r for r in rows if not r["impossible"] and (not r["effect"] or r["times"] >= 4)]
+    if not rows:
+        return
+    answers = ["none", *known, "unexplained", "in a set of rivals"]
+    counts = np.zeros((len(truths), len(answers)))
     for r in rows:
-        i = truths.index(r["effect"][0] if r["effect"] else "clean")
         if r["outcome"] in ("exact_with_rivals", "in_set"):
             j = len(answers) - 1
         else:
             names = [
-                n for n in r["names"] if n != "mesh_error" or r["unit"] == "written" or len(r["names"]) == 1
+                n for n in r["names"] if n != "mesh_error" or r["unit"] != "simulated" or len(r["names"]) == 1
             ]
             first = names[0] if names else r["verdict"]
             j = answers.index(first) if first in answers else answers.index("none")
-        counts[i, j] += 1
+        counts[truths.index(truth_of(r)), j] += 1
     total = counts.sum(axis=1, keepdims=True)
     shown = np.flatnonzero(total[:, 0])
     share = counts[shown] / total[shown]
-    figure, axes = plt.subplots(figsize=(11, 9.5), dpi=110)
+    figure, axes = plt.subplots(figsize=(11, 2.5 + 0.27 * len(shown)), dpi=110)
     axes.imshow(share, cmap="Blues", vmin=0, vmax=1, aspect="auto")
     for (i, j), v in np.ndenumerate(share):
         if v:
@@ -327,9 +386,11 @@ def confusion_picture(rows, path):
             )
     axes.set_xticks(range(len(answers)), [a.replace("_", " ") for a in answers], rotation=60, ha="right")
     axes.set_yticks(range(len(shown)), [f"{truths[i].replace('_', ' ')} ({int(total[i, 0])})" for i in shown])
-    axes.axhline(len([i for i in shown if truths[i] not in OUTSIDE]) - 0.5, color="0.4", lw=1)
+    inside = sum(truths[i] not in OUTSIDE for i in shown)
+    if inside < len(shown):
+        axes.axhline(inside - 0.5, color="0.4", lw=1)
     axes.set_xlabel("called (best name; % of the sets of a row)")
-    axes.set_ylabel("true, at 4 and 10 times its limit (sets); below the line: outside the library")
+    axes.set_ylabel(f"true, at 4 and 10 times its limit (sets){more}")
     figure.tight_layout()
     figure.savefig(path)
     plt.close(figure)
@@ -414,7 +475,8 @@ def main():
     print(report(found))
     if args.pictures:
         args.pictures.mkdir(parents=True, exist_ok=True)
-        confusion_picture(found, args.pictures / "evidence-confusion.png")
+        unit_confusion(found, args.pictures / "evidence-confusion.png")
+        kinds_confusion(found, args.pictures / "evidence-kinds.png")
         power_picture(found, args.pictures / "evidence-power.png")
     return 1 if failed else 0
 

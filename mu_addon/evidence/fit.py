@@ -221,8 +221,13 @@ class Fitter:
         measured: Array,
     ) -> Fit:
         values |= self.zeros(measured - f)
-        gram = jacobian.T @ jacobian
-        covariance = np.linalg.pinv(gram, rcond=1e-12, hermitian=True) if len(keys) else np.zeros((0, 0))
+        # Columns of unit length: which direction counts as none must not depend on units.
+        length = np.linalg.norm(jacobian, axis=0)
+        length[length == 0.0] = 1.0
+        unit = jacobian / length
+        covariance = np.zeros((0, 0))
+        if len(keys):
+            covariance = np.linalg.pinv(unit.T @ unit, rcond=1e-12, hermitian=True) / np.outer(length, length)
         n = len(f)
         return Fit(effects, values, chi2, residual, keys, jacobian[:n], covariance, jacobian[n:])
 

@@ -42,36 +42,53 @@ class Whitening:
             if group == KNOWN:
                 continue
             members = [s for s in record.series if s.group == group]
-            factor, log_det = _factor(members, sources[group])
+            factor = _factor(members, sources[group])
             self._parts.append((slice(members[0].at.start, members[-1].at.stop), factor))
-            self.log_dets[group] = log_det
+            self.log_dets[group] = factor.log_det
 
     def __call__(self, columns: Array) -> Array:
         """Whitened columns (N,) or (N, k); rows of groups that are not whitened stay."""
         found = np.array(columns, float, order="F")
         for rows, factor in self._parts:
-            found[rows] = _applied(factor, found[rows])
+            found[rows] = factor.applied(found[rows])
         return found
 
     def series(self, series: Series, columns: Array) -> Array:
         """Whitened columns (b, k) of one series."""
         if series.group == KNOWN:
             return columns
-        return _applied(_factor([series], self._sources[series.group])[0], columns)
+        return _factor([series], self._sources[series.group]).applied(columns)
 
 
-def _applied(factor: Any, x: Array) -> Array:
-    from scipy.linalg.lapack import dtbtrs
+@attrs.frozen(eq=False)
+class _Factor:
+    """Whitens rows (n, k): each over its scale, less what persists of the one before, solved by the band.
 
-    scale, persist, band = factor
-    x = (x.T / scale).T
-    y = np.array(x, order="F")
-    y[1:] -= (persist[1:] * x[:-1].T).T
-    solved, _ = dtbtrs(band, y if y.ndim == 2 else y[:, None], uplo="L")
-    return solved if y.ndim == 2 else np.asarray(solved[:, 0])
+    inverse (n,), carried (n - 1,): of scale, and of what persists. band (2, n): the covariance's factor with
+    ones on its diagonal, whose inverse is diagonal (n,).
+    """
+
+    inverse: Array
+    carried: Array
+    band: Array
+    diagonal: Array
+    log_det: float
+
+    def applied(self, x: Array) -> Array:
+        """Whitened rows of x (n,) or (n, k)."""
+        from scipy.linalg.lapack import dtbtrs
+
+        # Columns lie in memory one after the other, for LAPACK and for the loops before it.
+        columns = np.ascontiguousarray(x.T).reshape(-1, len(x))
+        y: Array = columns * self.inverse
+        y[:, 1:] -= self.carried * columns[:, :-1]
+        solved, _ = dtbtrs(self.band, y.T, uplo="L", diag="U", overwrite_b=1)
+        y = solved.T
+        y *= self.diagonal
+        return np.asarray(y.T if x.ndim == 2 else y[0])
 
 
-def _factor(members: Sequence[Series], source: Source) -> tuple[Any, float]:
+def _factor(members: Sequence[Series], source: Source) -> _Factor:
     from scipy.linalg.lapack import dpbtrf
 
     persist, slow, white = [], [], []
@@ -99,7 +116,10 @@ def _factor(members: Sequence[Series], source: Source) -> tuple[Any, float]:
         band[0] *= 1.0 + 1e-9
         factor, _ = dpbtrf(band, lower=1)
     log_det = float(np.log(c).sum() + 2.0 * np.log(factor[0]).sum())
-    return (np.sqrt(c), phi, factor), log_det
+    inverse, diagonal = 1.0 / np.sqrt(c), 1.0 / factor[0]
+    below = np.zeros_like(factor)
+    below[1, :-1] = factor[1, :-1] * diagonal[:-1]
+    return _Factor(inverse, phi[1:] * inverse[:-1], below, diagonal, log_det)
 
 
 def _block(count: Array, step: float) -> tuple[Array, Array]:
@@ -234,8 +254,8 @@ def _deviance(
     dof = max(start - sum(many for _, many in places), 1)
 
     def deviance(x: Array) -> tuple[float, float]:
-        factor, value = _factor(series, _source(x, *clock))
-        w = _applied(factor, stack)
+        factor = _factor(series, _source(x, *clock))
+        value, w = factor.log_det, factor.applied(stack)
         square = 0.0
         for at, many in places:
             b, r = w[at, :many], w[at, k]

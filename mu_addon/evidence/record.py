@@ -136,6 +136,10 @@ def _series(i: int, e: Experiment, row: int, channel: str, blocks: int) -> tuple
     seen = np.isfinite(values)
     head, _, unit = channel.rpartition("_")
     spread = e.columns.get(f"{head}_sd_{unit}")
+    if spread is not None and not spread.any():
+        raise InputError(
+            f"{head}_sd_{unit} is 0 throughout", e.name, "give by how much the record may be off, or none"
+        )
     per = max(1, math.ceil(n / blocks))
     first = np.arange(0, n, per)
     count = np.add.reduceat(seen.astype(float), first)

@@ -11,6 +11,7 @@ import numpy as np
 
 from .effect import Effect
 from .fit import PRIOR, Fit, Fitter, logarithmic
+from .record import KNOWN
 from .residuals import Dependence, dependence_table, strict_table, structure
 from .sensitivity import ABSORBED, Sensitivity
 
@@ -313,7 +314,8 @@ def _folds(fitter: Fitter, fit: Fit) -> list[Array]:
         clock = np.zeros(len(record))
         for s in record.series:
             if s.experiment == i:
-                clock[s.at] = s.time_s
+                # A record that counts as one number has no moment of its own.
+                clock[s.at] = s.time_s if s.group != KNOWN else s.time_s.mean()
         edges = np.quantile(clock[rows], [0.25, 0.5, 0.75])
         part = np.digitize(clock, edges)
         # Alternate quarters, so that either half has seen both early and late.

@@ -36,13 +36,14 @@ Array = np.ndarray[Any, Any]
 Progress = Callable[[str, float], None]
 
 # Part of every key: raise it when a change of the code changes what is computed.
-REVISION = 1
+REVISION = 2
 ANGLE = "angle_deg"
 # Fewer pressures make no cubic spline.
 FEWEST = 4
 # Along the meridian as fine as the default: there a coarser mesh misses most.
 COARSE = MeshSettings(refine=0.6, meridian_mm=0.9)
-FINE = MeshSettings()
+# Finer in all its sizes: what a mesh misses along the meridian is another curve than the rest of it.
+FINE = MeshSettings(meridian_mm=1.0)
 # Share of the progress that walls take.
 WALLS = 0.2
 # Walls as shares of how far the free unit gets, pressures as shares of the way on from where one is met.
@@ -99,7 +100,7 @@ def _effect(name: str) -> UnitEffect:
 class Run:
     """One quasi-static run: a body, the effect on it and its size, pressures in kPa, points (p, 3) in mm.
 
-    outline: of the free unit, how far its outline moves toward +y and -y instead of angle and places.
+    outline: of the free unit, how far its outline moves toward +y and -y beside angle and places.
     """
 
     body: Body
@@ -112,7 +113,7 @@ class Run:
     @property
     def rows(self) -> int:
         """How many values a pressure has."""
-        return 2 if self.outline else 1 + 3 * len(self.points)
+        return 1 + 3 * len(self.points) + 2 * self.outline
 
     @property
     def changed(self) -> tuple[Body, UnitEffect | None]:
@@ -152,7 +153,7 @@ class Result:
 
 
 def run(case: Run, cache: Path | None = None) -> Result:
-    """Angle and places of points at every pressure, from rest outward; or moves of the outline, see Run.
+    """Angle and places of points at every pressure, from rest outward, and moves of the outline, see Run.
 
     cache: where a mesher that is not repeatable keeps its meshes. A pressure that cannot be reached, with
     those beyond it, is nan; so is all where the body cannot be drawn or meshed.
@@ -170,13 +171,13 @@ def run(case: Run, cache: Path | None = None) -> Result:
         equilibrium = Equilibrium(model, materials, effect.newton if effect else SMOOTH)
         # Out of reach, it only lends the points at which the unit would touch.
         outline = walled(body, mesh, 1e6).obstacles[0] if case.outline else None
+        places = slice(1, 1 + 3 * len(case.points))
         for at, state in _states(equilibrium, np.array(case.pressures_kPa)):
+            values[0, at] = bending_angle_deg(mesh, state.u)
+            values[places, at] = points.at(state.u).ravel()
             if outline:
                 y, still = (outline.places(u)[..., 1] for u in (state.u, np.zeros_like(state.u)))
-                values[:, at] = y.max() - still.max(), still.min() - y.min()
-                continue
-            values[0, at] = bending_angle_deg(mesh, state.u)
-            values[1:, at] = points.at(state.u).ravel()
+                values[places.stop :, at] = y.max() - still.max(), still.min() - y.min()
     except (InputError, MeshingError, ConvergenceError) as error:
         return Result(values, str(error))
     return Result(values)
@@ -330,6 +331,7 @@ class _Plan:
     pressures_kPa: tuple[float, ...]
     markers: tuple[Marker, ...]
     channels: tuple[str, ...]
+    walled: bool
 
     @classmethod
     def of(
@@ -357,30 +359,33 @@ class _Plan:
             pressures(readings, settings.pressures, settings.margin),
             markers,
             tuple(c for c in known if c in measured),
+            WALL in settings.effects,
         )
 
     def case(self, effect: str = "", size: float = 0.0, orientation_deg: float = 0.0) -> Run:
+        """A run of an effect whose size is that at 1.0x, of the base where none is named."""
         points = tuple(tuple((m.point / self.enlarged).tolist()) for m in self.markers)
         body = attrs.evolve(self.body, orientation_deg=orientation_deg)
-        if effect:
-            size = size / self.enlarged ** _effect(effect).length
-        return Run(body, self.pressures_kPa, points, effect, size)
+        return Run(body, self.pressures_kPa, points, effect, size, not effect and self.walled)
 
     def runs(self, settings: UnitSettings) -> Iterator[Run]:
         """The base first, then what takes longest."""
         yield self.case()
-        if WALL in settings.effects:
-            yield attrs.evolve(self.case(), outline=True)
         for name in sorted(set(settings.effects) & set(EFFECTS), key=lambda n: (n != "mesh_error", n)):
             effect = EFFECTS[name]
             for orientation in self.orientations if effect.weighs else (0.0,):
-                for size in effect.sizes:
+                for size in effect.sizes_at(self.enlarged):
                     if size != effect.parameter.null:
                         yield self.case(name, size, orientation)
 
+    def base(self, found: dict[str, Result]) -> Result:
+        """The free unit's angle and places."""
+        result = found[self.case().key()]
+        return Result(result.values[: 1 + 3 * len(self.markers)], result.why)
+
     def free(self, found: dict[str, Result]) -> dict[int, tuple[Array, Array]]:
         """By side, 1 for +y: the free unit's pressures from 0 on, and its outline's moves in mm."""
-        outline = found[attrs.evolve(self.case(), outline=True).key()].values * self.enlarged
+        outline = found[self.case().key()].values[-2:] * self.enlarged
         at = np.array(self.pressures_kPa)
         sides: dict[int, tuple[Array, Array]] = {}
         for sign in (1, -1):
@@ -402,7 +407,7 @@ class _Plan:
                 gap = (1 - reach) * outward[-1]
                 met = float(PchipInterpolator(outward, pressure)(gap))
                 steps = sorted(met + s * (pressure[-1] - met) for s in SHARES)
-                case = self.case(WALL, side * gap)
+                case = self.case(WALL, side * gap / self.enlarged)
                 yield side, reach * outward[-1], attrs.evolve(case, pressures_kPa=tuple(steps))
 
     def sides(self, found: dict[str, Result], base: Array, rows: Sequence[int]) -> dict[int, Side]:
@@ -435,7 +440,7 @@ class _Plan:
 
     def responses(self, settings: UnitSettings, found: dict[str, Result]) -> Iterator[UnitResponse]:
         """The response in each orientation."""
-        base = found[self.case().key()]
+        base = self.base(found)
         rows = self._rows()
         reached = np.isfinite(base.values[0])
         if np.count_nonzero(reached) < FEWEST:
@@ -453,16 +458,17 @@ class _Plan:
             variants = {}
             for name in (n for n in settings.effects if n in EFFECTS):
                 sizes, values = [], []
-                for size in EFFECTS[name].sizes:
+                grown = self.enlarged ** EFFECTS[name].length
+                for size in EFFECTS[name].sizes_at(self.enlarged):
                     if size == EFFECTS[name].parameter.null:
                         result = base
                     else:
                         result = found[self.case(name, size, orientation).key()]
                     if np.isfinite(result.values[kept]).all():
-                        sizes.append(size)
+                        sizes.append(size * grown)
                         values.append((self.larger * result.values)[kept])
                     else:
-                        _warn(f"{name} = {size:g} at {self.scale:g}x is left out: {result.why}")
+                        _warn(f"{name} = {size * grown:g} at {self.scale:g}x is left out: {result.why}")
                 if len(sizes) > 1:
                     variants[name] = Variant(EFFECTS[name].parameter, np.array(sizes), np.array(values))
             at = np.array(self.pressures_kPa)[reached]

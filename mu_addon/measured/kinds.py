@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 
@@ -29,6 +30,17 @@ UNITS = {
     "added_mass": "g",
     "tip_deflection": "mm",
     "voltage": "V",
+}
+# What a column may be in instead: how much of the unit it is read in one of it is.
+CONVERTED = {
+    "s": {"ms": 1e-3, "min": 60.0},
+    "kPa": {"Pa": 1e-3, "MPa": 1e3, "mbar": 0.1, "bar": 100.0, "psi": 6.894757293168361},
+    "deg": {"rad": 180.0 / math.pi},
+    "mm": {"um": 1e-3, "cm": 10.0, "m": 1e3},
+    "N": {"mN": 1e-3, "kN": 1e3},
+    "g": {"mg": 1e-3, "kg": 1e3},
+    "V": {"mV": 1e-3},
+    "": {"percent": 1e-2},
 }
 # What a camera or a voltmeter can miss for a moment; a gap in anything else leaves rows without meaning.
 MAY_BE_MISSING = ("angle_deg", "voltage_V", "marker")
@@ -143,6 +155,12 @@ def named(quantity: str) -> str:
     """The column of a quantity, with the unit it is read in."""
     unit = UNITS.get(quantity, "mm")
     return f"{quantity}_{unit}" if unit else quantity
+
+
+def units_of(quantity: str) -> dict[str, float]:
+    """Units that a quantity's column may be in, each with what it is multiplied by to be read."""
+    unit = UNITS.get(quantity, "mm")
+    return {unit: 1.0, **CONVERTED[unit]}
 
 
 def markers(columns: Sequence[str]) -> dict[int, set[str]]:

@@ -14,7 +14,7 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
-from .kinds import UNITS, Kind, markers, may_be_missing, named, quantity_of
+from .kinds import Kind, markers, may_be_missing, named, quantity_of, units_of
 
 Array = np.ndarray[Any, Any]
 
@@ -58,7 +58,9 @@ def read_table(text: str, kind: Kind, path: Path) -> Table:
             _at(path),
             "record more, or leave this experiment out",
         )
-    columns = {name: _numbers(body, i, name, len(header), path) for i, name in kept.items()}
+    columns = {
+        name: factor * _numbers(body, i, header[i], len(header), path) for i, (name, factor) in kept.items()
+    }
     columns, rows = _without_repeats(columns, rows, path, remarks)
     if "time_s" in columns:
         _check_time(columns["time_s"], rows, path, remarks)
@@ -103,23 +105,28 @@ def _lines(text: str, path: Path) -> tuple[list[str], list[tuple[int, list[str]]
     return header, found[1:]
 
 
-def _header(header: Sequence[str], kind: Kind, path: Path, remarks: list[Remark]) -> dict[int, str]:
-    """The columns that are read, by their place."""
+def _header(
+    header: Sequence[str], kind: Kind, path: Path, remarks: list[Remark]
+) -> dict[int, tuple[str, float]]:
+    """The columns that are read and what their numbers are multiplied by, by their place."""
     known = ", ".join(kind.columns) + (", marker1_x_mm, marker1_y_mm, ..." if kind.marked else "")
-    kept = {}
+    kept: dict[int, tuple[str, float]] = {}
     for i, name in enumerate(header):
         if kind.knows(name):
-            kept[i] = name
+            kept[i] = name, 1.0
             continue
         quantity = quantity_of(name)
-        if quantity is not None and kind.knows(named(quantity[0])):
-            wanted = named(quantity[0])
-            unit = UNITS.get(quantity[0], "mm")
+        if quantity is not None and kind.knows(wanted := named(quantity[0])):
+            units = units_of(quantity[0])
+            if quantity[1] in units:
+                kept[i] = wanted, units[quantity[1]]
+                continue
+            unit, *others = units
             told = f"in {quantity[1]!r}" if quantity[1] else "without a unit"
             raise InputError(
                 f"column {name!r} is {told}; it is read " + (f"in {unit}" if unit else "as a bare number"),
                 _at(path, None, name),
-                f"convert it and name it {wanted}",
+                f"name it {wanted}, or end its name with {' or '.join(others)}, in which it is read as well",
             )
         close = difflib.get_close_matches(name, kind.columns, n=1, cutoff=0.75)
         if close:
@@ -129,7 +136,11 @@ def _header(header: Sequence[str], kind: Kind, path: Path, remarks: list[Remark]
         remarks.append(
             Remark(f"column {name!r} is not known and was not read", _at(path), f"known here: {known}")
         )
-    names = list(kept.values())
+    names = [name for name, _ in kept.values()]
+    for name in names:
+        if names.count(name) > 1:
+            twice = " and ".join(header[i] for i, (other, _) in kept.items() if other == name)
+            raise InputError(f"{twice} are one column in two units", _at(path), "keep one")
     if kind.timed and "time_s" not in names:
         raise InputError("column time_s is missing", _at(path), f"{kind.name} needs the time of every row")
     for number, axes in markers(names).items():

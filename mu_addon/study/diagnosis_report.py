@@ -310,13 +310,28 @@ def _gain(found: Diagnosis) -> str:
     html += "</div>"
     if gain.held_out is None:
         html += '<p>None was held out: give one role = "held_out", and its gain is that on unseen data.</p>'
-    groups = found.verdict.record.groups
-    which = f" of {spoken(groups[0])}" if len(groups) > 1 and groups[0] != KNOWN else ""
+    told = [name for name, (fit, _) in gain.by_quantity.items() if fit is gain.fit and name != KNOWN]
+    which = f" of {spoken(told[0])}" if told and len(gain.by_quantity) > 1 else ""
     return (
-        html + f"<p>Root mean square errors{which}. An honest cause beats the same effect put on the wrong "
+        html
+        + _by_quantity(found)
+        + f"<p>Root mean square errors{which}. An honest cause beats the same effect put on the wrong "
         "experiments, and a black box with as many parameters; the interval is from blocks drawn anew, so "
         "that correlated values do not count as many.</p>"
     )
+
+
+def _by_quantity(found: Diagnosis) -> str:
+    """Errors of every quantity that was measured, where there are several."""
+    every = found.verdict.gain.by_quantity
+    if len(every) < 2:
+        return ""
+    rows: list[tuple[list[Any], bool]] = []
+    for name, (fit, held) in every.items():
+        cells = [f"{_figures(e.before)} → {_figures(e.after)}" if e else "" for e in (fit, held)]
+        rows.append(([spoken(name), fit.unit, *cells], fit is found.verdict.gain.fit))
+    head = [("quantity", ""), ("unit", "text"), ("fitted experiments", "n"), ("held out", "n")]
+    return table("", head, rows)
 
 
 def _dependence(found: Diagnosis) -> str:

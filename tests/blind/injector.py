@@ -5,9 +5,9 @@ for the line `reveal`, and only then prints the answer and writes what the instr
 without noise, FOLDER-bare.
 
 An order is JSON; it holds a folder and a seed, and may hold: effect (a name, or several), times (its
-detection limit), values (sizes that are not drawn by what can be seen), unit ("written" or "simulated"),
-noise ("one" slow process beside white noise, "two", or "white"), count, most, dt, rho, level, held_out,
-dead_load, markers.
+detection limit), values (sizes that are not drawn by what can be seen), unit ("written" or "simulated", or
+a kind of experiment that `machines` has a bench of), noise ("one" slow process beside white noise, "two", or
+"white"), and, for a unit, count, most, dt, rho, level, held_out, dead_load, markers.
 """
 
 import hashlib
@@ -21,8 +21,10 @@ import numpy as np
 
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.noise import Source
+from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.record import record
 from mu_addon.evidence.simulator import Composite
+from tests.blind.machines import BENCHES, with_channels
 from tests.blind.truth import UNITS, Simulated, observe
 from tests.evidence import analytic
 
@@ -70,17 +72,34 @@ def shape_of(rng, effect, total_s):
 
 def main():
     for line in sys.stdin:
-        hide(json.loads(line))
+        order = json.loads(line)
+        if order.get("unit") in BENCHES:
+            hide_machine(order)
+        else:
+            hide(order)
+
+
+def sealed(answer, folder, bare):
+    """Commit to an answer, and tell it when asked; `bare` writes what the instruments would have read."""
+    text = json.dumps({**answer, "salt": secrets.token_hex(16)}, sort_keys=True)
+    print(json.dumps({"commitment": hashlib.sha256(text.encode()).hexdigest()}), flush=True)
+    if sys.stdin.readline().strip() == "reveal":
+        bare(folder.with_name(folder.name + "-bare"))
+        print(text, flush=True)
+
+
+def drawn_effects(order):
+    """Effects of an order, as a list."""
+    effects = order.get("effect") or []
+    return [effects] if isinstance(effects, str) else effects
 
 
 def hide(order):
-    """Serve one order."""
+    """Serve one order of a unit under pressure."""
     folder = Path(order["folder"])
     rng = np.random.default_rng(order["seed"])
     unit = UNITS[order.get("unit", "written")]()
-    effects = order.get("effect") or []
-    effects = [effects] if isinstance(effects, str) else effects
-    times = order.get("times", 4.0)
+    effects, times = drawn_effects(order), order.get("times", 4.0)
     dt = float(np.exp(rng.uniform(np.log(0.1), np.log(0.5))))
     dt = round(order.get("dt", dt), 3)
     rho = float(rng.uniform(0.5, 0.97))
@@ -117,12 +136,98 @@ def hide(order):
     write(folder, rng, tests, truth, zeros, noise, order, clock)
     if order.get("dead_load"):
         add_dead_load(folder, rng, values["modulus_factor"])
-    sealed = json.dumps({**answer, "salt": secrets.token_hex(16)}, sort_keys=True)
-    print(json.dumps({"commitment": hashlib.sha256(sealed.encode()).hexdigest()}), flush=True)
-    if sys.stdin.readline().strip() == "reveal":
-        bare = folder.with_name(folder.name + "-bare")
-        write(bare, rng, tests, truth, zeros, None, order, clock)
-        print(sealed, flush=True)
+    sealed(answer, folder, lambda bare: write(bare, rng, tests, truth, zeros, None, order, clock))
+
+
+def hide_machine(order):
+    """Serve one order of another kind of experiment."""
+    folder = Path(order["folder"])
+    rng = np.random.default_rng(order["seed"])
+    bench = BENCHES[order["unit"]]
+    effects, times = drawn_effects(order), order.get("times", 4.0)
+    dt = round(float(np.exp(rng.uniform(np.log(0.2), np.log(0.6)))), 3)
+    rho, slow_share = float(rng.uniform(0.5, 0.97)), float(rng.uniform(0.3, 0.9))
+    level = float(np.exp(rng.uniform(np.log(1e-3), np.log(1e-2))))
+    planned, base = bench.plan(rng, dt), bench.base(rng)
+    if order.get("noise") == "white" or "time_s" not in planned[0].columns:
+        slow_share = 0.0
+    sd = level * bench.reading(base)
+    source = Source(sd * np.sqrt(1 - slow_share), sd * np.sqrt(slow_share), -dt / np.log(rho))
+    answer = {"effect": effects, "times": times, "count": len(planned), "dt": dt, "rho": rho, "level": level}
+    values = base | order.get("values", {})
+    for name in effects if "values" not in order else []:
+        found = sized_machine(rng, bench, planned, name, times, base, source)
+        if found is None:
+            answer["impossible"] = True
+            break
+        values |= found
+    answer["values"] = values
+    truth = bench.observe(planned, values)
+    clock = float(rng.uniform(0.0, 500.0))
+    write_machine(folder, rng, bench, planned, truth, source, order, clock)
+    sealed(answer, folder, lambda bare: write_machine(bare, rng, bench, planned, truth, None, order, clock))
+
+
+def sized_machine(rng, bench, planned, effect, times, base, source):
+    """As `sized`: the size whose change the base model, fitted to it, cannot follow by so much."""
+    group = f"{bench.kind} {bench.channel.rpartition('_')[0]}"
+    shape = {
+        k: float(np.exp(rng.uniform(np.log(low), np.log(high))))
+        for k, low, high in bench.shapes
+        if k.startswith(effect + ".")
+    }
+    model = Composite(bench_simulators(weighed(planned, bench.observe(planned, base))))
+    p = next(e for e in model.effects if e.name == effect).parameters[0]
+    key = f"{effect}.{p.name}"
+    sign = float(rng.choice([s for s, bound in ((-1.0, p.low), (1.0, p.high)) if bound != p.null]))
+    slow = Source(source.white, max(source.slow, 1e-3 * source.white), source.time_s)
+
+    def length(size):
+        made = weighed(planned, bench.observe(planned, base | shape | {key: p.null + sign * size}))
+        other = Composite(bench_simulators(made))
+        fitter = Fitter(record(made, other), other, {group: slow})
+        return float(np.sqrt(fitter.fit((), base).chi2))
+
+    size = reached(length, abs((p.high if sign > 0 else p.low) - p.null), 4.0 * times)
+    return None if size is None else shape | {key: p.null + sign * size}
+
+
+def weighed(planned, observed):
+    """The experiments with what was observed, masses to half a per cent."""
+    return with_channels(
+        planned, [y | ({"mass_sd_g": 5e-3 * y["mass_g"]} if "mass_g" in y else {}) for y in observed]
+    )
+
+
+def write_machine(folder, rng, bench, planned, truth, source, order, clock):
+    """The folder of measured data of another kind; source: of the noise, or None."""
+    folder.mkdir(parents=True, exist_ok=True)
+    lines = []
+    for k, (e, y) in enumerate(zip(planned, truth, strict=True)):
+        columns = {c: v for c, v in {**e.columns, **y}.items() if not c.startswith("mass")}
+        lines += ["[[experiment]]", f'name = "{e.name}"', f'kind = "{e.kind}"', f'file = "run{k}.csv"']
+        lines += ['role = "fit"', f"scale = {e.scale}"]
+        for name in ("specimen", "mode", "axis"):
+            lines += [f'{name} = "{getattr(e, name)}"'] if getattr(e, name) else []
+        for name in ("length_mm", "section_mm"):
+            value = getattr(e, name)
+            lines += [f"{name} = {list(value) if name == 'section_mm' else value}"] if value else []
+        lines += [f"temperature_C = {e.temperature_C}"] if np.isfinite(e.temperature_C) else []
+        if "mass_g" in y:
+            mass = float(y["mass_g"][0])
+            off = 0.0 if source is None else 5e-3 * rng.normal()
+            lines += [f"mass_g = {mass * (1 + off)}", f"mass_sd_g = {5e-3 * mass}"]
+        if source is not None:
+            time = columns.get("time_s", np.arange(len(e), dtype=float))
+            noise = drawn(rng, time, source.white, source.slow, source.time_s, order.get("noise") == "two")
+            columns[bench.channel] = columns[bench.channel] + noise
+        if "time_s" in columns:
+            columns["time_s"] = columns["time_s"] + clock
+        lines += [f'source = "{rng.choice(["machine 1", "machine 2", "worn grips?", "new operator"])}"', ""]
+        text = [",".join(columns)]
+        text += [",".join(f"{v:.9g}" for v in row) for row in np.stack(list(columns.values()), axis=1)]
+        (folder / f"run{k}.csv").write_text("\n".join(text) + "\n")
+    (folder / "experiments.toml").write_text("\n".join(lines))
 
 
 def sized(rng, unit, tests, effect, times, base, noise, total):
@@ -156,19 +261,24 @@ def sized(rng, unit, tests, effect, times, base, noise, total):
         (key, most), null = SIZES[effect], 0.0
     else:
         e = next(e for e in model.effects if e.name == effect)
-        p = e.parameters[0]
-        key, null = e.keys[0], p.null
-        sign = float(rng.choice([s for s, bound in ((-1.0, p.low), (1.0, p.high)) if bound != null]))
-        most = abs((p.high if sign > 0 else p.low) - null)
+        key, null = e.keys[0], e.parameters[0].null
+        low, high = unit.reach(effect, e.parameters[0])
+        sign = float(rng.choice([s for s, bound in ((-1.0, low), (1.0, high)) if bound != null]))
+        most = abs((high if sign > 0 else low) - null)
 
     def length(size):
         values = base | shape | {key: null + sign * size}
         j = fitter.project(long(data, observe(tests, values, unit, 4)) - plain)
         return float(np.linalg.norm(j - tangent * (tangent @ j)))
 
-    wanted = 4.0 * times
+    size = reached(length, most, 4.0 * times)
+    return None if size is None else shape | {key: null + sign * size}
+
+
+def reached(length, most, wanted):
+    """The size, up to `most`, at which `length` of it is what is wanted; None where it never is."""
     # What touches only at a large size shows nothing below it, and little again where it always touches.
-    low, high = 0.0, math.inf
+    low, high, now = 0.0, math.inf, 0.0
     for size in most * np.unique([*np.geomspace(1e-5, 1.0, 11), *np.linspace(0.1, 1.0, 10)]):
         now = length(size)
         if now >= wanted:
@@ -180,13 +290,13 @@ def sized(rng, unit, tests, effect, times, base, noise, total):
     size = high
     for _ in range(30):
         if abs(now / wanted - 1.0) < 0.03:
-            return shape | {key: null + sign * size}
+            return size
         # In proportion where that lies between the bounds, their middle otherwise.
         guess = size * wanted / now if now > 0 else 0.0
         size = guess if low < guess < high else 0.5 * (low + high)
         now = length(size)
         low, high = (size, high) if now < wanted else (low, size)
-    return shape | {key: null + sign * size} if abs(now / wanted - 1.0) < 0.3 else None
+    return size if abs(now / wanted - 1.0) < 0.3 else None
 
 
 def judged_unit(unit, experiments):

@@ -12,6 +12,7 @@ from pathlib import Path
 import attrs
 
 from mu_addon.evidence.fit import Fitter
+from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.record import record
 from mu_addon.evidence.selection import TOLD_APART
@@ -19,6 +20,7 @@ from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
 from mu_addon.measured import read_folder
 from tests.blind import unit_runs
+from tests.blind.machines import BENCHES
 from tests.blind.truth import UNITS
 from tests.evidence import stand_ins
 
@@ -32,7 +34,11 @@ def fingerprint():
     """Hash of the code that verdicts of the battery come from."""
     engine = ROOT / "mu_addon" / "evidence"
     code = [p for p in engine.glob("*.py") if p.stem not in FEM]
-    code += [engine / "prediction" / "unit.py", ROOT / "tests" / "evidence" / "analytic.py", unit_runs.TABLE]
+    code += [
+        *(engine / "prediction").glob("*.py"),
+        ROOT / "tests" / "evidence" / "analytic.py",
+        unit_runs.TABLE,
+    ]
     code += [p for p in (ROOT / "tests" / "blind").glob("*.py") if p.stem != "test_blind"]
     return hashlib.sha256(b"".join(c.read_bytes() for c in sorted(code))).hexdigest()[:12]
 
@@ -79,6 +85,8 @@ def hidden(order, judge):
 
 def simulator_of(order, experiments):
     """The judge's simulator: the unit as it is known to designers, and a beam where one was loaded."""
+    if order.get("unit") in BENCHES:
+        return Composite(bench_simulators(experiments))
     unit = UNITS[order.get("unit", "written")]()
     bent = [e for e in experiments if e.kind == "unit_pressure"]
     kinds = sorted({(e.scale, e.orientation_deg) for e in bent})

@@ -121,6 +121,10 @@ class Written:
         """Name, time, pressure and conditions of each experiment."""
         return analytic.protocols(dt, count)
 
+    def reach(self, effect, parameter):
+        """Smallest and largest size of an effect that may be hidden."""
+        return parameter.low, parameter.high
+
     def responses(self, kinds):
         """The judge's responses at (scale, orientation)s."""
         return [analytic.response(*kind) for kind in kinds]
@@ -167,6 +171,11 @@ class Simulated:
         """As the written unit's, at four fifths of the pressure, hanging or level."""
         known = [b for b in analytic.protocols(dt, 10) if b[3].get("orientation_deg", 0.0) in unit_runs.TURNS]
         return [(name, t, 0.8 * p, how) for name, t, p, how in known[:count]]
+
+    def reach(self, effect, parameter):
+        """Smallest and largest size of an effect that may be hidden: as far as it was run."""
+        sizes = (parameter.null, *unit_runs.SIZES[effect]) if effect in unit_runs.SIZES else ()
+        return (min(sizes), max(sizes)) if sizes else (parameter.low, parameter.high)
 
     def responses(self, kinds):
         """The judge's responses at (scale, orientation)s, of scale 1."""

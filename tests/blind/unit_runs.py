@@ -29,9 +29,15 @@ JUDGED_kPa = (-18.0, -13.5, -9.0, -4.5, 0.0, *(38.0 * np.arange(1, 8) / 7).tolis
 HIDDEN_kPa = (-18.5, -15.0, -11.0, -7.0, -3.0, 0.0, 3.0, 7.0, 11.5, 16.5, 22.0, 28.0, 34.0, 39.0)
 HIDDEN_MESH = MeshSettings(refine=1.15, meridian_mm=1.35)
 # What the bench may hide in this unit, at sizes of its own; the judge's are those of each effect.
-SIZES = {"wall_thickness": (0.85, 0.95, 1.1, 1.25), "clogged_chamber": (0.15, 0.5, 1.0)}
-# What the judge knows of this unit; the last is there as a rival alone.
-JUDGED = ("mesh_error", *SIZES, "overcure")
+SIZES = {
+    "wall_thickness": (0.85, 0.95, 1.1, 1.25),
+    "clogged_chamber": (0.15, 0.5, 1.0),
+    "gravity": (800.0, 2500.0),
+    "overcure": (0.04, 0.11, 0.2),
+    "strain_stiffening": (-0.02, 0.05, 0.25, 0.7),
+}
+# What the judge knows of this unit.
+JUDGED = ("mesh_error", *SIZES)
 
 
 def runs():

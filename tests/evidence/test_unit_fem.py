@@ -182,6 +182,21 @@ def test_what_changes_a_result_changes_its_key():
     assert attrs.evolve(base, body=attrs.evolve(base.body, orientation_deg=90.0)).key() == base.key()
 
 
+def test_units_of_all_scales_share_their_runs():
+    """The bound at each scale is reached by sizes of one list, the one beyond it being the last."""
+    for e in EFFECTS.values():
+        every = (*e.sizes, *e.larger)
+        for enlarged in (0.75, 1.0, 1.5, 2.0):
+            sizes = e.sizes_at(enlarged)
+            assert sizes == every[: len(sizes)]
+            needed = e.parameter.high / enlarged**e.length
+            assert e.length == 0 or sizes[-1] >= 0.97 * needed
+            assert all(s < needed for s in sizes[:-1])
+    assert EFFECTS["overcure"].sizes_at(0.75)[-1] == 0.34
+    assert EFFECTS["overcure"].sizes_at(1.5) == (0.0, 0.06, 0.14, 0.25)
+    assert EFFECTS["gravity"].sizes_at(1.5) == (0.0, 1300.0, 4000.0, 6000.0)
+
+
 AT = (-10.0, 0.0, 10.0, 20.0)
 
 

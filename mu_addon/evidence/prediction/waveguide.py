@@ -45,7 +45,8 @@ class WaveguideVoltage:
     """Predicts waveguides: voltage V exp(-b a) at bending angle a, as each bend loses a share of the light.
 
     The loss of the straight guide is in V, which makes a zero of the angle the same as another V until
-    something else is nonlinear. Missing angles are interpolated in time.
+    something else is nonlinear. Missing angles are interpolated in time, by cubics: the chords of a fast bend
+    miss as much of it as a late clock does.
     """
 
     nuisances = (STRAIGHT, LOSS)
@@ -59,8 +60,7 @@ class WaveguideVoltage:
         """Prediction (1, n) in V, see Simulator."""
         get = values.get
         time, angle = experiment["time_s"], experiment["angle_deg"]
-        seen = np.isfinite(angle)
-        angle = np.interp(time - get("clock_offset.offset_s", 0.0), time[seen], angle[seen])
+        angle = _angle(time, angle, get("clock_offset.offset_s", 0.0))
         angle = angle - get("angle_offset.offset_deg", 0.0)
         if excess := get("optical_nonlinearity.excess", 0.0):
             beyond = np.maximum(np.abs(angle) - get("optical_nonlinearity.onset_deg", 0.0), 0.0)
@@ -70,3 +70,16 @@ class WaveguideVoltage:
         # Far from the data a fit may try losses that no float holds.
         voltage = get(STRAIGHT.name, STRAIGHT.null) * np.exp(np.clip(exponent, -100.0, 100.0))
         return (voltage + get("ambient_light.ambient_V", 0.0))[None]
+
+
+def _angle(time: Array, angle: Array, delay_s: float) -> Array:
+    """Angles (n,) in deg `delay_s` before times (n,); the first and the last beyond the record."""
+    from scipy.interpolate import Akima1DInterpolator
+
+    seen = np.isfinite(angle)
+    if not delay_s and seen.all():
+        return angle
+    if np.count_nonzero(seen) < 2:
+        return np.full(len(time), angle[seen][0])
+    at = np.clip(time - delay_s, time[seen][0], time[seen][-1])
+    return np.asarray(Akima1DInterpolator(time[seen], angle[seen])(at))
