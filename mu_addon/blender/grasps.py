@@ -15,7 +15,7 @@ from ..design import gripper as core
 from ..design.parameters import to_toml
 from ..errors import MuError
 from ..files import write_text
-from . import studies
+from . import gripper_object, studies
 from .gripper_properties import to_gripper
 from .properties import exact
 
@@ -42,7 +42,12 @@ def arguments(root: Any) -> list[str]:
     if props.detail == "part":
         return [*line, "--solid-only"]
     line += ["--cube", f"{_side(props):g}", "--friction", f"{exact(props.friction):g}"]
-    line += ["--density", f"{exact(props.density_g_per_ml):g}"]
+    line += [
+        "--density",
+        f"{exact(props.density_g_per_ml):g}",
+        "--beyond",
+        f"{gripper_object.beyond_mm(root):g}",
+    ]
     return line + {"quick": ["--coarse", "--no-paths"], "full": ["--no-paths"], "paths": []}[props.detail]
 
 
@@ -82,8 +87,9 @@ def of(root: Any) -> Grasped | None:
         gripper = to_gripper(props)
         now = core.to_toml(gripper, "unit.toml"), to_toml(gripper.unit)
         densities = {c["side_mm"]: c["density_g_per_ml"] for c in asked["cubes"]}
-        own = asked["grip"]["friction"], densities.get(_side(props))
-        stale = now != texts or own != (exact(props.friction), exact(props.density_g_per_ml))
+        own = densities.get(_side(props)), asked["grip"]["friction"], asked["grip"]["beyond_mm"]
+        set_now = exact(props.density_g_per_ml), exact(props.friction), gripper_object.beyond_mm(root)
+        stale = now != texts or own != set_now
     except (OSError, ValueError, KeyError, MuError):
         return None
     return Grasped(folder / f"cube-{side}", stale, figures.get(side, {}), *tables[side])

@@ -20,6 +20,7 @@ from . import grasps, materials, motion_parts, preview, stack, unit_object
 from .compat import set_curve
 from .gripper_properties import from_gripper, to_gripper
 from .live import held
+from .properties import exact
 
 PART = "mu_grip"
 """Marks the parts: `finger:SIDE`, `finger:SIDE:NAME`, `plate`, `cube`, `moving:SIDE`, `moving:cube`."""
@@ -27,7 +28,8 @@ SIDES = ("left", "right")
 SHOWN = ("membranes", "struts", "wells")
 """Steps of a finger's unit that are drawn."""
 BEYOND_MM = 3.0
-"""The cube's middle beyond the tips, as the core's `Grip` has it; that cannot be asked without the solver."""
+"""The cube's middle beyond the tips where it is put first, as the core's `Grip` has it; that cannot be asked
+without the solver."""
 MOVING = "moving:"
 
 
@@ -104,9 +106,22 @@ def _draw(root: Any, gripper: Gripper) -> None:
             unit_object.draw_part(obj, name, skeleton)
     x, y = (extent / 2.0 for extent in gripper.size_mm)
     _box(root, "plate", (-x, -y, -gripper.plate.thickness_mm), (x, y, 0.0), "MU Plate")
+    first = part(root, "cube") is None
     half = np.full(3, root.mu_gripper.cube_mm / 2.0)
-    at = np.array([0.0, 0.0, gripper.unit.dimensions.height + BEYOND_MM])
-    _box(root, "cube", at - half, at + half, "MU Obstacle")
+    cube = _box(root, "cube", -half, half, "MU Obstacle")
+    if first:
+        cube.location.z = gripper.unit.dimensions.height + BEYOND_MM
+        # Fingers and cube are solved as mirror images: it may be moved between them, along them alone.
+        cube.lock_location[2] = False
+
+
+def beyond_mm(root: Any) -> float:
+    """How far beyond the tips the cube's middle is, where the user has it."""
+    cube = part(root, "cube")
+    if cube is None:
+        return BEYOND_MM
+    # Digits beyond a nanometre are single precision's.
+    return round(exact(cube.location.z) - to_gripper(root.mu_gripper).unit.dimensions.height, 6)
 
 
 def _box(root: Any, name: str, low: Any, high: Any, material: str) -> Any:

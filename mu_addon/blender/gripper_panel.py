@@ -57,6 +57,9 @@ class MU_PT_grasp(OfGripper, bpy.types.Panel):
         if props.detail != "part":
             column = layout.column(align=True)
             column.prop(props, "cube_mm")
+            cube = gripper_object.part(root, "cube")
+            if cube is not None:
+                column.prop(cube, "location", index=2, text="Its Height")
             column.prop(props, "density_g_per_ml")
             column.prop(props, "friction")
         child = simulation.of(grasps.job(root))

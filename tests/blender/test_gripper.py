@@ -59,6 +59,14 @@ def test_two_fingers_face_each_other_over_the_plate(tmp_path):
         assert np.allclose(cube.min(axis=0), [-12.5, -12.5, 75 + 3 - 12.5], atol=1e-4)
         root.mu_gripper.cube_mm = 12.5
         assert np.allclose(np.ptp(world(gripper_object.part(root, "cube")), axis=0), 12.5, atol=1e-4)
+        # It is the user's to move, along the fingers, and stays there.
+        moved = gripper_object.part(root, "cube")
+        assert tuple(moved.lock_location) == (True, True, False)
+        moved.location.z = 80.3
+        root.mu_gripper.cube_mm = 20.0
+        bpy.context.view_layer.update()
+        assert np.allclose(world(moved).mean(axis=0), [0, 0, 80.3], atol=1e-4)
+        assert gripper_object.beyond_mm(root) == 5.3
 
         root.mu_gripper.plate.hole_diameter_mm = 9.0
         assert "leave too little" in root.mu_gripper.trouble and "leave too little" in drawn()
@@ -107,6 +115,7 @@ def test_what_a_grasp_is_asked_and_how_it_ends(tmp_path):
         props.fingers.gap_mm = 26.5
         line = grasps.arguments(root)
         assert line[0] == "grip" and line[line.index("--cube") + 1] == "20"
+        assert line[line.index("--beyond") + 1] == "3"
         assert line[line.index("--friction") + 1] == "0.3" and "--coarse" in line and "--no-paths" in line
         assert read_gripper(line[line.index("--gripper") + 1]).fingers.gap_mm == 26.5
         props.detail = "part"
@@ -138,7 +147,7 @@ def write_folder(folder):
     (folder / "gripper.toml").write_text(gripper_toml(gripper, "unit.toml"), encoding="utf-8")
     (folder / "unit.toml").write_text(to_toml(gripper.unit), encoding="utf-8")
     cubes = "cubes = [{ side_mm = 20.0, density_g_per_ml = 1.24 }]"
-    (folder / "grip.toml").write_text(f"{cubes}\n[grip]\nfriction = 0.5\n", encoding="utf-8")
+    (folder / "grip.toml").write_text(f"{cubes}\n[grip]\nfriction = 0.5\nbeyond_mm = 3.0\n", encoding="utf-8")
     figures = {"angle_at_hold_deg": 12.3, "normal_at_hold_N": 0.45, "held": True, "margin": 4.0}
     figures["gap_error_mm"] = 0.02
     (folder / "summary.json").write_text(json.dumps({"grasps": {"20": figures}}), encoding="utf-8")
@@ -198,12 +207,14 @@ def test_a_grasp_plays_on_the_timeline(tmp_path):
             assert grasps.of(root).stale and "Stale" in drawn(), name
             setattr(props, name, before)
             assert not grasps.of(root).stale
+        gripper_object.part(root, "cube").location.z += 2.0
+        assert grasps.of(root).stale and "Stale" in drawn()
         """,
         tmp_path,
     )
 
 
-def test_the_cube_is_drawn_where_the_core_puts_it(tmp_path):
+def test_the_cube_is_drawn_where_the_core_puts_it():
     assert Grip().beyond_mm == 3.0, "gripper_object.BEYOND_MM, which the first test here sees drawn"
 
 

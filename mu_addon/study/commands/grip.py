@@ -42,6 +42,13 @@ def add(commands: Commands[Any]) -> None:
         "--friction", type=float, default=0.5, metavar="MU", help="Coulomb's coefficient (0.5)"
     )
     command.add_argument(
+        "--beyond",
+        type=float,
+        default=3.0,
+        metavar="MM",
+        help="how far the cubes' middle lies beyond the tips at rest (3)",
+    )
+    command.add_argument(
         "--protocol", metavar="CSV", help="pressure and phases i to v (protocols/gripper.csv)"
     )
     command.add_argument(
@@ -76,7 +83,7 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
     job = Job(
         gripper=gripper,
         cubes=() if options.solid_only else tuple(Cube(side, options.density) for side in options.cube),
-        grip=Grip(friction=options.friction, step_s=step_s),
+        grip=Grip(friction=options.friction, beyond_mm=options.beyond, step_s=step_s),
         phases=shipped_phases() if options.protocol is None else read_phases(Path(options.protocol)),
         mesh=MeshSettings(refine=refine),
         rules=() if options.solid_only or options.no_paths else rules,

@@ -92,6 +92,8 @@ class Grip:
     def __attrs_post_init__(self) -> None:
         if not 0.0 <= self.friction <= 5.0:
             raise InputError(f"a friction coefficient of {self.friction:g}", "--friction", "give 0 to 5")
+        if not -50.0 <= self.beyond_mm <= 50.0:
+            raise InputError(f"a cube {self.beyond_mm:g} mm beyond the tips", "--beyond", "give -50 to 50 mm")
         if not 0.0 < self.step_s <= 2.0:
             raise InputError(f"instants {self.step_s:g} s apart", "step_s", "give a time up to 2 s")
 
