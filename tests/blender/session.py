@@ -108,6 +108,8 @@ def blender(code, folder, *arguments, prelude=PRELUDE):
         **{name: os.environ[name] for name in ("PATH", "LD_LIBRARY_PATH", "LANG") if name in os.environ},
         "HOME": str(folder),
         "BLENDER_USER_RESOURCES": str(folder / "blender"),
+        # A session that ends as these do leaves its folder of temporary files.
+        "TMPDIR": str(folder),
         "OPENBLAS_NUM_THREADS": "1",
         "PYTHONPATH": str(ROOT),
     }
