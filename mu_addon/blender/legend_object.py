@@ -14,7 +14,7 @@ from bpy.app.handlers import persistent
 from mathutils import Matrix
 
 from ..errors import InputError
-from . import fields, legend, materials, motion_parts, preview, unit_object
+from . import fields, handlers, legend, materials, motion_parts, preview, unit_object
 from .unit_object import LEGEND, remove_part
 
 BAR, HEAD, TICK = "bar", "head", "tick"
@@ -119,12 +119,14 @@ def _before_frame(scene, *_):
         tell(root, scene)
 
 
+_HANDLERS = {"frame_change_pre": _before_frame}
+
+
 def register() -> None:
     """The handler that writes time and pressure."""
-    bpy.app.handlers.frame_change_pre.append(_before_frame)
+    handlers.add(_HANDLERS)
 
 
 def unregister() -> None:
     """Take it out."""
-    if _before_frame in bpy.app.handlers.frame_change_pre:
-        bpy.app.handlers.frame_change_pre.remove(_before_frame)
+    handlers.remove(_HANDLERS)

@@ -12,6 +12,8 @@ from contextlib import contextmanager
 import bpy
 from bpy.app.handlers import persistent
 
+from . import handlers
+
 INTERVAL_S = 0.03
 
 _held = 0
@@ -101,21 +103,17 @@ def catch_up() -> None:
             schedule(root)
 
 
-_HANDLERS = ("undo_post", "redo_post", "load_post")
+_HANDLERS = dict.fromkeys(("undo_post", "redo_post", "load_post"), _catch_up)
 
 
 def register():
     """Handlers for undo, redo and load."""
-    for name in _HANDLERS:
-        getattr(bpy.app.handlers, name).append(_catch_up)
+    handlers.add(_HANDLERS)
 
 
 def unregister():
     """Take out handlers and a waiting rebuild."""
-    for name in _HANDLERS:
-        handlers = getattr(bpy.app.handlers, name)
-        if _catch_up in handlers:
-            handlers.remove(_catch_up)
+    handlers.remove(_HANDLERS)
     if bpy.app.timers.is_registered(_flush):
         bpy.app.timers.unregister(_flush)
     _pending.clear()

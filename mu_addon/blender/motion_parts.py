@@ -18,7 +18,7 @@ from bpy.app.handlers import persistent
 from ..errors import InputError
 from ..study.motion import FIELDS, FOLDER, MODEL_A, PLAYED, REGIONS, SENSITIVITY, Motion, Skin, read_motion
 from ..study.point_cache import read_pc2, write_pc2
-from . import fields, preview, studies, unit_object
+from . import fields, handlers, preview, studies, unit_object
 from .properties import to_unit
 from .unit_object import MOTION
 
@@ -378,15 +378,11 @@ _HANDLERS = {"frame_change_pre": _before_frame, "load_post": _loaded}
 
 def register() -> None:
     """Handlers that keep the fields at the scene's frame."""
-    for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(handler)
+    handlers.add(_HANDLERS)
 
 
 def unregister() -> None:
     """Take them out."""
-    for name, handler in _HANDLERS.items():
-        handlers = getattr(bpy.app.handlers, name)
-        if handler in handlers:
-            handlers.remove(handler)
+    handlers.remove(_HANDLERS)
     for kept in (_played, _prints, _motions):
         kept.clear()

@@ -19,7 +19,7 @@ from ..design.body import Body, Flaw, flaws, overlaps, require_sound
 from ..design.parameters import Unit
 from ..design.rigid_body import FRICTION
 from ..files import write_text
-from . import bodies
+from . import bodies, handlers
 from .properties import exact
 
 ODD_SIZE_MM = (0.1, 2000.0)
@@ -143,16 +143,12 @@ def register() -> None:
     """The property on objects, and handlers that notice edits."""
     bpy.utils.register_class(MU_PG_obstacle)
     bpy.types.Object.mu_obstacle = PointerProperty(type=MU_PG_obstacle)
-    for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(handler)
+    handlers.add(_HANDLERS)
 
 
 def unregister() -> None:
     """Take them out; what is an obstacle stays so in the file."""
-    for name, handler in _HANDLERS.items():
-        handlers = getattr(bpy.app.handlers, name)
-        if handler in handlers:
-            handlers.remove(handler)
+    handlers.remove(_HANDLERS)
     del bpy.types.Object.mu_obstacle
     bpy.utils.unregister_class(MU_PG_obstacle)
     _placed.clear()

@@ -23,7 +23,7 @@ from ..sensing.recording import FIXED
 from ..study.client import DONE, FAILED, RUNNING, Child
 from ..study.traces import Traces
 from ..study.watching import Watched
-from . import simulation, studies, twin
+from . import handlers, simulation, studies, twin
 from .properties import BESIDE_BLEND_FILE
 
 INTERVAL_S = 1 / 60
@@ -527,8 +527,7 @@ def register() -> None:
     """The property group, the one property on objects that holds it, and the handlers."""
     bpy.utils.register_class(MU_PG_sensor)
     bpy.types.Object.mu_sensor = PointerProperty(type=MU_PG_sensor)
-    for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(handler)
+    handlers.add(_HANDLERS)
 
 
 def unregister() -> None:
@@ -541,9 +540,6 @@ def unregister() -> None:
     _calibrating.clear()
     if bpy.app.timers.is_registered(_poll):
         bpy.app.timers.unregister(_poll)
-    for name, handler in _HANDLERS.items():
-        handlers = getattr(bpy.app.handlers, name)
-        if handler in handlers:
-            handlers.remove(handler)
+    handlers.remove(_HANDLERS)
     del bpy.types.Object.mu_sensor
     bpy.utils.unregister_class(MU_PG_sensor)

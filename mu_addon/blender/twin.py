@@ -17,7 +17,7 @@ from bpy.app.handlers import persistent
 from ..errors import InputError
 from ..study.motion import REGIONS, Motion
 from ..study.posing import Poses, poses
-from . import materials, motion_parts, preview, studies, unit_object
+from . import handlers, materials, motion_parts, preview, studies, unit_object
 from .unit_object import TWIN
 
 LIVE, OUTSIDE, WAITING = "live", "outside", "waiting"
@@ -157,14 +157,16 @@ def _loaded(*_: Any) -> None:
         _dress(root, WAITING)
 
 
+_HANDLERS = {"load_post": _loaded}
+
+
 def register() -> None:
     """The handler for loading."""
-    bpy.app.handlers.load_post.append(_loaded)
+    handlers.add(_HANDLERS)
 
 
 def unregister() -> None:
     """Take it out."""
-    if _loaded in bpy.app.handlers.load_post:
-        bpy.app.handlers.load_post.remove(_loaded)
+    handlers.remove(_HANDLERS)
     _shapes.clear()
     _said.clear()
