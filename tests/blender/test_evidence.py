@@ -53,7 +53,8 @@ def test_a_folder_is_checked_as_it_is_chosen(tmp_path):
         table = data / "block_1.csv"
         good = table.read_text()
         table.write_text(good.replace("0.1,", "0.1,much"))
-        assert "is not a number" in drawn() and "block_1.csv, row" in drawn().replace("/ ", "/")
+        # Where a line is broken depends on how long the folder's name is.
+        assert "isnotanumber" in "".join(drawn().split()) and "block_1.csv,row" in "".join(drawn().split())
         table.write_text(good)
         assert "1.5x: 4 rows" in drawn()
         """,

@@ -236,8 +236,11 @@ def test_a_coarse_grasp_from_start_to_timeline(tmp_path):
         hold = found.columns["time_s"][max(i for i, p in enumerate(found.phase) if p == "iii")]
         bpy.context.scene.frame_set(1 + round(24 * hold))
         graph = bpy.context.evaluated_depsgraph_get()
-        inner = motion_parts.vertices_of(left.evaluated_get(graph).data)[:, 1].max()
-        assert abs(inner + 12.5) < 1.0, "the left finger's face lies on the cube's"
+        at = motion_parts.vertices_of(left.evaluated_get(graph).data)
+        # The finger is wider than the cube: beside it, it bulges past the cube's face.
+        beside = (np.abs(at[:, 0]) < 12.5) & (np.abs(at[:, 2] - cube.matrix_world.translation.z) < 12.5)
+        inner = at[beside, 1].max()
+        assert abs(inner + 12.5) < 0.3, f"the left finger's face lies on the cube's: {inner}"
         """,
         tmp_path,
     )
