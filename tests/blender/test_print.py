@@ -324,7 +324,7 @@ def test_a_body_of_ones_own_is_checked_by_its_solid(tmp_path):
         bpy.ops.mesh.primitive_cylinder_add(vertices=64, radius=20, depth=30, location=(0, 0, 14))
         body = bpy.context.object
         root.select_set(True)
-        assert bpy.ops.mu.body(role="envelope") == {"FINISHED"}
+        assert bpy.ops.mu.body() == {"FINISHED"}
         bpy.context.view_layer.objects.active = root
         assert "only STL is written" in refused(bpy.ops.mu.print_export)
         assert bpy.ops.mu.print_check() == {"FINISHED"}
