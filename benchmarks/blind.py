@@ -330,7 +330,7 @@ def unit_confusion(rows, path):
         ["clean", *known, *OUTSIDE],
         known,
         lambda r: r["effect"][0] if r["effect"] else "clean",
-        "; below the line: outside the library",
+        "\nbelow the line: outside the library",
     )
 
 
@@ -338,7 +338,7 @@ def kinds_confusion(rows, path):
     """The same of the other kinds of experiment."""
 
     def truth(unit, effect):
-        return f"{unit.partition('_')[0]}: {effect}"
+        return f"{unit}: {effect}"
 
     truths = [truth(kind, e) for kind, bench in BENCHES.items() for e in ("clean", *bench.effects)]
     known = list(dict.fromkeys(e for bench in BENCHES.values() for e in bench.effects))

@@ -308,8 +308,13 @@ def _folds(fitter: Fitter, fit: Fit) -> list[Array]:
     folds = []
     for i, share in _told(fitter, fit).items():
         rows = record.rows(i)
-        if share < 0.6 or "time_s" not in record.experiments[i].columns or rows.sum() < 40:
+        timed = "time_s" in record.experiments[i].columns
+        if share < 0.6 or rows.sum() < (40 if timed else 12):
             folds.append(rows)
+            continue
+        if not timed:
+            # Readings without a clock stand alone: every other one foretells those between.
+            folds += [rows & (np.cumsum(rows) % 2 == k) for k in (0, 1)]
             continue
         clock = np.zeros(len(record))
         for s in record.series:

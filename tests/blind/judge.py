@@ -14,7 +14,7 @@ import attrs
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.prediction.unit import UnitPressure
-from mu_addon.evidence.record import record
+from mu_addon.evidence.record import KNOWN, record
 from mu_addon.evidence.selection import TOLD_APART
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
@@ -118,7 +118,7 @@ def told_apart(order, bare, verdict, answer):
     experiments = [e for e in read_folder(bare).experiments if e.role == "fit"]
     simulator = simulator_of(order, experiments)
     data = record(experiments, simulator)
-    if any(g not in verdict.sources for g in data.groups):
+    if any(g not in verdict.sources for g in data.groups if g != KNOWN):
         return None
     fitter = Fitter(data, simulator, verdict.sources)
     base = fitter.fit()
