@@ -89,13 +89,18 @@ def test_the_cache_makes_it_repeatable(tmp_path: Path) -> None:
     assert len(list(tmp_path.iterdir())) == 2
 
 
-def test_a_flat_element_is_bad_luck_and_meshed_again(tmp_path: Path) -> None:
+@pytest.mark.parametrize("off", [0.0, 1e-6], ids=["flat", "flat but for rounding"])
+def test_a_flat_element_is_bad_luck_and_meshed_again(tmp_path: Path, off: float) -> None:
     ball = sphere(10.0)
     mesh_surface(ball.vertices, ball.faces, 4.0, cache=tmp_path)
     (file,) = tmp_path.glob("tetwild-*.npz")
     stored = dict(np.load(file))
-    bottom, *_, top = stored["tets"][0]
-    stored["nodes"][top] = stored["nodes"][bottom]
+    bottom, left, right, top = stored["tets"][0]
+    x = stored["nodes"]
+    up = np.sign(np.linalg.det(x[[left, right, top]] - x[bottom])) * np.cross(
+        x[left] - x[bottom], x[right] - x[bottom]
+    )
+    x[top] = x[[bottom, left, right]].mean(axis=0) + off * up
     np.savez(file, **stored)
     mesh = mesh_surface(ball.vertices, ball.faces, 4.0, cache=tmp_path)
     assert element_volumes(mesh).min() > 1e-3
