@@ -213,6 +213,11 @@ def called(rows):
     return ", ".join(f"{n} {k}" for k, n in collections.Counter(named(r) for r in rows).most_common(4))
 
 
+def tellable(rows):
+    """Without sets that were not exact and whose data, free of noise, a rival fits so that any judge errs."""
+    return [r for r in rows if r["outcome"] in RIGHT or not r["nearest"] or r["nearest"][0] >= TELLABLE]
+
+
 def report(rows):
     """The battery in words and tables, as Markdown."""
     gone = sum(bool(r["impossible"]) for r in rows)
@@ -240,11 +245,9 @@ def report(rows):
         here = [r for r in by["one"] if r["times"] == times]
         line(f"one effect, {times:g} x its limit: exact", rate(here, RIGHT))
         if times >= 4:
-            # Where data without noise leave a rival that any judge would confuse it with, exact is luck.
-            fair = [
-                r for r in here if r["outcome"] in RIGHT or not r["nearest"] or r["nearest"][0] >= TELLABLE
-            ]
-            line(f"{times:g} x: exact, where no rival fits the data without noise", rate(fair, RIGHT))
+            line(
+                f"{times:g} x: exact, where no rival fits the data without noise", rate(tellable(here), RIGHT)
+            )
         line(f"{times:g} x: truth in the set", rate(here, IN_SET))
         line(f"{times:g} x: wrong with confidence", rate(here, ("wrong",)))
         line(f"{times:g} x: wrong set", rate(here, ("wrong_set",)))
@@ -258,10 +261,10 @@ def report(rows):
         here = [r for r in kinds if r["effect"] and r["times"] == times]
         line(f"other kinds, {times:g} x: exact", rate(here, RIGHT))
         if times >= 4:
-            fair = [
-                r for r in here if r["outcome"] in RIGHT or not r["nearest"] or r["nearest"][0] >= TELLABLE
-            ]
-            line(f"other kinds, {times:g} x: exact, where no rival fits without noise", rate(fair, RIGHT))
+            line(
+                f"other kinds, {times:g} x: exact, where no rival fits without noise",
+                rate(tellable(here), RIGHT),
+            )
         line(f"other kinds, {times:g} x: truth in the set", rate(here, IN_SET))
         line(f"other kinds, {times:g} x: wrong with confidence", rate(here, ("wrong",)))
         line(f"other kinds, {times:g} x: missed (none)", rate(here, ("none",)))

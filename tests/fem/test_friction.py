@@ -15,6 +15,7 @@ from mu_addon.fem.rigid import Box, Plane, Pose, Sphere
 from mu_addon.fem.trajectory import simulate
 
 from .bodies import box, hollow_box
+from .derivatives import assert_consistent
 
 E, NU, MU = 1.0, 0.3, 0.3
 LID = Plane((0, 0, 1), (0, 0, -1))
@@ -62,15 +63,7 @@ def test_force_and_tangent_are_derivatives_of_the_energy(rigid, order):
     obstacle.pose = Pose(Rotation.from_rotvec((0.01, -0.02, 0.015)).as_matrix(), (0.02, -0.03, 0.05))
     obstacle.settle(u + 0.005 * random.standard_normal(u.shape))
     assert 0.05 < obstacle.contact(u).sticking < 0.95
-    v = random.standard_normal(mesh.nodes.shape)
-    v.ravel()[np.setdiff1d(np.arange(v.size), model.free)] = 0.0
-    h = 1e-6
-    plus, minus = (model.potential(u + s * h * v, 0.0, m) for s in (1, -1))
-    force = model.residual(u, 0.0, m)
-    assert (plus - minus) / (2 * h) == pytest.approx(float((force * v).sum()), rel=1e-7)
-    plus, minus = (model.residual(u + s * h * v, 0.0, m).ravel()[model.free] for s in (1, -1))
-    moved = model.matrix(model.tangent(u, 0.0, m)) @ v.ravel()[model.free]
-    np.testing.assert_allclose((plus - minus) / (2 * h), moved, atol=1e-7 * np.abs(moved).max())
+    assert_consistent(model, m, u, random, 1e-7)
 
 
 def test_a_dragged_block_resists_with_mu_times_the_normal_force():
