@@ -10,6 +10,15 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+# Simulating a unit takes half a gigabyte a process; more processes than this wait for memory, not for cores.
+MOST_WORKERS = 16
+
+
+def cores() -> int:
+    """How many cores this process may use, `MOST_WORKERS` at most: a process for each is what pays."""
+    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(allowed, MOST_WORKERS)
+
 
 def end_with_parent() -> None:
     """End this process as soon as its parent has ended: one that was killed cannot end its workers."""

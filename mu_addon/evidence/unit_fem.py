@@ -25,7 +25,7 @@ from ..measured import Experiment
 from ..meshing.mesh import AXES
 from ..meshing.settings import MeshSettings
 from ..meshing.unit import mesh_unit
-from ..processes import ctrl_c_ignored, end_with_parent, one_thread_each
+from ..processes import cores, ctrl_c_ignored, end_with_parent, one_thread_each
 from .markers import Marker, attached, followed
 from .prediction.unit import KIND, UnitResponse, Variant
 from .prediction.wall import NAME as WALL
@@ -63,7 +63,7 @@ class UnitSettings:
     mesh: the model's; finer: what mesh_error compares it with. pressures: how many, about; margin: how far
     beyond the measured ones, as a share of their range. effects: names of those to run. distal: chambers
     behind a clog. lattice: a law for the lattice in place of the unit's moduli. farthest_mm: of a marker
-    from the unit, at scale 1. workers: processes.
+    from the unit, at scale 1. workers: processes, one a core by default.
     """
 
     mesh: MeshSettings = COARSE
@@ -74,7 +74,7 @@ class UnitSettings:
     distal: int = 1
     lattice: LatticeLaw | None = None
     farthest_mm: float = 4.0
-    workers: int = 2
+    workers: int = attrs.field(factory=cores)
 
     def __attrs_post_init__(self) -> None:
         for name in self.effects:
@@ -168,7 +168,8 @@ def run(case: Run, cache: Path | None = None) -> Result:
             materials = effect.materials(body, mesh, case.size)
         if effect and effect.model:
             model = effect.model(body, mesh, case.size)
-        equilibrium = Equilibrium(model, materials, effect.newton if effect else SMOOTH)
+        newton = effect.newton if effect else SMOOTH
+        equilibrium = Equilibrium(model, materials, newton, explains=not case.effect)
         # Out of reach, it only lends the points at which the unit would touch.
         outline = walled(body, mesh, 1e6).obstacles[0] if case.outline else None
         places = slice(1, 1 + 3 * len(case.points))

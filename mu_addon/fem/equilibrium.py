@@ -36,11 +36,21 @@ class State:
 
 
 class Equilibrium:
-    """Finds equilibria of one body with one set of materials."""
+    """Finds equilibria of one body with one set of materials.
 
-    def __init__(self, model: Model, materials: Materials, settings: NewtonSettings | None = None) -> None:
+    explains: whether a failure names the limit point that caused it, which takes some twenty factorisations.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        materials: Materials,
+        settings: NewtonSettings | None = None,
+        explains: bool = True,
+    ) -> None:
         self.model = model
         self.settings = settings or NewtonSettings()
+        self.explains = explains
         self.parameters = model.parameters(materials)
         self.factor = model.factor
 
@@ -180,8 +190,9 @@ class Equilibrium:
 
         # Load steps may give up a little before the limit.
         ahead = last.pressure_MPa + 8 * (pressure - last.pressure_MPa)
-        with contextlib.suppress(ConvergenceError):
-            why = str(limit_pressure(self, last, ahead) or why)
+        if self.explains:
+            with contextlib.suppress(ConvergenceError):
+                why = str(limit_pressure(self, last, ahead) or why)
         least, element = self.model.smallest_jacobian(last.u, self.parameters)
         nodes = self.model.mesh.tets[element]
         place = (self.model.mesh.nodes[nodes] + last.u[nodes]).mean(axis=0)
