@@ -11,15 +11,10 @@ import numpy as np
 from ..errors import InputError
 from ..fem.kinematics import Probe, probe
 from ..measured import Experiment
-from ..measured.kinds import markers
+from ..measured.rest import at_rest
 from ..meshing.mesh import AXES, Mesh, boundary_faces
 
 Array = np.ndarray[Any, Any]
-
-# A marker is at rest where the pressure is within this share of its range from 0 ...
-AT_REST = 0.02
-# ... and lies where these first samples of rest put it on average.
-SAMPLES = 5
 
 
 @attrs.frozen(eq=False)
@@ -36,40 +31,6 @@ class Marker:
     seen: Array
     point: Array
     distance_mm: float
-
-
-def at_rest(experiments: Sequence[Experiment]) -> dict[int, tuple[str, Array, str]]:
-    """Axes, position (3,) in mm at rest, 0 where not measured, and experiment of each marker by its number.
-
-    Of the first experiment that shows the marker at rest. Raises InputError where none does or a marker
-    lacks y or z.
-    """
-    found: dict[int, tuple[str, Array, str]] = {}
-    missed: dict[int, str] = {}
-    for e in experiments:
-        p = np.abs(e["pressure_kPa"])
-        still = p <= AT_REST * np.ptp(e["pressure_kPa"])
-        for number, axes in markers(list(e.columns)).items():
-            if number in found:
-                continue
-            if not {"y", "z"} <= axes:
-                raise InputError(f"marker {number} lacks its y or z", e.name, "give both columns")
-            known = "".join(a for a in AXES if a in axes)
-            columns = np.stack([e[f"marker{number}_{a}_mm"] for a in known], axis=1)
-            rows = np.flatnonzero(still & np.isfinite(columns).all(axis=1))[:SAMPLES]
-            if len(rows):
-                seen = np.zeros(3)
-                seen[[AXES.index(a) for a in known]] = columns[rows].mean(axis=0)
-                found[number] = known, seen, e.name
-            else:
-                missed.setdefault(number, e.name)
-    for number in missed.keys() - found.keys():
-        raise InputError(
-            f"marker {number} is never seen at rest",
-            missed[number],
-            "record it at no pressure before the run",
-        )
-    return dict(sorted(found.items()))
 
 
 def attached(mesh: Mesh, experiments: Sequence[Experiment], farthest_mm: float) -> tuple[Marker, ...]:

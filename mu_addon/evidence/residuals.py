@@ -10,9 +10,13 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..design.parameters import Chambers
+from ..errors import InputError
 from ..measured import Experiment
+from ..measured.rest import at_rest
 from .fit import Fit, Fitter
 from .noise import harmonics, repeated
+from .prediction.unit import KIND as UNIT
 from .prediction.unit import cycles, play
 from .record import KNOWN, Record, Series
 
@@ -21,6 +25,8 @@ Array = np.ndarray[Any, Any]
 # Share of clean sets in which any structure at all may be seen.
 FALSE_ALARM = 0.003
 BANDS = 16
+# The pitch of chambers at 1.0x.
+PITCH_MM = Chambers().cell_mm
 
 
 @attrs.frozen
@@ -122,6 +128,7 @@ def _fitted_tests(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[
         found += _tested(fitter, fit, name, _by_condition(record, values, response), spare)
     return [
         *found,
+        *_chambers(fitter, fit, response, spare),
         *_phase(fitter, fit, spare),
         *_steps(fitter, r, spare),
         *_breaks(fitter, fit, response, spare),
@@ -190,6 +197,54 @@ def _by_condition(record: Record, values: Array, response: Array) -> dict[str, A
                 block[s.at] = response[s.at, None] * x[s.experiment] ** np.arange(1, 3)
         columns[channel] = block
     return columns
+
+
+def _chambers(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, float]) -> list[Dependence]:
+    """Whether markers answer to the modulus more or less by the chamber beside which they sit.
+
+    A chamber that bends otherwise than the rest moves the markers beyond it, and none before it. `where`
+    names the marker that stands out most, and its place at rest counted in chambers from the inlet.
+    """
+    from scipy.stats import chi2
+
+    record = fitter.record
+    place = _marker_places(record)
+    levels = np.unique(list(place.values()))
+    if len(levels) < 2:
+        return []
+    block, own = np.zeros((len(record), min(2, len(levels) - 1))), np.zeros((len(record), len(levels)))
+    for s in record.series:
+        if s.channel in place and s.group != KNOWN:
+            at = int(np.searchsorted(levels, place[s.channel]))
+            x = 2.0 * (levels[at] - levels[0]) / (levels[-1] - levels[0]) - 1.0
+            block[s.at] = response[s.at, None] * x ** np.arange(1, block.shape[1] + 1)
+            own[s.at, at] = response[s.at]
+    q = _basis(fit.jacobian)
+    white, each = (_unit(fitter.project(columns)) for columns in (block, own))
+    b = _basis(white - q @ (q.T @ white))
+    if not b.shape[1]:
+        return []
+    gain = float(np.sum((b.T @ fit.residual) ** 2))
+    groups = {s.group for s in record.series if s.channel in place}
+    p = float(chi2.sf(gain - sum(spare[g] for g in groups), b.shape[1]))
+    most = levels[int(np.argmax(np.abs(each.T @ fit.residual)))]
+    named = next(c for c, level in place.items() if level == most).partition("_")[0]
+    return [Dependence("chamber", gain, p, f"{named}, {most:g} chambers from the inlet", b.shape[1])]
+
+
+def _marker_places(record: Record) -> dict[str, float]:
+    """Where on the axis the markers sit at rest, by their channels, in chambers from the inlet."""
+    bent = [e for e in record.experiments if e.kind == UNIT]
+    try:
+        seen = at_rest(bent)
+    except InputError:
+        # Without a moment of rest nothing says where they sit.
+        return {}
+    scale = {e.name: e.scale for e in bent}
+    # To half a chamber: where markers were glued is not known better.
+    chamber = {n: round(2 * z / (PITCH_MM * scale[name])) / 2 for n, (_, (*_, z), name) in seen.items()}
+    channels = _channels(record)
+    return {c: chamber[n] for c in channels for n in chamber if c.startswith(f"marker{n}_")}
 
 
 def _tested(

@@ -20,11 +20,11 @@ import numpy as np
 
 from ..design.toml_text import line_of, parse, place
 from ..errors import InputError
-from ..evidence.markers import AT_REST, SAMPLES
 from ..files import write_text
 from ..measured import read_folder
 from ..measured.folder import FILE
 from ..measured.kinds import COMMON, KINDS
+from ..measured.rest import AT_REST, SAMPLES
 from ..measured.table import Remark, read_table
 from ..measured.video import Motion, Pair, Tracks, View, motion, resting
 

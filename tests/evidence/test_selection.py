@@ -98,6 +98,29 @@ def test_strict_tests_doubt_what_a_slower_noise_would_do():
     assert not fitted & set(strict)
 
 
+def test_a_chamber_that_bends_otherwise_is_what_the_residual_depends_on():
+    """The third of six is weaker: markers beyond it answer more than the one before."""
+    weaker = fitter_of({"clogged_chamber.share_lost": 0.2})
+    found = min(dependence_table(weaker, weaker.fit()), key=lambda d: d.p_value)
+    assert found.against == "chamber"
+    assert found.p_value < 1e-10
+    assert found.where == "marker1, 2 chambers from the inlet"
+    clean = fitter_of({})
+    alike = {d.against: d for d in dependence_table(clean, clean.fit())}
+    assert alike["chamber"].p_value > 0.01
+
+
+def test_a_record_that_is_never_at_rest_has_no_chambers():
+    fitter = fitter_of({})
+    moving = [
+        attrs.evolve(e, columns=e.columns | {"pressure_kPa": e["pressure_kPa"] + 20.0})
+        for e in fitter.record.experiments
+    ]
+    model = analytic.simulator(moving)
+    again = Fitter(record(moving, model), model, fitter.sources)
+    assert "chamber" not in {d.against for d in dependence_table(again, again.fit())}
+
+
 @pytest.fixture(scope="module")
 def both_kinds():
     """A dead load beside the unit: its sag comes first by name, and no friction of the unit changes it."""

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import ConvergenceError, InputError
 from mu_addon.evidence import unit_fem
-from mu_addon.evidence.markers import at_rest, attached, followed, nearest
+from mu_addon.evidence.markers import attached, followed, nearest
 from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.unit_effects import EFFECTS, Body, down
 from mu_addon.evidence.unit_fem import (
@@ -27,6 +27,7 @@ from mu_addon.fem.clogged import CloggedModel
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
 from mu_addon.fem.unit import materials_of
+from mu_addon.measured.rest import at_rest
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from tests.evidence import analytic
