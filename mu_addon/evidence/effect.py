@@ -66,6 +66,14 @@ class Parameter:
                 f"keep them from {self.low:g} to {self.high:g}",
             )
 
+    def narrowed(self, low: float, high: float) -> Parameter:
+        """The same between closer bounds; raises InputError where they leave the null out."""
+        low, high = max(self.low, low), min(self.high, high)
+        starts = tuple(v for v in self.starts if low <= v <= high) or (0.5 * (low + high),) * bool(
+            self.starts
+        )
+        return attrs.evolve(self, low=low, high=high, starts=starts)
+
     @property
     def step(self) -> float:
         """A change small enough for a derivative at the null, away from the nearer bound."""

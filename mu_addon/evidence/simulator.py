@@ -111,13 +111,12 @@ class Composite:
 
 def _shared(known: Parameter, other: Parameter) -> Parameter:
     """One parameter of two simulators, within the bounds of both."""
-    low, high = max(known.low, other.low), min(known.high, other.high)
-    if (known.unit, known.null, known.linear) != (other.unit, other.null, other.linear) or not low < high:
+    apart = max(known.low, other.low) >= min(known.high, other.high)
+    if (known.unit, known.null, known.linear) != (other.unit, other.null, other.linear) or apart:
         raise InputError(
             f"two simulators describe {known.name} differently", "simulators", "give it one unit and one null"
         )
-    starts = tuple(v for v in known.starts if low <= v <= high) or (0.5 * (low + high),) * bool(known.starts)
-    return attrs.evolve(known, low=low, high=high, starts=starts, spread=min(known.spread, other.spread))
+    return attrs.evolve(known.narrowed(other.low, other.high), spread=min(known.spread, other.spread))
 
 
 def effect_named(effects: Sequence[Effect], name: str) -> Effect:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import multiprocessing
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -456,25 +457,36 @@ class _Plan:
         kept = np.ix_(np.array(rows), np.flatnonzero(reached))
         walls = self.sides(found, self.larger * base.values, rows) if WALL in settings.effects else {}
         for orientation in self.orientations:
-            variants = {}
-            for name in (n for n in settings.effects if n in EFFECTS):
-                sizes, values = [], []
-                grown = self.enlarged ** EFFECTS[name].length
-                for size in EFFECTS[name].sizes_at(self.enlarged):
-                    if size == EFFECTS[name].parameter.null:
-                        result = base
-                    else:
-                        result = found[self.case(name, size, orientation).key()]
-                    if np.isfinite(result.values[kept]).all():
-                        sizes.append(size * grown)
-                        values.append((self.larger * result.values)[kept])
-                    else:
-                        _warn(f"{name} = {size * grown:g} at {self.scale:g}x is left out: {result.why}")
-                if len(sizes) > 1:
-                    variants[name] = Variant(EFFECTS[name].parameter, np.array(sizes), np.array(values))
+            names = [n for n in settings.effects if n in EFFECTS]
+            every = {n: self._variant(n, orientation, base, found, kept) for n in names}
+            variants = {n: v for n, v in every.items() if v is not None}
             at = np.array(self.pressures_kPa)[reached]
             values_ = (self.larger * base.values)[kept]
             yield UnitResponse(self.channels, at, values_, variants, self.scale, orientation, walls)
+
+    def _variant(
+        self, name: str, orientation: float, base: Result, found: dict[str, Result], kept: Any
+    ) -> Variant | None:
+        """The response to an effect at the sizes that could be computed; None where that is one alone."""
+        effect = EFFECTS[name]
+        null, grown = effect.parameter.null, self.enlarged**effect.length
+        sizes: list[float] = []
+        missed: list[float] = []
+        values: list[Array] = []
+        for size in effect.sizes_at(self.enlarged):
+            result = base if size == null else found[self.case(name, size, orientation).key()]
+            if np.isfinite(result.values[kept]).all():
+                sizes.append(size * grown)
+                values.append((self.larger * result.values)[kept])
+            else:
+                missed.append(size * grown)
+                _warn(f"{name} = {size * grown:g} at {self.scale:g}x is left out: {result.why}")
+        if len(sizes) < 2:
+            return None
+        # Beyond a size that could not be computed nothing is known of what the effect does.
+        low = sizes[0] if any(m < sizes[0] for m in missed) else -math.inf
+        high = sizes[-1] if any(m > sizes[-1] for m in missed) else math.inf
+        return Variant(effect.parameter.narrowed(low, high), np.array(sizes), np.array(values))
 
     def _rows(self) -> list[int]:
         order = [ANGLE, *(f"marker{m.number}_{a}_mm" for m in self.markers for a in AXES)]

@@ -231,6 +231,10 @@ def test_what_cannot_be_computed_is_left_out_and_said(monkeypatch):
     with pytest.warns(UnitResponseWarning, match="wall_thickness = 10 at 1x is left out"):
         (r,) = unit_responses(UNIT, [bench(markers={})], quick)
     np.testing.assert_array_equal(r.variants["wall_thickness"].at, [0.9, 1.0])
+    # What it would do there is not guessed either.
+    (effect,) = (e for e in UnitPressure([r]).effects if e.name == "wall_thickness")
+    assert effect.parameters[0].low < 0.9
+    assert effect.parameters[0].high == 1.0
     monkeypatch.setitem(EFFECTS, "wall_thickness", attrs.evolve(broken, sizes=(1.0, 10.0)))
     with pytest.warns(UnitResponseWarning):
         (r,) = unit_responses(UNIT, [bench(markers={})], quick)

@@ -231,10 +231,12 @@ class UnitPressure:
         self._past = histories(experiments)
         self.channels_known = self._responses[0].channels
         self.nuisances = self._bounded(nuisances(self.channels_known), experiments)
-        static: dict[str, Effect] = {}
+        known: dict[str, Parameter] = {}
         for r in self._responses:
             for name, v in r.variants.items():
-                static.setdefault(name, Effect(name, (v.parameter,), (KIND,)))
+                p = v.parameter
+                known[name] = known[name].narrowed(p.low, p.high) if name in known else p
+        static = {name: Effect(name, (p,), (KIND,)) for name, p in known.items()}
         walls = [wall for r in self._responses for wall in r.walls.items()]
         if walls:
             static[CONTACT] = wall_effect(walls, KIND)
