@@ -7,6 +7,7 @@ from scipy.interpolate import CubicSpline
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.evidence.prediction.unit import UnitPressure
+from mu_addon.evidence.prediction.wall import effect
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.unit_effects import Body, layer_stiffness, walled
 from mu_addon.evidence.unit_fem import Run, UnitSettings, run, unit_responses
@@ -77,6 +78,15 @@ def test_a_wall_changes_nothing_before_it_is_met_and_the_more_the_nearer_it_is(w
             before = change
         # With most of the way barred, a good part of the bending on that side is lost.
         assert np.abs(before).max() > 0.2 * np.abs(free[0][np.sign(pressure) == side]).max()
+
+
+def test_walls_nearer_than_those_computed_are_not_guessed(walls):
+    whole = max(walls, key=lambda r: r.scale)
+    wall = whole.walls[1]
+    fewer = attrs.evolve(wall, reaches_mm=wall.reaches_mm[:-1], changes=wall.changes[:-1])
+    (size,) = effect([(1, fewer), (-1, whole.walls[-1])], "unit_pressure").parameters
+    assert size.high == wall.reaches_mm[-2]
+    assert size.low == -whole.walls[-1].reaches_mm[-1]
 
 
 def test_the_table_of_walls_is_the_simulation_between_its_points(walls):

@@ -96,7 +96,12 @@ _EVEN = np.linspace(0.0, 1.0, 101)
 def effect(sides: Sequence[tuple[int, Side]], kind: str) -> Effect:
     """Contact with a wall, its size in mm: above 0 on the side +y, below 0 on the other."""
     farthest = {s: max((side.farthest_mm for t, side in sides if t == s), default=0.0) for s in (1, -1)}
-    starts = [round(s * share * far, 3) for s, far in farthest.items() for share in (0.25, 0.6) if far]
+    # Nearer walls than were computed are not guessed.
+    nearest = {
+        s: max((side.reaches_mm[-1] + side.spare_mm for t, side in sides if t == s), default=0.0)
+        for s in (1, -1)
+    }
+    starts = [round(s * share * near, 3) for s, near in nearest.items() for share in (0.3, 0.7) if near]
     said = " or ".join(
         f"{far:.1f} mm beyond its outline at rest toward {'+' if s > 0 else '-'}y"
         for s, far in farthest.items()
@@ -105,8 +110,8 @@ def effect(sides: Sequence[tuple[int, Side]], kind: str) -> Effect:
     size = Parameter(
         "reach_mm",
         "mm",
-        -NEAREST * farthest[-1],
-        NEAREST * farthest[1],
+        -float(nearest[-1]),
+        float(nearest[1]),
         0.0,
         tuple(starts),
         f"how far a wall stands inside the farthest place of the free unit, {said}; below 0 toward -y",
