@@ -97,7 +97,8 @@ def sensitivities(fitter: Fitter, values: Mapping[str, float]) -> list[Sensitivi
     names: list[Parameter] = []
     for p in simulator.nuisances:
         column = _slope(fitter, values, p.name, p)
-        if column.any():
+        # One at its bound went as far as it may, and hides nothing more.
+        if column.any() and p.low < values.get(p.name, p.null) < p.high:
             nuisances.append(column)
             names.append(p)
     n = fitter.project(np.stack(nuisances, axis=1), zeros=False) if nuisances else np.zeros((len(base), 0))

@@ -110,6 +110,16 @@ def test_a_chamber_that_bends_otherwise_is_what_the_residual_depends_on():
     assert alike["chamber"].p_value > 0.01
 
 
+def test_a_modulus_at_its_bound_hides_nothing_more():
+    """A gauge's gain is absorbed by the modulus as long as that may move, and no longer."""
+    fitter = fitter_of({})
+    low = next(p.low for p in fitter.curved if p.name == "modulus_factor")
+    for modulus, hidden in ((1.05, True), (low, False)):
+        seen = sensitivities(fitter, {"modulus_factor": modulus})
+        gain_of_gauge = next(s for s in seen if s.effect.name == "pressure_gain")
+        assert (gain_of_gauge.unabsorbed < 1e-3) is hidden
+
+
 def test_a_record_that_is_never_at_rest_has_no_chambers():
     fitter = fitter_of({})
     moving = [
