@@ -66,7 +66,10 @@ def logarithmic(p: Parameter) -> bool:
 
 
 class Fitter:
-    """Fits models to one record under one noise; `kept` (N,) are the values that count, all by default."""
+    """Fits models to one record under one noise; `kept` (N,) are the values that count, all by default.
+
+    zeros_basis (N, z): orthonormal columns that span what zeros of channels can do, whitened.
+    """
 
     def __init__(
         self,
@@ -92,16 +95,19 @@ class Fitter:
                     columns.append(column)
         self.curved = tuple(p for p in simulator.nuisances if not p.linear)
         self.known = tuple(p for p in self.curved if math.isfinite(p.spread))
-        white = self._white(np.stack(columns, axis=1)) if columns else np.zeros((len(record), 0))
-        self._zeros = white
-        self._q = np.linalg.qr(white)[0]
+        white = self.whitened(np.stack(columns, axis=1)) if columns else np.zeros((len(record), 0))
+        self.zeros_basis, r = np.linalg.qr(white)
+        # A zero whose channel is left out altogether stays as it is.
+        self._of_zeros = np.linalg.pinv(r, rcond=1e-11)
+        self._own: dict[Fit, tuple[Fitter, Fit]] = {}
 
     def without(self, left_out: Array) -> Fitter:
         """The same, for what is left when some of the N values (N,) are left out."""
         kept = ~left_out if self._kept is None else self._kept & ~left_out
         return Fitter(self.record, self.simulator, self.sources, kept, self.whitening)
 
-    def _white(self, columns: Array) -> Array:
+    def whitened(self, columns: Array) -> Array:
+        """Whitened columns (N,) or (N, k), 0 where values do not count."""
         w = self.whitening(columns)
         if self._kept is not None:
             w[~self._kept] = 0.0
@@ -109,8 +115,8 @@ class Fitter:
 
     def project(self, columns: Array, zeros: bool = True) -> Array:
         """Columns (N,) or (N, k) whitened, and freed of what zeros of channels can do."""
-        w = self._white(columns)
-        return w - self._q @ (self._q.T @ w) if zeros and self._q.shape[1] else w
+        w = self.whitened(columns)
+        return w - self.zeros_basis @ (self.zeros_basis.T @ w) if zeros and self.zeros_basis.shape[1] else w
 
     def deviance(self, fit: Fit) -> dict[str, float]:
         """-2 log likelihood of a fit by group of series and of `PRIOR`, but for a constant."""
@@ -124,16 +130,18 @@ class Fitter:
 
     def under_its_own_noise(self, fit: Fit) -> tuple[Fitter, Fit]:
         """The fit under the noise that its residual shows if nothing in it has a cause."""
-        left = self.record.values - self.predict(fit.values)
-        constant = [np.ones((s.at.stop - s.at.start, 1)) for s in self.record.series]
-        own = Fitter(self.record, self.simulator, estimate(self.record, left, constant))
-        return own, own.fit(fit.effects, fit.values)
+        if fit not in self._own:
+            left = self.record.values - self.predict(fit.values)
+            constant = [np.ones((s.at.stop - s.at.start, 1)) for s in self.record.series]
+            own = Fitter(self.record, self.simulator, estimate(self.record, left, constant))
+            self._own[fit] = own, own.fit(fit.effects, fit.values)
+        return self._own[fit]
 
     def zeros(self, left: Array) -> dict[str, float]:
         """Values of the linear nuisances that take most of what is left (N,), not whitened."""
         if not self._linear:
             return {}
-        found = np.linalg.lstsq(self._zeros, self._white(left), rcond=None)[0]
+        found = self._of_zeros @ (self.zeros_basis.T @ self.whitened(left))
         return {p.name: p.null + float(z) for p, z in zip(self._linear, found, strict=True)}
 
     def predict(self, values: Mapping[str, float]) -> Array:
@@ -183,13 +191,14 @@ class Fitter:
         for _ in range(ITERATIONS):
             if not len(x):
                 break
-            shifted = np.empty((len(f), len(x)))
+            shifted = np.empty((len(f), len(x)), order="F")
             for i in range(len(x)):
                 h = step[i] if x[i] + step[i] <= high[i] else -step[i]
                 moved = x.copy()
                 moved[i] += h
                 shifted[:, i] = (self.predict(at(moved)) - f) / h
-            jacobian = np.vstack([self.project(shifted), np.zeros((len(known), len(x)))])
+            jacobian = np.zeros((len(r), len(x)), order="F")
+            jacobian[: len(f)] = self.project(shifted)
             for row, (i, p) in enumerate(known):
                 jacobian[len(f) + row, i] = 1.0 / p.spread
             gram, gradient = jacobian.T @ jacobian, jacobian.T @ r

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..measured import Experiment
 from .record import KNOWN, Record, Series
 
 Array = np.ndarray[Any, Any]
@@ -38,11 +40,12 @@ class Whitening:
         self.log_dets: dict[str, float] = {}
         self._sources = dict(sources)
         self._parts: list[tuple[slice, Any]] = []
+        self._single: dict[Any, _Factor] = {}
         for group in groups or record.groups:
             if group == KNOWN:
                 continue
             members = [s for s in record.series if s.group == group]
-            factor = _factor(members, sources[group])
+            factor = _Clocks(members).factor(sources[group])
             self._parts.append((slice(members[0].at.start, members[-1].at.stop), factor))
             self.log_dets[group] = factor.log_det
 
@@ -57,7 +60,10 @@ class Whitening:
         """Whitened columns (b, k) of one series."""
         if series.group == KNOWN:
             return columns
-        return _factor([series], self._sources[series.group]).applied(columns)
+        key = series.group, series.clock
+        if key not in self._single:
+            self._single[key] = _Clocks([series]).factor(self._sources[series.group])
+        return self._single[key].applied(columns)
 
 
 @attrs.frozen(eq=False)
@@ -88,47 +94,66 @@ class _Factor:
         return np.asarray(y.T if x.ndim == 2 else y[0])
 
 
-def _factor(members: Sequence[Series], source: Source) -> _Factor:
-    from scipy.linalg.lapack import dpbtrf
+class _Clocks:
+    """Covariance of several series one after the other, factored once for all that share a clock."""
 
-    persist, slow, white = [], [], []
-    for s in members:
-        if math.isnan(s.sample_s):
-            # Without a clock each value stands alone.
-            persist.append(np.zeros(len(s.time_s)))
-            slow.append(np.full(len(s.time_s), source.white**2))
-            white.append(np.zeros(len(s.time_s)))
-            continue
-        apart = np.diff(s.time_s, prepend=-math.inf)
-        persist.append(np.exp(-apart / source.time_s))
-        kept, first = _block(s.count, s.sample_s / source.time_s)
+    def __init__(self, members: Sequence[Series]) -> None:
+        first: dict[Any, Series] = {}
+        for s in members:
+            first.setdefault(s.clock, s)
+        lengths = [len(s.time_s) for s in first.values()]
+        begins = dict(zip(first, np.cumsum([0, *lengths[:-1]]).tolist(), strict=True))
+        rows = [begins[s.clock] + np.arange(len(s.time_s)) for s in members]
+        # Where no two share a clock every row is its own.
+        self._rows = np.concatenate(rows) if len(members) > len(first) else None
+        self._many = [sum(s.clock == clock for s in members) for clock in first]
+        self._ends = np.cumsum(lengths)
+        self._timed = np.repeat([not math.isnan(s.sample_s) for s in first.values()], lengths)
+        self._step = np.repeat([s.sample_s for s in first.values()], lengths)
+        self._count = np.concatenate([s.count for s in first.values()])
+        # Nothing persists into the first of a series, nor from value to value without a clock.
+        apart = [np.diff(s.time_s, prepend=-math.inf) for s in first.values()]
+        self._apart = np.where(self._timed, np.concatenate(apart), math.inf)
+
+    def factor(self, source: Source) -> _Factor:
+        """The factor under one source, for rows of all series."""
+        from scipy.linalg.lapack import dpbtrf
+
+        phi = np.exp(-self._apart / source.time_s)
+        kept, first = _block(self._count, self._step / source.time_s)
         variance = source.slow**2 * kept
-        slow.append(variance)
-        white.append(source.white**2 / s.count + source.slow**2 * first - variance)
-    phi, c, v = np.concatenate(persist), np.concatenate(slow), np.concatenate(white)
-    u = v / c
-    before = np.concatenate([[0.0], u[:-1]])
-    band = np.zeros((2, len(c)))
-    band[0] = 1.0 - phi**2 + u + phi**2 * before
-    band[1, :-1] = -(phi * before)[1:]
-    factor, failed = dpbtrf(band, lower=1)
-    if failed:
-        band[0] *= 1.0 + 1e-9
-        factor, _ = dpbtrf(band, lower=1)
-    log_det = float(np.log(c).sum() + 2.0 * np.log(factor[0]).sum())
-    inverse, diagonal = 1.0 / np.sqrt(c), 1.0 / factor[0]
-    below = np.zeros_like(factor)
-    below[1, :-1] = factor[1, :-1] * diagonal[:-1]
-    return _Factor(inverse, phi[1:] * inverse[:-1], below, diagonal, log_det)
+        # Without a clock each value stands alone.
+        c = np.where(self._timed, variance, source.white**2)
+        v = np.where(self._timed, source.white**2 / self._count + source.slow**2 * first - variance, 0.0)
+        u = v / c
+        before = np.concatenate([[0.0], u[:-1]])
+        band = np.zeros((2, len(c)))
+        band[0] = 1.0 - phi**2 + u + phi**2 * before
+        band[1, :-1] = -(phi * before)[1:]
+        factor, failed = dpbtrf(band, lower=1)
+        if failed:
+            band[0] *= 1.0 + 1e-9
+            factor, _ = dpbtrf(band, lower=1)
+        logs = np.add.reduceat(np.log(c) + 2.0 * np.log(factor[0]), np.concatenate([[0], self._ends[:-1]]))
+        inverse, diagonal = 1.0 / np.sqrt(c), 1.0 / factor[0]
+        below = np.zeros(len(c))
+        below[:-1] = factor[1, :-1] * diagonal[:-1]
+        carried = np.concatenate([[0.0], phi[1:] * inverse[:-1]])
+        if self._rows is not None:
+            # The last row of a clock has none below it: its series may be followed by any other.
+            below[self._ends - 1] = 0.0
+            inverse, carried, below, diagonal = (v[self._rows] for v in (inverse, carried, below, diagonal))
+        whole = np.stack([np.ones(len(below)), below])
+        return _Factor(inverse, carried[1:], whole, diagonal, float(logs @ self._many))
 
 
-def _block(count: Array, step: float) -> tuple[Array, Array]:
+def _block(count: Array, step: Array) -> tuple[Array, Array]:
     """Covariance of two blocks' means over exp(-distance), and variance of one's, for unit slow noise."""
     if (count == 1).all():
         return np.ones(len(count)), np.ones(len(count))
-    a = max(step, 1e-9)
-    kept = (np.sinh(count * a / 2.0) / (count * math.sinh(a / 2.0))) ** 2
-    r = math.exp(-a)
+    a = np.maximum(step, 1e-9)
+    kept = (np.sinh(count * a / 2.0) / (count * np.sinh(a / 2.0))) ** 2
+    r = np.exp(-a)
     # Sum over pairs of samples of r^|i - j|.
     total = count + 2.0 * (r * count / (1.0 - r) - r * (1.0 - r**count) / (1.0 - r) ** 2)
     return kept, total / count**2
@@ -252,18 +277,20 @@ def _deviance(
         stack[at, k] = residual[record.series[i].at]
 
     dof = max(start - sum(many for _, many in places), 1)
+    clocks = _Clocks(series)
+    # Columns that a series lacks are zero; a one on the diagonal keeps them out of what is solved.
+    lacking = np.stack([np.diag(np.arange(k) >= many).astype(float) for _, many in places])
 
     def deviance(x: Array) -> tuple[float, float]:
-        factor = _factor(series, _source(x, *clock))
-        value, w = factor.log_det, factor.applied(stack)
-        square = 0.0
-        for at, many in places:
-            b, r = w[at, :many], w[at, k]
-            gram = b.T @ b
-            lower = np.linalg.cholesky(gram + 1e-12 * np.trace(gram) * np.eye(many))
-            half = np.linalg.solve(lower, b.T @ r)
-            value += 2.0 * float(np.log(np.diag(lower)).sum())
-            square += float(r @ r - half @ half)
+        factor = clocks.factor(_source(x, *clock))
+        w = factor.applied(stack)
+        grams = np.stack([w[at].T @ w[at] for at, _ in places])
+        gram, onto = grams[:, :k, :k], grams[:, :k, k:]
+        small = 1e-12 * np.trace(gram, axis1=1, axis2=2)
+        lower = np.linalg.cholesky(gram + small[:, None, None] * np.eye(k) + lacking)
+        half = np.linalg.solve(lower, onto)
+        value = factor.log_det + 2.0 * float(np.log(np.diagonal(lower, axis1=1, axis2=2)).sum())
+        square = float(grams[:, k, k].sum() - np.sum(half**2))
         size = math.sqrt(max(square, 1e-300) / dof)
         return value + 2.0 * dof * math.log(size), size
 
@@ -297,10 +324,12 @@ def span(record: Record, signatures: Array) -> list[Array]:
         if cycle is not None:
             parts.append(_centred(cycle))
         every = np.hstack(parts)
-        u, sizes, _ = np.linalg.svd(every, full_matrices=False)
+        # By the products of columns, of which there are fewer than rows: far more digits than are needed.
+        squares, vectors = np.linalg.eigh(every.T @ every)
         most = max(b // 5 - 1, 0) if not math.isnan(s.sample_s) else max(b // 2 - 1, 0)
-        many = min(int((sizes > 1e-2).sum()), most)
-        found.append(np.hstack([constant, u[:, :many]]))
+        many = min(int((squares > 1e-4).sum()), most)
+        first = np.argsort(-squares)[:many]
+        found.append(np.hstack([constant, every @ (vectors[:, first] / np.sqrt(squares[first]))]))
     return found
 
 
@@ -317,12 +346,18 @@ def harmonics(record: Record, s: Series, orders: int = 12) -> Array | None:
     e = record.experiments[s.experiment]
     if math.isnan(s.sample_s) or not record.driven(s.experiment, "pressure_kPa"):
         return None
-    period = repeated(e["time_s"], e["pressure_kPa"])
+    period = cycle_s(e)
     if period is None:
         return None
     most = min(orders, int(period / (4.0 * s.sample_s * np.median(s.count))))
     phase = 2.0 * math.pi * s.time_s[:, None] / period * np.arange(1, most + 1)
     return np.hstack([np.sin(phase), np.cos(phase)]) if most else None
+
+
+@functools.lru_cache(maxsize=256)
+def cycle_s(e: Experiment) -> float | None:
+    """Period in s of an experiment's pressure, or None."""
+    return repeated(e["time_s"], e["pressure_kPa"])
 
 
 def repeated(time_s: Array, signal: Array) -> float | None:

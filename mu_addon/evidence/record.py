@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import attrs
@@ -41,15 +42,30 @@ class Series:
     _kept: Array = attrs.field(repr=False)
     _spread: Array | None = attrs.field(repr=False, default=None)
 
+    @cached_property
+    def clock(self) -> tuple[Any, ...]:
+        """What tells the times between its blocks from those of other series, to rounding."""
+        if math.isnan(self.sample_s):
+            return (len(self.time_s),)
+        apart = np.round(np.diff(self.time_s) / self.sample_s, 9)
+        return f"{self.sample_s:.12g}", self.count.tobytes(), apart.tobytes()
+
+    @cached_property
+    def blocks(self) -> tuple[Any, ...]:
+        """What tells how samples become blocks from how they do in other series of its experiment."""
+        spread = None if self._spread is None else self._spread.tobytes()
+        return self._seen.tobytes(), spread
+
     def mean(self, values: Array) -> Array:
-        """Block means (b,) of samples (n,)."""
+        """Block means (..., b) of samples (..., n)."""
         if self._spread is not None:
             # The whole record lies too high or too low together: it is one number, in units of its spread.
-            return np.array([self._spread @ values / (self._spread @ self._spread)])
-        if len(self._first) == len(values):
-            return values[self._kept]
-        total = np.add.reduceat(np.where(self._seen, values, 0.0), self._first)
-        return np.asarray(total[self._kept] / self.count)
+            return np.asarray(values @ self._spread / (self._spread @ self._spread))[..., None]
+        if len(self._first) == values.shape[-1]:
+            return values if self._kept.all() else values[..., self._kept]
+        whole = self._seen.all()
+        total = np.add.reduceat(values if whole else np.where(self._seen, values, 0.0), self._first, axis=-1)
+        return np.asarray((total if whole else total[..., self._kept]) / self.count)
 
 
 @attrs.frozen(eq=False)
@@ -72,9 +88,20 @@ class Record:
         """Prediction (N,) of the measured values."""
         known = {i: simulator.predict(e, values) for i, e in enumerate(self.experiments)}
         found = np.empty(len(self))
-        for s in self.series:
-            found[s.at] = s.mean(known[s.experiment][s.row])
+        for s, rows, at in self._together:
+            found[at] = s.mean(known[s.experiment][rows])
         return found
+
+    @cached_property
+    def _together(self) -> list[tuple[Series, list[int], Array]]:
+        """Series of one experiment and the same blocks: the first, rows of the prediction, places (r, b)."""
+        alike: dict[Any, list[Series]] = {}
+        for s in self.series:
+            alike.setdefault((s.experiment, s.blocks), []).append(s)
+        return [
+            (same[0], [s.row for s in same], np.stack([np.arange(s.at.start, s.at.stop) for s in same]))
+            for same in alike.values()
+        ]
 
     def rows(self, experiment: int) -> Array:
         """Which of the N values (N,) an experiment gave."""
@@ -91,12 +118,23 @@ class Record:
 
     def covariate(self, of: Any) -> Array:
         """A quantity (N,) of every value: `of(experiment)` gives it for its samples (n,)."""
-        found = np.empty(len(self))
-        for i, e in enumerate(self.experiments):
-            quantity = np.asarray(of(e), float) * np.ones(len(e))
-            for s in self.series:
-                if s.experiment == i:
-                    found[s.at] = s.mean(quantity)
+        columns = [np.asarray(of(e), float) * np.ones((1, len(e))) for e in self.experiments]
+        return np.asarray(self.laid_out(columns.__getitem__)[:, 0])
+
+    def laid_out(self, columns: Callable[[int], Array]) -> Array:
+        """Quantities (N, d) of every value: `columns(experiment)` gives them for its samples (d, n)."""
+        parts = [(s.mean(columns(s.experiment)), at) for s, _, at in self._together]
+        found = np.empty((len(self), len(parts[0][0])), order="F")
+        for means, at in parts:
+            found[at] = means.T
+        return found
+
+    @cached_property
+    def of_experiment(self) -> Array:
+        """The number (N,) of the experiment that gave each value."""
+        found = np.empty(len(self), int)
+        for s in self.series:
+            found[s.at] = s.experiment
         return found
 
 

@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..measured import Experiment
 from ..measured.rest import at_rest
 from .fit import Fit, Fitter
-from .noise import harmonics, repeated
+from .noise import cycle_s, harmonics
 from .prediction.unit import KIND as UNIT
 from .prediction.unit import cycles, play
 from .record import KNOWN, Record, Series
@@ -27,6 +27,8 @@ FALSE_ALARM = 0.003
 BANDS = 16
 # The pitch of chambers at 1.0x.
 PITCH_MM = Chambers().cell_mm
+# Directions of a test's columns, each of unit length, that hold less than this are none.
+NEAR = 0.03
 
 
 @attrs.frozen
@@ -113,6 +115,7 @@ def _fitted_tests(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[
         found.append(Dependence("spread", value, float(chi2.sf(value, dof)), "all", dof))
     if all(s.group == KNOWN for s in record.series):
         return found
+    fitted = _fitted(fitter, fit)
     for name, needs, of in COVARIATES:
         held = [
             i
@@ -120,12 +123,11 @@ def _fitted_tests(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[
             if all(c in e.columns for c in needs)
             and ("pressure_kPa" not in needs or record.driven(i, "pressure_kPa"))
         ]
-        columns = _powers(record, held, of)
-        found += _tested(fitter, fit, name, columns, spare)
+        found += _tested(fitted, name, _powers(record, held, of), spare)
     response = _response(fitter, fit)
     for name, condition in CONDITIONS:
         values = np.array([condition(e, i) for i, e in enumerate(record.experiments)], float)
-        found += _tested(fitter, fit, name, _by_condition(record, values, response), spare)
+        found += _tested(fitted, name, _by_condition(record, values, response), spare)
     return [
         *found,
         *_chambers(fitter, fit, response, spare),
@@ -163,40 +165,61 @@ def _channels(record: Record) -> tuple[str, ...]:
     return tuple(dict.fromkeys(s.channel for s in record.series if s.group != KNOWN))
 
 
-def _powers(record: Record, held: Sequence[int], of: Any, degree: int = 4) -> dict[str, Array]:
-    """Chebyshev powers of a covariate and, for a fairly straight unit, of it alone, a channel."""
+def _powers(record: Record, held: Sequence[int], of: Any, degree: int = 4) -> Array | None:
+    """Chebyshev powers (N, d) of a covariate, for a fairly straight unit; None where it does not vary."""
     if not held:
-        return {}
+        return None
     values = {i: np.asarray(of(record.experiments[i]), float) for i in held}
     low, high = min(v.min() for v in values.values()), max(v.max() for v in values.values())
     if not high > low:
-        return {}
+        return None
     few = len(np.unique(np.concatenate([np.unique(v)[:20] for v in values.values()])))
-    columns = {}
-    for channel in _channels(record):
-        block = np.zeros((len(record), min(degree, few - 1)))
-        for s in record.series:
-            if s.channel == channel and s.experiment in values:
-                x = 2.0 * (values[s.experiment] - low) / (high - low) - 1.0
-                c = np.polynomial.chebyshev.chebvander(x, block.shape[1])[:, 1:]
-                block[s.at] = np.stack([s.mean(column) for column in c.T], axis=1)
-        columns[channel] = block
-    return columns
+    degree = min(degree, few - 1)
+
+    def powers(i: int) -> Array:
+        if i not in values:
+            return np.zeros((degree, len(record.experiments[i])))
+        x = 2.0 * (values[i] - low) / (high - low) - 1.0
+        return np.polynomial.chebyshev.chebvander(x, degree)[:, 1:].T
+
+    return record.laid_out(powers)
 
 
-def _by_condition(record: Record, values: Array, response: Array) -> dict[str, Array]:
-    """The response (N,) to the modulus, stronger or weaker by a condition of whole experiments."""
+def _by_condition(record: Record, values: Array, response: Array) -> Array | None:
+    """The response (N,) to the modulus, stronger or weaker by a condition of whole experiments: (N, 2)."""
     if len(np.unique(values)) < 2:
-        return {}
+        return None
     x = (values - values.mean()) / np.ptp(values)
-    columns = {}
-    for channel in _channels(record):
-        block = np.zeros((len(record), 2))
-        for s in record.series:
-            if s.channel == channel:
-                block[s.at] = response[s.at, None] * x[s.experiment] ** np.arange(1, 3)
-        columns[channel] = block
-    return columns
+    return np.asarray(response[:, None] * x[record.of_experiment][:, None] ** np.arange(1, 3))
+
+
+@attrs.frozen(eq=False)
+class _Fitted:
+    """What was fitted anyway: k orthonormal columns span it, and the residual (N,) lies `along` (k,) them.
+
+    rows, own: of each channel, its rows of the record, and the columns there.
+    """
+
+    fitter: Fitter
+    residual: Array
+    along: Array
+    rows: Mapping[str, Array]
+    own: Mapping[str, Array]
+    groups: Mapping[str, str]
+
+
+def _fitted(fitter: Fitter, fit: Fit) -> _Fitted:
+    record = fitter.record
+    q = np.hstack([fitter.zeros_basis, _basis(fit.jacobian)])
+    rows = {
+        channel: np.concatenate(
+            [np.arange(s.at.start, s.at.stop) for s in record.series if s.channel == channel]
+        )
+        for channel in _channels(record)
+    }
+    own = {channel: q[at] for channel, at in rows.items()}
+    groups = {s.channel: s.group for s in record.series}
+    return _Fitted(fitter, fit.residual, q.T @ fit.residual, rows, own, groups)
 
 
 def _chambers(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, float]) -> list[Dependence]:
@@ -221,15 +244,17 @@ def _chambers(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, flo
             own[s.at, at] = response[s.at]
     q = _basis(fit.jacobian)
     white, each = (_unit(fitter.project(columns)) for columns in (block, own))
-    b = _basis(white - q @ (q.T @ white))
-    if not b.shape[1]:
+    onto = q.T @ white
+    gain, dof = _gained(
+        white.T @ white - onto.T @ onto, white.T @ fit.residual - onto.T @ (q.T @ fit.residual)
+    )
+    if not dof:
         return []
-    gain = float(np.sum((b.T @ fit.residual) ** 2))
     groups = {s.group for s in record.series if s.channel in place}
-    p = float(chi2.sf(gain - sum(spare[g] for g in groups), b.shape[1]))
+    p = float(chi2.sf(gain - sum(spare[g] for g in groups), dof))
     most = levels[int(np.argmax(np.abs(each.T @ fit.residual)))]
     named = next(c for c, level in place.items() if level == most).partition("_")[0]
-    return [Dependence("chamber", gain, p, f"{named}, {most:g} chambers from the inlet", b.shape[1])]
+    return [Dependence("chamber", gain, p, f"{named}, {most:g} chambers from the inlet", dof)]
 
 
 def _marker_places(record: Record) -> dict[str, float]:
@@ -248,35 +273,57 @@ def _marker_places(record: Record) -> dict[str, float]:
 
 
 def _tested(
-    fitter: Fitter, fit: Fit, name: str, columns: dict[str, Array], spare: Mapping[str, float]
+    fitted: _Fitted, name: str, columns: Array | None, spare: Mapping[str, float]
 ) -> list[Dependence]:
-    """The joint test of all channels and the best single one, each given half of the chance."""
+    """The joint test of all channels and the best single one, each given half of the chance.
+
+    columns (N, d): of all channels, each of which has sizes of its own.
+    """
     from scipy.stats import chi2
 
-    if not columns:
+    if columns is None:
         return []
-    q = _basis(fit.jacobian)
-    joint, total, best = [], 0, (1.0, "", 0.0, 0)
-    groups = {s.channel: s.group for s in fitter.record.series}
-    for channel, block in columns.items():
-        white = _unit(fitter.project(block))
-        white -= q @ (q.T @ white)
-        b = _basis(white)
-        if not b.shape[1]:
+    # Series are whitened apart, so one pass does for all channels.
+    every = fitted.fitter.whitened(columns)
+    joint, total, best, groups = [], 0, (1.0, "", 0.0, 0), set()
+    for channel, rows in fitted.rows.items():
+        white, q = _unit(every[rows]), fitted.own[channel]
+        onto = q.T @ white
+        gain, dof = _gained(
+            white.T @ white - onto.T @ onto, white.T @ fitted.residual[rows] - onto.T @ fitted.along
+        )
+        if not dof:
             continue
-        gain = float(np.sum((b.T @ fit.residual) ** 2))
-        p = float(chi2.sf(gain - spare[groups[channel]], b.shape[1]))
+        p = float(chi2.sf(gain - spare[fitted.groups[channel]], dof))
         joint.append(gain)
-        total += b.shape[1]
+        groups.add(fitted.groups[channel])
+        total += dof
         if p <= best[0]:
-            best = (p, channel, gain, b.shape[1])
+            best = (p, channel, gain, dof)
     if not joint:
         return []
-    together = float(chi2.sf(sum(joint) - sum(spare[g] for g in {groups[c] for c in columns}), total))
+    together = float(chi2.sf(sum(joint) - sum(spare[g] for g in groups), total))
     single = min(1.0, len(joint) * best[0])
     if together < single:
         return [Dependence(name, sum(joint), min(1.0, 2.0 * together), "all channels", total)]
     return [Dependence(name, best[2], min(1.0, 2.0 * single), best[1], best[3])]
+
+
+def _gained(gram: Array, along: Array) -> tuple[float, int]:
+    """Chi squared that columns take, and how many count, by their products and those with the residual (d,).
+
+    Near dependences are left out, as in `_basis`; so is a column of unit length of which nothing is left but
+    rounding.
+    """
+    size = np.sqrt(np.maximum(np.diag(gram), 0.0))
+    kept = size > 1e-6
+    size = size[kept]
+    if not len(size):
+        return 0.0, 0
+    squares, vectors = np.linalg.eigh(gram[np.ix_(kept, kept)] / np.outer(size, size))
+    told = squares > NEAR**2
+    parts = vectors.T @ (along[kept] / size)
+    return float(np.sum(parts[told] ** 2 / squares[told])), int(told.sum())
 
 
 def _unit(columns: Array) -> Array:
@@ -289,7 +336,7 @@ def _basis(columns: Array) -> Array:
     if not columns.shape[1]:
         return columns
     u, sizes, _ = np.linalg.svd(_unit(columns), full_matrices=False)
-    return np.asarray(u[:, sizes > 0.03])
+    return np.asarray(u[:, sizes > NEAR])
 
 
 def _clocked(record: Record) -> list[Series]:
@@ -301,11 +348,17 @@ def _phase(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Depende
     from scipy.stats import chi2
 
     gains, groups, worst = [], set(), (1.0, "", 0.0, 0)
+    bases: dict[Any, Array | None] = {}
     for s in _clocked(fitter.record):
-        columns = harmonics(fitter.record, s)
-        if columns is None or columns.shape[1] < 2:
+        key = s.experiment, s.group, s.clock
+        if key not in bases:
+            columns = harmonics(fitter.record, s)
+            bases[key] = None
+            if columns is not None and columns.shape[1] > 1:
+                bases[key] = _basis(fitter.whitening.series(s, columns))
+        b = bases[key]
+        if b is None:
             continue
-        b = _basis(fitter.whitening.series(s, columns))
         gain = float(np.sum((b.T @ fit.residual[s.at]) ** 2))
         gains.append((gain, b.shape[1]))
         groups.add(s.group)
@@ -357,8 +410,7 @@ def _cycles_alike(record: Record, r: Array) -> list[Dependence]:
     sums, count = 0.0, 0
     for s in _clocked(record):
         e = record.experiments[s.experiment]
-        driven = record.driven(s.experiment, "pressure_kPa")
-        period = repeated(e["time_s"], e["pressure_kPa"]) if driven else None
+        period = cycle_s(e) if record.driven(s.experiment, "pressure_kPa") else None
         if period is None:
             continue
         lag = round(period / (s.sample_s * float(np.median(s.count))))
@@ -440,42 +492,57 @@ def _breaks(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, float
     from scipy.stats import chi2
 
     record = fitter.record
-    moments: list[tuple[int, float, str]] = []
+    # Experiment, time, words, and which eighth.
+    moments: list[tuple[int, float, str, int]] = []
     for i, e in enumerate(record.experiments):
         t = e.columns.get("time_s")
         if t is not None:
             at = t[0] + np.linspace(0.0, 1.0, 9)[:-1] * (t[-1] - t[0])
-            moments += [(i, float(v), f"{e.name}, {v:.4g} s") for v in at]
+            moments += [(i, float(v), f"{e.name}, {v:.4g} s", k) for k, v in enumerate(at)]
     moments = moments[1:]
     if not moments:
         return []
-    after = np.zeros((len(record), len(moments)))
+    places = [[k for k, m in enumerate(moments) if m[0] == i] for i in range(len(record.experiments))]
+    # Of experiments after that of a moment all of the response counts: eight moments' columns, and that one.
+    eighth = np.zeros((len(record), 9))
     for s in _clocked(record):
-        for k, (i, t0, _) in enumerate(moments):
-            if s.experiment > i:
-                after[s.at, k] = 1.0
-            elif s.experiment == i:
-                after[s.at, k] = s.time_s >= t0
-    white = fitter.whitening(after * response[:, None])
+        eighth[s.at, 0] = response[s.at]
+        for k in places[s.experiment]:
+            eighth[s.at, 1 + moments[k][3]] = response[s.at] * (s.time_s >= moments[k][1])
+    white = fitter.whitening(eighth)
     level = fitter.whitening(np.ones(len(record)))
     gains, dof = np.zeros(len(moments)), 0
     saved = sum(spare[g] for g in {s.group for s in _clocked(record)})
     for channel in _channels(record):
-        rows = np.concatenate(
-            [np.arange(s.at.start, s.at.stop) for s in record.series if s.channel == channel]
-        )
-        columns, own = white[rows], np.column_stack([level[rows], fit.jacobian[rows]])
-        before = np.linalg.norm(columns, axis=0)
-        q = _basis(own)
-        columns = columns - q @ (q.T @ columns)
-        length = np.linalg.norm(columns, axis=0)
-        told = length > 1e-3 * np.maximum(before, 1e-300)
-        along = columns.T @ fit.residual[rows]
-        gains += np.where(told, along / np.where(told, length, 1.0), 0.0) ** 2
+        members = [s for s in record.series if s.channel == channel]
+        own = [np.column_stack([level[s.at], fit.jacobian[s.at]]) for s in members]
+        q = np.split(_basis(np.concatenate(own)), np.cumsum([len(o) for o in own])[:-1])
+        # Of each experiment: squares, products with what was fitted, and with the residual.
+        square = np.zeros((len(record.experiments), 9))
+        onto = np.zeros((len(record.experiments), 9, q[0].shape[1]))
+        along = np.zeros((len(record.experiments), 9))
+        total = np.zeros(q[0].shape[1])
+        for s, part in zip(members, q, strict=True):
+            w, r = white[s.at], fit.residual[s.at]
+            square[s.experiment] += np.sum(w**2, axis=0)
+            onto[s.experiment] += w.T @ part
+            along[s.experiment] += w.T @ r
+            total += part.T @ r
+        own_, later = (np.array([m[i] for m in moments]) for i in (0, 3))
+        before = [v[own_, 1 + later] + _beyond(v[:, 0])[own_] for v in (square, onto, along)]
+        left = before[0] - np.sum(before[1] ** 2, axis=1)
+        told = left > 1e-6 * np.maximum(before[0], 1e-300)
+        gain = (before[2] - before[1] @ total) ** 2 / np.where(told, left, 1.0)
+        gains += np.where(told, gain, 0.0)
         dof += 1
     best = int(np.argmax(gains))
     p = min(1.0, len(moments) * float(chi2.sf(gains[best] - saved, dof)))
     return [Dependence("break", float(gains[best]), p, moments[best][2], dof)]
+
+
+def _beyond(v: Array) -> Array:
+    """Sums (n, ...) over all that come after each one of v (n, ...)."""
+    return np.asarray(v.sum(axis=0) - np.cumsum(v, axis=0))
 
 
 def _outliers(record: Record, r: Array) -> list[Dependence]:

@@ -40,6 +40,27 @@ def test_a_gap_in_the_clock_lets_go_of_the_past():
     np.testing.assert_allclose(white @ white.T, np.eye(60), atol=1e-9)
 
 
+def test_series_of_one_clock_are_whitened_as_each_alone():
+    rng = np.random.default_rng(5)
+    made = []
+    for k, dt in enumerate((0.2, 0.2, 0.5)):
+        t = 7.0 * k + np.arange(60) * dt
+        columns = {c: rng.normal(size=60) for c in ("marker1_y_mm", "marker1_z_mm")}
+        if k == 1:
+            # A sample that was not seen makes another clock of blocks.
+            columns["marker1_z_mm"][20] = np.nan
+        made.append(analytic.experiment(f"run {k}", t, np.zeros(60), columns))
+    data = record(made, analytic.simulator(made))
+    group, source = data.groups[0], Source(0.3, 1.0, 2.0)
+    whitening, x = Whitening(data, {group: source}), rng.normal(size=(len(data), 3))
+    assert len({s.clock for s in data.series}) == 3
+    for s in data.series:
+        dense = 0.09 * np.eye(len(s.time_s)) + np.exp(-np.abs(s.time_s[:, None] - s.time_s) / 2.0)
+        squares = x[s.at].T @ np.linalg.solve(dense, x[s.at])
+        for white in (whitening(x)[s.at], whitening.series(s, x[s.at])):
+            np.testing.assert_allclose(white.T @ white, squares, rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     "hidden",
     [{}, {"viscoelasticity.share": 0.2, "viscoelasticity.time_s": 12.0}, {"clogged_chamber.share_lost": 0.6}],
