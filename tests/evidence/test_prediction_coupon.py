@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
-from mu_addon.evidence.prediction.coupon import CouponStress
+from mu_addon.errors import InputError
+from mu_addon.evidence.prediction.coupon import CouponStress, yeoh
 from mu_addon.evidence.prediction.specimen import recorded
 from mu_addon.evidence.prediction.unit import lagged
+from mu_addon.fem.laws import Yeoh
+from mu_addon.materials import incompressible
 
 from .bench import experiment, measured, recovered
 
@@ -29,6 +32,18 @@ def test_neo_hooke_in_each_mode(mode, power):
     a = 1 + STRAIN
     found = predict(coupon(mode=mode), coupon_modulus_kPa=900.0)
     np.testing.assert_allclose(found, 300.0 * (a - a**power), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("mode", ["uniaxial", "equibiaxial", "pure_shear"])
+def test_closed_form_is_the_law_of_the_finite_elements(mode):
+    stretch = np.linspace(0.6, 2.0, 29)
+    law = incompressible(Yeoh, np.array([0.3, 0.05, 0.0, 1.0]), mode, stretch)
+    np.testing.assert_allclose(yeoh(0.3, 0.05, mode, stretch), law, rtol=1e-12, atol=1e-14)
+
+
+def test_a_stretch_of_nothing_is_refused():
+    with pytest.raises(InputError, match="not positive"):
+        predict(coupon(strain=[0.0, -1.0]))
 
 
 def test_yeoh_in_tension():

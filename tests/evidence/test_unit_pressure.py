@@ -95,6 +95,17 @@ def test_play_stays_within_its_width_and_forgets_the_rate(levels, width):
     np.testing.assert_allclose(play(slowly, width)[::4], x, atol=1e-9)
 
 
+@pytest.mark.parametrize("digits", [0, 3])
+def test_play_is_followed_value_by_value(digits):
+    """Rounded to whole numbers it stands still now and then, and turns after that."""
+    p = np.round(np.cumsum(np.random.default_rng(2).normal(size=400)), digits)
+    x, followed = p[0], []
+    for v in p:
+        x = min(max(x, v - 1.5), v + 1.5)
+        followed.append(x)
+    np.testing.assert_array_equal(play(p, 1.5), followed)
+
+
 def test_a_friction_loop_has_the_area_of_its_slip():
     t = np.linspace(0, 4, 4001)
     p = 20.0 * np.interp(t, [0, 1, 3, 4], [0, 1, -1, 0])

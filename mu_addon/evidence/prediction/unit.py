@@ -25,6 +25,8 @@ REFERENCE_C = 23.0
 DEADBAND_kPa = 0.2
 # Times the last pressure computed, up to which the response is believed along its end's slope.
 BEYOND = 1.25
+# Sizes of variants whose curves a response keeps.
+REMEMBERED = 64
 
 
 def _float64(values: Any) -> Array:
@@ -68,6 +70,7 @@ class UnitResponse:
     orientation_deg: float = 0.0
     walls: Mapping[int, Side] = attrs.field(factory=dict)
     _splines: Mapping[str, Any] = attrs.field(init=False, repr=False)
+    _curves: dict[Any, Any] = attrs.field(init=False, repr=False, factory=dict)
 
     def __attrs_post_init__(self) -> None:
         from scipy.interpolate import CubicSpline
@@ -90,22 +93,35 @@ class UnitResponse:
 
     def at(self, pressure_kPa: Array, sizes: Mapping[str, float]) -> Array:
         """Channels (c, n) at effective pressures (n,) with static effects of the given sizes."""
-        from scipy.interpolate import PPoly
-
-        c = self._splines[""]
-        for name, size in sizes.items():
-            if name in self.variants and size != self.variants[name].parameter.null:
-                c = c + self._splines[name](size)
-        curve = PPoly.construct_fast(c, self.pressures_kPa, extrapolate=True, axis=0)
+        known = self.variants
+        curve = self._curve(
+            tuple((n, v) for n, v in sizes.items() if n in known and v != known[n].parameter.null)
+        )
         low, high = self.pressures_kPa[0], self.pressures_kPa[-1]
-        inside = np.clip(pressure_kPa, low, high)
+        within = low <= pressure_kPa.min() and pressure_kPa.max() <= high
+        inside = pressure_kPa if within else np.clip(pressure_kPa, low, high)
         found: Array = curve(inside).T
-        if not np.array_equal(inside, pressure_kPa):
+        if not within:
             ends = curve(np.array([low, high]), 1).T
             beyond = pressure_kPa - inside
             found = found + np.where(beyond < 0, ends[:, :1], ends[:, 1:]) * beyond
+        if not self.walls:
+            return found
         side = self.walls.get(int(np.sign(sizes.get(CONTACT, 0.0))))
         return found if side is None else found + side.change(pressure_kPa, abs(sizes[CONTACT]))
+
+    def _curve(self, sizes: tuple[tuple[str, float], ...]) -> Any:
+        """The response over pressure with variants of given sizes, which many experiments ask for in turn."""
+        from scipy.interpolate import PPoly
+
+        if sizes not in self._curves:
+            if len(self._curves) >= REMEMBERED:
+                self._curves.clear()
+            c = self._splines[""]
+            for name, size in sizes:
+                c = c + self._splines[name](size)
+            self._curves[sizes] = PPoly.construct_fast(c, self.pressures_kPa, extrapolate=True, axis=0)
+        return self._curves[sizes]
 
 
 @attrs.frozen
@@ -229,6 +245,8 @@ class UnitPressure:
             raise InputError("no response of the unit is given", "unit_pressure", "simulate the unit first")
         self._responses = tuple(responses)
         self._past = histories(experiments)
+        self._nearest: dict[tuple[float, float], UnitResponse] = {}
+        self._zeros = {r.channels: tuple(map(_zero, r.channels)) for r in self._responses}
         self.channels_known = self._responses[0].channels
         self.nuisances = self._bounded(nuisances(self.channels_known), experiments)
         known: dict[str, Parameter] = {}
@@ -275,10 +293,11 @@ class UnitPressure:
         if "gravity" in static:
             # Weight bends a unit of stiffer resin by as much less.
             static["gravity"] = static["gravity"] / values.get("modulus_factor", 1.0)
-        y = response.at(pressure, static)
-        y = y + np.array([values.get(_zero(c), 0.0) for c in response.channels])[:, None]
-        if "angle_deg" in response.channels:
-            y[response.channels.index("angle_deg")] += values.get("angle_offset.offset_deg", 0.0)
+        zeros = [
+            values.get(zero, 0.0) + (values.get("angle_offset.offset_deg", 0.0) if c == "angle_deg" else 0.0)
+            for c, zero in zip(response.channels, self._zeros[response.channels], strict=True)
+        ]
+        y = np.add(response.at(pressure, static), np.array(zeros)[:, None], order="C")
         kept = [i for i, c in enumerate(response.channels) if c in experiment.columns]
         return y if len(kept) == len(y) else y[kept]
 
@@ -298,12 +317,13 @@ class UnitPressure:
             # The line feeds the leak: tau dp_c/dt = p - p_c - leak p_c.
             p, lag = p / (1.0 + leak), lag / (1.0 + leak)
         p = lagged(t, p, lag)
-        modulus = get("modulus_factor", 1.0) * np.ones_like(p)
+        modulus: Any = get("modulus_factor", 1.0)
         if per_K := get("temperature_drift.per_K", 0.0):
             kelvin = experiment.temperature_C - REFERENCE_C
-            modulus *= 1.0 + per_K * (kelvin if math.isfinite(kelvin) else 0.0)
+            modulus = modulus * (1.0 + per_K * (kelvin if math.isfinite(kelvin) else 0.0))
         if per_decade := get("fatigue_drift.per_decade", 0.0):
-            modulus *= 1.0 - per_decade * np.log10(1.0 + past.cycles + cycles(experiment["pressure_kPa"]))
+            done = past.cycles + cycles(experiment["pressure_kPa"])
+            modulus = modulus * (1.0 - per_decade * np.log10(1.0 + done))
         p = p / modulus
         if share := get("viscoelasticity.share", 0.0):
             time = get("viscoelasticity.time_s", 1.0) / (1.0 - share)
@@ -317,6 +337,12 @@ class UnitPressure:
         return p
 
     def _response(self, experiment: Experiment) -> UnitResponse:
+        how = experiment.scale, experiment.orientation_deg
+        if how not in self._nearest:
+            self._nearest[how] = self._found(experiment)
+        return self._nearest[how]
+
+    def _found(self, experiment: Experiment) -> UnitResponse:
         apart = [
             abs(r.scale - experiment.scale)
             + abs(_turn(r.orientation_deg - experiment.orientation_deg)) / 90.0
@@ -363,12 +389,18 @@ def _weights(h: Any, time_s: float) -> tuple[Any, Any, Any]:
 
 def play(p: Array, threshold: float) -> Array:
     """Play operator (n,) of a half-width `threshold`, at rest in the middle at first."""
+    moves = np.diff(p)
+    at = np.flatnonzero(moves)
+    turned = np.flatnonzero(np.diff(np.sign(moves[at])))
+    turns = at[turned + 1]
+    # Between two turns what happened before is one number.
     x = float(p[0])
-    found = []
-    for v in p.tolist():
+    before = [x]
+    for v in p[turns].tolist():
         x = min(max(x, v - threshold), v + threshold)
-        found.append(x)
-    return np.array(found)
+        before.append(x)
+    held = np.repeat(before, np.diff(turns, prepend=-1, append=len(p) - 1))
+    return np.minimum(np.maximum(held, p - threshold), p + threshold)
 
 
 def softened(p: Array, before_kPa: float, softening: float, width: float) -> Array:
