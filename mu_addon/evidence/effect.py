@@ -44,7 +44,8 @@ class Parameter:
     """A number with unit, bounds, the `null` at which it changes nothing, `starts` for a fit, its source.
 
     linear: the prediction is affine in it, with one slope whatever the other values are. spread: standard
-    deviation of what is known of it before any data; inf where nothing is.
+    deviation of what is known of it before any data; inf where nothing is. experiment: the only one whose
+    prediction heeds it, by name; any may where it is empty.
     """
 
     name: str
@@ -56,6 +57,7 @@ class Parameter:
     source: str = ""
     linear: bool = False
     spread: float = math.inf
+    experiment: str = ""
 
     def __attrs_post_init__(self) -> None:
         inside = [self.null, *self.starts]

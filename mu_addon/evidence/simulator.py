@@ -68,6 +68,7 @@ class Composite:
                 effects[e.keys] = attrs.evolve(known, parameters=tuple(both), kinds=(*known.kinds, kind))
         self.nuisances = tuple(nuisances.values())
         self.effects = tuple(effects.values())
+        self._only = {p.name: p.experiment for p in self.nuisances if p.experiment}
         self._knows = {
             kind: {p.name for p in s.nuisances} | {key for e in s.effects for key in e.keys}
             for kind, s in self._simulators.items()
@@ -85,7 +86,7 @@ class Composite:
         """Prediction (channels, n), from memory where it was made before; InputError for other kinds."""
         simulator = self._of(experiment)
         knows = self._knows[experiment.kind]
-        own = {k: v for k, v in values.items() if k in knows}
+        own = {k: v for k, v in values.items() if k in knows and self._heeds(experiment, k)}
         key = (experiment.name, id(experiment), tuple(sorted(own.items())))
         if key in self._kept:
             self._kept.move_to_end(key)
@@ -98,6 +99,9 @@ class Composite:
         if len(self._kept) > self._remembered:
             self._kept.popitem(last=False)
         return found
+
+    def _heeds(self, experiment: Experiment, key: str) -> bool:
+        return self._only.get(key, experiment.name) == experiment.name
 
     def _of(self, experiment: Experiment) -> Simulator:
         if experiment.kind not in self._simulators:

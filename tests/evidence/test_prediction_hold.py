@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from mu_addon.evidence.prediction.hold import ROOM_K, ATMOSPHERE_kPa, ChamberPressure, held
+from mu_addon.evidence.prediction.hold import KIND, ROOM_K, ATMOSPHERE_kPa, ChamberPressure, held
+from mu_addon.evidence.simulator import Composite
 
 from .bench import experiment, measured, recovered
 
@@ -82,6 +83,15 @@ def test_the_supply_keeps_the_pressure_until_the_valve_shuts():
     found = ChamberPressure([e]).predict(e, {"leak.loss_per_s": 0.01, "shut_s of hold": 30.0})[0]
     np.testing.assert_array_equal(found[TIME <= 30.0], 300.0)
     assert found[-1] == pytest.approx(held(np.array([0.0, 90.0]), 300.0, loss_per_s=0.01)[-1])
+
+
+def test_what_belongs_to_one_hold_leaves_predictions_of_others_as_they_were():
+    holds = [plan(300.0, "a"), plan(200.0, "b")]
+    model = Composite({KIND: ChamberPressure(holds)})
+    before = [model.predict(e, {}) for e in holds]
+    after = [model.predict(e, {"initial_kPa of a": 301.0}) for e in holds]
+    assert after[1] is before[1]
+    assert after[0][0, 0] == 301.0
 
 
 def test_a_leak_is_recovered():

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import attrs
 import numpy as np
 
 from ...measured import Experiment
@@ -83,6 +84,7 @@ class ChamberPressure:
             nuisances.append(
                 Parameter(_shut(e), "s", 0.0, 0.5 * lasts, 0.0, (), "records begin by hand", spread=5.0)
             )
+            nuisances[-2:] = [attrs.evolve(p, experiment=e.name) for p in nuisances[-2:]]
         self.nuisances = tuple(nuisances)
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
