@@ -94,6 +94,10 @@ class _Factor:
         return np.asarray(y.T if x.ndim == 2 else y[0])
 
 
+# Share of white noise that always wanders: the factor asks for some, and so little is not felt.
+LEAST_SLOW = 1e-4
+
+
 class _Clocks:
     """Covariance of several series one after the other, factored once for all that share a clock."""
 
@@ -121,10 +125,11 @@ class _Clocks:
 
         phi = np.exp(-self._apart / source.time_s)
         kept, first = _block(self._count, self._step / source.time_s)
-        variance = source.slow**2 * kept
+        slow = max(source.slow, LEAST_SLOW * source.white)
+        variance = slow**2 * kept
         # Without a clock each value stands alone.
         c = np.where(self._timed, variance, source.white**2)
-        v = np.where(self._timed, source.white**2 / self._count + source.slow**2 * first - variance, 0.0)
+        v = np.where(self._timed, source.white**2 / self._count + slow**2 * first - variance, 0.0)
         u = v / c
         before = np.concatenate([[0.0], u[:-1]])
         band = np.zeros((2, len(c)))

@@ -7,7 +7,7 @@ from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.noise import Source, Whitening, repeated
 from mu_addon.evidence.record import record
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.verdict import noise_of
+from mu_addon.evidence.verdict import diagnose, noise_of
 from tests.evidence import analytic, stand_ins
 
 
@@ -38,6 +38,21 @@ def test_a_gap_in_the_clock_lets_go_of_the_past():
     dense = 0.09 * np.eye(60) + np.exp(-np.abs(t[:, None] - t) / 2.0)
     white = Whitening(data, {data.groups[0]: source})(np.linalg.cholesky(dense))
     np.testing.assert_allclose(white @ white.T, np.eye(60), atol=1e-9)
+
+
+def test_a_timed_record_of_a_few_samples_has_white_noise_and_a_verdict():
+    """Too few to tell slow noise by: it is taken for none."""
+    rng = np.random.default_rng(2)
+    pressure = np.linspace(0.0, 20.0, 10)
+    angle = analytic.channels(pressure)[0] + rng.normal(size=10)
+    e = analytic.experiment("short", np.arange(10) * 0.5, pressure, {"angle_deg": angle})
+    model = analytic.simulator([e])
+    data = record([e], model)
+    (source,) = noise_of(data, model).values()
+    assert source.slow == 0.0
+    white = Whitening(data, {data.groups[0]: source})(np.eye(10))
+    np.testing.assert_allclose(white, np.eye(10) / source.white, atol=1e-6 / source.white)
+    assert diagnose([e], model).kind == "none"
 
 
 def test_series_of_one_clock_are_whitened_as_each_alone():
