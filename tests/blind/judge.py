@@ -19,6 +19,7 @@ from mu_addon.evidence.selection import TOLD_APART
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
 from mu_addon.measured import read_folder
+from mu_addon.processes import one_thread_each
 from tests.blind import unit_runs
 from tests.blind.machines import BENCHES
 from tests.blind.truth import UNITS
@@ -46,13 +47,15 @@ def fingerprint():
 @functools.cache
 def injector():
     """The other process; it serves this one until this one ends."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "tests.blind.injector"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        cwd=ROOT,
-    )
+    # Its matrices are small: on cores that have other work, threads would mostly wait for each other.
+    with one_thread_each():
+        return subprocess.Popen(
+            [sys.executable, "-m", "tests.blind.injector"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=ROOT,
+        )
 
 
 def said(bench, words):

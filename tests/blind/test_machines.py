@@ -50,3 +50,9 @@ def test_formulas_of_bench_and_judge_are_of_one_physics(kind, effect):
 def test_a_hidden_cause_of_another_kind_is_found(kind, effect):
     row = judged({"seed": 9_000_010, "unit": kind, "effect": effect, "times": 8.0})
     assert row["outcome"] in (IN_SET if effect else ("clean",))
+
+
+def test_a_clamp_of_which_one_beam_alone_tells_is_found():
+    # Left out whole, that beam could not be foretold by the others.
+    row = judged({"seed": 26_300_002, "unit": "beam_deadweight", "effect": "frame_compliance", "times": 4.0})
+    assert (row["outcome"], row["doubted"]) == ("exact", "")
