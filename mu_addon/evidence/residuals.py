@@ -19,6 +19,7 @@ from .noise import cycle_s, harmonics
 from .prediction.unit import KIND as UNIT
 from .prediction.unit import cycles, play
 from .record import KNOWN, Record, Series
+from .ringing import modes, ringing
 
 Array = np.ndarray[Any, Any]
 
@@ -29,6 +30,8 @@ BANDS = 16
 PITCH_MM = Chambers().cell_mm
 # Directions of a test's columns, each of unit length, that hold less than this are none.
 NEAR = 0.03
+# Periods of the slowest ringing that is looked for in the longest record: what is slower is no vibration.
+PERIODS = 10.0
 
 
 @attrs.frozen
@@ -134,6 +137,7 @@ def _fitted_tests(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[
         *_phase(fitter, fit, spare),
         *_steps(fitter, r, spare),
         *_breaks(fitter, fit, response, spare),
+        *_ringing(fitter, fit, spare),
     ]
 
 
@@ -543,6 +547,48 @@ def _breaks(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, float
 def _beyond(v: Array) -> Array:
     """Sums (n, ...) over all that come after each one of v (n, ...)."""
     return np.asarray(v.sum(axis=0) - np.cumsum(v, axis=0))
+
+
+def _ringing(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Dependence]:
+    """Whether what is under pressure goes on swinging after each change of it: one size for all channels.
+
+    The residual along the motion of a mass that the fitted model drives, by the largest of many modes.
+    """
+    from scipy.stats import chi2
+
+    record = fitter.record
+    driven = [
+        s for s in _clocked(record) if record.driven(s.experiment, "pressure_kPa") and len(s.time_s) > 16
+    ]
+    if not driven:
+        return []
+    longest = max(float(s.time_s[-1] - s.time_s[0]) for s in driven)
+    # A mode somewhat faster than half the clock is seen, at another frequency.
+    fastest = max(0.75 * (len(s.time_s) - 1) / float(s.time_s[-1] - s.time_s[0]) for s in driven)
+    hertz, damping = modes(PERIODS / longest, fastest)
+    if not len(hertz):
+        return []
+    still = fitter.predict(fit.values)
+    swings = np.zeros((len(record), len(hertz)))
+    clocks: dict[Any, list[Series]] = {}
+    for s in driven:
+        clocks.setdefault((s.experiment, s.time_s.tobytes()), []).append(s)
+    for members in clocks.values():
+        together = np.stack([still[s.at] for s in members], axis=1)
+        found = ringing(members[0].time_s, together, hertz, damping)
+        for k, s in enumerate(members):
+            swings[s.at] = found[:, k]
+    swings = fitter.project(swings)
+    before = np.linalg.norm(swings, axis=0)
+    q = _basis(fit.jacobian)
+    swings -= q @ (q.T @ swings)
+    length = np.linalg.norm(swings, axis=0)
+    told = length > 1e-3 * np.maximum(before, 1e-300)
+    gains = np.where(told, swings.T @ fit.residual / np.where(told, length, 1.0), 0.0) ** 2
+    best = int(np.argmax(gains))
+    saved = sum(spare[g] for g in {s.group for s in driven})
+    p = min(1.0, len(hertz) * float(chi2.sf(gains[best] - saved, 1)))
+    return [Dependence("ringing", float(gains[best]), p, f"{hertz[best]:.3g} Hz, after changes of pressure")]
 
 
 def _outliers(record: Record, r: Array) -> list[Dependence]:

@@ -1,0 +1,46 @@
+"""How a mass on a spring that is driven would ring: what its motion adds to one without inertia."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, Any]
+
+# Shares of the critical damping, each for those within a factor of 1.6 of it.
+DAMPINGS = (0.03, 0.08, 0.2)
+# Between neighbouring frequencies, in dampings: one halfway between them keeps three quarters of its power.
+APART = 1.5
+
+
+def modes(low_Hz: float, high_Hz: float) -> tuple[Array, Array]:
+    """Frequencies (k,) in Hz and dampings (k,), so close that any mode between the bounds is near one."""
+    found: list[tuple[float, float]] = []
+    for damping in DAMPINGS:
+        many = math.ceil(math.log(high_Hz / low_Hz) / (APART * damping)) + 1 if high_Hz > low_Hz else 0
+        found += [(f, damping) for f in np.geomspace(low_Hz, high_Hz, many).tolist()]
+    hertz, dampings = np.array(found).reshape(-1, 2).T
+    return hertz, dampings
+
+
+def ringing(time_s: Array, still: Array, hertz: Array, damping: Array) -> Array:
+    """What inertia adds (n, c, k) to signals (n, c), by k modes that start at rest.
+
+    Of x'' + 2 damping w x' + w^2 x = w^2 still, exact for signals straight between their samples, x - still.
+    """
+    w = 2.0 * np.pi * hertz
+    rate = w * (-damping + 1j * np.sqrt(1.0 - damping**2))
+    h = np.diff(time_s)[:, None]
+    keeps = np.exp(rate * h)
+    # The integral of exp(rate (h - s)) over a step, of a signal that stays and of one that grows from 0 to 1.
+    stays = (keeps - 1.0) / rate
+    grows = (stays - h) / (rate * h)
+    z = -still[0, :, None] / rate
+    found = np.zeros((*still.shape, len(hertz)))
+    scale = w / np.sqrt(1.0 - damping**2)
+    for i in range(len(h)):
+        z = keeps[i] * z + still[i, :, None] * stays[i] + (still[i + 1] - still[i])[:, None] * grows[i]
+        found[i + 1] = scale * z.imag - still[i + 1, :, None]
+    return found
