@@ -25,6 +25,8 @@ MOST_EFFECTS = 3
 # Models that the next effect is added to: the best one may be wrong while two effects are seen as one.
 SEEDS = 4
 DRAWS = 20000
+# What the model's own mesh does: there in every set of data, seen or not.
+NUMERICS = "mesh_error"
 # An effect is told of by one experiment alone where this share of what is known of it comes from there.
 ALONE = 0.9
 # Chi squared that an effect must take from a fit's residual, to first order, to be fitted beside it: a small
@@ -339,22 +341,47 @@ def _causes(
     found = []
     for e in chosen.effects:
         others = [o for o in chosen.effects if o.name != e.name]
-        rivals: dict[str, float] = {}
+        tried = [f for f in levels[0] if f.names != chosen.names]
         if others:
-            tried = []
-            for a in effects:
-                if a.name not in chosen.names:
-                    fits = fitter.best([*others, a], [{**chosen.values, **s} for s in a.starts()])
-                    tried.append((a.name, fits.chi2))
-        else:
-            tried = [(f.names[0], f.chi2) for f in levels[0] if f.names != chosen.names]
-        for name, chi2 in tried:
-            if chi2 - chosen.chi2 < TOLD_APART:
-                rivals[name] = min(chi2, rivals.get(name, chi2))
+            tried = [
+                fitter.best([*others, a], [{**chosen.values, **s} for s in a.starts()])
+                for a in effects
+                if a.name not in chosen.names
+            ]
+        rivals: dict[str, float] = {}
+        for f in tried:
+            if f.chi2 - chosen.chi2 < TOLD_APART:
+                name = f.names[-1]
+                rivals[name] = min(f.chi2, rivals.get(name, f.chi2))
+        rivals |= _by_numerics(fitter, effects, chosen, [f for f in tried if f.names[-1] not in rivals])
         less = fitter.best(others, [chosen.values])
         p = max(ps)
         found.append(Cause(e, p, less.chi2 - chosen.chi2, tuple(sorted(rivals, key=lambda n: rivals[n]))))
     return tuple(sorted(found, key=lambda c: -c.loss))
+
+
+def _by_numerics(
+    fitter: Fitter, effects: Sequence[Effect], chosen: Fit, tried: Sequence[Fit]
+) -> dict[str, float]:
+    """Chi squared of models that only the error of the model's own mesh tells from the chosen one, by rival.
+
+    No mesh is exact, and its error is another one with the effect than without it. So an effect is not told
+    from one that explains the data as well once either has as much of that error as it likes.
+    """
+    mesh = next((e for e in effects if e.name == NUMERICS), None)
+    if mesh is None or NUMERICS in chosen.names:
+        return {}
+
+    def meshed(f: Fit) -> Fit:
+        return fitter.best([*f.effects, mesh], [{**f.values, **s} for s in mesh.starts()])
+
+    reference, found = meshed(chosen), {}
+    for f in tried:
+        if f.names[-1] != NUMERICS and _promises(fitter, f, mesh):
+            other = meshed(f)
+            if other.chi2 - reference.chi2 < TOLD_APART:
+                found[f.names[-1]] = other.chi2
+    return found
 
 
 def interval(fitter: Fitter, fit: Fit, key: str, rise: float = 3.84) -> tuple[float, float]:
