@@ -353,7 +353,9 @@ def _causes(
             if f.chi2 - chosen.chi2 < TOLD_APART:
                 name = f.names[-1]
                 rivals[name] = min(f.chi2, rivals.get(name, f.chi2))
-        rivals |= _by_numerics(fitter, effects, chosen, [f for f in tried if f.names[-1] not in rivals])
+        if NUMERICS not in rivals:
+            # Where the mesh alone does in its place, anything beside the mesh would.
+            rivals |= _by_numerics(fitter, effects, chosen, [f for f in tried if f.names[-1] not in rivals])
         less = fitter.best(others, [chosen.values])
         p = max(ps)
         found.append(Cause(e, p, less.chi2 - chosen.chi2, tuple(sorted(rivals, key=lambda n: rivals[n]))))
