@@ -37,6 +37,14 @@ def test_a_name_that_only_the_mesh_s_error_decides_is_not_given():
     assert (row["verdict"], row["outcome"]) == ("ambiguous", "in_set")
 
 
+def test_where_the_mesh_s_error_would_do_in_an_effect_s_place_nothing_more_is_listed_beside_it():
+    row = judged({"seed": 2_000_101, "effect": "overcure", "times": 2.0, "unit": "simulated", "most": 6})
+    assert row["outcome"] == "in_set"
+    # Lags, friction and wear explain nothing here.
+    assert "mesh_error" in row["ambiguity"]
+    assert not {"line_lag", "rate_independent_hysteresis", "fatigue_drift"} & set(row["ambiguity"])
+
+
 def test_two_causes_are_found_though_neither_looks_best_alone():
     row = judged({"seed": 4100000, "dt": 0.3, "count": 5, "times": 8.0} | TWO)
     assert row["outcome"] in IN_SET
