@@ -10,8 +10,8 @@ import os
 import sys
 from pathlib import Path
 
-# Before anything loads BLAS: its threads spin while they wait for each other on the many small systems here. A
-# verdict on a beam took 7.8 s with two and 2.5 s with one.
+# Before anything loads BLAS: its threads spin while they wait for each other on the many small systems here.
+# A verdict on a beam took 7.8 s with two and 2.5 s with one.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 ROOT = Path(__file__).resolve().parent.parent
