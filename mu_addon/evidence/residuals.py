@@ -28,6 +28,7 @@ FALSE_ALARM = 0.003
 BANDS = 16
 # The pitch of chambers at 1.0x.
 PITCH_MM = Chambers().cell_mm
+ANGLE = "angle_deg"
 # Directions of a test's columns, each of unit length, that hold less than this are none.
 NEAR = 0.03
 # Periods of the slowest ringing that is looked for in the longest record: what is slower is no vibration.
@@ -120,13 +121,14 @@ def _fitted_tests(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[
         return found
     fitted = _fitted(fitter, fit)
     for name, needs, of in COVARIATES:
-        held = [
-            i
+        held = {
+            i: np.asarray(of(e), float)
             for i, e in enumerate(record.experiments)
             if all(c in e.columns for c in needs)
             and ("pressure_kPa" not in needs or record.driven(i, "pressure_kPa"))
-        ]
-        found += _tested(fitted, name, _powers(record, held, of), spare)
+        }
+        found += _tested(fitted, name, _powers(record, held), spare)
+    found += _tested(fitted, "angle", _powers(record, _angles(fitter, fit)), spare)
     response = _response(fitter, fit)
     for name, condition in CONDITIONS:
         values = np.array([condition(e, i) for i, e in enumerate(record.experiments)], float)
@@ -169,11 +171,27 @@ def _channels(record: Record) -> tuple[str, ...]:
     return tuple(dict.fromkeys(s.channel for s in record.series if s.group != KNOWN))
 
 
-def _powers(record: Record, held: Sequence[int], of: Any, degree: int = 4) -> Array | None:
-    """Chebyshev powers (N, d) of a covariate, for a fairly straight unit; None where it does not vary."""
-    if not held:
+def _angles(fitter: Fitter, fit: Fit) -> dict[int, Array]:
+    """The angle (n,) at each sample, by experiments that have one: as predicted, which has no noise.
+
+    What was read has the noise that it would be compared with; where the angle is what was done, it has none.
+    """
+    found = {}
+    for i, e in enumerate(fitter.record.experiments):
+        if ANGLE not in e.columns or "time_s" not in e.columns:
+            continue
+        rows = [s.row for s in fitter.record.series if s.experiment == i and s.channel == ANGLE]
+        if rows:
+            found[i] = fitter.simulator.predict(e, fit.values)[rows[0]]
+        else:
+            found[i] = np.nan_to_num(e[ANGLE])
+    return found
+
+
+def _powers(record: Record, values: Mapping[int, Array], degree: int = 4) -> Array | None:
+    """Chebyshev powers (N, d) of a covariate's samples (n,) by experiment; None where it does not vary."""
+    if not values:
         return None
-    values = {i: np.asarray(of(record.experiments[i]), float) for i in held}
     low, high = min(v.min() for v in values.values()), max(v.max() for v in values.values())
     if not high > low:
         return None

@@ -110,6 +110,21 @@ def test_a_chamber_that_bends_otherwise_is_what_the_residual_depends_on():
     assert alike["chamber"].p_value > 0.01
 
 
+def test_an_angle_that_is_read_too_far_where_it_is_large_depends_on_the_angle():
+    """By the angle as predicted: as read, it shares its noise with what is left."""
+    clean = fitter_of({})
+    table = {d.against: d for d in dependence_table(clean, clean.fit())}
+    assert table["angle"].p_value > 0.01
+    wrong = []
+    for e in clean.record.experiments:
+        angle = e["angle_deg"]
+        wrong.append(attrs.evolve(e, columns=e.columns | {"angle_deg": angle + 2.0 * (angle / 30.0) ** 3}))
+    model = analytic.simulator(wrong)
+    misread = Fitter(record(wrong, model), model, clean.sources)
+    found = {d.against: d for d in dependence_table(misread, misread.fit())}["angle"]
+    assert found.p_value < 1e-6
+
+
 def test_a_modulus_at_its_bound_hides_nothing_more():
     """A gauge's gain is absorbed by the modulus as long as that may move, and no longer."""
     fitter = fitter_of({})
