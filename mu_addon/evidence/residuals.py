@@ -31,6 +31,8 @@ PITCH_MM = Chambers().cell_mm
 ANGLE = "angle_deg"
 # Directions of a test's columns, each of unit length, that hold less than this are none.
 NEAR = 0.03
+# A column of which what was fitted anyway leaves no more than this share tells nothing.
+ABSORBED = 1e-3
 # Periods of the slowest ringing that is looked for in the longest record: what is slower is no vibration.
 PERIODS = 10.0
 
@@ -137,7 +139,7 @@ def _fitted_tests(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[
         *found,
         *_chambers(fitter, fit, response, spare),
         *_phase(fitter, fit, spare),
-        *_steps(fitter, r, spare),
+        *_steps(fitter, fit, spare),
         *_breaks(fitter, fit, response, spare),
         *_ringing(fitter, fit, spare),
     ]
@@ -479,10 +481,11 @@ def same_protocol(a: Experiment, b: Experiment) -> bool:
     return bool(clock < step and np.abs(p - q).max() < 0.05 * max(float(np.ptp(p)), 1e-9))
 
 
-def _steps(fitter: Fitter, r: Array, spare: Mapping[str, float]) -> list[Dependence]:
-    """Whether a channel jumped once, anywhere: every place of the jump is tried."""
+def _steps(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Dependence]:
+    """Whether a channel jumped once, in an experiment or between two: every place of the jump is tried."""
     from scipy.stats import norm
 
+    r = fit.residual
     best, tried = (0.0, ""), 0
     known: dict[Any, Array] = {}
     for s in _clocked(fitter.record):
@@ -500,10 +503,57 @@ def _steps(fitter: Fitter, r: Array, spare: Mapping[str, float]) -> list[Depende
         if z[at] > best[0]:
             name = fitter.record.experiments[s.experiment].name
             best = (float(z[at]), f"{name}, {s.channel}, {s.time_s[at + 4]:.4g} s")
-    if not tried:
-        return []
     # Jumps at neighbouring places are nearly the same test, yet no fewer than a third are independent.
-    return [Dependence("jump", best[0], min(1.0, 2.0 * tried * float(norm.sf(best[0]))), best[1])]
+    both = [(*best, tried), *([_moved(fitter, fit, spare)] if len(fitter.record.experiments) > 1 else [])]
+    found = [
+        Dependence("jump", z, min(1.0, 2.0 * len(both) * many * float(norm.sf(z))), where)
+        for z, where, many in both
+        if many
+    ]
+    return sorted(found, key=lambda d: d.p_value)[:1]
+
+
+def _moved(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> tuple[float, str, int]:
+    """The clearest jump between two experiments, in standard deviations and words, and how many were tried.
+
+    Of channels whose one zero is fitted for all experiments: a marker that was glued anew, or a camera that
+    was moved, has another one from then on.
+    """
+    record = fitter.record
+    every: dict[str, list[Series]] = {}
+    for s in _clocked(record):
+        every.setdefault(s.channel, []).append(s)
+    places: list[tuple[str, int]] = []
+    columns = []
+    for channel, own in every.items():
+        # The first is the zero itself, which must be one that is fitted.
+        for first in sorted({s.experiment for s in own}):
+            column = np.zeros(len(record))
+            for s in own:
+                column[s.at] = s.experiment >= first
+            places.append((channel, first))
+            columns.append(column)
+    if not columns:
+        return 0.0, "", 0
+    stacked = np.stack(columns, axis=1)
+    whole = np.linalg.norm(fitter.whitened(stacked), axis=0)
+    white = fitter.project(stacked)
+    absorbed = np.linalg.norm(white, axis=0) <= 1e-6 * whole
+    zeros = {channel for (channel, _), gone in zip(places, absorbed, strict=True) if gone}
+    q = _basis(fit.jacobian)
+    white -= q @ (q.T @ white)
+    length = np.linalg.norm(white, axis=0)
+    best, tried = (0.0, ""), 0
+    for (channel, first), along, size, before in zip(
+        places, white.T @ fit.residual, length, whole, strict=True
+    ):
+        if channel not in zeros or size <= ABSORBED * before:
+            continue
+        tried += 1
+        left = (float(along) / float(size)) ** 2 - spare[every[channel][0].group]
+        if left > best[0] ** 2:
+            best = math.sqrt(left), f"{channel}, from {record.experiments[first].name} on"
+    return *best, tried
 
 
 def _breaks(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, float]) -> list[Dependence]:
@@ -601,7 +651,7 @@ def _ringing(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Depen
     q = _basis(fit.jacobian)
     swings -= q @ (q.T @ swings)
     length = np.linalg.norm(swings, axis=0)
-    told = length > 1e-3 * np.maximum(before, 1e-300)
+    told = length > ABSORBED * np.maximum(before, 1e-300)
     gains = np.where(told, swings.T @ fit.residual / np.where(told, length, 1.0), 0.0) ** 2
     best = int(np.argmax(gains))
     saved = sum(spare[g] for g in {s.group for s in driven})

@@ -15,6 +15,7 @@ from mu_addon.evidence.residuals import dependence_table, strict_table, structur
 from mu_addon.evidence.selection import one_more, reviewed, select
 from mu_addon.evidence.sensitivity import sensitivities
 from mu_addon.evidence.simulator import Composite, effect_named
+from mu_addon.evidence.verdict import diagnose
 from tests.evidence import analytic, stand_ins
 
 RUBBING = {"rate_independent_hysteresis.share": 0.25, "rate_independent_hysteresis.threshold_kPa": 3.0}
@@ -123,6 +124,22 @@ def test_an_angle_that_is_read_too_far_where_it_is_large_depends_on_the_angle():
     misread = Fitter(record(wrong, model), model, clean.sources)
     found = {d.against: d for d in dependence_table(misread, misread.fit())}["angle"]
     assert found.p_value < 1e-6
+
+
+def test_a_marker_glued_anew_between_two_experiments_is_a_jump():
+    """Within each experiment it keeps still; all share one zero."""
+    clean = fitter_of({})
+    assert {d.against: d for d in dependence_table(clean, clean.fit())}["jump"].p_value > 0.01
+    moved = [
+        attrs.evolve(e, columns=e.columns | {"marker2_y_mm": e["marker2_y_mm"] + 0.3 * (i > 1)})
+        for i, e in enumerate(clean.record.experiments)
+    ]
+    model = analytic.simulator(moved)
+    found = Fitter(record(moved, model), model, clean.sources)
+    (jump,) = (d for d in strict_table(found, found.fit()) if d.against == "jump")
+    assert jump.p_value < 1e-6
+    assert jump.where == f"marker2_y_mm, from {moved[2].name} on"
+    assert diagnose(moved, model).kind == "unexplained"
 
 
 def test_a_modulus_at_its_bound_hides_nothing_more():
