@@ -91,7 +91,7 @@ def dependence_table(fitter: Fitter, fit: Fit) -> list[Dependence]:
     misses, and now and then the slowest part of the noise, of which such data tell little.
     """
     spare = dict.fromkeys(fitter.deviance(fit), 0.0)
-    return [*_fitted_tests(fitter, fit, spare), *_plain_tests(fitter.record, fit.residual)]
+    return [*_fitted_tests(fitter, fit, spare), *_plain_tests(fitter, fit)]
 
 
 def strict_table(fitter: Fitter, fit: Fit) -> list[Dependence]:
@@ -104,7 +104,7 @@ def strict_table(fitter: Fitter, fit: Fit) -> list[Dependence]:
     before, after = fitter.deviance(fit), own.deviance(refitted)
     spare = {group: max(before[group] - after[group], 0.0) for group in before}
     found = _fitted_tests(fitter, fit, spare)
-    once, again = (_plain_tests(f.record, m.residual) for f, m in ((fitter, fit), (own, refitted)))
+    once, again = (_plain_tests(f, m) for f, m in ((fitter, fit), (own, refitted)))
     found += [max(pair, key=lambda d: d.p_value) for pair in zip(once, again, strict=True)]
     return found
 
@@ -139,14 +139,15 @@ def _fitted_tests(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[
         *found,
         *_chambers(fitter, fit, response, spare),
         *_phase(fitter, fit, spare),
-        *_steps(fitter, fit, spare),
         *_breaks(fitter, fit, response, spare),
         *_ringing(fitter, fit, spare),
     ]
 
 
-def _plain_tests(record: Record, r: Array) -> list[Dependence]:
+def _plain_tests(fitter: Fitter, fit: Fit) -> list[Dependence]:
+    record, r = fitter.record, fit.residual
     return [
+        *_steps(fitter, fit),
         *_spectrum(record, r),
         *_cycles_alike(record, r),
         *_repeats_alike(record, r),
@@ -481,7 +482,7 @@ def same_protocol(a: Experiment, b: Experiment) -> bool:
     return bool(clock < step and np.abs(p - q).max() < 0.05 * max(float(np.ptp(p)), 1e-9))
 
 
-def _steps(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Dependence]:
+def _steps(fitter: Fitter, fit: Fit) -> list[Dependence]:
     """Whether a channel jumped once, in an experiment or between two: every place of the jump is tried."""
     from scipy.stats import norm
 
@@ -497,14 +498,14 @@ def _steps(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Depende
             jump = np.tril(np.ones((b, b)))[:, 4:-4]
             white = fitter.whitening.series(s, jump - jump.mean(axis=0))
             known[key] = white / np.linalg.norm(white, axis=0)
-        z = np.sqrt(np.maximum((known[key].T @ r[s.at]) ** 2 - spare[s.group], 0.0))
+        z = np.abs(known[key].T @ r[s.at])
         tried += len(z)
         at = int(np.argmax(z))
         if z[at] > best[0]:
             name = fitter.record.experiments[s.experiment].name
             best = (float(z[at]), f"{name}, {s.channel}, {s.time_s[at + 4]:.4g} s")
     # Jumps at neighbouring places are nearly the same test, yet no fewer than a third are independent.
-    both = [(*best, tried), *([_moved(fitter, fit, spare)] if len(fitter.record.experiments) > 1 else [])]
+    both = [(*best, tried), *([_moved(fitter, fit)] if len(fitter.record.experiments) > 1 else [])]
     found = [
         Dependence("jump", z, min(1.0, 2.0 * len(both) * many * float(norm.sf(z))), where)
         for z, where, many in both
@@ -513,7 +514,7 @@ def _steps(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Depende
     return sorted(found, key=lambda d: d.p_value)[:1]
 
 
-def _moved(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> tuple[float, str, int]:
+def _moved(fitter: Fitter, fit: Fit) -> tuple[float, str, int]:
     """The clearest jump between two experiments, in standard deviations and words, and how many were tried.
 
     Of channels whose one zero is fitted for all experiments: a marker that was glued anew, or a camera that
@@ -550,9 +551,9 @@ def _moved(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> tuple[float,
         if channel not in zeros or size <= ABSORBED * before:
             continue
         tried += 1
-        left = (float(along) / float(size)) ** 2 - spare[every[channel][0].group]
-        if left > best[0] ** 2:
-            best = math.sqrt(left), f"{channel}, from {record.experiments[first].name} on"
+        z = abs(float(along) / float(size))
+        if z > best[0]:
+            best = z, f"{channel}, from {record.experiments[first].name} on"
     return *best, tried
 
 
