@@ -51,6 +51,10 @@ class ExtendedModel:
 
     def save(self, path: Path) -> None:
         """Write model.toml; raises OutputError."""
+        write_text(path, self.text())
+
+    def text(self) -> str:
+        """What model.toml holds."""
         lines = ["# Effects that measured data named, with what each parameter is known to.", ""]
         lines.append(f"verdict = {json.dumps(self.verdict)}")
         for effect, parameters in self.effects.items():
@@ -65,7 +69,7 @@ class ExtendedModel:
                 "# The block that was compressed, by print offset at 1.0x: modulus over the resin's.",
             ]
             lines += ["[lattice]", *(f"{n} = {getattr(self.lattice, n).tolist()}" for n in _RESPONSE)]
-        write_text(path, "\n".join(lines) + "\n")
+        return "\n".join(lines) + "\n"
 
 
 _RESPONSE = tuple(a.name for a in attrs.fields(OffsetResponse))

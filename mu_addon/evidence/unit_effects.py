@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..fem.clogged import CloggedModel
 from ..fem.descent import NewtonSettings
 from ..fem.lattice_law import LatticeLaw
-from ..fem.laws import Foam, Layered, Yeoh
+from ..fem.laws import Foam, Layered, NeoHooke, Yeoh
 from ..fem.loads import gravity
 from ..fem.materials import Layer, Materials
 from ..fem.model import Model
@@ -58,8 +58,8 @@ class Body:
     """
 
     unit: Unit
-    mesh: MeshSettings
-    finer: MeshSettings
+    mesh: MeshSettings = attrs.field(factory=MeshSettings)
+    finer: MeshSettings = attrs.field(factory=MeshSettings)
     distal: int = 1
     lattice: LatticeLaw | None = None
     orientation_deg: float = 0.0
@@ -83,18 +83,21 @@ class Body:
 class UnitEffect:
     """A static effect: its parameter, the sizes (ascending, the null among them) that are run, what changes.
 
-    body: of a body and a size; materials, model: of a body, its mesh and a size, the base's where None.
-    weighs: whether it depends on the direction of gravity. newton: of its runs. length: the power of a
-    length by which the size of the same change grows with the unit, at the same moduli and pressures; sizes
-    are those at 1.0x, and larger are more of them, for units at whose scale the bound is beyond the last.
+    body: of a body and a size; materials: of those without it, the mesh and a size; model, in place of the
+    base's, and load (n, 3) in N: of a body, its mesh and a size. They act side by side: each changes what the
+    others have left. weighs: whether it depends on the direction of gravity. newton: of its runs. length:
+    the power of a length by which the size of the same change grows with the unit, at the same moduli and
+    pressures; sizes are those at 1.0x, and larger are more of them, for units at whose scale the bound is
+    beyond the last.
     """
 
     name: str
     parameter: Parameter
     sizes: tuple[float, ...]
     body: Callable[[Body, float], Body] | None = None
-    materials: Callable[[Body, Mesh, float], Materials] | None = None
+    materials: Callable[[Materials, Mesh, float], Materials] | None = None
     model: Callable[[Body, Mesh, float], Model] | None = None
+    load: Callable[[Body, Mesh, float], Array] | None = None
     weighs: bool = False
     newton: NewtonSettings = SMOOTH
     length: int = 0
@@ -119,12 +122,9 @@ def down(orientation_deg: float) -> Array:
     return np.array([0.0, -math.sin(a), math.cos(a)])
 
 
-def _weighed(body: Body, mesh: Mesh, density_kg_m3: float) -> Model:
-    model = body.model(mesh)
+def _weight(body: Body, mesh: Mesh, density_kg_m3: float) -> Array:
     solid = np.where(mesh.region == LATTICE, relative_density(strut_cell(body.unit)), 1.0)
-    if density_kg_m3:
-        model.load = gravity(mesh, density_kg_m3 * TONNE_PER_MM3 * solid, down(body.orientation_deg))
-    return model
+    return gravity(mesh, density_kg_m3 * TONNE_PER_MM3 * solid, down(body.orientation_deg))
 
 
 def _clogged(body: Body, mesh: Mesh, share_lost: float) -> Model:
@@ -196,10 +196,14 @@ def _elastic(materials: Materials, mesh: Mesh, region: int) -> tuple[Array, Arra
     return elements, modulus[elements], poisson[elements]
 
 
-def _stiffening(body: Body, mesh: Mesh, c2_over_c1: float) -> Materials:
-    wall, rest = parted(body.materials(mesh), mesh, MEMBRANE)
+def _stiffening(materials: Materials, mesh: Mesh, c2_over_c1: float) -> Materials:
+    wall, rest = parted(materials, mesh, MEMBRANE)
     stiffer = []
     for layer in wall:
+        if layer.law is not NeoHooke:
+            # What makes its layers differ: it stays in proportion to stretch.
+            stiffer.append(layer)
+            continue
         # The unit's membrane is neo-Hookean, which is Yeoh's law with c1 = mu/2 alone.
         mu, kappa = layer.parameters.T
         c1 = mu / 2
@@ -208,15 +212,14 @@ def _stiffening(body: Body, mesh: Mesh, c2_over_c1: float) -> Materials:
     return Materials((*stiffer, *rest))
 
 
-def _asymmetric(body: Body, mesh: Mesh, excess: float) -> Materials:
+def _asymmetric(materials: Materials, mesh: Mesh, excess: float) -> Materials:
     """Struts stiffer by `excess` where the lattice shortens; below 0 less stiff there, as if they buckled.
 
     In parallel with the lattice's law a foam that resists one side only; for less stiff struts it resists
     tension, and takes the place of as much of the law. Two such foams are the lattice at small strain.
     """
-    base = body.materials(mesh)
-    lattice_, rest = parted(base, mesh, LATTICE)
-    elements, E, nu = _elastic(base, mesh, LATTICE)
+    lattice_, rest = parted(materials, mesh, LATTICE)
+    elements, E, nu = _elastic(materials, mesh, LATTICE)
     both = Foam.parameters(E, nu, 2.0, 2.0)
     both[:, 2 if excess < 0 else 0] *= NEXT_TO_NOTHING
     both[:, 4] /= 2
@@ -249,12 +252,12 @@ def layer_stiffness(ratio: float, shear_MPa: float, bulk_MPa: float) -> tuple[fl
     return added, moduli(0.0)[1] / moduli(added)[1]
 
 
-def _layered(body: Body, mesh: Mesh, in_plane: float) -> Materials:
+def _layered(materials: Materials, mesh: Mesh, in_plane: float) -> Materials:
     """The wall stiffer along the print's layers, which lie across the axis; the lattice as it is.
 
     All struts of a body-centred cell make one angle with the layers: to them it is another modulus.
     """
-    wall, rest = parted(body.materials(mesh), mesh, MEMBRANE)
+    wall, rest = parted(materials, mesh, MEMBRANE)
     layered: list[Layer] = []
     for layer in wall:
         # The unit's membrane is neo-Hookean, alike everywhere.
@@ -281,7 +284,7 @@ EFFECTS = {
             "gravity",
             _shared(beam.EFFECTS, "gravity"),
             (0.0, 1300.0, 4000.0),
-            model=_weighed,
+            load=_weight,
             weighs=True,
             length=-1,
             larger=(6000.0, 9000.0),

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..design.parameters import Unit
 from ..errors import ConvergenceError, InputError, MeshingError, MuError
-from ..fem.equilibrium import Equilibrium, State, rest
+from ..fem.equilibrium import Equilibrium, State
 from ..fem.kinematics import bending_angle_deg
 from ..fem.lattice_law import LatticeLaw
 from ..fem.trajectory import branches
@@ -123,7 +123,7 @@ class Run:
             return self.body, None
         effect = _effect(self.effect)
         body = effect.body(self.body, self.size) if effect.body else self.body
-        return body, effect if effect.materials or effect.model else None
+        return body, effect if effect.materials or effect.model or effect.load else None
 
     def key(self) -> str:
         """Hash of all that the result depends on."""
@@ -166,9 +166,11 @@ def run(case: Run, cache: Path | None = None) -> Result:
         points = followed(mesh, np.array(case.points).reshape(-1, 3))
         materials, model = body.materials(mesh), body.model(mesh)
         if effect and effect.materials:
-            materials = effect.materials(body, mesh, case.size)
+            materials = effect.materials(materials, mesh, case.size)
         if effect and effect.model:
             model = effect.model(body, mesh, case.size)
+        if effect and effect.load:
+            model.load = effect.load(body, mesh, case.size)
         newton = effect.newton if effect else SMOOTH
         equilibrium = Equilibrium(model, materials, newton, explains=not case.effect)
         # Out of reach, it only lends the points at which the unit would touch.
@@ -187,7 +189,7 @@ def run(case: Run, cache: Path | None = None) -> Result:
 
 def _states(equilibrium: Equilibrium, pressures_kPa: Array) -> Iterator[tuple[int, State]]:
     """Number of a pressure and its state, as far as they are reached; the last ConvergenceError is raised."""
-    start = _unpressed(equilibrium)
+    start = equilibrium.unpressed()
     distinct, sides = branches(pressures_kPa)
     if 0.0 in distinct:
         yield int(np.flatnonzero(pressures_kPa == 0.0)[0]), start
@@ -203,27 +205,6 @@ def _states(equilibrium: Equilibrium, pressures_kPa: Array) -> Iterator[tuple[in
             yield int(np.flatnonzero(pressures_kPa == pressure)[0]), history[-1]
     if failed:
         raise failed
-
-
-def _unpressed(equilibrium: Equilibrium) -> State:
-    """The state without pressure; a weight too large for one step is put on in several."""
-    model = equilibrium.model
-    state, load = rest(model.mesh), model.load
-    if load is None:
-        return state
-    for steps in (1, 4, 16):
-        try:
-            now = state
-            for step in range(1, steps + 1):
-                model.load = load * (step / steps)
-                now = equilibrium.newton(now.u, 0.0)
-            return now
-        except ConvergenceError:
-            if steps == 16:
-                raise
-        finally:
-            model.load = load
-    return state
 
 
 def pressures(readings_kPa: Array, count: int, margin: float) -> tuple[float, ...]:

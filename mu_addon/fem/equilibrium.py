@@ -22,6 +22,8 @@ Array = np.ndarray[Any, Any]
 # How much friction may still change with its lagged bound, as a share of it, and how often it may lag.
 FRICTION_TOLERANCE = 1e-4
 MOST_LAGS = 40
+# In how many steps a weight is put on, where fewer are not enough.
+WEIGHT_STEPS = (1, 4, 16)
 
 
 @attrs.frozen(eq=False)
@@ -33,6 +35,11 @@ class State:
     residual: float = 0.0
     iterations: int = 0
     factorisations: int = 0
+
+    @property
+    def loaded(self) -> bool:
+        """Whether anything acts on the body: without pressure and weight it is as drawn."""
+        return bool(self.pressure_MPa) or bool(self.u.any())
 
 
 class Equilibrium:
@@ -73,6 +80,33 @@ class Equilibrium:
             except IndefiniteError:
                 continue
         raise ConvergenceError("the tangent is far from definite")
+
+    def unpressed(self) -> State:
+        """The state without pressure: as drawn, or where the model's load takes it from there.
+
+        Raises ConvergenceError where the body does not bear its load.
+        """
+        model = self.model
+        start, load = rest(model.mesh), model.load
+        if load is None:
+            return start
+        failed: ConvergenceError | None = None
+        for steps in WEIGHT_STEPS:
+            try:
+                state = start
+                for step in range(1, steps + 1):
+                    model.load = load * (step / steps)
+                    state = self.newton(state.u, 0.0)
+                return state
+            except ConvergenceError as error:
+                failed = error
+            finally:
+                model.load = load
+        raise ConvergenceError(
+            f"no equilibrium under the weight alone: {failed.what if failed else 'none was sought'}",
+            "0 kPa",
+            "stiffen the material, or hang the unit with its tip down",
+        )
 
     def newton(self, u: Array, pressure: float, reach_mm: float = np.inf) -> State:
         """Stable equilibrium at a pressure in MPa, from a start (n, 3) that obeys the supports.
@@ -217,5 +251,5 @@ def extrapolate(points: Sequence[State], pressure: float) -> Array:
 
 
 def rest(mesh: Mesh) -> State:
-    """The undeformed, unloaded state of a mesh."""
+    """The undeformed, unloaded state of a mesh; where something weighs ask for `Equilibrium.unpressed`."""
     return State(0.0, np.zeros_like(mesh.nodes))

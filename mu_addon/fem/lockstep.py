@@ -65,7 +65,7 @@ class Lockstep:
 
         Raises ConvergenceError where a variant has none that continues the body's.
         """
-        if state.pressure_MPa == 0.0:
+        if not state.loaded:
             return [rest(self.model.mesh) for _ in self.variants]
         found: list[State | None] = [None] * len(self.variants)
         searches: dict[int, Descent] = {}
@@ -124,7 +124,7 @@ class Lockstep:
                 continue
             if np.abs(found.u - state.u).max() <= limit:
                 return found
-        return alone.reach(state.pressure_MPa, [rest(self.model.mesh)])
+        return alone.reach(state.pressure_MPa, [alone.unpressed()])
 
 
 class _Part:

@@ -46,7 +46,8 @@ def march(
 ) -> Trajectory:
     """Equilibria of a body with history at k instants, time in s ascending and pressure in kPa.
 
-    The body starts at rest without history; the first instant's pressure comes at once. Pressure is
+    The body starts without history, at rest or, where the model has a load, where that takes it; the first
+    instant's pressure comes at once. Pressure is
     linear between instants, in steps of at most `max_step_s` and the settings' largest pressure step, halved
     where they do not converge; obstacles with a path are where they are at each step's time. `on_state` is
     called when its instant is the last that materials and contacts remember. `load` gives an instant of an
@@ -59,13 +60,13 @@ def march(
             "time runs backward", f"instant {int(np.argmax(np.diff(time) < 0)) + 1} of the protocol"
         )
     equilibrium.model.forget(float(time[0]), equilibrium.parameters)
-    last = Instant(time[0], rest(equilibrium.model.mesh))
+    last: Instant | None = None
     states = []
     obstacles = equilibrium.model.obstacles
     for number, (t, p) in enumerate(zip(time, pressure, strict=True)):
         kept = load(number)
         if kept is None:
-            last = _interval(equilibrium, last, t, p, max_step_s)
+            last = _interval(equilibrium, last or _start(equilibrium, time[0]), t, p, max_step_s)
             store(number, attrs.evolve(last, contacts=tuple(o.kept() for o in obstacles)))
         else:
             last = kept
@@ -76,6 +77,15 @@ def march(
         if on_state:
             on_state(last.state)
     return Trajectory(time, np.asarray(pressure_kPa, float), tuple(states), np.arange(len(states)))
+
+
+def _start(eq: Equilibrium, time: float) -> Instant:
+    """The body before any pressure; what touches an obstacle there is remembered."""
+    if eq.model.load is None:
+        return Instant(time, rest(eq.model.mesh))
+    state = eq.unpressed()
+    eq.model.commit(state.u, eq.parameters)
+    return Instant(time, state)
 
 
 def _interval(eq: Equilibrium, start: Instant, time: float, pressure: float, max_step_s: float) -> Instant:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import attrs
@@ -50,25 +51,32 @@ def simulate(
     """Equilibria of a protocol sampled at k instants, time in s and pressure in kPa.
 
     `load` gives a state of an earlier run at a pressure in MPa, if it kept one with `store`; a resumed
-    run finds the same states to the last digit, since each starts from those before it alone. Raises
+    run finds the same states to the last digit, since each starts from those before it alone. The state
+    without pressure is one of them where the model has a load, else it is as drawn and not solved for. Raises
     ConvergenceError where a pressure cannot be reached; `on_state` has then seen all before it, and
     InputError for a body with friction.
     """
     if equilibrium.model.rubs:
         raise InputError("a body with friction remembers", "trajectory.simulate", "use marching.march")
+
+    def state_at(pressure_MPa: float, solve: Callable[[], State]) -> State:
+        state = load(pressure_MPa)
+        if state is None:
+            state = solve()
+            store(state)
+        if on_state:
+            on_state(state)
+        return state
+
     distinct, sides = branches(pressure_kPa)
-    found = {0.0: rest(equilibrium.model.mesh)}
+    model = equilibrium.model
+    start = rest(model.mesh) if model.load is None else state_at(0.0, equilibrium.unpressed)
+    found = {0.0: start}
     for side in sides:
-        history = [found[0.0]]
+        history = [start]
         for pressure in side:
-            state = load(pressure / 1e3)
-            if state is None:
-                state = equilibrium.reach(pressure / 1e3, history)
-                store(state)
-            history.append(state)
-            found[pressure] = state
-            if on_state:
-                on_state(state)
+            found[pressure] = state_at(pressure / 1e3, partial(equilibrium.reach, pressure / 1e3, history))
+            history.append(found[pressure])
     return _assemble(time_s, pressure_kPa, distinct, found)
 
 

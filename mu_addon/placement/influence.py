@@ -53,7 +53,7 @@ def parities(model: Model) -> list[Parity]:
     held = np.zeros((len(mesh.nodes), 3), bool)
     held[mesh.symmetry_nodes("x"), 1:] = True
     whole = attrs.evolve(mesh, symmetry=())
-    other = Model(whole, held=held, device=model.device, threads=model.threads)
+    other = model.under_other_supports(whole, held)
     return [Parity(model, (1, 2), False), Parity(other, (0,), True)]
 
 
@@ -68,8 +68,8 @@ def probe_loads(mesh: Mesh, monitor: Probe, components: Sequence[int]) -> Array:
 
 
 def loaded(trajectory: Trajectory, pressures_MPa: Array | None = None) -> list[State]:
-    """States of a trajectory under pressure, or those at some pressures: at rest nothing deviates."""
-    states = [state for state in trajectory.states if state.pressure_MPa]
+    """A trajectory's states under pressure or weight, or those at some pressures; rest is left out."""
+    states = [state for state in trajectory.states if state.loaded]
     if pressures_MPa is None:
         return states
     return [s for s in states if np.isclose(s.pressure_MPa, pressures_MPa, rtol=1e-9).any()]
@@ -78,13 +78,13 @@ def loaded(trajectory: Trajectory, pressures_MPa: Array | None = None) -> list[S
 def telling_pressures(trajectory: Trajectory) -> Array:
     """Three of a trajectory's pressures in MPa that stand for all: the extremes, and one between.
 
-    Over the grasp protocol J_hat by `polynomials` through these was within 0.4 % of that with each
-    pressure solved for.
+    And none, where the unit's weight makes it deviate there, too. Over the grasp protocol J_hat by
+    `polynomials` through these was within 0.4 % of that with each pressure solved for.
     """
     pressures = np.array([state.pressure_MPa for state in loaded(trajectory)])
     low, high = pressures.min(), pressures.max()
     middle = pressures[np.argmin(np.abs(pressures - (low + 2 * high) / 3))]
-    return np.unique([low, middle, high])
+    return np.unique([low, middle, high, *pressures[pressures == 0]])
 
 
 @attrs.frozen(eq=False)
@@ -166,7 +166,7 @@ def mean_deviation(gradients: Array, moved: Array, weights: Array) -> Array:
 def shares_of_time(trajectory: Trajectory) -> Array:
     """Share (s,) of the instants at which each loaded state holds."""
     count = np.bincount(trajectory.index, minlength=len(trajectory.states)) / len(trajectory.index)
-    return count[[bool(state.pressure_MPa) for state in trajectory.states]]
+    return count[[state.loaded for state in trajectory.states]]
 
 
 def gradients_of(trajectory: Trajectory, points: Array, monitor: Probe, stations: int) -> Array:

@@ -10,27 +10,34 @@ import numpy as np
 Array = np.ndarray[Any, Any]
 
 
-def rounds(pressure: Array) -> list[list[int]]:
+def rounds(pressure: Array, weighs: bool = False) -> list[list[int]]:
     """In which order to solve distinct pressures (s,): two at a time, the extremes first.
 
-    Each later pressure is the one farthest from those before it and from 0, where nothing deviates.
+    Each later pressure is the one farthest from those before it and from 0, where nothing deviates. Where
+    the unit weighs something, it deviates there, too: 0, if it is met, is then solved beside the extremes.
     """
     pressure = np.asarray(pressure, float)
-    left = [i for i, p in enumerate(pressure) if p]
+    left = [i for i, p in enumerate(pressure) if p or weighs]
     order = [i for i in (int(np.argmin(pressure)), int(np.argmax(pressure))) if i in left]
-    order = list(dict.fromkeys(order))
+    still = [i for i in left if not pressure[i]]
+    order = list(dict.fromkeys(still + order))
     while len(order) < len(left):
         known = np.append(pressure[order], 0.0)
         rest = [i for i in left if i not in order]
         order.append(rest[int(np.argmax([np.abs(pressure[i] - known).min() for i in rest]))])
-    return [order[i : i + 2] for i in range(0, len(order), 2)]
+    first = 2 + len(still)
+    return [order[:first], *(order[i : i + 2] for i in range(first, len(order), 2))]
 
 
 def polynomials(known: Array, wanted: Array) -> Array:
-    """Weights (t, s) of values known at s pressures, and 0 at none, in their polynomial at t others."""
+    """Weights (t, s) of values known at s pressures in their polynomial at t others.
+
+    It is 0 at no pressure, unless the value there is among the known ones.
+    """
     weights = np.empty((len(wanted), len(known)))
+    vanishes = [] if (np.asarray(known) == 0).any() else [0.0]
     for i, here in enumerate(known):
-        others = np.append(0.0, np.delete(known, i))
+        others = np.append(vanishes, np.delete(known, i))
         weights[:, i] = np.prod((np.asarray(wanted)[:, None] - others) / (here - others), axis=1)
     return weights
 
@@ -38,10 +45,10 @@ def polynomials(known: Array, wanted: Array) -> Array:
 def between(pressure: Array, known: Mapping[int, Array]) -> Array:
     """Differences (s, ...) at all pressures (s,) of those known at some, by number.
 
-    The polynomial through them and through 0 at 0 pressure; what is known stays as it is.
+    Their polynomial, see `polynomials`; what is known stays as it is.
     """
     pressure = np.asarray(pressure, float)
-    numbers = [i for i in known if pressure[i]]
+    numbers = list(known)
     values = np.array([known[i] for i in numbers])
     found: Array = np.tensordot(polynomials(pressure[numbers], pressure), values, axes=1)
     for i, value in known.items():

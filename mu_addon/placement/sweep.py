@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..fem.equilibrium import State, rest
+from ..fem.descent import NewtonSettings
+from ..fem.equilibrium import State
 from ..fem.kinematics import Probe
 from ..fem.laws import NeoHooke
 from ..fem.lockstep import Lockstep, Variant
@@ -23,7 +24,7 @@ class Sweep:
     """Many sensors in one unit: where each moves the monitored points at a state of Model A.
 
     shares: the part (m,) of every element that each sensor fills (see inclusion.sensor_share).
-    monitored: points (p, 3) in mm of the backbone and their probe.
+    monitored: points (p, 3) in mm of the backbone and their probe. settings: of Newton's method.
     """
 
     def __init__(
@@ -33,20 +34,20 @@ class Sweep:
         monitored: tuple[Array, Probe],
         shares: Sequence[Array],
         sensor_MPa: float,
+        settings: NewtonSettings | None = None,
     ) -> None:
         _, poisson = materials.small_strain(len(model.mesh.tets))
         stiff = NeoHooke.parameters(np.full(len(poisson), sensor_MPa), poisson)
         self._points, self._probe = monitored
-        self._lockstep = Lockstep(model, materials, [Variant(s, NeoHooke, stiff) for s in shares])
+        self._lockstep = Lockstep(model, materials, [Variant(s, NeoHooke, stiff) for s in shares], settings)
 
     def alone(self, number: int, pressures_MPa: Array) -> Array:
         """Monitored points (s, p, 3) in mm of one sensor's unit along its whole path through some pressures.
 
-        They are visited in order from rest. Raises ConvergenceError.
+        They are visited in order from the state without pressure. Raises ConvergenceError.
         """
         equilibrium = self._lockstep.alone(number)
-        states = equilibrium.path(pressures_MPa, rest(equilibrium.model.mesh))
-        return self.points(states)
+        return self.points(equilibrium.path(pressures_MPa, equilibrium.unpressed()))
 
     def marched(self, number: int, time_s: Array, pressure_kPa: Array) -> Array:
         """Monitored points (k, p, 3) in mm of one sensor's unit at k instants, beside the model's obstacles.

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..errors import InputError
 from ..fem.kinematics import probe
-from ..fem.model import Model
 from ..files import write_csv
 from ..placement.candidates import Candidate
 from ..placement.graph import Graph, lattice_graph
@@ -46,7 +45,7 @@ def sensitivity_map(study: Study) -> Array:
     assert study.mesh is not None
     assert study.trajectory is not None
     with study.progress.stage("map"):
-        model = Model(study.mesh)
+        model = study.job.model(study.mesh)
         monitor = probe(study.mesh, study.anchors)
         materials = study.job.materials(study.mesh)
         chosen = telling_pressures(study.trajectory)
@@ -155,7 +154,7 @@ def _predicted(study: Study, graph: Graph, chains: list[tuple[int, ...]], rule: 
     assert study.mesh is not None
     assert study.trajectory is not None
     unit = study.job.unit
-    model = Model(study.mesh)
+    model = study.job.model(study.mesh)
     monitor = probe(study.mesh, study.anchors)
     found = response(
         model,

@@ -14,6 +14,7 @@ from ..design.parameters import Unit, read_unit, to_toml
 from ..design.rigid_body import RigidBody, mirrored, read_rigid_bodies, to_obj
 from ..design.solid import QUALITY
 from ..errors import InputError
+from ..fem.obstacle import CONTACT
 from ..fem.protocol import Protocol, read_protocol
 from ..fem.unit import materials_of
 from ..homogenize.effective import Effective, read_effective
@@ -21,11 +22,15 @@ from ..meshing.settings import MeshSettings
 from ..placement.graph import Limits
 from ..placement.inclusion import RULES
 from ..sensing.optics import Optics
+from .contact import obstacles_of
+from .static_effects import StaticEffects
 from .study_file import FILES, NAME, STAGES, Tables, compose, digest, holds
 from .study_file import read as read_tables
 
 if TYPE_CHECKING:
+    from ..fem.descent import NewtonSettings
     from ..fem.materials import Materials
+    from ..fem.model import Model
     from ..meshing.mesh import Mesh
 
 GRASP = "protocols/grasp.csv"
@@ -75,6 +80,8 @@ class Job:
     body: Body | None = None
     # Rigid bodies that the unit may touch, fixed in its frame.
     obstacles: tuple[RigidBody, ...] = attrs.field(default=(), converter=tuple)
+    # What measured data named beside what the unit has parameters for, and the direction of gravity.
+    effects: StaticEffects = attrs.field(factory=StaticEffects)
     # What is run of it: the first, the first two or all.
     stages: tuple[str, ...] = STAGES
 
@@ -83,6 +90,12 @@ class Job:
             raise InputError(
                 "the search of the whole lattice knows a unit that touches nothing",
                 "obstacles, paths",
+                "leave one of them out",
+            )
+        if "clogged_chamber" in self.effects.values and "place" in self.stages and self.paths == "graph":
+            raise InputError(
+                "the search of the whole lattice knows a unit whose chambers share one pressure",
+                "clogged_chamber, paths",
                 "leave one of them out",
             )
         _, pressure = self.protocol.sample(self.times)
@@ -108,7 +121,8 @@ class Job:
             | _named("lattice", self.lattice_text())
             | _named("obstacles", self.obstacles_text())
             | ({"friction": [o.friction for o in self.obstacles]} if self.obstacles else {})
-            | {"mesh": mesh},
+            | {"mesh": mesh}
+            | self.effects.tables,
             "place": {
                 "stations": self.stations,
                 "rules": list(self.rules),
@@ -127,8 +141,21 @@ class Job:
         return compose(self.tables())
 
     def materials(self, mesh: Mesh) -> Materials:
-        """Materials of the unit's mesh."""
-        return materials_of(self.unit, mesh, None if self.lattice is None else self.lattice.law)
+        """Materials of the unit's mesh, effects and all."""
+        drawn = materials_of(self.unit, mesh, None if self.lattice is None else self.lattice.law)
+        return self.effects.materials(drawn, mesh)
+
+    def model(self, mesh: Mesh, threads: int = 2) -> Model:
+        """Model of the unit's mesh: pressure, what weighs, what it may touch. Raises InputError."""
+        model = self.effects.model(self.unit, mesh, threads)
+        if self.obstacles:
+            model.obstacles = obstacles_of(self.obstacles, self.unit, mesh)
+        return model
+
+    @property
+    def newton(self) -> NewtonSettings:
+        """Settings of Newton's method for this unit."""
+        return CONTACT if self.obstacles else self.effects.newton
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; study.toml is the first."""
@@ -238,6 +265,9 @@ def job_with(tables: Mapping[str, Mapping[str, Any]], where: str, **given: Any) 
     for stage, table in tables.items():
         own = (*FILES, *OF_FILES)
         values = {k: v for k, v in table.items() if k not in own and not k.endswith("_sha256")}
+        if stage == "simulate" and ("effects" in values or "orientation_deg" in values):
+            named, turn = values.pop("effects", {}), values.pop("orientation_deg", 0.0)
+            job["effects"] = StaticEffects(named, turn, f"{where}, [{stage}.effects]")
         for key, kind in (("mesh", MeshSettings), ("search", Limits), ("optics", Optics)):
             if key in values:
                 inner = _inner(values.pop(key), f"{where}, [{stage}.{key}]")

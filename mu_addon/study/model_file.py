@@ -1,4 +1,4 @@
-"""A unit as an extended model has it: what model.toml says is wrong, put into the unit's parameters."""
+"""A unit as an extended model has it: what model.toml says is wrong, put into parameters and mechanics."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from ..evidence.unit_effects import EFFECTS, Body
 from ..homogenize.effective import Effective
 from ..meshing.settings import MeshSettings
 from .diagnosing import spoken
+from .static_effects import NAMES, StaticEffects
 
 Values = Mapping[str, Fitted]
 # A unit with a value in it, and what changed in words.
@@ -29,15 +30,34 @@ _SAID = {
     "skin_cure": "a skin of {:.3g} mm times the excess of its modulus over the core's",
     "wall_thickness": "walls are {:.3g} times as thick as drawn",
 }
+# Effects that a simulation is told of otherwise.
+_ELSEWHERE = {
+    "contact": "what a unit touches is given with --obstacle",
+    "mesh_error": "a finer mesh is made with --refine",
+}
+_NOWHERE = "it is of time, gauge or bench, and a quasi-static simulation of the unit has neither"
 
 
 @attrs.frozen
 class Extended:
-    """A unit with an extended model in it; applied, left_out: in words, what of the model is in it."""
+    """A unit with an extended model in it; applied, left_out: in words, what of the model is in it.
+
+    effects: what of it is no parameter of a unit and belongs into a simulation of one. kept: the model with
+    these effects alone.
+    """
 
     unit: Unit
     applied: tuple[str, ...]
     left_out: tuple[str, ...]
+    effects: StaticEffects
+    kept: ExtendedModel
+
+    def of_parameters(self) -> Extended:
+        """As far as the unit's parameters go, for what simulates no whole unit."""
+        said = self.effects.words()
+        whole = tuple(f"{words}: only `simulate` and `place` know the unit as a whole" for words in said)
+        applied = tuple(words for words in self.applied if words not in said)
+        return attrs.evolve(self, applied=applied, left_out=(*self.left_out, *whole), effects=StaticEffects())
 
 
 def read_extended(unit: Unit, path: str | Path) -> Extended:
@@ -46,20 +66,24 @@ def read_extended(unit: Unit, path: str | Path) -> Extended:
 
 
 def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Extended:
-    """The unit as a model has it. Raises InputError where the unit breaks a rule with it.
+    """The unit as a model has it. Raises InputError where the unit breaks a rule, or an effect its bounds.
 
     overcure moves the print's surfaces, skin_cure gives it a skin, wall_thickness changes its wall, and
     moduli that were fitted take the place of the unit's. A fitted modulus of the lattice is of the lattice as
-    drawn at 1.0x, so the unit gets that of its own scale.
+    drawn at 1.0x, so the unit gets that of its own scale. Effects that no parameter of a unit stands for, and
+    that are as static as a simulation of it, are for that, see `StaticEffects`.
     """
     applied: list[str] = []
     left_out: list[str] = []
+    static = {name: values for name, values in model.effects.items() if name in NAMES}
     for name, values in model.effects.items():
+        if name in static:
+            continue
         effect = EFFECTS.get(name)
         known = effect is not None and tuple(values) == (effect.parameter.name,)
         put = _of_effect(name) if known and name in _SAID else None
         if put is None:
-            left_out.append(f"{spoken(name)} ({_said(values)}) has no counterpart in a unit")
+            left_out.append(f"{spoken(name)} ({_said(values)}): {_ELSEWHERE.get(name, _NOWHERE)}")
             continue
         for p, fitted in values.items():
             unit, words = _put(unit, origin, f"{name}.{p}", fitted, put)
@@ -73,11 +97,15 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
             applied.append(words)
         else:
             left_out.append(f"{spoken(name)} ({fitted.value:.4g}) is of the bench, not of the unit")
+    named = {name: {p: fitted.value for p, fitted in values.items()} for name, values in static.items()}
+    effects = StaticEffects(named, where=f"{origin}, [effect]")
+    applied += effects.words()
     if model.verdict == "ambiguous" and applied:
         left_out.insert(0, "the verdict is ambiguous: other effects fit these data as well, see its report")
     if model.verdict == "unexplained":
         left_out.insert(0, "the verdict is unexplained: no effect is in the model, though something is wrong")
-    return Extended(unit, tuple(applied), tuple(left_out))
+    kept = ExtendedModel(model.verdict, {n: v for n, v in static.items() if n in effects.values}, {})
+    return Extended(unit, tuple(applied), tuple(left_out), effects, kept)
 
 
 def require_same_print(unit: Unit, lattice: Effective, origin: str | Path) -> None:

@@ -23,11 +23,9 @@ from ..placement.candidates import Candidate, roi
 from ..placement.inclusion import sensor_share
 from ..placement.sweep import Sweep
 from ..processes import ctrl_c_ignored, end_with_parent, one_thread_each
-from .contact import obstacles_of
 
 if TYPE_CHECKING:
-    from ..design.parameters import Unit
-    from ..design.rigid_body import RigidBody
+    from .job import Job
 
 Array = np.ndarray[Any, Any]
 
@@ -37,8 +35,8 @@ class Setting:
     """What a sweep is about; plain data, so that it travels to another process.
 
     jobs: candidates and the inclusion rule of each; anchors (p, 3) in mm are the monitored points. whole:
-    the jobs, by number, whose displacement of the whole mesh is wanted, too. beside: the unit, and the rigid
-    bodies that it may touch.
+    the jobs, by number, whose displacement of the whole mesh is wanted, too. study: whose unit it is, with
+    its effects and obstacles; without it nothing but pressure acts.
     """
 
     mesh: Mesh
@@ -48,7 +46,7 @@ class Setting:
     radius_mm: float
     sensor_MPa: float
     whole: tuple[int, ...] = ()
-    beside: tuple[Unit, tuple[RigidBody, ...]] | None = None
+    study: Job | None = None
 
 
 class Moved(NamedTuple):
@@ -69,11 +67,9 @@ class Evaluator:
         found = {c.name: roi(s.mesh, c, s.radius_mm) for c, _ in s.jobs}
         shares = [sensor_share(rule, found[c.name]) for c, rule in s.jobs]
         monitored = s.anchors, probe(s.mesh, s.anchors)
-        model = Model(s.mesh, threads=threads)
-        if s.beside is not None:
-            unit, bodies = s.beside
-            model.obstacles = obstacles_of(bodies, unit, s.mesh)
-        self._sweep = Sweep(model, s.materials, monitored, shares, s.sensor_MPa)
+        model = Model(s.mesh, threads=threads) if s.study is None else s.study.model(s.mesh, threads)
+        newton = None if s.study is None else s.study.effects.newton
+        self._sweep = Sweep(model, s.materials, monitored, shares, s.sensor_MPa, newton)
         self._whole = s.whole
 
     def __call__(self, state: State) -> Moved:

@@ -51,10 +51,12 @@ def _signals(study: Study, optics: Optics) -> Signals:
     with study.progress.stage("light", expected_s=10.0):
         law = _law(study, optics)
         states = study.trajectory.states
-        # Rest comes first, whether or not a sample meets it.
-        angle = np.array([0.0, *(bending_angle_deg(study.mesh, s.u) for s in states)])
+        # What no pressure acts on comes first, whether or not a sample meets it.
+        still = next((s.u for s in states if not s.pressure_MPa), np.zeros_like(study.mesh.nodes))
+        displacements = [still, *(s.u for s in states)]
+        angle = np.array([bending_angle_deg(study.mesh, u) for u in displacements])
         joints = Joints.of(study.mesh, study.anchors, unit.dimensions.cell)
-        moved = [joints.moved(u) for u in (np.zeros_like(study.mesh.nodes), *(s.u for s in states))]
+        moved = [joints.moved(u) for u in displacements]
         bars = _bars(study)
         own = {name: [(at[i], turned[i]) for at, turned in moved] for name, (i, _) in bars.items()}
         found = {name: signal_of_nodes(law, bar, own[name]) for name, (_, bar) in bars.items()}

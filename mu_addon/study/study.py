@@ -18,15 +18,13 @@ from ..design.solid import Solid, build_solid
 from ..design.strut_cell import strut_cell
 from ..errors import ConvergenceError, MeshingError
 from ..fem.contact import first_contact
-from ..fem.descent import NewtonSettings
 from ..fem.equilibrium import Equilibrium, State, rest
 from ..fem.kinematics import bending_angle_deg
 from ..fem.lattice_law import deformation_gradients, stretches
 from ..fem.marching import Instant, march
 from ..fem.model import Model
-from ..fem.obstacle import CONTACT
 from ..fem.obstacle import Contact as Touch
-from ..fem.trajectory import Trajectory, branches, simulate
+from ..fem.trajectory import Trajectory, simulate
 from ..files import write_csv, write_npz
 from ..homogenize.foam_response import ellipticity
 from ..meshing.mesh import LATTICE, Mesh
@@ -37,7 +35,7 @@ from ..placement.candidates import Candidate, Evaluation, candidates
 from ..placement.deviation import rank
 from .cache import Cache, key
 from .contact import COLUMNS as CONTACT_COLUMNS
-from .contact import ContactHistory, history, obstacles_of
+from .contact import ContactHistory, history
 from .ending import Ending
 from .folder import begin, keep_inputs, require_space
 from .job import Job
@@ -136,6 +134,8 @@ class Study:
         if job.lattice is not None:
             summary["study"]["lattice"] = attrs.asdict(job.lattice)
             self._warn_of_another_cell()
+        if job.effects:
+            summary["study"] |= job.effects.tables
         self._warn_of_missed_corners()
         if job.mesh.order == 1:
             self.warn("Linear elements lock in thin walls: these answers are for a quick look only.")
@@ -236,7 +236,7 @@ class Study:
         assert self.mesh is not None
         time, pressure = self.job.protocol.sample(self.job.times)
         with self.progress.stage("Model A"):
-            model = Model(self.mesh)
+            model = self.job.model(self.mesh)
             if candidates_beside and self.job.workers > 1 and not self.job.obstacles:
                 self._ahead = Sweep(
                     self.job, self.cache, self.mesh, self._jobs(), pressure, self.headline_rule
@@ -253,7 +253,7 @@ class Study:
             write_model_a(self.folder, self.mesh, self.job.materials(self.mesh), self.trajectory)
             self._look_for_contact(self.trajectory.states)
             self._look_beyond_the_fit(self.trajectory.states)
-        states = [s for s in self.trajectory.states if s.pressure_MPa]
+        states = [s for s in self.trajectory.states if s.loaded]
         self.solver = {
             "unknowns": len(model.free),
             "states": len(states),
@@ -276,8 +276,8 @@ class Study:
             return self._touching(model, time, pressure, on_state)
         # A state's last digits depend on the pressures visited before it.
         visited = np.unique(pressure)
-        name = key(model.mesh.hash(), materials.hash(), visited, NewtonSettings())
-        total = len(branches(pressure)[0])
+        name = key(model.mesh.hash(), materials.hash(), visited, self.job.newton, *self.job.effects.parts)
+        total = len(np.union1d(visited, 0.0))
         done = 0
 
         def keep(state: State) -> None:
@@ -289,7 +289,7 @@ class Study:
             on_state(state)
 
         return simulate(
-            Equilibrium(model, materials),
+            Equilibrium(model, materials, self.job.newton),
             time,
             pressure,
             keep,
@@ -302,10 +302,16 @@ class Study:
     def _touching(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
         """Model A beside obstacles: instant by instant, since friction remembers, from the cache likewise."""
         job, materials = self.job, self.job.materials(model.mesh)
-        model.obstacles = obstacles_of(job.obstacles, job.unit, model.mesh)
         parts = [(o.depth_mm, o.stiffness, o.stick_stiffness, o.friction) for o in model.obstacles]
         name = key(
-            model.mesh.hash(), materials.hash(), time, pressure, CONTACT, job.obstacles_text() or "", parts
+            model.mesh.hash(),
+            materials.hash(),
+            time,
+            pressure,
+            job.newton,
+            job.obstacles_text() or "",
+            parts,
+            *job.effects.parts,
         )
         found: list[list[Touch]] = []
 
@@ -318,7 +324,7 @@ class Study:
             on_state(state)
 
         motion = march(
-            Equilibrium(model, materials, CONTACT),
+            Equilibrium(model, materials, job.newton),
             time,
             pressure,
             keep,
@@ -403,7 +409,8 @@ class Study:
             outward = sorted(
                 (s for s in states if s.pressure_MPa * sign > 0), key=lambda s: abs(s.pressure_MPa)
             )
-            contact = first_contact(self.mesh, [rest(self.mesh), *outward])
+            still = [s for s in states if s.loaded and not s.pressure_MPa]
+            contact = first_contact(self.mesh, [rest(self.mesh), *still, *outward])
             if contact is None:
                 continue
             pressure = f"{contact.pressure_MPa * 1e3:.4g}"
@@ -458,7 +465,7 @@ class Study:
     def _keep_partial_motion(self) -> None:
         """What was found before a failure is kept; summary.json says that it is partial."""
         if self.mesh is not None and self.states:
-            start = [] if self.job.obstacles else [rest(self.mesh)]
+            start = [] if self.job.obstacles or self.job.effects.weighs else [rest(self.mesh)]
             self._write_motion([*start, *self.states])
 
     def _jobs(self) -> list[tuple[Candidate, str]]:
@@ -534,7 +541,7 @@ class Study:
             instants = list(range(len(time)))
         with self.progress.stage("mesh check"):
             mesh = self._mesh(coarse)
-            model = Model(mesh)
+            model = self.job.model(mesh)
             trajectory = self._model_a(model, time, chosen, lambda _: None)
             ratio: dict[str, list[float]] = {rule: [] for rule in self.job.rules}
             for found in self.sweep(mesh, trajectory, jobs):

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ..design.anchors import anchors
-from ..fem.descent import NewtonSettings
 from ..fem.equilibrium import State
 from ..fem.kinematics import probe
 from ..fem.trajectory import Trajectory
@@ -51,25 +50,29 @@ class Sweep:
         materials = job.materials(mesh)
         self._whole = tuple(i for i, (_, rule) in enumerate(jobs) if rule == whole)
         self._sweeper = Sweeper(
-            Setting(mesh, materials, self._anchors, tuple(jobs), self._radius, sensor, self._whole),
+            Setting(mesh, materials, self._anchors, tuple(jobs), self._radius, sensor, self._whole, job),
             job.workers,
         )
         self._key = key(
             mesh.hash(),
             materials.hash(),
             pressure_kPa,
-            NewtonSettings(),
+            job.newton,
             self._anchors,
             *(part for candidate, rule in jobs for part in (candidate.points, rule)),
             self._radius,
             sensor,
+            *job.effects.parts,
         )
         distinct = np.unique(pressure_kPa) / 1e3
         # What is solved whatever comes of it; the rest only where these do not tell enough.
-        self._certain = {float(distinct[i]) for pair in rounds(distinct)[:2] for i in pair}
+        self._certain = {float(distinct[i]) for pair in self._rounds(distinct)[:2] for i in pair}
         self.solved_kPa: list[float] = []
         self.error = 0.0
         self.path_difference_mm = 0.0
+
+    def _rounds(self, distinct: Array) -> list[list[int]]:
+        return rounds(distinct, self._job.effects.weighs)
 
     def _name(self, state: State) -> str:
         return key(self._key, state.pressure_MPa)
@@ -94,12 +97,13 @@ class Sweep:
         that lead elsewhere.
         """
         distinct = np.array([s.pressure_MPa for s in trajectory.states])
-        loaded = np.count_nonzero(distinct)
+        order = self._rounds(distinct)
+        loaded = sum(map(len, order))
         weight = np.bincount(trajectory.index, minlength=len(distinct))
         monitor = probe(self._mesh, self._anchors)
         still = np.array([self._anchors + monitor.displacement(s.u) for s in trajectory.states])
         known: dict[int, Array] = {}
-        for pair in rounds(distinct):
+        for pair in order:
             for number, points in self._solved(trajectory, pair):
                 known[number] = points - still[number]
                 on_progress(len(known) / loaded)
@@ -111,7 +115,7 @@ class Sweep:
             if self.error <= SAMPLING_ERROR:
                 break
         if verify and known and not self._independent_of_path(distinct, known, still):
-            known = self._along_paths(distinct, still)
+            known = self._along_paths(distinct, still, known)
         self.solved_kPa = sorted(float(distinct[n]) * 1e3 for n in known)
         difference = between(distinct, known) if known else np.zeros((len(distinct), len(self._jobs), 1, 3))
         baseline = trajectory.of_time(still)
@@ -131,7 +135,7 @@ class Sweep:
         if kept is not None:
             self.path_difference_mm = float(kept["difference_mm"])
             return self.path_difference_mm <= PATH_DIFFERENCE_MM
-        numbers = list(known)
+        numbers = [n for n in known if distinct[n]]
         size = np.array([np.linalg.norm(known[n], axis=2).max(axis=1) for n in numbers])
         state, job = np.unravel_index(size.argmax(), size.shape)
         number = numbers[int(state)]
@@ -141,13 +145,17 @@ class Sweep:
         self._cache.put("path", self._key, {"difference_mm": self.path_difference_mm})
         return self.path_difference_mm <= PATH_DIFFERENCE_MM
 
-    def _along_paths(self, distinct: Array, still: Array) -> dict[int, Array]:
-        """Differences (jobs, p, 3) in mm at every loaded pressure, each job along its whole path."""
+    def _along_paths(self, distinct: Array, still: Array, before: dict[int, Array]) -> dict[int, Array]:
+        """Differences (jobs, p, 3) in mm at every pressure but 0, each job along its whole path.
+
+        At 0, where weight alone acts and every path begins, they stay as they were found before.
+        """
         sides = [_outward(distinct, p) for p in (distinct.min(), distinct.max())]
         sides = [side for side in sides if len(side)]
         tasks = [(job, distinct[side]) for job in range(len(self._jobs)) for side in sides]
         moved = iter(self._sweeper.alone(tasks))
         known = {int(n): np.zeros((len(self._jobs), *still.shape[1:])) for side in sides for n in side}
+        known |= {n: values for n, values in before.items() if not distinct[n]}
         for job in range(len(self._jobs)):
             for side in sides:
                 for n, points in zip(side.tolist(), next(moved), strict=True):

@@ -39,8 +39,7 @@ def evaluations(
     points, radius = anchors(unit), unit.dimensions.inclusion_radius
     sensor = unit.material.sensor_modulus_kPa / 1e3
     time, pressure = trajectory.time_s, trajectory.pressure_kPa
-    beside = unit, job.obstacles
-    setting = Setting(mesh, materials, points, tuple(jobs), radius, sensor, beside=beside)
+    setting = Setting(mesh, materials, points, tuple(jobs), radius, sensor, study=job)
     contact = CONTACT, PRESSURE_MPa, DEPTH_mm, HALVINGS, [o.friction for o in job.obstacles]
     names = [
         key(
@@ -55,6 +54,7 @@ def evaluations(
             rule,
             radius,
             sensor,
+            *job.effects.parts,
         )
         for candidate, rule in jobs
     ]

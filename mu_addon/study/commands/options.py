@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ...design.parameters import Unit
     from ..ending import Ending
+    from ..model_file import Extended
     from ..progress import Progress
+    from ..static_effects import StaticEffects
 
 Commands = argparse._SubParsersAction  # what add_subparsers returns; argparse gives it no public name
 
@@ -31,6 +33,18 @@ def add_model(command: argparse.ArgumentParser) -> None:
     """--model, what a diagnosis found."""
     command.add_argument(
         "--model", metavar="FILE", help="model.toml of `diagnose`: what it found is put into the unit"
+    )
+
+
+def add_orientation(command: argparse.ArgumentParser) -> None:
+    """--orientation, of what weighs."""
+    command.add_argument(
+        "--orientation",
+        type=float,
+        default=0.0,
+        metavar="DEG",
+        help="direction of gravity about x, as in measured data: 0 hangs, tip down (0). Of use where what "
+        "--model gives has weight",
     )
 
 
@@ -62,15 +76,41 @@ def unit_if_named(options: argparse.Namespace) -> Unit | None:
     return None if options.preset is None and options.unit is None else unit_of(options)
 
 
-def modelled_unit(options: argparse.Namespace, progress: Progress, ending: Ending) -> Unit:
-    """The unit, with what the extended model of --model adds to it; what it cannot take is warned of."""
+def modelled(options: argparse.Namespace, progress: Progress, ending: Ending) -> tuple[Unit, StaticEffects]:
+    """The unit with what the extended model of --model adds to it, and effects beyond a unit's parameters.
+
+    What no simulation of a unit can take is warned of.
+    """
+    import attrs
+
+    from ..static_effects import StaticEffects
+
     unit = unit_of(options)
-    if getattr(options, "model", None) is None:
+    turn = options.orientation
+    effects = StaticEffects(orientation_deg=turn, where="--orientation")
+    if options.model is not None:
+        from ..model_file import read_extended
+
+        found = _told(read_extended(unit, options.model), options, progress, ending)
+        unit, effects = found.unit, attrs.evolve(found.effects, orientation_deg=turn)
+    if turn and not effects.weighs:
+        progress.warning("nothing here has weight, so that its direction changes nothing", "--orientation")
+    return unit, effects
+
+
+def modelled_unit(options: argparse.Namespace, progress: Progress, ending: Ending) -> Unit:
+    """The unit, with what the model of --model adds to its parameters; what else that has is warned of."""
+    unit = unit_of(options)
+    if options.model is None:
         return unit
     from ..model_file import read_extended
 
-    found = read_extended(unit, options.model)
+    found = read_extended(unit, options.model).of_parameters()
+    return _told(found, options, progress, ending).unit
+
+
+def _told(found: Extended, options: argparse.Namespace, progress: Progress, ending: Ending) -> Extended:
     for words in found.left_out:
         progress.warning(f"not applied here: {words}", str(options.model))
     ending.summary["model"] = {"applied": found.applied, "left_out": found.left_out}
-    return found.unit
+    return found

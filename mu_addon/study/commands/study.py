@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import modelled_unit
+from .options import modelled, unit_of
 
 if TYPE_CHECKING:
     from ...design.anchors import Window
@@ -115,10 +115,13 @@ def _open(options: argparse.Namespace, progress: Progress, ending: Ending) -> St
     from ..model_file import require_same_print
     from ..study import Study
 
-    unit = modelled_unit(options, progress, ending)
     extra: dict[str, Any] = {}
-    if "simulate" in options.stages:
+    if "simulate" not in options.stages:
+        unit = unit_of(options)
+    else:
+        unit, effects = modelled(options, progress, ending)
         extra = {
+            "effects": effects,
             "mesh": MeshSettings(order=options.order, refine=options.refine),
             "times": options.times,
             "mesher": options.mesher,
