@@ -11,6 +11,7 @@ import numpy as np
 
 from ..design.parameters import SECTIONS, assumed
 from ..design.quantity import describe
+from ..evidence.unit_effects import EFFECTS
 from ..fem.kinematics import bending_angle_deg
 from ..files import write_bytes
 from .job import LATTICE_LAW
@@ -18,6 +19,7 @@ from .results import Gate, Parameter, Path, Picture, ReportData, RuleResult, Sid
 
 if TYPE_CHECKING:
     from ..homogenize.effective import Effective
+    from .static_effects import StaticEffects
     from .study import Study
 
 PACKAGES = ("numpy", "scipy", "warp-lang", "cvxopt", "pymetis", "manifold3d", "gmsh", "pytetwild", "meshio")
@@ -114,6 +116,7 @@ def report_data(
         search_picture=search_picture,
         light=study.light,
         contact=study.contact,
+        effects=tuple(_effect_words(job.effects)),
         pressure_kPa=np.array([s.pressure_MPa * 1e3 for s in states]),
         angle_deg=np.array([bending_angle_deg(study.mesh, s.u) for s in states if study.mesh]),
         protocol_s=time if states else np.zeros(0),
@@ -162,6 +165,7 @@ def _parameters(study: Study) -> list[Parameter]:
                 continue
             rows.append(Parameter(path, value, d.unit, reasons.get(path, d.source), d.assumed))
     rows += _lattice_parameters(study.job.lattice)
+    rows += _effects(study.job.effects)
     m, k, j = study.job.mesh, study.job.times, study.job.stations
     rows += [
         Parameter("study.times", k, "", "samples of the protocol; the paper prints none", True),
@@ -172,6 +176,29 @@ def _parameters(study: Study) -> list[Parameter]:
             "protocol", "protocol.csv", "", "between the paper's pressures, times are not printed", True
         ),
     ]
+    return rows
+
+
+def _effect_words(effects: StaticEffects) -> list[str]:
+    """What acts on the unit besides, in words."""
+    turned = (
+        [f"gravity turned {effects.orientation_deg:g}° about x, 0 being the tip down"]
+        if effects.weighs
+        else []
+    )
+    return [*effects.words(), *turned]
+
+
+def _effects(effects: StaticEffects) -> list[Parameter]:
+    """Size of every effect beside the unit's parameters, and the direction of gravity where it matters."""
+    rows = [
+        Parameter(f"effects.{name}.{p}", value, EFFECTS[name].parameter.unit, f"the model given: {words}")
+        for (name, given), words in zip(effects.values.items(), effects.words(), strict=True)
+        for p, value in given.items()
+    ]
+    if effects.weighs:
+        turned = Parameter("orientation", effects.orientation_deg, "deg", "asked for: 0 hangs, tip down")
+        rows.append(turned)
     return rows
 
 

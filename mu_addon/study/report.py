@@ -301,6 +301,8 @@ def _motion(r: ReportData) -> str:
             "Pressure against time.",
         )
     html = f'<div class="pair">{html}</div>' if html else ""
+    if html and r.effects:
+        html = f"<p>With what measured data named: {escape('; '.join(r.effects))}.</p>{html}"
     if r.pictures[1:]:
         html += (
             '<div class="triple">' + "".join(picture_figure(picture) for picture in r.pictures[1:]) + "</div>"

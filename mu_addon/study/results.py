@@ -159,6 +159,7 @@ class ReportData:
     search_picture: Picture | None = None
     light: Signals | None = None
     contact: ContactHistory | None = None
+    effects: Sequence[str] = ()  # that measured data named and the simulation has, in words
     pressure_kPa: Floats = attrs.field(factory=lambda: np.zeros(0))  # per converged state
     angle_deg: Floats = attrs.field(factory=lambda: np.zeros(0))
     protocol_s: Floats = attrs.field(factory=lambda: np.zeros(0))
