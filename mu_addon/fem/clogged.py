@@ -39,7 +39,7 @@ class CloggedModel(Model):
             raise InputError(
                 f"no cavity is cut at z = {height_mm:g} mm", "clogged chamber", "give the height of a neck"
             )
-        self.height_mm, self.share_lost = height_mm, share_lost
+        self.share_lost = share_lost
         self._beyond = np.flatnonzero(beyond)
         self._rim = _rim(mesh, mesh.cavity[beyond])
         self._rim_nodes = np.unique(self._rim)
@@ -50,11 +50,6 @@ class CloggedModel(Model):
         self._lost_force = wp.zeros((count, k), dtype=wp.vec3d, device=self.device)
         self._pairs = k * (k + 1) // 2
         self._lost_blocks = wp.zeros(count * self._pairs, dtype=mat33, device=self.device)
-
-    def under_other_supports(self, mesh: Mesh, held: Array) -> Model:
-        """As `Model.under_other_supports`; its residual closes the neck otherwise, and is of no use."""
-        more = {"device": self.device, "threads": self.threads, "mean_dilatation": self.mean_dilatation}
-        return CloggedModel(mesh, self.height_mm, self.share_lost, held=held, **more)
 
     def potential(self, u: Array, pressure: float, m: MaterialData) -> float:
         """As `Model.potential`, with the clogged part's share of the pressure's work."""

@@ -150,13 +150,6 @@ class Model:
         self.free = np.nonzero(~fixed.ravel())[0]
         self._build_pattern(fixed)
 
-    def under_other_supports(self, mesh: Mesh, held: Array) -> Model:
-        """A model with this one's tangents on the same nodes, and its own mirror planes and supports (n, 3).
-
-        Loads and obstacles are not taken over.
-        """
-        return Model(mesh, held, self.device, self.threads, self.mean_dilatation)
-
     def _put(self, a: Array, dtype: Any) -> wp.array:
         return wp.array(np.ascontiguousarray(a), dtype=dtype, device=self.device)
 

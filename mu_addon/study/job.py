@@ -92,7 +92,7 @@ class Job:
                 "obstacles, paths",
                 "leave one of them out",
             )
-        if "clogged_chamber" in self.effects.values and "place" in self.stages and self.paths == "graph":
+        if self.effects.clogged and "place" in self.stages and self.paths == "graph":
             raise InputError(
                 "the search of the whole lattice knows a unit whose chambers share one pressure",
                 "clogged_chamber, paths",

@@ -102,6 +102,14 @@ class StaticEffects:
         return any(EFFECTS[name].weighs for name in self.values)
 
     @property
+    def clogged(self) -> bool:
+        """Whether a neck closes: the model's tangent then lacks what of the pressure the rim bears.
+
+        Newton's method only takes longer for it, but what is linear about a state comes out 14 to 26 % off.
+        """
+        return "clogged_chamber" in self.values
+
+    @property
     def tables(self) -> dict[str, Any]:
         """What study.toml has of them: nothing where there is none, no direction where nothing weighs."""
         if not self:

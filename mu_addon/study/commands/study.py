@@ -215,7 +215,12 @@ def run_stages(study: Study, path: Window | None = None) -> None:
                 "tell is known: both take a unit with one state a pressure."
             )
         else:
-            sensitivity_map(study)
+            if study.job.effects.clogged:
+                study.warn(
+                    "What each element alone would disturb is not known for a unit with a clogged neck."
+                )
+            else:
+                sensitivity_map(study)
             signals(study, study.job.optics)
         if study.job.paths == "graph":
             search_graph(study)
