@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
+from mu_addon.errors import ConvergenceError
 from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, rest
 from mu_addon.fem.loads import STANDARD_GRAVITY, gravity, traction
+from mu_addon.fem.marching import march
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
+from mu_addon.fem.trajectory import simulate
 from mu_addon.meshing.mesh import MEMBRANE, Mesh, boundary_faces
 
 from . import bodies
@@ -116,3 +119,58 @@ def test_weight_of_half_a_body_is_half_the_weight():
     whole = Mesh(nodes, tets, np.full(len(tets), MEMBRANE), np.empty((0, 6), int), [], [])
     load = gravity(whole, DENSITY, [0, 0, -1])
     np.testing.assert_allclose(load[: len(half.nodes)], gravity(half, DENSITY, [0, 0, -1]))
+
+
+def bar(load_factor, direction):
+    """A clamped bar of silicone's weight, or so many times as heavy."""
+    mesh = bodies.box((1, 1, 6), (2.0, 2.0, 30.0), order=2)
+    model = Model(mesh, held=np.repeat(mesh.nodes[:, 2:] == 0.0, 3, axis=1))
+    model.load = load_factor * gravity(mesh, DENSITY, direction)
+    return Equilibrium(model, uniform(mesh, 0.5, 0.3))
+
+
+def test_a_body_that_weighs_nothing_is_as_drawn_without_pressure():
+    body = bar(1.0, [0, -1, 0])
+    body.model.load = None
+    state = body.unpressed()
+    assert not state.loaded
+    assert state.factorisations == 0
+
+
+def test_weight_is_put_on_in_as_many_steps_as_it_takes():
+    light, heavy = bar(1.0, [0, -1, 0]), bar(60.0, [0, -1, 0])
+    with pytest.raises(ConvergenceError):
+        heavy.newton(rest(heavy.model.mesh).u, 0.0)
+    load = heavy.model.load.copy()
+    state = heavy.unpressed()
+    assert state.loaded
+    assert state.residual < 1e-9
+    np.testing.assert_array_equal(heavy.model.load, load)
+    tip = light.model.mesh.nodes[:, 2] == 30.0
+    once, sixty = (s.u[tip, 1].mean() for s in (light.unpressed(), state))
+    # Longer than it is it cannot hang.
+    assert -30.0 < sixty < 4 * once < 0
+
+
+def test_a_weight_that_is_not_borne_is_said():
+    """A column under many times the weight at which it buckles."""
+    body = bar(400.0, [0, 0, -1])
+    load = body.model.load.copy()
+    with pytest.raises(ConvergenceError, match="no equilibrium under the weight alone") as caught:
+        body.unpressed()
+    assert caught.value.remedy
+    np.testing.assert_array_equal(body.model.load, load)
+
+
+def test_motion_begins_where_the_weight_has_taken_the_body():
+    body = bar(1.0, [0, -1, 0])
+    start, seen, kept = body.unpressed(), [], {}
+    found = simulate(
+        body, np.arange(2.0), np.zeros(2), seen.append, kept.get, lambda s: kept.update({s.pressure_MPa: s})
+    )
+    np.testing.assert_array_equal(found.states[0].u, start.u)
+    assert [s.pressure_MPa for s in seen] == list(kept) == [0.0]
+    # What was kept is not solved again.
+    again = simulate(body, np.arange(2.0), np.zeros(2), load=kept.get)
+    assert again.states[0] is kept[0.0]
+    np.testing.assert_array_equal(march(body, np.arange(2.0), np.zeros(2)).states[0].u, start.u)

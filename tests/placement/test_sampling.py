@@ -21,6 +21,23 @@ def test_every_pressure_but_zero_is_met_once(values):
     assert sorted(met) == [i for i, p in enumerate(pressure) if p]
 
 
+@given(st.lists(st.floats(-50, 50).filter(lambda p: abs(p) > 1e-3), min_size=1, max_size=9, unique=True))
+def test_where_the_unit_weighs_something_no_pressure_is_solved_beside_the_extremes(values):
+    pressure = np.unique([0.0, *values])
+    order = rounds(pressure, weighs=True)
+    assert sorted(i for batch in order for i in batch) == list(range(len(pressure)))
+    met = [pressure[i] for i in order[0]]
+    assert {0.0, pressure.min(), pressure.max()} <= set(met)
+    assert len(met) <= 3
+    # What a solved set is judged by is what its last pressure adds, and that is not the weight.
+    assert met[-1] != 0
+
+
+def test_a_value_at_no_pressure_is_taken_as_it_is_known():
+    truth = np.array([np.array([0.7, -0.1]) + p * np.array([1.0, 0.2]) + p**2 * 0.01 for p in PRESSURE])
+    np.testing.assert_allclose(between(PRESSURE, {i: truth[i] for i in (0, 2, 6)}), truth, atol=1e-12)
+
+
 def test_a_polynomial_is_found_exactly_and_known_values_are_kept():
     truth = np.array([p * np.array([1.0, 0.2]) + p**2 * 0.01 - p**3 * 1e-4 for p in PRESSURE])
     known = {i: truth[i] for i in (0, 4, 6)}
