@@ -19,7 +19,7 @@ from ..errors import InputError, MuError
 from ..files import write_csv
 from ..measured import Measured, read_folder
 from ..measured.folder import FILE
-from . import studies
+from . import effects, studies
 from .properties import BESIDE_BLEND_FILE, to_unit
 
 FOLDER = "evidence"
@@ -43,7 +43,7 @@ class MU_PG_evidence(bpy.types.PropertyGroup):
         subtype="DIR_PATH",
         options=BESIDE_BLEND_FILE,
     )
-    # Model that the unit was given last, the unit before it, and what was given in words.
+    # Model that the unit was given last, the unit before it, and what it and its simulation got in words.
     applied: StringProperty(options={"HIDDEN"})
 
 
@@ -180,20 +180,31 @@ def _state(files: list[Path]) -> tuple[Any, ...]:
     return tuple(found)
 
 
-def mark_applied(root: Any, words: str) -> None:
-    """Remember, on the unit as it is before, that it gets the diagnosis's model; words: what it gets."""
-    root.mu_evidence.applied = "\n".join([_model(root), to_unit(root.mu_unit).hash(), words])
+def mark_applied(root: Any, to_unit_: str, to_simulation: str) -> None:
+    """Remember, on the unit as it is before, that it gets the diagnosis's model.
+
+    In words what its parameters get, and what its simulation gets beside them.
+    """
+    root.mu_evidence.applied = "\n".join([_model(root), _having(root), to_unit_, to_simulation])
 
 
 def applied(root: Any) -> str:
     """What of the diagnosis's model the unit has, in words, or nothing: given twice it would count twice."""
-    model, _, rest = root.mu_evidence.applied.partition("\n")
-    before, _, words = rest.partition("\n")
+    model, before, to_unit_, to_simulation = (*root.mu_evidence.applied.split("\n"), "", "", "", "")[:4]
     try:
-        now = to_unit(root.mu_unit).hash()
+        now = _having(root)
     except MuError:
         now = ""
-    return words if model and model == _model(root) and now != before else ""
+    if not model or model != _model(root) or now == before:
+        return ""
+    # What the simulation was given may have been taken from it again.
+    return "; ".join(words for words in (to_unit_, effects.asked(root) and to_simulation) if words)
+
+
+def _having(root: Any) -> str:
+    """Hash of the unit, and of the effects beside its parameters; raises InputError."""
+    text = root.mu_unit.study.effects
+    return to_unit(root.mu_unit).hash() + (hashlib.sha256(text.encode()).hexdigest() if text else "")
 
 
 def _model(root: Any) -> str:

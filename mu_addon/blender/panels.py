@@ -11,7 +11,7 @@ from ..design.parameters import SECTIONS
 from ..design.quantity import describe
 from ..study.client import CANCELLED, DONE, FAILED, RUNNING
 from ..study.progress import spell
-from . import bodies, gripper_object, simulation, studies, unit_object
+from . import bodies, effects, gripper_object, simulation, studies, unit_object
 from .operators.acting import NO_UNIT
 from .operators.path import selected_candidate
 from .operators.unit import in_millimetres
@@ -206,6 +206,7 @@ class MU_PT_simulate(OfUnit, bpy.types.Panel):
             layout.prop(study, "paths")
         layout.prop(study, "detail")
         layout.prop(study, "protocol")
+        _effects(layout, root)
         child = simulation.of(root.mu_unit.uuid)
         start(layout, child, "mu.simulate", "PLAY")
         told(layout, child, "see Results")
@@ -217,6 +218,21 @@ class MU_PT_simulate(OfUnit, bpy.types.Panel):
         if body:
             parameters(body, root.mu_unit, "simulate")
             body.prop(study, "folder")
+
+
+def _effects(layout, root) -> None:
+    """What a diagnosis named beside the unit's parameters, and the direction of gravity where it matters."""
+    lines = effects.said(root)
+    if not lines:
+        return
+    box = layout.box()
+    row = box.row()
+    row.label(text="With what was found", icon="LIGHT")
+    row.operator("mu.evidence_remove", text="", icon="X")
+    for line in lines:
+        wrapped(box, line)
+    if effects.weighs(root):
+        box.prop(root.mu_unit.study, "orientation_deg")
 
 
 def start(layout, child, operator: str, icon: str) -> None:

@@ -135,6 +135,17 @@ class MU_PG_study(bpy.types.PropertyGroup):
         subtype="FILE_PATH",
         options=BESIDE_BLEND_FILE,
     )
+    orientation_deg: FloatProperty(
+        name="Gravity (deg)",
+        description="Direction of gravity about the x axis, as in measured data: at 0 the unit hangs, its "
+        "tip down. It matters where a diagnosis named the weight",
+        min=-360.0,
+        max=360.0,
+        precision=1,
+        step=100,
+    )
+    # model.toml of the effects that a diagnosis named beside the unit's parameters, see `effects`.
+    effects: StringProperty(options={"HIDDEN"})
     folder: StringProperty(
         name="Study Folder",
         description="Folder of this unit's results. Empty: beside the .blend file, or the user's folder",

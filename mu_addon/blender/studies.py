@@ -18,7 +18,7 @@ from ..design.rigid_body import read_rigid_bodies
 from ..errors import MuError
 from ..study import study_file
 from ..study.client import ERRORS
-from . import bodies, obstacles
+from . import bodies, effects, obstacles
 from .compat import user_folder
 from .properties import to_unit
 
@@ -102,6 +102,7 @@ def findings(root: Any) -> Findings | None:
         try:
             summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
             inputs = read_unit(folder / "unit.toml").hash(), _body_hash(folder), _obstacles(folder)
+            inputs += (_effects(folder),)
             kept = times, summary if isinstance(summary, dict) else {}, inputs
         except (OSError, ValueError, MuError):
             return None
@@ -109,7 +110,8 @@ def findings(root: Any) -> Findings | None:
     try:
         unit = to_unit(root.mu_unit)
         body = bodies.envelope_in(root, unit)
-        stale = (unit.hash(), "" if body is None else body.hash, obstacles.given(root)) != kept[2]
+        own = "" if body is None else body.hash
+        stale = (unit.hash(), own, obstacles.given(root), effects.asked(root)) != kept[2]
     except MuError:
         stale = True
     return Findings(folder, str(kept[1].get("status", "")), stale, kept[1])
@@ -159,6 +161,12 @@ def _read_touches(path: Path) -> list[Touch]:
         force = np.linalg.norm([float(row[f"force_{axis}_N"]) for axis in "xyz"])
         found.setdefault(Path(row["obstacle"]).stem, []).append((float(row["time_s"]), float(force)))
     return [Touch(name, *np.array(values).T) for name, values in found.items()]
+
+
+def _effects(folder: Path) -> dict[str, Any]:
+    """Effects that a study was made with, as `effects.asked` has them; raises InputError."""
+    asked = (study_file.read(folder) or {}).get("simulate", {})
+    return {name: asked[name] for name in effects.ASKED if name in asked}
 
 
 def _obstacles(folder: Path) -> list[tuple[str, float]]:

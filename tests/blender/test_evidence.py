@@ -165,6 +165,86 @@ def clogged(tmp_path_factory):
     return root
 
 
+def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
+    """Applied, undone, saved, simulated, changed and removed; found again as what the results are of."""
+    session(
+        """
+        import json, pathlib, shutil
+        import mu_addon.blender.panels as panels
+        from mu_addon.blender import effects
+        from mu_addon.blender.properties import to_unit
+        from mu_addon.evidence.extended import ExtendedModel, Fitted
+
+        clogged, folder = pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
+        PANELS.append(panels.MU_PT_simulate)
+        shutil.copytree(clogged / "study", folder / "study")
+        bpy.context.preferences.edit.use_global_undo = True
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / "seat.blend"))
+        root = add()
+        root.mu_evidence.folder, root.mu_unit.study.folder = str(clogged / "data"), "//study"
+        study = root.mu_unit.study
+        study.command, study.detail = "simulate", "quick"
+        unit = to_unit(root.mu_unit)
+        assert effects.arguments(root, folder) == [] and "With what was found" not in drawn()
+        assert "no effects beside" in refused(bpy.ops.mu.evidence_remove)
+        bpy.ops.ed.undo_push(message="diagnosed")
+        assert bpy.ops.mu.evidence_apply() == {"FINISHED"}
+        bpy.ops.ed.undo_push(message="applied")
+        assert to_unit(root.mu_unit).chambers == unit.chambers
+        share = json.loads((folder / "study/evidence/verdict.json").read_text())
+        share = share["causes"][0]["parameters"]["share_lost"]["value"]
+        (line,) = effects.said(root)
+        assert line.startswith(f"clogged chamber, share lost {share:.4g} (") and " to " in line
+        said = drawn()
+        assert "With what was found" in said and "clogged chamber, share lost 0.5" in said, said
+        assert "The unit has it: all moduli" in said and "the last chamber lacks" in said, said
+        assert not bpy.ops.mu.evidence_apply.poll()
+        # Pressure alone knows no direction.
+        assert not effects.weighs(root) and "--orientation" not in effects.arguments(root, folder)
+
+        bpy.ops.ed.undo()
+        root = unit_object.active_root(bpy.context)
+        assert effects.asked(root) == {} and bpy.ops.mu.evidence_apply.poll()
+        bpy.ops.ed.redo()
+        bpy.ops.wm.save_mainfile()
+        bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+        (root,) = unit_object.roots()
+        asked = {"effects": {"clogged_chamber": {"share_lost": share}}}
+        assert effects.asked(root) == asked and "The unit has it" in drawn()
+
+        def simulated():
+            assert bpy.ops.mu.simulate() == {"FINISHED"}
+            child = simulation.of(root.mu_unit.uuid)
+            watch(lambda: child.state != "running")
+            assert child.state == "done", child.error
+            return studies.findings(root)
+
+        found = simulated()
+        assert not found.stale
+        assert found.summary["study"]["effects"] == asked["effects"]
+        root.mu_unit.study.orientation_deg = 90.0
+        assert not studies.findings(root).stale
+
+        # Weight has a direction, and results of another one are stale.
+        known = Fitted(1300.0, 50.0, 1200.0, 1400.0, "kg/m3")
+        effects.keep(root, ExtendedModel("named", {"gravity": {"density_kg_m3": known}}, {}).text())
+        assert studies.findings(root).stale
+        assert "gravity, density kg m3 1300 (1.2e+03 to 1.4e+03)" in drawn().replace("  ", " ")
+        level = simulated()
+        assert not level.stale and level.summary["study"]["orientation_deg"] == 90.0
+        assert dict(level.angles)[0.0] < -0.5
+        root.mu_unit.study.orientation_deg = -90.0
+        assert studies.findings(root).stale
+        assert bpy.ops.mu.evidence_remove() == {"FINISHED"}
+        assert studies.findings(root).stale and "With what was found" not in drawn()
+        assert effects.arguments(root, folder) == []
+        """,
+        tmp_path,
+        clogged,
+        tmp_path,
+    )
+
+
 MOTION = """
 import csv, math
 import numpy as np

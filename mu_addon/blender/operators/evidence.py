@@ -5,7 +5,7 @@
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from .. import evidence, evidence_motion, live, simulation, studies, unit_object
+from .. import effects, evidence, evidence_motion, live, simulation, studies, unit_object
 from ..properties import from_unit, to_unit
 from .acting import RUN_FILES, CancelsJob, DismissesJob, OnSoundUnit, OnUnit, OpensRun, telling
 
@@ -123,12 +123,38 @@ class MU_OT_evidence_apply(OnSoundUnit, bpy.types.Operator):
         if not extended.applied:
             self.report({"ERROR"}, "Nothing of the model has a counterpart in a unit")
             return {"CANCELLED"}
-        words = "; ".join(extended.applied)
-        evidence.mark_applied(root, words)
+        beside = extended.effects.words()
+        own = [words for words in extended.applied if words not in beside]
+        evidence.mark_applied(root, "; ".join(own), "; ".join(beside))
         with live.held():
             from_unit(root.mu_unit, extended.unit)
+        # The diagnosis knew nothing of effects that the simulation had before: its own take their place.
+        effects.keep(root, extended.kept.text() if extended.effects else "")
         unit_object.rebuild(root)
-        self.report({"INFO"}, f"Applied: {words}")
+        self.report({"INFO"}, f"Applied: {'; '.join(extended.applied)}")
+        return {"FINISHED"}
+
+
+class MU_OT_evidence_remove(OnUnit, bpy.types.Operator):
+    """Take from the unit's simulation what was found beside its parameters: undo brings it back"""
+
+    bl_idname = "mu.evidence_remove"
+    bl_label = "Remove Effects"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if not effects.asked(unit_object.active_root(context)):
+            cls.poll_message_set("The unit's simulation has no effects beside its parameters")
+            return False
+        return True
+
+    @telling
+    def execute(self, context):
+        effects.keep(unit_object.active_root(context), "")
+        live.redraw()
         return {"FINISHED"}
 
 
@@ -187,5 +213,6 @@ CLASSES = (
     MU_OT_evidence_dismiss,
     MU_OT_evidence_open,
     MU_OT_evidence_apply,
+    MU_OT_evidence_remove,
     MU_OT_evidence_motion,
 )

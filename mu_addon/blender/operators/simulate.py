@@ -5,7 +5,7 @@
 import bpy
 from bpy.props import EnumProperty
 
-from .. import bodies, live, obstacles, simulation, studies, unit_object
+from .. import bodies, effects, live, obstacles, simulation, studies, unit_object
 from ..properties import to_unit
 from .acting import RUN_FILES, CancelsJob, DismissesJob, OnSoundUnit, OpensRun, telling
 
@@ -49,6 +49,7 @@ class MU_OT_simulate(OnSoundUnit, bpy.types.Operator):
         folder = studies.settle(root)
         arguments += bodies.arguments(root, core, folder / "blender")
         arguments += obstacles.arguments(root, core, folder / "blender")
+        arguments += effects.arguments(root, folder / "blender")
         simulation.start(root.mu_unit.uuid, core, folder, arguments)
         live.redraw()
         return {"FINISHED"}
