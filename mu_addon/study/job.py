@@ -295,7 +295,7 @@ OF_FILES = ("friction",)
 # Keys of each stage's table besides files and inner tables.
 SETTINGS = {
     "design": ("quality",),
-    "simulate": ("times", "mesher"),
+    "simulate": ("times", "mesher", "orientation_deg"),
     "place": ("stations", "rules", "mesh_check", "paths"),
 }
 

@@ -33,6 +33,7 @@ from mu_addon.study.model_file import extend
 from mu_addon.study.progress import Progress
 from mu_addon.study.static_effects import NAMES, StaticEffects
 from mu_addon.study.study import Study
+from mu_addon.study.sweeps.plan import parse_plan
 
 UNIT = load_preset("mu-1.0x")
 ROUGH = MeshSettings(refine=0.4, order=1)
@@ -224,7 +225,8 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_digits(placed, tmp_path):
         assert len(kept) == 3, "one of them is of no pressure"
         for path in kept[::2]:
             path.unlink()
-    job = read_job(copy, workers=1)
+    # By processes of their own, beside the motion, as far as there is something left to do.
+    job = read_job(copy, workers=2)
     assert job.effects == with_effects(90.0, gravity=1300.0).effects
     assert ran(job, copy)["J_hat_mm"] == found["J_hat_mm"]
     same_digits(folder, copy)
@@ -374,3 +376,13 @@ def test_an_effect_out_of_its_bounds_is_refused_by_the_models_name():
     with pytest.raises(InputError, match="out of bounds") as caught:
         extend(UNIT, known, "there/model.toml")
     assert "there/model.toml" in caught.value.where
+
+
+def test_a_sweep_may_turn_a_unit_that_weighs_something(tmp_path):
+    plan = parse_plan(
+        'format = 1\npreset = "mu-1.0x"\nmethod = "grid"\n' + GRAVITY + "[vary]\n"
+        '"simulate.orientation_deg" = { values = [0.0, 90.0] }\n',
+        tmp_path,
+    )
+    found = [point.job.effects for point in plan.points(plan.values()[0])]
+    assert found == [with_effects(turn, gravity=1300.0).effects for turn in (0.0, 90.0)]
