@@ -104,8 +104,9 @@ class Response:
     """A sensor's signal over a motion.
 
     angle_deg (k,) and transmitted (k,), sorted by angle; sensitivity_per_deg: change of Delta V / V_f a
-    degree at 0 degrees, signed; monotonic_deg: the widest interval about 0 in which the signal only rises
-    or only falls; span: what Delta V / V_f covers over that interval.
+    degree at rest, signed; monotonic_deg: the widest interval about rest in which the signal only rises
+    or only falls; span: what Delta V / V_f covers over that interval; rest_deg: the angle at rest, which a
+    weight may turn from 0.
     """
 
     angle_deg: Array
@@ -113,28 +114,29 @@ class Response:
     sensitivity_per_deg: float
     monotonic_deg: tuple[float, float]
     span: float
+    rest_deg: float = 0.0
 
     @property
     def delta(self) -> Array:
         """Delta V / V_f (k,): the share of the light at rest that is lost."""
-        return 1 - self.transmitted / np.interp(0.0, self.angle_deg, self.transmitted)
+        return 1 - self.transmitted / np.interp(self.rest_deg, self.angle_deg, self.transmitted)
 
 
-def response(angle_deg: Array, share: Array) -> Response:
-    """The figures of a signal `share` (k,) at angles (k,) that include 0; see Response."""
+def response(angle_deg: Array, share: Array, rest_deg: float = 0.0) -> Response:
+    """The figures of a signal `share` (k,) at angles (k,) that include that at rest; see Response."""
     order = np.argsort(angle_deg, kind="stable")
     angle, light = np.asarray(angle_deg, float)[order], np.asarray(share, float)[order]
     keep = np.r_[True, np.diff(angle) > 1e-9]
     angle, light = angle[keep], light[keep]
-    if len(angle) < 2 or not angle[0] <= 0 <= angle[-1]:
+    if len(angle) < 2 or not angle[0] <= rest_deg <= angle[-1]:
         raise InputError(
             "the unit does not bend, or was not seen at rest", "angle_deg", "a protocol that bends it"
         )
-    delta = 1 - light / np.interp(0.0, angle, light)
+    delta = 1 - light / np.interp(rest_deg, angle, light)
     slope = np.diff(delta) / np.diff(angle)
-    at = int(np.clip(np.searchsorted(angle, 0.0, side="right") - 1, 0, len(slope) - 1))
+    at = int(np.clip(np.searchsorted(angle, rest_deg, side="right") - 1, 0, len(slope) - 1))
     # On a sample the mean of both sides.
-    here = (slope[at] + slope[at - 1]) / 2 if at > 0 and angle[at] == 0 else slope[at]
+    here = (slope[at] + slope[at - 1]) / 2 if at > 0 and angle[at] == rest_deg else slope[at]
     low, high = at, at
     sign = np.sign(here)
     while low > 0 and np.sign(slope[low - 1]) == sign:
@@ -147,6 +149,7 @@ def response(angle_deg: Array, share: Array) -> Response:
         float(here),
         (float(angle[low]), float(angle[high + 1])),
         float(abs(delta[high + 1] - delta[low])),
+        rest_deg,
     )
 
 

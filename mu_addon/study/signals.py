@@ -60,7 +60,7 @@ def _signals(study: Study, optics: Optics) -> Signals:
         bars = _bars(study)
         own = {name: [(at[i], turned[i]) for at, turned in moved] for name, (i, _) in bars.items()}
         found = {name: signal_of_nodes(law, bar, own[name]) for name, (_, bar) in bars.items()}
-        responses = [response(angle, signal.transmitted) for signal in found.values()]
+        responses = [response(angle, signal.transmitted, float(angle[0])) for signal in found.values()]
         errors, slopes = [], []
         for name, (_, bar) in bars.items():
             # Over the whole motion: the law's error grows with what changes.
@@ -70,7 +70,8 @@ def _signals(study: Study, optics: Optics) -> Signals:
         names = tuple(bars)
         J = np.array([study.evaluations[name, study.headline_rule].deviation.J_hat for name in names])
         best = names[int(J.argmin())]
-        checks = _checked(bars[best][1], own[best], angle, optics)
+        weighs = study.job.effects.weighs
+        checks = _checked(bars[best][1], own[best], angle, optics, weighs)
     sizes = [size for size in (2, 3) if size <= len(names)]
     sets = [best for size in sizes for best in best_sets(SPREAD * np.array(slopes), NOISE, size)]
     pairs = differential_pairs([r.sensitivity_per_deg for r in responses])
@@ -80,7 +81,7 @@ def _signals(study: Study, optics: Optics) -> Signals:
         names=names,
         responses=tuple(responses),
         errors_per_deg=np.array(errors),
-        at_rest=np.array([signal.at_rest for signal in found.values()]),
+        at_rest=np.array([s.transmitted[0] if weighs else s.at_rest for s in found.values()]),
         checks=checks,
         j_hat=J,
         front=tuple(pareto(J.tolist(), [r.sensitivity_per_deg for r in responses])),
@@ -113,12 +114,19 @@ def _bars(study: Study) -> dict[str, tuple[list[int], Held]]:
     return found
 
 
-def _checked(bar: Held, moved: list[tuple[Array, Array]], angle: Array, optics: Optics) -> Checks:
-    """Rays through a bar at rest, at its ends of the motion and between them; `moved` begins with rest."""
+def _checked(
+    bar: Held, moved: list[tuple[Array, Array]], angle: Array, optics: Optics, weighs: bool
+) -> Checks:
+    """Rays through a bar at rest, at its ends of the motion and between them; `moved` begins with rest.
+
+    weighs: whether rest is not as drawn.
+    """
     order = np.argsort(angle, kind="stable")
     some = order[np.unique(np.linspace(0, len(order) - 1, _CHECKS).astype(int))]
-    light = traced_signal(bar, [moved[i] for i in some], optics)
-    return Checks(angle[some], light.delta, light.errors * (1 - light.delta))
+    light = traced_signal(bar, [*moved[:weighs], *(moved[i] for i in some)], optics)
+    share, errors = light.transmitted[weighs:], light.errors[weighs:]
+    delta = 1 - share / (light.transmitted[0] if weighs else light.at_rest)
+    return Checks(angle[some], delta, errors * (1 - delta))
 
 
 def _named(names: Sequence[str], chosen: Any) -> tuple[tuple[tuple[str, ...], float], ...]:

@@ -69,6 +69,19 @@ def test_rays_in_place_of_the_law() -> None:
     assert signed == pytest.approx([-0.012 * 6, 0.012 * 6], rel=1e-2)
 
 
+def test_a_response_is_told_about_rest_wherever_that_is() -> None:
+    """The same light seen from another zero of the angle, as that of a unit which hangs under its weight."""
+    angle = np.arange(-30.0, 31.0, 10.0)
+    light = np.array([0.8, 0.7, 0.9, 1.0, 1.1, 1.2, 1.1])
+    drawn, hung = response(angle, light), response(angle + 45.0, light, 45.0)
+    assert hung.sensitivity_per_deg == pytest.approx(drawn.sensitivity_per_deg, rel=1e-12)
+    assert hung.monotonic_deg == (25.0, 65.0)
+    assert hung.span == drawn.span
+    np.testing.assert_array_equal(hung.delta, drawn.delta)
+    with pytest.raises(InputError, match="not seen at rest"):
+        response(angle + 45.0, light)
+
+
 def test_figures_of_a_response() -> None:
     angle = np.array([-30.0, -20, -10, 0, 10, 20, 30])
     found = response(angle, 1 - 0.01 * angle)

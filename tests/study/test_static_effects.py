@@ -207,6 +207,9 @@ def test_sensor_paths_are_ranked_in_the_unit_that_has_the_effect(placed, name, m
         at_rest = alone.deviation.delta[0].mean()
         assert at_rest > 0.01 if name == "weight" else at_rest == 0
     assert (folder / "sensitivity.vtu").is_file()
+    # Light is told about the angle without pressure.
+    for low, high in found["light"]["monotonic_deg"].values():
+        assert low <= found["angle_deg"]["0"] <= high
 
 
 def same_digits(one, other):
