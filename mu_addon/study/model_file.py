@@ -16,7 +16,6 @@ from ..evidence.lattice_fem import printed
 from ..evidence.prediction.lattice import SLENDER, ComputedCell
 from ..evidence.unit_effects import EFFECTS, Body
 from ..homogenize.effective import Effective
-from ..meshing.settings import MeshSettings
 from .diagnosing import spoken
 from .static_effects import NAMES, StaticEffects
 
@@ -146,8 +145,7 @@ def _of_effect(name: str) -> Put:
     assert change is not None
 
     def put(unit: Unit, size: float) -> tuple[Unit, str]:
-        mesh = MeshSettings()
-        return change(Body(unit, mesh, mesh), size).unit, _SAID[name].format(size)
+        return change(Body(unit), size).unit, _SAID[name].format(size)
 
     return put
 

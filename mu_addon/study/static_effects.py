@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 # Those with materials, in the order in which they change what the others left: the first takes the wall as
 # neo-Hookean, and what of it is isotropic then may stiffen.
 _LAWS = ("anisotropy", "strain_stiffening", "tension_compression_asymmetry")
-# What another effect than these has in the unit's model: it moves the mesh, or makes another one.
+# The other effects change the unit that is meshed, or the mesh.
 NAMES = tuple(name for name, e in EFFECTS.items() if e.materials or e.model or e.load)
 # Of each in a few words, its size included.
 _SAID = {
@@ -146,11 +146,10 @@ class StaticEffects:
         body = Body(unit, orientation_deg=self.orientation_deg)
         sizes = self.sizes
         # One at most has a model of its own.
-        own = [(e.model, size) for e, size in ((EFFECTS[n], s) for n, s in sizes.items()) if e.model]
-        found = own[0][0](body, mesh, own[0][1]) if own else body.model(mesh)
+        found = next((make(body, mesh, s) for n, s in sizes.items() if (make := EFFECTS[n].model)), None)
+        found = found or body.model(mesh)
         for name, size in sizes.items():
-            load = EFFECTS[name].load
-            if load:
+            if load := EFFECTS[name].load:
                 found.load = load(body, mesh, size)
         found.threads = threads
         return found
