@@ -44,11 +44,14 @@ def said(root: Any) -> list[str]:
     lines = []
     for effect, parameters in _tables(root).items():
         for name, table in parameters.items():
+            unit = str(table.get("unit", ""))
             known = ""
             if "low95" in table and "high95" in table:
-                known = f" ({table['low95']:.3g} to {table['high95']:.3g})"
-            words = f"{effect}, {name}".replace("_", " ")
-            lines.append(f"{words} {table['value']:.4g}{known}")
+                known = f" ({table['low95']:.4g} to {table['high95']:.4g})"
+            # A parameter's name ends with its unit.
+            bare = name.removesuffix("_" + unit.replace("/", "_")) if unit else name
+            words = f"{effect}, {bare}".replace("_", " ")
+            lines.append(f"{words}: {table['value']:.4g}{' ' * bool(unit)}{unit}{known}")
     return lines
 
 

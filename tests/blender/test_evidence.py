@@ -194,9 +194,9 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
         share = json.loads((folder / "study/evidence/verdict.json").read_text())
         share = share["causes"][0]["parameters"]["share_lost"]["value"]
         (line,) = effects.said(root)
-        assert line.startswith(f"clogged chamber, share lost {share:.4g} (") and " to " in line
+        assert line.startswith(f"clogged chamber, share lost: {share:.4g} (") and " to " in line
         said = drawn()
-        assert "With what was found" in said and "clogged chamber, share lost 0.5" in said, said
+        assert "With what was found" in said and "clogged chamber, share lost: 0.5" in said, said
         assert "The unit has it: all moduli" in said and "the last chamber lacks" in said, said
         assert not bpy.ops.mu.evidence_apply.poll()
         # Pressure alone knows no direction.
@@ -229,7 +229,7 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
         known = Fitted(1300.0, 50.0, 1200.0, 1400.0, "kg/m3")
         effects.keep(root, ExtendedModel("named", {"gravity": {"density_kg_m3": known}}, {}).text())
         assert studies.findings(root).stale
-        assert "gravity, density kg m3 1300 (1.2e+03 to 1.4e+03)" in drawn().replace("  ", " ")
+        assert "gravity, density: 1300 kg/m3 (1200 to 1400)" in drawn().replace("  ", " ")
         level = simulated()
         assert not level.stale and level.summary["study"]["orientation_deg"] == 90.0
         assert dict(level.angles)[0.0] < -0.5
