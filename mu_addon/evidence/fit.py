@@ -137,6 +137,18 @@ class Fitter:
             self._own[fit] = own, own.fit(fit.effects, fit.values)
         return self._own[fit]
 
+    def driven_again(self, fit: Fit) -> Fitter | None:
+        """A fitter to what a fit predicts, free of noise, for a model that other readings of the gauge drive.
+
+        Whatever gains there does so by the gauge's noise. None where gauges have none.
+        """
+        record = self.record
+        if record.again is None:
+            return None
+        values = self.predict(fit.values)
+        other = attrs.evolve(record, experiments=record.again, values=values, again=None)
+        return Fitter(other, self.simulator, self.sources, self._kept, self.whitening)
+
     def zeros(self, left: Array) -> dict[str, float]:
         """Values of the linear nuisances that take most of what is left (N,), not whitened."""
         if not self._linear:

@@ -70,11 +70,15 @@ class Series:
 
 @attrs.frozen(eq=False)
 class Record:
-    """Series of several experiments, their measured values (N,) as one vector, series of a group together."""
+    """Series of several experiments, their measured values (N,) as one vector, series of a group together.
+
+    again: the experiments as gauges of the same noise might have read them, see `drive.without_noise`.
+    """
 
     experiments: tuple[Experiment, ...]
     series: tuple[Series, ...]
     values: Array
+    again: tuple[Experiment, ...] | None = None
 
     def __len__(self) -> int:
         return len(self.values)

@@ -125,7 +125,8 @@ def reviewed(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) -> S
     doubted = found.doubted
     for e in chosen.effects:
         less = fitter.fit([o for o in chosen.effects if o is not e], chosen.values)
-        p = _chance(fitter, less, seen, less.chi2 - chosen.chi2)
+        own = attrs.evolve(chosen, effects=(*less.effects, e))
+        p = _chance(fitter, less, seen, less.chi2 - chosen.chi2 - _by_gauges(fitter, less, own))
         ps.append(p)
         if p >= CHANCE:
             doubted = doubted or f"{e.name} gains no more than chance under the noise that the causes leave"
@@ -264,7 +265,7 @@ def _gain(fitter: Fitter, less: Fit, more: Fit) -> float:
     """Twice the log likelihood gained by an effect: the least under one noise and under each one's own.
 
     Without the second, slow noise estimated too small would pass for a cause; without the first, noise
-    swollen by a cause would hide it.
+    swollen by a cause would hide it. What the gauges' noise alone would let it gain is taken off.
     """
     gain = less.chi2 - more.chi2
     if gain < TOLD_APART:
@@ -273,7 +274,21 @@ def _gain(fitter: Fitter, less: Fit, more: Fit) -> float:
     for fit in (less, more):
         under, refitted = fitter.under_its_own_noise(fit)
         own.append(sum(under.deviance(refitted).values()))
-    return min(gain, own[0] - own[1])
+    return min(gain, own[0] - own[1]) - _by_gauges(fitter, less, more)
+
+
+def _by_gauges(fitter: Fitter, less: Fit, more: Fit) -> float:
+    """What the last effect of a model may gain by smoothing what gauges read, which the right model cannot.
+
+    On data that the model without it made, driven by other readings of the same noise; taken twice, since
+    that is one draw, and of readings that were quieter before.
+    """
+    other = fitter.driven_again(less)
+    if other is None:
+        return 0.0
+    without = other.fit(less.effects, less.values)
+    starts = [more.values, *({**less.values, **s} for s in more.effects[-1].starts())]
+    return 2.0 * max(without.chi2 - other.best(more.effects, starts).chi2, 0.0)
 
 
 def _loss(fitter: Fitter, less: Fit, more: Fit) -> float:

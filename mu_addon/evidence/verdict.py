@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
+from .drive import without_noise
 from .fit import Fitter
 from .gain import Gain, gain
 from .next_experiment import Proposal, next_experiment
@@ -121,7 +122,11 @@ def diagnose(
 
     progress: called with what is being done. Raises InputError where no experiment can be predicted.
     """
+    experiments, again = without_noise(experiments, simulator)
     measured = record([e for e in experiments if e.role == "fit"], simulator)
+    if again:
+        other = {e.name: e for e in again}
+        measured = attrs.evolve(measured, again=tuple(other[e.name] for e in measured.experiments))
     progress("noise")
     sources = noise_of(measured, simulator)
     fitter = Fitter(measured, simulator, sources)

@@ -7,7 +7,8 @@ without noise, FOLDER-bare.
 An order is JSON; it holds a folder and a seed, and may hold: effect (a name, or several), times (its
 detection limit), values (sizes that are not drawn by what can be seen), unit ("written" or "simulated", or
 a kind of experiment that `machines` has a bench of), noise ("one" slow process beside white noise, "two", or
-"white"), and, for a unit, count, most, dt, rho, level, held_out, dead_load, markers.
+"white"), gauge (the share of its range that is the noise of what reads the drive), and, for a unit, count,
+most, dt, rho, level, held_out, dead_load, markers.
 """
 
 import hashlib
@@ -58,6 +59,20 @@ def held_out(dt):
         ("later, another way up", *middle, {"role": "held_out", "orientation_deg": 270.0}),
         ("later, larger", *middle, {"role": "held_out", "scale": 1.5, "specimen": "B"}),
     ]
+
+
+def gauge_noise(order):
+    """The gauge's own white noise as a share of what it goes through: none in half of the sets."""
+    rng = np.random.default_rng([order["seed"], 1])
+    share = float(np.exp(rng.uniform(np.log(1e-4), np.log(1e-3))) * rng.integers(2))
+    return order.get("gauge", share)
+
+
+def gauged(order, number, values):
+    """A drive (n,) as a gauge reads it in the experiment of that number."""
+    # By a generator of its own: another gauge is no other camera.
+    rng = np.random.default_rng([order["seed"], 2, number])
+    return values + rng.normal(size=len(values)) * gauge_noise(order) * np.ptp(values)
 
 
 def shape_of(rng, effect, total_s):
@@ -120,6 +135,7 @@ def hide(order):
     base = {"modulus_factor": float(rng.uniform(0.9, 1.1))}
     zeros = rng.normal(0.0, 0.5, len(analytic.CHANNELS))
     answer = {"effect": effects, "times": times, "count": len(tests), "dt": dt, "rho": rho, "level": level}
+    answer["gauge"] = gauge_noise(order)
     values = base | order.get("values", {})
     # Sizes that were ordered are taken as they are; others are drawn by what can be seen.
     for name in effects if "values" not in order else []:
@@ -154,6 +170,7 @@ def hide_machine(order):
     sd = level * bench.reading(base)
     source = Source(sd * np.sqrt(1 - slow_share), sd * np.sqrt(slow_share), -dt / np.log(rho))
     answer = {"effect": effects, "times": times, "count": len(planned), "dt": dt, "rho": rho, "level": level}
+    answer["gauge"] = gauge_noise(order)
     values = base | order.get("values", {})
     for name in effects if "values" not in order else []:
         found = sized_machine(rng, bench, planned, name, times, base, source)
@@ -221,6 +238,9 @@ def write_machine(folder, rng, bench, planned, truth, source, order, clock):
             time = columns.get("time_s", np.arange(len(e), dtype=float))
             noise = drawn(rng, time, source.white, source.slow, source.time_s, order.get("noise") == "two")
             columns[bench.channel] = columns[bench.channel] + noise
+            for drive in ("strain", "angle_deg") if "time_s" in columns else ():
+                if drive in columns:
+                    columns[drive] = gauged(order, k, columns[drive])
         if "time_s" in columns:
             columns["time_s"] = columns["time_s"] + clock
         lines += [f'source = "{rng.choice(["machine 1", "machine 2", "worn grips?", "new operator"])}"', ""]
@@ -321,7 +341,8 @@ def write(folder, rng, tests, truth, zeros, noise, order, clock):
     lines = []
     many = order.get("noise") == "two"
     for k, ((name, time, pressure, how), y) in enumerate(zip(tests, truth, strict=True)):
-        columns, head = [time + clock, pressure], ["time_s", "pressure_kPa"]
+        seen = pressure if noise is None else gauged(order, k, pressure)
+        columns, head = [time + clock, seen], ["time_s", "pressure_kPa"]
 
         def read(values, c, time=time):
             return values if noise is None else values + drawn(rng, time, *noise[c], many=many)

@@ -153,6 +153,10 @@ def changed(experiments, change):
     return tuple(found)
 
 
+# Of an answer, what rates are counted by.
+TOLD = ("effect", "times", "count", "dt", "rho", "level", "gauge", "impossible")
+
+
 def judged(order):
     """One order as a row of plain data."""
     start = time.perf_counter()
@@ -175,7 +179,7 @@ def judged(order):
             inside.append((key, value, chosen.values[key], (low, high), low <= value <= high))
     held = verdict.gain.held_out
     return {
-        **{k: answer.get(k) for k in ("effect", "times", "count", "dt", "rho", "level", "impossible")},
+        **{k: answer.get(k) for k in TOLD},
         "part": order.get("part", ""),
         "unit": order.get("unit", "written"),
         "seed": order["seed"],

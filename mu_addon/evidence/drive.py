@@ -1,0 +1,129 @@
+"""What was done to a specimen, freed of the noise of the gauge that read it.
+
+A model is driven by readings. Taken as they are, whatever smooths them (friction, a lag, a clock that is off)
+would predict better than the model that is right, and be named for it: errors in variables.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..measured import Experiment
+from .simulator import Composite
+
+Array = np.ndarray[Any, Any]
+
+# Columns that may say what was done, where they are not predicted.
+DRIVES = ("pressure_kPa", "angle_deg", "strain", "displacement_mm")
+# Half-widths of windows, in samples.
+WIDTHS = (1, 2, 4, 8, 16, 32, 64)
+# A wider window counts while its straight line agrees with those of all narrower ones, within so many
+# standard deviations: the rule of intersecting confidence intervals (Goldenshluger and Nemirovski 1997).
+AGREE = 2.5
+# Orders of differences that tell noise from signal: of noise all give one size, of a smooth signal the
+# higher ones give less.
+ORDERS = (2, 3, 4, 5, 6, 7, 8)
+# Noise smaller than this share of a record's range changes no verdict, and is not looked at.
+NEGLIGIBLE = 1e-6
+FEWEST = 9
+
+
+def reading_noise(values: Array) -> float:
+    """Standard deviation of white noise in readings (n,), by the median of their higher differences."""
+    found = []
+    for order in ORDERS:
+        if len(values) < 4 * order:
+            break
+        d = np.abs(np.diff(values, order))
+        found.append(float(np.median(d)) / 0.6745 / math.sqrt(math.comb(2 * order, order)))
+    return min(found, default=0.0)
+
+
+def quietened(time_s: Array, values: Array) -> Array:
+    """Readings (n,) with their white noise averaged away as far as they run straight, corners kept.
+
+    At each sample a straight line is fitted to windows before it, after it and around it, each as wide as
+    agrees with the narrower ones; what they say is averaged by their variances.
+    """
+    sd = reading_noise(values)
+    weight, total = np.zeros(len(values)), np.zeros(len(values))
+    for before, after in ((True, True), (True, False), (False, True)):
+        found, variance = _widest(time_s, values, sd, before, after)
+        weight += 1.0 / variance
+        total += found / variance
+    return np.asarray(total / weight)
+
+
+def _widest(time_s: Array, values: Array, sd: float, before: bool, after: bool) -> tuple[Array, Array]:
+    """The line's value (n,) at each sample by the widest window that agrees, and its variance over sd^2."""
+    best, spread = values.copy(), np.ones(len(values))
+    low, high = values - AGREE * sd, values + AGREE * sd
+    agrees = np.ones(len(values), bool)
+    for width in WIDTHS:
+        if width >= len(values):
+            break
+        found, variance = _lines(time_s, values, width * before, width * after)
+        reach = AGREE * sd * np.sqrt(variance)
+        low, high = np.maximum(low, found - reach), np.minimum(high, found + reach)
+        agrees &= low <= high
+        # A line through two readings knows no more at its end than the reading.
+        better = agrees & (variance < spread)
+        best, spread = np.where(better, found, best), np.where(better, variance, spread)
+    return best, spread
+
+
+def _lines(time_s: Array, values: Array, before: int, after: int) -> tuple[Array, Array]:
+    """Least-squares lines' values (n,) at each sample over so many samples around it, and variances."""
+    n = len(values)
+    first = np.maximum(np.arange(n) - before, 0)
+    last = np.minimum(np.arange(n) + after, n - 1) + 1
+    # About the middle, so that sums keep their digits.
+    t = (time_s - time_s.mean()) / max(float(np.ptp(time_s)), 1e-300)
+    y = values - values.mean()
+
+    def summed(of: Array) -> Array:
+        run = np.concatenate([[0.0], np.cumsum(of)])
+        return np.asarray(run[last] - run[first])
+
+    count = (last - first).astype(float)
+    st, sy, stt, sty = summed(t), summed(y), summed(t * t), summed(t * y)
+    mean_t, mean_y = st / count, sy / count
+    squares = np.maximum(stt - st * mean_t, 0.0)
+    known = squares > 1e-18 * count
+    slope = np.where(known, (sty - st * mean_y) / np.where(known, squares, 1.0), 0.0)
+    away = t - mean_t
+    variance = 1.0 / count + np.where(known, away**2 / np.where(known, squares, 1.0), 0.0)
+    return values.mean() + mean_y + slope * away, np.minimum(variance, 1.0)
+
+
+def without_noise(
+    experiments: Sequence[Experiment], simulator: Composite
+) -> tuple[list[Experiment], list[Experiment] | None]:
+    """The experiments with their drives `quietened`: timed columns that no simulator predicts.
+
+    And once more, with as much noise added to what was found and treated the same: what a model that is
+    driven by the second says of data that follow the first, it says by the gauge's noise alone. None where
+    there is no noise.
+    """
+    rng = np.random.default_rng(0)
+    found, again = [], []
+    for e in experiments:
+        drives: list[str] = []
+        if simulator.knows(e) and "time_s" in e.columns and len(e) >= FEWEST:
+            predicted = simulator.channels(e)
+            drives = [c for c in DRIVES if c in e.columns and c not in predicted and np.isfinite(e[c]).all()]
+        once, twice = dict(e.columns), dict(e.columns)
+        for c in drives:
+            sd = reading_noise(e[c])
+            if sd > NEGLIGIBLE * float(np.ptp(e[c])):
+                once[c] = quietened(e["time_s"], e[c])
+                twice[c] = quietened(e["time_s"], once[c] + rng.normal(0.0, sd, len(e)))
+        noisy = any(once[c] is not e.columns[c] for c in drives)
+        found.append(attrs.evolve(e, columns=once) if noisy else e)
+        again.append(attrs.evolve(e, columns=twice) if noisy else e)
+    return found, again if any(a is not e for a, e in zip(again, found, strict=True)) else None
