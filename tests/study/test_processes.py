@@ -21,6 +21,8 @@ def child():
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for one process")
 def test_a_child_born_inside_outlives_ctrl_c_and_one_born_outside_does_not():
+    # A shell's background jobs are born deaf to Ctrl-C, and so would be their children.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     with ctrl_c_ignored():
         inside = child()
     outside = child()
@@ -31,6 +33,7 @@ def test_a_child_born_inside_outlives_ctrl_c_and_one_born_outside_does_not():
         with pytest.raises(subprocess.TimeoutExpired):
             inside.wait(1)
     finally:
+        signal.signal(signal.SIGINT, before)
         for process in (inside, outside):
             process.kill()
             process.communicate()
