@@ -31,7 +31,10 @@ RENEWED = 1.5
 
 @attrs.frozen(eq=False)
 class Verdict:
-    """What the data say of the model; kind is one of `KINDS`. See `as_json` for the file."""
+    """What the data say of the model; kind is one of `KINDS`. See `as_json` for the file.
+
+    experiments: all of them, their drives freed of the noise of gauges, see `drive.without_noise`.
+    """
 
     kind: str
     selection: Selection
@@ -42,6 +45,7 @@ class Verdict:
     proposal: Proposal | None
     identifiability: dict[str, str]
     intervals: dict[str, tuple[float, float]]
+    experiments: tuple[Experiment, ...]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -152,7 +156,9 @@ def diagnose(
     known = chosen.chosen if chosen.causes else chosen.base
     bounds = {k: interval(fitter, known, k) for k in known.keys}
     told = _identifiability(seen, chosen)
-    return Verdict(kind, chosen, tuple(seen), sources, measured, gained, proposal, told, bounds)
+    return Verdict(
+        kind, chosen, tuple(seen), sources, measured, gained, proposal, told, bounds, tuple(experiments)
+    )
 
 
 def _apart(one: Source, other: Source) -> bool:

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..design.parameters import Unit, load_preset, to_toml
 from ..errors import InputError
+from ..evidence.drive import reading_noise
 from ..evidence.effect import Parameter
 from ..evidence.extended import ExtendedModel, extended_model
 from ..evidence.prediction import lattice
@@ -134,6 +135,7 @@ def diagnose_folder(
         model = attrs.evolve(model, lattice=block.computed)
         told += _resin(model, unit)
     told += _bounds_met(verdict, simulator)
+    told += _noisy_gauges(measured, verdict)
     remarks = [*(f"{r.what} ({_place(r.where)})" for r in measured.remarks), *told]
     unknown = dict.fromkeys(e.kind for e in measured.experiments if not simulator.knows(e))
     remarks += [f"nothing predicts {kind}: its experiments were left out" for kind in unknown]
@@ -240,6 +242,20 @@ def _resin(model: ExtendedModel, unit: Unit | None) -> list[str]:
     ]
 
 
+def _noisy_gauges(measured: Measured, verdict: Verdict) -> list[str]:
+    """Which readings drove the model with less noise than they have, in words."""
+    noise: dict[str, float] = {}
+    for e, judged in zip(measured.experiments, verdict.experiments, strict=True):
+        for column, values in judged.columns.items():
+            if values is not e.columns[column]:
+                noise[column] = max(noise.get(column, 0.0), reading_noise(e.columns[column]))
+    return [
+        f"{column} was read with white noise of up to {sd:.2g}; where it runs straight this was averaged "
+        "away, and no effect is named for what is left of it"
+        for column, sd in noise.items()
+    ]
+
+
 def _bounds_met(verdict: Verdict, simulator: Composite) -> list[str]:
     """Which fitted values of the base model ended at a bound, in words."""
     values = verdict.selection.base.values
@@ -295,11 +311,11 @@ def curves(found: Diagnosis) -> list[Curve]:
     """Every predicted channel of every experiment, in the order of the folder."""
     simulator = found.simulator
     listed = []
-    for e in found.measured.experiments:
+    for e, judged in zip(found.measured.experiments, found.verdict.experiments, strict=True):
         if not simulator.knows(e):
             continue
-        before = simulator.predict(e, found.before)
-        after = simulator.predict(e, found.after)
+        before = simulator.predict(judged, found.before)
+        after = simulator.predict(judged, found.after)
         for row, channel in enumerate(simulator.channels(e)):
             listed.append(Curve(e, channel, e[channel], before[row], after[row]))
     return listed
