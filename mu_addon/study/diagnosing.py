@@ -247,7 +247,7 @@ def _noisy_gauges(measured: Measured, verdict: Verdict) -> list[str]:
     noise: dict[str, float] = {}
     for e, judged in zip(measured.experiments, verdict.experiments, strict=True):
         for column, values in judged.columns.items():
-            if values is not e.columns[column]:
+            if not np.array_equal(values, e.columns[column], equal_nan=True):
                 noise[column] = max(noise.get(column, 0.0), reading_noise(e.columns[column]))
     return [
         f"{column} was read with white noise of up to {sd:.2g}; where it runs straight this was averaged "

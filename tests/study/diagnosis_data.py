@@ -31,8 +31,11 @@ def weighed_blocks(folder, offset_mm, noise=(0.4, -0.3, 0.2)):
     return folder
 
 
-def bent_unit(folder, values, count=3, dt=0.4, seed=3):
-    """Cycles of the analytic unit, the last of them held out, with white noise of 0.1 deg and 0.03 mm."""
+def bent_unit(folder, values, count=3, dt=0.4, seed=3, gauge_kPa=0.0):
+    """Cycles of the analytic unit, the last of them held out, with white noise of 0.1 deg and 0.03 mm.
+
+    gauge_kPa: white noise of the gauge.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(seed)
     tests = analytic.protocols(dt, count)
@@ -42,7 +45,7 @@ def bent_unit(folder, values, count=3, dt=0.4, seed=3):
         seen = {c: np.zeros(len(t)) for c in empty}
         e = analytic.experiment(name, t, p, seen, **how)
         y = analytic.simulator([e]).predict(e, values)
-        columns = {"time_s": t, "pressure_kPa": p}
+        columns = {"time_s": t, "pressure_kPa": p + gauge_kPa * np.random.default_rng(i).normal(size=len(t))}
         for c, row in zip(analytic.CHANNELS, y, strict=True):
             columns[c] = row + (0.1 if c == "angle_deg" else 0.03) * rng.normal(size=len(t))
         for m in (1, 2, 3):

@@ -164,9 +164,10 @@ def test_three_moduli_of_the_paper_are_not_enough_to_tell(tmp_path):
     assert any("3 x 3 x 3 cells between plates that hold" in words for words in ending.summary["remarks"])
 
 
-def test_a_unit_is_judged_by_its_angle_and_markers(tmp_path, monkeypatch):
+@pytest.mark.parametrize("gauge_kPa", [0.0, 0.02])
+def test_a_unit_is_judged_by_its_angle_and_markers(tmp_path, monkeypatch, gauge_kPa):
     """A clogged chamber; the unit's own simulation is stood in for by one that is written down."""
-    folder = bent_unit(tmp_path / "data", {"clogged_chamber.share_lost": 0.5})
+    folder = bent_unit(tmp_path / "data", {"clogged_chamber.share_lost": 0.5}, gauge_kPa=gauge_kPa)
 
     def responses(unit, experiments, settings, cache, progress):
         assert unit.name
@@ -180,6 +181,9 @@ def test_a_unit_is_judged_by_its_angle_and_markers(tmp_path, monkeypatch):
     assert ending.status == 0, messages[-1]
     assert ending.summary["verdict"] == "named"
     assert [c["effect"] for c in ending.summary["causes"]] == ["clogged_chamber"]
+    told = [r.partition(";")[0] for r in ending.summary["remarks"] if "white noise" in r]
+    # What is predicted has noise as well, of which nothing is taken.
+    assert told == ["pressure_kPa was read with white noise of up to 0.022"] * (gauge_kPa > 0)
     gain = ending.summary["gain"]["held_out"]
     assert gain["unit"] == "deg"
     assert gain["rmse_after"] < 0.15 < gain["rmse_before"]
