@@ -90,9 +90,10 @@ def test_a_skin_is_as_deep_as_it_says(cache: Path) -> None:
     cell = StrutCell(cells.SIMPLE_CUBIC, 10.0, 1.0, 1.0, skin_depth_mm=0.3, skin_factor=2.0)
     mesh = cell_mesh(cell, CellMeshSettings(per_diameter=4.0, facets=Facets(16, 8), tolerance=0.005), cache)
     share, volumes = skin_share(cell, mesh), element_volumes(mesh)
-    # Away from the joints a strut along an axis has a core of radius 0.7.
+    # Away from the joints a strut along an axis has a core of radius 0.7. All three of them, since an element
+    # is core or skin as a whole, and meshes without a seed scatter by 2 % over a single one.
     middle = mesh.nodes[mesh.corners].mean(axis=1)
-    along = (middle[:, 2] > 2) & (middle[:, 2] < 4)
+    along = (middle > 2).any(axis=1)
     found = (share * volumes)[along].sum() / volumes[along].sum()
     assert found == pytest.approx(1 - 0.7**2, rel=0.03)
     assert share.min() == 0
