@@ -44,13 +44,14 @@ def reading_noise(values: Array) -> float:
     return min(found, default=0.0)
 
 
-def quietened(time_s: Array, values: Array) -> Array:
+def quietened(time_s: Array, values: Array, sd: float | None = None) -> Array:
     """Readings (n,) with their white noise averaged away as far as they run straight, corners kept.
 
     At each sample a straight line is fitted to windows before it, after it and around it, each as wide as
-    agrees with the narrower ones; what they say is averaged by their variances.
+    agrees with the narrower ones; what they say is averaged by their variances. sd: of the noise, that of
+    `reading_noise` where it is not given.
     """
-    sd = reading_noise(values)
+    sd = reading_noise(values) if sd is None else sd
     weight, total = np.zeros(len(values)), np.zeros(len(values))
     for before, after in ((True, True), (True, False), (False, True)):
         found, variance = _widest(time_s, values, sd, before, after)
@@ -121,7 +122,7 @@ def without_noise(
         for c in drives:
             sd = reading_noise(e[c])
             if sd > NEGLIGIBLE * float(np.ptp(e[c])):
-                once[c] = quietened(e["time_s"], e[c])
+                once[c] = quietened(e["time_s"], e[c], sd)
                 twice[c] = quietened(e["time_s"], once[c] + rng.normal(0.0, sd, len(e)))
         noisy = any(once[c] is not e.columns[c] for c in drives)
         found.append(attrs.evolve(e, columns=once) if noisy else e)

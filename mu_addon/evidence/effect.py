@@ -71,9 +71,9 @@ class Parameter:
     def narrowed(self, low: float, high: float) -> Parameter:
         """The same between closer bounds; raises InputError where they leave the null out."""
         low, high = max(self.low, low), min(self.high, high)
-        starts = tuple(v for v in self.starts if low <= v <= high) or (0.5 * (low + high),) * bool(
-            self.starts
-        )
+        starts = tuple(v for v in self.starts if low <= v <= high)
+        if self.starts and not starts:
+            starts = (0.5 * (low + high),)
         return attrs.evolve(self, low=low, high=high, starts=starts)
 
     @property

@@ -641,7 +641,7 @@ def _ringing(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Depen
     swings = np.zeros((len(record), len(hertz)))
     clocks: dict[Any, list[Series]] = {}
     for s in driven:
-        clocks.setdefault((s.experiment, s.time_s.tobytes()), []).append(s)
+        clocks.setdefault((s.experiment, s.clock), []).append(s)
     for members in clocks.values():
         together = np.stack([still[s.at] for s in members], axis=1)
         found = ringing(members[0].time_s, together, hertz, damping)
