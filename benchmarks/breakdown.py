@@ -21,7 +21,7 @@ from mu_addon.fem.trajectory import simulate
 from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.study.job import Job, grasp
+from mu_addon.usecases.simulate_and_place.job import Job, grasp
 
 
 @attrs.define

@@ -22,10 +22,10 @@ from mu_addon.fem.model import Model
 from mu_addon.fem.trajectory import simulate
 from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.study.ending import run_to_end
-from mu_addon.study.job import Job, grasp
-from mu_addon.study.progress import Progress
-from mu_addon.study.study import Study
+from mu_addon.run.context import run_to_end
+from mu_addon.run.progress import Progress
+from mu_addon.usecases.simulate_and_place.job import Job, grasp
+from mu_addon.usecases.simulate_and_place.run import Study
 
 PRESSURES = np.array([0.0, -10.0, -20.0, 0.0, 10.0, 20.0, 30.0, 40.0])
 

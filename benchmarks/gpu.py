@@ -26,9 +26,9 @@ from mu_addon.fem.model import Model
 from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
+from mu_addon.placement.batch import Sweep
 from mu_addon.placement.candidates import candidates, roi
 from mu_addon.placement.inclusion import sensor_share
-from mu_addon.placement.sweep import Sweep
 
 STEP_KPA = 5.0
 SENSOR_MPA = 2.5

@@ -28,7 +28,7 @@ from mu_addon.homogenize.modulus import modulus
 from mu_addon.homogenize.offset_response import OffsetResponse, fit_offset
 from mu_addon.homogenize.specimen import specimen
 from mu_addon.materials.library import load_material
-from mu_addon.study.plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas
+from mu_addon.report.charts import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas
 
 SCALES = (0.75, 1.0, 1.5)
 MEASURED_kPa = (21.70, 18.34, 16.38)

@@ -32,7 +32,7 @@ from mu_addon.placement.candidates import Candidate, candidates, moved_points, r
 from mu_addon.placement.inclusion import sensor_share
 from mu_addon.placement.influence import influence, telling_pressures
 from mu_addon.placement.sampling import rounds
-from mu_addon.study.parallel import Setting, Sweeper
+from mu_addon.usecases.simulate_and_place.candidate_pool import Setting, Sweeper
 
 RADIUS_MM, SENSOR_MPA, RULE = 1.0, 2.5, "volume_fraction"
 

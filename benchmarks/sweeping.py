@@ -24,12 +24,12 @@ sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
 from circumstances import circumstances  # noqa: E402
 
-from mu_addon.study.ending import run_to_end  # noqa: E402
-from mu_addon.study.progress import Progress  # noqa: E402
-from mu_addon.study.sweeps.cluster import Cluster  # noqa: E402
-from mu_addon.study.sweeps.plan import parse_plan  # noqa: E402
-from mu_addon.study.sweeps.point import Task, run_point, version  # noqa: E402
-from mu_addon.study.sweeps.sweep import sweep  # noqa: E402
+from mu_addon.run.context import run_to_end  # noqa: E402
+from mu_addon.run.progress import Progress  # noqa: E402
+from mu_addon.usecases.parameter_study.cluster import Cluster  # noqa: E402
+from mu_addon.usecases.parameter_study.plan import parse_plan  # noqa: E402
+from mu_addon.usecases.parameter_study.point import Task, run_point, version  # noqa: E402
+from mu_addon.usecases.parameter_study.run import sweep  # noqa: E402
 
 POINTS = 200
 # What a real study of this sweep answers, so that as many bytes travel back.

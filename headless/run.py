@@ -27,6 +27,6 @@ def arguments() -> list[str]:
 
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
-    from mu_addon.study.command import main
+    from mu_addon.cli.main import main
 
     sys.exit(main(arguments()))

@@ -2,6 +2,56 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
+_MODULES = (
+    # What others read: properties, state, handlers.
+    "unit.properties",
+    "results.properties",
+    "obstacles.state",
+    "gripper.properties",
+    "evidence.state",
+    "track.properties",
+    "printing.state",
+    "unit.live_update",
+    "results.motion",
+    "results.legend_object",
+    "simulate.state",
+    "sensor.twin",
+    "sensor.state",
+    "results.thumbnails",
+    # Operators.
+    "unit.operators",
+    "unit.preset_operators",
+    "path.operators",
+    "simulate.operators",
+    "results.operators",
+    "printing.solid_operators",
+    "printing.operators",
+    "steps.operators",
+    "body.operators",
+    "obstacles.operators",
+    "gripper.operators",
+    "assets.operators",
+    "evidence.operators",
+    "track.operators",
+    "sensor.operators",
+    # What draws; panels stand in the sidebar in this order.
+    "unit.panel",
+    "obstacles.panel",
+    "printing.panel",
+    "steps.panel",
+    "results.panel",
+    "evidence.panel",
+    "sensor.panel",
+    "gripper.panel",
+    "track.panel",
+    "results.legend",
+    "sensor.plot",
+    "shared.menus",
+)
+"""Modules with something to register, in the order they need each other."""
+
 _registered = False
 
 
@@ -30,66 +80,7 @@ def unregister() -> None:
 
 
 def _modules():
-    """Modules with something to register, in the order they need each other."""
-    from . import (
-        bench,
-        evidence,
-        evidence_panel,
-        gripper_panel,
-        gripper_properties,
-        legend,
-        legend_object,
-        live,
-        menus,
-        motion_parts,
-        motion_properties,
-        obstacle_panel,
-        obstacles,
-        operators,
-        panels,
-        print_panel,
-        printing,
-        properties,
-        results_panel,
-        sensor,
-        sensor_panel,
-        sensor_plot,
-        simulation,
-        stack_panel,
-        thumbnails,
-        track_panel,
-        twin,
-    )
-
-    return [
-        properties,
-        motion_properties,
-        obstacles,
-        gripper_properties,
-        evidence,
-        bench,
-        printing,
-        live,
-        motion_parts,
-        legend_object,
-        simulation,
-        twin,
-        sensor,
-        thumbnails,
-        operators,
-        panels,
-        obstacle_panel,
-        print_panel,
-        stack_panel,
-        results_panel,
-        evidence_panel,
-        sensor_panel,
-        gripper_panel,
-        track_panel,
-        legend,
-        sensor_plot,
-        menus,
-    ]
+    return [import_module(f".{name}", __name__) for name in _MODULES]
 
 
 def _remove(modules):

@@ -26,7 +26,7 @@ from ..measured import Experiment
 from ..meshing.mesh import AXES
 from ..meshing.settings import MeshSettings
 from ..meshing.unit import mesh_unit
-from ..processes import cores, ctrl_c_ignored, end_with_parent, one_thread_each
+from ..run.processes import cores, ctrl_c_ignored, end_with_parent, one_thread_each
 from .markers import Marker, attached, followed
 from .prediction.unit import KIND, UnitResponse, Variant
 from .prediction.wall import NAME as WALL

@@ -12,11 +12,11 @@ from ..errors import InputError
 from ..meshing.mesh import AXES, TRIANGLE_EDGES, Mesh, boundary_faces
 from ..meshing.quality import shapes
 from . import friction
-from .contact import with_middles
 from .descent import NewtonSettings
 from .elements import triangle_quadrature
 from .friction import Lag, Memory
 from .rigid import Pose, Rigid
+from .self_intersection import with_middles
 
 Array = np.ndarray[Any, Any]
 

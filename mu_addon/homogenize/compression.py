@@ -15,7 +15,7 @@ from ..fem.model import Model
 from .curve import Curve
 from .specimen import Specimen
 from .stability import Loss, Motions, first_loss, interpolated
-from .touching import Touch, first_touch
+from .strut_contact import Touch, first_touch
 
 Array = np.ndarray[Any, Any]
 Friction = Literal["slide", "stick"]

@@ -9,9 +9,9 @@ import attrs
 import numpy as np
 
 from ..errors import ConvergenceError, InputError
-from ..fem.contact import crossings
 from ..fem.factor import IndefiniteError
 from ..fem.materials import Materials
+from ..fem.self_intersection import crossings
 from ..meshing.mesh import AXES, Array, Mesh
 from .curve import Curve
 from .octant import Octant, require_factor

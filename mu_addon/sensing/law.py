@@ -17,8 +17,8 @@ import numpy as np
 from ..design.parameters import Dimensions
 from ..design.waveguide import STRUT_GAP
 from ..errors import InputError
+from .embedded_waveguide import Guided
 from .guide import Centreline, swept
-from .held import Guided
 from .notched import kinks, notched
 from .optics import Optics
 from .tracing import Light, lambertian, trace

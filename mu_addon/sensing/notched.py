@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from .embedded_waveguide import Guided
 from .guide import Centreline
-from .held import Guided
 
 Array = np.ndarray[Any, Any]
 

@@ -18,7 +18,7 @@ from ..design.parameters import Unit
 from ..design.waveguide import waveguide
 from ..errors import InputError
 from ..meshing.mesh import Mesh
-from .held import Held, Joints, held
+from .embedded_waveguide import Held, Joints, held
 from .law import Law, features, fit_law, traced
 from .optics import Optics
 

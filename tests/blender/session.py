@@ -25,7 +25,7 @@ import mu_addon
 
 bpy.ops.wm.read_factory_settings(use_empty=True)
 mu_addon.register()
-from mu_addon.blender import unit_object
+from mu_addon.blender.unit import object as unit_object
 from mu_addon.design.parameters import load_preset
 
 
@@ -47,7 +47,7 @@ def refused(operator, **settings):
 FAKE = ROOT / "tests" / "study" / "fake_worker.py"
 WATCHING = """
 import time
-from mu_addon.blender import simulation, studies
+from mu_addon.blender.simulate import state as simulation, study_folder as studies
 
 def launch(root, how):
     command = [sys.executable, sys.argv[1], how]

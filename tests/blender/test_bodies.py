@@ -7,7 +7,8 @@ pytestmark = needs_bpy
 BODIES = """
 import math
 import numpy as np
-from mu_addon.blender import bodies, stack
+from mu_addon.blender.body import state as bodies
+from mu_addon.blender.steps import state as stack
 from mu_addon.design.body import envelope
 
 
@@ -158,7 +159,7 @@ def test_an_inside_out_or_mirrored_body_is_turned(tmp_path):
 def test_a_simulation_is_given_the_body(tmp_path):
     session(
         """
-        from mu_addon.blender import simulation, studies
+        from mu_addon.blender.simulate import state as simulation, study_folder as studies
         from mu_addon.design.body import read_body
 
         root = add()

@@ -9,15 +9,15 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.evidence import unit_fem
 from mu_addon.measured import read_folder
 from tests.evidence import analytic
-from tests.study.diagnosis_data import bent_unit, weighed_blocks
-from tests.study.test_diagnosing import run as diagnosed
+from tests.usecases.diagnosis_data import bent_unit, weighed_blocks
+from tests.usecases.test_diagnose import run as diagnosed
 
 from .session import DRAWN, FAKE, PRELUDE, WATCHING, blender, needs_bpy
 
 pytestmark = needs_bpy
 
 SEEN = """
-from mu_addon.blender import evidence, evidence_motion, evidence_panel
+from mu_addon.blender.evidence import state as evidence, motion as evidence_motion, panel as evidence_panel
 
 PANELS = [evidence_panel.MU_PT_evidence]
 
@@ -69,7 +69,7 @@ def test_from_data_to_a_unit_that_has_what_was_found(tmp_path):
     session(
         """
         import json, pathlib
-        from mu_addon.blender.properties import to_unit
+        from mu_addon.blender.unit.properties import to_unit
         folder = pathlib.Path(sys.argv[2])
         bpy.context.preferences.edit.use_global_undo = True
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / "seat.blend"))
@@ -170,9 +170,9 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
     session(
         """
         import json, pathlib, shutil
-        import mu_addon.blender.panels as panels
-        from mu_addon.blender import effects
-        from mu_addon.blender.properties import to_unit
+        import mu_addon.blender.unit.panel as panels
+        from mu_addon.blender.simulate import effects
+        from mu_addon.blender.unit.properties import to_unit
         from mu_addon.evidence.extended import ExtendedModel, Fitted
 
         clogged, folder = pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])

@@ -9,8 +9,8 @@ from mu_addon.design.gripper import load_gripper
 from mu_addon.design.gripper import to_toml as gripper_toml
 from mu_addon.design.parameters import to_toml
 from mu_addon.files import write_npz
-from mu_addon.study.grip.grasp import Grip
-from mu_addon.study.point_cache import write_pc2
+from mu_addon.report.pc2 import write_pc2
+from mu_addon.usecases.grip.grasp import Grip
 
 from .session import DRAWN, FAKE, PRELUDE, WATCHING, blender, needs_bpy
 
@@ -18,7 +18,8 @@ pytestmark = needs_bpy
 
 HELD = """
 import numpy as np
-from mu_addon.blender import grasps, gripper_object, gripper_panel, motion_parts
+from mu_addon.blender.gripper import state as grasps, object as gripper_object, panel as gripper_panel
+from mu_addon.blender.results import motion as motion_parts
 PANELS = gripper_panel.CLASSES
 
 
@@ -87,7 +88,7 @@ def test_its_fingers_may_be_a_unit_of_ones_own(tmp_path):
         unit.mu_unit.chambers.wall_mm = 1.1
         bpy.ops.mu.path(name="alpha3")
         root = held(of_unit=True)
-        from mu_addon.blender.gripper_properties import to_gripper
+        from mu_addon.blender.gripper.properties import to_gripper
         core = to_gripper(root.mu_gripper)
         assert (core.unit.scale, core.unit.chambers.wall_mm, core.path) == (0.75, 1.1, "alpha3")
         # The active object decides whether unit or gripper is worked on.

@@ -15,7 +15,8 @@ GRAPH = ["--paths", "graph", "--longest-cells", "2.5", "--checks", "2"]
 
 SEEN = """
 import numpy as np
-from mu_addon.blender import fields, motion_parts, studies
+from mu_addon.blender.results import fields, motion as motion_parts
+from mu_addon.blender.simulate import study_folder as studies
 PANELS = []
 
 def started():
@@ -145,7 +146,7 @@ def test_colours_follow_the_range_and_grey_is_what_is_not_known(tmp_path, study)
 def test_the_legend_stands_in_the_scene(tmp_path, study):
     session(
         """
-        from mu_addon.blender import legend_object
+        from mu_addon.blender.results import legend_object
         root = started()
         show(name="model_a")
         root.mu_motion.field = "displacement_mm"
@@ -184,7 +185,8 @@ def test_the_legend_stands_in_the_scene(tmp_path, study):
 def test_a_path_of_the_whole_lattice_moves_and_is_shown_where_it_lies(tmp_path, study):
     session(
         """
-        from mu_addon.blender import live, ranking
+        from mu_addon.blender.unit import live_update as live
+        from mu_addon.blender.path import ranking
         root = started()
         name, j, points = ranking.free(root)
         assert name in motion_parts.motion_of(root).paths and 0 < j < 1
@@ -290,9 +292,9 @@ def test_what_is_missing_is_said(tmp_path, study):
 def test_candidates_say_their_rank(tmp_path, study):
     session(
         """
-        from mu_addon.blender import ranking
-        from mu_addon.blender.compat import modifier_input
-        from mu_addon.blender import live
+        from mu_addon.blender.path import ranking
+        from mu_addon.blender.shared.compat import modifier_input
+        from mu_addon.blender.unit import live_update as live
         root = add(preset="mu-0.75x")
         root.mu_unit.candidates = True
         assert modifier_input(unit_object.part(root, "candidate:alpha1").modifiers[0], "Label") == "α1"
@@ -321,7 +323,7 @@ def test_candidates_say_their_rank(tmp_path, study):
 def test_panels_show_the_motion(tmp_path, study):
     session(
         """
-        from mu_addon.blender import results_panel, thumbnails
+        from mu_addon.blender.results import panel as results_panel, thumbnails
         PANELS.extend(results_panel.CLASSES)
 
         root = add(preset="mu-0.75x")

@@ -6,8 +6,8 @@ pytestmark = needs_bpy
 
 EDGES = """
 import numpy as np
-from mu_addon.blender import nodes
-from mu_addon.blender.compat import modifier_input, set_modifier_input
+from mu_addon.blender.preview import nodes
+from mu_addon.blender.shared.compat import modifier_input, set_modifier_input
 
 
 def edge(length, radius=None):
@@ -232,7 +232,7 @@ def test_a_group_of_an_older_version_in_a_file_is_upgraded(tmp_path):
 def test_the_groups_become_an_asset_library_of_the_users(tmp_path):
     curves(
         """
-        from mu_addon.blender import library
+        from mu_addon.blender.assets import library
 
         names = lambda: {entry.name for entry in bpy.context.preferences.filepaths.asset_libraries}
         assert bpy.ops.mu.assets() == {"FINISHED"}
@@ -260,7 +260,7 @@ def test_the_groups_become_an_asset_library_of_the_users(tmp_path):
 def test_the_sample_scene(tmp_path):
     curves(
         """
-        from mu_addon.blender import bodies
+        from mu_addon.blender.body import state as bodies
 
         assert bpy.ops.mu.sample() == {"FINISHED"}
         whole, opened, bodied = (bpy.data.objects[n] for n in ("Whole", "Cut Open", "In a Body of Its Own"))

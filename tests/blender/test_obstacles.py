@@ -9,7 +9,8 @@ pytestmark = needs_bpy
 MET = """
 import numpy as np
 from mathutils import Vector
-from mu_addon.blender import obstacles, simulation, studies
+from mu_addon.blender.obstacles import state as obstacles
+from mu_addon.blender.simulate import state as simulation, study_folder as studies
 from mu_addon.design.body import read_body
 from mu_addon.design.surface import volume
 
@@ -118,7 +119,7 @@ def test_what_moves_or_is_edited_is_another_obstacle(tmp_path):
 def test_flaws_are_told_and_marked(tmp_path):
     session(
         """
-        from mu_addon.blender import bodies
+        from mu_addon.blender.body import state as bodies
 
         root = add()
         bpy.ops.mesh.primitive_plane_add(size=20, location=(0, 80, 30))
@@ -173,7 +174,7 @@ def test_a_box_stands_before_the_tip(tmp_path):
 def test_a_box_in_the_way_is_met_and_its_move_makes_the_study_stale(tmp_path):
     blender(
         """
-        from mu_addon.blender import legend, motion_parts
+        from mu_addon.blender.results import legend, motion as motion_parts
 
         def bent(folder):
             root.mu_unit.study.folder = sys.argv[2] + folder

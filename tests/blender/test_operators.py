@@ -13,7 +13,7 @@ pytestmark = needs_bpy
 def test_add_makes_a_unit_in_millimetres(tmp_path):
     blender(
         """
-        from mu_addon.blender.properties import to_unit
+        from mu_addon.blender.unit.properties import to_unit
 
         bpy.context.scene.cursor.location = (1.0, 2.0, 3.0)
         root = add()
@@ -171,7 +171,7 @@ def test_stl_comes_out_in_millimetres(tmp_path):
 def test_presets_of_the_users_own(tmp_path):
     said = blender(
         """
-        from mu_addon.blender import presets
+        from mu_addon.blender.unit import presets
 
         assert presets.names() == ["mu-0.75x", "mu-1.0x", "mu-1.5x"]
         root = add()
@@ -198,7 +198,7 @@ def test_presets_of_the_users_own(tmp_path):
     assert read_unit(kept).chambers.wall_mm == 1.1
     blender(
         """
-        from mu_addon.blender import presets
+        from mu_addon.blender.unit import presets
 
         assert presets.names()[-1] == "user:thick one"  # another session finds it
         assert bpy.ops.mu.preset_remove(name="user:thick one") == {"FINISHED"}
@@ -211,7 +211,7 @@ def test_presets_of_the_users_own(tmp_path):
 def test_save_and_reload(tmp_path):
     blender(
         """
-        from mu_addon.blender.properties import to_unit
+        from mu_addon.blender.unit.properties import to_unit
 
         root = add()
         root.mu_unit.chambers.wall_mm = 0.95

@@ -66,7 +66,7 @@ def test_cut_open_shows_the_wall(tmp_path):
     blender(
         """
         import numpy as np
-        from mu_addon.blender import preview
+        from mu_addon.blender.preview import arrays as preview
         from mu_addon.design.profile import cavity_polygon, outer_polygon
 
         from mu_addon.design.steps import ALONG, Given, Stack
@@ -146,7 +146,7 @@ def test_every_slider_reaches_the_preview_quickly(tmp_path):
 def test_a_preview_that_fell_behind_is_caught_up(tmp_path):
     blender(
         """
-        from mu_addon.blender import live
+        from mu_addon.blender.unit import live_update as live
 
         root = add()
         with live.held():

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from mu_addon.design.surface import bad_edges, stl_surface
-from mu_addon.study.exporting import FORMATS, MANIFEST
+from mu_addon.usecases.export.run import FORMATS, MANIFEST
 
 from .session import DRAWN, FAKE, PRELUDE, WATCHING, blender, needs_bpy
 
 pytestmark = needs_bpy
 
 SEEN = """
-from mu_addon.blender import print_panel, printing
+from mu_addon.blender.printing import panel as print_panel, state as printing
 import pathlib
 import numpy as np
 
@@ -37,7 +37,7 @@ def short():
 WRITTEN = """
 from mu_addon.design.parameters import write_unit
 from mu_addon.design.printing.printer import printer_text
-from mu_addon.blender.properties import to_unit
+from mu_addon.blender.unit.properties import to_unit
 import json
 
 def finding(check, severity, places=(), value=None, limit=None, unit="", **more):
@@ -228,7 +228,7 @@ def test_an_export_as_chosen(tmp_path):
             def invoke_confirm(self, *_, **words):
                 asked.update(words)
                 return {"RUNNING_MODAL"}
-        from mu_addon.blender.operators.printing import MU_OT_print_export as operator
+        from mu_addon.blender.printing.operators import MU_OT_print_export as operator
         context = MagicMock(wraps=bpy.context, window_manager=Manager(), object=root)
         assert operator.invoke(MagicMock(), context, None) == {"RUNNING_MODAL"}
         assert "chamber wall" in asked["message"] and not simulation.running()

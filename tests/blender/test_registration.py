@@ -46,7 +46,7 @@ def test_a_failure_while_registering_leaves_nothing(tmp_path):
         """
         import bpy
         import mu_addon
-        from mu_addon.blender import panels
+        from mu_addon.blender.unit import panel as panels
 
         def fails():
             raise RuntimeError("no")
@@ -72,7 +72,7 @@ def test_a_failure_while_registering_leaves_nothing(tmp_path):
 def test_every_parameter_of_the_core_is_a_property(tmp_path):
     blender(
         """
-        from mu_addon.blender.properties import GROUPS, UNITS
+        from mu_addon.blender.unit.properties import GROUPS, UNITS
         from mu_addon.design.parameters import SECTIONS
         from mu_addon.design.quantity import describe
 
@@ -120,8 +120,8 @@ def test_a_new_section_of_the_core_appears_by_itself(tmp_path):
         root = bpy.data.objects.new("x", None)
         group = root.mu_unit.novelty
         group.depth_mm, group.way = 1.25, "right"
-        from mu_addon.blender.panels import parameters as draw
-        from mu_addon.blender.properties import section_of
+        from mu_addon.blender.unit.panel import parameters as draw
+        from mu_addon.blender.unit.properties import section_of
         assert section_of(root.mu_unit, "novelty") == {"depth_mm": 1.25, "way": "right"}
 
         class Layout:
@@ -142,8 +142,8 @@ def test_a_new_section_of_the_core_appears_by_itself(tmp_path):
 def test_values_survive_single_precision(tmp_path):
     blender(
         """
-        from mu_addon.blender.live import held
-        from mu_addon.blender.properties import exact, from_unit, to_unit
+        from mu_addon.blender.unit.live_update import held
+        from mu_addon.blender.unit.properties import exact, from_unit, to_unit
         from mu_addon.design.parameters import preset_names
 
         assert exact(0.8999999761581421) == 0.9 and exact(3.125) == 3.125 and exact(1e6) == 1e6

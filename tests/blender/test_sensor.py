@@ -14,7 +14,7 @@ import pytest
 
 from mu_addon.sensing.calibration import Sweep, calibrate, write_calibration
 from mu_addon.sensing.recording import read_recording
-from tests.study.bent_motion import write_bent_motion
+from tests.usecases.bent_motion import write_bent_motion
 
 from .session import DRAWN, PRELUDE, blender, needs_bpy
 
@@ -24,7 +24,9 @@ SENDER = Path(__file__).parents[1] / "sensing" / "sender.py"
 
 SEEN = """
 import pathlib, time
-from mu_addon.blender import motion_parts, sensor, sensor_panel, simulation, studies, twin
+from mu_addon.blender.results import motion as motion_parts
+from mu_addon.blender.sensor import state as sensor, panel as sensor_panel, twin
+from mu_addon.blender.simulate import state as simulation, study_folder as studies
 
 def watch(until, seconds=120):
     end = time.monotonic() + seconds
@@ -209,7 +211,7 @@ def test_a_device_at_a_pty_that_is_unplugged_twice(tmp_path):
             age, low, high = s.traces.extremes()
             assert len(age) > 10 and (low[:4, -1] <= high[:4, -1]).all()
             assert bpy.ops.mu.sensor_channel(name="light2_V") == {"FINISHED"}
-            from mu_addon.blender import sensor_plot
+            from mu_addon.blender.sensor import plot as sensor_plot
             assert [name for _, name in sensor_plot.shown(root.mu_sensor, s)] == [
                 "light0_V", "light1_V", "light3_V"
             ]
@@ -456,7 +458,7 @@ def test_what_is_drawn_does_not_grow_with_the_rate_and_stays_in_its_axes(tmp_pat
     session(
         """
         import numpy as np
-        from mu_addon.blender import sensor_plot
+        from mu_addon.blender.sensor import plot as sensor_plot
         root = started()
         s = connected(root)
         rows = np.random.default_rng(0).normal(2.0, 0.1, (50_000, 5))

@@ -10,7 +10,9 @@ from .session import DRAWN, FAKE, PRELUDE, WATCHING, blender, needs_bpy
 pytestmark = needs_bpy
 
 SEEN = """
-from mu_addon.blender import obstacle_panel, panels, print_panel
+from mu_addon.blender.obstacles import panel as obstacle_panel
+from mu_addon.blender.unit import panel as panels
+from mu_addon.blender.printing import panel as print_panel
 PANELS = [*panels.CLASSES, obstacle_panel.MU_PT_obstacles, *print_panel.CLASSES]
 PANELS += [bpy.types.MU_MT_presets, bpy.types.MU_MT_presets_remove]
 
@@ -162,7 +164,7 @@ def test_two_simulations_of_one_unit_are_refused(tmp_path):
     session(
         """
         from mu_addon.errors import InputError
-        from mu_addon.blender.properties import to_unit
+        from mu_addon.blender.unit.properties import to_unit
         root = add()
         launch(root, "hang")
         try:

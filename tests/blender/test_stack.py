@@ -7,7 +7,7 @@ pytestmark = needs_bpy
 COUNTED = """
 import numpy as np
 from collections import Counter
-from mu_addon.blender import stack
+from mu_addon.blender.steps import state as stack
 from mu_addon.design.steps import STEPS
 
 

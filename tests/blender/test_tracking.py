@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mu_addon.measured import read_folder
-from mu_addon.study.tracking import read_pixels
+from mu_addon.usecases.track_video.run import read_pixels
 from tests.headless.processes import assert_clear_failure, run
 
 from .filming import MM_PER_PIXEL, described, film, pressures
@@ -128,8 +128,8 @@ def editor(clip):
     region = next(r for r in area.regions if r.type == "WINDOW")
     return bpy.context.temp_override(window=window, area=area, region=region)
 
-from mu_addon.blender import bench, tracking
-from mu_addon.study.tracking import Marks
+from mu_addon.blender.track import properties as bench, state as tracking
+from mu_addon.usecases.track_video.run import Marks
 """
 
 

@@ -19,7 +19,7 @@ from mu_addon.evidence.selection import TOLD_APART
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
 from mu_addon.measured import read_folder
-from mu_addon.processes import one_thread_each
+from mu_addon.run.processes import one_thread_each
 from tests.blind import unit_runs
 from tests.blind.machines import BENCHES
 from tests.blind.truth import UNITS

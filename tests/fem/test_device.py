@@ -15,11 +15,11 @@ from scipy.sparse.linalg import eigsh
 
 from mu_addon.errors import ConvergenceError
 from mu_addon.fem import conjugate_gradients, kernels, krylov_kernels
+from mu_addon.fem.batched_newton import Lockstep, Variant
 from mu_addon.fem.conjugate_gradients import ConjugateGradients
 from mu_addon.fem.equilibrium import Equilibrium, rest
 from mu_addon.fem.factor import IndefiniteError
 from mu_addon.fem.laws import NeoHooke
-from mu_addon.fem.lockstep import Lockstep, Variant
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.variants import Change, IterativeVariants

@@ -7,11 +7,11 @@ from scipy.spatial.transform import Rotation
 from mu_addon.errors import ConvergenceError, InputError
 from mu_addon.fem.equilibrium import Equilibrium, rest
 from mu_addon.fem.loads import gravity
-from mu_addon.fem.marching import march
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.obstacle import CONTACT, Obstacle
 from mu_addon.fem.rigid import Box, Plane, Pose, Sphere
+from mu_addon.fem.time_stepping import march
 from mu_addon.fem.trajectory import simulate
 
 from .bodies import box, hollow_box

@@ -9,9 +9,9 @@ from scipy.optimize import brentq
 from mu_addon.errors import ConvergenceError, InputError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.laws import Friction, NeoHooke, OgdenRoxburgh, Prony, Yeoh
-from mu_addon.fem.marching import march
 from mu_addon.fem.materials import Layer, Materials
 from mu_addon.fem.model import Model
+from mu_addon.fem.time_stepping import march
 from mu_addon.fem.trajectory import simulate
 from mu_addon.meshing.mesh import Mesh, boundary_faces
 

@@ -16,10 +16,10 @@ from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
+from mu_addon.placement.batch import Sweep
 from mu_addon.placement.candidates import candidates, roi, with_sensor
 from mu_addon.placement.inclusion import sensor_share
 from mu_addon.placement.influence import influence, loaded
-from mu_addon.placement.sweep import Sweep
 
 UNIT = load_preset("mu-1.0x")
 FOAM = np.array([0.006, 5.0, 0.006, 4.0, 0.01, -2.0])

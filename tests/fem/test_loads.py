@@ -6,9 +6,9 @@ import pytest
 from mu_addon.errors import ConvergenceError
 from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, rest
 from mu_addon.fem.loads import STANDARD_GRAVITY, gravity, traction
-from mu_addon.fem.marching import march
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
+from mu_addon.fem.time_stepping import march
 from mu_addon.fem.trajectory import simulate
 from mu_addon.meshing.mesh import MEMBRANE, Mesh, boundary_faces
 

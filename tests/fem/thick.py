@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, rest
-from mu_addon.fem.marching import march
 from mu_addon.fem.model import Model
+from mu_addon.fem.time_stepping import march
 
 from . import bodies
 from .radial import inner_stretch

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mu_addon.design.parameters import read_unit
-from tests.study.diagnosis_data import weighed_blocks
+from tests.usecases.diagnosis_data import weighed_blocks
 
 from .processes import assert_clear_failure, run
 

@@ -16,7 +16,7 @@ import pytest
 from mu_addon.design.anchors import anchors
 from mu_addon.design.parameters import load_preset, read_unit
 
-from ..study.browser import EXECUTABLE, Browser, complaints, requests
+from ..report.browser import EXECUTABLE, Browser, complaints, requests
 from .processes import COARSE, ROOT, RUN, command, run
 
 

@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from mu_addon.study.command import main
+from mu_addon.cli.main import main
 
 pytestmark = pytest.mark.slow
 

@@ -9,8 +9,8 @@ import pytest
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.study.folder import keep_inputs
-from mu_addon.study.job import Job, grasp
+from mu_addon.run.folder import keep_inputs
+from mu_addon.usecases.simulate_and_place.job import Job, grasp
 
 from .processes import assert_clear_failure, command, run
 

@@ -27,7 +27,7 @@ def archive(tmp_path_factory):
 @needs_bpy
 def test_archive_holds_what_ships(archive):
     names = zipfile.ZipFile(archive).namelist()
-    assert {"blender_manifest.toml", "__init__.py", "LICENSE", "errors.py", "study/report.css"} <= set(names)
+    assert {"blender_manifest.toml", "__init__.py", "LICENSE", "errors.py", "report/report.css"} <= set(names)
     for name in names:
         assert not name.startswith(("tests/", "docs/", "benchmarks/", "."))
         assert "__pycache__" not in name

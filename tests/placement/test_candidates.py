@@ -16,9 +16,9 @@ from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.mesh import mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
+from mu_addon.placement.batch import Sweep
 from mu_addon.placement.candidates import candidates, evaluate, evaluation, moved_points, roi
 from mu_addon.placement.inclusion import RULES, sensor_share
-from mu_addon.placement.sweep import Sweep
 
 UNIT = load_preset("mu-1.0x")
 COARSE = MeshSettings(refine=0.5)

@@ -16,6 +16,7 @@ from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.mesh import LATTICE, mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
+from mu_addon.placement.batch import Sweep
 from mu_addon.placement.deviation import centreline, deviation
 from mu_addon.placement.graph import Limits, lattice_graph
 from mu_addon.placement.inclusion import sensor_share
@@ -23,7 +24,6 @@ from mu_addon.placement.influence import gradients_of, loaded, mean_deviation, s
 from mu_addon.placement.polyline import polyline_inclusion
 from mu_addon.placement.response import response
 from mu_addon.placement.search import SearchSettings, chance_of_better, front, search
-from mu_addon.placement.sweep import Sweep
 
 UNIT = load_preset("mu-1.0x")
 D = UNIT.dimensions

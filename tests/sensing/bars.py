@@ -9,7 +9,7 @@ from mu_addon.design.anchors import anchors, window
 from mu_addon.design.parameters import Unit, load_preset
 from mu_addon.design.waveguide import waveguide
 from mu_addon.meshing.mesh import Mesh
-from mu_addon.sensing.held import Held, held
+from mu_addon.sensing.embedded_waveguide import Held, held
 from tests.fem.bodies import box
 
 

@@ -1,0 +1,95 @@
+"""The sample scene: what the extension makes, side by side, by the same operators that a designer uses."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import bpy
+
+from ..preview import nodes
+from ..shared.compat import set_modifier_input
+from ..unit import object as unit_object
+
+APART_MM = 130.0
+
+
+def build(context: Any) -> list[Any]:
+    """Three units in the scene, whole, cut open with paths, and in a body, and a curve; the roots."""
+    cursor = context.scene.cursor.location.copy()
+    roots = []
+    try:
+        for number in range(3):
+            context.scene.cursor.location = cursor + _beside(number)
+            bpy.ops.mu.add(preset="mu-1.0x", frame=False)
+            roots.append(unit_object.active_root(context))
+    finally:
+        context.scene.cursor.location = cursor
+    whole, opened, bodied = roots
+    whole.name, opened.name, bodied.name = "Whole", "Cut Open", "In a Body of Its Own"
+
+    context.view_layer.objects.active = opened
+    opened.mu_unit.cut = True
+    opened.mu_unit.candidates = True
+    bpy.ops.mu.path(name="alpha4")
+
+    body = _barrel(context, bodied)
+    for other in context.selected_objects:
+        other.select_set(False)
+    body.select_set(True)
+    context.view_layer.objects.active = bodied
+    context.view_layer.update()
+    bpy.ops.mu.body()
+    _curve(context, cursor + _beside(3))
+    context.view_layer.objects.active = whole
+    return roots
+
+
+def _beside(number: int) -> Any:
+    from mathutils import Vector
+
+    return Vector((0.0, APART_MM * number, 0.0))
+
+
+def _barrel(context: Any, root: Any) -> Any:
+    """A barrel, wider at its middle, around a unit's chambers and anchors."""
+    around, rings = 48, 9
+    vertices, faces = [], []
+    for ring in range(rings):
+        share = ring / (rings - 1)
+        z, width = -2.0 + 79.0 * share, 20.0 + 5.0 * math.sin(math.pi * share)
+        for k in range(around):
+            angle = 2.0 * math.pi * k / around
+            vertices.append((width * math.cos(angle), 7.0 + 1.35 * width * math.sin(angle), z))
+    for ring in range(rings - 1):
+        for k in range(around):
+            a, b = ring * around + k, ring * around + (k + 1) % around
+            faces.append((a, b, b + around, a + around))
+    faces.append(tuple(reversed(range(around))))
+    faces.append(tuple(range((rings - 1) * around, rings * around)))
+    mesh = bpy.data.meshes.new("Barrel")
+    mesh.from_pydata(vertices, [], faces)
+    obj = bpy.data.objects.new("Barrel", mesh)
+    obj.location = root.location
+    context.collection.objects.link(obj)
+    return obj
+
+
+def _curve(context: Any, at: Any) -> Any:
+    """A curve of the user's own kind, with a waveguide and its wells along it."""
+    curve = bpy.data.curves.new("Own Curve", "CURVE")
+    curve.dimensions = "3D"
+    spline = curve.splines.new("BEZIER")
+    spline.bezier_points.add(2)
+    for point, place in zip(
+        spline.bezier_points, ((0.0, 0.0, 5.0), (0.0, 14.0, 38.0), (0.0, 0.0, 70.0)), strict=True
+    ):
+        point.co = place
+        point.handle_left_type = point.handle_right_type = "AUTO"
+    obj = bpy.data.objects.new("Waveguide on a Curve", curve)
+    obj.location = at
+    context.collection.objects.link(obj)
+    modifier = nodes.skin(obj, "MU Waveguide")
+    for name, value in {"Section": 3.0, "Pitch": 6.0, "Well Width": 2.0, "Well Depth": 1.2}.items():
+        set_modifier_input(modifier, name, value)
+    return obj

@@ -1,0 +1,95 @@
+"""A body of the user's own: check it, make it the unit's envelope, take it out again."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+
+from ...design.body import require_sound
+from ...errors import InputError
+from ..shared.acting import OnUnit, telling
+from ..unit import object as unit_object
+from ..unit.properties import to_unit
+from . import state as bodies
+
+
+def selected_meshes(context):
+    """Selected meshes that are no parts of a unit; raises InputError where there is none."""
+    found = [o for o in context.selected_objects if o.type == "MESH" and unit_object.root_of(o) is None]
+    if not found:
+        raise InputError("no mesh is selected besides the unit", "selection", "select a closed mesh")
+    return found
+
+
+def selected_mesh(context):
+    """The selected mesh that is no part of a unit; raises InputError where there is none, or more."""
+    found = selected_meshes(context)
+    if len(found) > 1:
+        raise InputError(
+            f"{len(found)} meshes are selected besides the unit", "selection", "select one closed mesh"
+        )
+    return found[0]
+
+
+def tell_flaws(operator, root, found, sound):
+    """Mark the places of a body's flaws, and tell what they are; `sound` where there are none."""
+    unit_object.mark(root, [place for flaw in found for place in flaw.places])
+    if not found:
+        operator.report({"INFO"}, sound)
+    for flaw in found:
+        operator.report({"WARNING"}, f"{flaw.what[:1].upper()}{flaw.what[1:]}: {flaw.remedy}")
+
+
+class MU_OT_body_check(OnUnit, bpy.types.Operator):
+    """Examine the selected mesh: open edges, faces that cut each other, size, fit; mark the places"""
+
+    bl_idname = "mu.body_check"
+    bl_label = "Check Body"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        body = bodies.of_object(selected_mesh(context), root)
+        found = bodies.examined(body, to_unit(root.mu_unit).dimensions)
+        tell_flaws(self, root, found, f"{body.name} can be an envelope: {len(body.triangles)} triangles")
+        return {"FINISHED"}
+
+
+class MU_OT_body(OnUnit, bpy.types.Operator):
+    """Make a copy of the selected mesh the unit's envelope, which the lattice then fills"""
+
+    bl_idname = "mu.body"
+    bl_label = "Use as Envelope"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        obj = selected_mesh(context)
+        body = bodies.of_object(obj, root)
+        require_sound(body, bodies.examined(body, to_unit(root.mu_unit).dimensions))
+        unit_object.put_envelope(root, body)
+        obj.hide_set(True)
+        unit_object.mark(root, [])
+        unit_object.rebuild(root)
+        return {"FINISHED"}
+
+
+class MU_OT_body_remove(OnUnit, bpy.types.Operator):
+    """Take the body of your own out of the unit: the lattice fills its box again"""
+
+    bl_idname = "mu.body_remove"
+    bl_label = "Remove Body"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        unit_object.remove_bodies(root)
+        unit_object.rebuild(root)
+        return {"FINISHED"}
+
+
+CLASSES = (MU_OT_body_check, MU_OT_body, MU_OT_body_remove)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

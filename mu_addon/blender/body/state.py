@@ -1,0 +1,90 @@
+"""Bodies of the user's own: a selected mesh, taken into a unit's frame, examined by the core, and kept."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...design.body import Body, Flaw, body_of, envelope, flaws, misfits
+from ...design.parameters import Dimensions, Unit
+from ...errors import InputError
+from ...files import write_text
+
+ENVELOPE = "envelope"
+FLAWS = "flaws"
+PARTS = (ENVELOPE, FLAWS)
+"""Parts of a unit that are the user's, and that no rebuild removes."""
+
+_kept: dict[tuple[str, str], Body] = {}
+
+
+def of_object(obj: Any, root: Any) -> Body:
+    """The mesh of an object, its modifiers applied, in the frame of a unit; raises InputError."""
+    if obj is None or obj.type != "MESH":
+        raise InputError("no mesh is selected besides the unit", "selection", "select one closed mesh")
+    seen = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = seen.to_mesh()
+    try:
+        vertices, triangles = _arrays(mesh)
+    finally:
+        seen.to_mesh_clear()
+    to_unit = np.array(root.matrix_world.inverted() @ obj.matrix_world)
+    if np.linalg.det(to_unit[:3, :3]) < 0.0:
+        triangles = triangles[:, ::-1]
+    return body_of(vertices @ to_unit[:3, :3].T + to_unit[:3, 3], triangles, obj.name)
+
+
+def examined(body: Body, d: Dimensions) -> list[Flaw]:
+    """Why a body cannot be the envelope of a unit of these dimensions."""
+    return flaws(body) or misfits(body, d)
+
+
+def envelope_in(root: Any, unit: Unit) -> Body | None:
+    """The envelope that the user gave a unit, cut to its length, or None; raises InputError."""
+    obj = _part(root, ENVELOPE)
+    if obj is None:
+        return None
+    vertices, triangles = _arrays(obj.data)
+    digest = hashlib.sha256(vertices.tobytes() + triangles.tobytes()).hexdigest()
+    key = digest, repr((unit.scale, unit.chambers))
+    if key not in _kept:
+        if len(_kept) > 16:
+            _kept.clear()
+        _kept[key] = envelope(body_of(vertices, triangles, obj.name), unit.dimensions)
+    return _kept[key]
+
+
+def fingerprint(root: Any) -> str:
+    """Text that differs whenever the user's envelope does."""
+    obj = _part(root, ENVELOPE)
+    if obj is None:
+        return ""
+    return hashlib.sha256(b"".join(array.tobytes() for array in _arrays(obj.data))).hexdigest()
+
+
+def arguments(root: Any, unit: Unit, folder: Path) -> list[str]:
+    """Words of the command line that hand the user's envelope over, a file in `folder`; or OutputError."""
+    body = envelope_in(root, unit)
+    if body is None:
+        return []
+    path = folder / "body.obj"
+    write_text(path, body.text())
+    return ["--body", str(path)]
+
+
+def _part(root: Any, name: str) -> Any:
+    return next((child for child in root.children if child.get("mu_part") == name), None)
+
+
+def _arrays(mesh: Any) -> tuple[Any, Any]:
+    """Vertices (n, 3) float64 and triangles (m, 3) of a Blender mesh."""
+    mesh.calc_loop_triangles()
+    vertices = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", vertices)
+    triangles = np.empty(3 * len(mesh.loop_triangles), np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles)
+    return vertices.reshape(-1, 3).astype(float), triangles.reshape(-1, 3).astype(np.int64)

@@ -1,0 +1,227 @@
+"""Diagnose measured data, show their motion, and give the unit what was found."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+from bpy.props import EnumProperty, StringProperty
+
+from ..shared.acting import RUN_FILES, CancelsJob, DismissesJob, OnSoundUnit, OnUnit, OpensRun, telling
+from ..simulate import effects
+from ..simulate import state as simulation
+from ..simulate import study_folder as studies
+from ..unit import live_update as live
+from ..unit import object as unit_object
+from ..unit.properties import from_unit, to_unit
+from . import motion as evidence_motion
+from . import state as evidence
+
+NO_DATA = "Choose a folder of measured data first"
+
+
+def _current(context):
+    """The unit's root and what was diagnosed of it, or None and why there is nothing to use."""
+    root = unit_object.active_root(context)
+    found = evidence.said(root)
+    if found is None or not found.name:
+        return root, None, "Diagnose the measured data first"
+    if found.stale:
+        return root, None, f"The diagnosis is stale: {found.stale}"
+    return root, found, ""
+
+
+class MU_OT_evidence_diagnose(OnSoundUnit, bpy.types.Operator):
+    """Ask the measured data what is wrong with the simulation, why, and what mending it gains"""
+
+    bl_idname = "mu.evidence_diagnose"
+    bl_label = "Diagnose"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        root = unit_object.active_root(context)
+        found = evidence.checked(root)
+        trouble = ""
+        if found is None or found.measured is None:
+            trouble = found.trouble[0] if found else NO_DATA
+        elif evidence.job(root) in simulation.running():
+            trouble = "It is being diagnosed"
+        elif simulation.missing():
+            trouble = f"Not in this Blender: {', '.join(simulation.missing())}"
+        if trouble:
+            cls.poll_message_set(trouble)
+        return not trouble
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        studies.settle(root)
+        data = bpy.path.abspath(root.mu_evidence.folder)
+        words = ["diagnose", data]
+        simulation.start(evidence.job(root), to_unit(root.mu_unit), evidence.folder_of(root), words)
+        live.redraw()
+        return {"FINISHED"}
+
+
+class MU_OT_evidence_cancel(CancelsJob, bpy.types.Operator):
+    """Stop the diagnosis; the simulations it has finished are kept, and the next one goes on from there"""
+
+    bl_idname = "mu.evidence_cancel"
+    bl_label = "Cancel"
+    bl_options = {"REGISTER"}
+    idle = "Nothing is being diagnosed"
+    job_of = staticmethod(evidence.job)
+
+
+class MU_OT_evidence_dismiss(DismissesJob, bpy.types.Operator):
+    """Take the message of an ended diagnosis off the panel"""
+
+    bl_idname = "mu.evidence_dismiss"
+    bl_label = "Dismiss"
+    bl_options = {"REGISTER"}
+    job_of = staticmethod(evidence.job)
+
+
+class MU_OT_evidence_open(OpensRun, bpy.types.Operator):
+    """Open a file of the unit's diagnosis"""
+
+    bl_idname = "mu.evidence_open"
+    bl_label = "Open"
+    bl_options = {"REGISTER"}
+    first = "diagnose first"
+    folder_of = staticmethod(evidence.folder_of)
+
+    what: EnumProperty(name="What", description="File or folder of the diagnosis to open", items=RUN_FILES)
+
+
+class MU_OT_evidence_apply(OnSoundUnit, bpy.types.Operator):
+    """Give the unit what was found, so that the next simulation has it: undo takes it back"""
+
+    bl_idname = "mu.evidence_apply"
+    bl_label = "Apply Extended Model"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        _, found, trouble = _current(context)
+        if found is not None and found.name not in ("named", "ambiguous"):
+            trouble = "No effect was named that could be applied"
+        if not trouble and evidence.applied(unit_object.active_root(context)):
+            trouble = "The unit has this model: undo takes it back"
+        if not trouble and simulation.missing():
+            trouble = f"Not in this Blender: {', '.join(simulation.missing())}"
+        if trouble:
+            cls.poll_message_set(trouble)
+        return not trouble
+
+    @telling
+    def execute(self, context):
+        # Only now: it brings in the simulator's packages, which a Blender may lack.
+        from ...usecases.simulate_and_place.extended_unit import read_extended
+
+        root, found, _ = _current(context)
+        extended = read_extended(to_unit(root.mu_unit), found.folder / evidence.MODEL)
+        for words in extended.left_out:
+            self.report({"WARNING"}, f"Not applied: {words}")
+        if not extended.applied:
+            self.report({"ERROR"}, "Nothing of the model has a counterpart in a unit")
+            return {"CANCELLED"}
+        beside = extended.effects.words()
+        own = [words for words in extended.applied if words not in beside]
+        evidence.mark_applied(root, "; ".join(own), "; ".join(beside))
+        with live.held():
+            from_unit(root.mu_unit, extended.unit)
+        # The diagnosis knew nothing of effects that the simulation had before: its own take their place.
+        effects.keep(root, extended.kept.text() if extended.effects else "")
+        unit_object.rebuild(root)
+        self.report({"INFO"}, f"Applied: {'; '.join(extended.applied)}")
+        return {"FINISHED"}
+
+
+class MU_OT_evidence_remove(OnUnit, bpy.types.Operator):
+    """Take from the unit's simulation what was found beside its parameters: undo brings it back"""
+
+    bl_idname = "mu.evidence_remove"
+    bl_label = "Remove Effects"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if not effects.asked(unit_object.active_root(context)):
+            cls.poll_message_set("The unit's simulation has no effects beside its parameters")
+            return False
+        return True
+
+    @telling
+    def execute(self, context):
+        effects.keep(unit_object.active_root(context), "")
+        live.redraw()
+        return {"FINISHED"}
+
+
+class MU_OT_evidence_motion(OnUnit, bpy.types.Operator):
+    """Show an experiment on the timeline beside the unit, measured and simulated; once more takes it off"""
+
+    bl_idname = "mu.evidence_motion"
+    bl_label = "Show Measured Motion"
+    bl_options = {"REGISTER", "UNDO"}
+
+    experiment: StringProperty(
+        name="Experiment", description="Name of an experiment of a unit under pressure; nothing takes it off"
+    )
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        if not self.experiment:
+            evidence_motion.hide(root)
+            return {"FINISHED"}
+        course = evidence.course(root, self.experiment)
+        if course is None:
+            self.report({"ERROR"}, f"No unit under pressure was measured as {self.experiment!r}")
+            return {"CANCELLED"}
+        evidence_motion.show(root, self.experiment, course, context.scene)
+        return {"FINISHED"}
+
+
+class MU_OT_evidence_protocol(OnUnit, bpy.types.Operator):
+    """Let the unit's next simulation follow an experiment's pressures, so that both play in the same time"""
+
+    bl_idname = "mu.evidence_protocol"
+    bl_label = "Simulate These Pressures"
+    bl_options = {"REGISTER", "UNDO"}
+
+    experiment: StringProperty(
+        name="Experiment", description="Name of an experiment of a unit under pressure"
+    )
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        course = evidence.course(root, self.experiment)
+        if course is None:
+            self.report({"ERROR"}, f"No unit under pressure was measured as {self.experiment!r}")
+            return {"CANCELLED"}
+        path = evidence.write_protocol(course, studies.settle(root) / evidence.PROTOCOL)
+        root.mu_unit.study.protocol = str(path)
+        return {"FINISHED"}
+
+
+CLASSES = (
+    MU_OT_evidence_protocol,
+    MU_OT_evidence_diagnose,
+    MU_OT_evidence_cancel,
+    MU_OT_evidence_dismiss,
+    MU_OT_evidence_open,
+    MU_OT_evidence_apply,
+    MU_OT_evidence_remove,
+    MU_OT_evidence_motion,
+)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -1,0 +1,151 @@
+"""The panel Evidence of the sidebar tab MU: measured data, their verdict, and what to do with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from ..simulate import state as simulation
+from ..unit.panel import OfUnit, start, told, wrapped
+from . import motion as evidence_motion
+from . import state as evidence
+
+JOB = "evidence_"
+ROWS = 5
+"""Rows of the dependence table that are shown; the report has them all."""
+ICONS = {"none": "CHECKMARK", "named": "LIGHT", "ambiguous": "QUESTION"}
+ICONS |= {"unidentifiable": "QUESTION", "unexplained": "ERROR"}
+
+
+def spoken(name: str) -> str:
+    """An effect's or quantity's name as it is said."""
+    return name.replace("_", " ")
+
+
+class MU_PT_evidence(OfUnit, bpy.types.Panel):
+    """Measured data against the simulation: what is wrong, why, and what mending it gains"""
+
+    bl_idname = "MU_PT_evidence"
+    bl_label = "Evidence"
+
+    def show(self, layout, context, root):
+        layout.prop(root.mu_evidence, "folder")
+        found = evidence.checked(root)
+        if found is None:
+            wrapped(layout, "Choose a folder with experiments.toml and its CSV files", "INFO")
+            wrapped(
+                layout, "A video of the bench becomes one in the Movie Clip Editor, sidebar tab MU", "INFO"
+            )
+            return
+        if found.measured is None:
+            box = layout.box()
+            box.alert = True
+            wrapped(box, "\n".join(found.trouble), "ERROR")
+            return
+        _experiments(layout, context, root, found.measured)
+        child = simulation.of(evidence.job(root))
+        start(layout, child, "mu.evidence_diagnose", "VIEWZOOM")
+        told(layout, child, "see below", JOB)
+        judged = evidence.said(root)
+        if judged is None or not judged.name:
+            wrapped(
+                layout, "Not diagnosed yet" if judged is None else "The diagnosis is not finished", "INFO"
+            )
+            return
+        _verdict(layout, root, judged)
+
+
+def _experiments(layout, context, root, measured):
+    """A line an experiment, with a button that plays it; then what the reader remarked."""
+    shown = evidence_motion.shown(root)
+    column = layout.column(align=True)
+    for e in measured.experiments:
+        row = column.row(align=True)
+        held = e.role != "fit"
+        said = f"{e.name}, held out" if held else f"{e.name}: {len(e)} rows"
+        row.label(text=said, icon="HIDE_ON" if held else "CHECKBOX_HLT")
+        button = row.row(align=True)
+        button.enabled = e.kind == "unit_pressure"
+        on = e.name == shown
+        button.operator("mu.evidence_motion", text="", icon="PLAY", depress=on).experiment = (
+            "" if on else e.name
+        )
+    if shown:
+        time, angles = evidence_motion.reading(root, context.scene)
+        said = [f"{evidence_motion.LOOKS[s][0].lower()} {angle:+.1f}" for s, angle in angles.items()]
+        wrapped(layout, f"at {time:.2f} s: {', '.join(said)} deg" if said else f"at {time:.2f} s", "TIME")
+        layout.operator("mu.evidence_protocol", icon="GRAPH").experiment = shown
+    if measured.remarks:
+        header, body = layout.panel("MU_remarks", default_closed=True)
+        header.label(text=f"{len(measured.remarks)} remark(s) on the data", icon="INFO")
+        if body:
+            for remark in measured.remarks:
+                wrapped(body, f"{remark.what} ({Path(remark.where).name})")
+
+
+def _verdict(layout, root, judged):
+    box = layout.box()
+    if judged.stale:
+        box.alert = True
+        wrapped(box, f"Stale: {judged.stale}. Diagnose again", "ERROR")
+    column = box.column()
+    column.active = not judged.stale
+    headline = str(judged.summary.get("headline", ""))
+    title = evidence.NAMES.get(judged.name, judged.name)
+    wrapped(
+        column, f"{title}: {headline}" if judged.name in ("named", "ambiguous") else title, ICONS[judged.name]
+    )
+    # Mechanism and parameters with their intervals, or why nothing is named.
+    wrapped(column, str(judged.summary.get("sentence", "")))
+    for cause in judged.verdict.get("causes") or ():
+        if cause["rivals"]:
+            rivals = ", ".join(spoken(name) for name in cause["rivals"])
+            wrapped(
+                column, f"explained as well by {rivals}, in place of {spoken(cause['effect'])}", "QUESTION"
+            )
+    gain = (judged.verdict.get("gain") or {}).get("held_out") or {}
+    if gain.get("rmse_before") is not None and judged.verdict.get("causes"):
+        wrapped(
+            column,
+            f"Error on held-out data {gain['rmse_before']:.3g} -> {gain['rmse_after']:.3g} {gain['unit']}",
+            "FORWARD",
+        )
+    if judged.summary.get("next"):
+        wrapped(column, f"Next: {judged.summary['next']}", "EXPERIMENTAL")
+    _dependence(layout, judged)
+    row = layout.row(align=True)
+    row.operator("mu.evidence_open", text="Report", icon="URL").what = "report"
+    row.operator("mu.evidence_open", text="Folder", icon="FILE_FOLDER").what = "folder"
+    layout.operator("mu.evidence_apply", icon="CHECKMARK")
+    words = evidence.applied(root)
+    if words:
+        wrapped(layout, f"The unit has it: {words}", "INFO")
+
+
+def _dependence(layout, judged):
+    """What the model's residuals depend on, the surest first."""
+    rows = judged.dependence
+    if not rows:
+        return
+    header, body = layout.panel("MU_dependence", default_closed=True)
+    header.label(text="What the Error Depends on")
+    if body:
+        for against, p, where in rows[:ROWS]:
+            row = body.row()
+            row.label(text=spoken(against), icon="ERROR" if p < 0.01 else "BLANK1")
+            row.label(text="p < 1e-16" if p < 1e-16 else f"p = {p:.2g}")
+            if where and p < 0.01:
+                wrapped(body, where, "BLANK1")
+        if len(rows) > ROWS:
+            body.label(text=f"{len(rows) - ROWS} more in the report")
+
+
+def register() -> None:
+    """The panel."""
+    bpy.utils.register_class(MU_PT_evidence)
+
+
+def unregister() -> None:
+    """The panel."""
+    bpy.utils.unregister_class(MU_PT_evidence)

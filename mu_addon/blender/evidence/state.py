@@ -1,0 +1,294 @@
+"""A unit's measured data and what was diagnosed from them, read again only when files change."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import csv
+import hashlib
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import attrs
+import bpy
+import numpy as np
+from bpy.props import PointerProperty, StringProperty
+
+from ...design.parameters import read_unit
+from ...errors import InputError, MuError
+from ...files import write_csv
+from ...measured import Measured, read_folder
+from ...measured.folder import FILE
+from ..simulate import effects
+from ..simulate import study_folder as studies
+from ..unit.properties import BESIDE_BLEND_FILE, to_unit
+
+FOLDER = "evidence"
+"""Folder of the diagnosis in the unit's study folder."""
+PROTOCOL = "measured-pressures.csv"
+"""Pressures of an experiment, in the unit's study folder, for a simulation to follow."""
+AT_REST = 0.02
+"""A record that begins within this share of its range of 0 begins at rest."""
+MODEL, REPORT, RESIDUALS = "model.toml", "report.html", "residuals.csv"
+NAMES = {"none": "Nothing wrong", "named": "Named", "ambiguous": "Ambiguous"}
+NAMES |= {"unidentifiable": "Cannot be told", "unexplained": "Unexplained"}
+"""Verdicts as they are headed."""
+
+
+class MU_PG_evidence(bpy.types.PropertyGroup):
+    """Measured data of a unit."""
+
+    folder: StringProperty(
+        name="Measured Data",
+        description="Folder with experiments.toml and the CSV files it names",
+        subtype="DIR_PATH",
+        options=BESIDE_BLEND_FILE,
+    )
+    # Model that the unit was given last, the unit before it, and what it and its simulation got in words.
+    applied: StringProperty(options={"HIDDEN"})
+
+
+@attrs.frozen(eq=False)
+class Checked:
+    """A folder of measured data, or why it cannot be used: the lines of an error, what, where and remedy."""
+
+    measured: Measured | None
+    trouble: tuple[str, ...] = ()
+    digest: dict[str, Any] = attrs.field(factory=dict)
+
+
+@attrs.frozen(eq=False)
+class Said:
+    """What a diagnosis found: verdict.json and summary.json; stale: why it is not of the unit now."""
+
+    folder: Path
+    status: str
+    stale: str
+    verdict: dict[str, Any]
+    summary: dict[str, Any]
+
+    @property
+    def name(self) -> str:
+        """Its verdict, one of the keys of `NAMES`, or nothing where the run did not come to its end."""
+        return str(self.verdict.get("verdict", "")) if self.status == "complete" else ""
+
+    @property
+    def dependence(self) -> list[tuple[str, float, str]]:
+        """What the base model's residuals depend on: name, p-value and where, the surest first."""
+        rows = self.verdict.get("residual_table") or []
+        found = [(str(r["against"]), float(r["p_value"]), str(r.get("where") or "")) for r in rows]
+        return sorted(found, key=lambda row: row[1])
+
+
+def job(root: Any) -> str:
+    """Name under which the unit's diagnosis runs beside its simulation."""
+    return f"{root.mu_unit.uuid}:{FOLDER}"
+
+
+def folder_of(root: Any) -> Path:
+    """Folder of the unit's diagnosis."""
+    return studies.folder_of(root) / FOLDER
+
+
+_checked: dict[Path, tuple[Any, Checked]] = {}
+
+
+def checked(root: Any) -> Checked | None:
+    """The unit's measured data, or None where no folder was chosen."""
+    if not root.mu_evidence.folder:
+        return None
+    folder = Path(bpy.path.abspath(root.mu_evidence.folder))
+    state = _state([folder / FILE, *sorted(folder.glob("*.csv"))])
+    kept = _checked.get(folder)
+    if kept is None or kept[0] != state:
+        kept = _checked[folder] = state, _check(folder)
+    return kept[1]
+
+
+def _check(folder: Path) -> Checked:
+    try:
+        measured = read_folder(folder)
+        described = hashlib.sha256((folder / FILE).read_bytes()).hexdigest()
+    except MuError as error:
+        return Checked(None, tuple(text for text in (error.what, error.where, error.remedy) if text))
+    except OSError as error:
+        return Checked(None, (str(error),))
+    data = {e.name: [e.kind, e.role, e.sha256] for e in measured.experiments}
+    return Checked(measured, digest={"experiments_sha256": described, "data": data})
+
+
+_said: dict[Path, tuple[Any, tuple[dict[str, Any], dict[str, Any], dict[str, Any], str]]] = {}
+
+
+def said(root: Any) -> Said | None:
+    """What the diagnosis in the unit's folder found, or None where there is none."""
+    folder = folder_of(root)
+    files = [folder / name for name in ("summary.json", "verdict.json", "diagnose.toml", "unit.toml")]
+    if not files[0].is_file():
+        return None
+    state, kept = _state(files), _said.get(folder)
+    if kept is None or kept[0] != state:
+        kept = _said[folder] = state, _read(*files)
+    summary, verdict, inputs, unit = kept[1]
+    return Said(folder, str(summary.get("status", "")), _stale(root, inputs, unit), verdict, summary)
+
+
+def _read(
+    summary: Path, verdict: Path, inputs: Path, unit: Path
+) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any], str]:
+    try:
+        named = tomllib.loads(inputs.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        named = {}
+    try:
+        of = read_unit(unit).hash() if unit.is_file() else ""
+    except MuError:
+        of = "unreadable"
+    return _json(summary), _json(verdict), named, of
+
+
+def _json(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _stale(root: Any, inputs: dict[str, Any], unit: str) -> str:
+    found = checked(root)
+    if found is None or found.measured is None:
+        return "the measured data it is of are not here"
+    if any(inputs.get(key) != value for key, value in found.digest.items()):
+        return "it is of other measured data"
+    try:
+        now = to_unit(root.mu_unit).hash()
+    except MuError:
+        now = ""
+    # Without a unit's own file the verdict does not rest on the unit.
+    return "it is of the unit with other parameters" if unit and now != unit else ""
+
+
+def _state(files: list[Path]) -> tuple[Any, ...]:
+    """Times and sizes of files; of one that is not there, nothing."""
+    found: list[Any] = []
+    for path in files:
+        try:
+            stat = path.stat()
+            found.append((path.name, stat.st_mtime_ns, stat.st_size))
+        except OSError:
+            found.append((path.name,))
+    return tuple(found)
+
+
+def mark_applied(root: Any, to_unit_: str, to_simulation: str) -> None:
+    """Remember, on the unit as it is before, that it gets the diagnosis's model.
+
+    In words what its parameters get, and what its simulation gets beside them.
+    """
+    root.mu_evidence.applied = "\n".join([_model(root), _having(root), to_unit_, to_simulation])
+
+
+def applied(root: Any) -> str:
+    """What of the diagnosis's model the unit has, in words, or nothing: given twice it would count twice."""
+    model, before, to_unit_, to_simulation = (*root.mu_evidence.applied.split("\n"), "", "", "", "")[:4]
+    try:
+        now = _having(root)
+    except MuError:
+        now = ""
+    if not model or model != _model(root) or now == before:
+        return ""
+    # What the simulation was given may have been taken from it again.
+    return "; ".join(words for words in (to_unit_, effects.asked(root) and to_simulation) if words)
+
+
+def _having(root: Any) -> str:
+    """Hash of the unit, and of the effects beside its parameters; raises InputError."""
+    text = root.mu_unit.study.effects
+    return to_unit(root.mu_unit).hash() + (hashlib.sha256(text.encode()).hexdigest() if text else "")
+
+
+def _model(root: Any) -> str:
+    try:
+        return hashlib.sha256((folder_of(root) / MODEL).read_bytes()).hexdigest()
+    except OSError:
+        return ""
+
+
+@attrs.frozen(eq=False)
+class Course:
+    """One experiment over time: time_s (n,), pressure_kPa (n,) and series by who tells.
+
+    series: `measured`, and `model` and `extended` where a diagnosis predicted them; of each the channels by
+    name, (n,) with nan where there is nothing.
+    """
+
+    time_s: Any
+    pressure_kPa: Any
+    series: dict[str, dict[str, Any]]
+
+
+SERIES = {"base_model": "model", "extended_model": "extended"}
+
+
+def course(root: Any, name: str) -> Course | None:
+    """A unit_pressure experiment with what the diagnosis predicted of it, or None where there is no such."""
+    found, judged = checked(root), said(root)
+    every = found.measured.of("unit_pressure") if found and found.measured else ()
+    e = next((e for e in every if e.name == name), None)
+    if e is None:
+        return None
+    channels = [c for c in e.columns if c == "angle_deg" or c.startswith("marker")]
+    series = {"measured": {c: np.array(e[c]) for c in channels}}
+    if judged is not None and judged.name and not judged.stale:
+        series |= _predicted(judged.folder / RESIDUALS, e)
+    return Course(np.array(e["time_s"]), np.array(e["pressure_kPa"]), series)
+
+
+def _predicted(path: Path, e: Any) -> dict[str, dict[str, Any]]:
+    """The columns of residuals.csv that are of an experiment, at its rows."""
+    place = {int(row): i for i, row in enumerate(e.rows)}
+    found: dict[str, dict[str, Any]] = {name: {} for name in SERIES.values()}
+    try:
+        with path.open(encoding="utf-8", newline="") as stream:
+            for line in csv.DictReader(stream):
+                at = place.get(int(line["row"])) if line["experiment"] == e.name else None
+                if at is None:
+                    continue
+                for column, name in SERIES.items():
+                    values = found[name].setdefault(line["channel"], np.full(len(e), np.nan))
+                    values[at] = float(line[column])
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
+    same = found["extended"].keys() == found["model"].keys() and all(
+        np.array_equal(values, found["model"][c], equal_nan=True) for c, values in found["extended"].items()
+    )
+    if same:  # nothing was added to the model
+        del found["extended"]
+    return {name: channels for name, channels in found.items() if channels}
+
+
+def write_protocol(course: Course, path: Path) -> Path:
+    """Write an experiment's pressures as a protocol; raises InputError where it does not begin at rest."""
+    time, pressure = course.time_s - course.time_s[0], course.pressure_kPa.copy()
+    if abs(pressure[0]) > AT_REST * np.ptp(pressure):
+        raise InputError(
+            f"the experiment begins at {pressure[0]:.3g} kPa",
+            "",
+            "a simulation begins at rest: take an experiment that does, too",
+        )
+    pressure[0] = 0.0  # gauge noise
+    write_csv(path, ("time_s", "pressure_kPa"), zip(time.tolist(), pressure.tolist(), strict=True))
+    return path
+
+
+def register() -> None:
+    """The property group and the one property on objects that holds it."""
+    bpy.utils.register_class(MU_PG_evidence)
+    bpy.types.Object.mu_evidence = PointerProperty(type=MU_PG_evidence)
+
+
+def unregister() -> None:
+    """Take them out again; values stay in the file."""
+    del bpy.types.Object.mu_evidence
+    bpy.utils.unregister_class(MU_PG_evidence)

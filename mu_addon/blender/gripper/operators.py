@@ -1,0 +1,179 @@
+"""Add a gripper, let it grasp in a process of its own, and play the grasp."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import attrs
+import bpy
+from bpy.props import BoolProperty, EnumProperty
+
+from ...design.gripper import gripper_names, load_gripper
+from ...run.child import RUNNING
+from ..shared.acting import RUN_FILES, CancelsJob, DismissesJob, OnUnit, OpensRun, telling
+from ..simulate import state as simulation
+from ..simulate import study_folder as studies
+from ..unit import live_update as live
+from ..unit.object import active_root
+from ..unit.operators import use_millimetres
+from ..unit.properties import to_unit
+from . import object as gripper_object
+from . import state as grasps
+
+NO_GRIPPER = "Select a Monolithic Gripper, or add one: Add > Mesh > Monolithic Gripper"
+
+_items: list[tuple[str, str, str]] = []
+
+
+def _preset_items(self, context):
+    # Blender does not keep these strings alive; this list does.
+    _items[:] = [(name, name.capitalize(), "") for name in gripper_names()]
+    return _items
+
+
+class MU_OT_gripper_add(bpy.types.Operator):
+    """Add a Monolithic Gripper: two units that face each other on a plate, one part to print"""
+
+    bl_idname = "mu.gripper_add"
+    bl_label = "Monolithic Gripper"
+    bl_options = {"REGISTER", "UNDO"}
+
+    preset: EnumProperty(
+        name="Preset", description="Gripper to begin with", items=_preset_items, options={"SKIP_SAVE"}
+    )
+    of_unit: BoolProperty(
+        name="Of the Active Unit",
+        description="Its fingers are copies of the active unit, with its sensor path",
+        options={"SKIP_SAVE"},
+    )
+
+    @telling
+    def execute(self, context):
+        found = load_gripper(self.preset)
+        unit = active_root(context) if self.of_unit else None
+        if unit is not None:
+            found = attrs.evolve(
+                found,
+                unit=to_unit(unit.mu_unit),
+                path=unit.mu_unit.path or found.path,
+                name=unit.mu_unit.title,
+            )
+        use_millimetres(context.scene)
+        if context.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        gripper_object.create(context, found)
+        return {"FINISHED"}
+
+
+class OnGripper(OnUnit):
+    """An operator on the active gripper and its grasp."""
+
+    seek = staticmethod(gripper_object.active)
+    lacking = NO_GRIPPER
+    job_of = staticmethod(grasps.job)
+    folder_of = staticmethod(grasps.folder_of)
+
+
+class MU_OT_gripper_delete(OnGripper, bpy.types.Operator):
+    """Delete the gripper with all its parts; its folder stays"""
+
+    bl_idname = "mu.gripper_delete"
+    bl_label = "Delete Gripper"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        gripper_object.delete(gripper_object.active(context))
+        return {"FINISHED"}
+
+
+class MU_OT_grasp(OnGripper, bpy.types.Operator):
+    """Do the chosen job in a process of its own; Blender stays free, and finished work is not repeated"""
+
+    bl_idname = "mu.grasp"
+    bl_label = "Grasp"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        root, missing = gripper_object.active(context), simulation.missing()
+        child = simulation.of(grasps.job(root))
+        trouble = root.mu_gripper.trouble.partition("\n")[0]
+        if child is not None and child.state == RUNNING:
+            trouble = "This gripper is at work"
+        elif missing:
+            trouble = f"Not in this Blender: {', '.join(missing)}"
+        if trouble:
+            cls.poll_message_set(trouble)
+        return not trouble
+
+    @telling
+    def execute(self, context):
+        root = gripper_object.active(context)
+        folder = grasps.folder_of(root)
+        if not root.mu_gripper.folder:
+            root.mu_gripper.folder = studies.relative(folder)
+        line = grasps.arguments(root)
+        simulation.launch(grasps.job(root), simulation.of_worker(line), folder / "blender")
+        live.redraw()
+        return {"FINISHED"}
+
+
+class MU_OT_grasp_cancel(OnGripper, CancelsJob, bpy.types.Operator):
+    """Stop the grasp; what it has finished is kept, and the next one goes on from there"""
+
+    bl_idname = "mu.grasp_cancel"
+    bl_label = "Cancel"
+    bl_options = {"REGISTER"}
+    idle = "This gripper is not at work"
+
+
+class MU_OT_grasp_dismiss(OnGripper, DismissesJob, bpy.types.Operator):
+    """Take the message of an ended grasp off the panel"""
+
+    bl_idname = "mu.grasp_dismiss"
+    bl_label = "Dismiss"
+    bl_options = {"REGISTER"}
+
+
+class MU_OT_grasp_open(OnGripper, OpensRun, bpy.types.Operator):
+    """Open a file of the gripper's results"""
+
+    bl_idname = "mu.grasp_open"
+    bl_label = "Open"
+    bl_options = {"REGISTER"}
+    first = "press Grasp first"
+
+    what: EnumProperty(name="What", description="File or folder of the grasp to open", items=RUN_FILES)
+
+
+class MU_OT_grasp_show(OnGripper, bpy.types.Operator):
+    """Play the grasp on the timeline, both fingers and the cube, or take it away"""
+
+    bl_idname = "mu.grasp_show"
+    bl_label = "Show Grasp"
+    bl_options = {"REGISTER", "UNDO"}
+
+    on: BoolProperty(name="Show", description="Show it, or take it away", default=True)
+
+    @telling
+    def execute(self, context):
+        root = gripper_object.active(context)
+        if self.on:
+            gripper_object.show_grasp(root, context.scene)
+        else:
+            gripper_object.hide_grasp(root)
+        return {"FINISHED"}
+
+
+CLASSES = (
+    MU_OT_gripper_add,
+    MU_OT_gripper_delete,
+    MU_OT_grasp,
+    MU_OT_grasp_cancel,
+    MU_OT_grasp_dismiss,
+    MU_OT_grasp_open,
+    MU_OT_grasp_show,
+)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -1,0 +1,107 @@
+"""The panel Monolithic Gripper of the sidebar tab MU: its parameters, its grasp, and what that found."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...design.gripper import SECTIONS
+from ...design.quantity import describe
+from ..simulate import state as simulation
+from ..unit.panel import OfOne, start, told, wrapped
+from . import object as gripper_object
+from . import state as grasps
+
+JOB = "grasp_"
+PHASES = {"i": "opening", "ii": "closing", "iii": "holding", "iv": "lifting", "v": "releasing"}
+"""Phases of a grasp as they are said; the core's `grip.phases.MEANING` has them in full."""
+
+
+class OfGripper(OfOne):
+    """A panel of the active gripper."""
+
+    seek = staticmethod(gripper_object.active)
+
+
+class MU_PT_gripper(OfGripper, bpy.types.Panel):
+    """The gripper that is worked on"""
+
+    bl_idname = "MU_PT_gripper"
+    bl_label = "Monolithic Gripper"
+
+    def show(self, layout, context, root):
+        props = root.mu_gripper
+        layout.prop(props, "title")
+        layout.prop(props, "path")
+        for section in SECTIONS:
+            column = layout.column(align=True)
+            column.label(text=section.section.capitalize())
+            for d in describe(section):
+                column.prop(getattr(props, section.section), d.name)
+        row = layout.row()
+        row.use_property_split = False
+        row.prop(props, "cut", icon="MOD_BOOLEAN", toggle=True)
+        if props.trouble:
+            box = layout.box()
+            box.alert = True
+            wrapped(box, props.trouble, "ERROR")
+
+
+class MU_PT_grasp(OfGripper, bpy.types.Panel):
+    """A cube between the fingers: closed on, held, lifted, let go"""
+
+    bl_idname = "MU_PT_grasp"
+    bl_label = "Grasp"
+    bl_parent_id = "MU_PT_gripper"
+
+    def show(self, layout, context, root):
+        props = root.mu_gripper
+        layout.prop(props, "detail")
+        if props.detail != "part":
+            column = layout.column(align=True)
+            column.prop(props, "cube_mm")
+            cube = gripper_object.part(root, "cube")
+            if cube is not None:
+                column.prop(cube, "location", index=2, text="Its Height")
+            column.prop(props, "density_g_per_ml")
+            column.prop(props, "friction")
+        child = simulation.of(grasps.job(root))
+        start(layout, child, "mu.grasp", "PLAY")
+        told(layout, child, "see below", JOB)
+        found = grasps.of(root)
+        if found is None:
+            wrapped(layout, "This cube was not grasped yet", "INFO")
+        else:
+            _found(layout, context.scene, root, found)
+        if grasps.folder_of(root).is_dir():
+            row = layout.row(align=True)
+            row.operator("mu.grasp_open", text="Report", icon="URL").what = "report"
+            row.operator("mu.grasp_open", text="Folder", icon="FILE_FOLDER").what = "folder"
+
+
+def _found(layout, scene, root, found):
+    box = layout.box()
+    if found.stale:
+        box.alert = True
+        wrapped(box, "Stale: gripper, cube or friction were changed. Grasp again", "ERROR")
+    column = box.column(align=True)
+    column.active = not found.stale
+    f = found.figures
+    if f:
+        column.label(text=f"{f['angle_at_hold_deg']:.1f} deg, {f['normal_at_hold_N']:.2f} N a finger at hold")
+        held, icon = ("Held", "CHECKMARK") if f["held"] else ("It slips", "ERROR")
+        column.label(text=f"{held}: {f['margin']:.2g} times its weight", icon=icon)
+        column.label(text=f"Gap error {f['gap_error_mm']:.3f} mm")
+    on = bool(gripper_object.moving(root))
+    row = box.row(align=True)
+    text = "Hide Grasp" if on else "Show Grasp"
+    row.operator("mu.grasp_show", text=text, icon="MOD_SIMPLEDEFORM", depress=on).on = not on
+    row.operator("screen.animation_play", text="Play", icon="PLAY")
+    if on:
+        phase, force = grasps.phase_at(found, scene)
+        box.label(text=f"{phase}, {PHASES.get(phase, '')}: {force:.2f} N", icon="TIME")
+
+
+CLASSES = (MU_PT_gripper, MU_PT_grasp)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -1,0 +1,148 @@
+"""A gripper's parameters on its root object: generated from the core's, and what it is to grasp."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty, StringProperty
+
+from ...design import parameters
+from ...design.gripper import SECTIONS, Gripper
+from ...design.quantity import describe
+from ...design.rigid_body import FRICTION
+from ..unit import live_update as live
+from ..unit.properties import BESIDE_BLEND_FILE, blender_property, exact
+
+
+def _changed(group, context):
+    from . import object as gripper_object
+
+    if not live.holds() and group.id_data.mu_gripper.uuid:
+        gripper_object.rebuild(group.id_data)
+
+
+def _generated(section: type):
+    annotations = {d.name: blender_property(d, _changed) for d in describe(section)}
+    return type(
+        f"MU_PG_gripper_{section.section}",
+        (bpy.types.PropertyGroup,),
+        {"__annotations__": annotations, "__doc__": section.__doc__},
+    )
+
+
+GROUPS = {section.section: _generated(section) for section in SECTIONS}
+
+
+class MU_PG_gripper(bpy.types.PropertyGroup):
+    """One Monolithic Gripper, kept on its root object."""
+
+    __annotations__ = {
+        "uuid": StringProperty(options={"HIDDEN"}),
+        # The unit of both fingers, as TOML: a gripper does not change when a preset does.
+        "finger": StringProperty(options={"HIDDEN"}),
+        "title": StringProperty(
+            name="Name",
+            description="Name of the gripper, one line of 1 to 80 printable characters",
+            default="gripper",
+            maxlen=80,
+            update=_changed,
+        ),
+        "path": StringProperty(
+            name="Sensor Path",
+            description="Window of anchors that the waveguide of either finger follows, such as alpha4",
+            default="alpha4",
+            update=_changed,
+        ),
+        **{
+            name: PointerProperty(type=group, description=group.__doc__ or name)
+            for name, group in GROUPS.items()
+        },
+        "cut": BoolProperty(
+            name="Cut Open",
+            description="Show the fingers cut in their bending plane, to see chambers and wall",
+            update=_changed,
+        ),
+        "cube_mm": FloatProperty(
+            name="Cube",
+            description="Side of the cube that is grasped; it stands in the middle between the tips",
+            subtype="DISTANCE",
+            default=25.0,
+            min=1.0,
+            max=199.0,
+            update=_changed,
+        ),
+        "density_g_per_ml": FloatProperty(
+            name="Density (g/ml)",
+            description="Of the cube, which decides its weight. The default is solid PLA, assumed",
+            default=1.24,
+            min=0.001,
+            max=25.0,
+        ),
+        "friction": FloatProperty(
+            name="Friction",
+            description="Coefficient of Coulomb friction between fingers and cube. The default is assumed: "
+            "dry elastomers on hard plastics mostly have 0.5 to 1 and above",
+            default=FRICTION,
+            min=0.0,
+            max=5.0,
+        ),
+        "detail": EnumProperty(
+            name="Job",
+            description="What is done",
+            items=[
+                ("quick", "Grasp, Quick Look", "A coarser mesh and longer steps"),
+                ("full", "Grasp", "The grasp on the default mesh"),
+                (
+                    "paths",
+                    "Grasp and Sensor Paths",
+                    "Besides, every sensor path ranked in a finger that grasps",
+                ),
+                ("part", "Part to Print", "Only the printable part as STL and 3MF"),
+            ],
+        ),
+        "folder": StringProperty(
+            name="Grasp Folder",
+            description="Folder of the results. Empty: beside the .blend file, or the user's folder",
+            subtype="DIR_PATH",
+            options=BESIDE_BLEND_FILE,
+        ),
+        "trouble": StringProperty(options={"HIDDEN"}),
+    }
+
+
+CLASSES = (*GROUPS.values(), MU_PG_gripper)
+
+
+def to_gripper(props) -> Gripper:
+    """The core's gripper that the properties stand for; raises InputError where a rule is broken."""
+    sections = {}
+    for section in SECTIONS:
+        group = getattr(props, section.section)
+        sections[section.section] = section(
+            **{d.name: exact(getattr(group, d.name)) for d in describe(section)}
+        )
+    unit = parameters.from_toml(props.finger)
+    return Gripper(unit=unit, name=props.title, path=props.path, **sections)
+
+
+def from_gripper(props, gripper: Gripper) -> None:
+    """Set the properties to a gripper; each still calls its update, see `live.held`."""
+    props.finger = parameters.to_toml(gripper.unit, comments=False)
+    props.title, props.path = gripper.name, gripper.path
+    for section in SECTIONS:
+        group, values = getattr(props, section.section), getattr(gripper, section.section)
+        for d in describe(section):
+            setattr(group, d.name, getattr(values, d.name))
+
+
+def register() -> None:
+    """Classes and the one property on objects that holds a gripper."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.Object.mu_gripper = PointerProperty(type=MU_PG_gripper)
+
+
+def unregister() -> None:
+    """Take them out again; values stay in the file."""
+    del bpy.types.Object.mu_gripper
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

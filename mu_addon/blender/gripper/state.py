@@ -1,0 +1,122 @@
+"""Grasps of a gripper in the scene: the job that is asked for, and what it has found."""
+
+from __future__ import annotations
+
+import csv
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...design import gripper as core
+from ...design.parameters import to_toml
+from ...errors import MuError
+from ...files import write_text
+from ..simulate import study_folder as studies
+from ..unit.properties import exact
+from . import object as gripper_object
+from .properties import to_gripper
+
+
+def job(root: Any) -> str:
+    """Name under which the gripper's grasp runs."""
+    return f"{root.mu_gripper.uuid}:grip"
+
+
+def folder_of(root: Any) -> Path:
+    """Folder of the gripper's results: the one it names, else beside the .blend file, else the user's own."""
+    props = root.mu_gripper
+    return studies.place_of(props.folder, props.title, props.uuid)
+
+
+def arguments(root: Any) -> list[str]:
+    """The command line of the job that is chosen, its inputs written; raises MuError."""
+    props, folder = root.mu_gripper, folder_of(root)
+    gripper = to_gripper(props)
+    own = folder / "blender"
+    write_text(own / "unit.toml", to_toml(gripper.unit))
+    core.write_gripper(gripper, own / "gripper.toml", "unit.toml")
+    line = ["grip", "--gripper", str(own / "gripper.toml"), "--out", str(folder), "--json"]
+    if props.detail == "part":
+        return [*line, "--solid-only"]
+    line += ["--cube", f"{_side(props):g}", "--friction", f"{exact(props.friction):g}"]
+    line += [
+        "--density",
+        f"{exact(props.density_g_per_ml):g}",
+        "--beyond",
+        f"{gripper_object.beyond_mm(root):g}",
+    ]
+    return line + {"quick": ["--coarse", "--no-paths"], "full": ["--no-paths"], "paths": []}[props.detail]
+
+
+def _side(props: Any) -> float:
+    return exact(props.cube_mm)
+
+
+@attrs.frozen(eq=False)
+class Grasped:
+    """What a grasp found: figures by name, and whether the gripper or the cube were changed since.
+
+    rows: of the grasp at times `time_s` (k,): `phase` (k,) and by name of the CSV's column (k,).
+    """
+
+    folder: Path
+    stale: bool
+    figures: dict[str, Any]
+    phase: tuple[str, ...]
+    columns: dict[str, Any]
+
+
+_read: dict[Path, tuple[float, Any]] = {}
+
+
+def of(root: Any) -> Grasped | None:
+    """The latest grasp of the cube that is chosen, or None; read again only when its files change."""
+    folder, props = folder_of(root), root.mu_gripper
+    side = f"{_side(props):g}"
+    try:
+        time = (folder / "summary.json").stat().st_mtime
+        kept = _read.get(folder)
+        if kept is None or kept[0] != time:
+            kept = _read[folder] = time, _read_folder(folder)
+        figures, asked, texts, tables = kept[1]
+        if side not in tables:
+            return None
+        gripper = to_gripper(props)
+        now = core.to_toml(gripper, "unit.toml"), to_toml(gripper.unit)
+        densities = {c["side_mm"]: c["density_g_per_ml"] for c in asked["cubes"]}
+        own = densities.get(_side(props)), asked["grip"]["friction"], asked["grip"]["beyond_mm"]
+        set_now = exact(props.density_g_per_ml), exact(props.friction), gripper_object.beyond_mm(root)
+        stale = now != texts or own != set_now
+    except (OSError, ValueError, KeyError, MuError):
+        return None
+    return Grasped(folder / f"cube-{side}", stale, figures.get(side, {}), *tables[side])
+
+
+def _read_folder(folder: Path) -> Any:
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    asked = tomllib.loads((folder / "grip.toml").read_text(encoding="utf-8"))
+    texts = tuple((folder / name).read_text(encoding="utf-8") for name in ("gripper.toml", "unit.toml"))
+    tables = {}
+    for cube in asked["cubes"]:
+        side = f"{cube['side_mm']:g}"
+        path = folder / f"grasp_{side}.csv"
+        if path.is_file():
+            with path.open(encoding="utf-8", newline="") as stream:
+                rows = list(csv.DictReader(stream))
+            names = [name for name in rows[0] if name != "phase"]
+            columns = {name: np.array([float(row[name]) for row in rows]) for name in names}
+            tables[side] = tuple(row["phase"] for row in rows), columns
+    return summary.get("grasps", {}), asked, texts, tables
+
+
+def phase_at(found: Grasped, scene: Any) -> tuple[str, float]:
+    """Phase of the grasp and force in N of a finger on the cube at the scene's frame."""
+    rate = scene.render.fps / scene.render.fps_base
+    time = found.columns["time_s"]
+    now = time[0] + (scene.frame_current_final - scene.frame_start) / rate
+    at = min(int(np.searchsorted(time, now - 1e-6)), len(time) - 1)
+    return found.phase[at], float(np.interp(now, time, found.columns["normal_N"]))

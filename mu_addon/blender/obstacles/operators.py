@@ -1,0 +1,174 @@
+"""What the unit meets: make selected meshes its obstacles, add a box as one, examine them, take them out."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+import numpy as np
+from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
+from mathutils import Vector
+
+from ...design.body import require_sound
+from ...design.rigid_body import FRICTION
+from ...errors import InputError
+from ..body.operators import selected_meshes, tell_flaws
+from ..preview import arrays as preview
+from ..preview import colours as materials
+from ..shared.acting import OnSoundUnit, OnUnit, telling
+from ..unit import object as unit_object
+from ..unit.properties import exact, to_unit
+from . import state as obstacles
+
+NO_OBSTACLE = "No obstacle yet: select a closed mesh and use it as one"
+
+
+class OnObstacles(OnUnit):
+    """An operator on the obstacles of the active unit; greyed, with the reason, where it has none."""
+
+    name: StringProperty(
+        name="Obstacle", description="Name of its object. Empty: all of this unit", options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if not obstacles.of_unit(unit_object.active_root(context)):
+            cls.poll_message_set(NO_OBSTACLE)
+            return False
+        return True
+
+    def chosen(self, root):
+        """Objects that it is to act on; raises InputError for a name that is none."""
+        found = obstacles.of_unit(root)
+        chosen = [o for o in found if o.name == self.name] if self.name else found
+        if not chosen:
+            names = ", ".join(o.name for o in found)
+            raise InputError(
+                f"{self.name!r} is no obstacle of this unit", root.name, f"choose one of {names}"
+            )
+        return chosen
+
+
+class MU_OT_obstacle(OnSoundUnit, bpy.types.Operator):
+    """Make the selected closed meshes obstacles of the unit: rigid, in place, with friction"""
+
+    bl_idname = "mu.obstacle"
+    bl_label = "Use as Obstacle"
+    bl_options = {"REGISTER", "UNDO"}
+
+    friction: FloatProperty(
+        name="Friction", description="Coefficient of Coulomb friction", default=FRICTION, min=0.0, max=5.0
+    )
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        core, chosen = to_unit(root.mu_unit), selected_meshes(context)
+        for obj in chosen:
+            body = obstacles.placed(root, obj).body
+            require_sound(body, obstacles.unsound(body), "an obstacle")
+        for obj in chosen:
+            obj.mu_obstacle.unit, obj.mu_obstacle.friction = root.mu_unit.uuid, self.friction
+            # What stands in the unit now may be moved: it is told, and refused by a simulation.
+            for flaw in obstacles.examined(root, obj, core):
+                self.report({"WARNING"}, f"{obj.name}: {flaw.what}: {flaw.remedy}")
+        return {"FINISHED"}
+
+
+class MU_OT_obstacle_box(OnSoundUnit, bpy.types.Operator):
+    """Add a box as an obstacle, in front of the tip on the side that the unit bends to"""
+
+    bl_idname = "mu.obstacle_box"
+    bl_label = "Add Box"
+    bl_options = {"REGISTER", "UNDO"}
+
+    size: FloatVectorProperty(
+        name="Size",
+        description="Edges of the box",
+        subtype="XYZ_LENGTH",
+        unit="LENGTH",
+        default=(25.0, 25.0, 25.0),
+        min=0.1,
+    )
+    gap: FloatProperty(
+        name="Gap", description="Distance between unit and box", subtype="DISTANCE", default=5.0, min=0.0
+    )
+    friction: FloatProperty(
+        name="Friction", description="Coefficient of Coulomb friction", default=FRICTION, min=0.0, max=5.0
+    )
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        d = to_unit(root.mu_unit).dimensions
+        size = np.array([exact(edge) for edge in self.size])
+        mesh = bpy.data.meshes.new("Obstacle")
+        preview.write(mesh, preview.box(-size / 2.0, size / 2.0), smooth=False)
+        materials.assign(mesh, "MU Obstacle")
+        obj = bpy.data.objects.new("Obstacle", mesh)
+        context.collection.objects.link(obj)
+        reach = d.bounds[1][1] + exact(self.gap) + 0.5 * float(size[1])
+        obj.matrix_world = root.matrix_world.copy()
+        obj.location = root.matrix_world @ Vector((0.0, reach, d.height - 0.5 * float(size[2])))
+        obj.mu_obstacle.unit, obj.mu_obstacle.friction = root.mu_unit.uuid, self.friction
+        return {"FINISHED"}
+
+
+class MU_OT_obstacle_check(OnObstacles, bpy.types.Operator):
+    """Examine obstacles: open edges, faces that cut each other, size, overlap; mark the places"""
+
+    bl_idname = "mu.obstacle_check"
+    bl_label = "Check Obstacles"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        core, chosen = to_unit(root.mu_unit), self.chosen(root)
+        found = [flaw for obj in chosen for flaw in obstacles.examined(root, obj, core)]
+        tell_flaws(self, root, found, f"{len(chosen)} obstacle(s), sound and off the unit")
+        return {"FINISHED"}
+
+
+class MU_OT_obstacle_remove(OnObstacles, bpy.types.Operator):
+    """Let an object be no obstacle any more; the object stays"""
+
+    bl_idname = "mu.obstacle_remove"
+    bl_label = "Remove Obstacle"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        for obj in self.chosen(root):
+            obj.property_unset("mu_obstacle")
+        return {"FINISHED"}
+
+
+class MU_OT_obstacle_select(OnObstacles, bpy.types.Operator):
+    """Select an obstacle, to move it"""
+
+    bl_idname = "mu.obstacle_select"
+    bl_label = "Select Obstacle"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        for other in context.selected_objects:
+            other.select_set(False)
+        for obj in self.chosen(root):
+            obj.select_set(True)
+        return {"FINISHED"}
+
+
+CLASSES = (
+    MU_OT_obstacle,
+    MU_OT_obstacle_box,
+    MU_OT_obstacle_check,
+    MU_OT_obstacle_remove,
+    MU_OT_obstacle_select,
+)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

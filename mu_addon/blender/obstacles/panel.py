@@ -1,0 +1,56 @@
+"""What the unit meets, under Simulate: a line an obstacle, with its friction."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...errors import InputError
+from ..unit.panel import OfUnit, wrapped
+from . import state as obstacles
+
+
+class MU_PT_obstacles(OfUnit, bpy.types.Panel):
+    """Rigid things that the unit meets while it moves"""
+
+    bl_idname = "MU_PT_obstacles"
+    bl_label = "Obstacles"
+    bl_parent_id = "MU_PT_simulate"
+
+    def show(self, layout, context, root):
+        found = obstacles.of_unit(root)
+        for obj in found:
+            column = layout.column(align=True)
+            row = column.row(align=True)
+            row.operator(
+                "mu.obstacle_select", text=obj.name, icon="CUBE", depress=obj.select_get()
+            ).name = obj.name
+            row.operator("mu.obstacle_remove", text="", icon="X").name = obj.name
+            column.prop(obj.mu_obstacle, "friction")
+            for words in _troubles(root, obj):
+                wrapped(column, words, "ERROR")
+        row = layout.row(align=True)
+        row.operator("mu.obstacle", icon="ADD")
+        row.operator("mu.obstacle_box", icon="MESH_CUBE")
+        if found:
+            layout.operator("mu.obstacle_check", icon="VIEWZOOM")
+        else:
+            wrapped(layout, "None: the unit moves freely. Select a closed mesh to put in its way", "INFO")
+
+
+def _troubles(root, obj):
+    """What is known to be wrong with an obstacle as it stands, a text each."""
+    try:
+        known = obstacles.placed(root, obj).flaws or []
+    except InputError as error:
+        return [f"{error.what}: {error.remedy}"]
+    return [f"{flaw.what[:1].upper()}{flaw.what[1:]}: {flaw.remedy}" for flaw in known]
+
+
+def register() -> None:
+    """The panel."""
+    bpy.utils.register_class(MU_PT_obstacles)
+
+
+def unregister() -> None:
+    """The panel."""
+    bpy.utils.unregister_class(MU_PT_obstacles)

@@ -1,0 +1,155 @@
+"""Rigid things that a unit meets: closed meshes of the scene that the user has declared its obstacles.
+
+They stay the user's own objects: moved, scaled or edited, they are read again, in the unit's frame, and what
+was simulated with them before is stale. Copies of an obstacle are obstacles; undo and deletion need no care.
+"""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import re
+from pathlib import Path
+from typing import Any
+
+import attrs
+import bpy
+from bpy.app.handlers import persistent
+from bpy.props import FloatProperty, PointerProperty, StringProperty
+
+from ...design.body import Body, Flaw, flaws, overlaps, require_sound
+from ...design.parameters import Unit
+from ...design.rigid_body import FRICTION
+from ...files import write_text
+from ..body import state as bodies
+from ..shared import handlers
+from ..unit.properties import exact
+
+ODD_SIZE_MM = (0.1, 2000.0)
+"""An obstacle smaller or larger than that is more likely in another unit of length."""
+
+
+class MU_PG_obstacle(bpy.types.PropertyGroup):
+    """An object as an obstacle of a unit."""
+
+    unit: StringProperty(name="Unit", description="UUID of the unit that meets it", options={"HIDDEN"})
+    friction: FloatProperty(
+        name="Friction",
+        description="Coefficient of Coulomb friction between unit and obstacle; 0: none. The default is "
+        "assumed: dry elastomers on hard plastics mostly have 0.5 to 1 and above",
+        default=FRICTION,
+        min=0.0,
+        soft_max=1.0,
+        max=5.0,
+        precision=2,
+        step=5,
+    )
+
+
+@attrs.frozen(eq=False)
+class Placed:
+    """An obstacle as it stands now, in mm of the unit's frame; flaws: why it cannot be one, if looked for."""
+
+    body: Body
+    flaws: list[Flaw] | None = None
+
+
+_placed: dict[tuple[str, str], tuple[Any, Placed]] = {}
+"""By unit and object: where the object stood against the unit, and what it was there."""
+
+
+def of_unit(root: Any) -> list[Any]:
+    """Objects that are obstacles of a unit, by name."""
+    found = [o for o in bpy.data.objects if o.mu_obstacle.unit == root.mu_unit.uuid and o.users_collection]
+    return sorted(found, key=lambda o: o.name)
+
+
+def placed(root: Any, obj: Any) -> Placed:
+    """An obstacle as it stands now; raises InputError for what is no surface."""
+    key = root.mu_unit.uuid, obj.name_full
+    where = _where(root, obj)
+    kept = _placed.get(key)
+    if kept is None or kept[0] != where:
+        kept = _placed[key] = where, Placed(bodies.of_object(obj, root))
+    return kept[1]
+
+
+def examined(root: Any, obj: Any, unit: Unit) -> list[Flaw]:
+    """Why an object cannot be an obstacle of a unit as it stands: its surface, its size, its place."""
+    body = placed(root, obj).body
+    found = unsound(body) or overlaps(body, unit.dimensions, bodies.envelope_in(root, unit))
+    _placed[root.mu_unit.uuid, obj.name_full] = _where(root, obj), Placed(body, found)
+    return found
+
+
+def unsound(body: Body) -> list[Flaw]:
+    """Why a surface cannot be an obstacle wherever it stands."""
+    found = flaws(body)
+    size = float((body.bounds[1] - body.bounds[0]).max())
+    low, high = ODD_SIZE_MM
+    if found or low <= size <= high:
+        return found
+    return [
+        Flaw(
+            f"it is {size:.3g} mm long: it seems to be in another unit of length",
+            "scale it; one Blender unit is one millimetre",
+            body.bounds,
+        )
+    ]
+
+
+def given(root: Any) -> list[tuple[str, float]]:
+    """Hash of the surface and friction of every obstacle, sorted; InputError for what is no surface."""
+    return sorted((placed(root, o).body.hash, exact(o.mu_obstacle.friction)) for o in of_unit(root))
+
+
+def arguments(root: Any, unit: Unit, folder: Path) -> list[str]:
+    """Words of the command line that hand a unit's obstacles over, their files in `folder`.
+
+    Raises InputError for one that cannot be an obstacle as it stands, and OutputError.
+    """
+    words: list[str] = []
+    for number, obj in enumerate(of_unit(root), 1):
+        require_sound(placed(root, obj).body, examined(root, obj, unit), "an obstacle")
+        # Its file's name is what reports call it.
+        name = re.sub(r"[^A-Za-z0-9._-]+", "-", obj.name)
+        path = folder / f"{name}.obj"
+        if str(path) in words:
+            path = folder / f"{name}-{number}.obj"
+        write_text(path, placed(root, obj).body.text())
+        words += ["--obstacle", str(path), "--friction", f"{exact(obj.mu_obstacle.friction):g}"]
+    return words
+
+
+def _where(root: Any, obj: Any) -> Any:
+    """Where an object stands against a unit."""
+    return [tuple(row) for row in root.matrix_world.inverted() @ obj.matrix_world]
+
+
+@persistent
+def _edited(scene, depsgraph):
+    """What was edited is read again: `placed` sees by itself where it was only moved."""
+    changed = {u.id.name_full for u in depsgraph.updates if u.is_updated_geometry}
+    for key in [key for key in _placed if key[1] in changed]:
+        del _placed[key]
+
+
+@persistent
+def _loaded(*_):
+    _placed.clear()
+
+
+_HANDLERS = {"depsgraph_update_post": _edited, "load_post": _loaded}
+
+
+def register() -> None:
+    """The property on objects, and handlers that notice edits."""
+    bpy.utils.register_class(MU_PG_obstacle)
+    bpy.types.Object.mu_obstacle = PointerProperty(type=MU_PG_obstacle)
+    handlers.add(_HANDLERS)
+
+
+def unregister() -> None:
+    """Take them out; what is an obstacle stays so in the file."""
+    handlers.remove(_HANDLERS)
+    del bpy.types.Object.mu_obstacle
+    bpy.utils.unregister_class(MU_PG_obstacle)
+    _placed.clear()

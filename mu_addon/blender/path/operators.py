@@ -1,0 +1,45 @@
+"""Choose the sensor path that the waveguide follows."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+from bpy.props import StringProperty
+
+from ...design.anchors import window
+from ..shared.acting import OnUnit, telling
+from ..unit import object as unit_object
+from ..unit.live_update import held
+from ..unit.properties import to_unit
+
+
+class MU_OT_path(OnUnit, bpy.types.Operator):
+    """Lay the waveguide along this path; without a name, along the candidate selected in the viewport"""
+
+    bl_idname = "mu.path"
+    bl_label = "Choose Sensor Path"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: StringProperty(name="Path", description="Name of a path, alpha1 ..; `none` takes the waveguide out")
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        name = self.name or selected_candidate(context)
+        if name and name != "none":
+            name = window(to_unit(root.mu_unit), name).name
+        with held():
+            root.mu_unit.path = "" if name == "none" else name
+        unit_object.rebuild(root)
+        return {"FINISHED"}
+
+
+def selected_candidate(context) -> str:
+    """Name of the candidate path that is the active object, or nothing."""
+    part = context.object.get(unit_object.PART, "") if context.object else ""
+    return part.removeprefix(unit_object.CANDIDATE) if part.startswith(unit_object.CANDIDATE) else ""
+
+
+CLASSES = (MU_OT_path,)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -1,0 +1,258 @@
+"""Values of the design's steps as arrays to draw, and candidate paths.
+
+Everything here is for the eye and takes milliseconds; what is printed or simulated comes from the core.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...design.anchors import anchors, windows
+from ...design.block import FACES
+from ...design.lattice import Graph
+from ...design.parameters import Unit
+from ...design.steps import Path, Section, Struts, Trimmed, along
+from ...design.waveguide import Bar
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+AROUND = 48
+"""Flat pieces around the axis."""
+ALONG_STRUT = 4
+"""Straight pieces of a strut, enough to see its taper."""
+LADDER_STEP = 0.45
+"""Distance, in cells, between candidate paths drawn side by side outside the lattice."""
+_CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+_CUBE_FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+_CUBE_EDGES = np.array([[a, b] for a in range(8) for b in range(a) if np.abs(_CUBE[a] - _CUBE[b]).sum() == 1])
+
+
+@attrs.frozen(eq=False)
+class Skeleton:
+    """A mesh to draw: vertices (n, 3) in mm, edges (e, 2), faces, a list of (m, k) arrays, and attributes.
+
+    attributes: values (n,) at the vertices by name; slots: number of the material of each face, or None;
+    inputs: further inputs, by name, of the node group that skins it.
+    """
+
+    vertices: Floats
+    edges: Integers = attrs.field(factory=lambda: np.empty((0, 2), np.int64))
+    faces: tuple[Integers, ...] = ()
+    attributes: dict[str, Floats] = attrs.field(factory=dict)
+    slots: Integers | None = None
+    inputs: dict[str, Any] = attrs.field(factory=dict)
+
+
+def outline(profile: Floats) -> Skeleton:
+    """The outer profile as a line in the bending plane, on the side with more lattice."""
+    points = np.column_stack([np.zeros(len(profile)), profile])
+    return Skeleton(points, _polylines(1, len(points)))
+
+
+def cavity(polygon: Floats | None, cut: bool) -> Skeleton | None:
+    """Surface of the cavity; with `cut`, its half x <= 0."""
+    return None if polygon is None else _revolved(polygon[::-1], closed=not cut)
+
+
+def actuator(section: Section | None, cut: bool) -> Skeleton | None:
+    """Surface of the actuator with its inlet; with `cut`, the half x <= 0 and its section."""
+    if section is None:
+        return None
+    outer = section.outer[1:]
+    if not cut:
+        return _revolved(np.concatenate([section.inlet, outer]), closed=True)
+    bore = section.inlet[:1]
+    inner = bore * [0.0, 1.0] if section.cavity is None else section.cavity[:0:-1]
+    loop = np.concatenate([section.inlet[1:], outer, inner, bore])
+    half = _revolved(np.concatenate([loop, loop[:1]]), closed=False)
+    return _with_section(half, loop)
+
+
+def boxes(graph: Graph | None) -> Skeleton | None:
+    """Edges of the lattice's cells, those that neighbours share once."""
+    if graph is None:
+        return None
+    whole = graph.kind.divisions
+    corners = graph.cells[:, None] + whole * _CUBE
+    points, index = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    edges = index.reshape(-1, 8)[:, _CUBE_EDGES].reshape(-1, 2)
+    return Skeleton(points * (graph.cell / whole), np.unique(np.sort(edges, axis=1), axis=0))
+
+
+def lines(trimmed: Trimmed | None, cut: bool) -> Skeleton | None:
+    """Axes of the struts that show; with `cut`, those at x <= 0."""
+    return None if trimmed is None else lattice(Struts(trimmed, None), cut)
+
+
+def lattice(struts: Struts | None, cut: bool) -> Skeleton | None:
+    """Struts as polylines with their radius, or without one as lines; with `cut`, those at x <= 0."""
+    if struts is None:
+        return None
+    shown = struts.trimmed
+    here = (shown.ends[:, :, 0] <= 1e-6).all(axis=1) if cut else np.full(len(shown.ends), True)
+    ends, first, last = shown.ends[here], shown.first[here], shown.last[here]
+    pieces = 1 if struts.lattice is None else ALONG_STRUT
+    t = first[:, None] + (last - first)[:, None] * np.linspace(0.0, 1.0, pieces + 1)
+    radius = {} if struts.lattice is None else {"radius": struts.lattice.radius(t).ravel()}
+    edges = _polylines(len(ends), pieces + 1)
+    return Skeleton(along(ends, t).reshape(-1, 3), edges, attributes=radius)
+
+
+def anchor_points(points: Floats | None, struts: Struts | None) -> Skeleton | None:
+    """Anchors as points, a little wider than the junctions they are in."""
+    if points is None:
+        return None
+    thick = struts is not None and struts.lattice is not None
+    widest = max(struts.lattice.junction_radius, struts.lattice.midspan_radius) if thick else 0.8
+    return Skeleton(points, attributes={"radius": np.full(len(points), 1.24 * widest)})
+
+
+def line_through(path: Path | None) -> Skeleton | None:
+    """The path as a line through its anchors."""
+    return None if path is None else Skeleton(path.points, _polylines(1, len(path.points)))
+
+
+def bar(found: Bar | None) -> Skeleton | None:
+    """The waveguide's bar and seats (slot 0) with what is cut out of them (slot 1)."""
+    if found is None:
+        return None
+    solid = [*found.legs, *(seat.body.corners for seat in found.seats)]
+    hollow = [block.corners for block in found.cuts]
+    corners = np.array([*solid, *hollow])
+    faces = np.concatenate([FACES + 8 * number for number in range(len(corners))])
+    slots = np.repeat(np.arange(len(corners)) >= len(solid), 6).astype(np.int64)
+    return Skeleton(corners.reshape(-1, 3), faces=(faces,), slots=slots)
+
+
+def candidates(unit: Unit) -> dict[str, Skeleton]:
+    """Every candidate path by name, side by side outside the lattice: in place they cover each other."""
+    d = unit.dimensions
+    at, side = anchors(unit), float(np.sign(d.row)) or 1.0
+    edge = d.bounds[1][1] if side > 0 else d.bounds[1][0]
+    found = {}
+    for number, window in enumerate(windows(len(at)), 1):
+        points = at[list(window.indices)].copy()
+        points[:, 1] = edge + side * LADDER_STEP * d.cell * (number + 0.5)
+        radius = np.full(len(points), 0.06 * d.cell)
+        name = {
+            "Label": window.name.replace("alpha", "α"),
+            "At": (0.1 * d.cell, float(points[0, 1]) - 0.1 * d.cell, float(points[0, 2]) - 0.4 * d.cell),
+            "Size": 0.3 * d.cell,
+        }
+        edges = _polylines(1, len(points))
+        found[window.name] = Skeleton(points, edges, attributes={"radius": radius}, inputs=name)
+    return found
+
+
+def box(low: ArrayLike, high: ArrayLike) -> Skeleton:
+    """A box between two corners (3,) in mm, its faces outward."""
+    corners = np.asarray(low, float) + (np.asarray(high, float) - np.asarray(low, float)) * _CUBE
+    return Skeleton(corners, faces=(_CUBE_FACES,))
+
+
+def free_path(points: Floats, name: str, cell: float) -> Skeleton:
+    """A path through any nodes of the lattice, points (h, 3) in mm, where it lies, and its name."""
+    at = (float(points[0, 0]) + 0.3 * cell, float(points[0, 1]) + 0.15 * cell, float(points[0, 2]))
+    return Skeleton(
+        points,
+        _polylines(1, len(points)),
+        attributes={"radius": np.full(len(points), 0.1 * cell)},
+        inputs={"Label": name, "At": at, "Size": 0.3 * cell},
+    )
+
+
+def _polylines(count: int, points: int) -> Integers:
+    """Edges of `count` polylines of `points` vertices each, one after another."""
+    first = np.arange(count)[:, None] * points + np.arange(points - 1)
+    return np.stack([first, first + 1], axis=-1).reshape(-1, 2)
+
+
+def _revolved(curve: Floats, closed: bool) -> Skeleton:
+    """Curve (n, 2) of (radius, z) around z: whole, or the half x <= 0; points on the axis are poles."""
+    angle = (
+        np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
+        if closed
+        else np.linspace(0.5, 1.5, AROUND // 2 + 1) * np.pi
+    )
+    columns = AROUND if closed else len(angle)
+    angle = angle[:columns]
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    on_axis = curve[:, 0] < 1e-9
+    rows, vertices = [], []
+    count = 0
+    for (radius, z), pole in zip(curve, on_axis, strict=True):
+        points = np.array([[0.0, 0.0, z]]) if pole else np.column_stack([radius * ring, np.full(columns, z)])
+        rows.append(np.full(columns, count) if pole else count + np.arange(columns))
+        vertices.append(points)
+        count += len(points)
+    low, up = np.array(rows[:-1]), np.array(rows[1:])
+    turn = np.roll if closed else (lambda a, _, axis: a[:, 1:])
+    cut = slice(None) if closed else slice(None, -1)
+    quads = np.stack([low[:, cut], turn(low, -1, axis=1), turn(up, -1, axis=1), up[:, cut]], axis=-1)
+    low_pole, up_pole = on_axis[:-1], on_axis[1:]
+    whole = quads[~(low_pole | up_pole)].reshape(-1, 4)
+    top = quads[~low_pole & up_pole][..., [0, 1, 2]].reshape(-1, 3)
+    bottom = quads[low_pole & ~up_pole][..., [0, 2, 3]].reshape(-1, 3)
+    faces = tuple(f for f in (whole, top, bottom) if len(f))
+    return Skeleton(np.concatenate(vertices), faces=faces)
+
+
+def _with_section(half: Skeleton, section: Floats) -> Skeleton:
+    """The half with its two cut faces in the plane x = 0, slot 1."""
+    from mathutils.geometry import tessellate_polygon
+
+    triangles = np.array(tessellate_polygon([[(r, z, 0.0) for r, z in section]]))
+    start = len(half.vertices)
+    sides = []
+    for number, sign in enumerate((1.0, -1.0)):
+        flat = np.column_stack([np.zeros(len(section)), sign * section[:, 0], section[:, 1]])
+        sides.append((flat, triangles + start + number * len(section)))
+    count = sum(len(f) for f in half.faces)
+    cuts = np.concatenate(
+        [_facing_x(np.concatenate([half.vertices, *(s[0] for s in sides)]), s[1]) for s in sides]
+    )
+    return Skeleton(
+        np.concatenate([half.vertices, *(s[0] for s in sides)]),
+        faces=(*half.faces, cuts),
+        slots=np.concatenate([np.zeros(count, np.int64), np.ones(len(cuts), np.int64)]),
+    )
+
+
+def _facing_x(vertices: Floats, triangles: Integers) -> Integers:
+    """Triangles turned so that they face +x."""
+    p, q, r = vertices[triangles.T]
+    away = np.cross(q - p, r - p)[:, 0] < 0.0
+    return np.where(away[:, None], triangles[:, ::-1], triangles)
+
+
+def write(mesh: Any, skeleton: Skeleton, smooth: bool = True) -> None:
+    """Replace the geometry of a Blender mesh by a skeleton, materials kept."""
+    mesh.clear_geometry()
+    mesh.vertices.add(len(skeleton.vertices))
+    mesh.attributes["position"].data.foreach_set("vector", skeleton.vertices.astype(np.float32).ravel())
+    if len(skeleton.edges):
+        mesh.edges.add(len(skeleton.edges))
+        mesh.edges.foreach_set("vertices", skeleton.edges.astype(np.int32).ravel())
+    if skeleton.faces:
+        sizes = np.concatenate([np.full(len(f), f.shape[1]) for f in skeleton.faces])
+        corners = np.concatenate([f.ravel() for f in skeleton.faces]).astype(np.int32)
+        mesh.loops.add(len(corners))
+        mesh.loops.foreach_set("vertex_index", corners)
+        mesh.polygons.add(len(sizes))
+        starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int32)
+        mesh.polygons.foreach_set("loop_start", starts)
+        if skeleton.slots is not None:
+            mesh.polygons.foreach_set("material_index", skeleton.slots.astype(np.int32))
+    mesh.update(calc_edges=bool(skeleton.faces))
+    if skeleton.faces:
+        mesh.polygons.foreach_set("use_smooth", np.full(len(mesh.polygons), smooth))
+        if smooth:
+            mesh.set_sharp_from_angle(angle=np.radians(40.0))
+    for name, values in skeleton.attributes.items():
+        attribute = mesh.attributes.new(name, "FLOAT", "POINT")
+        attribute.data.foreach_set("value", values.astype(np.float32))

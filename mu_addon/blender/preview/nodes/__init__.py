@@ -1,0 +1,55 @@
+"""Geometry Nodes groups that skin skeletons: built in code, versioned, rebuilt in place when older."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import bpy
+
+from ...shared.compat import input_defaults, modifier_inputs, set_modifier_input
+from . import balls, field, labelled, tubes, waveguide
+
+GROUPS: dict[str, ModuleType] = {module.NAME: module for module in (tubes, balls, labelled, waveguide, field)}
+
+CATALOGUE = "6f0f3a5e-5f0b-4a37-9a39-0c2f7c1b9d21"
+"""Identifier of the catalogue that the groups are listed under in the asset browser."""
+
+
+def group(name: str):
+    """The node group of that name, built or brought up to date; it is an asset of the file it is in."""
+    module = GROUPS[name]
+    found = bpy.data.node_groups.get(name)
+    if found is None:
+        found = bpy.data.node_groups.new(name, "GeometryNodeTree")
+        found.is_modifier = True
+        found.asset_mark()
+    if found.get("mu_version") != module.VERSION:
+        _build(found, module)
+    return found
+
+
+def _build(tree, module: ModuleType) -> None:
+    """Build a group anew; modifiers that use it keep what was set on them, by the name of the input."""
+    users = [m for o in bpy.data.objects for m in o.modifiers if m.type == "NODES" and m.node_group == tree]
+    kept = [modifier_inputs(modifier) for modifier in users]
+    tree.nodes.clear()
+    tree.interface.clear()
+    module.build(tree, *(group(name) for name in getattr(module, "USES", ())))
+    if tree.asset_data is not None:  # the user may have taken the mark off
+        tree.asset_data.description = module.TEXT
+        tree.asset_data.catalog_id = CATALOGUE
+    tree["mu_version"] = module.VERSION
+    for modifier, values in zip(users, kept, strict=True):
+        for name, default in input_defaults(tree).items():
+            set_modifier_input(modifier, name, values.get(name, default))
+
+
+def skin(obj, name: str):
+    """The modifier with that group on an object, added where it is missing."""
+    tree = group(name)
+    for modifier in obj.modifiers:
+        if modifier.type == "NODES" and modifier.node_group == tree:
+            return modifier
+    modifier = obj.modifiers.new(name, "NODES")
+    modifier.node_group = tree
+    return modifier

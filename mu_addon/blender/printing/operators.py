@@ -1,0 +1,278 @@
+"""Check a unit for the printer, look at what was found, and write its files and specimens."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatVectorProperty, IntProperty
+
+from ...design.parameters import write_unit
+from ...run.child import RUNNING
+from ..shared.acting import RUN_FILES, CancelsJob, DismissesJob, OnSoundUnit, OnUnit, OpensFile, telling
+from ..simulate import state as simulation
+from ..simulate import study_folder as studies
+from ..unit import live_update as live
+from ..unit import object as unit_object
+from ..unit.properties import to_unit
+from . import state as printing
+
+NOT_CHECKED = "Check the print first"
+
+
+def _start(context, command):
+    root = unit_object.active_root(context)
+    studies.settle(root)
+    unit = to_unit(root.mu_unit)
+    own = printing.folder_of(root, command) / "blender"
+    write_unit(unit, own / "unit.toml")
+    line = [*printing.words(root, unit, command), "--out", str(own.parent), "--json"]
+    simulation.launch(printing.job(root), simulation.of_worker(line), own)
+    live.redraw()
+    return {"FINISHED"}
+
+
+class _Job(OnSoundUnit):
+    """An operator that starts one of the jobs for the printer; greyed, with the reason, where it cannot."""
+
+    job = ""
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        root = unit_object.active_root(context)
+        child = simulation.of(printing.job(root))
+        running = child is not None and child.state == RUNNING
+        trouble = "A job for the printer is running" if running else printing.trouble(root, cls.job)
+        if trouble:
+            cls.poll_message_set(trouble)
+        return not trouble
+
+    @telling
+    def execute(self, context):
+        return _start(context, self.job)
+
+
+class MU_OT_print_check(_Job, bpy.types.Operator):
+    """Look for what the printer would stumble over, and for the best way up, in a process of its own"""
+
+    bl_idname = "mu.print_check"
+    bl_label = "Check Print"
+    bl_options = {"REGISTER"}
+    job = printing.CHECK
+
+
+class MU_OT_print_export(_Job, bpy.types.Operator):
+    """Write the chosen files of the unit with its path; asks first where the check found errors"""
+
+    bl_idname = "mu.print_export"
+    bl_label = "Export"
+    bl_options = {"REGISTER"}
+    job = printing.EXPORT
+
+    def invoke(self, context, event):
+        found = printing.checked(unit_object.active_root(context))
+        if found is None or found.stale or not found.errors:
+            return self.execute(context)
+        names = ", ".join(error["check"] for error in found.errors)
+        return context.window_manager.invoke_confirm(
+            self,
+            event,
+            title="Export what must not be printed?",
+            message=f"The check found errors: {names}",
+            confirm_text="Export",
+            icon="WARNING",
+        )
+
+
+class MU_OT_print_specimens(_Job, bpy.types.Operator):
+    """Write lattice cubes, coupons and a gauge to print, a sheet of what to measure, a folder for the data"""
+
+    bl_idname = "mu.print_specimens"
+    bl_label = "Export Specimens"
+    bl_options = {"REGISTER"}
+    job = printing.SPECIMENS
+
+
+class MU_OT_print_cancel(CancelsJob, bpy.types.Operator):
+    """Stop the check or the export; files that were whole stay"""
+
+    bl_idname = "mu.print_cancel"
+    bl_label = "Cancel"
+    bl_options = {"REGISTER"}
+    idle = "Nothing for the printer runs"
+    job_of = staticmethod(printing.job)
+
+
+class MU_OT_print_dismiss(DismissesJob, bpy.types.Operator):
+    """Take the message of an ended check or export off the panel"""
+
+    bl_idname = "mu.print_dismiss"
+    bl_label = "Dismiss"
+    bl_options = {"REGISTER"}
+    job_of = staticmethod(printing.job)
+
+
+class MU_OT_print_open(OpensFile, bpy.types.Operator):
+    """Open what a check or an export has left"""
+
+    bl_idname = "mu.print_open"
+    bl_label = "Open"
+    bl_options = {"REGISTER"}
+    first = "check or export first"
+
+    what: EnumProperty(
+        name="What",
+        description="Which file or folder",
+        items=[
+            ("report", "Report", "Every finding with pictures, and the build directions, in the browser"),
+            ("export", "Files", "Folder of the exported files"),
+            ("specimens", "Specimens", "Folder of the specimens, their sheet and the folder for the data"),
+            *RUN_FILES[1:3],
+        ],
+    )
+
+    def path_of(self, root):
+        """The file or folder that `what` stands for; log and errors are the latest job's."""
+        if self.what in (printing.EXPORT, printing.SPECIMENS):
+            return printing.folder_of(root, self.what)
+        child = simulation.of(printing.job(root))
+        checks = printing.folder_of(root, printing.CHECK)
+        folder = checks if self.what == "report" or child is None else child.folder.parent
+        return folder / studies.FILES[self.what]
+
+
+class _OfCheck(OnUnit):
+    """An operator on what a check found; greyed where there is none of the unit as it is."""
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        found = printing.checked(unit_object.active_root(context))
+        if found is None or found.stale:
+            cls.poll_message_set(f"The check is stale: {found.stale}" if found else NOT_CHECKED)
+            return False
+        return True
+
+
+class MU_OT_print_marks(_OfCheck, bpy.types.Operator):
+    """Mark every place of every error (red) and warning (orange), and the build direction (arrow)"""
+
+    bl_idname = "mu.print_marks"
+    bl_label = "Mark Places"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        printing.mark(root, printing.checked(root))
+        return {"FINISHED"}
+
+
+class MU_OT_print_clear(OnUnit, bpy.types.Operator):
+    """Take the markers of the check out of the scene"""
+
+    bl_idname = "mu.print_clear"
+    bl_label = "Clear Markers"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if not printing.marks(unit_object.active_root(context)):
+            cls.poll_message_set("No place is marked")
+            return False
+        return True
+
+    def execute(self, context):
+        printing.clear(unit_object.active_root(context))
+        return {"FINISHED"}
+
+
+class MU_OT_print_show(_OfCheck, bpy.types.Operator):
+    """Turn the view to a place of this finding; once more: to the next one"""
+
+    bl_idname = "mu.print_show"
+    bl_label = "Show Finding"
+    bl_options = {"REGISTER", "UNDO"}
+
+    # Not kept from the last call: a click on a row is about that row alone.
+    finding: IntProperty(
+        name="Finding", description="Its number in the list, from 0", min=0, options={"SKIP_SAVE"}
+    )
+    place: IntProperty(
+        name="Place",
+        description="Number of the place, from 0; -1: the one after that shown",
+        default=-1,
+        min=-1,
+        options={"SKIP_SAVE"},
+    )
+    view: BoolProperty(
+        name="Turn the View", description="Turn the 3D views to it", default=True, options={"SKIP_SAVE"}
+    )
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        found, settings = printing.checked(root), root.mu_print
+        if self.finding >= len(found.findings):
+            self.report({"ERROR"}, f"There are {len(found.findings)} findings")
+            return {"CANCELLED"}
+        chosen = found.findings[self.finding]
+        places = chosen["places"]
+        if self.place >= max(len(places), 1):
+            self.report({"ERROR"}, f"{chosen['check']}: it has {len(places)} places")
+            return {"CANCELLED"}
+        next_one = settings.place + 1 if settings.finding == self.finding else 0
+        if printing.marked(root) != found.digest:
+            printing.mark(root, found)
+        settings.finding = self.finding
+        settings.place = (next_one if self.place < 0 else self.place) % max(len(places), 1)
+        printing.resize(root)
+        if len(places):
+            for obj in context.selected_objects:
+                obj.select_set(False)
+            for obj in printing.marks(root):
+                if obj[printing.MARK] == str(self.finding):
+                    obj.select_set(True)
+            if self.view:
+                reach = to_unit(root.mu_unit).dimensions.cell
+                printing.frame(context, root, places[settings.place], reach)
+        return {"FINISHED"}
+
+
+class MU_OT_print_up(OnUnit, bpy.types.Operator):
+    """Take this build direction; check again for what it finds"""
+
+    bl_idname = "mu.print_up"
+    bl_label = "Take Direction"
+    bl_options = {"REGISTER", "UNDO"}
+
+    direction: FloatVectorProperty(
+        name="Up",
+        description="Away from the platform, in the unit's frame",
+        subtype="XYZ",
+        default=(0.0, 0.0, 1.0),
+        options={"SKIP_SAVE"},
+    )
+
+    def execute(self, context):
+        unit_object.active_root(context).mu_print.up = self.direction
+        return {"FINISHED"}
+
+
+CLASSES = (
+    MU_OT_print_check,
+    MU_OT_print_export,
+    MU_OT_print_specimens,
+    MU_OT_print_cancel,
+    MU_OT_print_dismiss,
+    MU_OT_print_open,
+    MU_OT_print_marks,
+    MU_OT_print_clear,
+    MU_OT_print_show,
+    MU_OT_print_up,
+)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -1,0 +1,267 @@
+"""The panel Print of the sidebar tab MU: the solid, what a printer would stumble over, and the files."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import bpy
+
+from ...run.child import FAILED
+from ..simulate import state as simulation
+from ..unit import object as unit_object
+from ..unit.panel import OfUnit, parameters, told, wrapped
+from . import state as printing
+
+JOB = "print_"
+ICONS = {"error": "CANCEL", "warning": "ERROR", "info": "INFO", "pass": "CHECKMARK"}
+DIRECTIONS = 3
+"""Build directions that are shown; the report has them all."""
+NOT_PRINTABLE = 6
+"""Exit status of a check that went well and found an error."""
+
+
+class MU_PT_print(OfUnit, bpy.types.Panel):
+    """The printable solid, its check and its files"""
+
+    bl_idname = "MU_PT_print"
+    bl_label = "Print"
+
+    def show(self, layout, context, root):
+        row = layout.row()
+        row.scale_y = 1.4
+        row.operator("mu.solid", icon="MESH_DATA")
+        solid = unit_object.part(root, unit_object.SOLID)
+        if solid is None:
+            wrapped(layout, "No solid built yet", "INFO")
+        else:
+            _gates(layout, root, solid)
+        child = simulation.of(printing.job(root))
+        refused = child is not None and child.state == FAILED
+        if refused and (child.error or {}).get("status") == NOT_PRINTABLE:
+            box = layout.box()
+            box.alert = True
+            wrapped(box, "Checked: do not print it, see Check", "ERROR")
+            box.operator("mu.print_dismiss")
+        else:
+            where = {printing.CHECK: "see Check", printing.EXPORT: "see Files"}
+            name = child.folder.parent.name if child is not None else ""
+            told(layout, child, where.get(name, "its folder opens below"), JOB)
+
+
+def _gates(layout, root, solid) -> None:
+    box = layout.box()
+    if not unit_object.solid_is_current(root, solid):
+        wrapped(box, "Built from earlier parameters: build it again", "ERROR")
+    g = json.loads(solid["mu_gates"])
+    for text in (
+        f"Lattice genus {g['lattice_genus']}, as E - V + 1",
+        f"{g['components']} body, {g['bad_edges_after_stl']} open edges in its STL",
+        f"{g['inner_shells']} cavity of {g['inner_volume_mm3'] / 1000:.2f} cm3",
+        f"{g['volume_mm3'] / 1000:.2f} cm3 of resin, {g['triangles']} triangles",
+    ):
+        box.label(text=text, icon="CHECKMARK")
+    if solid["mu_path"]:
+        box.label(text=f"Waveguide along {solid['mu_path']}", icon="CHECKMARK")
+
+
+class _OfPrint(OfUnit):
+    bl_parent_id = "MU_PT_print"
+
+
+class MU_PT_print_check(_OfPrint, bpy.types.Panel):
+    """What the printer would stumble over, where, and the best way up"""
+
+    bl_idname = "MU_PT_print_check"
+    bl_label = "Check"
+    bl_options = set()
+
+    def show(self, layout, context, root):
+        settings = root.mu_print
+        layout.prop(settings, "printer")
+        if settings.printer == printing.OWN_PRINTER:
+            layout.prop(settings, "printer_file")
+        layout.prop(settings, "up")
+        row = layout.row()
+        row.scale_y = 1.4
+        row.operator("mu.print_check", icon="VIEWZOOM")
+        found = printing.checked(root)
+        if found is None:
+            wrapped(layout, "Not checked yet", "INFO")
+            return
+        if found.stale:
+            box = layout.box()
+            box.alert = True
+            wrapped(box, f"Stale: {found.stale}. Check again", "ERROR")
+        column = layout.column()
+        column.active = not found.stale
+        _findings(column, settings, found)
+        row = layout.row(align=True)
+        row.operator("mu.print_marks", icon="EMPTY_AXIS")
+        row.operator("mu.print_clear", text="", icon="X")
+        if printing.marks(root):
+            layout.prop(settings, "marker")
+            if printing.marked(root) != found.digest:
+                wrapped(layout, "The markers are of an earlier check: mark again", "INFO")
+        _directions(layout, settings, found)
+        layout.operator("mu.print_open", text="Report", icon="URL").what = "report"
+
+
+def _findings(layout, settings, found) -> None:
+    """A line for every error and warning, the chosen one in full; then how many passed."""
+    passed = []
+    for number, finding in enumerate(found.findings):
+        if finding["severity"] == "pass":
+            passed.append(finding)
+            continue
+        chosen = number == settings.finding
+        count = finding["count"]
+        times = f"  ({count})" if count > 1 else ""
+        layout.operator(
+            "mu.print_show",
+            text=f"{finding['check'].capitalize()}{times}{_measure(finding)}",
+            icon=ICONS[finding["severity"]],
+            depress=chosen,
+        ).finding = number
+        if chosen:
+            _in_full(layout.box(), number, settings.place, finding)
+    header, body = layout.panel("MU_passed", default_closed=True)
+    header.label(text=f"{len(passed)} checks passed", icon="CHECKMARK")
+    if body:
+        for finding in passed:
+            wrapped(body, finding["what"])
+
+
+def _in_full(box, number, place, finding) -> None:
+    wrapped(box, finding["what"])
+    places = finding["places"]
+    if len(places):
+        row = box.row(align=True)
+        before = row.operator("mu.print_show", text="", icon="TRIA_LEFT")
+        before.finding, before.place = number, (place - 1) % len(places)
+        row.label(text=f"place {place % len(places) + 1} of {len(places)}")
+        after = row.operator("mu.print_show", text="", icon="TRIA_RIGHT")
+        after.finding, after.place = number, (place + 1) % len(places)
+        x, y, z = places[place % len(places)]
+        box.label(text=f"at {x:.1f}, {y:.1f}, {z:.1f} mm")
+    if finding["remedy"]:
+        wrapped(box, finding["remedy"].capitalize())
+    if finding["assumed"]:
+        wrapped(box, "The limit is assumed, nobody has published one: set your own", "INFO")
+
+
+def _measure(finding) -> str:
+    """Value and limit of a finding, where it has both and they are more than a count."""
+    value, limit, unit = finding["value"], finding["limit"], finding["unit"]
+    if value is None or limit is None or not unit or not math.isfinite(value):
+        return ""
+    return f":  {value:.3g} / {limit:.3g} {unit}"
+
+
+def _directions(layout, settings, found) -> None:
+    """The best build directions of the check, with what each costs and a button that takes it."""
+    builds = found.found["orientation"]
+    if not builds:
+        return
+    header, body = layout.panel("MU_directions", default_closed=False)
+    header.label(text="Best Way Up")
+    if not body:
+        return
+    choice = [build for build in builds if build["best_among"]][:DIRECTIONS]
+    for build in choice:
+        box = body.box()
+        row = box.split(factor=0.66)
+        row.label(text=", ".join(f"{x:.2f}" for x in build["direction"]), icon="SORT_DESC")
+        same = sum(a * b for a, b in zip(build["direction"], settings.up, strict=True)) > 0.9999
+        button = row.operator("mu.print_up", text="Chosen" if same else "Take", depress=same)
+        button.direction = build["direction"]
+        box.label(text=f"{build['islands']} islands, cups of {build['cup_ml']:.2g} ml")
+        box.label(text=f"{build['support_mm2']:.0f} mm2 to support, {build['inner_mm2']:.0f} in chambers")
+
+
+class MU_PT_print_files(_OfPrint, bpy.types.Panel):
+    """Files for printer and CAD, each read back and compared, and specimens to measure"""
+
+    bl_idname = "MU_PT_print_files"
+    bl_label = "Files"
+    bl_options = set()
+
+    def show(self, layout, context, root):
+        settings, found = root.mu_print, printing.checked(root)
+        row = layout.row(align=True)
+        row.use_property_split = False
+        row.prop(settings, "formats")
+        layout.prop(settings, "quality")
+        layout.prop(settings, "compensate")
+        if settings.compensate == "gauge":
+            layout.prop(settings, "gauge")
+        if settings.compensate != "none" and settings.formats & {"3mf-beams", "step"}:
+            wrapped(layout, "Beams and STEP stay of nominal size", "INFO")
+        path = root.mu_unit.path
+        wrapped(
+            layout,
+            f"With the waveguide along {path}" if path else "Without a waveguide: no path chosen",
+            "INFO",
+        )
+        _said(layout, found)
+        row = layout.row()
+        row.scale_y = 1.4
+        row.operator("mu.print_export", icon="EXPORT")
+        _written(layout, printing.exported(root))
+        layout.operator("mu.export_stl", text="Export STL As ...", icon="FILE_FOLDER")
+        row = layout.row(align=True)
+        row.operator("mu.print_specimens", icon="OUTLINER_OB_LATTICE")
+        row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = printing.SPECIMENS
+        header, body = layout.panel("MU_printing", default_closed=True)
+        header.label(text="How It Prints")
+        if body:
+            parameters(body, root.mu_unit, "print")
+
+
+def _said(layout, found) -> None:
+    """What the check says about what is to be exported."""
+    if found is None or found.stale:
+        wrapped(layout, f"Not checked: {found.stale}" if found else "Not checked", "QUESTION")
+        return
+    count = {s: sum(f["severity"] == s for f in found.findings) for s in printing.FAULTS}
+    if count["error"]:
+        box = layout.box()
+        box.alert = True
+        wrapped(box, f"The check found {count['error']} error(s): export asks first", "CANCEL")
+    else:
+        doubts = f", {count['warning']} warning(s) to decide on" if count["warning"] else ""
+        wrapped(layout, f"Checked: no errors{doubts}", "CHECKMARK")
+
+
+def _written(layout, found) -> None:
+    """The files of the latest export."""
+    if found is None:
+        return
+    box = layout.box()
+    row = box.row()
+    resin = found.manifest["resin"]
+    row.label(text=f"{resin['ml']:.2f} ml, {resin['g']:.1f} g")
+    row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = printing.EXPORT
+    if found.stale:
+        wrapped(box, f"Stale: {found.stale}", "ERROR")
+    column = box.column(align=True)
+    column.active = not found.stale
+    for entry in found.manifest["files"]:
+        column.label(text=f"{entry['file']}, {entry['bytes'] / 1e6:.2f} MB", icon="CHECKMARK")
+    for entry in found.manifest["refused"]:
+        wrapped(column, f"Not written: {entry['format']}: {entry['why']}", "ERROR")
+
+
+CLASSES = (MU_PT_print, MU_PT_print_check, MU_PT_print_files)
+
+
+def register() -> None:
+    """The panel Print and those in it."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """Take them out."""
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

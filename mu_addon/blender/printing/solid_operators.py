@@ -1,0 +1,83 @@
+"""Build the printable solid and write it as STL, both by the core."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+from pathlib import Path
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy_extras.io_utils import ExportHelper
+
+from ...design.export import write_nodes, write_stl
+from ...design.solid import QUALITY
+from ..shared.acting import OnSoundUnit, telling
+from ..unit import object as unit_object
+from ..unit.properties import to_unit
+from . import state as printing
+
+_QUALITY = [
+    (name, name.capitalize(), f"{f.around_axis} facets around the axis, {f.around_strut} around a strut")
+    for name, f in QUALITY.items()
+]
+_FACETS = "How finely round parts are cut into flat ones"
+
+
+class MU_OT_solid(OnSoundUnit, bpy.types.Operator):
+    """Build the printable solid, with the waveguide of the chosen path, and check it; takes seconds"""
+
+    bl_idname = "mu.solid"
+    bl_label = "Build Solid"
+    bl_options = {"REGISTER", "UNDO"}
+
+    quality: EnumProperty(name="Quality", description=_FACETS, items=_QUALITY, default="interactive")
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        core = to_unit(root.mu_unit)
+        solid = unit_object.solid_of(root, core, self.quality)
+        unit_object.put_solid(root, solid, core)
+        gates = solid.gates
+        self.report({"INFO"}, f"Watertight, {gates.triangles} triangles, {gates.volume_mm3 / 1000:.2f} cm3")
+        return {"FINISHED"}
+
+
+class MU_OT_export_stl(OnSoundUnit, bpy.types.Operator, ExportHelper):
+    """Build the solid in the quality to print, check it and write it as binary STL in mm"""
+
+    bl_idname = "mu.export_stl"
+    bl_label = "Export STL"
+    bl_options = {"REGISTER"}
+
+    filename_ext = ".stl"
+    filter_glob: StringProperty(default="*.stl", options={"HIDDEN"})
+    quality: EnumProperty(name="Quality", description=_FACETS, items=_QUALITY, default="export")
+    nodes: BoolProperty(
+        name="Lattice Nodes as Text", description="Also write the nodes' coordinates beside it", default=False
+    )
+
+    def invoke(self, context, event):
+        root = unit_object.active_root(context)
+        path = root.mu_unit.path
+        self.filepath = f"{root.mu_unit.title}{'-' + path if path else ''}.stl"
+        found = printing.checked(root)
+        if found is not None and not found.stale and found.errors:
+            self.report({"WARNING"}, f"The check found: {found.errors[0]['check']}. Do not print this")
+        return ExportHelper.invoke(self, context, event)
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        core = to_unit(root.mu_unit)
+        target = Path(bpy.path.abspath(self.filepath))
+        write_stl(unit_object.solid_of(root, core, self.quality), target)
+        if self.nodes:
+            write_nodes(core, target.with_suffix(".txt"))
+        self.report({"INFO"}, f"Written: {target}")
+        return {"FINISHED"}
+
+
+CLASSES = (MU_OT_solid, MU_OT_export_stl)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -1,0 +1,167 @@
+"""Physical fields in colour: what each is called, and the material whose ramp shows it.
+
+The attribute keeps its values and its unit; the material scales it to its ramp, so that another range or
+other colours change no data.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import bpy
+import numpy as np
+
+from ...report.charts import MAP
+from ..preview import colours as materials
+
+STOPS = 9
+"""Colours of the ramp when it is made; the user may change them, and the legend follows."""
+TABLE = 128
+"""Colours that solid shading tells apart."""
+COLOUR = "mu_field_colour"
+"""The colour attribute that solid shading shows; renders and material preview use the material."""
+_PLAIN = "MU Solid"
+
+
+@attrs.frozen
+class Field:
+    """A field: its attribute, what it is called, its unit and what it says."""
+
+    name: str
+    label: str
+    unit: str
+    text: str
+
+
+FIELDS = (
+    Field("displacement_mm", "Displacement", "mm", "Distance from where the point is at rest"),
+    Field(
+        "deviation_mm",
+        "Deviation",
+        "mm",
+        "Distance between the unit with the sensor and Model A, point by point",
+    ),
+    Field("von_mises_kPa", "Von Mises Stress", "kPa", "Of Cauchy's stress, averaged at the nodes"),
+    Field(
+        "largest_principal_stress_kPa",
+        "Largest Principal Stress",
+        "kPa",
+        "Of Cauchy's stress, tension positive, averaged at the nodes",
+    ),
+    Field("largest_stretch", "Largest Stretch", "", "Largest principal stretch"),
+    Field("smallest_stretch", "Smallest Stretch", "", "Smallest principal stretch"),
+    Field(
+        "dJ_by_modulus_mm_per_MPa",
+        "Sensitivity dJ/dE",
+        "mm/MPa",
+        "How much stiffening the material there alone would disturb the motion; of Model A",
+    ),
+)
+BY_NAME = {field.name: field for field in FIELDS}
+
+
+def material_of(root: Any) -> Any:
+    """The material that colours a unit's fields, made where it is missing."""
+    name = f"MU Field {root.mu_unit.uuid[:8]}"
+    return bpy.data.materials.get(name) or _make(name)
+
+
+def _make(name: str) -> Any:
+    made = bpy.data.materials.new(name)
+    if made.node_tree is None:  # before 5.0
+        made.use_nodes = True
+    tree = made.node_tree
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    value = tree.nodes.new("ShaderNodeAttribute")
+    value.name, value.attribute_type = "Field", "GEOMETRY"
+    scaled = tree.nodes.new("ShaderNodeMapRange")
+    scaled.name, scaled.clamp = "Range", True
+    ramp = tree.nodes.new("ShaderNodeValToRGB")
+    ramp.name = "Ramp"
+    for node, place in ((value, -900), (scaled, -700), (ramp, -500)):
+        node.location = (place, 200)
+    elements = ramp.color_ramp.elements
+    for number in range(STOPS):
+        at = number / (STOPS - 1)
+        element = elements[0] if number == 0 else elements[-1] if number == STOPS - 1 else elements.new(at)
+        element.color = of_map(at)
+    tree.links.new(value.outputs["Fac"], scaled.inputs["Value"])
+    tree.links.new(scaled.outputs["Result"], ramp.inputs["Fac"])
+    tree.links.new(ramp.outputs["Color"], shader.inputs["Base Color"])
+    shader.inputs["Roughness"].default_value = 0.7
+    made.diffuse_color = (0.13, 0.57, 0.55, 1.0)
+    return made
+
+
+def legend_material_of(root: Any) -> Any:
+    """The material of a unit's legend in the scene: the field's ramp as it is now, by `share`, unlit."""
+    name = f"MU Legend {root.mu_unit.uuid[:8]}"
+    made = bpy.data.materials.get(name) or bpy.data.materials.new(name)
+    materials.shining(made)
+    tree = made.node_tree
+    share, ramp = tree.nodes.new("ShaderNodeAttribute"), tree.nodes.new("ShaderNodeValToRGB")
+    share.attribute_name, share.attribute_type = "share", "GEOMETRY"
+    _copy_ramp(material_of(root).node_tree.nodes["Ramp"].color_ramp, ramp.color_ramp)
+    tree.links.new(share.outputs["Fac"], ramp.inputs["Fac"])
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    tree.links.new(ramp.outputs["Color"], emission.inputs["Color"])
+    return made
+
+
+def _copy_ramp(source: Any, target: Any) -> None:
+    target.interpolation, target.color_mode = source.interpolation, source.color_mode
+    while len(target.elements) > 1:
+        target.elements.remove(target.elements[-1])
+    for number, element in enumerate(source.elements):
+        own = target.elements.new(element.position) if number else target.elements[0]
+        own.position, own.color = element.position, element.color
+
+
+def of_map(share: float) -> tuple[float, float, float, float]:
+    """The colour, linear, at a share 0 .. 1 of the map that reports use, too."""
+    import matplotlib
+
+    r, g, b, _ = matplotlib.colormaps[MAP](share)
+    return _linear(r), _linear(g), _linear(b), 1.0
+
+
+def _linear(srgb: float) -> float:
+    return srgb / 12.92 if srgb <= 0.04045 else ((srgb + 0.055) / 1.055) ** 2.4
+
+
+def colours(root: Any, values: Any) -> Any:
+    """The ramp's colours (v, 4), linear, of values (v,) of the field."""
+    settings = root.mu_motion
+    ramp = material_of(root).node_tree.nodes["Ramp"].color_ramp
+    table = np.array([ramp.evaluate(share) for share in np.linspace(0.0, 1.0, TABLE)], np.float32)
+    share = (values - settings.low) / max(settings.high - settings.low, 1e-30)
+    return table[np.clip(share * TABLE, 0, TABLE - 1).astype(np.int32)]
+
+
+def paint(root: Any, parts: list[tuple[Any, bool]]) -> None:
+    """Set range and field of a unit's material, and give it to the parts that carry the field."""
+    settings = root.mu_motion
+    found = material_of(root)
+    nodes = found.node_tree.nodes
+    nodes["Field"].attribute_name = settings.field
+    nodes["Range"].inputs["From Min"].default_value = settings.low
+    nodes["Range"].inputs["From Max"].default_value = settings.high
+    for part, carries in parts:
+        wanted = found if carries else materials.material(_PLAIN)
+        slots = part.data.materials
+        if not slots:
+            slots.append(wanted)
+        elif slots[0] != wanted:
+            slots[0] = wanted
+
+
+def write_colours(root: Any, mesh: Any, values: Any | None) -> None:
+    """Write a field's values (v,) as the colours that solid shading shows, plain where it has none."""
+    attribute = mesh.color_attributes.get(COLOUR) or mesh.color_attributes.new(COLOUR, "FLOAT_COLOR", "POINT")
+    if values is None:
+        found = np.broadcast_to(np.float32(materials.COLOURS[_PLAIN]), (len(mesh.vertices), 4))
+    else:
+        found = colours(root, values)
+    attribute.data.foreach_set("color", np.ascontiguousarray(found).ravel())
+    mesh.color_attributes.active_color = mesh.color_attributes[COLOUR]

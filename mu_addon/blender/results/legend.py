@@ -1,0 +1,140 @@
+"""What the colours of a motion mean, drawn over the viewport: ramp, values, unit, time and pressure.
+
+Names stand above what is shown. It is drawn with the viewport and is not part of a render; where the legend
+stands in the scene (`legend_object`), names alone are drawn.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import blf
+import bpy
+import gpu
+import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from gpu_extras.batch import batch_for_shader
+from mathutils import Vector
+
+from ...usecases.simulate_and_place.motion import MODEL_A
+from ..shared.overlay import Overlay
+from ..simulate import study_folder as studies
+from ..unit import object as unit_object
+from . import fields
+from . import motion as motion_parts
+
+PIECES = 48
+"""Flat pieces of the drawn ramp."""
+WIDTH, HEIGHT, LEFT, BOTTOM = 18, 190, 24, 60
+TEXT = (0.92, 0.92, 0.92, 1.0)
+
+
+def ticks(low: float, high: float) -> list[float]:
+    """Three to seven round numbers from `low` to `high`."""
+    step = 10.0 ** np.floor(np.log10((high - low) / 3.0))
+    step *= next(f for f in (5, 2, 1) if (high - low) / (f * step) >= 3 or f == 1)
+    first = np.ceil(low / step - 1e-9)
+    return [float(step * n) + 0.0 for n in np.arange(first, np.floor(high / step + 1e-9) + 1)]
+
+
+def words(root: Any, motion: Any, scene: Any) -> list[str]:
+    """Title, state and remark of the legend."""
+    field = fields.BY_NAME[root.mu_motion.field]
+    time = motion_parts.time_of(motion, scene)
+    pressure = float(np.interp(time, motion.time_s, motion.pressure_kPa))
+    found = [f"{field.label} [{field.unit}]" if field.unit else field.label]
+    found.append(f"{np.clip(time, motion.time_s[0], motion.time_s[-1]):.2f} s, {pressure + 0.0:.1f} kPa")
+    for touch in studies.touches(root):
+        force = float(np.interp(time, touch.time_s, touch.force_N))
+        found.append(f"{touch.name}: {force:.2f} N")
+    findings = studies.findings(root)
+    if findings is None or findings.stale:
+        found.append("stale: of other parameters")
+    elif findings.quick:
+        found.append("quick look: linear elements lock")
+    return found
+
+
+def _draw() -> None:
+    context = bpy.context
+    root = unit_object.active_root(context)
+    if root is None or not root.mu_motion.legend:
+        return
+    shown = [part for part in motion_parts.parts(root) if part.visible_get()]
+    motion = motion_parts.motion_of(root) if shown else None
+    if motion is None:
+        return
+    scale = context.preferences.system.ui_scale
+    size = round(12 * scale)
+    in_scene = any(child.get(unit_object.LEGEND) and child.visible_get() for child in root.children)
+    if not in_scene:
+        left = _beside_tools(context.area) + LEFT * scale
+        if any(root.mu_motion.field in part.data.attributes for part in shown):
+            _ramp(root, scale, left)
+        for line, text in enumerate(reversed(words(root, motion, context.scene))):
+            write(text, left, (BOTTOM + HEIGHT + 14) * scale + 1.5 * size * line, size)
+    _names(context, root, motion, size)
+
+
+def _beside_tools(area: Any) -> float:
+    """Width in pixels of the toolbar that lies over the viewport's left, 0 where there is none."""
+    tools = next((region for region in area.regions if region.type == "TOOLS"), None)
+    return 0.0 if tools is None or tools.width <= 1 else float(tools.width)
+
+
+def _ramp(root: Any, scale: float, left: float) -> None:
+    settings = root.mu_motion
+    x0, x1 = left, left + WIDTH * scale
+    heights = (BOTTOM + HEIGHT * np.linspace(0.0, 1.0, PIECES + 1)) * scale
+    corners = [(x, y) for y in heights for x in (x0, x1)]
+    low, high = settings.low, settings.high
+    if not high > low:
+        return
+    colours = _display(fields.colours(root, np.repeat(np.linspace(low, high, PIECES + 1), 2)))
+    corner = np.array([[0, 1, 3], [0, 3, 2]], np.int32)
+    triangles = np.concatenate([corner + 2 * piece for piece in range(PIECES)])
+    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+    data = {"pos": corners, "color": colours.tolist()}
+    batch_for_shader(shader, "TRIS", data, indices=triangles).draw(shader)
+    size = round(11 * scale)
+    for value in ticks(low, high):
+        y = (BOTTOM + HEIGHT * (value - low) / (high - low)) * scale
+        write(f"{value:.4g}", x1 + 6 * scale, y - 0.35 * size, size)
+
+
+def _display(linear: Any) -> Any:
+    """Colours (c, 4) as a screen takes them, of linear ones: sRGB, opaque."""
+    linear = np.clip(linear, 0.0, 1.0)
+    shown = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    shown[:, 3] = 1.0
+    return shown
+
+
+def _names(context: Any, root: Any, motion: Any, size: int) -> None:
+    """The name of each motion above it."""
+    top = float(motion.mesh.nodes[:, 2].max())
+    middle = float(motion.mesh.nodes[:, 1].mean())
+    for name, what in motion_parts.shown(root):
+        part = motion_parts.one(root, name, what)
+        at = part.matrix_world @ Vector((0.0, middle, 1.32 * top))
+        place = location_3d_to_region_2d(context.region, context.region_data, at)
+        if place is not None:
+            text = "Model A" if name == MODEL_A else name.replace("alpha", "α")
+            text += ", print" if what == motion_parts.PRINT else ""
+            blf.size(0, size)
+            write(text, place.x - blf.dimensions(0, text)[0] / 2, place.y, size)
+
+
+def write(text: str, x: float, y: float, size: int, colour: tuple[float, ...] = TEXT) -> None:
+    """Draw a text with a shadow, its lower left at x, y in pixels."""
+    blf.size(0, size)
+    blf.color(0, *colour)
+    blf.enable(0, blf.SHADOW)
+    blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.8)
+    blf.position(0, x, y, 0)
+    blf.draw(0, text)
+    blf.disable(0, blf.SHADOW)
+
+
+_overlay = Overlay(_draw)
+register, unregister = _overlay.register, _overlay.unregister

@@ -1,0 +1,137 @@
+"""The legend as objects in the scene, so that renders have it: a ramp, its values, unit, time and pressure.
+
+A bar beside the unit, a child of its root, with texts; it may be moved, turned or scaled, and keeps that. Its
+colours are the field material's ramp, unlit: they say the same whatever shines on the model.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+from mathutils import Matrix
+
+from ...errors import InputError
+from ..preview import arrays as preview
+from ..preview import colours as materials
+from ..shared import handlers
+from ..unit import object as unit_object
+from ..unit.object import LEGEND, remove_part
+from . import fields, legend
+from . import motion as motion_parts
+
+BAR, HEAD, TICK = "bar", "head", "tick"
+"""What an object of the legend is: its bar, the text above it, or a value beside it."""
+WIDTH, TEXT = 0.08, 0.065
+"""Width of the bar and height of its letters, in heights of the bar."""
+# Read from +x with z up: the side from which a unit that is cut open shows its inside.
+_FACING_X = Matrix(((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))).to_4x4()
+
+
+def bar_of(root: Any) -> Any | None:
+    """The unit's legend, or None."""
+    return next((child for child in root.children if child.get(LEGEND) == BAR), None)
+
+
+def show(root: Any) -> Any:
+    """Stand a legend beside what is shown, or bring it up to date; raises InputError without a motion."""
+    motion = motion_parts.motion_of(root)
+    if motion is None or not motion_parts.parts(root):
+        raise InputError("no motion is shown, so no colours", "On the Model", "show a motion first")
+    bar = bar_of(root)
+    if bar is None:
+        low, high = motion.mesh.nodes.min(axis=0), motion.mesh.nodes.max(axis=0)
+        bar = _add(root, root, BAR, bpy.data.meshes.new("Legend"))
+        bar.matrix_local = (
+            Matrix.Translation((0.0, float(high[1] + 0.4 * (high[1] - low[1])), float(low[2])))
+            @ _FACING_X
+            @ Matrix.Scale(float(high[2] - low[2]), 4)
+        )
+    update(root)
+    return bar
+
+
+def hide(root: Any) -> None:
+    """Take the legend out of the scene."""
+    bar = bar_of(root)
+    if bar is not None:
+        for obj in (*bar.children, bar):
+            remove_part(obj)
+
+
+def update(root: Any) -> None:
+    """Write field, range and colours into the legend, if there is one."""
+    bar = bar_of(root)
+    motion = motion_parts.motion_of(root)
+    if bar is None or motion is None:
+        return
+    settings = root.mu_motion
+    low, high = settings.low, max(settings.high, settings.low + 1e-12)
+    heights = np.linspace(0.0, 1.0, legend.PIECES + 1)
+    corners = np.array([[x, y, 0.0] for y in heights for x in (0.0, WIDTH)])
+    first = 2 * np.arange(legend.PIECES)[:, None]
+    values = np.repeat(low + (high - low) * heights, 2)
+    shape = preview.Skeleton(
+        corners, faces=(first + np.array([0, 1, 3, 2]),), attributes={"share": corners[:, 1]}
+    )
+    preview.write(bar.data, shape, smooth=False)
+    fields.write_colours(root, bar.data, values)
+    wanted = fields.legend_material_of(root)
+    if not bar.data.materials:
+        bar.data.materials.append(wanted)
+    for text in [child for child in bar.children if child.get(LEGEND) == TICK]:
+        remove_part(text)
+    for value in legend.ticks(low, high):
+        _say(bar, TICK, f"{value:.4g}", (WIDTH + 0.02, (value - low) / (high - low)))
+    tell(root, bpy.context.scene)
+
+
+def tell(root: Any, scene: Any) -> None:
+    """Write the field's name, the frame's time and pressure, and what else the legend remarks."""
+    bar, motion = bar_of(root), motion_parts.motion_of(root)
+    if bar is not None and motion is not None:
+        _say(bar, HEAD, "\n".join(legend.words(root, motion, scene)), (0.0, 1.05))
+
+
+def _say(bar: Any, what: str, words: str, place: tuple[float, float]) -> None:
+    """A text of the legend; all but ticks are there once."""
+    text = next((child for child in bar.children if child.get(LEGEND) == what and what != TICK), None)
+    if text is None:
+        text = _add(bar.parent, bar, what, bpy.data.curves.new("Legend Text", "FONT"))
+        # Not by its location: Blender would draw a line from there to the bar.
+        text.data.offset_x, text.data.offset_y = place
+        text.data.size = TEXT
+        text.data.align_y = "BOTTOM" if what == HEAD else "CENTER"
+        text.data.materials.append(materials.unlit("MU Legend Text"))
+    if text.data.body != words:
+        text.data.body = words
+
+
+def _add(root: Any, parent: Any, what: str, data: Any) -> Any:
+    made = bpy.data.objects.new(data.name, data)
+    made[LEGEND] = what
+    for collection in root.users_collection:
+        collection.objects.link(made)
+    made.parent = parent
+    return made
+
+
+@persistent
+def _before_frame(scene, *_):
+    for root in unit_object.roots():
+        tell(root, scene)
+
+
+_HANDLERS = {"frame_change_pre": _before_frame}
+
+
+def register() -> None:
+    """The handler that writes time and pressure."""
+    handlers.add(_HANDLERS)
+
+
+def unregister() -> None:
+    """Take it out."""
+    handlers.remove(_HANDLERS)

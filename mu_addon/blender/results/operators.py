@@ -1,0 +1,179 @@
+"""Show a study's motion on the timeline, take it away, fit its colours, and look at its pictures."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+
+from ...errors import InputError
+from ...usecases.simulate_and_place.motion import FOLDER, MODEL_A
+from ..shared.acting import OnUnit, telling
+from ..simulate import study_folder as studies
+from ..unit import object as unit_object
+from . import legend_object
+from . import motion as motion_parts
+
+NO_MOTION = "No motion yet: simulate this unit first"
+
+
+class OnMotion(OnUnit):
+    """An operator on the active unit whose study holds a motion."""
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if motion_parts.motion_of(unit_object.active_root(context)) is None:
+            cls.poll_message_set(NO_MOTION)
+            return False
+        return True
+
+
+class MU_OT_motion(OnMotion, bpy.types.Operator):
+    """Show this motion beside the unit, or take it away: Model A or a sensor path, as mesh or as print"""
+
+    bl_idname = "mu.motion"
+    bl_label = "Show Motion"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: StringProperty(
+        name="Whose", description="`model_a`, the unit without a sensor, or a path's name", default=MODEL_A
+    )
+    what: EnumProperty(
+        name="Body",
+        description="What moves",
+        items=[
+            (motion_parts.MESH, "Analysis Mesh", "The mesh that was solved, with its fields"),
+            (motion_parts.PRINT, "Printable Solid", "The body to print, carried along by the mesh"),
+        ],
+    )
+    on: BoolProperty(name="Show", description="Show it, or take it away", default=True)
+    timeline: BoolProperty(
+        name="Fit Timeline", description="End the scene's timeline where the protocol ends", default=True
+    )
+    shade: BoolProperty(
+        name="Show Colours",
+        description="Have viewports in solid shading show attributes, which hold the field's colours",
+        default=True,
+    )
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        motion = motion_parts.motion_of(root)
+        if self.name not in (MODEL_A, *motion.paths):
+            raise InputError(
+                f"there is no motion of {self.name!r}",
+                str(motion.folder),
+                f"choose one of {', '.join((MODEL_A, *motion.paths))}",
+            )
+        if not self.on:
+            motion_parts.hide(root, self.name, self.what)
+            return {"FINISHED"}
+        motion_parts.show(root, self.name, self.what)
+        if self.timeline:
+            context.scene.frame_end = motion_parts.last_frame(motion, context.scene)
+        if self.shade and context.screen:
+            for area in context.screen.areas:
+                if area.type == "VIEW_3D" and area.spaces.active.shading.type == "SOLID":
+                    area.spaces.active.shading.color_type = "VERTEX"
+        return {"FINISHED"}
+
+
+class MU_OT_motion_clear(OnUnit, bpy.types.Operator):
+    """Take every motion of this unit out of the scene; the study's files stay"""
+
+    bl_idname = "mu.motion_clear"
+    bl_label = "Clear Motion"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        for name, what in motion_parts.shown(root):
+            motion_parts.hide(root, name, what)
+        legend_object.hide(root)
+        return {"FINISHED"}
+
+
+class MU_OT_motion_update(OnMotion, bpy.types.Operator):
+    """Build what is shown again from the study's files, after another simulation"""
+
+    bl_idname = "mu.motion_update"
+    bl_label = "Update Motion"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        motion_parts.rebuild(root)
+        root.mu_motion.trouble = ""
+        return {"FINISHED"}
+
+
+class MU_OT_motion_range(OnMotion, bpy.types.Operator):
+    """Fit the range of the colours to the field over the whole motion"""
+
+    bl_idname = "mu.motion_range"
+    bl_label = "Fit Range"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        settings = root.mu_motion
+        settings.low, settings.high = motion_parts.extent(root, settings.field)
+        return {"FINISHED"}
+
+
+class MU_OT_motion_legend(OnMotion, bpy.types.Operator):
+    """Stand the legend in the scene beside the unit, where renders see it, or take it away"""
+
+    bl_idname = "mu.motion_legend"
+    bl_label = "Legend in Renders"
+    bl_options = {"REGISTER", "UNDO"}
+
+    on: BoolProperty(name="Show", description="Show it, or take it away", default=True)
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        legend_object.show(root) if self.on else legend_object.hide(root)
+        return {"FINISHED"}
+
+
+class MU_OT_picture(OnUnit, bpy.types.Operator):
+    """Open a picture of the study in an image editor of its own"""
+
+    bl_idname = "mu.picture"
+    bl_label = "Enlarge"
+    bl_options = {"REGISTER"}
+
+    name: StringProperty(name="Picture", description="Name of its file in the study's folder")
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        path = studies.folder_of(root) / FOLDER / self.name
+        if not self.name or not path.is_file():
+            raise InputError("there is no such picture", str(path), "simulate first")
+        image = bpy.data.images.load(str(path), check_existing=True)
+        image.reload()
+        if bpy.app.background:
+            return {"FINISHED"}
+        bpy.ops.wm.window_new()
+        area = context.window_manager.windows[-1].screen.areas[0]
+        area.type = "IMAGE_EDITOR"
+        area.spaces.active.image = image
+        return {"FINISHED"}
+
+
+CLASSES = (
+    MU_OT_motion,
+    MU_OT_motion_clear,
+    MU_OT_motion_update,
+    MU_OT_motion_range,
+    MU_OT_motion_legend,
+    MU_OT_picture,
+)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

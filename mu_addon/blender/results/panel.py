@@ -1,0 +1,136 @@
+"""Results on the model: which motion is shown, what its colours say, and the study's pictures."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import bpy
+
+from ...usecases.simulate_and_place.motion import FOLDER, MODEL_A
+from ...usecases.simulate_and_place.panel_pictures import ANGLE, delta_name
+from ..simulate import study_folder as studies
+from ..unit import object as unit_object
+from ..unit.panel import OfUnit, wrapped
+from . import fields, legend_object, thumbnails
+from . import motion as motion_parts
+from .operators import NO_MOTION
+
+PICTURE = 13.0
+"""Side of a picture, in heights of a button."""
+
+
+class _OfResults(OfUnit):
+    bl_parent_id = "MU_PT_results"
+    bl_options: ClassVar[set[str]] = set()
+
+
+class MU_PT_motion(_OfResults, bpy.types.Panel):
+    """The motion on the timeline: Model A and any path, side by side, as mesh and as print"""
+
+    bl_idname = "MU_PT_motion"
+    bl_label = "On the Model"
+
+    def show(self, layout, context, root):
+        motion = motion_parts.motion_of(root)
+        if motion is None:
+            wrapped(layout, NO_MOTION, "INFO")
+            return
+        on = motion_parts.shown(root)
+        for what, title in ((motion_parts.MESH, "Analysis mesh"), (motion_parts.PRINT, "Printable solid")):
+            layout.label(text=title)
+            grid = layout.grid_flow(columns=4, align=True, even_columns=True, row_major=True)
+            for name in (MODEL_A, *motion.paths):
+                text = "A" if name == MODEL_A else name.replace("alpha", "α")
+                there = (name, what) in on
+                button = grid.operator("mu.motion", text=text, depress=there)
+                button.name, button.what, button.on = name, what, not there
+        if not motion.paths:
+            wrapped(layout, "Paths: simulate with Place the Sensor", "INFO")
+        settings = root.mu_motion
+        if settings.trouble:
+            wrapped(layout, settings.trouble, "ERROR")
+        for part in motion_parts.parts(root):
+            if part.get("mu_outside"):
+                wrapped(layout, f"{part.name}: {part['mu_outside']}", "INFO")
+        if not on:
+            return
+        row = layout.row(align=True)
+        row.operator("screen.animation_play", text="Play", icon="PLAY")
+        row.operator("mu.motion_update", text="", icon="FILE_REFRESH")
+        row.operator("mu.motion_clear", text="", icon="X")
+        column = layout.column(align=True)
+        row = column.row()
+        row.enabled = motion.halved
+        row.prop(settings, "cut")
+        column.prop(settings, "apart")
+        column.prop(settings, "live")
+
+
+class MU_PT_field(_OfResults, bpy.types.Panel):
+    """What the colours say, and their range"""
+
+    bl_idname = "MU_PT_field"
+    bl_label = "Colours"
+
+    @classmethod
+    def poll(cls, context):
+        root = unit_object.active_root(context)
+        return root is not None and bool(motion_parts.parts(root))
+
+    def show(self, layout, context, root):
+        settings = root.mu_motion
+        layout.prop(settings, "field")
+        missing = [
+            part.name for part in motion_parts.parts(root) if settings.field not in part.data.attributes
+        ]
+        if missing:
+            wrapped(layout, f"Not known of {', '.join(missing)}: grey", "INFO")
+        unit = fields.BY_NAME[settings.field].unit
+        column = layout.column(align=True)
+        column.prop(settings, "low", text=f"From ({unit})" if unit else "From")
+        column.prop(settings, "high", text="To")
+        row = layout.row(align=True)
+        row.use_property_split = False
+        row.prop(settings, "lock", toggle=True, icon="LOCKED" if settings.lock else "UNLOCKED", text="Lock")
+        row.prop(settings, "symmetric", toggle=True)
+        row.operator("mu.motion_range", text="Fit")
+        row = layout.row(align=True)
+        row.use_property_split = False
+        row.prop(settings, "legend", toggle=True)
+        there = legend_object.bar_of(root) is not None
+        row.operator("mu.motion_legend", text="In Renders", icon="RENDER_STILL", depress=there).on = not there
+
+
+class MU_PT_pictures(_OfResults, bpy.types.Panel):
+    """The angle over the pressure, and where and when the chosen path disturbs the motion"""
+
+    bl_idname = "MU_PT_pictures"
+    bl_label = "Pictures"
+
+    def show(self, layout, context, root):
+        folder = studies.folder_of(root) / FOLDER
+        names = [ANGLE] + ([delta_name(root.mu_unit.path)] if root.mu_unit.path else [])
+        found = [(name, thumbnails.icon_of(folder / name)) for name in names]
+        for name, icon in found:
+            if icon is not None:
+                layout.template_icon(icon, scale=PICTURE)
+                layout.operator("mu.picture", text="Enlarge", icon="FULLSCREEN_ENTER").name = name
+        if all(icon is None for _, icon in found):
+            wrapped(layout, "No pictures yet: simulate this unit first", "INFO")
+        elif not root.mu_unit.path:
+            wrapped(layout, "Choose a sensor path to see its deviation", "INFO")
+
+
+CLASSES = (MU_PT_motion, MU_PT_field, MU_PT_pictures)
+
+
+def register() -> None:
+    """The panels under Results."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """Take them out."""
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

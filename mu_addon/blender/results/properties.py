@@ -1,0 +1,104 @@
+"""How a unit's motion is shown: kept on its root object, beside its parameters."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
+
+from ...errors import MuError
+from ..unit import live_update as live
+from . import fields
+from . import motion as motion_parts
+
+
+def _again(settings, context):
+    """The field or its range changed: colours follow."""
+    motion_parts.refresh(settings.id_data)
+    live.redraw()
+
+
+def _range(settings, context):
+    motion_parts.colour(settings.id_data)
+    live.redraw()
+
+
+def _surface(settings, context):
+    try:
+        motion_parts.rebuild(settings.id_data)
+    except MuError as error:
+        # A property cannot refuse: the panel says so instead.
+        settings.trouble = error.what
+    else:
+        settings.trouble = ""
+
+
+def _apart(settings, context):
+    motion_parts.arrange(settings.id_data)
+
+
+class MU_PG_motion(bpy.types.PropertyGroup):
+    """How the motion in a unit's study is shown."""
+
+    field: EnumProperty(
+        name="Field",
+        description="What the colours say",
+        items=[(f.name, f"{f.label} ({f.unit})" if f.unit else f.label, f.text) for f in fields.FIELDS],
+        update=_again,
+    )
+    low: FloatProperty(
+        name="From", description="Value of the first colour, in the field's unit", precision=4, update=_range
+    )
+    high: FloatProperty(
+        name="To",
+        description="Value of the last colour, in the field's unit",
+        default=1.0,
+        precision=4,
+        update=_range,
+    )
+    lock: BoolProperty(
+        name="Lock Range",
+        description="Keep the range when field, motion or study change, to compare",
+        update=_again,
+    )
+    symmetric: BoolProperty(
+        name="Symmetric", description="Range from -x to x, so that 0 is the middle colour", update=_again
+    )
+    legend: BoolProperty(
+        name="Legend", description="Draw colours, values and unit in the viewport", default=True
+    )
+    cut: BoolProperty(
+        name="Cut Open",
+        description="Show the half behind the bending plane, to see chambers and walls; where the analysis "
+        "mesh is a half",
+        default=True,
+        update=_surface,
+    )
+    apart: FloatProperty(
+        name="Apart",
+        description="Distance between neighbours, in widths of the unit; 0 lays all in one place",
+        default=1.5,
+        min=0.0,
+        max=10.0,
+        update=_apart,
+    )
+    live: BoolProperty(
+        name="Follow the Timeline",
+        description="Write the fields at every frame; without it only shapes move, which is faster",
+        default=True,
+        update=_again,
+    )
+    trouble: bpy.props.StringProperty(
+        name="Trouble", description="Why the motion could not be shown anew", options={"HIDDEN"}
+    )
+
+
+def register():
+    """The class and the property on objects."""
+    bpy.utils.register_class(MU_PG_motion)
+    bpy.types.Object.mu_motion = PointerProperty(type=MU_PG_motion)
+
+
+def unregister():
+    """Take them out; values stay in the file."""
+    del bpy.types.Object.mu_motion
+    bpy.utils.unregister_class(MU_PG_motion)

@@ -1,0 +1,356 @@
+"""Connect the real sensor, mark, calibrate, zero, and show its twin."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+from pathlib import Path
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+
+from ...errors import InputError
+from ..results.operators import OnMotion
+from ..shared.acting import RUN_FILES, CancelsJob, DismissesJob, OnUnit, OpensFile, telling
+from ..simulate import state as simulation
+from ..simulate import study_folder as studies
+from ..unit import live_update as live
+from ..unit import object as unit_object
+from . import state as sensor
+from . import twin
+
+NOT_CONNECTED = "Connect the sensor first"
+
+
+class OnSession(OnUnit):
+    """An operator on the active unit whose sensor is connected."""
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        session = sensor.of(unit_object.active_root(context))
+        if session is None or not session.running:
+            cls.poll_message_set(NOT_CONNECTED)
+            return False
+        return True
+
+
+class MU_OT_sensor_ports(bpy.types.Operator):
+    """Look for serial ports"""
+
+    bl_idname = "mu.sensor_ports"
+    bl_label = "Find Ports"
+    bl_options = {"REGISTER"}
+
+    @telling
+    def execute(self, context):
+        found = sensor.find_ports()
+        self.report({"INFO"}, f"{len(found)} serial port(s)" if found else "No serial port is there")
+        return {"FINISHED"}
+
+
+class MU_OT_sensor_port(OnUnit, bpy.types.Operator):
+    """Take this port"""
+
+    bl_idname = "mu.sensor_port"
+    bl_label = "Take Port"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: StringProperty(name="Name", description="A port's device, or usb:VID:PID[:SERIAL]")
+
+    def execute(self, context):
+        unit_object.active_root(context).mu_sensor.port = self.name
+        return {"FINISHED"}
+
+
+class MU_OT_sensor_connect(OnUnit, bpy.types.Operator):
+    """Read the sensor in a process of its own; every sample is on disk before it is shown"""
+
+    bl_idname = "mu.sensor_connect"
+    bl_label = "Connect and Record"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        session = sensor.of(unit_object.active_root(context))
+        if sensor.missing():
+            cls.poll_message_set(f"Not in this Blender: {', '.join(sensor.missing())}")
+            return False
+        if session is not None and session.running:
+            cls.poll_message_set("The sensor is connected")
+            return False
+        return True
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        settings = root.mu_sensor
+        if settings.source == "replay" and not settings.replay:
+            raise InputError("no recording is chosen", "Recording", "choose the folder of one")
+        sensor.connect(root)
+        live.redraw()
+        return {"FINISHED"}
+
+
+class MU_OT_sensor_disconnect(OnUnit, bpy.types.Operator):
+    """End the session: the port is free, and the recording whole"""
+
+    bl_idname = "mu.sensor_disconnect"
+    bl_label = "Disconnect"
+    bl_options = {"REGISTER"}
+
+    others: BoolProperty(
+        name="Others", description="The sensors of all other units instead", options={"SKIP_SAVE"}
+    )
+
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        for uuid in sensor.others(root) if self.others else [root.mu_unit.uuid]:
+            sensor.disconnect(uuid)
+        return {"FINISHED"}
+
+
+class MU_OT_sensor_pause(OnSession, bpy.types.Operator):
+    """Give the port to another program, for firmware say, or take it again; the session goes on"""
+
+    bl_idname = "mu.sensor_pause"
+    bl_label = "Give Port"
+    bl_options = {"REGISTER"}
+
+    def execute(self, context):
+        session = sensor.of(unit_object.active_root(context))
+        session.child.tell("resume" if session.state == "paused" else "pause")
+        return {"FINISHED"}
+
+
+class MU_OT_sensor_mark(OnSession, bpy.types.Operator):
+    """Leave words in the recording, at this moment"""
+
+    bl_idname = "mu.sensor_mark"
+    bl_label = "Mark"
+    bl_options = {"REGISTER"}
+
+    words: StringProperty(name="Words", description="What happens now", default="here")
+
+    def invoke(self, context, event):
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context):
+        # One line: the next would be another order.
+        words = " ".join(self.words.split())
+        sensor.of(unit_object.active_root(context)).child.tell(f"mark {words}")
+        return {"FINISHED"}
+
+
+class MU_OT_sensor_freeze(OnUnit, bpy.types.Operator):
+    """Have the plot stand still, to read it, or go on; recording goes on in any case"""
+
+    bl_idname = "mu.sensor_freeze"
+    bl_label = "Stand Still"
+    bl_options = {"REGISTER"}
+
+    def execute(self, context):
+        session = sensor.of(unit_object.active_root(context))
+        if session is None or session.traces is None:
+            return {"CANCELLED"}
+        session.frozen = session.traces.copy() if session.frozen is None else None
+        live.redraw()
+        return {"FINISHED"}
+
+
+class MU_OT_sensor_channel(OnUnit, bpy.types.Operator):
+    """Draw this channel, or leave it out of the plot"""
+
+    bl_idname = "mu.sensor_channel"
+    bl_label = "Draw Channel"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: StringProperty(name="Channel", description="Name of the channel")
+
+    def execute(self, context):
+        settings = unit_object.active_root(context).mu_sensor
+        hidden = {name for name in settings.hidden.split(",") if name}
+        settings.hidden = ",".join(sorted(hidden ^ {self.name}))
+        return {"FINISHED"}
+
+
+class MU_OT_sensor_sweep(OnSession, bpy.types.Operator):
+    """Calibrate step by step: hold the unit at angles to and fro; a map is fitted after the last one"""
+
+    bl_idname = "mu.sensor_sweep"
+    bl_label = "Guided Sweep"
+    bl_options = {"REGISTER"}
+
+    on: BoolProperty(
+        name="Begin", description="Begin a sweep, or give it up", default=True, options={"SKIP_SAVE"}
+    )
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        session = sensor.of(root)
+        if not self.on:
+            session.guide = None
+            return {"FINISHED"}
+        if sensor.calibrating(root) in simulation.running():
+            raise InputError("a calibration is running", remedy="wait for it, or cancel it")
+        angles = sensor.sweep(root.mu_sensor)
+        if len(set(angles)) < 3:
+            raise InputError(
+                f"a sweep over {len(set(angles))} angle(s)", remedy="take a smaller step or a wider range"
+            )
+        session.guide = sensor.Guide(angles)
+        return {"FINISHED"}
+
+
+class MU_OT_sensor_hold(OnSession, bpy.types.Operator):
+    """The unit is at this angle: keep it there while it is read"""
+
+    bl_idname = "mu.sensor_hold"
+    bl_label = "It Is There"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        session = sensor.of(unit_object.active_root(context))
+        if session.guide is None:
+            cls.poll_message_set("Begin a guided sweep first")
+            return False
+        if session.guide.holding:
+            cls.poll_message_set("Hold still: it is being read")
+            return False
+        if not session.fresh:
+            cls.poll_message_set("No samples come")
+            return False
+        return True
+
+    def execute(self, context):
+        sensor.hold(sensor.of(unit_object.active_root(context)))
+        live.redraw()
+        return {"FINISHED"}
+
+
+class MU_OT_sensor_calibrate(OnUnit, bpy.types.Operator):
+    """Calibrate from a recording with angles marked, or from measured data, in a process of its own"""
+
+    bl_idname = "mu.sensor_calibrate"
+    bl_label = "Calibrate"
+    bl_options = {"REGISTER"}
+
+    data: StringProperty(
+        name="Sweeps",
+        description="Folder. Empty: the one that the panel names",
+        subtype="DIR_PATH",
+        options={"SKIP_SAVE"},
+    )
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        data = self.data or root.mu_sensor.data
+        if not data:
+            raise InputError(
+                "no folder is chosen", "Sweeps", "choose a recording with marks, or measured data"
+            )
+        sensor.calibrate(root, Path(bpy.path.abspath(data)))
+        live.redraw()
+        return {"FINISHED"}
+
+
+class MU_OT_sensor_cancel(CancelsJob, bpy.types.Operator):
+    """Stop calibrating; the calibration that was there stays"""
+
+    bl_idname = "mu.sensor_cancel"
+    bl_label = "Cancel"
+    bl_options = {"REGISTER"}
+    idle = "Nothing is being calibrated"
+    job_of = staticmethod(sensor.calibrating)
+
+
+class MU_OT_sensor_dismiss(DismissesJob, bpy.types.Operator):
+    """Take the message of an ended calibration off the panel"""
+
+    bl_idname = "mu.sensor_dismiss"
+    bl_label = "Dismiss"
+    bl_options = {"REGISTER"}
+    job_of = staticmethod(sensor.calibrating)
+
+
+class MU_OT_sensor_zero(OnSession, bpy.types.Operator):
+    """Say at which angle the unit is now, to make up for light that grew weaker or stronger"""
+
+    bl_idname = "mu.sensor_zero"
+    bl_label = "Zero"
+    bl_options = {"REGISTER"}
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        sensor.zero(root, root.mu_sensor.known_deg)
+        live.redraw()
+        return {"FINISHED"}
+
+
+class MU_OT_sensor_twin(OnMotion, bpy.types.Operator):
+    """Show the simulated unit bending as the sensor says, beside the design, or take it away"""
+
+    bl_idname = "mu.sensor_twin"
+    bl_label = "Show Twin"
+    bl_options = {"REGISTER", "UNDO"}
+
+    on: BoolProperty(name="Show", description="Show it, or take it away", default=True)
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        twin.show(root) if self.on else twin.hide(root)
+        return {"FINISHED"}
+
+
+class MU_OT_sensor_open(OpensFile, bpy.types.Operator):
+    """Open what was recorded, or how it was calibrated"""
+
+    bl_idname = "mu.sensor_open"
+    bl_label = "Open"
+    bl_options = {"REGISTER"}
+    first = "connect, or calibrate"
+
+    what: EnumProperty(
+        name="What",
+        description="Which file or folder; a report, log or errors of the latest calibration",
+        items=[("recording", "Recording", "Folder of the recording"), *RUN_FILES[:3]],
+    )
+
+    def path_of(self, root):
+        """The file or folder that `what` stands for."""
+        session, folder = sensor.of(root), studies.folder_of(root)
+        if self.what == "recording":
+            return session.watched.folder if session else folder / sensor.RECORDINGS
+        made = folder / sensor.CALIBRATIONS
+        return max(made.glob("*/"), default=made) / studies.FILES[self.what]
+
+
+CLASSES = (
+    MU_OT_sensor_ports,
+    MU_OT_sensor_port,
+    MU_OT_sensor_connect,
+    MU_OT_sensor_disconnect,
+    MU_OT_sensor_pause,
+    MU_OT_sensor_mark,
+    MU_OT_sensor_freeze,
+    MU_OT_sensor_channel,
+    MU_OT_sensor_sweep,
+    MU_OT_sensor_hold,
+    MU_OT_sensor_calibrate,
+    MU_OT_sensor_cancel,
+    MU_OT_sensor_dismiss,
+    MU_OT_sensor_zero,
+    MU_OT_sensor_twin,
+    MU_OT_sensor_open,
+)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

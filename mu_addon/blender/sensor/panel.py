@@ -1,0 +1,238 @@
+"""The panel Sensor of the sidebar tab MU: the real sensor, its calibration, and the twin."""
+
+from __future__ import annotations
+
+import time
+from math import isfinite
+
+import bpy
+
+from ...run.child import FAILED
+from ..simulate import state as simulation
+from ..simulate import study_folder as studies
+from ..unit.panel import OfUnit, told, wrapped
+from . import state as sensor
+from . import twin
+
+LOSSES = {
+    "lost": "lost",
+    "crc_errors": "wrong CRC",
+    "malformed": "unreadable",
+    "repeated": "repeated",
+    "overlong": "bytes without an end",
+    "restarts": "restarts",
+    "reconnects": "reconnects",
+}
+"""Counters of a session's status, and what they are called."""
+STATES = {
+    "starting": ("The reader starts", "TIME"),
+    "searching": ("Looking for the sensor", "VIEWZOOM"),
+    "waiting": ("The sensor is not there; it is looked for", "ERROR"),
+    "disconnected": ("Unplugged; it is looked for until it comes", "ERROR"),
+    "connected": ("Connected", "LINKED"),
+    "paused": ("The port is free for others", "PAUSE"),
+    "ended": ("Disconnected", "UNLINKED"),
+}
+
+
+class MU_PT_sensor(OfUnit, bpy.types.Panel):
+    """The real sensor: connect, record, calibrate, and bend the twin by it"""
+
+    bl_idname = "MU_PT_sensor"
+    bl_label = "Sensor"
+
+    def show(self, layout, context, root):
+        missing = sensor.missing()
+        if missing:
+            box = layout.box()
+            wrapped(box, f"Not in this Blender: {', '.join(missing)}. Install the built extension", "ERROR")
+            return
+        session = sensor.of(root)
+        if session is None or not session.running:
+            _source(layout, root.mu_sensor)
+        if session is not None:
+            _session(layout, root.mu_sensor, session)
+        if sensor.others(root):
+            wrapped(layout, f"{len(sensor.others(root))} sensor(s) of other units connected", "INFO")
+            layout.operator("mu.sensor_disconnect", text="Disconnect Them", icon="UNLINKED").others = True
+        _plot(layout, root.mu_sensor, session)
+        _calibration(layout, root, session)
+        _twin(layout, root)
+
+
+def _source(layout, settings):
+    layout.prop(settings, "source")
+    if settings.source == "port":
+        row = layout.row(align=True)
+        row.prop(settings, "port")
+        row.operator("mu.sensor_ports", text="", icon="FILE_REFRESH")
+        for name, words in sensor.known_ports():
+            layout.operator(
+                "mu.sensor_port", text=words, icon="CHECKMARK" if name == settings.port else "BLANK1"
+            ).name = name
+        layout.prop(settings, "baud")
+    elif settings.source == "replay":
+        layout.prop(settings, "replay")
+        layout.prop(settings, "speed")
+    row = layout.row()
+    row.scale_y = 1.4
+    row.operator("mu.sensor_connect", icon="LINKED")
+
+
+def _session(layout, settings, session):
+    status = session.watched.status
+    if session.running:
+        row = layout.row(align=True)
+        row.operator("mu.sensor_disconnect", icon="UNLINKED")
+        paused = session.state == "paused"
+        row.operator(
+            "mu.sensor_pause",
+            text="Take Port" if paused else "Give Port",
+            icon="PLAY" if paused else "PAUSE",
+        )
+    box = layout.box()
+    words, icon = STATES.get(session.state, (session.state, "INFO"))
+    if session.child.state == FAILED:
+        box.alert = True
+        wrapped(box, str((session.child.error or {}).get("what", "")), "ERROR")
+        wrapped(box, str((session.child.error or {}).get("where", "")))
+        wrapped(box, "What was recorded is kept. Connect again")
+    elif session.running and session.watched.silent_s > sensor.SILENT_S and status:
+        box.alert = True
+        wrapped(
+            box,
+            f"The reader has said nothing for {session.watched.silent_s:.0f} s: is its folder still there?",
+            "ERROR",
+        )
+    else:
+        if session.state == "connected" and not session.fresh:
+            words, icon = "Connected, and nothing comes", "ERROR"
+        port = f": {status['port']}" if status.get("port") and session.state == "connected" else ""
+        wrapped(box, f"{words}{port}", icon)
+    if not status:
+        return
+    column = box.column(align=True)
+    column.label(text=f"{status.get('format') or 'format not found yet'}, {status.get('rate_hz', 0):.0f} Hz")
+    column.label(text=f"{status.get('rows', 0)} samples on disk in {status.get('duration_s', 0):.0f} s")
+    losses = [f"{status[key]} {word}" for key, word in LOSSES.items() if status.get(key)]
+    wrapped(column, ", ".join(losses) or "nothing lost", "ERROR" if losses else "CHECKMARK")
+    for name, value in zip(session.channels, list(status.get("latest", ()))[3:], strict=False):
+        row = column.row()
+        row.label(text=name)
+        row.label(text="-" if value is None else f"{value:.4f}")
+    reading = session.reading
+    if session.fresh and reading is not None and isfinite(reading.angle_deg):
+        row = column.row()
+        row.label(text=f"angle {reading.angle_deg:.1f}°", icon="NONE" if reading.possible else "ERROR")
+        row.label(text=f"{reading.low_deg:.1f} to {reading.high_deg:.1f}°")
+    if session.trouble:
+        box.alert = True
+        wrapped(box, session.trouble, "ERROR")
+    row = box.row(align=True)
+    row.operator("mu.sensor_open", text="Recording", icon="FILE_FOLDER").what = "recording"
+    if session.running:
+        row.operator("mu.sensor_mark", icon="BOOKMARKS")
+
+
+def _plot(layout, settings, session):
+    header, body = layout.panel("MU_sensor_plot", default_closed=True)
+    header.label(text="Plot")
+    if not body:
+        return
+    row = body.row(align=True)
+    row.use_property_split = False
+    row.prop(settings, "plot", toggle=True)
+    frozen = session is not None and session.frozen is not None
+    row.operator(
+        "mu.sensor_freeze", text="Go On" if frozen else "Stand Still", icon="PLAY" if frozen else "PAUSE"
+    )
+    body.prop(settings, "seconds")
+    if session is not None:
+        hidden = settings.hidden.split(",")
+        grid = body.grid_flow(columns=2, align=True)
+        for name in session.channels:
+            grid.operator("mu.sensor_channel", text=name, depress=name not in hidden).name = name
+
+
+def _calibration(layout, root, session):
+    settings = root.mu_sensor
+    header, body = layout.panel("MU_sensor_calibration")
+    header.label(text="Calibration")
+    if not body:
+        return
+    found, trouble = sensor.calibration(root)
+    if found is not None:
+        low, high = found.range_deg
+        zeroed = "" if found.gain == 1.0 else f", light {100 * (found.gain - 1):+.1f} % since"
+        wrapped(
+            body,
+            f"{low:.0f} to {high:.0f}°, {found.sweeps} sweeps, {found.error_deg:.2f}° rms where not "
+            f"fitted{zeroed}",
+            "CHECKMARK",
+        )
+    else:
+        wrapped(body, trouble or "Not calibrated: voltages only", "ERROR" if trouble else "INFO")
+    light, dark = sensor.chosen(root)
+    body.prop(settings, "channel", placeholder=light)
+    body.prop(settings, "dark", placeholder=str(dark))
+    body.prop(settings, "calibration")
+    told(body, simulation.of(sensor.calibrating(root)), "it is applied", "sensor_")
+    guide = session.guide if session is not None and session.running else None
+    if guide is None:
+        column = body.column(align=True)
+        for name in ("sweep_from", "sweep_to", "sweep_step", "sweep_times"):
+            column.prop(settings, name)
+        body.operator("mu.sensor_sweep", icon="CON_ROTLIKE")
+    else:
+        _guide(body, guide)
+    row = body.row(align=True)
+    row.prop(settings, "data")
+    row.operator("mu.sensor_calibrate", text="", icon="CHECKMARK")
+    row = body.row(align=True)
+    row.prop(settings, "known_deg")
+    row.operator("mu.sensor_zero", icon="PIVOT_CURSOR")
+
+
+def _guide(layout, guide):
+    box = layout.box()
+    if guide.holding:
+        left = max(0.0, guide.until - time.monotonic())
+        wrapped(box, f"Hold still at {guide.angles[guide.held - 1]:g}°: {left:.1f} s", "TIME")
+    elif guide.held < len(guide.angles):
+        angle = guide.angles[guide.held]
+        wrapped(box, f"Bend to {angle:g}°, hold it there, then press", "FORWARD")
+    row = box.row()
+    row.scale_y = 1.6
+    said = f"It Is at {guide.angles[guide.held]:g}°" if guide.held < len(guide.angles) else "Done"
+    row.operator("mu.sensor_hold", text=said, icon="PINNED")
+    box.progress(factor=guide.held / len(guide.angles), text=f"{guide.held} of {len(guide.angles)}")
+    box.operator("mu.sensor_sweep", text="Give Up", icon="CANCEL").on = False
+
+
+def _twin(layout, root):
+    header, body = layout.panel("MU_sensor_twin")
+    header.label(text="Twin")
+    if not body:
+        return
+    on = bool(twin.parts(root))
+    body.operator(
+        "mu.sensor_twin", text="Hide Twin" if on else "Show Twin", icon="MOD_SIMPLEDEFORM", depress=on
+    ).on = not on
+    if on:
+        state, words = twin.said(root)
+        if state == twin.OUTSIDE:
+            body.alert = True
+        wrapped(body, words, {twin.LIVE: "CHECKMARK", twin.OUTSIDE: "ERROR"}.get(state, "INFO"))
+        found = studies.findings(root)
+        if found is not None and found.stale:
+            wrapped(body, "It moves as a unit of other parameters: simulate again", "ERROR")
+
+
+def register() -> None:
+    """The panel."""
+    bpy.utils.register_class(MU_PT_sensor)
+
+
+def unregister() -> None:
+    """The panel."""
+    bpy.utils.unregister_class(MU_PT_sensor)

@@ -1,0 +1,177 @@
+"""The twin: the simulated unit, beside the design, bent as far as the sensor says the real one is.
+
+It moves between Model A's states and never beyond them: a signal that cannot come from the calibration or
+from the simulated motion leaves the last pose, in red, with the reason above it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import attrs
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from ...errors import InputError
+from ...usecases.simulate_and_place.motion import REGIONS, Motion
+from ...usecases.simulate_and_place.poses import Poses, poses
+from ..preview import arrays as preview
+from ..preview import colours as materials
+from ..results import motion as motion_parts
+from ..shared import handlers
+from ..simulate import study_folder as studies
+from ..unit import object as unit_object
+from ..unit.object import TWIN
+
+LIVE, OUTSIDE, WAITING = "live", "outside", "waiting"
+_LOOKS = {LIVE: {"membrane": "MU Twin", "lattice": "MU Lattice"}}
+_COLOURS = {OUTSIDE: "MU Out of Range", WAITING: "MU Twin Waiting"}
+
+
+@attrs.frozen(eq=False)
+class _Shape:
+    """What the twin of one motion is made of: its poses, and vertices (s, v, 3) of each region by state."""
+
+    motion: Motion
+    poses: Poses
+    vertices: dict[str, Any]
+    triangles: dict[str, Any]
+
+
+_shapes: dict[tuple[Path, bool], _Shape] = {}
+_said: dict[str, tuple[str, str]] = {}
+"""By unit: state and words of its twin."""
+
+
+def parts(root: Any) -> list[Any]:
+    """The objects of a unit's twin: one a region."""
+    return [child for child in root.children if child.get(TWIN)]
+
+
+def said(root: Any) -> tuple[str, str]:
+    """State of the unit's twin, LIVE, OUTSIDE or WAITING, and what it says."""
+    return _said.get(root.mu_unit.uuid, (WAITING, "no signal"))
+
+
+def _shape(root: Any) -> _Shape:
+    motion = motion_parts.motion_of(root)
+    if motion is None:
+        raise InputError(
+            "there is no simulated motion to bend the twin by", str(studies.folder_of(root)), "simulate first"
+        )
+    cut = bool(root.mu_motion.cut and motion.halved)
+    kept = _shapes.get((motion.folder, cut))
+    if kept is None or kept.motion is not motion:
+        vertices, triangles = {}, {}
+        for region in REGIONS:
+            skin = motion.skin(region, cut)
+            moved = skin.of_nodes(motion.mesh.nodes) + skin.of_nodes(motion.model_a)
+            vertices[region], triangles[region] = moved.astype(np.float32), skin.triangles
+        kept = _shapes[motion.folder, cut] = _Shape(motion, poses(motion), vertices, triangles)
+    return kept
+
+
+def show(root: Any) -> None:
+    """Put the twin beside the unit, on the side that it bends to, at rest. Raises InputError."""
+    shape = _shape(root)
+    hide(root)
+    wide = float(np.ptp(shape.motion.mesh.nodes[:, 1]))
+    rest = int(np.argmin(np.abs(shape.motion.state_kPa)))
+    for region in REGIONS:
+        title = f"Twin {region}"
+        part = bpy.data.objects.new(title, bpy.data.meshes.new(title))
+        part[TWIN] = region
+        preview.write(
+            part.data, preview.Skeleton(shape.vertices[region][rest], faces=(shape.triangles[region],))
+        )
+        for collection in root.users_collection:
+            collection.objects.link(part)
+        part.parent = root
+        part.location = (0.0, 1.5 * wide, 0.0)
+        part.lock_location = part.lock_rotation = part.lock_scale = (True, True, True)
+    _said.pop(root.mu_unit.uuid, None)
+    _dress(root, WAITING)
+
+
+def hide(root: Any) -> None:
+    """Take the twin out of the scene."""
+    for part in parts(root):
+        unit_object.remove_part(part)
+
+
+def follow(root: Any, reading: Any, fresh: bool) -> bool:
+    """Bend the twin as the reading says; returns whether it has something new to say.
+
+    reading: angle_deg, low_deg, high_deg and possible, or None; fresh: whether samples are coming.
+    """
+    if not parts(root):
+        return False
+    state, words = WAITING, "no signal"
+    if fresh and reading is not None:
+        try:
+            state, words = _bend(root, _shape(root), reading)
+        except InputError as error:
+            words = error.what
+    before = _said.get(root.mu_unit.uuid)
+    _said[root.mu_unit.uuid] = state, words
+    _dress(root, state)
+    return before is None or before[0] != state
+
+
+def _bend(root: Any, shape: _Shape, reading: Any) -> tuple[str, str]:
+    if not np.isfinite(reading.angle_deg):
+        return WAITING, "not calibrated"
+    if not reading.possible:
+        return OUTSIDE, f"{reading.light_V:.3f} V cannot come from the calibration"
+    place = shape.poses.at(reading.angle_deg)
+    if place is None:
+        low, high = shape.poses.range_deg
+        return OUTSIDE, f"{reading.angle_deg:.1f}°: simulated are {low:.1f} to {high:.1f}° only"
+    first, second, share = place
+    for part in parts(root):
+        moved = shape.vertices[part[TWIN]]
+        if len(part.data.vertices) != moved.shape[1]:
+            return WAITING, "the simulation is another one now: show the twin again"
+        now = moved[first] + np.float32(share) * (moved[second] - moved[first])
+        part.data.attributes["position"].data.foreach_set("vector", now.ravel())
+        part.data.update()
+    pressure = shape.poses.pressure_at(reading.angle_deg)
+    half = (reading.high_deg - reading.low_deg) / 2
+    return LIVE, f"{reading.angle_deg:.1f} ± {half:.1f}°, Model A at {pressure:.1f} kPa"
+
+
+def _dress(root: Any, state: str) -> None:
+    """Colours of a state; written only where they change."""
+    for part in parts(root):
+        name = _COLOURS.get(state) or _LOOKS[state][part[TWIN]]
+        slots = part.data.materials
+        if not slots:
+            slots.append(materials.material(name))
+        elif slots[0] is None or slots[0].name != name:
+            slots[0] = materials.material(name)
+
+
+@persistent
+def _loaded(*_: Any) -> None:
+    """A twin that was saved while it moved has no signal now, unless its session still runs."""
+    _shapes.clear()
+    _said.clear()
+    for root in unit_object.roots():
+        _dress(root, WAITING)
+
+
+_HANDLERS = {"load_post": _loaded}
+
+
+def register() -> None:
+    """The handler for loading."""
+    handlers.add(_HANDLERS)
+
+
+def unregister() -> None:
+    """Take it out."""
+    handlers.remove(_HANDLERS)
+    _shapes.clear()
+    _said.clear()

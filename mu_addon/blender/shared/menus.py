@@ -1,0 +1,77 @@
+"""Entries in Blender's menus, and the menu of presets."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..unit import presets
+
+
+class MU_MT_presets(bpy.types.Menu):
+    """Presets that come with the extension, then the user's own"""
+
+    bl_idname = "MU_MT_presets"
+    bl_label = "Presets"
+
+    def draw(self, context):
+        layout = self.layout
+        names = presets.names()
+        own = [name for name in names if name.startswith(presets.USER)]
+        for name in names:
+            if own and name == own[0]:
+                layout.separator()
+            layout.operator("mu.preset_load", text=name.removeprefix(presets.USER)).name = name
+        layout.separator()
+        layout.operator("mu.preset_save", text="Save as Preset...", icon="ADD")
+        if own:
+            layout.menu("MU_MT_presets_remove", icon="REMOVE")
+
+
+class MU_MT_presets_remove(bpy.types.Menu):
+    """The user's own presets, to be removed"""
+
+    bl_idname = "MU_MT_presets_remove"
+    bl_label = "Remove Preset"
+
+    def draw(self, context):
+        for name in presets.names():
+            if name.startswith(presets.USER):
+                self.layout.operator("mu.preset_remove", text=name.removeprefix(presets.USER)).name = name
+
+
+def _add(self, context):
+    self.layout.operator("mu.add", icon="OUTLINER_OB_LATTICE")
+    self.layout.operator("mu.gripper_add", icon="MOD_MIRROR")
+
+
+class MU_MT_more(bpy.types.Menu):
+    """Sample scene, node groups for curves of your own, and the asset browser"""
+
+    bl_idname = "MU_MT_more"
+    bl_label = "More"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.operator("mu.sample", icon="SCENE_DATA")
+        layout.operator("mu.gripper_add", text="Gripper of This Unit", icon="MOD_MIRROR").of_unit = True
+        layout.operator_menu_enum("mu.skin", "group", text="Skin with Nodes", icon="GEOMETRY_NODES")
+        layout.separator()
+        layout.operator("mu.assets", icon="ASSET_MANAGER")
+        layout.operator("mu.assets_remove")
+
+
+CLASSES = (MU_MT_presets, MU_MT_presets_remove, MU_MT_more)
+
+
+def register() -> None:
+    """Menus, and the entry in Add > Mesh."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.VIEW3D_MT_mesh_add.append(_add)
+
+
+def unregister() -> None:
+    """Take them out again."""
+    bpy.types.VIEW3D_MT_mesh_add.remove(_add)
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

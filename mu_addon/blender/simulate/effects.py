@@ -1,0 +1,79 @@
+"""Effects that a diagnosis named beside a unit's parameters, kept with the unit for its next simulation.
+
+They stay what the diagnosis wrote, a model.toml of these effects alone, with what each parameter is known to:
+a text on the unit's root, so that undo, copies and the .blend file need no care. It is read without the
+simulator's packages, which a Blender may lack.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from ...files import write_text
+from ..unit.properties import exact
+
+MODEL = "model.toml"
+WEIGHT = "gravity"
+"""The effect that depends on the direction of gravity."""
+ASKED = ("orientation_deg", "effects")
+"""What study.toml has of them, in its table of the simulation."""
+
+
+def keep(root: Any, text: str) -> None:
+    """Give the unit's next simulation the effects of a model.toml's text, in place of what it had."""
+    root.mu_unit.study.effects = text
+
+
+def _tables(root: Any) -> dict[str, dict[str, dict[str, Any]]]:
+    try:
+        found: dict[str, Any] = tomllib.loads(root.mu_unit.study.effects).get("effect", {})
+    except tomllib.TOMLDecodeError:
+        return {}
+    return found
+
+
+def weighs(root: Any) -> bool:
+    """Whether the direction of gravity matters to the unit's simulation."""
+    return WEIGHT in _tables(root)
+
+
+def said(root: Any) -> list[str]:
+    """A line a parameter: its effect, its value and the bounds of 95 %."""
+    lines = []
+    for effect, parameters in _tables(root).items():
+        for name, table in parameters.items():
+            unit = str(table.get("unit", ""))
+            known = ""
+            if "low95" in table and "high95" in table:
+                known = f" ({table['low95']:.4g} to {table['high95']:.4g})"
+            # A parameter's name ends with its unit.
+            bare = name.removesuffix("_" + unit.replace("/", "_")) if unit else name
+            words = f"{effect}, {bare}".replace("_", " ")
+            lines.append(f"{words}: {table['value']:.4g}{' ' * bool(unit)}{unit}{known}")
+    return lines
+
+
+def asked(root: Any) -> dict[str, Any]:
+    """What a study of the unit would have in study.toml, see `ASKED`; nothing where there is no effect."""
+    effects = {
+        name: {p: float(table["value"]) for p, table in parameters.items()}
+        for name, parameters in _tables(root).items()
+    }
+    turned = {"orientation_deg": _direction(root)} if WEIGHT in effects else {}
+    return {**turned, "effects": effects} if effects else {}
+
+
+def _direction(root: Any) -> float:
+    return exact(root.mu_unit.study.orientation_deg) % 360.0
+
+
+def arguments(root: Any, folder: Path) -> list[str]:
+    """Words of the command line that hand the effects over, their file in `folder`. Raises OutputError."""
+    if not _tables(root):
+        return []
+    path = folder / MODEL
+    write_text(path, root.mu_unit.study.effects)
+    turned = ["--orientation", repr(_direction(root))] if weighs(root) else []
+    return ["--model", str(path), *turned]

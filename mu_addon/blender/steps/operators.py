@@ -1,0 +1,139 @@
+"""The core's steps as operators, made from its list, each with its own parameters in the redo panel."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import attrs
+import bpy
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+
+from ...design.parameters import SECTIONS
+from ...design.quantity import describe
+from ...design.steps import STEPS, Step, downstream
+from ..shared.acting import OnUnit, telling
+from ..unit import object as unit_object
+from ..unit.live_update import held
+from ..unit.properties import blender_property, exact, from_unit, to_unit
+from . import state as stack
+
+_OF_THEIR_OWN = ("path", "solid")
+"""Steps that have operators of their own."""
+
+
+def _annotations(step: Step) -> dict:
+    """Properties of a step's operator: its own parameters, and whether it is muted."""
+    found = {}
+    for section in SECTIONS:
+        for d in describe(section):
+            if f"{section.section}.{d.name}" in step.own:
+                found[d.name] = blender_property(d, options={"SKIP_SAVE"})
+    if step.muting:
+        found["muted"] = BoolProperty(
+            name="Mute", description=f"Leave this step out: {step.muting}", options={"SKIP_SAVE"}
+        )
+    return found
+
+
+class _OfStep(OnUnit):
+    """Sets a step's own parameters, as far as they are given, and makes the step again."""
+
+    bl_options = {"REGISTER", "UNDO"}
+    step: Step
+
+    def invoke(self, context, event):
+        props = unit_object.active_root(context).mu_unit
+        for section, name in stack.own_parameters(self.step):
+            setattr(self, name, getattr(getattr(props, section), name))
+        if self.step.muting:
+            self.muted = props.stack[self.step.name].muted
+        return self.execute(context)
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        props = root.mu_unit
+        unit = to_unit(props)
+        for section, name in stack.own_parameters(self.step):
+            if self.properties.is_property_set(name):
+                value = getattr(self, name)
+                value = exact(value) if isinstance(value, float) else value
+                unit = attrs.evolve(unit, **{section: attrs.evolve(getattr(unit, section), **{name: value})})
+        before = stack.STACK.counts.copy()
+        with held():
+            stack.fill(props)
+            from_unit(props, unit)
+            if self.step.muting and self.properties.is_property_set("muted"):
+                props.stack[self.step.name].muted = self.muted
+            props.step = list(STEPS).index(self.step.name)
+        stack.STACK.again(self.step.name, stack.given(root, unit))
+        if not unit_object.rebuild(root):
+            self.report({"ERROR"}, props.trouble)
+            return {"CANCELLED"}
+        made = [name for name in STEPS if stack.STACK.counts[name] > before[name]]
+        self.report({"INFO"}, f"Made: {', '.join(made)}; all else was there")
+        return {"FINISHED"}
+
+
+def _generated(step: Step) -> type:
+    text = f"{step.text[:1].upper()}{step.text[1:]}"
+    after = downstream(step.name)
+    if after:
+        text += f". Made from it: {', '.join(after)}"
+    members = {
+        "__doc__": text,
+        "__annotations__": _annotations(step),
+        "bl_idname": f"mu.{step.name}",
+        "bl_label": step.name.capitalize(),
+        "step": step,
+    }
+    return type(f"MU_OT_{step.name}", (_OfStep, bpy.types.Operator), members)
+
+
+class MU_OT_mute(OnUnit, bpy.types.Operator):
+    """Mute or unmute a step of the design"""
+
+    bl_idname = "mu.mute"
+    bl_label = "Mute Step"
+    bl_options = {"REGISTER", "UNDO"}
+
+    step: EnumProperty(
+        name="Step",
+        description="Step of the design",
+        items=[(step.name, step.name.capitalize(), step.muting) for step in STEPS.values() if step.muting],
+    )
+    muted: BoolProperty(name="Mute", description="Whether the step is left out", default=True)
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        with held():
+            stack.fill(root.mu_unit)
+            root.mu_unit.stack[self.step].muted = self.muted
+        unit_object.rebuild(root)
+        return {"FINISHED"}
+
+
+class MU_OT_again(OnUnit, bpy.types.Operator):
+    """Make one step again, and of those after it only what comes out different"""
+
+    bl_idname = "mu.again"
+    bl_label = "Run Step Again"
+    bl_options = {"REGISTER", "UNDO"}
+
+    step: StringProperty(name="Step", description="Name of a step of the design", default="profile")
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        stack.STACK.again(self.step, stack.given(root, to_unit(root.mu_unit)))
+        unit_object.rebuild(root)
+        return {"FINISHED"}
+
+
+CLASSES = (
+    *(_generated(step) for step in STEPS.values() if step.name not in _OF_THEIR_OWN),
+    MU_OT_mute,
+    MU_OT_again,
+)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

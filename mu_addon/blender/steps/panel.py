@@ -1,0 +1,76 @@
+"""The design's steps as a list: what is shown, what is muted, and the chosen one's parameters."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...design.steps import STEPS
+from ..unit import object as unit_object
+from ..unit.panel import OfUnit, wrapped
+from . import state as stack
+
+
+class MU_UL_steps(bpy.types.UIList):
+    """Steps of the design, in the order in which they are made"""
+
+    bl_idname = "MU_UL_steps"
+
+    def draw_item(self, context, layout, data, item, icon, active_data, active_property, index):
+        row = layout.row(align=True)
+        drawable = row.row()
+        drawable.enabled = item.name in unit_object.DRAWN
+        drawable.prop(item, "shown", text="", emboss=False, icon="HIDE_OFF" if item.shown else "HIDE_ON")
+        name = row.row()
+        name.active = not item.muted
+        name.label(text=item.name.capitalize())
+        mute = row.row()
+        mute.enabled = stack.can_be_muted(item.name)
+        state = "CHECKBOX_DEHLT" if item.muted else "CHECKBOX_HLT"
+        mute.prop(item, "muted", text="", emboss=False, icon=state)
+
+
+class MU_PT_stack(OfUnit, bpy.types.Panel):
+    """The design step by step: each can be shown, muted, changed and made again on its own"""
+
+    bl_idname = "MU_PT_stack"
+    bl_label = "Steps"
+
+    def show(self, layout, context, root):
+        props = root.mu_unit
+        layout.template_list("MU_UL_steps", "", props, "stack", props, "step", rows=len(STEPS))
+        if not 0 <= props.step < len(props.stack):
+            return
+        entry = props.stack[props.step]
+        step = STEPS.get(entry.name)
+        if step is None:
+            return
+        wrapped(layout, f"{step.text[:1].upper()}{step.text[1:]}", "INFO")
+        if entry.muted:
+            wrapped(layout, f"Muted: {step.muting}", "ERROR")
+        column = layout.column(align=True)
+        column.enabled = not entry.muted
+        for section, name in stack.own_parameters(step):
+            column.prop(getattr(props, section), name)
+        row = layout.row(align=True)
+        if step.name == "solid":
+            row.operator("mu.solid")
+        else:
+            row.operator("mu.again", icon="FILE_REFRESH").step = step.name
+        lacking = stack.muted(props)
+        if lacking:
+            wrapped(layout, f"Not printed while muted: {', '.join(s for s in STEPS if s in lacking)}", "INFO")
+
+
+CLASSES = (MU_UL_steps, MU_PT_stack)
+
+
+def register() -> None:
+    """The list and its panel."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """The list and its panel."""
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

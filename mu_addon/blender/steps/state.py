@@ -1,0 +1,52 @@
+"""The core's steps for a unit in the scene: what is muted and shown, and the values, kept by content."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...design.anchors import windows
+from ...design.parameters import Unit
+from ...design.steps import STEPS, Given, Stack, Step
+from ..body import state as bodies
+
+STACK = Stack()
+"""Values of every unit's steps: units of one shape, and the states before and after an undo, share them."""
+
+SHOWN = ("membranes", "struts", "anchors", "wells")
+"""Steps that are shown until the user says otherwise."""
+
+
+def fill(props: Any) -> None:
+    """Give a unit's properties an entry for every step of the core, in its order."""
+    if [entry.name for entry in props.stack] == list(STEPS):
+        return
+    kept = {entry.name: (entry.muted, entry.shown) for entry in props.stack}
+    props.stack.clear()
+    for name in STEPS:
+        entry = props.stack.add()
+        entry.name = name
+        entry.muted, entry.shown = kept.get(name, (False, name in SHOWN))
+
+
+def muted(props: Any) -> frozenset[str]:
+    """Names of the muted steps."""
+    return frozenset(entry.name for entry in props.stack if entry.muted and can_be_muted(entry.name))
+
+
+def can_be_muted(name: str) -> bool:
+    """Whether the core knows what to do without that step."""
+    return name in STEPS and bool(STEPS[name].muting)
+
+
+def given(root: Any, unit: Unit, quality: str = "interactive") -> Given:
+    """What the steps of a unit in the scene are made from; raises InputError for a body that does not fit."""
+    # A unit of fewer chambers has fewer paths: the chosen one waits until it is there again.
+    path = root.mu_unit.path
+    known = path in {window.name for window in windows(unit.chambers.count)}
+    body = bodies.envelope_in(root, unit)
+    return Given(unit, path if known else "", muted(root.mu_unit), quality, body)
+
+
+def own_parameters(step: Step) -> list[tuple[str, str]]:
+    """(section, name) of a step's own parameters."""
+    return [(section, name) for section, name in (path.split(".") for path in step.own)]

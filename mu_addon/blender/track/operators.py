@@ -1,0 +1,103 @@
+"""From a clip in the Movie Clip Editor to an experiment in a folder of measured data."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+from pathlib import Path
+
+import bpy
+from bpy.props import StringProperty
+
+from ...usecases.track_video.run import answer, figures, filmed, read_pressure, write_experiment
+from ..shared.acting import telling
+from ..unit import object as unit_object
+from . import properties as bench
+from . import state as tracking
+
+NO_CLIP = "Open a clip of the bench in the Movie Clip Editor"
+
+
+def clip_of(context):
+    """The clip that the Movie Clip Editor shows, or None."""
+    return getattr(context.space_data, "clip", None)
+
+
+class MU_OT_track(bpy.types.Operator):
+    """Follow the markers, the selected ones or all, from this frame to the clip's end"""
+
+    bl_idname = "mu.track"
+    bl_label = "Follow Markers"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        clip = clip_of(context)
+        if clip is None:
+            cls.poll_message_set(NO_CLIP)
+            return False
+        if not clip.tracking.tracks:
+            cls.poll_message_set("Place markers first: Ctrl-click them in the clip")
+            return False
+        return True
+
+    def execute(self, context):
+        clip, scene = clip_of(context), context.scene
+        every = list(clip.tracking.tracks)
+        chosen = [track for track in every if track.select] or every
+        tracking.prepare(chosen, clip.mu_bench.marks)
+        for track in chosen:
+            track.select = True
+        # Blender's tracker stops at the scene's end, and beyond the clip's it loses what it has.
+        end = clip.frame_start + clip.frame_duration - 1
+        if scene.frame_end > end:
+            self.report({"INFO"}, f"The scene ended at frame {scene.frame_end}, and ends with the clip now")
+        scene.frame_end = end
+        how = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
+        bpy.ops.clip.track_markers(how, backwards=False, sequence=True)
+        return {"FINISHED"}
+
+
+class MU_OT_track_write(bpy.types.Operator):
+    """Write angle, places and pressure over time into a folder of measured data"""
+
+    bl_idname = "mu.track_write"
+    bl_label = "Write Measured Data"
+    bl_options = {"REGISTER", "UNDO"}
+
+    clip: StringProperty(
+        name="Clip",
+        description="Name of a clip of this file. Empty: the one in the editor",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context):
+        clip = clip_of(context)
+        if clip is not None and bench.missing(clip):
+            cls.poll_message_set(bench.missing(clip))
+            return False
+        return True
+
+    @telling
+    def execute(self, context):
+        clip = bpy.data.movieclips.get(self.clip) if self.clip else clip_of(context)
+        if clip is None:
+            self.report({"ERROR"}, f"There is no clip {self.clip!r}" if self.clip else NO_CLIP)
+            return {"CANCELLED"}
+        described, name = bench.bench_of(clip), bench.title(clip)
+        pressure = read_pressure(Path(bpy.path.abspath(clip.mu_bench.pressure)))
+        found = filmed(tracking.tracks_of(clip), described, pressure, clip.name)
+        folder = Path(bpy.path.abspath(clip.mu_bench.folder))
+        table, remarks = write_experiment(found, described, name, folder)
+        for remark in (*found.remarks, *remarks):
+            self.report({"WARNING"}, remark.what)
+        self.report({"INFO"}, ". ".join(answer(figures(found, name, table))))
+        root = unit_object.active_root(context)
+        if root is not None and not root.mu_evidence.folder:
+            root.mu_evidence.folder = clip.mu_bench.folder
+        return {"FINISHED"}
+
+
+CLASSES = (MU_OT_track, MU_OT_track_write)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

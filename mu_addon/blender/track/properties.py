@@ -1,0 +1,204 @@
+"""How a clip was filmed, kept on the clip itself, and the core's description that it stands for."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ...errors import InputError
+from ...measured.kinds import ROLES
+from ...measured.video import View
+from ...usecases.track_video.run import Bench, Marks
+from ..unit.properties import BESIDE_BLEND_FILE, exact
+
+
+def _track(name: str, description: str):
+    return StringProperty(name=name, description=description)
+
+
+def _place(name: str):
+    return FloatVectorProperty(
+        name=name,
+        description="Its y (toward more lattice) and z (along the axis) in the unit's frame, mm",
+        size=2,
+        precision=2,
+    )
+
+
+class MU_PG_bench(bpy.types.PropertyGroup):
+    """What was filmed, from where, and by which markers it is measured."""
+
+    camera: EnumProperty(
+        name="Camera at",
+        description="Side of the unit that the camera looks from, along x",
+        items=[
+            ("+x", "+x", "With the axis upward, the side with more lattice (+y) is on the right"),
+            ("-x", "-x", "With the axis upward, the side with more lattice (+y) is on the left"),
+        ],
+    )
+    marks: EnumProperty(
+        name="Markers are",
+        description="What the markers look like",
+        items=[
+            (
+                "crosses",
+                "Crosses",
+                "Checks or crosses, which show how they turn: the tracker follows the turn",
+            ),
+            (
+                "dots",
+                "Dots",
+                "Round dots look the same when they turn: the tracker follows their place alone",
+            ),
+        ],
+    )
+    base_1: _track("Base", "A marker that stands with the unit's base or its clamp")
+    base_2: _track("Base, Other", "Another marker on the base; the farther apart, the better")
+    base_1_mm: _place("Place of Base")
+    base_2_mm: _place("Place of Base, Other")
+    tip_1: _track("Tip", "A marker on the tip's end; without a tip, only places are written")
+    tip_2: _track("Tip, Other", "Another marker on the tip's end; the farther apart, the better")
+    scale_by: EnumProperty(
+        name="Scale by",
+        description="What tells millimetres from pixels",
+        items=[
+            ("base", "Base", "The places of the two markers on the base"),
+            ("ruler", "Ruler", "Two marks of a known distance, as far from the camera as the markers"),
+            ("number", "Number", "Millimetres a pixel, known otherwise"),
+        ],
+    )
+    ruler_1: _track("Ruler", "A mark on a ruler")
+    ruler_2: _track("Ruler, Other", "Another mark on the ruler")
+    ruler_mm: FloatProperty(
+        name="Distance (mm)", description="Distance of the ruler's two marks", min=0.0, default=50.0
+    )
+    mm_per_pixel: FloatProperty(
+        name="mm a Pixel", description="Size of a pixel in the plane of the markers", min=0.0, precision=5
+    )
+    follow_base: BoolProperty(
+        name="Base Moves",
+        description="Measure against the base as it is in each frame, for a camera or clamp that moves; else "
+        "its mean place counts, which is quieter",
+    )
+    fps: FloatProperty(
+        name="Frame Rate",
+        description="Frames a second. 0: as the clip says; a sequence of pictures does not say, and a film "
+        "in slow motion says the wrong rate",
+        min=0.0,
+    )
+    starts_s: FloatProperty(
+        name="Starts at (s)",
+        description="What the clock of the pressure's record shows at the clip's first frame",
+        precision=3,
+    )
+    pressure: StringProperty(
+        name="Pressure",
+        description="CSV file of time_s,pressure_kPa: a recording, or the protocol that was played",
+        subtype="FILE_PATH",
+        options=BESIDE_BLEND_FILE,
+    )
+    folder: StringProperty(
+        name="Measured Data",
+        description="Folder that gets the experiment; other clips may be in it already",
+        subtype="DIR_PATH",
+        options=BESIDE_BLEND_FILE,
+    )
+    title: StringProperty(name="Experiment", description="Name of the experiment. Empty: the clip's")
+    role: EnumProperty(
+        name="Role",
+        description="What the experiment is for",
+        items=[
+            (ROLES[0], "Fit", "The model may be fitted to it"),
+            (ROLES[1], "Held Out", "Never touched before the verdict: it shows what the verdict gains"),
+        ],
+    )
+    unit_scale: FloatProperty(
+        name="Scale", description="Scale of the unit that was filmed", default=1.0, min=0.01
+    )
+    orientation_deg: FloatProperty(
+        name="Gravity about x (deg)",
+        description="Direction of gravity about x: 0 hangs with the tip down",
+        min=-360.0,
+        max=360.0,
+    )
+    specimen: StringProperty(name="Specimen", description="Which print it was, such as A; may be empty")
+
+
+def missing(clip: Any) -> str:
+    """What a clip still lacks before it can be measured, in words; nothing where all is there."""
+    bench, names = clip.mu_bench, {track.name for track in clip.tracking.tracks}
+    if len(names) < 2:
+        return "Place markers first: Ctrl-click them in the clip, two on the base and two on the tip"
+    wanted = {"Base": (bench.base_1, bench.base_2)}
+    if bench.tip_1 or bench.tip_2:
+        wanted["Tip"] = (bench.tip_1, bench.tip_2)
+    if bench.scale_by == "ruler":
+        wanted["Ruler"] = (bench.ruler_1, bench.ruler_2)
+    for role, pair in wanted.items():
+        if not set(pair) <= names or pair[0] == pair[1]:
+            return f"{role}: choose two of the clip's markers"
+    if tuple(bench.base_1_mm) == tuple(bench.base_2_mm):
+        return "Give the places of the base's two markers in the unit's frame"
+    if bench.scale_by == "number" and bench.mm_per_pixel == 0.0:
+        return "Give the millimetres a pixel"
+    if bench.fps == 0.0 and clip.fps == 0.0:
+        return "Give the frames a second: pictures do not tell them"
+    for name in ("pressure", "folder"):
+        if not getattr(bench, name):
+            return (
+                f"Choose the {'CSV file of the pressure' if name == 'pressure' else 'folder to write into'}"
+            )
+    return ""
+
+
+def bench_of(clip: Any) -> Bench:
+    """The core's description of a clip; raises InputError for what is missing."""
+    lacks = missing(clip)
+    if lacks:
+        raise InputError(lacks, clip.name, "sidebar of the clip editor, tab MU")
+    b = clip.mu_bench
+    view = View(
+        (b.base_1, b.base_2),
+        (_pair(b.base_1_mm), _pair(b.base_2_mm)),
+        (b.tip_1, b.tip_2) if b.tip_1 else None,
+        camera=b.camera,
+        ruler=(b.ruler_1, b.ruler_2) if b.scale_by == "ruler" else None,
+        ruler_mm=exact(b.ruler_mm) if b.scale_by == "ruler" else None,
+        mm_per_pixel=exact(b.mm_per_pixel) if b.scale_by == "number" else None,
+        follow_base=b.follow_base,
+    )
+    experiment = {"role": b.role, "scale": exact(b.unit_scale), "orientation_deg": exact(b.orientation_deg)}
+    if b.specimen:
+        experiment["specimen"] = b.specimen
+    return Bench(view, Marks({}, b.marks), exact(b.fps) or None, exact(b.starts_s), experiment)
+
+
+def _pair(values: Any) -> tuple[float, float]:
+    return exact(values[0]), exact(values[1])
+
+
+def title(clip: Any) -> str:
+    """Name of the experiment that a clip becomes."""
+    return clip.mu_bench.title or Path(clip.name).stem
+
+
+def register() -> None:
+    """The property group and the one property on clips that holds it."""
+    bpy.utils.register_class(MU_PG_bench)
+    bpy.types.MovieClip.mu_bench = PointerProperty(type=MU_PG_bench)
+
+
+def unregister() -> None:
+    """Take them out again; values stay in the file."""
+    del bpy.types.MovieClip.mu_bench
+    bpy.utils.unregister_class(MU_PG_bench)

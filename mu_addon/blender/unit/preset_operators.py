@@ -1,0 +1,75 @@
+"""Take a preset, keep one's own, remove it."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+from bpy.props import StringProperty
+
+from ..shared.acting import OnUnit, telling
+from . import object as unit_object
+from . import presets
+from .live_update import held
+from .properties import from_unit, to_unit
+
+
+class MU_OT_preset_load(OnUnit, bpy.types.Operator):
+    """Set every parameter of the unit to those of a preset"""
+
+    bl_idname = "mu.preset_load"
+    bl_label = "Load Preset"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: StringProperty(name="Preset", description="Name of a preset; your own begin with `user:`")
+
+    @telling
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        core = presets.load(self.name)
+        with held():
+            from_unit(root.mu_unit, core)
+        unit_object.rebuild(root)
+        return {"FINISHED"}
+
+
+class MU_OT_preset_save(OnUnit, bpy.types.Operator):
+    """Keep the unit's parameters as a preset of your own, a TOML file that headless/run.py reads, too"""
+
+    bl_idname = "mu.preset_save"
+    bl_label = "Save Preset"
+    bl_options = {"REGISTER"}
+
+    name: StringProperty(name="Name", description="Name of your preset", default="my unit")
+
+    def invoke(self, context, event):
+        self.name = unit_object.active_root(context).mu_unit.title
+        return context.window_manager.invoke_props_dialog(self)
+
+    @telling
+    def execute(self, context):
+        kept = presets.save(to_unit(unit_object.active_root(context).mu_unit), self.name)
+        self.report({"INFO"}, f"Preset {kept.removeprefix(presets.USER)} is kept")
+        return {"FINISHED"}
+
+
+class MU_OT_preset_remove(bpy.types.Operator):
+    """Remove a preset of your own"""
+
+    bl_idname = "mu.preset_remove"
+    bl_label = "Remove Preset"
+    bl_options = {"REGISTER"}
+
+    name: StringProperty(name="Preset", description="Name of your preset")
+
+    def invoke(self, context, event):
+        return context.window_manager.invoke_confirm(self, event)
+
+    @telling
+    def execute(self, context):
+        presets.remove(self.name)
+        return {"FINISHED"}
+
+
+CLASSES = (MU_OT_preset_load, MU_OT_preset_save, MU_OT_preset_remove)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

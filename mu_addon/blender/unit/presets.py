@@ -1,0 +1,53 @@
+"""Presets: units that come with the extension, and the user's own as TOML files in the user's folder."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from ...design.parameters import Unit, load_preset, preset_names, read_unit, write_unit
+from ...errors import InputError, OutputError
+from ..shared.compat import user_folder
+
+USER = "user:"
+
+
+def names() -> list[str]:
+    """Built-in names, then the user's own with the prefix `user:`."""
+    return [*preset_names(), *(USER + path.stem for path in sorted(_folder().glob("*.toml")))]
+
+
+def load(name: str) -> Unit:
+    """The unit of that preset; raises InputError."""
+    return read_unit(_file(name)) if name.startswith(USER) else load_preset(name)
+
+
+def save(unit: Unit, title: str) -> str:
+    """Keep a unit as the user's preset and return its name; raises InputError and OutputError."""
+    title = title.strip()
+    if not re.fullmatch(r"[\w][\w .+-]{0,59}", title):
+        raise InputError(
+            f"{title!r} cannot be the name of a preset",
+            "preset",
+            "use 1 to 60 letters, digits, spaces and . + - _, a letter or digit first",
+        )
+    write_unit(unit, _file(USER + title))
+    return USER + title
+
+
+def remove(name: str) -> None:
+    """Delete a preset of the user's; raises InputError for one that comes with the extension."""
+    if not name.startswith(USER):
+        raise InputError(f"{name} comes with the extension", "preset", "only your own presets can be removed")
+    try:
+        _file(name).unlink(missing_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot remove the preset: {error.strerror}", str(_file(name)), "") from error
+
+
+def _file(name: str) -> Path:
+    return _folder() / f"{name.removeprefix(USER)}.toml"
+
+
+def _folder() -> Path:
+    return user_folder("presets")

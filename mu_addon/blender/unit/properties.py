@@ -1,0 +1,259 @@
+"""Parameters of the core as Blender properties: one group a section, generated from its descriptions.
+
+A parameter that the core gains appears here, with its bounds, meaning and source, without a line of code.
+"""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import textwrap
+
+import bpy
+import numpy as np
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ...design.parameters import SECTIONS, Unit
+from ...design.quantity import Description, describe
+from . import live_update as live
+
+UNITS = ("mm", "kPa")
+BESIDE_BLEND_FILE = {"PATH_SUPPORTS_BLEND_RELATIVE"}
+
+
+def exact(value: float) -> float:
+    """The shortest decimal number that Blender's single precision stands for: 0.9 for 0.8999999762."""
+    return float(str(np.float32(value)))
+
+
+def label(d: Description) -> str:
+    """Name of a parameter for a panel: `bladder_diameter_mm` becomes "Bladder Diameter"."""
+    words = d.name.split("_")
+    unit = words.pop() if words[-1] in UNITS else ""
+    text = " ".join(word if word.isupper() else word.capitalize() for word in words)
+    return f"{text} ({unit})" if unit and unit != "mm" else text
+
+
+def tooltip(d: Description) -> str:
+    """What a parameter is, its bounds and where its value comes from; Blender adds the last full stop."""
+    allowed = f". {d.allowed} {d.unit}".rstrip() if d.allowed else ""
+    fixed = ". The same at every scale" if d.fixed else ""
+    return f"{d.text[:1].upper()}{d.text[1:]}{allowed}{fixed}.\nSource: {d.source}"
+
+
+def blender_property(d: Description, update=None, options=frozenset()):
+    """The Blender property of one parameter."""
+    shared = {
+        "name": label(d),
+        "description": tooltip(d),
+        "update": update,
+        "options": {"ANIMATABLE", *options},
+    }
+    if d.choices:
+        items = [
+            (name, name.replace("-", " ").capitalize(), textwrap.shorten(d.text, 60)) for name in d.choices
+        ]
+        return EnumProperty(items=items, default=d.default, **shared)
+    if d.type is bool:
+        return BoolProperty(default=d.default, **shared)
+    if d.type is int:
+        return IntProperty(default=d.default, min=int(d.low), max=int(d.high), **shared)
+    length = {"subtype": "DISTANCE"} if d.unit == "mm" else {}
+    return FloatProperty(
+        default=d.default,
+        min=d.low,
+        max=d.high,
+        precision=3 if d.high < 1000 else 1,
+        step=10 if d.high > 20 else 1,
+        **length,
+        **shared,
+    )
+
+
+def _changed(group, context):
+    live.schedule(group.id_data)
+
+
+def _generated(section: type):
+    annotations = {d.name: blender_property(d, _changed) for d in describe(section)}
+    name = f"MU_PG_{section.section}"
+    return type(
+        name, (bpy.types.PropertyGroup,), {"__annotations__": annotations, "__doc__": section.__doc__}
+    )
+
+
+GROUPS = {section.section: _generated(section) for section in SECTIONS}
+_HEAD = {d.name: d for d in describe(Unit)}
+
+
+class MU_PG_study(bpy.types.PropertyGroup):
+    """What the next simulation is asked to do."""
+
+    command: EnumProperty(
+        name="Job",
+        description="What is simulated",
+        items=[
+            ("place", "Place the Sensor", "Motion of the unit and the ranking of all sensor paths"),
+            ("simulate", "Motion Only", "Motion of the unit without a sensor"),
+        ],
+        default="place",
+    )
+    paths: EnumProperty(
+        name="Paths",
+        description="Which sensor paths are ranked",
+        items=[
+            ("windows", "Along the Anchors", "Paths through neighbouring anchors, alpha1 and on"),
+            (
+                "graph",
+                "Whole Lattice",
+                "Besides, the path along any struts that disturbs the motion least: minutes to hours more",
+            ),
+        ],
+    )
+    detail: EnumProperty(
+        name="Detail",
+        description="How fine the mesh is, and of which order its elements",
+        items=[
+            ("full", "Full", "Quadratic elements on the default mesh: what a design is decided by"),
+            (
+                "quick",
+                "Quick Look",
+                "Linear elements on a coarser mesh: they lock in thin walls, for a look only",
+            ),
+        ],
+        default="full",
+    )
+    protocol: StringProperty(
+        name="Protocol",
+        description="CSV file of time_s,pressure_kPa. Empty: the grasp that comes with the extension",
+        subtype="FILE_PATH",
+        options=BESIDE_BLEND_FILE,
+    )
+    orientation_deg: FloatProperty(
+        name="Gravity (deg)",
+        description="Direction of gravity about the x axis, as in measured data: at 0 the unit hangs, its "
+        "tip down. It matters where a diagnosis named the weight",
+        min=-360.0,
+        max=360.0,
+        precision=1,
+        step=100,
+    )
+    # model.toml of the effects that a diagnosis named beside the unit's parameters, see `effects`.
+    effects: StringProperty(options={"HIDDEN"})
+    folder: StringProperty(
+        name="Study Folder",
+        description="Folder of this unit's results. Empty: beside the .blend file, or the user's folder",
+        subtype="DIR_PATH",
+        options=BESIDE_BLEND_FILE,
+    )
+
+
+def _show_changed(group, context):
+    live.show(group.id_data)
+
+
+class MU_PG_step(bpy.types.PropertyGroup):
+    """One step of the design in a unit's stack; its name is the core's."""
+
+    muted: BoolProperty(
+        name="Mute", description="Leave this step out: what it would change is passed on", update=_changed
+    )
+    shown: BoolProperty(name="Show", description="Show what this step gives in the preview", update=_changed)
+
+
+class MU_PG_unit(bpy.types.PropertyGroup):
+    """One Monolithic Unit, kept on its root object."""
+
+    __annotations__ = {
+        "uuid": StringProperty(options={"HIDDEN"}),
+        "title": StringProperty(
+            name="Name",
+            description="Name of the unit, one line of 1 to 80 printable characters",
+            default="custom",
+            maxlen=80,
+            update=_changed,
+        ),
+        "scale": blender_property(_HEAD["scale"], _changed),
+        **{
+            name: PointerProperty(type=group, description=textwrap.shorten(group.__doc__ or name, 200))
+            for name, group in GROUPS.items()
+        },
+        "study": PointerProperty(type=MU_PG_study, description="What the next simulation is asked to do"),
+        "stack": CollectionProperty(type=MU_PG_step, description="Steps of the design, in their order"),
+        "step": IntProperty(name="Step", description="The step whose parameters are shown"),
+        "path": StringProperty(
+            name="Sensor Path", description="Window of anchors that the waveguide follows", update=_changed
+        ),
+        "cut": BoolProperty(
+            name="Cut Open",
+            description="Show the unit cut in its bending plane, to see chambers and wall",
+            update=_changed,
+        ),
+        "candidates": BoolProperty(
+            name="Show Candidates",
+            description="Draw every candidate path beside the lattice, to compare and to pick one by a click",
+            update=_changed,
+        ),
+        "show": EnumProperty(
+            name="Show",
+            description="Whether the unit is seen as it is being designed or as it will be printed",
+            items=[
+                ("preview", "Preview", "Skeleton of the design, follows every slider"),
+                ("solid", "Solid", "The printable solid that was built last"),
+            ],
+            default="preview",
+            update=_show_changed,
+        ),
+        # What the preview was last built from, and why it could not follow the parameters.
+        "built": StringProperty(options={"HIDDEN"}),
+        "trouble": StringProperty(options={"HIDDEN"}),
+    }
+
+
+CLASSES = (*GROUPS.values(), MU_PG_study, MU_PG_step, MU_PG_unit)
+
+
+def section_of(props, section: str) -> dict:
+    """Values of one section of a unit's properties, as the core's parameters."""
+    group = getattr(props, section)
+    (core,) = (s for s in SECTIONS if s.section == section)
+    return {d.name: _value(d, getattr(group, d.name)) for d in describe(core)}
+
+
+def to_unit(props) -> Unit:
+    """The core's unit that Blender's properties stand for; raises InputError where a rule is broken."""
+    sections = {s.section: s(**section_of(props, s.section)) for s in SECTIONS}
+    return Unit(name=props.title, scale=exact(props.scale), **sections)
+
+
+def from_unit(props, unit: Unit) -> None:
+    """Set Blender's properties to a unit; each still calls its update, see `live.held`."""
+    props.title, props.scale = unit.name, unit.scale
+    for section in SECTIONS:
+        group, values = getattr(props, section.section), getattr(unit, section.section)
+        for d in describe(section):
+            setattr(group, d.name, getattr(values, d.name))
+
+
+def _value(d: Description, value):
+    return exact(value) if d.type is float else value
+
+
+def register():
+    """Classes and the one property on objects that holds a unit."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.Object.mu_unit = PointerProperty(type=MU_PG_unit)
+
+
+def unregister():
+    """Take them out again; values stay in the file and are found when the extension comes back."""
+    del bpy.types.Object.mu_unit
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

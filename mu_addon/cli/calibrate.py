@@ -1,0 +1,55 @@
+"""`calibrate`: from recorded bending to a map from voltage to angle."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .options import add_results, require_out
+
+if TYPE_CHECKING:
+    from ..run.context import Ending
+    from ..run.progress import Progress
+    from .options import Commands
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `calibrate`."""
+    command = commands.add_parser(
+        "calibrate",
+        help="a sensor's map from voltage to bending angle, from recorded sweeps",
+        epilog="example: run.py calibrate out/bench-1 --channel light_V --dark dark_V --out out/calibration",
+    )
+    command.add_argument(
+        "data", nargs="+", metavar="FOLDER", help="recordings, or measured data of waveguide_bending"
+    )
+    add_results(command)
+    command.add_argument("--channel", metavar="NAME", help="column of the light (the only one)")
+    command.add_argument("--dark", metavar="NAME|V", help="column of the dark level, or volts (0)")
+    command.add_argument(
+        "--angles", metavar="CSV", help='time_s,angle_deg of a recording without marks such as "angle 30"'
+    )
+
+
+def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    """Calibrate."""
+    from ..usecases.sensor.calibrate import calibrate_sensor
+
+    require_out(options)
+    calibrate_sensor(
+        [Path(folder) for folder in options.data],
+        Path(options.out),
+        channel=options.channel,
+        dark=options.dark,
+        angles=None if options.angles is None else Path(options.angles),
+        progress=progress,
+        ending=ending,
+    )
+
+
+def answer(summary: dict[str, Any]) -> list[str]:
+    """What was found, in a few lines."""
+    from ..usecases.sensor.calibrate import answer
+
+    return answer(summary)

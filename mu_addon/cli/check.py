@@ -1,0 +1,83 @@
+"""`check`: what a printer would stumble over."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .options import add_unit, unit_if_named
+from .study_options import add_solid
+
+if TYPE_CHECKING:
+    from ..run.context import Ending
+    from ..run.progress import Progress
+    from .options import Commands
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `check`."""
+    command = commands.add_parser(
+        "check",
+        help="print check of a unit or an STL file, and the best way up; exit status 6: do not print it",
+        epilog="example: run.py check --preset mu-1.0x --path alpha4 --out out/check",
+    )
+    add_unit(command, required=False)
+    command.add_argument("--stl", metavar="FILE", help="check this file; with a unit, against its drawing")
+    command.add_argument("--path", metavar="NAME", help="the unit's waveguide, alpha1 ..")
+    command.add_argument(
+        "--printer",
+        default="form-4-elastic-50a",
+        metavar="NAME|FILE",
+        help="limits of a printer and its resin: a shipped name, or a TOML file (form-4-elastic-50a)",
+    )
+    command.add_argument(
+        "--up",
+        nargs=3,
+        type=float,
+        default=(0.0, 0.0, 1.0),
+        metavar=("X", "Y", "Z"),
+        help="build direction, away from the platform (0 0 1: inlet toward the platform)",
+    )
+    add_solid(command)
+
+
+def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    """Check the part."""
+    from ..design.anchors import window
+    from ..design.printing.printer import load_printer
+    from ..errors import InputError
+    from ..usecases.check_print.run import Job, check_print
+
+    unit = unit_if_named(options)
+    if unit is None and options.stl is None:
+        raise InputError("nothing to check was named", "--preset, --unit or --stl", "give one of them")
+    if unit is None and options.path is not None:
+        raise InputError("a path belongs to a unit", "--path", "give --preset or --unit as well")
+    if not 1e-6 < sum(x * x for x in options.up) < 1e12:
+        raise InputError(f"{options.up} is no direction", "--up", "give three figures, such as 0 0 1")
+    content = None
+    if options.stl is not None:
+        try:
+            content = Path(options.stl).read_bytes()
+        except OSError as error:
+            raise InputError(
+                f"cannot read the file: {error.strerror or error}", options.stl, "check its name"
+            ) from error
+    job = Job(
+        printer=load_printer(options.printer),
+        unit=unit,
+        window=None if options.path is None or unit is None else window(unit, options.path),
+        quality=options.quality,
+        stl=content,
+        stl_name="" if options.stl is None else Path(options.stl).name,
+        direction=tuple(options.up),
+    )
+    check_print(job, Path(options.out), progress, ending)
+
+
+def answer(summary: dict[str, Any]) -> list[str]:
+    """What was found, in a few lines."""
+    from ..usecases.check_print.run import answer
+
+    return answer(summary)

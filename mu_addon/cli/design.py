@@ -1,0 +1,25 @@
+"""`design`: the printable solid."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from .options import add_unit
+from .study_options import EXAMPLE, add_body, add_solid, answer, run
+
+if TYPE_CHECKING:
+    from .options import Commands
+
+__all__ = ["add", "answer", "run"]
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `design`."""
+    command = commands.add_parser("design", help="printable solid, STL and lattice nodes", epilog=EXAMPLE)
+    add_unit(command)
+    add_solid(command)
+    add_body(command)
+    command.add_argument(
+        "--path", metavar="NAME", help="also the unit with a waveguide along this path, alpha1 .."
+    )
+    command.set_defaults(stages=("design",))

@@ -1,0 +1,49 @@
+"""`design-experiments`: what planned measurements would show."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .options import add_measured_folder, add_unit, unit_if_named
+
+if TYPE_CHECKING:
+    from ..run.context import Ending
+    from ..run.progress import Progress
+    from .options import Commands
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `design-experiments`."""
+    command = commands.add_parser(
+        "design-experiments",
+        help="before measuring: which effects planned experiments would show, from which size on",
+        epilog="example: run.py design-experiments my-protocols --noise angle=0.5 --out out/plan",
+    )
+    add_measured_folder(command, "as for `diagnose`; what would be measured may hold any numbers")
+    add_unit(command, required=False)
+    command.add_argument(
+        "--noise",
+        nargs="+",
+        default=(),
+        metavar="QUANTITY=VALUE",
+        help="standard deviation of a reading, in the unit of its column (angle=0.3 marker=0.1 stress=0.1 "
+        "pressure=0.1 tip_deflection=0.1 voltage=0.002)",
+    )
+
+
+def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    """Plan the folder's experiments."""
+    from ..usecases.diagnose.design_experiments import design_experiments, noise_of
+
+    unit = unit_if_named(options)
+    noise = noise_of(options.noise)
+    design_experiments(Path(options.folder), Path(options.out), unit, noise, progress=progress, ending=ending)
+
+
+def answer(summary: dict[str, Any]) -> list[str]:
+    """What the plan would show, in a few lines."""
+    from ..usecases.diagnose.design_experiments import answer
+
+    return answer(summary)

@@ -1,0 +1,40 @@
+"""`diagnose`: what measured data say is wrong with the model."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .options import add_measured_folder, add_unit, unit_if_named
+
+if TYPE_CHECKING:
+    from ..run.context import Ending
+    from ..run.progress import Progress
+    from .options import Commands
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `diagnose`."""
+    command = commands.add_parser(
+        "diagnose",
+        help="what measured data say is wrong with the model, why, and what mending it gains",
+        epilog="example: run.py diagnose assets/examples/paper-moduli --out out/why",
+    )
+    add_measured_folder(command)
+    add_unit(command, required=False)
+
+
+def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    """Diagnose the folder."""
+    from ..usecases.diagnose.run import diagnose_folder
+
+    unit = unit_if_named(options)
+    diagnose_folder(Path(options.folder), Path(options.out), unit, progress=progress, ending=ending)
+
+
+def answer(summary: dict[str, Any]) -> list[str]:
+    """What was found, in a few lines."""
+    from ..usecases.diagnose.run import answer
+
+    return answer(summary)

@@ -1,0 +1,72 @@
+"""`homogenize`: from struts and resin to the lattice's law."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .options import add_model, add_unit, modelled_unit
+
+if TYPE_CHECKING:
+    from ..run.context import Ending
+    from ..run.progress import Progress
+    from .options import Commands
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `homogenize`."""
+    command = commands.add_parser(
+        "homogenize",
+        help="the lattice's moduli from its struts and resin, virtual compression tests, its law for `place`",
+        epilog="example: run.py homogenize --preset mu-1.0x --out out/lattice",
+    )
+    add_unit(command)
+    add_model(command)
+    command.add_argument(
+        "--resin",
+        metavar="NAME|FILE",
+        help="a material of the library, or its TOML file (the modulus of the unit's membrane)",
+    )
+    command.add_argument(
+        "--cells", type=int, default=3, metavar="N", help="cells along each side of the specimen (3)"
+    )
+    command.add_argument(
+        "--friction",
+        choices=("both", "slide", "stick"),
+        default="both",
+        help="whether plates let the specimen's faces slide or hold them (both)",
+    )
+    command.add_argument(
+        "--strain", type=float, default=0.4, metavar="E", help="nominal compression to go to (0.4)"
+    )
+    command.add_argument(
+        "--no-specimen", dest="specimen", action="store_false", help="only the endless lattice"
+    )
+    command.add_argument(
+        "--refine", type=float, default=1.0, metavar="F", help="divides the size of the cell's elements (1)"
+    )
+
+
+def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    """Homogenise the unit's lattice."""
+    from ..usecases.homogenize.run import FRICTIONS, Job, homogenize, resin_of
+
+    unit = modelled_unit(options, progress, ending)
+    frictions = FRICTIONS if options.friction == "both" else (options.friction,)
+    job = Job(
+        unit=unit,
+        resin=resin_of(options.resin, unit),
+        cells=options.cells,
+        frictions=frictions if options.specimen else (),
+        strain=options.strain,
+        refine=options.refine,
+    )
+    homogenize(job, Path(options.out), progress, ending)
+
+
+def answer(summary: dict[str, Any]) -> list[str]:
+    """What was found, in a few lines."""
+    from ..usecases.homogenize.run import answer
+
+    return answer(summary)

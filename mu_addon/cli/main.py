@@ -1,0 +1,50 @@
+"""The command line: its parser, and how a run of a subcommand begins and ends."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from . import all_commands
+
+STATUSES = (
+    "exit status: 0 done, 1 any other failure, 2 wrong input, 3 no mesh, 4 no equilibrium, 5 cannot write, "
+    "6 not printable, 70 fault of this program, 130 Ctrl-C, 143 terminated"
+)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, and where help is."""
+
+    def error(self, message: str) -> None:  # type: ignore[override]
+        self.exit(2, f"error: {message}\n  what to do: {self.prog} --help lists what there is\n")
+
+
+def parser() -> argparse.ArgumentParser:
+    """The parser of the whole command line."""
+    top = _Parser(
+        "run.py", description="Monolithic Units: design, simulate, place the sensor.", epilog=STATUSES
+    )
+    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+    for command in all_commands().values():
+        command.add(commands)
+    return top
+
+
+def main(arguments: list[str]) -> int:
+    """Run one command line; returns its exit status and never raises."""
+    options = parser().parse_args(arguments)
+    command = all_commands()[options.command]
+
+    # Only now, so that --help answers at once.
+    from ..run.context import run_to_end
+    from ..run.progress import Progress, json_lines, terminal
+
+    json = getattr(options, "json", False)
+    progress = Progress([json_lines(sys.stdout) if json else terminal(sys.stderr)])
+    with run_to_end(progress) as ending:
+        command.run(options, progress, ending)
+    if ending.status == 0 and not json:
+        results = [f"results: {ending.folder}"] if ending.folder is not None else []
+        sys.stdout.write("\n".join([*results, *command.answer(ending.summary)]) + "\n")
+    return ending.status

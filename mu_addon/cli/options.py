@@ -1,0 +1,116 @@
+"""Options that several subcommands share, and what they stand for."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..design.parameters import Unit
+    from ..run.context import Ending
+    from ..run.progress import Progress
+    from ..usecases.simulate_and_place.extended_unit import Extended
+    from ..usecases.simulate_and_place.static_effects import StaticEffects
+
+Commands = argparse._SubParsersAction  # what add_subparsers returns; argparse gives it no public name
+
+
+def add_results(command: argparse.ArgumentParser) -> None:
+    """--out and --json."""
+    command.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
+    command.add_argument("--json", action="store_true", help="one JSON message a line on standard output")
+
+
+def add_unit(command: argparse.ArgumentParser, required: bool = True) -> None:
+    """--preset or --unit, and where the results go."""
+    which = command.add_mutually_exclusive_group(required=required)
+    which.add_argument("--preset", metavar="NAME", help="a preset: mu-0.75x, mu-1.0x, mu-1.5x")
+    which.add_argument("--unit", metavar="FILE", help="a unit's parameters, TOML")
+    add_results(command)
+
+
+def add_model(command: argparse.ArgumentParser) -> None:
+    """--model, what a diagnosis found."""
+    command.add_argument(
+        "--model", metavar="FILE", help="model.toml of `diagnose`: what it found is put into the unit"
+    )
+
+
+def add_orientation(command: argparse.ArgumentParser) -> None:
+    """--orientation, of what weighs."""
+    command.add_argument(
+        "--orientation",
+        type=float,
+        default=0.0,
+        metavar="DEG",
+        help="direction of gravity about x, as in measured data: 0 hangs, tip down (0). Of use where what "
+        "--model gives has weight",
+    )
+
+
+def add_measured_folder(command: argparse.ArgumentParser, help_: str = "") -> None:
+    """FOLDER, a folder of measured data."""
+    words = help_ or "measured data: experiments.toml and its CSV files"
+    command.add_argument("folder", metavar="FOLDER", help=words)
+
+
+def require_out(options: argparse.Namespace) -> None:
+    """Raise InputError if --out names no folder."""
+    from ..errors import InputError
+
+    if not options.out.strip():
+        raise InputError("no folder was named", "--out", "give a folder for the results")
+
+
+def unit_of(options: argparse.Namespace) -> Unit:
+    """The unit that --preset or --unit names; raises InputError."""
+    from ..design.parameters import load_preset, read_unit
+
+    require_out(options)
+    return load_preset(options.preset) if options.preset is not None else read_unit(options.unit)
+
+
+def unit_if_named(options: argparse.Namespace) -> Unit | None:
+    """The unit that --preset or --unit names, or None if neither was given; raises InputError."""
+    require_out(options)
+    return None if options.preset is None and options.unit is None else unit_of(options)
+
+
+def modelled(options: argparse.Namespace, progress: Progress, ending: Ending) -> tuple[Unit, StaticEffects]:
+    """The unit with what the extended model of --model adds to it, and effects beyond a unit's parameters.
+
+    What no simulation of a unit can take is warned of.
+    """
+    import attrs
+
+    from ..usecases.simulate_and_place.static_effects import StaticEffects
+
+    unit = unit_of(options)
+    turn = options.orientation
+    effects = StaticEffects(orientation_deg=turn, where="--orientation")
+    if options.model is not None:
+        from ..usecases.simulate_and_place.extended_unit import read_extended
+
+        found = _told(read_extended(unit, options.model), options, progress, ending)
+        unit, effects = found.unit, attrs.evolve(found.effects, orientation_deg=turn)
+    if turn and not effects.weighs:
+        progress.warning("nothing here has weight, so that its direction changes nothing", "--orientation")
+    return unit, effects
+
+
+def modelled_unit(options: argparse.Namespace, progress: Progress, ending: Ending) -> Unit:
+    """The unit, with what the model of --model adds to its parameters; what else that has is warned of."""
+    unit = unit_of(options)
+    if options.model is None:
+        return unit
+    from ..usecases.simulate_and_place.extended_unit import read_extended
+
+    found = read_extended(unit, options.model).of_parameters()
+    return _told(found, options, progress, ending).unit
+
+
+def _told(found: Extended, options: argparse.Namespace, progress: Progress, ending: Ending) -> Extended:
+    for words in found.left_out:
+        progress.warning(f"not applied here: {words}", str(options.model))
+    ending.summary["model"] = {"applied": found.applied, "left_out": found.left_out}
+    return found

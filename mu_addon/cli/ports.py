@@ -1,0 +1,28 @@
+"""`ports`: the serial ports of this computer."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..run.context import Ending
+    from ..run.progress import Progress
+    from .options import Commands
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `ports`."""
+    commands.add_parser("ports", help="list the serial ports, for `stream` and `record`")
+
+
+def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    """Put a line for each port into the summary."""
+    from ..usecases.sensor.stream import port_lines
+
+    ending.summary["ports"] = port_lines()
+
+
+def answer(summary: dict[str, Any]) -> list[str]:
+    """A line for each port."""
+    return summary["ports"] or ["no serial port is there"]

@@ -1,0 +1,39 @@
+"""`presets`: the units and grippers that come with the package."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..run.context import Ending
+    from ..run.progress import Progress
+    from .options import Commands
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `presets`."""
+    commands.add_parser(
+        "presets", help="list the presets that come with the package: units, and grippers for `grip`"
+    )
+
+
+def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    """Put every preset's name and size into the summary."""
+    from ..design.gripper import gripper_names, load_gripper
+    from ..design.parameters import load_preset, preset_names
+
+    for name in preset_names():
+        d = load_preset(name).dimensions
+        ending.summary[name] = f"cell {d.cell:g} mm, {d.count} chambers, {d.height:g} mm long"
+    for name in gripper_names():
+        gripper = load_gripper(name)
+        ending.summary[name] = f"two fingers {gripper.unit.name}, {gripper.fingers.gap_mm:g} mm apart"
+
+
+def answer(summary: dict[str, Any]) -> list[str]:
+    """A line for each preset."""
+    from ..design.gripper import gripper_names
+    from ..design.parameters import preset_names
+
+    return [f"{name:12s} {summary[name]}" for name in (*preset_names(), *gripper_names())]

@@ -1,0 +1,58 @@
+"""`replay`: a recording as if it came from the sensor."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .options import add_results, require_out
+from .stream import add_calibration, shown
+
+if TYPE_CHECKING:
+    from ..run.context import Ending
+    from ..run.progress import Progress
+    from .options import Commands
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `replay`."""
+    command = commands.add_parser(
+        "replay",
+        help="play a recording as if it came from the sensor",
+        epilog="example: run.py replay out/bench-1 --out out/again",
+    )
+    command.add_argument("recording", metavar="RECORDING", help="folder of `stream` or `record`")
+    add_results(command)
+    command.add_argument(
+        "--speed", type=float, default=1.0, metavar="F", help="times as fast as it was; 0: at once (1)"
+    )
+    add_calibration(command)
+    command.add_argument("--controlled", action="store_true", help="as for `stream`")
+
+
+def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    """Play the recording to its end."""
+    from ..sensing.sources import Replay
+    from ..usecases.sensor.stream import stream
+
+    require_out(options)
+    stream(
+        Replay(Path(options.recording), options.speed),
+        Path(options.out),
+        seconds=None,
+        about={"source": f"replay of {Path(options.recording).name}"},
+        progress=progress,
+        ending=ending,
+        controlled=options.controlled,
+        calibration=options.calibration,
+        keep_time=True,
+        show=shown(options),
+    )
+
+
+def answer(summary: dict[str, Any]) -> list[str]:
+    """What was played, in a few lines."""
+    from ..usecases.sensor.stream import answer
+
+    return answer(summary)

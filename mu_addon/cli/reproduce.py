@@ -1,0 +1,84 @@
+"""`reproduce`: the paper's table, its bending ranges, and what stands between them and ours."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .options import add_results, require_out
+
+if TYPE_CHECKING:
+    from ..run.context import Ending
+    from ..run.progress import Progress
+    from .options import Commands
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `reproduce`."""
+    command = commands.add_parser(
+        "reproduce",
+        help="the paper's Table I and bending at three scales beside ours, in one page",
+        epilog="example: run.py reproduce --out out/reproduce",
+    )
+    add_results(command)
+    command.add_argument(
+        "--coarse",
+        action="store_true",
+        help="coarse meshes and no random ones: a minute or two, a quick look",
+    )
+    command.add_argument(
+        "--refine", type=float, default=None, metavar="F", help="divides element sizes (1; 0.4 with --coarse)"
+    )
+    command.add_argument(
+        "--set", default="default", metavar="NAME|FILE", help="values that the paper leaves open (default)"
+    )
+    command.add_argument(
+        "--meshes",
+        type=int,
+        default=None,
+        metavar="N",
+        help="random meshes of each kind; 0: those that come with the package (12; 0 with --coarse)",
+    )
+    command.add_argument(
+        "--open",
+        dest="points",
+        type=int,
+        default=0,
+        metavar="N",
+        help="solve N sets of open values, hours; 0: those that come with the package (0)",
+    )
+    command.add_argument(
+        "--no-gripper",
+        dest="gripper",
+        action="store_false",
+        help="leave out the gripper's column, as --coarse",
+    )
+    command.add_argument("--workers", type=int, default=2, metavar="N", help="processes (2)")
+
+
+def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    """Do the paper's table again."""
+    from ..meshing.settings import MeshSettings
+    from ..usecases.reproduce.run import reproduce
+    from ..usecases.reproduce.settings import Settings, read_set
+
+    require_out(options)
+    coarse = options.coarse
+    settings = Settings(
+        **read_set(options.set),
+        values_name=Path(options.set).stem,
+        mesh=MeshSettings(refine=options.refine if options.refine is not None else 0.4 if coarse else 1.0),
+        meshes=options.meshes if options.meshes is not None else 0 if coarse else 12,
+        points=options.points,
+        gripper=options.gripper and not coarse,
+        workers=options.workers,
+    )
+    reproduce(settings, Path(options.out), progress, ending)
+
+
+def answer(summary: dict[str, Any]) -> list[str]:
+    """What was found, in a few lines."""
+    from ..usecases.reproduce.run import answer
+
+    return answer(summary)

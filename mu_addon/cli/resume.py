@@ -1,0 +1,51 @@
+"""`resume`: the study that a folder's study.toml describes, from where it stopped."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .study_options import answer
+
+if TYPE_CHECKING:
+    from ..run.context import Ending
+    from ..run.progress import Progress
+    from .options import Commands
+
+__all__ = ["add", "answer", "run"]
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `resume`."""
+    command = commands.add_parser(
+        "resume",
+        help="go on with the study of a folder, or do again what its study.toml says",
+        epilog="example: run.py resume out/mu-1.0x",
+    )
+    command.add_argument("out", metavar="FOLDER", help="a folder of `design`, `simulate` or `place`")
+    command.add_argument("--json", action="store_true", help="one JSON message a line on standard output")
+    command.add_argument(
+        "--workers", type=int, default=2, metavar="N", help="processes for the candidates (2)"
+    )
+    command.add_argument(
+        "--no-report", dest="report", action="store_false", help="figures only: no pictures, no report.html"
+    )
+
+
+def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    """Run what study.toml says; what is finished is taken from the cache."""
+    from ..usecases.simulate_and_place.job import read_job
+    from ..usecases.simulate_and_place.report_data import publish
+    from ..usecases.simulate_and_place.run import Study
+    from .options import require_out
+    from .study_options import run_stages
+
+    require_out(options)
+    folder = Path(options.out)
+    study = Study.open(read_job(folder, options.workers), folder, progress, ending)
+    if options.report:
+        ending.on_stop = lambda reason: publish(study, reason["what"])
+    run_stages(study)
+    if options.report:
+        publish(study)

@@ -1,0 +1,28 @@
+"""`simulate`: the solid and its motion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from .options import add_model, add_orientation, add_unit
+from .study_options import EXAMPLE, add_body, add_obstacles, add_simulation, add_solid, answer, run
+
+if TYPE_CHECKING:
+    from .options import Commands
+
+__all__ = ["add", "answer", "run"]
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `simulate`."""
+    command = commands.add_parser(
+        "simulate", help="... and its motion under a pressure protocol", epilog=EXAMPLE
+    )
+    add_unit(command)
+    add_model(command)
+    add_orientation(command)
+    add_solid(command)
+    add_body(command)
+    add_obstacles(command)
+    add_simulation(command)
+    command.set_defaults(stages=("design", "simulate"))

@@ -1,0 +1,46 @@
+"""`specimens`: parts to print and measure."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .options import add_unit, unit_if_named
+
+if TYPE_CHECKING:
+    from ..run.context import Ending
+    from ..run.progress import Progress
+    from .options import Commands
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `specimens`."""
+    command = commands.add_parser(
+        "specimens",
+        help="lattice cubes, coupons and a gauge for the printer as STL, with sheets for what to measure",
+        epilog="example: run.py specimens --out out/specimens",
+    )
+    add_unit(command, required=False)
+    command.add_argument(
+        "--resin", metavar="NAME|FILE", help="a material of the library, or its TOML file (elastic-50a-v1)"
+    )
+
+
+def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    """Write the specimens of a unit, mu-1.0x unless one is named."""
+    from ..design.parameters import load_preset
+    from ..materials.library import load_material, read_material
+    from ..usecases.export.specimens import make_specimens
+
+    unit = unit_if_named(options) or load_preset("mu-1.0x")
+    resin = options.resin or "elastic-50a-v1"
+    known = read_material(Path(resin)) if resin.endswith(".toml") else load_material(resin)
+    make_specimens(unit, known, Path(options.out), progress, ending)
+
+
+def answer(summary: dict[str, Any]) -> list[str]:
+    """What was written, in a few lines."""
+    from ..usecases.export.specimens import answer
+
+    return answer(summary)

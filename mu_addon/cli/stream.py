@@ -1,0 +1,89 @@
+"""`stream`: the real sensor, recorded and shown as it comes."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .options import add_results, require_out
+
+if TYPE_CHECKING:
+    from ..run.context import Ending
+    from ..run.progress import Progress, Sink
+    from .options import Commands
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `stream`."""
+    command = commands.add_parser(
+        "stream",
+        help="read the sensor over serial: record every sample, then show it",
+        epilog="example: run.py stream --port usb:2341:0043 --out out/bench-1",
+    )
+    add_source(command)
+    command.set_defaults(show=True)
+
+
+def add_source(command: argparse.ArgumentParser) -> None:
+    """Where the samples come from, for how long, and where they go."""
+    add_results(command)
+    command.add_argument(
+        "--port",
+        metavar="NAME",
+        help="a port's device, or usb:VID:PID[:SERIAL], which finds it in any socket (the only USB port)",
+    )
+    command.add_argument("--baud", type=int, default=115200, metavar="B", help="bits a second (115200)")
+    command.add_argument(
+        "--simulate", action="store_true", help="a simulated sensor instead, bending to and fro"
+    )
+    add_calibration(command)
+    command.add_argument("--seconds", type=float, metavar="S", help="stop after that long (Ctrl-C)")
+    command.add_argument(
+        "--controlled",
+        action="store_true",
+        help="obey pause, resume, mark WORDS and stop on standard input, and end with it",
+    )
+
+
+def add_calibration(command: argparse.ArgumentParser) -> None:
+    """--calibration, a map from voltage to angle."""
+    command.add_argument(
+        "--calibration", metavar="FILE", help="calibration.toml of `calibrate`: shows angles beside voltages"
+    )
+
+
+def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    """Stream until Ctrl-C."""
+    from ..usecases.sensor.stream import serial_source, simulated_source, stream
+
+    require_out(options)
+    source = simulated_source() if options.simulate else serial_source(options.port, options.baud)
+    about = {"source": "simulated" if options.simulate else options.port, "baud": options.baud}
+    stream(
+        source,
+        Path(options.out),
+        seconds=options.seconds,
+        about=about,
+        progress=progress,
+        ending=ending,
+        controlled=options.controlled,
+        calibration=options.calibration,
+        show=shown(options) if options.show else None,
+    )
+
+
+def shown(options: argparse.Namespace) -> Sink:
+    """Who shows the stream: a line for people, or JSON for programs."""
+    from ..run.progress import json_lines
+    from ..usecases.sensor.stream import Display
+
+    return json_lines(sys.stdout) if options.json else Display(sys.stdout)
+
+
+def answer(summary: dict[str, Any]) -> list[str]:
+    """What was recorded, in a few lines."""
+    from ..usecases.sensor.stream import answer
+
+    return answer(summary)

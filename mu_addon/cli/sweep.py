@@ -1,0 +1,64 @@
+"""`sweep`: many studies that differ in some of their inputs."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .options import add_results, require_out
+
+if TYPE_CHECKING:
+    from ..run.context import Ending
+    from ..run.progress import Progress
+    from .options import Commands
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `sweep`."""
+    command = commands.add_parser(
+        "sweep",
+        help="many studies over ranges of inputs: one table, effects, best compromises",
+        epilog="example: run.py sweep assets/examples/sweep/sweep.toml --out out/sweep",
+    )
+    command.add_argument("file", metavar="FILE", help="sweep.toml: what is varied, and how")
+    add_results(command)
+    command.add_argument(
+        "--workers", type=int, default=2, metavar="N", help="studies at the same time, on this machine (2)"
+    )
+    command.add_argument(
+        "--scheduler", metavar="ADDRESS", help="run on that Dask scheduler's workers: tcp://host:8786"
+    )
+    command.add_argument("--add", type=int, default=0, metavar="N", help="so many points more than there are")
+    command.add_argument("--retry", action="store_true", help="run the points that failed again")
+
+
+def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    """Run the points that are not there yet, and report on all."""
+    from ..errors import InputError
+    from ..usecases.parameter_study.plan import read_plan
+    from ..usecases.parameter_study.run import sweep
+
+    require_out(options)
+    for name, least in (("workers", 1), ("add", 0)):
+        if not least <= getattr(options, name) <= 100_000:
+            raise InputError(
+                f"{getattr(options, name)} is out of bounds", f"--{name}", f"give {least} or more"
+            )
+    sweep(
+        read_plan(Path(options.file)),
+        Path(options.out),
+        progress,
+        ending,
+        scheduler=options.scheduler,
+        workers=options.workers,
+        add=options.add,
+        retry=options.retry,
+    )
+
+
+def answer(summary: dict[str, Any]) -> list[str]:
+    """What was found, in a few lines."""
+    from ..usecases.parameter_study.run import answer
+
+    return answer(summary)

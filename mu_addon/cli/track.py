@@ -1,0 +1,83 @@
+"""`track`: a video of the bench becomes an experiment in a folder of measured data."""
+
+from __future__ import annotations
+
+import argparse
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .options import add_results, require_out
+
+if TYPE_CHECKING:
+    from ..run.context import Ending
+    from ..run.progress import Progress
+    from ..usecases.track_video.run import Tracker
+    from .options import Commands
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `track`."""
+    command = commands.add_parser(
+        "track",
+        help="a video of the bench as measured data: markers followed by Blender, in mm and degrees",
+        epilog="example: run.py track bench.mp4 --markers bench.toml --pressure ladder.csv --out measured",
+    )
+    command.add_argument(
+        "clip", metavar="CLIP", help="a movie, the first picture of a sequence, or a CSV of followed pixels"
+    )
+    command.add_argument(
+        "--markers", required=True, metavar="FILE", help="TOML: camera, base, tip, scale and markers"
+    )
+    command.add_argument(
+        "--pressure", required=True, metavar="CSV", help="time_s,pressure_kPa: a recording, or the protocol"
+    )
+    command.add_argument("--fps", type=float, metavar="F", help="frames a second (as FILE or the clip says)")
+    add_results(command)
+
+
+def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+    """Follow the markers and put the experiment into the folder."""
+    import attrs
+
+    from ..usecases.track_video.run import read_bench, track
+
+    require_out(options)
+    bench = read_bench(Path(options.markers))
+    if options.fps is not None:
+        bench = attrs.evolve(bench, fps=options.fps)
+    ending.open_folder(Path(options.out))
+    with progress.stage("track"):
+        figures, remarks = track(
+            Path(options.clip), bench, Path(options.pressure), Path(options.out), _tracker()
+        )
+    for remark in remarks:
+        progress.warning(remark.what, remark.where, remark.remedy)
+    ending.summary |= figures | {"remarks": [remark.what for remark in remarks]}
+
+
+def _tracker() -> Tracker:
+    """Blender's tracker, where there is a Blender."""
+
+    def follow(clip: Path, marks: Any) -> Any:
+        from ..errors import InputError
+
+        if find_spec("bpy") is None:
+            raise InputError(
+                "following markers needs Blender",
+                str(clip),
+                "run it in Blender, blender -b -P headless/run.py -- track ..., or with the bpy wheel; or "
+                "give a CSV of pixels that another tracker followed",
+            )
+        # By name: the command line knows the core, and Blender's side only where it is asked for.
+        return import_module("...blender.tracking", __package__).follow(clip, marks)
+
+    return follow
+
+
+def answer(summary: dict[str, Any]) -> list[str]:
+    """What was found, in a few lines."""
+    from ..usecases.track_video.run import answer
+
+    return answer(summary)

@@ -1,0 +1,74 @@
+"""Every candidate on one mesh at once: Model A's states, each with all sensors in lockstep."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..fem.batched_newton import Lockstep, Variant
+from ..fem.descent import NewtonSettings
+from ..fem.equilibrium import State
+from ..fem.kinematics import Probe
+from ..fem.laws import NeoHooke
+from ..fem.materials import Materials
+from ..fem.model import Model
+from ..fem.obstacle import CONTACT
+from ..fem.time_stepping import march
+
+Array = np.ndarray[Any, Any]
+
+
+class Sweep:
+    """Many sensors in one unit: where each moves the monitored points at a state of Model A.
+
+    shares: the part (m,) of every element that each sensor fills (see inclusion.sensor_share).
+    monitored: points (p, 3) in mm of the backbone and their probe. settings: of Newton's method.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        materials: Materials,
+        monitored: tuple[Array, Probe],
+        shares: Sequence[Array],
+        sensor_MPa: float,
+        settings: NewtonSettings | None = None,
+    ) -> None:
+        _, poisson = materials.small_strain(len(model.mesh.tets))
+        stiff = NeoHooke.parameters(np.full(len(poisson), sensor_MPa), poisson)
+        self._points, self._probe = monitored
+        self._lockstep = Lockstep(model, materials, [Variant(s, NeoHooke, stiff) for s in shares], settings)
+
+    def alone(self, number: int, pressures_MPa: Array) -> Array:
+        """Monitored points (s, p, 3) in mm of one sensor's unit along its whole path through some pressures.
+
+        They are visited in order from the state without pressure. Raises ConvergenceError.
+        """
+        equilibrium = self._lockstep.alone(number)
+        return self.points(equilibrium.path(pressures_MPa, equilibrium.unpressed()))
+
+    def marched(self, number: int, time_s: Array, pressure_kPa: Array) -> Array:
+        """Monitored points (k, p, 3) in mm of one sensor's unit at k instants, beside the model's obstacles.
+
+        Its whole motion is solved in the order of time, as friction remembers. Raises ConvergenceError.
+        """
+        equilibrium = self._lockstep.alone(number)
+        equilibrium.settings = CONTACT
+        return self.points(march(equilibrium, time_s, pressure_kPa).states)
+
+    def at(self, state: State) -> Array:
+        """Monitored points (sensors, p, 3) in mm, at the pressure of one of Model A's states.
+
+        Raises ConvergenceError where a sensor's unit has no equilibrium that continues Model A's.
+        """
+        return self.points(self.states(state))
+
+    def states(self, state: State) -> list[State]:
+        """Every sensor's own state at the pressure of one of Model A's. Raises ConvergenceError, as `at`."""
+        return self._lockstep.at(state)
+
+    def points(self, states: Sequence[State]) -> Array:
+        """Monitored points (s, p, 3) in mm of some states."""
+        return np.array([self._points + self._probe.displacement(s.u) for s in states])

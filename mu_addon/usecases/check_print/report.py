@@ -1,0 +1,254 @@
+"""The report of a print check: the verdict, where every fault is, and which way up to print."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...design.printing.check import PrintCheck
+from ...design.printing.finding import Finding, numbered
+from ...design.printing.orientation import Build, directions
+from ...design.printing.printer import MEANING
+from ...design.surface import Triangles, Vertices
+from ...files import write_bytes, write_text
+from ...report import charts as plots
+from ...report.html import cards, facts_table, figure, note, page, picture_figure, table
+from ...report.render import Floats, Part, fit, png, render
+from ...report.results import Picture
+from ...report.shapes import ball, tube
+from ...run.progress import Progress
+from ..simulate_and_place.report_data import package_versions
+from .run import Job
+
+FILES = {
+    "check.toml": "inputs of this check",
+    "printer.toml": "the printer's limits, to be copied and set for `check --printer`",
+    "unit.toml": "parameters of the unit",
+    "part.stl": "the part as it was checked",
+    "check.json": "every finding with its places, and every build direction",
+    "summary.json": "key figures",
+    "log.ndjson": "what was said while it ran",
+}
+COLORS = {"error": (0.75, 0.05, 0.10), "warning": (0.95, 0.55, 0.0)}
+GREY = (0.66, 0.70, 0.76)
+MOST_ROWS = 12
+
+
+def publish(
+    job: Job, vertices: Vertices, triangles: Triangles, found: PrintCheck, folder: Path, progress: Progress
+) -> None:
+    """Write places.png and report.html."""
+    with progress.stage("report", expected_s=8.0):
+        picture = places_picture(vertices, triangles, found, job.direction)
+        write_bytes(folder / "places.png", picture.png)
+        write_text(folder / "report.html", report(job, found, picture))
+
+
+def report(job: Job, found: PrintCheck, picture: Picture) -> str:
+    """The whole report as HTML text."""
+    files = {name: text for name, text in FILES.items() if name != "unit.toml" or job.unit is not None}
+    sections = [
+        ("findings", "What was checked", _findings(found)),
+        ("orientation", "Which way up", _orientation(found.builds)),
+        ("limits", "The printer's limits", _limits(job)),
+        ("files", "Files of this check", facts_table("file", "what it holds", files)),
+        ("versions", "Versions", facts_table("program", "version", package_versions())),
+    ]
+    assumed = sum(f.assumed for f in found.findings if f.limit is not None)
+    notes = [f"{assumed} of these limits are assumed: nobody has published them for this resin. Set yours."]
+    lead = f'<div class="lead"><div>{_answer(job, found)}</div>{picture_figure(picture)}</div>'
+    return page(f"Print check: {job.name}", job.printer.title, note(notes if assumed else []), lead, sections)
+
+
+def _answer(job: Job, found: PrintCheck) -> str:
+    faults = [f for f in found.findings if f.severity == "error"]
+    warned = [f for f in found.findings if f.severity == "warning"]
+    words = {
+        "error": f"<strong>Do not print it</strong>: {_joined(faults)}.",
+        "warning": f"<strong>It can be printed</strong>, once this is seen to: {_joined(warned)}.",
+        "pass": "<strong>It can be printed</strong>: every check passed.",
+    }[found.worst]
+    figures = found.figures
+    facts = [("size", " x ".join(f"{figures[f'{a}_mm']:.4g}" for a in "xyz") + " mm")]
+    facts.append(("resin in the part", f"{figures['volume_ml']:.3g} ml"))
+    if "mass_g" in figures:
+        facts.append(("mass", f"{figures['mass_g']:.3g} g"))
+    if "chamber_ml" in figures:
+        facts.append(("resin to drain from chambers", f"{figures['chamber_ml']:.3g} ml"))
+    if "trapped_ml" in figures:
+        facts.append(("resin trapped for good", f"{figures['trapped_ml']:.3f} ml"))
+    up = direction_name(job.direction)
+    return (
+        f'<p class="answer">{words}</p><p>Built along {escape(up)}, away from the platform, and held off it '
+        f"by supports. Balls mark the places: red must be mended, orange needs a decision.</p>{cards(facts)}"
+    )
+
+
+def _joined(findings: Sequence[Finding]) -> str:
+    return escape("; ".join(f"{f.check}, {f.what}" for f in findings))
+
+
+def _findings(found: PrintCheck) -> str:
+    words = {"error": "FAILED", "warning": "warning", "pass": "passed", "info": "note"}
+    order = ("error", "warning", "info", "pass")
+    head = [("check", ""), ("outcome", ""), ("found", "text"), ("limit", "n"), ("where, mm", "line")]
+    rows = []
+    for f in sorted(found.findings, key=lambda f: order.index(f.severity)):
+        limit = "" if f.limit is None else f"{f.limit:g} {f.unit}".strip() + (" *" if f.assumed else "")
+        remedy = f". {f.remedy[:1].upper()}{f.remedy[1:]}." if f.remedy else ""
+        rows.append(([f.check, words[f.severity], f.what + remedy, limit, _where(f)], False))
+    return table("* assumed, see the printer's limits", head, rows) + _places(found)
+
+
+def _where(f: Finding) -> str:
+    if not len(f.places):
+        return ""
+    first = ", ".join(f"{x:.2f}" for x in f.places[0])
+    return f"({first})" + (f" + {f.count - 1}" if f.count > 1 else "")
+
+
+def _places(found: PrintCheck) -> str:
+    """Every place of every fault, in rows."""
+    rows = []
+    for f in found.findings:
+        if f.is_fault and len(f.places) > 1:
+            text = "; ".join(f"({x:.1f}, {y:.1f}, {z:.1f})" for x, y, z in f.places[:MOST_ROWS])
+            rows.append(([f.check, text + (" ..." if f.count > MOST_ROWS else "")], False))
+    return table("Places in mm, the worst first", [("check", ""), ("places", "text")], rows) if rows else ""
+
+
+def _orientation(builds: Sequence[Build]) -> str:
+    if not builds:
+        return ""
+    head = [
+        ("build direction", ""),
+        ("cup ml", "n"),
+        ("in chambers mm²", "n"),
+        ("islands", "n"),
+        ("to support mm²", "n"),
+        ("height mm", "n"),
+        ("unbeaten", ""),
+    ]
+    rows = []
+    for k, b in enumerate([*builds[:MOST_ROWS], *(b for b in builds[MOST_ROWS:] if b.best_among)]):
+        name = direction_name(b.direction) + ("" if b.fits else " (does not fit)")
+        cells = [
+            f"{b.cup_ml:.2g}",
+            f"{b.inner_mm2:.0f}",
+            b.islands,
+            f"{b.support_mm2:.0f}",
+            f"{b.height_mm:.0f}",
+        ]
+        rows.append(([name, *cells, "yes" if b.best_among else ""], k == 0))
+    words = (
+        f"{len(builds)} directions, pointing away from the platform: the sides, edges and corners of a cube, "
+        "and eight that lean 20 degrees from the best of these. They are ordered by what matters most: it "
+        "fits, seals off no cup of half a millilitre, has the least flat surface in chambers, where no "
+        "support can be taken out; then the fewest islands, the least surface to support, the least height. "
+        "Where a direction is unbeaten, none is as good in all of these and better in one."
+    )
+    svg = trade_off(builds)
+    alt = "Surface to support against the largest cup, a point a build direction"
+    caption = "Few supports or no cup: each point is a build direction, orange the one to choose."
+    return f"<p>{escape(words)}</p>" + figure(svg, caption, alt, "chart") + table("", head, rows)
+
+
+def _limits(job: Job) -> str:
+    head = [("limit", "text"), ("value", "n"), ("", ""), ("source", "text")]
+    rows = [
+        ([MEANING[name], f"{limit.value:g}", "assumed" if limit.assumed else "", limit.source], False)
+        for name, limit in job.printer.limits.items()
+    ]
+    return table("mm, degrees, ml and g/ml", head, rows)
+
+
+def direction_name(direction: Sequence[float]) -> str:
+    """A direction in words: +z, +x−y, or `20° from +z toward −x`."""
+    way = np.asarray(direction, float) / np.linalg.norm(direction)
+    every = directions()
+    k = int((every @ way).argmax())
+    if every[k] @ way > np.cos(np.radians(1.0)):
+        return _signs(every[k])
+    axis = every[int((every[:6] @ way).argmax())]
+    aside = way - (way @ axis) * axis
+    toward = every[int((every @ aside).argmax())]
+    return f"{np.degrees(np.arccos(way @ axis)):.0f}° from {_signs(axis)} toward {_signs(toward)}"
+
+
+def _signs(way: Floats) -> str:
+    return "".join(
+        f"{'+' if s > 0 else '−'}{a}" for a, s in zip("xyz", way.tolist(), strict=True) if abs(s) > 1e-9
+    )
+
+
+def trade_off(builds: Sequence[Build]) -> str:
+    """Surface to support against the largest cup, as SVG text."""
+    with plots.canvas(plots.WIDTH, 3.0) as (chart, svg):
+        axes = chart.add_axes((0.15, 0.16, 0.81, 0.78))
+        x = np.array([b.support_mm2 for b in builds]) / 100.0
+        y = np.array([b.cup_ml for b in builds])
+        unbeaten = np.array([b.best_among for b in builds])
+        axes.plot(x[~unbeaten], y[~unbeaten], "o", color=plots.QUIET, markersize=4, alpha=0.7)
+        axes.plot(x[unbeaten], y[unbeaten], "o", color=plots.BY_LENGTH[0], markersize=6)
+        axes.plot(x[:1], y[:1], "o", color=plots.CHOSEN, markersize=9)
+        axes.annotate(
+            direction_name(builds[0].direction),
+            (x[0], y[0]),
+            (9, 7),
+            textcoords="offset points",
+            fontsize=8,
+            color=plots.CHOSEN,
+        )
+        axes.set(xlabel="flat surface to support [cm²]", ylabel="largest cup [ml]")
+        axes.set_xlim(0.0, 1.08 * float(x.max(initial=1.0)))
+        axes.set_ylim(-0.04 * max(float(y.max()), 0.1), 1.08 * max(float(y.max()), 0.1))
+    return svg()
+
+
+def places_picture(
+    vertices: Vertices, triangles: Triangles, found: PrintCheck, up: Sequence[float], width: int = 760
+) -> Picture:
+    """The part, seen through, with a ball at each place of each fault, and an arrow along the build."""
+    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    parts = [Part(vertices, triangles, GREY, opacity=0.15)]
+    count = 0
+    for f in found.findings:
+        if f.is_fault:
+            count += len(f.places)
+            parts += [Part(*ball(place, 0.016 * size), COLORS[f.severity], whole=True) for place in f.places]
+    way = np.asarray(up, float) / np.linalg.norm(up)
+    foot = vertices.mean(axis=0) + np.array([0.0, -0.75 * np.ptp(vertices[:, 1]), 0.0])
+    arrow = np.stack([foot - 0.1 * size * way, foot + 0.1 * size * way])
+    parts.append(Part(*tube(arrow, 0.005 * size), plots_ink(), whole=True))
+    parts.append(Part(*_cone(arrow[1], way, 0.015 * size, 0.05 * size), plots_ink(), whole=True))
+    towards, aspect = (1.0, -0.45, 0.3), 0.85
+    camera = fit(parts, towards, aspect=aspect)
+    image = render(parts, camera, width, round(width / aspect), background=(1.0, 1.0, 1.0), layers=4)
+    caption = (
+        f"{numbered(count, 'place', 'places')}; the arrow is the build direction, away from the platform."
+    )
+    return Picture(png(image), caption, "The part seen through, with balls at the places of faults")
+
+
+def plots_ink() -> tuple[float, float, float]:
+    """The ink of charts as a colour of a picture."""
+    ink = plots.INK
+    return tuple(int(ink[k : k + 2], 16) / 255.0 for k in (1, 3, 5))  # type: ignore[return-value]
+
+
+def _cone(base: Any, way: Any, radius: float, height: float, sides: int = 24) -> tuple[Any, Any]:
+    from ...design.printing.voxels import frame_along
+
+    x, y, z = frame_along(way)
+    angle = 2.0 * np.pi * np.arange(sides) / sides
+    rim = base + radius * (np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y)
+    points = np.concatenate([rim, [base, base + height * z]])
+    i = np.arange(sides)
+    j = (i + 1) % sides
+    sides_ = np.stack([i, j, np.full(sides, sides + 1)], 1)
+    bottom = np.stack([j, i, np.full(sides, sides)], 1)
+    return points, np.concatenate([sides_, bottom])

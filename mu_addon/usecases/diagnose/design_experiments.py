@@ -1,0 +1,235 @@
+"""Before any measurement: which effects a set of experiments would show, and from which size on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...design.parameters import Unit
+from ...errors import InputError
+from ...evidence.fit import Fitter
+from ...evidence.noise import Source
+from ...evidence.record import KNOWN, Record, record
+from ...evidence.sensitivity import Sensitivity, sensitivities, similarity
+from ...evidence.simulator import Composite
+from ...files import write_csv, write_text
+from ...measured import Experiment, read_folder
+from ...report.html import facts_table, note, page, table
+from ...run.context import Ending
+from ...run.folder import begin
+from ...run.progress import Progress
+from ..simulate_and_place.report_data import package_versions
+from .run import UNIT, bare, folder_inputs, listed, simulators_of, spoken, unit_behind
+
+Array = np.ndarray[Any, Any]
+
+HEADER = "# The inputs of this design of experiments; its protocols are named by the SHA-256 of their files."
+RESULTS = ("limits.csv", "report.html")
+# Standard deviation of a reading, by quantity: an ordinary camera, gauge, load cell and voltmeter.
+NOISE = {
+    "angle": 0.3,
+    "marker": 0.1,
+    "stress": 0.1,
+    "pressure": 0.1,
+    "tip_deflection": 0.1,
+    "voltage": 0.002,
+}
+# Half of the variance wanders, as slowly as a tenth of the longest record.
+SLOW = 0.1
+# Effects that look as much alike as this cannot be told apart.
+ALIKE = 0.95
+
+
+@attrs.frozen(eq=False)
+class Plan:
+    """What experiments would show: every effect, those that are visible first; alike: pairs, their cosine."""
+
+    experiments: tuple[Experiment, ...]
+    seen: tuple[Sensitivity, ...]
+    alike: tuple[tuple[str, str, float], ...]
+    noise: Mapping[str, float]
+
+
+def noise_of(words: Sequence[str]) -> dict[str, float]:
+    """Noise by quantity, from words like "angle=0.5", the rest as in `NOISE`. Raises InputError."""
+    found = dict(NOISE)
+    for word in words:
+        name, _, text = word.partition("=")
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if name not in NOISE or not (math.isfinite(value) and value > 0):
+            raise InputError(
+                f"{word!r} is no noise", "--noise", f"write QUANTITY=VALUE, of {', '.join(NOISE)}"
+            )
+        found[name] = value
+    return found
+
+
+def design_experiments(
+    folder: Path,
+    out: Path,
+    unit: Unit | None = None,
+    noise: Mapping[str, float] = NOISE,
+    *,
+    progress: Progress,
+    ending: Ending,
+) -> Plan:
+    """What the experiments of a folder would show, made with instruments of this noise; results in `out`.
+
+    The folder is laid out as for `diagnose`; what would be measured may hold any numbers. Writes limits.csv
+    and report.html. Raises InputError, OutputError.
+    """
+    measured = read_folder(Path(folder))
+    unit = unit_behind(measured.experiments, unit)
+    inputs = folder_inputs(
+        "protocols.toml", HEADER, measured, unit, [f"{k} = {v!r}" for k, v in noise.items()]
+    )
+    begin(ending, out, HEADER, inputs, RESULTS, optional=(UNIT,))
+    simulators, told = simulators_of(measured.experiments, unit, out / "cache", progress)
+    simulator = Composite(simulators)
+    with progress.stage("sensitivities", expected_s=5.0):
+        found = plan(measured.experiments, simulator, noise)
+    _write(found, out / "limits.csv")
+    ending.summary |= summary(found)
+    versions = package_versions()
+    write_text(out / "report.html", _report(found, measured.folder.resolve().name, told, versions))
+    return found
+
+
+def plan(experiments: Sequence[Experiment], simulator: Composite, noise: Mapping[str, float] = NOISE) -> Plan:
+    """What experiments would show, whatever they measured so far."""
+    expected = tuple(_expected(e, simulator) for e in experiments if simulator.knows(e))
+    planned = record(expected, simulator)
+    fitter = Fitter(planned, simulator, _sources(planned, noise))
+    values = {p.name: p.null for p in fitter.curved}
+    # Of each effect the shape that is seen soonest.
+    least: dict[str, Sensitivity] = {}
+    for s in sensitivities(fitter, values):
+        if s.effect.name not in least or s.limit < least[s.effect.name].limit:
+            least[s.effect.name] = s
+    seen = sorted(least.values(), key=lambda s: (not s.identifiable, s.limit))
+    shown = [s for s in seen if s.identifiable]
+    alike = []
+    if len(shown) > 1:
+        cosines = similarity(shown)
+        for i, a in enumerate(shown):
+            for j in range(i + 1, len(shown)):
+                if abs(cosines[i, j]) > ALIKE:
+                    alike.append((a.effect.name, shown[j].effect.name, float(cosines[i, j])))
+    return Plan(expected, tuple(seen), tuple(sorted(alike, key=lambda p: -abs(p[2]))), noise)
+
+
+def _expected(e: Experiment, simulator: Composite) -> Experiment:
+    """The experiment as the base model predicts it."""
+    columns = dict(zip(simulator.channels(e), simulator.predict(e, {}), strict=True))
+    # Channels that are alike to the last digit would be taken for one.
+    columns = {c: y + 1e-9 * k for k, (c, y) in enumerate(columns.items())}
+    return attrs.evolve(e, columns={**e.columns, **columns})
+
+
+def _sources(planned: Record, noise: Mapping[str, float]) -> dict[str, Source]:
+    found = {}
+    for group in planned.groups:
+        if group == KNOWN:
+            continue
+        members = [s for s in planned.series if s.group == group]
+        head = members[0].channel.rpartition("_")[0]
+        quantity = "marker" if head.startswith("marker") else head
+        if quantity not in noise:
+            raise InputError(f"no noise of {quantity} is given", "--noise", f"known: {', '.join(noise)}")
+        size = noise[quantity] * math.sqrt(0.5)
+        times = [s.time_s for s in members if not math.isnan(s.sample_s)]
+        longest = max((float(t[-1] - t[0]) for t in times), default=1.0)
+        found[group] = Source(size if times else noise[quantity], size if times else 0.0, SLOW * longest)
+    return found
+
+
+def _limit(s: Sensitivity) -> str:
+    p = s.effect.parameters[0]
+    return f"{bare(p)} {s.limit:.3g} {p.unit}".strip() if s.identifiable else "not at all"
+
+
+def _write(found: Plan, path: Path) -> None:
+    rows = []
+    for s in found.seen:
+        p = s.effect.parameters[0]
+        alike = [b if a == s.effect.name else a for a, b, _ in found.alike if s.effect.name in (a, b)]
+        rows.append(
+            (s.effect.name, p.name, p.unit, s.limit, s.unabsorbed, int(s.identifiable), " ".join(alike))
+        )
+    head = ["effect", "parameter", "unit", "visible_from", "not_absorbed", "visible", "looks_like"]
+    write_csv(path, head, rows)
+
+
+def _report(found: Plan, name: str, told: Sequence[str], versions: Mapping[str, str]) -> str:
+    rows = []
+    for s in found.seen:
+        alike = [b if a == s.effect.name else a for a, b, _ in found.alike if s.effect.name in (a, b)]
+        by = listed([spoken(n) for n in s.absorbed_by]) if s.absorbed_by else ""
+        cells = [
+            spoken(s.effect.name),
+            _limit(s),
+            f"{s.unabsorbed:.1%}" if s.unabsorbed else "–",
+            ""
+            if s.identifiable
+            else (f"absorbed by {by}" if by and s.unabsorbed else "nothing depends on it"),
+            listed([spoken(a) for a in alike]) if alike else "",
+            s.effect.reveals,
+        ]
+        rows.append((cells, s.identifiable))
+    head = [
+        ("effect", ""),
+        ("visible from", "line"),
+        ("not absorbed", "n"),
+        ("why not", "text"),
+        ("looks like", "text"),
+        ("what shows it best", "text"),
+    ]
+    html = (
+        "<p>An effect of the size given is seen in nearly every set of such data (χ² of 16). What is not "
+        "absorbed is the share of its signature that fitted moduli and zeros cannot imitate. "
+        f"Effects that look alike by more than {ALIKE:g} (cosine) are told from each other only by another "
+        "experiment.</p>" + table("", head, rows)
+    )
+    noise = {spoken(k): v for k, v in found.noise.items()}
+    sections = [
+        ("limits", "What these experiments would show", html),
+        (
+            "noise",
+            "Noise of a reading",
+            facts_table("quantity", "in the unit of its column", noise),
+        ),
+        ("versions", "Versions", facts_table("program", "version", versions)),
+    ]
+    count = len(found.experiments)
+    subtitle = f"{count} experiment{'s' if count != 1 else ''}, not yet made"
+    shown = sum(s.identifiable for s in found.seen)
+    share = f"<strong>{shown} of {len(found.seen)}</strong>"
+    lead = f'<p class="answer">These experiments would show {share} effects.</p>'
+    return page(f"What {name} would show", subtitle, note(told), lead, sections)
+
+
+def summary(found: Plan) -> dict[str, Any]:
+    """Every figure of a plan in plain data."""
+    return {
+        "visible": {s.effect.name: [_limit(s), s.limit] for s in found.seen if s.identifiable},
+        "hidden": {s.effect.name: s.effect.reveals for s in found.seen if not s.identifiable},
+        "alike": [list(pair) for pair in found.alike],
+        "noise": dict(found.noise),
+    }
+
+
+def answer(summary: Mapping[str, Any]) -> list[str]:
+    """What a plan would show, in a few lines of text, of its `summary`."""
+    lines = [f"{spoken(name)}: visible from {limit}" for name, (limit, _) in summary["visible"].items()]
+    if summary["hidden"]:
+        lines.append(f"not visible: {listed([spoken(n) for n in summary['hidden']])}")
+    lines += [f"look alike: {spoken(a)} and {spoken(b)} ({c:.3f})" for a, b, c in summary["alike"][:5]]
+    return lines

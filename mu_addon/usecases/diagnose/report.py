@@ -1,0 +1,545 @@
+"""The report of a diagnosis: the verdict in a sentence, and all that it rests on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...evidence.effect import Parameter
+from ...evidence.fit import Fit
+from ...evidence.record import KNOWN
+from ...evidence.residuals import CONDITIONS, COVARIATES, FALSE_ALARM, same_protocol
+from ...evidence.selection import TOLD_APART
+from ...evidence.sensitivity import best_seen
+from ...files import write_text
+from ...report.charts import CHOSEN, INK, signed
+from ...report.html import cards, facts_table, figure, note, page, table
+from ...run.context import Ending
+from ..simulate_and_place.report_data import package_versions
+from . import charts as pictures
+from .run import Curve, Diagnosis, advice, bare, between, curves, listed, sentence, spoken
+
+FILES = {
+    "diagnose.toml": "inputs of this run",
+    "unit.toml": "parameters of the unit",
+    "verdict.json": "the verdict and its figures",
+    "model.toml": "the extended model: `simulate`, `place` and `homogenize` take it with --model",
+    "residuals.csv": "every measured value beside both models",
+    "summary.json": "every figure of this run",
+    "log.ndjson": "what was said while it ran",
+}
+# Panels of measured beside predicted; the rest is in residuals.csv.
+MOST_PANELS = 30
+# Remarks on the data that stand at the top; more would hide the verdict.
+MOST_NOTES = 3
+
+
+def publish(found: Diagnosis, out: Path, ending: Ending) -> None:
+    """Write report.html; raises OutputError."""
+    versions = package_versions()
+    ending.summary["versions"] = versions
+    write_text(out / "report.html", report(found, out, versions))
+
+
+def report(found: Diagnosis, out: Path, versions: dict[str, str]) -> str:
+    """The whole report as HTML text."""
+    sections = [
+        ("measured", "Measured and predicted", _measured(found)),
+        ("causes", "The cause", _causes(found)),
+        ("rivals", "Other explanations", _rivals(found)),
+        ("gain", "What mending it gains", _gain(found)),
+        ("left", "What the residual depends on", _dependence(found)),
+        ("seen", "What these data could show", _identifiability(found)),
+        ("noise", "Noise", _noise(found)),
+        ("data", "The data", _data(found)),
+        ("files", "Files of this run", facts_table("file", "what it holds", _files(out))),
+        ("versions", "Versions", facts_table("program", "version", versions)),
+    ]
+    experiments = found.measured.experiments
+    held = sum(e.role == "held_out" for e in experiments)
+    kinds = listed([spoken(k) for k in dict.fromkeys(e.kind for e in experiments)])
+    count = len(experiments)
+    subtitle = f"{count} experiment{'s' if count > 1 else ''} ({kinds}), {held or 'none'} of them held out"
+    name = found.measured.folder.resolve().name
+    return page(
+        f"What {name} says of the model",
+        subtitle,
+        _notes(found),
+        _answer(found),
+        sections,
+    )
+
+
+def _notes(found: Diagnosis) -> str:
+    told = [f"{r[:1].upper()}{r[1:]}." for r in found.remarks]
+    if len(told) > MOST_NOTES:
+        told = [f"There are {len(told)} remarks on the data, listed with them below."]
+    return note(told)
+
+
+def _answer(found: Diagnosis) -> str:
+    verdict = found.verdict
+    headline, words = sentence(verdict)
+    html = (
+        f'<p class="answer">Verdict: <strong>{escape(headline)}</strong>.</p><p>{escape(signed(words))}</p>'
+    )
+    if next_ := advice(verdict):
+        html += f"<p><strong>What to measure next.</strong> {escape(next_)}</p>"
+    judged = verdict.gain.held_out or verdict.gain.fit
+    facts = [("verdict", verdict.kind)]
+    if found.extends:
+        which = "held out" if verdict.gain.held_out else "fitted"
+        facts += [
+            (f"error as it was, {which}", f"{judged.before:.3g} {judged.unit}"),
+            (
+                "with the effect" + ("" if verdict.names else ", not named"),
+                f"{judged.after:.3g} {judged.unit}",
+            ),
+        ]
+    else:
+        facts.append(("error of the model", f"{judged.before:.3g} {judged.unit}"))
+    if verdict.names:
+        facts.append(("chance of a false name", _chance(max(c.p_value for c in verdict.selection.causes))))
+    facts.append(("effects tried", str(len(verdict.selection.singles))))
+    return html + cards(facts)
+
+
+def _extended_words(found: Diagnosis) -> str:
+    names = listed([spoken(n) for n in found.verdict.selection.chosen.names]) if found.extends else ""
+    return f"with {names}" + ("" if found.verdict.names else " (not named)")
+
+
+def _measured(found: Diagnosis) -> str:
+    drawn, more = _chosen(curves(found))
+    # A row an experiment, where each has as many panels.
+    wide = ' style="max-width:52rem"' if len(drawn) > len({c.experiment.name for c in drawn}) else ""
+    html = f'{_key(found)}<div class="triple"{wide}>'
+    for curve in drawn:
+        alt = f"{curve.experiment.name}: {pictures.titled(curve.channel)}, measured, predicted, left over."
+        html += figure(pictures.panel(curve, found.extends), "", alt)
+    html += "</div>"
+    if more:
+        html += f"<p>{more} more channels are in residuals.csv.</p>"
+    if any(c.spread is not None for c in drawn):
+        html += "<p>Grey: the spread given with the data; a whole record may lie so much higher or lower.</p>"
+    return html
+
+
+def _key(found: Diagnosis) -> str:
+    marks = [(INK, "●", "measured"), (pictures.BASE, "╌╌", "model as it was")]
+    if found.extends:
+        marks.append((CHOSEN, "━━", _extended_words(found)))
+    said = [f'<span style="color:{color}">{mark}</span> {escape(what)}' for color, mark, what in marks]
+    return f"<p>{' &emsp; '.join(said)}</p>"
+
+
+def _chosen(every: Sequence[Curve]) -> tuple[list[Curve], int]:
+    """Channels worth a panel: of each experiment the first, and the two markers that move most."""
+    drawn: list[Curve] = []
+    for name in dict.fromkeys(c.experiment.name for c in every):
+        mine = [c for c in every if c.experiment.name == name]
+        moving = sorted(mine[1:], key=lambda c: -float(np.ptp(c.before)))
+        drawn += [mine[0], *moving[:2]]
+    if len(drawn) > MOST_PANELS:
+        first = {id(c) for c in drawn if c.channel == drawn[0].channel}
+        drawn.sort(key=lambda c: id(c) not in first)
+    drawn = drawn[:MOST_PANELS]
+    return drawn, len(every) - len(drawn)
+
+
+def _causes(found: Diagnosis) -> str:
+    verdict = found.verdict
+    if not verdict.selection.causes:
+        return ""
+    rows = []
+    for cause in verdict.selection.causes:
+        for i, (key, p) in enumerate(zip(cause.effect.keys, cause.effect.parameters, strict=True)):
+            low, high = verdict.intervals.get(key, (math.nan, math.nan))
+            first = [spoken(cause.effect.name), cause.effect.mechanism] if i == 0 else ["", ""]
+            last = [
+                _chance(cause.p_value),
+                listed([spoken(r) for r in cause.rivals], "or") if cause.rivals else "none",
+            ]
+            value = verdict.selection.chosen.values[key]
+            rows.append(
+                (
+                    [
+                        *first,
+                        bare(p),
+                        _figures(value),
+                        signed(between(low, high)),
+                        p.unit,
+                        _at_bound(p, low, high),
+                        *(last if i == 0 else ["", ""]),
+                    ],
+                    i == 0 and bool(verdict.names),
+                )
+            )
+    head = [
+        ("effect", ""),
+        ("what it is", "text"),
+        ("parameter", ""),
+        ("value", "n"),
+        ("95 %", "n"),
+        ("unit", ""),
+        ("note", "line"),
+        ("by chance", "n"),
+        ("rivals", "text"),
+    ]
+    words = (
+        ""
+        if verdict.names
+        else "<p>These are the best attempt, and no verdict: what they leave still depends on something, so "
+        "their parameters may stand for something else.</p>"
+    )
+    rest = []
+    for p in found.simulator.nuisances:
+        if p.name in found.model.nuisances:
+            value, (low, high) = verdict.selection.chosen.values[p.name], verdict.intervals[p.name]
+            rest.append(([bare(p), _figures(value), signed(between(low, high)), p.unit], False))
+    fitted = [("quantity", ""), ("value", "n"), ("95 %", "n"), ("unit", "")]
+    return words + table("", head, rows) + (table("Fitted whatever the cause.", fitted, rest) if rest else "")
+
+
+def _at_bound(p: Parameter, low: float, high: float) -> str:
+    near = 1e-3 * (p.high - p.low)
+    sides = [
+        side
+        for side, value, bound in (("lower", low, p.low), ("upper", high, p.high))
+        if abs(value - bound) < near and bound != p.null
+    ]
+    return f"up to its {' and '.join(sides)} bound" if sides else ""
+
+
+def _rivals(found: Diagnosis) -> str:
+    selection = found.verdict.selection
+    if not selection.singles:
+        return ""
+    rivals = {r for c in selection.causes for r in c.rivals}
+    base = max(selection.base.chi2, 1e-12)
+    names = [f.names[0] for f in selection.singles]
+    left = [f.chi2 / base for f in selection.singles]
+    chart = pictures.rivals_chart(
+        names, left, selection.chosen.chi2 / base, [*selection.chosen.names, *sorted(rivals)]
+    )
+    rows = []
+    for f in selection.singles:
+        name = f.names[0]
+        e = f.effects[0]
+        size = ", ".join(
+            f"{bare(p)} {_figures(f.values[k])}{' ' + p.unit if p.unit else ''}"
+            for k, p in zip(e.keys, e.parameters, strict=True)
+        )
+        rows.append(
+            (
+                [spoken(name), size, f"{f.chi2:.4g}", _against(found, f, rivals)],
+                name in selection.chosen.names or name in rivals,
+            )
+        )
+    picture = figure(
+        chart,
+        "Each effect alone, refitted, nuisances with it. Orange: chosen, or as good. "
+        "Dashed: the model chosen.",
+        "Share of the misfit that each effect leaves.",
+    )
+    count = len(found.verdict.record)
+    return (
+        f"<p>The model as it was leaves χ² = {base:.4g} of {count} values; {len(names)} effects that these "
+        f"data could show were tried. Two that differ by less than {TOLD_APART:g} cannot be told apart.</p>"
+        + f'<div class="chart">{picture}</div>'
+        + table(
+            "",
+            [("effect alone", ""), ("best fit", "text"), ("χ² left", "n"), ("held against it", "text")],
+            rows,
+        )
+    )
+
+
+def _against(found: Diagnosis, f: Fit, rivals: set[str]) -> str:
+    selection = found.verdict.selection
+    name, gained = f.names[0], selection.base.chi2 - f.chi2
+    e = f.effects[0]
+    at = [bare(p) for k, p in zip(e.keys, e.parameters, strict=True) if _ended(p, f.values[k])]
+    bound = f"; {' and '.join(at)} at its bound" if at else ""
+    if name in selection.chosen.names and found.verdict.names:
+        return "nothing: named" if found.verdict.kind == "named" else "nothing: it fits best"
+    if name in selection.chosen.names:
+        return "part of the best attempt"
+    if name in rivals:
+        return f"nothing these data could tell: a rival{bound}"
+    if gained < TOLD_APART:
+        return f"gains no more than noise would ({_figures(max(gained, 0.0))}){bound}"
+    if not selection.chosen.effects:
+        return f"gains {gained:.3g}, too little for one of so many tried{bound}"
+    more = f.chi2 - selection.chosen.chi2
+    return f"leaves {more:.3g} more than the model chosen{bound}"
+
+
+def _ended(p: Parameter, value: float) -> bool:
+    """Whether a fit stopped at a bound that is not the null, where an effect is just absent."""
+    near = 1e-3 * (p.high - p.low)
+    return any(abs(value - bound) < near and bound != p.null for bound in (p.low, p.high))
+
+
+def _gain(found: Diagnosis) -> str:
+    gain = found.verdict.gain
+    if not found.extends:
+        return ""
+    html = '<div class="pair">'
+    for title, errors in (("Held out", gain.held_out), ("Fitted", gain.fit)):
+        if errors is None:
+            continue
+        low, high = errors.low95, errors.high95
+        drop = ""
+        if math.isfinite(low):
+            sure = "" if low > 0 else " It is not sure that it gains at all."
+            drop = (
+                f"The error drops by {_figures(errors.before - errors.after)} {errors.unit} "
+                f"(95 %: {_figures(low)} to {_figures(high)}).{sure}"
+            )
+        html += (
+            f"<div><h3>{title} experiments</h3>"
+            + figure(pictures.gain_chart(errors), escape(drop), f"Errors on experiments: {title.lower()}.")
+            + "</div>"
+        )
+    html += "</div>"
+    if gain.held_out is None:
+        html += '<p>None was held out: give one role = "held_out", and its gain is that on unseen data.</p>'
+    told = [name for name, (fit, _) in gain.by_quantity.items() if fit is gain.fit and name != KNOWN]
+    which = f" of {spoken(told[0])}" if told and len(gain.by_quantity) > 1 else ""
+    return (
+        html
+        + _by_quantity(found)
+        + f"<p>Root mean square errors{which}. An honest cause beats the same effect put on the wrong "
+        "experiments, and a black box with as many parameters; the interval is from blocks drawn anew, so "
+        "that correlated values do not count as many.</p>"
+    )
+
+
+def _by_quantity(found: Diagnosis) -> str:
+    """Errors of every quantity that was measured, where there are several."""
+    every = found.verdict.gain.by_quantity
+    if len(every) < 2:
+        return ""
+    rows: list[tuple[list[Any], bool]] = []
+    for name, (fit, held) in every.items():
+        cells = [f"{_figures(e.before)} → {_figures(e.after)}" if e else "" for e in (fit, held)]
+        rows.append(([spoken(name), fit.unit, *cells], fit is found.verdict.gain.fit))
+    head = [("quantity", ""), ("unit", "text"), ("fitted experiments", "n"), ("held out", "n")]
+    return table("", head, rows)
+
+
+def _dependence(found: Diagnosis) -> str:
+    selection = found.verdict.selection
+    before, after = selection.table_base, selection.table
+    if not before:
+        return ""
+    level = FALSE_ALARM / max(len(before), 1)
+    later = {d.against: d for d in after}
+    rows, structured = [], {}
+    for d in before:
+        now = later.get(d.against)
+        cells: list[Any] = [spoken(d.against), _chance(d.p_value), "yes" if d.p_value < level else "no"]
+        if found.extends:
+            cells += [_chance(now.p_value), "yes" if now.p_value < level else "no"] if now else ["–", "–"]
+        where = now if now is not None and now.p_value < level else d
+        cells.append(where.where if where.p_value < level else "")
+        rows.append((cells, where.p_value < level))
+        structured[d.against] = where.p_value < level
+    head = [("what is left, against", ""), ("by chance", "n"), ("structure", "")]
+    if found.extends:
+        head += [("after, by chance", "n"), ("structure", "")]
+    head.append(("strongest", "text"))
+    chart = figure(
+        pictures.dependence_chart(before, after, level, found.extends),
+        "Open: the model as it was"
+        + (f". Filled: {escape(_extended_words(found))}" if found.extends else "")
+        + ".",
+        "Probability by chance of each dependence of the residual.",
+    )
+    shown = "".join(
+        figure(pictures.residual_panel(d, found.extends), "", f"What is left against {spoken(d.name)}.")
+        for d in _dependents(found, structured)
+    )
+    panels = (
+        "<p>Means of what is left, over stretches of equally many values, with the middle half of them.</p>"
+        f'<div class="triple">{shown}</div>'
+        if shown
+        else ""
+    )
+    return (
+        "<p>A right model leaves noise, which depends on nothing. The probability is that of noise as "
+        "correlated as these instruments' alone showing as much.</p>"
+        f'<div class="chart">{chart}</div>{table("", head, rows)}{panels}'
+    )
+
+
+def _dependents(found: Diagnosis, tested: Mapping[str, bool]) -> list[pictures.Dependent]:
+    """What the first quantity leaves against what was tested: its name, and whether there is structure."""
+    record, simulator = found.verdict.record, found.simulator
+    group = record.groups[0]
+    members = [s for s in record.series if s.group == group]
+    before = record.values - record.predict(simulator, found.before)
+    after = record.values - record.predict(simulator, found.after)
+    unit = "spreads" if group == KNOWN else members[0].channel.rpartition("_")[2]
+    quantities: list[tuple[str, tuple[str, ...], Any]] = list(COVARIATES)
+    for name, condition in CONDITIONS:
+        places = {id(e): condition(e, i) for i, e in enumerate(record.experiments)}
+        quantities.append((name, (), lambda e, places=places: places[id(e)]))
+    drawn = []
+    for name, needs, of in quantities:
+        held = [s for s in members if all(c in record.experiments[s.experiment].columns for c in needs)]
+        if not held or (needs if group == KNOWN else name not in tested):
+            continue
+        x = []
+        for s in held:
+            e = record.experiments[s.experiment]
+            quantity = np.asarray(of(e), float) * np.ones(len(e))
+            x.append(s.mean(quantity) if group != KNOWN else quantity[:1])
+        values = np.concatenate(x)
+        if not np.ptp(values) > 0:
+            continue
+        rows = np.concatenate([np.arange(s.at.start, s.at.stop) for s in held])
+        drawn.append(
+            pictures.Dependent(name, unit, values, before[rows], after[rows], tested.get(name, False))
+        )
+    drawn.sort(key=lambda d: not d.structure)
+    return drawn[:9]
+
+
+def _identifiability(found: Diagnosis) -> str:
+    rows = []
+    verdict = found.verdict
+    for name, s in sorted(best_seen(verdict.seen).items(), key=lambda item: not item[1].identifiable):
+        p = s.effect.parameters[0]
+        # Where a linear step within bounds is too small, only a fit at the bounds showed that it could be.
+        limit = f"{bare(p)} {s.limit:.3g} {p.unit}".strip() if s.linear else "near its bound"
+        reason = verdict.identifiability.get(name, "")
+        rows.append(
+            (
+                [
+                    spoken(name),
+                    "yes" if s.identifiable else "no",
+                    limit if s.identifiable else "–",
+                    f"{s.unabsorbed:.1%}" if s.unabsorbed > 0 else "–",
+                    spoken(reason.partition(";")[0]),
+                    s.effect.reveals,
+                ],
+                False,
+            )
+        )
+    head = [
+        ("effect", ""),
+        ("could be seen", ""),
+        ("from", "n"),
+        ("not absorbed", "n"),
+        ("why not", "text"),
+        ("what shows it best", "text"),
+    ]
+    return (
+        "<p>An effect can hide behind a fitted modulus or zero. What is not absorbed is the share of its "
+        "signature that these cannot imitate; from the size given on it would have been seen.</p>"
+        + table("", head, rows)
+    )
+
+
+def _noise(found: Diagnosis) -> str:
+    record, rows = found.verdict.record, []
+    for group in record.groups:
+        members = [s for s in record.series if s.group == group]
+        values = sum(s.at.stop - s.at.start for s in members)
+        unit = members[0].channel.rpartition("_")[2]
+        if group == KNOWN:
+            rows.append(
+                (
+                    [
+                        "given with the data",
+                        "",
+                        "",
+                        "",
+                        f"{len(members)} values that stand for whole records",
+                    ],
+                    False,
+                )
+            )
+            continue
+        source = found.verdict.sources[group]
+        clocked = any(not math.isnan(s.sample_s) for s in members)
+        tested = [record.experiments[s.experiment] for s in members]
+        repeats = sum(same_protocol(a, b) for i, a in enumerate(tested) for b in tested[i + 1 :])
+        origin = f"{len(members)} series, {values} values"
+        origin += f", {repeats} pairs of repeats" if repeats else ""
+        rows.append(
+            (
+                [
+                    group.replace("_", " "),
+                    f"{_figures(source.white)} {unit}",
+                    f"{_figures(source.slow)} {unit}" if clocked and source.slow else "–",
+                    f"{_figures(source.time_s)} s" if clocked and source.slow else "–",
+                    origin + ("" if clocked else ", without a clock"),
+                ],
+                False,
+            )
+        )
+    head = [
+        ("quantity", ""),
+        ("of a value", "n"),
+        ("slow", "n"),
+        ("lasts", "n"),
+        ("estimated from", "text"),
+    ]
+    return (
+        "<p>Estimated from what is left after everything that any effect could do smoothly is set aside, so "
+        "that a cause does not pass for noise. Slow noise wanders; residuals are judged with it.</p>"
+        + table("", head, rows)
+    )
+
+
+def _data(found: Diagnosis) -> str:
+    rows = [
+        (
+            [
+                e.name,
+                spoken(e.kind),
+                e.role.replace("_", " "),
+                e.file.name,
+                f"{len(e)}",
+                f"{e.scale:g}x",
+                f"{e.orientation_deg:g}°",
+                e.specimen or "–",
+                e.sha256[:12],
+            ],
+            False,
+        )
+        for e in found.measured.experiments
+    ]
+    head = [
+        ("experiment", ""),
+        ("kind", "line"),
+        ("role", "line"),
+        ("file", "line"),
+        ("rows", "n"),
+        ("scale", "n"),
+        ("gravity", "n"),
+        ("specimen", ""),
+        ("SHA-256", ""),
+    ]
+    remarks = "".join(f"<li>{escape(r[:1].upper() + r[1:])}</li>" for r in found.remarks)
+    return table("", head, rows) + (f"<h3>Remarks</h3><ul>{remarks}</ul>" if remarks else "")
+
+
+def _files(out: Path) -> dict[str, str]:
+    return {n: what for n, what in FILES.items() if (out / n).exists() or n == "report.html"}
+
+
+def _chance(p: float) -> str:
+    return f"{p:.2g}" if p >= 1e-3 else ("below 1e-12" if p < 1e-12 else f"{p:.0e}").replace("e-0", "e-")
+
+
+def _figures(value: float) -> str:
+    return signed(f"{value:.3g}") if math.isfinite(value) else "–"

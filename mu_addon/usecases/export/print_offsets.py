@@ -1,0 +1,86 @@
+"""The printer's offsets: from a unit's own [print], or from calipers on the printed gauge."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from pathlib import Path
+
+from ...design.coupons import FEATURES, offsets
+from ...design.parameters import Unit
+from ...errors import InputError
+
+COLUMNS = ("feature", "kind", "axis", "nominal_mm", "measured_mm")
+
+
+def sheet() -> str:
+    """The gauge's sheet as CSV text, its last column to be filled in."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows([(f.name, f.kind, f.axis, f"{f.nominal_mm:g}", "") for f in FEATURES])
+    return text.getvalue()
+
+
+def read_sheet(path: Path) -> dict[str, tuple[float, float, float]]:
+    """Offset, its standard error and scale, for "xy" and "z", of a filled sheet; raises InputError."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            rows = list(csv.DictReader(stream))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read the sheet: {error}", str(path), "give the gauge's CSV file") from error
+    known = {feature.name: feature for feature in FEATURES}
+    chosen, sizes = [], []
+    for number, row in enumerate(rows, 2):
+        name, value = row.get("feature") or "", (row.get("measured_mm") or "").strip()
+        if name not in known:
+            raise InputError(
+                f"the gauge has no feature {name!r}", f"{path}, line {number}", "see `specimens`"
+            )
+        if not value:
+            continue
+        try:
+            size = float(value)
+        except ValueError:
+            size = math.nan
+        if not 0.0 < size < 3.0 * known[name].nominal_mm:
+            raise InputError(
+                f"{name} measured as {value!r}, nominal {known[name].nominal_mm:g} mm",
+                f"{path}, line {number}",
+                "give millimetres, or leave it empty",
+            )
+        chosen.append(known[name])
+        sizes.append(size)
+    found = offsets(chosen, sizes)
+    if set(found) != {"xy", "z"}:
+        raise InputError(
+            f"{len(chosen)} sizes were measured, too few in {'z' if 'xy' in found else 'the plane'}",
+            str(path),
+            "measure at least three along x and y, and three along z",
+        )
+    return found
+
+
+def taken_off(unit: Unit, source: str | None) -> tuple[tuple[float, float], str]:
+    """Offsets in mm, in the plane and along z, to take off a drawing, and where they are from.
+
+    source: None for nothing, "unit" for the unit's [print], else the gauge's filled sheet. Raises InputError.
+    """
+    if source is None:
+        return (0.0, 0.0), ""
+    if source == "unit":
+        found = unit.print.offset_xy_mm, unit.print.offset_z_mm
+        if not any(found):
+            raise InputError(
+                "the unit's [print] has no offsets to take off",
+                "--compensate",
+                "give --model of a diagnosis that found overcure, or the gauge's filled sheet",
+            )
+        return found, "the unit's [print]"
+    of = read_sheet(Path(source))
+    (xy, xy_error, _), (z, z_error, _) = of["xy"], of["z"]
+    return (
+        round(xy, 4),
+        round(z, 4),
+    ), f"{Path(source).name}: {xy:.3f} +- {xy_error:.3f} in the plane, {z:.3f} +- {z_error:.3f} along z"

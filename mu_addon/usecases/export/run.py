@@ -1,0 +1,327 @@
+"""Files of a unit for printers and CAD, each read back and compared, and a manifest of them."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from ...design.anchors import Window, window
+from ...design.beams import beam_parts
+from ...design.export import write_nodes
+from ...design.lattice import lattice_of
+from ...design.parameters import Unit, to_toml
+from ...design.solid import QUALITY, Solid, build_solid
+from ...design.surface import bad_edges, stl_bytes, stl_surface, volume
+from ...design.threemf import Part, read_3mf, write_3mf
+from ...errors import InputError, MeshingError, OutputError
+from ...files import write_bytes, write_json
+from ...materials.library import Material
+from ...run.context import Ending
+from ...run.folder import begin
+from ...run.progress import Progress
+
+Array = NDArray[np.float64]
+
+HEADER = "# The inputs of this export; unit.toml beside it belongs to them."
+FORMATS = ("stl", "3mf", "3mf-beams", "step", "txt")
+MANIFEST = "manifest.json"
+RESULTS = ("unit.stl", "unit.3mf", "unit-beams.3mf", "*.step", "nodes.txt", MANIFEST)
+
+MESH_TOLERANCE = 1e-4
+"""Relative difference of volume allowed between a solid and its STL or 3MF read back."""
+STEP_TOLERANCE = 5e-3
+"""The same of a STEP file, through its mesh."""
+
+# In which order CAD takes the bodies, and what each does to those before it.
+_ASSEMBLY = (
+    ("envelope.step", "start with it: the box of the lattice, without the actuator"),
+    ("membrane.step", "add: wall, end caps and inlet"),
+    ("waveguide.step", "add last of all that is solid: bar and seats, already cut"),
+    ("cavity.step", "subtract after everything was added, or keep as the volume of air"),
+)
+
+
+@attrs.frozen(eq=False)
+class Job:
+    """Inputs of an export. path: of the waveguide, or None; take_off: the printer's offsets in mm."""
+
+    unit: Unit
+    resin: Material
+    path: Window | Array | None = None
+    path_name: str = ""
+    formats: tuple[str, ...] = FORMATS
+    quality: str = "export"
+    take_off: tuple[float, float] = (0.0, 0.0)
+    offset_source: str = ""
+
+    def __attrs_post_init__(self) -> None:
+        for name in self.formats:
+            if name not in FORMATS:
+                raise InputError(
+                    f"there is no format {name!r}", "--formats", f"choose from {', '.join(FORMATS)}"
+                )
+        if self.quality not in QUALITY:
+            raise InputError(
+                f"there is no quality {self.quality!r}", "--quality", f"one of {', '.join(QUALITY)}"
+            )
+
+    def texts(self) -> dict[str, str]:
+        """Text of every file of inputs, by name; export.toml is the first."""
+        formats = ", ".join(f'"{name}"' for name in self.formats)
+        lines = [
+            HEADER,
+            "format = 1",
+            'unit = "unit.toml"',
+            f'path = "{self.path_name}"',
+            f"formats = [{formats}]",
+            f'quality = "{self.quality}"',
+            f"take_off_mm = [{self.take_off[0]}, {self.take_off[1]}]",
+            f'resin = "{self.resin.name}"',
+        ]
+        if self.path is not None and not isinstance(self.path, Window):
+            lines.append(f"points_mm = {np.asarray(self.path).tolist()}")
+        return {"export.toml": "\n".join(lines) + "\n", "unit.toml": to_toml(self.unit)}
+
+
+@attrs.define
+class Export:
+    """An export under way: what was written so far is here, and in `folder` as soon as it is whole."""
+
+    job: Job
+    folder: Path
+    progress: Progress
+    ending: Ending
+    files: list[dict[str, Any]] = attrs.field(factory=list)
+    refused: list[dict[str, str]] = attrs.field(factory=list)
+
+    def run(self) -> None:
+        """Build the solid, write every format, read each back, and leave the manifest."""
+        job = self.job
+        with self.progress.stage("solid", 12.0 if job.quality == "export" else 3.0):
+            solid = build_solid(job.unit, job.path, job.quality, take_off=job.take_off)
+        for name in job.formats:
+            with self.progress.stage(name, 8.0):
+                {
+                    "stl": self._stl,
+                    "3mf": self._3mf,
+                    "3mf-beams": self._beams,
+                    "step": self._step,
+                    "txt": self._nodes,
+                }[name](solid)
+        manifest = self._manifest(solid)
+        write_json(self.folder / MANIFEST, manifest)
+        self.ending.summary |= manifest
+
+    def _stl(self, solid: Solid) -> None:
+        write_bytes(self.folder / "unit.stl", stl_bytes(solid.vertices, solid.triangles))
+        vertices, triangles = stl_surface((self.folder / "unit.stl").read_bytes())
+        self._add(
+            "unit.stl", "printable unit, binary, mm", self._compared(solid, "unit.stl", vertices, triangles)
+        )
+
+    def _3mf(self, solid: Solid) -> None:
+        part = Part(self.job.unit.name, solid.vertices, solid.triangles)
+        write_bytes(self.folder / "unit.3mf", write_3mf([part], [1], self.job.unit.name))
+        objects, printed = read_3mf((self.folder / "unit.3mf").read_bytes())
+        found = objects[printed[0]]
+        self._add(
+            "unit.3mf",
+            "printable unit, mm",
+            self._compared(solid, "unit.3mf", found.vertices, found.triangles),
+        )
+
+    def _compared(
+        self, solid: Solid, name: str, vertices: Array, triangles: NDArray[np.int64]
+    ) -> dict[str, Any]:
+        """A mesh read back against the solid it was written from."""
+        enclosed, open_edges = volume(vertices, triangles), bad_edges(triangles)
+        error = enclosed / solid.gates.volume_mm3 - 1.0
+        if open_edges:
+            raise _mismatch(name, f"has {open_edges} edges that are not shared by two triangles")
+        if len(triangles) != len(solid.triangles):
+            raise _mismatch(name, f"has {len(triangles)} triangles and not {len(solid.triangles)}")
+        if abs(error) > MESH_TOLERANCE:
+            raise _mismatch(name, f"encloses {enclosed:.3f} mm3 and not {solid.gates.volume_mm3:.3f} mm3")
+        return {
+            "volume_mm3": enclosed,
+            "volume_error": error,
+            "triangles": len(triangles),
+            "open_edges": open_edges,
+            "bounding_box_mm": np.stack([vertices.min(axis=0), vertices.max(axis=0)]),
+        }
+
+    def _beams(self, solid: Solid) -> None:
+        job, name = self.job, "unit-beams.3mf"
+        parts, printed = beam_parts(job.unit.dimensions, QUALITY[job.quality], solid.bar)
+        write_bytes(self.folder / name, write_3mf(parts, printed, f"{job.unit.name}, lattice as beams"))
+        found, again = read_3mf((self.folder / name).read_bytes())
+        read = list(found.values())
+        if again != printed or len(read) != len(parts):
+            raise _mismatch(name, "has other objects")
+        for wrote, back in zip(parts, read, strict=True):
+            if wrote.beams is not None and back.beams is not None:
+                same = np.array_equal(wrote.beams.pairs, back.beams.pairs)
+                if not same or abs(back.beams.volume / wrote.beams.volume - 1.0) > MESH_TOLERANCE:
+                    raise _mismatch(name, "has other beams")
+            elif abs(
+                volume(back.vertices, back.triangles) / volume(wrote.vertices, wrote.triangles) - 1.0
+            ) > (MESH_TOLERANCE) or bad_edges(back.triangles):
+                raise _mismatch(name, f"has another {wrote.name}")
+        beams = next(part.beams for part in read if part.beams is not None)
+        measured = {
+            "nodes": len(beams.nodes),
+            "beams": len(beams.pairs),
+            "struts": int(np.count_nonzero(~solid.bar.followed)) if solid.bar else len(self._lattice.struts),
+            "frusta_mm3": beams.volume,
+        }
+        self._add(name, "actuator and waveguide as meshes, lattice as beams, nominal size, mm", measured)
+
+    def _step(self, solid: Solid) -> None:
+        from ...meshing.step import bodies, step_volume, write_step
+
+        d = self.job.unit.dimensions
+        try:
+            for number, (body, exact) in enumerate(bodies(d, solid.bar).items(), 1):
+                name = f"{body}.step"
+                write_step(body, d, self.folder / name, solid.bar)
+                solids, found = step_volume(self.folder / name)
+                if solids != 1:
+                    raise _mismatch(name, f"holds {solids} solids, not one")
+                if abs(found / exact - 1.0) > STEP_TOLERANCE:
+                    raise _mismatch(name, f"encloses {found:.2f} mm3 and not {exact:.2f} mm3")
+                self.progress.update(number / (3 + (solid.bar is not None)))
+                measured = {"solids": solids, "volume_mm3": found, "volume_error": found / exact - 1.0}
+                self._add(name, f"{body}, exact surfaces, nominal size, mm", measured)
+        except MeshingError as error:
+            self.refused.append({"format": "step", "why": error.what, "what_to_do": error.remedy})
+            self.progress.warning(f"No STEP: {error.what}. What to do: {error.remedy}.")
+
+    def _nodes(self, solid: Solid) -> None:
+        write_nodes(self.job.unit, self.folder / "nodes.txt")
+        lines = (self.folder / "nodes.txt").read_text(encoding="utf-8").splitlines()
+        rows = [line.split() for line in lines if not line.startswith("#")]
+        nodes = self._lattice.nodes
+        read = np.array([row[2:] for row in rows], dtype=float)
+        if read.shape != nodes.shape or np.abs(read - nodes).max() > 1e-6:
+            raise _mismatch("nodes.txt", "has other nodes")
+        anchors = sum(row[1].startswith("P") for row in rows)
+        self._add("nodes.txt", "lattice nodes and anchors, mm", {"nodes": len(rows), "anchors": anchors})
+
+    @property
+    def _lattice(self) -> Any:
+        return lattice_of(self.job.unit.dimensions)
+
+    def _add(self, name: str, what: str, read_back: Mapping[str, Any]) -> None:
+        content = (self.folder / name).read_bytes()
+        digest = hashlib.sha256(content).hexdigest()
+        self.files.append(
+            {
+                "file": name,
+                "what": what,
+                "bytes": len(content),
+                "sha256": digest,
+                "read_back": dict(read_back),
+            }
+        )
+
+    def _manifest(self, solid: Solid) -> dict[str, Any]:
+        job, g = self.job, solid.gates
+        density = job.resin.density_g_per_ml
+        written = {entry["file"] for entry in self.files}
+        bar = solid.bar
+        return {
+            "unit": {"name": job.unit.name, "scale": job.unit.scale, "sha256": job.unit.hash()},
+            "frame": "mm; z from inlet to tip, x = 0 the bending plane, +y the side with more lattice",
+            "path": None
+            if bar is None
+            else {
+                "name": job.path_name,
+                "axis_mm": bar.points,
+                "length_mm": bar.path_mm,
+                "wells": len(bar.wells),
+                "seats": len(bar.seats),
+            },
+            "solid": {
+                "quality": job.quality,
+                "volume_mm3": g.volume_mm3,
+                "cavity_mm3": g.inner_volume_mm3,
+                "bounding_box_mm": np.stack([solid.vertices.min(axis=0), solid.vertices.max(axis=0)]),
+                "triangles": g.triangles,
+                "gates": attrs.asdict(g),
+            },
+            "taken_off_mm": {
+                "xy": job.take_off[0],
+                "z": job.take_off[1],
+                "source": job.offset_source or "nothing: the drawing is nominal",
+            },
+            "resin": {
+                "name": job.resin.name,
+                "density_g_per_ml": density,
+                "ml": g.volume_mm3 / 1e3,
+                "g": g.volume_mm3 / 1e3 * density,
+            },
+            "files": self.files,
+            "refused": self.refused,
+            "assembly": [
+                {"order": order, "file": name, "how": how}
+                for order, (name, how) in enumerate((a for a in _ASSEMBLY if a[0] in written), 1)
+            ],
+        }
+
+
+def _mismatch(name: str, what: str) -> OutputError:
+    return OutputError(
+        f"{name}, read back, {what}", name, "report it with the unit's TOML; do not print this file"
+    )
+
+
+def export(job: Job, folder: Path, progress: Progress, ending: Ending) -> None:
+    """Run an export in a folder of its own; raises InputError, GateError and OutputError."""
+    begin(ending, folder, HEADER, job.texts(), RESULTS)
+    Export(job, folder, progress, ending).run()
+
+
+def path_of(unit: Unit, name: str | None, row: str | None = None) -> tuple[Window | Array | None, str]:
+    """A path and its name: a window, alpha1 .., or one of a paths.csv of `place`, its first unless named."""
+    if name is None:
+        return None, ""
+    if not name.endswith(".csv"):
+        return window(unit, name), name
+    try:
+        with Path(name).open(encoding="utf-8", newline="") as stream:
+            rows = list(csv.DictReader(stream))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"cannot read the paths: {error}", name, "give paths.csv of `place --paths graph`"
+        ) from error
+    named = [r for r in rows if row is None or r.get("path") == row]
+    if not named:
+        raise InputError(
+            f"there is no path {row!r}" if row else "there is no path", name, "see its first column"
+        )
+    try:
+        points = np.array([[float(c) for c in p.split()] for p in named[0]["points_mm"].split(";")])
+        return points.reshape(-1, 3), named[0]["path"]
+    except (KeyError, ValueError) as error:
+        raise InputError(
+            "its column points_mm is not a list of points", name, "write it again by `place`"
+        ) from error
+
+
+def answer(summary: Mapping[str, Any]) -> list[str]:
+    """What was written, in a few lines of text, of a run's `summary`."""
+    solid, resin = summary["solid"], summary["resin"]
+    lines = [
+        f"{entry['file']}: {entry['bytes'] / 1e6:.2f} MB, read back and the same"
+        for entry in summary["files"]
+    ]
+    lines += [f"not written: {entry['format']}: {entry['why']}" for entry in summary["refused"]]
+    lines.append(f"{solid['volume_mm3'] / 1e3:.2f} ml, {resin['g']:.1f} g of {resin['name']}")
+    return lines

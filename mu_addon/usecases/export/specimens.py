@@ -1,0 +1,276 @@
+"""Specimens ready to print, what to measure on them, and the folder that takes the measurements."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...design import coupons
+from ...design.parameters import Unit, to_toml
+from ...design.strut_cell import specimen_solid, strut_cell
+from ...design.surface import Triangles, Vertices, bad_edges, stl_bytes, stl_surface, volume
+from ...errors import OutputError
+from ...files import write_bytes, write_json, write_text
+from ...materials.library import Material
+from ...measured.kinds import KINDS
+from ...report.html import page, table
+from ...run.context import Ending
+from ...run.folder import begin
+from ...run.progress import Progress
+from .print_offsets import sheet
+
+HEADER = "# The inputs of these specimens; unit.toml beside it belongs to them."
+SCALES = (0.75, 1.0, 1.5)
+CELLS = 3
+TEMPLATE = "measured"
+RESULTS = ("*.stl", "manifest.json", "gauge.csv", "sheet.html", TEMPLATE)
+
+Surface = tuple[Vertices, Triangles]
+
+
+@attrs.frozen(eq=False)
+class Specimen:
+    """One part: how it is made, what to measure, and the experiment of a measured-data folder it is for.
+
+    kind: of `measured.kinds`, "" for the gauge; keys: what describes the experiment; columns: to be recorded.
+    """
+
+    name: str
+    make: Callable[[], Surface]
+    measure: str
+    kind: str = ""
+    keys: Mapping[str, Any] = attrs.field(factory=dict)
+    columns: tuple[str, ...] = ()
+    scale: float = 1.0
+    copies: int = 1
+
+
+def specimens(unit: Unit, scales: tuple[float, ...] = SCALES, cells: int = CELLS) -> list[Specimen]:
+    """Every specimen of a unit's design, of nominal size; the paper tested three cubes a scale."""
+    found = [
+        Specimen(
+            "gauge",
+            coupons.gauge,
+            "with calipers, every size of gauge.csv; back by `export --compensate gauge.csv`",
+        )
+    ]
+    for scale in scales:
+        scaled = attrs.evolve(unit, scale=scale)
+        nominal = attrs.evolve(strut_cell(scaled), offset_xy_mm=0.0, offset_z_mm=0.0)
+        found.append(
+            Specimen(
+                f"cube-{scale:g}x",
+                lambda cell=nominal: specimen_solid(cell, cells),  # type: ignore[misc]
+                "weigh it; compress it between plates to 40 % at 10 mm/min along its build axis",
+                "lattice_compression",
+                {
+                    "cells": [cells] * 3,
+                    "section_mm": [round(cells * nominal.size_mm, 4)] * 2,
+                    "length_mm": round(cells * nominal.size_mm, 4),
+                    "axis": "z",
+                    "mass_g": None,
+                },
+                ("displacement_mm", "force_N"),
+                scale,
+                3,
+            )
+        )
+    d = unit.dimensions
+    side = float(np.sqrt(np.pi) / 2.0 * d.junction_diameter)
+    length = 3.0 * d.cell
+    found += [
+        Specimen(
+            "strut",
+            lambda: coupons.strut_coupon(d),
+            "diameter at three places, give section_mm of the same area; weigh it; pull it to 50 %",
+            "coupon",
+            {
+                "mode": "uniaxial",
+                "section_mm": [round(side, 4)] * 2,
+                "length_mm": coupons.GAUGE_MM,
+                "axis": "z",
+            },
+            ("displacement_mm", "force_N"),
+            unit.scale,
+            3,
+        ),
+        Specimen(
+            "wall",
+            lambda: coupons.wall_coupon(d),
+            "width and thickness at three places; weigh it; pull it to 50 %",
+            "coupon",
+            {
+                "mode": "uniaxial",
+                "section_mm": [coupons.STRIP_MM, round(d.wall, 4)],
+                "length_mm": coupons.GAUGE_MM,
+                "axis": "z",
+            },
+            ("displacement_mm", "force_N"),
+            unit.scale,
+            3,
+        ),
+        Specimen(
+            "beam",
+            lambda: coupons.beam_coupon(d),
+            "clamp the block, beam level; note how far each weight at its tip lowers it",
+            "beam_deadweight",
+            {"section_mm": [d.waveguide_section] * 2, "length_mm": coupons.ARM_MM},
+            ("added_mass_g", "tip_deflection_mm"),
+            unit.scale,
+        ),
+        Specimen(
+            "waveguide",
+            lambda: coupons.waveguide_coupon(d, length),
+            "put light source and detector into the seats; bend it between two arms, wells outward",
+            "waveguide_bending",
+            {"section_mm": [d.waveguide_section] * 2, "length_mm": round(length, 4)},
+            ("time_s", "angle_deg", "voltage_V"),
+            unit.scale,
+        ),
+    ]
+    return found
+
+
+def make_specimens(unit: Unit, resin: Material, folder: Path, progress: Progress, ending: Ending) -> None:
+    """Write every specimen, the gauge's sheet, the manifest and the folder to fill; raises MuError."""
+    inputs = {"specimens.toml": f'{HEADER}\nformat = 1\nunit = "unit.toml"\nresin = "{resin.name}"\n'}
+    begin(ending, folder, HEADER, inputs | {"unit.toml": to_toml(unit)}, RESULTS)
+    every = specimens(unit)
+    rows = []
+    with progress.stage("specimens", 10.0):
+        for done, specimen in enumerate(every, 1):
+            rows.append(_written(specimen, folder, resin))
+            progress.update(done / len(every))
+    write_text(folder / "gauge.csv", sheet())
+    _write_template(every, folder / TEMPLATE)
+    ending.summary |= {"resin": resin.name, "density_g_per_ml": resin.density_g_per_ml, "specimens": rows}
+    write_json(folder / "manifest.json", ending.summary)
+    write_text(folder / "sheet.html", _page(unit, resin, every, rows))
+
+
+def _written(specimen: Specimen, folder: Path, resin: Material) -> dict[str, Any]:
+    vertices, triangles = specimen.make()
+    enclosed = volume(vertices, triangles)
+    content = stl_bytes(vertices, triangles)
+    path = folder / f"{specimen.name}.stl"
+    write_bytes(path, content)
+    points, faces = stl_surface(path.read_bytes())
+    again = volume(points, faces)
+    if bad_edges(faces) or abs(again / enclosed - 1.0) > 1e-4:
+        raise OutputError(
+            f"{path.name}, read back, encloses {again:.3f} mm3 and not {enclosed:.3f}, or is open",
+            str(path),
+            "report it; do not print this file",
+        )
+    return {
+        "name": specimen.name,
+        "file": path.name,
+        "copies": specimen.copies,
+        "volume_mm3": enclosed,
+        "mass_g": enclosed / 1e3 * resin.density_g_per_ml,
+        "size_mm": np.ptp(vertices, axis=0),
+        "measure": specimen.measure,
+        "kind": specimen.kind,
+        "sha256": hashlib.sha256(content).hexdigest(),
+    }
+
+
+def _write_template(every: list[Specimen], folder: Path) -> None:
+    """experiments.toml and CSV files of headers alone, named so that only the rows are missing."""
+    lines = ["# Fill in what was measured, delete what was not; see docs/evidence.md for every key."]
+    for specimen in (s for s in every if s.kind):
+        for letter in "ABC"[: specimen.copies]:
+            name = f"{specimen.name}-{letter}"
+            role = "held_out" if letter == "C" else "fit"
+            lines += [
+                "",
+                "[[experiment]]",
+                f'name = "{name}"',
+                f'kind = "{specimen.kind}"',
+                f'file = "{name}.csv"',
+                f'role = "{role}"',
+                f"scale = {specimen.scale:g}",
+                f'specimen = "{letter}"',
+            ]
+            for key, value in specimen.keys.items():
+                if value is None:
+                    lines.append(f"# {key} =   # as weighed")
+                else:
+                    lines.append(f"{key} = {_toml(value)}")
+            write_text(folder / f"{name}.csv", ",".join(specimen.columns) + "\n")
+    lines += [
+        "",
+        "# The unit itself, with a camera for its angle (kind unit_pressure), and its valve shut",
+        "# (kind pressure_hold), columns " + ", ".join(KINDS["unit_pressure"].columns) + ".",
+    ]
+    write_text(folder / "experiments.toml", "\n".join(lines) + "\n")
+
+
+def _toml(value: Any) -> str:
+    return f'"{value}"' if isinstance(value, str) else str(value)
+
+
+def _page(unit: Unit, resin: Material, every: list[Specimen], rows: list[dict[str, Any]]) -> str:
+    parts = [
+        (
+            [
+                r["file"],
+                str(r["copies"]),
+                " x ".join(f"{s:.4g}" for s in r["size_mm"]),
+                f"{r['mass_g']:.2f}",
+                r["kind"] or "-",
+                r["measure"],
+            ],
+            False,
+        )
+        for r in rows
+    ]
+    sizes = [([f.name, f.where, f.kind, f.axis, f"{f.nominal_mm:g}", ""], False) for f in coupons.FEATURES]
+    head = [
+        ("file", ""),
+        ("copies", "n"),
+        ("size [mm]", "n"),
+        ("mass [g]", "n"),
+        ("experiment", ""),
+        ("measure", ""),
+    ]
+    gauge = [
+        ("size", ""),
+        ("where", ""),
+        ("kind", ""),
+        ("along", ""),
+        ("nominal [mm]", "n"),
+        ("measured [mm]", "n"),
+    ]
+    lead = (
+        "<p>Print all with z upward, wash and cure them as the unit, and wait a day. The mass is that of "
+        f"{escape(resin.name)} at nominal size: a heavier part has thicker struts.</p>"
+    )
+    back = (
+        "<p>Write the sizes into gauge.csv, in millimetres; leave empty what cannot be reached. Then "
+        "<code>run.py export --compensate gauge.csv</code> takes the offsets off the drawing. Solids come "
+        "out larger by twice the offset, gaps smaller; the long sizes tell shrinkage from it.</p>"
+    )
+    return page(
+        "Specimens",
+        f"of {unit.name}, scale {unit.scale:g}",
+        "",
+        lead,
+        [
+            ("parts", "Parts", table("", head, parts)),
+            ("gauge", "The gauge, by calipers", back + table("", gauge, sizes)),
+        ],
+    )
+
+
+def answer(summary: Mapping[str, Any]) -> list[str]:
+    """What was written, in a few lines of text, of a run's `summary`."""
+    return [f"{row['file']}: {row['mass_g']:.2f} g, {row['measure']}" for row in summary["specimens"]] + [
+        "sheet.html says what to measure; measured/ takes it, for `diagnose`"
+    ]

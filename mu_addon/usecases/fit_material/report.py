@@ -1,0 +1,291 @@
+"""The report of a fit: which law, how well it fits each mode, how sure its parameters are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...files import write_text
+from ...materials.fit import FLOOR, POISSON, TOLERANCE
+from ...report.charts import signed
+from ...report.html import cards, facts_table, figure, note, page, table
+from ...run.context import Ending
+from ..simulate_and_place.report_data import package_versions
+from .charts import TITLES, mode_chart, residual_chart
+from .run import Fitting, modes, tested
+
+FILES = {
+    "fit.toml": "inputs of this run",
+    "material.toml": "the chosen law as a material: simulations take it in place of a library's name",
+    "fit.csv": "every measured value beside every law",
+    "parameters.csv": "parameters with their intervals",
+    "errors.csv": "how far each law is from each coupon",
+    "fit_*.svg": "a chart a mode",
+    "summary.json": "every figure of this run",
+    "log.ndjson": "what was said while it ran",
+}
+WEIGHTS_MEAN = {
+    "absolute": "each residual counts as a share of its coupon's largest stress",
+    "relative": f"each residual counts as a share of its stress, at least {FLOOR:.0%} of the largest",
+}
+
+
+def publish(found: Fitting, out: Path, ending: Ending) -> None:
+    """Write report.html; raises OutputError."""
+    versions = package_versions()
+    ending.summary["versions"] = versions
+    write_text(out / "report.html", report(found, versions))
+
+
+def report(found: Fitting, versions: dict[str, str]) -> str:
+    """The whole report as HTML text."""
+    sections = [
+        ("modes", "Tests and laws", _charts(found)),
+        ("errors", "How far each law is from each test", _errors(found)),
+        ("parameters", "Parameters", _parameters(found)),
+        ("stability", "Stability", _stability(found)),
+        ("method", "How it was done", _method(found)),
+        ("files", "Files of this run", facts_table("file", "what it holds", FILES)),
+        ("versions", "Versions", facts_table("program", "version", versions)),
+    ]
+    count = len(found.fitted) + len(found.held_out)
+    subtitle = f"{count} coupon test{'s' if count > 1 else ''}: " + ", ".join(TITLES[m] for m in modes(found))
+    return page(
+        f"A law for {found.material.name}", subtitle, note(_warnings(found)), _answer(found), sections
+    )
+
+
+def _warnings(found: Fitting) -> list[str]:
+    chosen = found.choice.chosen
+    told = []
+    missed = [TITLES[m] for m in chosen.fails]
+    if missed:
+        told.append(
+            f"{chosen.form.title} misses {_listed(missed)} by more than {TOLERANCE:.0%}: do not use it there."
+        )
+    for mode, (stretch, ratio) in found.apart.items():
+        i = int(np.argmax(ratio > 1.1)) if (ratio > 1.1).any() else len(ratio) - 1
+        told.append(
+            f"{TITLES[mode].capitalize()} was not tested. Laws that fit the rest differ there by a factor of "
+            f"{ratio[i]:.3g} at a stretch of {stretch[i]:.3g}"
+            + (f" and {_factor(ratio[-1])} at {stretch[-1]:.3g}." if i < len(ratio) - 1 else ".")
+            + (" Test it before relying on any of them." if ratio[-1] > 1.1 else "")
+        )
+    if found.compressibility > 0.02:
+        told.append(
+            f"With Poisson's ratio {POISSON:g}, stress at the end of the range differs by "
+            f"{found.compressibility:.0%} from that of an incompressible body, which was fitted: measure "
+            "the bulk modulus, or stay well within the range."
+        )
+    told += [
+        f"{r.what[0].upper()}{r.what[1:]} ({Path(r.where.split(',')[0]).name})."
+        for r in found.measured.remarks
+    ]
+    return told
+
+
+def _factor(ratio: float) -> str:
+    return f"{ratio:.3g}" if ratio < 1e3 else f"10{str(int(np.log10(ratio))).translate(_SUPERSCRIPT)}"
+
+
+_SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def _answer(found: Fitting) -> str:
+    choice = found.choice
+    chosen = choice.chosen
+    kept = [e for e in chosen.errors if e.mode not in chosen.fails] or list(chosen.errors)
+    worst = max(kept, key=lambda e: e.share)
+    html = (
+        f'<p class="answer">Take <strong>{escape(chosen.form.title)}</strong>: it is within '
+        f"{worst.share:.1%} of the measured stresses"
+        + (
+            f" in {_listed(list(dict.fromkeys(TITLES[e.mode] for e in kept)))}"
+            if len(chosen.errors) > 1
+            else ""
+        )
+        + (f", but misses {_listed([TITLES[m] for m in chosen.fails])}" if chosen.fails else "")
+        + ".</p>"
+    )
+    by = "misses the held-out tests least" if choice.by == "held out" else "has the least AICc"
+    whose = "the stable laws that follow what they were fitted to"
+    words = f"Of {whose} it {by}"
+    if not chosen.follows:
+        words = f"No stable law follows what it was fitted to; of all, this one {by}"
+    if choice.tied:
+        tied = [f.form.title for f in choice.tied]
+        score = "held-out error" if choice.by == "held out" else "AICc"
+        words = (
+            f"{_listed(tied)} {'does' if len(tied) == 1 else 'do'} as well ({score}); of these it has the "
+            "fewest parameters"
+        )
+    unstable = [f.form.title for f in found.fits if not f.stable]
+    if unstable:
+        was = "was" if len(unstable) == 1 else "were"
+        words += f". {_listed(unstable)} came out unstable and {was} not considered"
+    mu, _ = chosen.form.law.small_strain(chosen.parameters[None])[0]
+    facts = [
+        ("Young's modulus at rest", f"{3 * mu:.3g} MPa"),
+        ("parameters", str(chosen.form.count)),
+        *((f"error, {TITLES[e.mode]}", f"{e.share:.1%}") for e in chosen.errors[:4]),
+    ]
+    return f"{html}<p>{escape(words)}.</p>{cards(facts)}"
+
+
+def _charts(found: Fitting) -> str:
+    html = (
+        "<p>Filled marks were fitted, open ones held out. The thick orange line is the chosen law. “Misses” "
+        f"is said of laws that are off by more than {TOLERANCE:.0%}, norm over norm. Below each, what is "
+        "left over; the grey band is ±5% of the largest stress.</p>"
+        '<div class="pair">'
+    )
+    chosen = found.choice.chosen.form.name
+    for mode in modes(found):
+        fitted, held = tested(found, mode)
+        missed = [f.form.title for f in found.fits if mode in f.fails]
+        html += (
+            "<div>"
+            + figure(
+                mode_chart(mode, fitted, held, found.fits, chosen),
+                escape(
+                    f"{_listed(missed)} miss{'es' if len(missed) == 1 else ''} it."
+                    if missed
+                    else "No law misses it."
+                ),
+                f"Nominal stress against stretch, {TITLES[mode]}: tests and {len(found.fits)} laws.",
+            )
+            + figure(
+                residual_chart(mode, [*fitted, *held], found.fits, chosen),
+                "",
+                f"Difference between laws and tests, {TITLES[mode]}.",
+            )
+            + "</div>"
+        )
+    return html + "</div>"
+
+
+def _errors(found: Fitting) -> str:
+    tests = [*found.fitted, *found.held_out]
+    head = [("law", ""), ("parameters", "n")]
+    head += [(c.name + ("" if c in found.fitted else ", held out"), "n") for c in tests]
+    unseen = [m for m in modes(found) if any(m in u for u in found.unseen.values())]
+    head += [(TITLES[m], "n") for m in unseen]
+    head += [("score", "n"), ("fails", "")]
+    rows = []
+    for f in found.fits:
+        cells: list[Any] = [f.form.title, f.form.count]
+        cells += [percent(e.share) for e in f.errors]
+        cells += [percent(found.unseen[f.form.name].get(m, np.nan)) for m in unseen]
+        score = found.choice.scores.get(f.form.name)
+        cells.append("unstable" if score is None else _score(score, found.choice.by))
+        cells.append(_listed([TITLES[m] for m in f.fails]) if f.fails else "nothing")
+        rows.append((cells, f is found.choice.chosen))
+    groups = [("", 2), ("error, norm over norm", len(tests))]
+    if unseen:
+        groups.append(("error when fitted without it", len(unseen)))
+    groups.append(("", 2))
+    by = "error of the held-out tests" if found.choice.by == "held out" else "AICc"
+    return table(
+        f"Score: {by}, less is better. A law fails where it is off by more than {TOLERANCE:.0%}.",
+        head,
+        rows,
+        groups,
+    )
+
+
+def _score(score: float, by: str) -> str:
+    if by == "held out":
+        return percent(score)
+    return signed(f"{score:.1f}") if np.isfinite(score) else "too few values"
+
+
+def percent(share: float) -> str:
+    """A share as percent; beyond 1000 % as a power of ten."""
+    if not np.isfinite(share):
+        return "–"
+    return f"{share:.1%}" if share < 10 else f"× {_factor(share)}"
+
+
+def _parameters(found: Fitting) -> str:
+    rows = []
+    for f in found.fits:
+        for i, p in enumerate(f.intervals):
+            known = np.isfinite(p.low95)
+            rows.append(
+                (
+                    [
+                        f.form.title if i == 0 else "",
+                        p.name,
+                        _figures(p.value),
+                        _figures(p.low95) if known else "–",
+                        _figures(p.high95) if known else "–",
+                        p.note or ("its sign is not sure" if p.low95 <= 0 <= p.high95 else ""),
+                    ],
+                    f is found.choice.chosen,
+                )
+            )
+    chosen = found.choice.chosen
+    head = [
+        ("law", ""),
+        ("parameter", ""),
+        ("value", "n"),
+        ("low 95 %", "n"),
+        ("high 95 %", "n"),
+        ("note", "text"),
+    ]
+    words = (
+        "<p>Intervals by Student's t: those of Ogden's parameters by the profile of the fit, the others, "
+        "whose laws are linear in them, exactly. They are widened where residuals resemble those before "
+        f"them: of the chosen law, {chosen.n} values count as {chosen.n_effective:.3g} independent ones. "
+        "Where a law does not follow the test, what is left over is no noise, and no interval is honest.</p>"
+    )
+    return words + table("", head, rows)
+
+
+def _figures(value: float) -> str:
+    return signed(f"{value:.4g}")
+
+
+def _stability(found: Fitting) -> str:
+    rows = []
+    for f in found.fits:
+        if f.invalid:
+            rows.append(([f.form.title, "", "", "", "", f"FAILED: {f.invalid}"], False))
+        for i, s in enumerate(f.stability):
+            verdict = "stable" if s.stable else f"unstable {s.where()}"
+            cells = [f.form.title if i == 0 else "", TITLES[s.mode], f"{s.low:.3g} to {s.high:.3g}"]
+            cells += [_figures(s.least_MPa), f"{s.least_at:.3g}", verdict]
+            rows.append((cells, f is found.choice.chosen))
+    head = [
+        ("law", ""),
+        ("mode", ""),
+        ("stretches", "line"),
+        ("least stiffness [MPa]", "n"),
+        ("at", "n"),
+        ("verdict", ""),
+    ]
+    return (
+        "<p>Drucker's postulate in Hill's form: every further increment of logarithmic strain, at constant "
+        "volume and in any direction, costs work, d(τ):d(e) &gt; 0 with the Kirchhoff stress τ. Checked at "
+        "101 stretches of each mode, over the tested range; of a mode that was not tested, in tension to the "
+        "same logarithmic strain.</p>" + table("", head, rows)
+    )
+
+
+def _method(found: Fitting) -> str:
+    facts = {
+        "weights": f"{found.weights}: {WEIGHTS_MEAN[found.weights]}",
+        "stress": "nominal, of the laws at constant volume",
+        "Ogden terms": "each with mu alpha of 0 or more, which is enough for stability",
+        "bulk modulus": f"not seen by these tests; of Poisson's ratio {POISSON:g}",
+        "measured data": str(found.measured.folder.name),
+    }
+    return facts_table("what", "how", facts)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]

@@ -1,0 +1,278 @@
+"""From coupon tests to a material: laws fitted, compared and written down, in one folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...errors import InputError
+from ...files import write_csv, write_text
+from ...materials.choice import Choice, choose, disagreement
+from ...materials.coupon import Array, Coupon, response
+from ...materials.fit import POISSON, TOLERANCE, WEIGHTS, Fit, fit, leave_one_mode_out, ranges
+from ...materials.forms import FORMS, form
+from ...materials.library import Material, write_material
+from ...measured import Measured, read_folder
+from ...run.context import Ending
+from ...run.folder import begin
+from ...run.progress import Progress
+
+HEADER = "# The inputs of this fit; the measured data are named by the SHA-256 of their files."
+RESULTS = ("material.toml", "fit.csv", "parameters.csv", "errors.csv", "fit_*.svg", "report.html")
+
+
+@attrs.frozen(eq=False)
+class Fitting:
+    """Coupons and what was found with them.
+
+    unseen: share by which each law misses a mode when fitted without it; apart: how far laws differ in modes
+    that were not tested, see `disagreement`; compressibility: share by which kappa moves the chosen law's
+    stress at the end of its range.
+    """
+
+    measured: Measured
+    fitted: tuple[Coupon, ...]
+    held_out: tuple[Coupon, ...]
+    weights: str
+    fits: tuple[Fit, ...]
+    choice: Choice
+    unseen: dict[str, dict[str, float]]
+    apart: dict[str, tuple[Array, Array]]
+    compressibility: float
+    material: Material
+
+
+def fit_material(
+    folder: Path,
+    out: Path,
+    laws: Sequence[str] = (),
+    held_out_modes: Sequence[str] = (),
+    weights: str = "absolute",
+    *,
+    progress: Progress,
+    ending: Ending,
+) -> Fitting:
+    """Fit laws (all of them without names) to the coupons of a folder of measured data; results in `out`.
+
+    held_out_modes: modes that no law is fitted to, beside the experiments whose role is "held_out". Writes
+    material.toml, fit.csv, parameters.csv, errors.csv, a chart a mode, report.html. Raises InputError,
+    OutputError.
+    """
+    from .report import publish
+
+    forms = [form(name) for name in dict.fromkeys(laws)] or list(FORMS.values())
+    if weights not in WEIGHTS:
+        raise InputError(
+            f"there are no {weights!r} weights", "--weights", f"choose from {', '.join(WEIGHTS)}"
+        )
+    measured = read_folder(Path(folder))
+    fitted, held = _coupons(measured, held_out_modes)
+    inputs = {"fit.toml": _inputs(measured, [f.name for f in forms], held_out_modes, weights)}
+    begin(ending, out, HEADER, inputs, RESULTS)
+    for remark in measured.remarks:
+        progress.warning(remark.what, remark.where, remark.remedy)
+    with progress.stage("fit", expected_s=2.0 * len(forms)):
+        fits, unseen = [], {}
+        for i, one in enumerate(forms):
+            fits.append(fit(one, fitted, held, weights, profile=True))
+            unseen[one.name] = _unseen(one, fitted, weights)
+            progress.update((i + 1) / len(forms))
+        choice = choose(fits)
+    material = _material(measured, fitted, choice)
+    found = Fitting(
+        measured=measured,
+        fitted=fitted,
+        held_out=held,
+        weights=weights,
+        fits=tuple(fits),
+        choice=choice,
+        unseen=unseen,
+        apart={m: d for m, d in disagreement(fits, fitted).items() if m not in {c.mode for c in held}},
+        compressibility=_compressibility(choice.chosen, fitted),
+        material=material,
+    )
+    _write(found, out)
+    ending.summary |= summary(found)
+    with progress.stage("report", expected_s=4.0):
+        publish(found, out, ending)
+    return found
+
+
+def _coupons(
+    measured: Measured, held_out_modes: Sequence[str]
+) -> tuple[tuple[Coupon, ...], tuple[Coupon, ...]]:
+    """Coupons to fit, and those held out."""
+    experiments = measured.of("coupon")
+    if not experiments:
+        kinds = ", ".join(dict.fromkeys(e.kind for e in measured.experiments))
+        raise InputError(
+            f"there is no coupon among the experiments ({kinds})",
+            str(measured.folder),
+            'laws are fitted to experiments of kind = "coupon"',
+        )
+    modes = {str(e.mode) for e in experiments}
+    for mode in held_out_modes:
+        if mode not in modes:
+            raise InputError(
+                f"no coupon of mode {mode!r} is there to hold out",
+                "--hold-out",
+                f"modes: {', '.join(sorted(modes))}",
+            )
+    fitted: list[Coupon] = []
+    held: list[Coupon] = []
+    for e in experiments:
+        away = e.role == "held_out" or e.mode in held_out_modes
+        (held if away else fitted).append(Coupon.of(e))
+    if not fitted:
+        raise InputError("every coupon is held out", str(measured.folder), 'leave some with role = "fit"')
+    return tuple(fitted), tuple(held)
+
+
+def _inputs(measured: Measured, laws: Sequence[str], held_out: Sequence[str], weights: str) -> str:
+    lines = [HEADER, f"laws = {json.dumps(list(laws))}", f"held_out_modes = {json.dumps(list(held_out))}"]
+    lines += [f"weights = {json.dumps(weights)}", "", "[data]"]
+    for e in measured.of("coupon"):
+        lines.append(f"{json.dumps(e.name, ensure_ascii=False)} = {json.dumps([e.role, e.mode, e.sha256])}")
+    return "\n".join(lines) + "\n"
+
+
+def _unseen(one: Any, fitted: Sequence[Coupon], weights: str) -> dict[str, float]:
+    try:
+        return leave_one_mode_out(one, fitted, weights)
+    except InputError:
+        # Too few values are left for this law without one of the modes.
+        return {}
+
+
+def _compressibility(chosen: Fit, coupons: Sequence[Coupon]) -> float:
+    """How far kappa moves the stress at the end of the coupons' range, as a share of it."""
+    moved = []
+    for mode, (_, high) in ranges(coupons).items():
+        if high > 1:
+            at = np.array([high])
+            stiff = chosen.stress(mode, at)
+            moved.append(
+                abs(
+                    float(response(chosen.form.law, chosen.parameters, mode, at).stress_MPa[0] / stiff[0]) - 1
+                )
+            )
+    return max(moved, default=0.0)
+
+
+def _material(measured: Measured, fitted: Sequence[Coupon], choice: Choice) -> Material:
+    chosen = choice.chosen
+    specimens = dict.fromkeys(e.specimen for e in measured.of("coupon") if e.specimen)
+    sources = dict.fromkeys(e.source for e in measured.of("coupon") if e.source)
+    known = [p for p in chosen.intervals if p.low95 == p.low95]
+    names = ", ".join(c.name for c in fitted)
+    return Material(
+        name=", ".join(specimens) or measured.folder.resolve().name,
+        about="; ".join(sources),
+        values={},
+        points=(),
+        law=chosen.form.law,
+        parameters=chosen.parameters,
+        law_confidence="fitted",
+        law_source=f"{chosen.form.title}, fitted to {names} ({chosen.n} values, {chosen.weights} weights); "
+        f"kappa is not measured but of Poisson's ratio {POISSON:g}",
+        ranges=ranges(fitted),
+        fails=chosen.fails,
+        low95={p.name: p.low95 for p in known},
+        high95={p.name: p.high95 for p in known},
+    )
+
+
+def _write(found: Fitting, out: Path) -> None:
+    from .charts import mode_chart
+
+    write_material(found.material, out / "material.toml", "Fitted by fit-material; fit.toml names the data.")
+    names = [f.form.name for f in found.fits]
+    rows: list[list[Any]] = []
+    for group, role in ((found.fitted, "fit"), (found.held_out, "held_out")):
+        for c in group:
+            laws = [f.stress(c.mode, c.stretch) for f in found.fits]
+            for i, stretch in enumerate(c.stretch):
+                rows.append([c.name, c.mode, role, stretch, c.stress_MPa[i], *(s[i] for s in laws)])
+    columns = ["coupon", "mode", "role", "stretch", "stress_MPa", *(f"{name}_MPa" for name in names)]
+    write_csv(out / "fit.csv", columns, rows)
+    write_csv(
+        out / "parameters.csv",
+        ["law", "parameter", "value", "low95", "high95", "note"],
+        [[f.form.name, p.name, p.value, p.low95, p.high95, p.note] for f in found.fits for p in f.intervals],
+    )
+    write_csv(
+        out / "errors.csv",
+        ["law", "coupon", "mode", "role", "rms_MPa", "share", "worst"],
+        [
+            [f.form.name, e.coupon, e.mode, "fit" if e.fitted else "held_out", e.rms_MPa, e.share, e.worst]
+            for f in found.fits
+            for e in f.errors
+        ],
+    )
+    for mode in modes(found):
+        chart = mode_chart(mode, *tested(found, mode), found.fits, found.choice.chosen.form.name)
+        write_text(out / f"fit_{mode}.svg", chart)
+
+
+def modes(found: Fitting) -> list[str]:
+    """Modes that were tested, in the order of the coupons."""
+    return list(dict.fromkeys(c.mode for c in (*found.fitted, *found.held_out)))
+
+
+def tested(found: Fitting, mode: str) -> tuple[list[Coupon], list[Coupon]]:
+    """Coupons of a mode, fitted and held out."""
+    return [c for c in found.fitted if c.mode == mode], [c for c in found.held_out if c.mode == mode]
+
+
+def summary(found: Fitting) -> dict[str, Any]:
+    """Every figure of a fit in plain data."""
+    choice = found.choice
+    return {
+        "chosen": choice.chosen.form.name,
+        "tied": [f.form.name for f in choice.tied],
+        "chosen_by": choice.by,
+        "scores": dict(choice.scores),
+        "weights": found.weights,
+        "tolerance": TOLERANCE,
+        "compressibility": found.compressibility,
+        "laws": {
+            f.form.name: {
+                "parameters": {p.name: attrs.asdict(p) for p in f.intervals},
+                "stable": f.stable,
+                "unstable": f.instability(),
+                "fails": list(f.fails),
+                "errors": [attrs.asdict(e) for e in f.errors],
+                "unseen": found.unseen[f.form.name],
+                "memory": f.memory,
+                "n": f.n,
+                "n_effective": f.n_effective,
+            }
+            for f in found.fits
+        },
+        "untested": {
+            mode: {"stretch": stretch, "largest_over_smallest": ratio}
+            for mode, (stretch, ratio) in found.apart.items()
+        },
+        "remarks": [attrs.asdict(r) for r in found.measured.remarks],
+    }
+
+
+def answer(summary: Mapping[str, Any]) -> list[str]:
+    """What a fit found, in a few lines of text, of its `summary`."""
+    chosen = summary["chosen"]
+    law = summary["laws"][chosen]
+    values = ", ".join(f"{name} {p['value']:.4g}" for name, p in law["parameters"].items())
+    errors = ", ".join(f"{e['share']:.1%} in {e['coupon']}" for e in law["errors"])
+    lines = [f"law: {chosen}, {values}", f"off by {errors}"]
+    if summary["tied"]:
+        lines.append(f"as good: {', '.join(summary['tied'])}")
+    if law["fails"]:
+        lines.append(f"misses {', '.join(law['fails'])} by more than {summary['tolerance']:.0%}")
+    if summary["untested"]:
+        lines.append(f"not tested: {', '.join(summary['untested'])}")
+    return lines

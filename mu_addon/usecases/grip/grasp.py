@@ -1,0 +1,384 @@
+"""One finger of a gripper that closes on a cube, holds, lifts and releases it, with friction.
+
+Gripper and cube are symmetric about the middle plane, and the unit about x = 0: half of one finger and the
+rigid cube in the middle are the whole. The base is clamped: the plate's own give is left out, and so are the
+fingers' weight and the air between them. The gripper hangs, tips down: gravity pulls along +z.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...design.anchors import anchors
+from ...design.gripper import Gripper
+from ...errors import ConvergenceError, InputError
+from ...fem.equilibrium import Equilibrium, State
+from ...fem.kinematics import bending_angle_deg, probe
+from ...fem.loads import STANDARD_GRAVITY
+from ...fem.materials import Materials
+from ...fem.model import Model
+from ...fem.obstacle import CONTACT, Obstacle, outer_faces
+from ...fem.rigid import Box, Pose
+from ...fem.time_stepping import march
+from ...meshing.mesh import Mesh
+from .phases import Phases
+
+Array = np.ndarray[Any, Any]
+
+# Halves of fingers that touch one cube.
+HALVES = 4
+# A cube comes from so far below its place, in sides of its own.
+COMES_FROM = 1.5
+# The balance of weight and friction is found to this share of the weight, with so many tries.
+BALANCE = 1e-3
+MOST_SECANTS = 8
+# Steps in mm by which a cube is pulled out of the grasp, and how far at most.
+PULL_STEP_MM = 1.0
+PULL_MOST_MM = 10.0
+
+
+def _above(low: float, high: float, what: str, remedy: str) -> Any:
+    def check(_: object, field: attrs.Attribute[float], value: float) -> None:
+        if not low < value <= high:
+            raise InputError(f"{what} of {value:g}", field.name, f"{remedy}, above {low:g} to {high:g}")
+
+    return check
+
+
+@attrs.frozen
+class Cube:
+    """A rigid cube: its side in mm, and its density in g/ml.
+
+    The default is solid PLA: assumed, since the paper names neither material nor mass; a hollow print is
+    lighter.
+    """
+
+    side_mm: float = attrs.field(validator=_above(0.0, 200.0, "a cube with a side", "give mm"))
+    density_g_per_ml: float = attrs.field(default=1.24, validator=_above(0.0, 25.0, "a density", "give g/ml"))
+
+    @property
+    def mass_g(self) -> float:
+        """Mass of the whole cube."""
+        return self.density_g_per_ml * self.side_mm**3 / 1e3
+
+    @property
+    def weight_N(self) -> float:
+        """Weight of the whole cube."""
+        return self.mass_g * 1e-6 * STANDARD_GRAVITY
+
+
+@attrs.frozen
+class Grip:
+    """How fingers and cube meet.
+
+    friction: Coulomb's coefficient, assumed: dry elastomers on hard plastics mostly have 0.5 to 1 and above,
+    the cautious end is taken. beyond_mm: how far the cube's middle lies beyond the tips at rest, assumed: the
+    tips' edges then meet both cubes near the middle of their sides. pressure_MPa, depth_mm, stick_mm and
+    halvings: of the contact, see `Obstacle`. step_s: longest time between instants.
+    """
+
+    friction: float = 0.5
+    beyond_mm: float = 3.0
+    pressure_MPa: float = 0.02
+    depth_mm: float = 0.1
+    stick_mm: float = 0.1
+    halvings: int = 2
+    step_s: float = 0.5
+
+    def __attrs_post_init__(self) -> None:
+        if not 0.0 <= self.friction <= 5.0:
+            raise InputError(f"a friction coefficient of {self.friction:g}", "--friction", "give 0 to 5")
+        if not -50.0 <= self.beyond_mm <= 50.0:
+            raise InputError(f"a cube {self.beyond_mm:g} mm beyond the tips", "--beyond", "give -50 to 50 mm")
+        if not 0.0 < self.step_s <= 2.0:
+            raise InputError(f"instants {self.step_s:g} s apart", "step_s", "give a time up to 2 s")
+
+
+@attrs.frozen(eq=False)
+class Lift:
+    """A cube without support in the closed grasp.
+
+    held: whether friction carries the weight; sag_mm: how far it has sunk where it does, nan where it does
+    not. normal_N: of one finger on the cube, at the plateau. pull_mm (p,) and pull_N (p,): the force it takes
+    to pull the cube down so far, of both fingers together.
+    """
+
+    held: bool
+    sag_mm: float
+    weight_N: float
+    normal_N: float
+    friction: float
+    pull_mm: Array
+    pull_N: Array
+
+    @property
+    def capacity_N(self) -> float:
+        """The most that friction carries, found by pulling."""
+        return float(self.pull_N.max(initial=0.0))
+
+    @property
+    def margin(self) -> float:
+        """What friction can carry over the weight, by pulling."""
+        return self.capacity_N / self.weight_N
+
+    @property
+    def margin_by_rule(self) -> float:
+        """2 mu N over the weight, with N of one finger at the plateau."""
+        return 2.0 * self.friction * self.normal_N / self.weight_N
+
+
+@attrs.frozen(eq=False)
+class Grasp:
+    """A grasp of one cube at k instants; forces are those of one whole finger on the cube.
+
+    u (k, n, 3): displacement of the half mesh in mm; backbone (k, p, 3): the anchors, in the finger's frame;
+    cube_mm (k, 3): the cube's middle in that frame. normal_N (k,): toward the other finger; down_N (k,):
+    along +z, friction but for what edges press. sticking (k,): share of the touching area that does not
+    slide; slid_mm (k,): the farthest that a point has slid so far; deepest_mm (k,): the error of the gap;
+    lost_mJ (k,): what friction has taken, of one finger; volume_mm3 (k,): of its cavity.
+    """
+
+    cube: Cube
+    time_s: Array
+    pressure_kPa: Array
+    phase: tuple[str, ...]
+    angle_deg: Array
+    normal_N: Array
+    down_N: Array
+    area_mm2: Array
+    sticking: Array
+    slid_mm: Array
+    deepest_mm: Array
+    lost_mJ: Array
+    volume_mm3: Array
+    cube_mm: Array
+    backbone: Array
+    u: Array
+    lift: Lift
+
+    @property
+    def pressure_work_mJ(self) -> float:
+        """Work of the pressure on one finger over the whole cycle, by the trapezoidal rule."""
+        rise = np.diff(self.volume_mm3)
+        return float(((self.pressure_kPa[1:] + self.pressure_kPa[:-1]) / 2e3 * rise).sum())
+
+    @property
+    def cube_work_mJ(self) -> float:
+        """Work of the cube's way on one finger over the whole cycle, by the trapezoidal rule."""
+        way = np.diff(self.cube_mm[:, 2])
+        return -float(((self.down_N[1:] + self.down_N[:-1]) / 2.0 * way).sum())
+
+    def end(self, phase: str) -> int:
+        """Number of a phase's last instant."""
+        return max(i for i, name in enumerate(self.phase) if name == phase)
+
+
+def place_of(gripper: Gripper, grip: Grip) -> Array:
+    """The cube's middle (3,) in mm in a finger's frame, once it is between the tips."""
+    d = gripper.unit.dimensions
+    return np.array([0.0, gripper.axis_mm, d.height + grip.beyond_mm])
+
+
+def obstacle_of(gripper: Gripper, cube: Cube, grip: Grip, mesh: Mesh) -> Obstacle:
+    """The cube between the tips as an obstacle of a finger; raises InputError where it does not fit there."""
+    if cube.side_mm >= gripper.fingers.gap_mm:
+        raise InputError(
+            f"a cube of {cube.side_mm:g} mm does not fit between fingers {gripper.fingers.gap_mm:g} mm apart",
+            "--cube",
+            "choose a smaller cube, or a gripper with a wider gap",
+        )
+    return Obstacle(
+        mesh,
+        Box(np.zeros(3), np.full(3, cube.side_mm / 2.0)),
+        grip.pressure_MPa,
+        grip.depth_mm,
+        grip.halvings,
+        grip.friction,
+        grip.stick_mm,
+        pose=Pose(shift=place_of(gripper, grip)),
+        faces=_facing(gripper, mesh),
+    )
+
+
+def _facing(gripper: Gripper, mesh: Mesh) -> Array:
+    """Faces (f, 3 | 6) of a finger that can meet the cube: of its inner side and its tip."""
+    faces = outer_faces(mesh)
+    (_, inner), (_, tip) = gripper.unit.printed.bounds[1:]
+    y, z = mesh.nodes[faces[:, :3]][:, :, 1], mesh.nodes[faces[:, :3]][:, :, 2]
+    near = 1e-6 * tip
+    return faces[(y > inner - near).all(axis=1) | (z > tip - near).all(axis=1)]
+
+
+def grasp(
+    gripper: Gripper,
+    cube: Cube,
+    phases: Phases,
+    mesh: Mesh,
+    materials: Materials,
+    grip: Grip | None = None,
+    threads: int = 1,
+    on_instant: Callable[[float, str], None] = lambda share, words: None,
+) -> Grasp:
+    """Close a finger on a cube phase by phase, in time order, and lift the cube.
+
+    mesh and materials: of the gripper's unit, the half mesh. on_instant is told the share done. Raises
+    InputError for a cube that does not fit, ConvergenceError where an instant has no equilibrium.
+    """
+    grip = grip or Grip()
+    hand = _Hand(gripper, cube, phases, mesh, materials, grip, threads, on_instant)
+    return hand.work()
+
+
+class _Hand:
+    """A grasp under way: the finger, the cube, and where the cube is."""
+
+    def __init__(
+        self,
+        gripper: Gripper,
+        cube: Cube,
+        phases: Phases,
+        mesh: Mesh,
+        materials: Materials,
+        grip: Grip,
+        threads: int,
+        on_instant: Callable[[float, str], None],
+    ) -> None:
+        self.cube, self.grip, self.phases, self.mesh = cube, grip, phases, mesh
+        self.anchors = anchors(gripper.unit)
+        self.place = place_of(gripper, grip)
+        self.obstacle = obstacle_of(gripper, cube, grip, mesh)
+        self.obstacle.path = self.pose
+        model = Model(mesh, threads=threads)
+        model.obstacles = (self.obstacle,)
+        self.equilibrium = Equilibrium(model, materials, CONTACT)
+        self.time, self.pressure, self.phase = phases.sample(grip.step_s)
+        self.on_instant = on_instant
+        self.sunk = 0.0
+        self.lift: Lift | None = None
+        self.rows: list[tuple[float, ...]] = []
+        self.at: list[Array] = []
+
+    def pose(self, time_s: float) -> Pose:
+        """Where the cube is: it comes from below while the fingers open, and sinks as it is lifted.
+
+        One that friction cannot carry is not followed as it falls: it stays on its support.
+        """
+        begun, there = self.phases.span("i")
+        way = COMES_FROM * self.cube.side_mm
+        away = way * np.clip((there - time_s) / (there - begun), 0.0, 1.0)
+        start, end = self.phases.span("iv")
+        sinking = self.sunk * np.clip((time_s - start) / (end - start), 0.0, 1.0)
+        return Pose(shift=self.place + np.array([0.0, 0.0, away + sinking]))
+
+    def work(self) -> Grasp:
+        found = march(self.equilibrium, self.time, self.pressure, self._reached)
+        assert self.lift is not None
+        columns = np.array(self.rows).T
+        u = np.array([state.u for state in found.states])
+        points = self.anchors
+        monitor = probe(self.mesh, points)
+        return Grasp(
+            cube=self.cube,
+            time_s=self.time,
+            pressure_kPa=self.pressure,
+            phase=self.phase,
+            angle_deg=columns[0],
+            normal_N=columns[1],
+            down_N=columns[2],
+            area_mm2=columns[3],
+            sticking=columns[4],
+            slid_mm=columns[5],
+            deepest_mm=columns[6],
+            lost_mJ=columns[7],
+            volume_mm3=columns[8],
+            cube_mm=np.array(self.at),
+            backbone=np.array([points + monitor.displacement(one) for one in u]),
+            u=u,
+            lift=self.lift,
+        )
+
+    def _reached(self, state: State) -> None:
+        """Keep what an instant shows; at the end of holding, find out how the cube hangs."""
+        number = len(self.rows)
+        contact = self.obstacle.contact(state.u)
+        self.rows.append(
+            (
+                bending_angle_deg(self.mesh, state.u),
+                2.0 * float(contact.normal_N[1]),
+                2.0 * float(contact.force_N[2]),
+                2.0 * contact.area_mm2,
+                contact.sticking,
+                float(contact.slid_mm.max(initial=0.0)),
+                contact.deepest_mm,
+                2.0 * contact.lost_mJ,
+                2.0 * self.equilibrium.model.cavity_volume(state.u),
+            )
+        )
+        self.at.append(self.obstacle.pose.shift)
+        words = f"{self.phase[number]}, {self.pressure[number]:g} kPa"
+        self.on_instant((number + 1) / len(self.time), words + (", touching" if contact.area_mm2 else ""))
+        last_of_hold = max(i for i, name in enumerate(self.phase) if name == "iii")
+        if number == last_of_hold:
+            self.lift = lifted(self.equilibrium, self.obstacle, state, self.cube, self.grip.friction)
+            self.sunk = self.lift.sag_mm if self.lift.held else 0.0
+
+
+def lifted(equilibrium: Equilibrium, obstacle: Obstacle, state: State, cube: Cube, friction: float) -> Lift:
+    """How a cube hangs in a closed grasp once its support is gone: where friction balances its weight.
+
+    state: converged and committed. The cube is pulled down step by step, from one committed state to the
+    next, so that what slides stays slid, until what carries it grows no more or lets go; where that meets
+    the weight is then found within `BALANCE` of it. Leaves the obstacle as it was.
+    """
+    normal = 2.0 * float(obstacle.contact(state.u).normal_N[1])
+    if not obstacle.friction:
+        none = np.zeros(1)
+        return Lift(False, float("nan"), cube.weight_N, normal, friction, none, none)
+    pose, memories, states = obstacle.pose, [obstacle.memory], [state]
+
+    def carried(start: State, way: float) -> tuple[State, float]:
+        """The state with the cube so far down in mm, and the upward force on it in N."""
+        obstacle.pose = Pose(pose.rotation, pose.shift + np.array([0.0, 0.0, way]))
+        found = equilibrium.newton(start.u, state.pressure_MPa)
+        return found, -HALVES * float(obstacle.force_N(found.u)[2])
+
+    pulls = [(0.0, -HALVES * float(obstacle.force_N(state.u)[2]))]
+    try:
+        while pulls[-1][0] < PULL_MOST_MM - 1e-9 and not _fallen([force for _, force in pulls]):
+            way = pulls[-1][0] + PULL_STEP_MM
+            try:
+                found, force = carried(states[-1], way)
+            except ConvergenceError:
+                # The tips snap off the cube: what they carried until then is what they carry.
+                break
+            obstacle.commit(found.u)
+            pulls.append((way, force))
+            states.append(found)
+            memories.append(obstacle.memory)
+        number = next((k for k, (_, force) in enumerate(pulls) if force >= cube.weight_N), None)
+        sag = float("nan") if number is None else 0.0
+        if number:
+            (low, below), (high, above) = pulls[number - 1 : number + 1]
+            for _ in range(MOST_SECANTS):
+                sag = low + (cube.weight_N - below) * (high - low) / (above - below)
+                obstacle.recall(memories[number - 1])
+                force = carried(states[number - 1], sag)[1]
+                if abs(force - cube.weight_N) <= BALANCE * cube.weight_N:
+                    break
+                low, below, high, above = (
+                    (sag, force, high, above) if force < cube.weight_N else (low, below, sag, force)
+                )
+    finally:
+        obstacle.pose = pose
+        obstacle.recall(memories[0])
+    way, force = np.array(pulls).T
+    return Lift(number is not None, sag, cube.weight_N, normal, friction, way, force)
+
+
+def _fallen(force: list[float]) -> bool:
+    """Whether a force has passed its peak by more than what it wavers."""
+    return len(force) > 2 and force[-1] > 0 and force[-1] < 0.98 * max(force)

@@ -1,0 +1,79 @@
+"""A grasp's motion to look at and to play: a folder a cube.
+
+- motion/: one finger in its own frame, as `study.motion` has it, each instant a state of its own
+- finger.pvd and its .vtu files: the half mesh, for ParaView
+- gripper.npz: both fingers in the gripper's frame: `rest_mm` (2, v, 3), `triangles` (t, 3), `membrane` (t,),
+  whether a triangle is the membrane's; `time_s` (k,), `cube_mm` (k, 3), the cube's middle, `cube_side_mm`;
+  `placement` (2, 4, 4), from a finger's frame to the gripper's
+- left.pc2 and right.pc2: the vertices of `rest_mm` in motion, at even steps of time from 0 on
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...design.gripper import Gripper
+from ...fem.equilibrium import State
+from ...fem.materials import Materials
+from ...fem.trajectory import Trajectory
+from ...files import make_folder, write_npz
+from ...meshing.mesh import Mesh
+from ...report.pc2 import write_pc2
+from ...report.vtk import write_trajectory
+from ..simulate_and_place.motion import read_motion, write_model_a
+from .grasp import Grasp
+
+Array = np.ndarray[Any, Any]
+
+SIDES = ("left", "right")
+# Most even steps of time of a point cache.
+MOST_SAMPLES = 1001
+
+
+def write_grasp(folder: Path, gripper: Gripper, mesh: Mesh, materials: Materials, found: Grasp) -> None:
+    """Write a grasp's motion into `folder`. Raises OutputError."""
+    make_folder(folder)
+    states = tuple(State(p / 1e3, u) for p, u in zip(found.pressure_kPa, found.u, strict=True))
+    every = Trajectory(found.time_s, found.pressure_kPa, states, np.arange(len(states)))
+    write_model_a(folder, mesh, materials, every)
+    write_trajectory(folder / "finger.pvd", mesh, list(zip(found.time_s.tolist(), states, strict=True)))
+    motion = read_motion(folder)
+    skins = [motion.skin(region, cut=False) for region in ("membrane", "lattice")]
+    rest = np.concatenate([skin.of_nodes(mesh.nodes) for skin in skins])
+    moved = np.concatenate([skin.of_nodes(mesh.nodes + found.u) for skin in skins], axis=1)
+    counts = [len(skin.triangles) for skin in skins]
+    triangles = np.vstack([skins[0].triangles, skins[1].triangles + len(skins[0].node)])
+    time, samples = even(found.time_s, moved)
+    for side, (rotation, shift) in zip(SIDES, gripper.placements, strict=True):
+        write_pc2(
+            folder / f"{side}.pc2", samples @ rotation.T + shift, float(time[0]), float(time[1] - time[0])
+        )
+    placement = np.tile(np.eye(4), (2, 1, 1))
+    for matrix, (rotation, shift) in zip(placement, gripper.placements, strict=True):
+        matrix[:3, :3], matrix[:3, 3] = rotation, shift
+    write_npz(
+        folder / "gripper.npz",
+        {
+            "rest_mm": np.array([rest @ r.T + s for r, s in gripper.placements], np.float32),
+            "triangles": triangles.astype(np.int32),
+            "membrane": np.repeat([True, False], counts),
+            "time_s": found.time_s,
+            "cube_mm": found.cube_mm + gripper.placements[0][1],
+            "cube_side_mm": np.array(found.cube.side_mm),
+            "placement": placement,
+        },
+    )
+
+
+def even(time_s: Array, values: Array) -> tuple[Array, Array]:
+    """Times at even steps that meet the least step of `time_s` (k,), and values (k, ...) between linearly."""
+    step = float(np.diff(time_s).min())
+    count = min(MOST_SAMPLES, round(float(time_s[-1] - time_s[0]) / step) + 1)
+    time = np.linspace(time_s[0], time_s[-1], count)
+    place = np.interp(time, time_s, np.arange(len(time_s)))
+    first = np.minimum(place.astype(int), len(time_s) - 2)
+    share = (place - first).reshape(-1, *([1] * (values.ndim - 1)))
+    return time, (1 - share) * values[first] + share * values[first + 1]

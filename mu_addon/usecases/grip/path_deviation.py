@@ -1,0 +1,141 @@
+"""The paper's Table I for a finger of the gripper: how far each sensor path moves a finger that closes.
+
+On a cube the finger is stopped, and each path's unit is followed along its own path of equilibria. There is
+no friction here: with it a state depends on how it was reached, and the paths' differences, some tenths of a
+millimetre, would carry the error of its lagged bound.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...design.anchors import anchors, windows
+from ...design.assets import asset_root
+from ...design.gripper import Gripper
+from ...fem.equilibrium import Equilibrium
+from ...fem.kinematics import Probe, probe
+from ...fem.materials import Materials
+from ...fem.model import Model
+from ...fem.obstacle import CONTACT
+from ...fem.trajectory import Trajectory, simulate
+from ...meshing.mesh import Mesh
+from ...placement.batch import Sweep
+from ...placement.candidates import candidates, evaluation, moved_points, roi, with_sensor
+from ...placement.inclusion import sensor_share
+from ..simulate_and_place.job import grasp as grasp_protocol
+from .grasp import Cube, Grip, obstacle_of
+
+Array = np.ndarray[Any, Any]
+
+TABLE = "paper/table1_deviation_mm.csv"
+# Samples of the protocol and stations of the backbone, as `place` has them.
+TIMES, STATIONS = 13, 51
+
+
+@attrs.frozen(eq=False)
+class Column:
+    """J_hat in mm by path, under one inclusion rule; cube: what the finger closed on, None for nothing."""
+
+    rule: str
+    cube: Cube | None
+    J_hat_mm: dict[str, float]
+
+    @property
+    def chosen(self) -> str:
+        """The path that disturbs least."""
+        return min(self.J_hat_mm, key=lambda name: self.J_hat_mm[name])
+
+    def rank_correlation(self, other: dict[str, float]) -> float:
+        """Spearman's with another J by path, over the paths that both have; nan for fewer than three."""
+        from scipy.stats import spearmanr
+
+        both = [name for name in self.J_hat_mm if name in other]
+        if len(both) < 3:
+            return float("nan")
+        return float(spearmanr([self.J_hat_mm[n] for n in both], [other[n] for n in both]).statistic)
+
+
+@cache
+def printed_column(name: str = "gripper") -> dict[str, float]:
+    """A column of the paper's Table I in mm by path: "gripper", "scale_0.75", "scale_1.00", "scale_1.50"."""
+    lines = (asset_root() / TABLE).read_text(encoding="utf-8").splitlines()
+    rows = csv.DictReader(line for line in lines if not line.startswith("#"))
+    return {row["path"]: float(row[name]) for row in rows}
+
+
+def column(
+    gripper: Gripper,
+    mesh: Mesh,
+    materials: Materials,
+    rule: str,
+    cube: Cube | None,
+    grip: Grip | None = None,
+    threads: int = 1,
+    load: Callable[[str], Array | None] = lambda name: None,
+    store: Callable[[str, Array], None] = lambda name, moved: None,
+    on_path: Callable[[float, str], None] = lambda share, name: None,
+) -> Column:
+    """J_hat of every window's path against the finger without a sensor, through the grasp protocol.
+
+    `load` gives the monitored points (k, p, 3) in mm of a path's unit ("model_a" for none) that an earlier
+    run kept with `store`. Raises ConvergenceError where a unit has no equilibrium.
+    """
+    unit, grip = gripper.unit, grip or Grip()
+    points = anchors(unit)
+    monitored = (points, probe(mesh, points))
+    radius, sensor = unit.dimensions.inclusion_radius, unit.material.sensor_modulus_kPa / 1e3
+    time, pressure = grasp_protocol().sample(TIMES)
+    every = candidates(points, windows(len(points)))
+    shares = {c.name: sensor_share(rule, roi(mesh, c, radius)) for c in every}
+    model = Model(mesh, threads=threads)
+    if cube is not None:
+        model.obstacles = (obstacle_of(gripper, cube, attrs.evolve(grip, friction=0.0), mesh),)
+
+    known = {name: moved for name in ("model_a", *shares) if (moved := load(name)) is not None}
+
+    def alone(name: str, own: Materials) -> Array:
+        """The monitored points of one unit along its own path."""
+        if name not in known:
+            settings = None if cube is None else CONTACT
+            found = simulate(Equilibrium(model, own, settings), time, pressure)
+            known[name] = moved_points(monitored, found)
+            store(name, known[name])
+        return known[name]
+
+    if cube is None and len(known) <= len(shares):
+        base = simulate(Equilibrium(model, materials), time, pressure)
+        known["model_a"] = moved_points(monitored, base)
+        known |= _together(model, materials, monitored, base, shares, sensor)
+        for name, moved in known.items():
+            store(name, moved)
+    still = alone("model_a", materials)
+    on_path(1.0 / (len(every) + 1), "no sensor")
+    J = {}
+    for number, candidate in enumerate(every, 2):
+        name = candidate.name
+        moved = alone(name, with_sensor(materials, shares[name], sensor))
+        J[name] = evaluation(mesh, candidate, rule, radius, moved, still, STATIONS).deviation.J_hat
+        on_path(number / (len(every) + 1), name)
+    return Column(rule, cube, J)
+
+
+def _together(
+    model: Model,
+    materials: Materials,
+    monitored: tuple[Array, Probe],
+    base: Trajectory,
+    shares: dict[str, Array],
+    sensor_MPa: float,
+) -> dict[str, Array]:
+    """Monitored points (k, p, 3) in mm of every path's unit, from Model A's states and on one factor."""
+    points, _ = monitored
+    sweep = Sweep(model, materials, monitored, list(shares.values()), sensor_MPa)
+    at_rest = np.broadcast_to(points, (len(shares), *points.shape))
+    moved = np.array([sweep.at(s) if s.pressure_MPa else at_rest for s in base.states])
+    return {name: base.of_time(moved[:, i]) for i, name in enumerate(shares)}

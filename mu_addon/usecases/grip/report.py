@@ -1,0 +1,266 @@
+"""The report of a gripper: the part, its grasps, its light, its table of paths, and what was assumed."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+import attrs
+import numpy as np
+
+from ...design.gripper import SECTIONS
+from ...design.quantity import describe
+from ...files import write_bytes, write_text
+from ...report.charts import label, signed
+from ...report.html import cards, facts_table, figure, note, page, picture_figure, table
+from ...report.results import Picture
+from ..simulate_and_place.report_data import package_versions
+from . import charts as pictures
+from .path_deviation import printed_column
+from .phases import MEANING
+
+if TYPE_CHECKING:
+    from .run import Gripping
+
+FILES = {
+    "grip.toml": "inputs of this run",
+    "gripper.toml": "the gripper, beside its unit.toml",
+    "protocol.csv": "pressure and phases",
+    "gripper.stl": "the printable part, mm",
+    "gripper.3mf": "the same as 3MF",
+    "grasp_SIDE.csv": "every instant of the grasp of a cube",
+    "pull_SIDE.csv": "what friction carries as the cube is pulled down",
+    "cube-SIDE": "its motion: finger.pvd (ParaView), motion/, gripper.npz, left.pc2, right.pc2 (Blender)",
+    "deviation.csv": "deviation of every sensor path",
+    "summary.json": "every figure of this run",
+    "log.ndjson": "what was said while it ran",
+}
+
+
+def publish(run: Gripping, stopped: str = "") -> None:
+    """Write the pictures and report.html; `stopped` says why a run that is not complete stopped."""
+    if run.solid is None:
+        return
+    with run.progress.stage("report", expected_s=20.0):
+        versions = run.ending.summary["versions"] = package_versions()
+        part = pictures.part_picture(run.job.gripper, run.solid)
+        write_bytes(run.folder / "gripper.png", part.png)
+        frames: dict[float, list[Picture]] = {}
+        for side, found in run.grasps.items():
+            assert run.mesh is not None
+            frames[side] = pictures.frames(run.job.gripper, run.mesh, found)
+            for name, picture in zip(MEANING, frames[side], strict=True):
+                write_bytes(run.folder / f"frame_{side:g}_{name}.png", picture.png)
+        write_text(run.folder / "report.html", report(run, part, frames, versions, stopped))
+
+
+def report(
+    run: Gripping,
+    part: Picture,
+    frames: dict[float, list[Picture]],
+    versions: dict[str, str],
+    stopped: str = "",
+) -> str:
+    """The whole report as HTML text, as far as the run came."""
+    warnings = list(run.warnings)
+    if stopped:
+        warnings.insert(0, f"This run is partial: {stopped}. What is missing was not reached.")
+    job = run.job
+    sections = [
+        ("frames", "The grasp, phase by phase", _frames(run, frames)),
+        ("force", "Forces", _forces(run)),
+        ("lift", "Lifting", _lift(run)),
+        ("light", "Light of the waveguides", _light(run)),
+        ("paths", "Sensor paths of a finger that closes", _paths(run)),
+        ("assumed", "What was assumed", _assumed(run)),
+        ("files", "Files of this run", facts_table("file", "what it holds", FILES)),
+        ("versions", "Versions", facts_table("program", "version", versions)),
+    ]
+    gap = job.gripper.fingers.gap_mm
+    subtitle = f"Two {job.gripper.unit.name} {gap:g} mm apart, {label(job.gripper.path)} in each"
+    lead = f'<div class="lead"><div>{_answer(run)}</div>{picture_figure(part)}</div>'
+    return page(f"Gripper: {job.gripper.name}", subtitle, note(warnings), lead, sections)
+
+
+def _answer(run: Gripping) -> str:
+    summary = run.ending.summary
+    x, y, z = summary["size_mm"]
+    facts = [
+        ("part", f"{x:g} x {y:g} x {z:.4g} mm"),
+        ("resin", f"{summary['gates']['volume_mm3'] / 1e3:.3g} ml"),
+    ]
+    sentences = []
+    for side, found in run.grasps.items():
+        hold, lift = found.end("iii"), found.lift
+        facts.append((f"{side:g} mm, plateau", f"{found.angle_deg[hold]:.1f}°, {found.normal_N[hold]:.2f} N"))
+        sentences.append(
+            f"It lifts the cube of {side:g} mm: friction carries {lift.margin:.1f} times its weight."
+            if lift.held
+            else f"It drops the cube of {side:g} mm: friction carries {lift.capacity_N:.2g} N of "
+            f"{lift.weight_N:.2g} N."
+        )
+    words = " ".join(sentences) or "The printable part passed its gates."
+    return f'<p class="answer">{escape(words)}</p>{cards(facts)}'
+
+
+def _frames(run: Gripping, frames: dict[float, list[Picture]]) -> str:
+    if not frames:
+        return ""
+    meaning = "; ".join(f"{name}: {words}" for name, words in MEANING.items())
+    html = f"<p>{escape(meaning)}. The gripper hangs, tips down; fingers are cut open.</p>"
+    for side, every in frames.items():
+        html += f"<h3>Cube of {side:g} mm</h3>"
+        html += f'<div class="many">{"".join(picture_figure(picture) for picture in every)}</div>'
+    shapes = pictures.shapes(run.job.gripper, run.grasps)
+    return html + figure(shapes, "The anchors' lines; thin: the cubes.", "shapes of the fingers", "chart")
+
+
+def _forces(run: Gripping) -> str:
+    if not run.grasps:
+        return ""
+    charts = [
+        ("normal force of a finger [N]", {s: g.normal_N for s, g in run.grasps.items()}),
+        ("force of a finger along z, down [N]", {s: g.down_N for s, g in run.grasps.items()}),
+        ("bending angle [deg]", {s: g.angle_deg for s, g in run.grasps.items()}),
+    ]
+    html = "".join(
+        figure(pictures.over_time(run.grasps, values, words), "", words, "chart") for words, values in charts
+    )
+    head = [("cube [mm]", ""), ("phase", ""), ("kPa", "n"), ("angle [deg]", "n"), ("normal [N]", "n")]
+    head += [("down [N]", "n"), ("sticking [%]", "n"), ("slid [mm]", "n"), ("gap error [mm]", "n")]
+    rows = []
+    for side, g in run.grasps.items():
+        for name in MEANING:
+            k = g.end(name)
+            cells = [f"{side:g}", f"{name}, end", f"{g.pressure_kPa[k]:g}", f"{g.angle_deg[k]:.1f}"]
+            cells += [f"{g.normal_N[k]:.3f}", f"{g.down_N[k]:.3f}"]
+            touching = g.area_mm2[k] > 0
+            cells += [f"{100 * g.sticking[k]:.0f}" if touching else "", f"{g.slid_mm[k]:.2f}"]
+            rows.append(([*map(signed, cells), f"{g.deepest_mm[k]:.2f}"], False))
+    words = (
+        "Of one whole finger. Slid: the farthest that any point has slid so far, over all contacts. Gap "
+        "error: how deep the finger is in the cube at most, the penalty's price."
+    )
+    return f'<div class="pair">{html}</div>' + table(words, head, rows)
+
+
+def _lift(run: Gripping) -> str:
+    if not run.grasps:
+        return ""
+    words = (
+        "As a finger closes it also grows longer, and drags the cube down: on its support the cube is "
+        "pressed, not hung. The gripper must rise by some millimetres, the tips lagging behind, until "
+        "friction has turned round and carries the weight; then the cube leaves its support."
+    )
+    head = [("cube [mm]", ""), ("mass [g]", "n"), ("weight [N]", "n"), ("held", ""), ("rise [mm]", "n")]
+    head += [("most friction carries [N]", "n"), ("over the weight", "n"), ("2 mu N over the weight", "n")]
+    rows = []
+    for side, g in run.grasps.items():
+        f = g.lift
+        rise = f"{f.sag_mm:.2f}" if f.held else ""
+        cells = [f"{side:g}", f"{g.cube.mass_g:.1f}", f"{f.weight_N:.3f}", "yes" if f.held else "no", rise]
+        rows.append(([*cells, f"{f.capacity_N:.3f}", f"{f.margin:.1f}", f"{f.margin_by_rule:.1f}"], False))
+    chart = figure(
+        pictures.pulling(run.grasps), "Dots: where the weight is carried.", "force against way", "chart"
+    )
+    return f"<p>{escape(words)}</p>{chart}" + table("", head, rows)
+
+
+def _light(run: Gripping) -> str:
+    if not run.signals:
+        return ""
+    values = {side: 100.0 * signal.delta for side, signal in run.signals.items()}
+    chart = pictures.over_time(run.grasps, values, "light lost, ΔV/Vf [%]")
+    at_hold, error = {}, {}
+    for side, signal in run.signals.items():
+        k = run.grasps[side].end("iii")
+        at_hold[side] = 100.0 * float(signal.delta[k])
+        error[side] = 100.0 * float(signal.errors[k] * signal.transmitted[k]) / signal.at_rest
+    each = "; ".join(signed(f"{s:g} mm: {v:.1f} ± {error[s]:.1f} %") for s, v in sorted(at_hold.items()))
+    words = f"At the plateau: {each}."
+    if len(at_hold) > 1:
+        small, large = min(at_hold), max(at_hold)
+        more = abs(at_hold[small]) - abs(at_hold[large])
+        compared = "as much as" if abs(more) < 2.0 * np.hypot(error[small], error[large]) else "more than"
+        if compared == "more than" and more < 0:
+            compared = "less than"
+        words += (
+            f" Within what the rays can tell, the cube of {small:g} mm changes the light {compared} that of "
+            f"{large:g} mm; the paper measured more for the smaller one"
+            f"{'.' if compared == 'more than' else ', which this model misses.'}"
+        )
+    about = (
+        "By rays through the bent bar of the chosen path. Lost is positive, of the light at rest. Both "
+        "fingers are equal here, and so are their signals. The resin's optics are assumed, since nobody has "
+        "published them."
+    )
+    return f"<p>{escape(words)}</p><p>{escape(about)}</p>" + figure(
+        chart, "", "light over the phases", "chart"
+    )
+
+
+def _paths(run: Gripping) -> str:
+    if not run.columns:
+        return ""
+    printed = printed_column()
+    names = list(run.columns[0].J_hat_mm)
+    head = [("path", ""), ("paper", "n")]
+    groups = [("", 2)]
+    for rule in dict.fromkeys(c.rule for c in run.columns):
+        own = [c for c in run.columns if c.rule == rule]
+        groups.append((rule, len(own)))
+        head += [("on nothing" if c.cube is None else f"on {c.cube.side_mm:g} mm", "n") for c in own]
+    rows = [
+        (
+            [label(name), f"{printed[name]:.3f}" if name in printed else ""]
+            + [f"{c.J_hat_mm[name]:.3f}" for c in run.columns],
+            False,
+        )
+        for name in names
+    ]
+    best = min(printed, key=lambda name: printed[name])
+    rows.append((["least", label(best), *(label(c.chosen) for c in run.columns)], True))
+    rows.append(
+        (["rank correlation", "", *(f"{c.rank_correlation(printed):.2f}" for c in run.columns)], True)
+    )
+    rules = [c.rule for c in run.columns]
+    headline = "volume_fraction" if "volume_fraction" in rules else rules[0]
+    chart = pictures.against_paper([c for c in run.columns if c.rule == headline], printed)
+    words = (
+        "Mean deviation in mm of the backbone from that of a finger without a sensor, through the grasp "
+        "protocol (13 samples, −20 to 40 kPa); contact without friction, each path followed on its own."
+    )
+    caption = f"Inclusion rule {headline}."
+    return (
+        f"<p>{escape(words)}</p>{figure(chart, caption, 'deviation here against the paper', 'chart')}"
+        + table(
+            "J in mm, and Spearman's rank correlation with the paper's gripper column", head, rows, groups
+        )
+    )
+
+
+def _assumed(run: Gripping) -> str:
+    gripper, grip = run.job.gripper, run.job.grip
+    head = [("parameter", ""), ("value", "n"), ("unit", ""), ("why", "text")]
+    rows = []
+    for section in SECTIONS:
+        values = getattr(gripper, section.section)
+        for d in describe(section):
+            why = d.source.removeprefix("assumed: ")
+            rows.append(([f"{section.section}.{d.name}", f"{getattr(values, d.name):g}", d.unit, why], False))
+    reason = {
+        "friction": "published coefficients of dry elastomers on hard plastics are mostly 0.5 to 1 and above",
+        "beyond_mm": "how far the cube's middle lies beyond the tips: their edges meet it near its middle",
+        "pressure_MPa": "contact: at this pressure",
+        "depth_mm": "it gives way so far",
+        "stick_mm": "and slips so far before it slides",
+        "halvings": "of the faces' sides, for the contact's points",
+        "step_s": "longest time between instants",
+    }
+    for name, value in attrs.asdict(grip).items():
+        rows.append(([f"grip.{name}", f"{value:g}", "", reason[name]], False))
+    words = (
+        "The paper prints no size of its gripper, no pressure of its grasp beyond 0, −20 and 40 kPa, and no "
+        "mass of its cubes. The plate is clamped, the fingers' own weight left out, both fingers are equal."
+    )
+    return f"<p>{escape(words)}</p>" + table("", head, rows)

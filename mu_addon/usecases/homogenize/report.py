@@ -1,0 +1,243 @@
+"""The report of a homogenisation: what the lattice amounts to, how it was found, and how far to trust it."""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+
+from ...files import write_bytes, write_text
+from ...homogenize.modulus import DEFAULT, moduli
+from ...report.html import cards, facts_table, figure, note, page, picture_figure, table
+from ...report.results import Picture
+from ...report.unit_pictures import skin
+from ..simulate_and_place.report_data import package_versions
+from . import charts as pictures
+from .charts import Line, kPa
+from .run import Homogenisation
+
+FILES = {
+    "homogenize.toml": "inputs of this run",
+    "unit.toml": "parameters of the unit",
+    "effective.toml": "moduli and the lattice's law: `place --lattice effective.toml` takes it",
+    "tensor.csv": "effective elasticity, kPa, in Voigt's order with engineering shears",
+    "cell.csv": "the endless lattice pulled and pressed along an axis",
+    "cell.vtu": "analysis mesh of an eighth of a cell (ParaView)",
+    "specimen.stl": "printable block of cells, nominal size, mm",
+    "specimen_slide.csv": "the block between plates that let it slide",
+    "specimen_stick.csv": "the block between plates that hold it",
+    "summary.json": "every figure of this run",
+    "log.ndjson": "what was said while it ran",
+}
+FRICTION = {"slide": "plates that slide", "stick": "plates that hold"}
+
+
+def publish(study: Homogenisation, stopped: str = "") -> None:
+    """Write the pictures and report.html; `stopped` says why a run that is not complete stopped."""
+    with study.progress.stage("report", expected_s=15.0):
+        versions = package_versions()
+        study.ending.summary["versions"] = versions
+        write_text(study.folder / "report.html", report(study, versions, stopped))
+
+
+def report(study: Homogenisation, versions: dict[str, str], stopped: str = "") -> str:
+    """The whole report as HTML text, as far as the run came."""
+    cell = study.job.cell
+    warnings = list(study.warnings)
+    if stopped:
+        warnings.insert(0, f"This run is partial: {stopped}. What is missing was not reached.")
+    sections = [
+        ("cell", "The cell and its moduli", _moduli(study)),
+        ("test", "A block between plates", _test(study)),
+        ("law", "The law for the analysis mesh", _law(study)),
+        ("inputs", "What went in", _inputs(study)),
+        ("files", "Files of this run", facts_table("file", "what it holds", _files(study))),
+        ("versions", "Versions", facts_table("program", "version", versions)),
+    ]
+    title = f"From struts to moduli: the lattice of {study.job.unit.name}"
+    subtitle = (
+        f"Cell of {cell.size_mm:g} mm, {cell.kind.name}, struts of {2 * cell.junction_radius_mm:g} to "
+        f"{2 * cell.midspan_radius_mm:g} mm, resin of {kPa(1e3 * study.job.resin.modulus_MPa)}"
+    )
+    return page(title, subtitle, note(warnings), _answer(study), sections)
+
+
+def _answer(study: Homogenisation) -> str:
+    e = study.elasticity
+    if e is None:
+        return ""
+    html = (
+        f'<p class="answer">Along its axes this lattice has a Young\'s modulus of <strong>'
+        f"{kPa(1e3 * e.E100)}</strong>; along its struts it is {e.E111 / e.E100:.1f} times as stiff.</p>"
+    )
+    measured = study.job.unit.material.lattice_modulus_kPa
+    sentences = []
+    if study.tests:
+        values = {f: 1e3 * moduli(t.curve).get(DEFAULT, np.nan) for f, t in study.tests.items()}
+        said = " and ".join(f"{kPa(v)} between {FRICTION[f]}" for f, v in values.items())
+        n = study.job.cells
+        sentences.append(f"A block of {n} x {n} x {n} cells has {said} ({DEFAULT} of strain).")
+    ratio = measured / (1e3 * e.E100)
+    sentences.append(
+        f"The unit's parameters say {kPa(measured)}, {ratio:.2g} times the prediction: "
+        + (
+            "they agree within a tenth."
+            if 0.9 < ratio < 1.1
+            else "resin, print offset or strut diameters differ from what is assumed here. Weighing the "
+            "specimen tells which: see the mass below."
+        )
+    )
+    facts = [
+        ("relative density", f"{e.relative_density:.1%}"),
+        (f"mass of {study.job.cells}³ cells", f"{study.ending.summary['specimen_mass_g']:.3g} g"),
+        ("E along an axis", kPa(1e3 * e.E100)),
+        ("E along a strut", kPa(1e3 * e.E111)),
+        ("Poisson's ratio", f"{e.nu100:.3f}"),
+        ("Zener's ratio", f"{e.zener:.2f}"),
+    ]
+    return html + f"<p>{escape(' '.join(sentences))}</p>" + cards(facts)
+
+
+def _moduli(study: Homogenisation) -> str:
+    e, mesh = study.elasticity, study.mesh
+    if e is None or mesh is None:
+        return ""
+    faces = skin(mesh.tets)
+    made = {
+        "cell.png": pictures.cell_picture(mesh.nodes, faces, study.job.cell.size_mm, e.relative_density),
+        "modulus.png": pictures.modulus_surface(e.C),
+    }
+    for name, picture in made.items():
+        write_bytes(study.folder / name, picture.png)
+    shown = "".join(picture_figure(picture) for picture in made.values())
+    names = ("xx", "yy", "zz", "yz", "xz", "xy")
+    rows = [
+        ([a, *(f"{1e3 * c:.4g}" if c else "0" for c in row)], False)
+        for a, row in zip(names, e.C, strict=True)
+    ]
+    return (
+        f'<div class="pair">{shown}</div>'
+        + table(
+            "Effective elasticity of the endless lattice, kPa.", [("", ""), *((n, "n") for n in names)], rows
+        )
+        + f"<p>A cubic tensor has three constants; this one is cubic to {e.cubic_error:.2%}, which is the "
+        "mesh's noise unless the print's offset differs along z.</p>"
+    )
+
+
+def _test(study: Homogenisation) -> str:
+    if not study.tests:
+        return ""
+    lines = []
+    rows = []
+    for friction, found in study.tests.items():
+        curve = found.curve
+        side = curve.stretch <= 1
+        lines.append(
+            Line(
+                FRICTION[friction],
+                -curve.strain[side][::-1],
+                -1e3 * curve.stress_MPa[side][::-1],
+                found.valid_to_strain,
+            )
+        )
+        for procedure, value in moduli(curve).items():
+            needs = {"slope 0-40 %": 0.4, "secant at 40 %": 0.4, DEFAULT: 0.1}.get(procedure, 0.0)
+            beyond = "beyond its validity" if needs > found.valid_to_strain + 1e-9 else ""
+            rows.append(([procedure, FRICTION[friction], f"{1e3 * value:.3g}", beyond], procedure == DEFAULT))
+    if study.stretched is not None:
+        curve = study.stretched.curve
+        side = curve.stretch <= 1
+        lines.append(Line("endless lattice", -curve.strain[side][::-1], -1e3 * curve.stress_MPa[side][::-1]))
+    chart = figure(
+        pictures.compression_chart(lines),
+        "Nominal stress of the block and of the endless lattice. Dot: the curve stops being valid, for the "
+        "reason below; what is beyond it (dotted) is not what a test would show.",
+        "Nominal stress against compression.",
+    )
+    words = "".join(f"<p>Between {FRICTION[f]}: {escape(t.why)}.</p>" for f, t in study.tests.items())
+    moduli_table = table(
+        "Modulus by procedure; the paper prints none, and the marked one stands for it here.",
+        [("procedure", ""), ("plates", ""), ("modulus [kPa]", "n"), ("", "")],
+        rows,
+    )
+    shown = "".join(picture_figure(p) for p in _specimen_pictures(study))
+    n = study.job.cells
+    return (
+        f"<p>{n} x {n} x {n} cells, cut flat, between two rigid plates. Real plates lie between the two "
+        "bounds: without friction, and holding fast.</p>"
+        f'<div class="pair"><div>{chart}</div><div>{moduli_table}</div></div>{words}'
+        f'<div class="triple">{shown}</div>'
+    )
+
+
+def _specimen_pictures(study: Homogenisation) -> list[Picture]:
+    found = study.tests.get("stick") or next(iter(study.tests.values()))
+    mesh = found.specimen.mesh
+    last = found.states[-1]
+    middle = min(found.states, key=lambda s: abs(s.strain - last.strain / 2))
+    states = [(s.strain, s.u) for s in (found.states[0], middle, last)]
+    made = pictures.specimen_pictures(mesh.nodes, skin(mesh.tets), states, np.zeros(3))
+    for (strain, _), picture in zip(states, made, strict=True):
+        write_bytes(study.folder / f"specimen_{100 * strain:.0f}.png", picture.png)
+    return made
+
+
+def _law(study: Homogenisation) -> str:
+    if study.fit is None or study.stretched is None:
+        return ""
+    fit = study.fit
+    low, high = fit.stretch
+    along = np.linspace(low, high, 121)
+    stress, lateral = fit.uniaxial(along)
+    law = {"strain": along - 1, "stress_kPa": 1e3 * stress, "lateral": lateral}
+    charts = pictures.stretch_charts(study.stretched.curve, law)
+    shown = "".join(
+        figure(chart, caption, caption)
+        for chart, caption in zip(
+            charts,
+            (
+                "Stress along an axis.",
+                "Stretch of the sides: a foam law cannot follow the struts' kinematics.",
+            ),
+            strict=True,
+        )
+    )
+    rows = [
+        (["E along an axis [kPa]", f"{1e3 * fit.cell_E_MPa:.4g}", f"{1e3 * fit.E_MPa:.4g}"], False),
+        (["Poisson's ratio", f"{fit.cell_poisson:.3f}", f"{fit.poisson:.3f}"], False),
+        (["C44 [kPa]", f"{1e3 * fit.cell_C44_MPa:.4g}", f"{1e3 * fit.C44_MPa:.4g}"], False),
+    ]
+    m = fit.misfit
+    return (
+        "<p>Compressible foam, tension and compression apart, side by side with a cubic shear that brings "
+        "the shear modulus up to the cell's. It stands for the lattice between stretches of "
+        f"{low:g} and {high:g} along the axes; misfit (root mean square) {m.tension:.1%} of the largest "
+        f"stress in tension, {m.compression:.1%} in compression, {m.lateral:.0%} of the largest lateral "
+        "strain.</p>"
+        f'<div class="pair">{shown}</div>'
+        + table("At small strain.", [("", ""), ("cell", "n"), ("law", "n")], rows)
+    )
+
+
+def _inputs(study: Homogenisation) -> str:
+    cell, resin = study.job.cell, study.job.resin
+    facts = {
+        "lattice": cell.kind.name,
+        "cell [mm]": cell.size_mm,
+        "strut at a junction [mm]": 2 * cell.junction_radius_mm,
+        "strut at mid-span [mm]": 2 * cell.midspan_radius_mm,
+        "print offset in the plane [mm]": cell.offset_xy_mm,
+        "print offset along z [mm]": cell.offset_z_mm,
+        "skin's depth [mm]": cell.skin_depth_mm,
+        "skin's modulus over the core's": cell.skin_factor,
+        "resin": resin.name,
+        "resin's Young's modulus [kPa]": 1e3 * resin.modulus_MPa,
+        "resin's Poisson's ratio": resin.poisson,
+        "resin's density [g/ml]": resin.density_g_per_ml,
+    } | {f"mesh: {k}": v for k, v in study.ending.summary.get("mesh", {}).items()}
+    return facts_table("input", "value", facts)
+
+
+def _files(study: Homogenisation) -> dict[str, str]:
+    return {name: what for name, what in FILES.items() if (study.folder / name).exists()}

@@ -1,0 +1,270 @@
+"""What a sweep is asked to do: sweep.toml, and its points."""
+
+from __future__ import annotations
+
+import itertools
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...design.parameters import Unit, load_preset, read_unit, to_toml
+from ...design.toml_text import nearest
+from ...errors import InputError, MuError
+from ...fem.protocol import Protocol
+from ..simulate_and_place.job import OF_FILES, Job, job_with, protocol_of, protocol_text
+from ..simulate_and_place.study_file import FILES, STAGES, table_lines, toml_value
+from .sampling import METHODS, sample
+from .variable import FILE, Inputs, Variable, put, variable
+
+Array = np.ndarray[Any, Any]
+
+HEADER = "# The inputs of this sweep; unit.toml and protocol.csv beside it belong to them."
+FORMAT = 1
+MOST_POINTS = 100_000
+_KEYS = (
+    "format", "preset", "unit", "protocol", "resin", "stages", "method", "points", "seed", "memory_MB",
+    "minutes", "minimize", "maximize", "vary", *STAGES,
+)  # fmt: skip
+
+
+@attrs.frozen
+class Point:
+    """One study of a sweep: its number from 1, what was varied, and its job, or why there is none."""
+
+    number: int
+    values: Mapping[str, Any]
+    job: Job | None
+    error: MuError | None = None
+
+
+@attrs.frozen
+class Plan:
+    """A sweep: the study that is varied, its variables, and how its points are chosen.
+
+    folder: where sweep.toml lies, and the files that it names. memory_MB, minutes: what one study may take.
+    minimize, maximize: columns of the table that Pareto fronts are drawn of.
+    """
+
+    inputs: Inputs
+    variables: tuple[Variable, ...]
+    folder: Path
+    method: str = "sobol"
+    count: int = 16
+    seed: int = 0
+    memory_MB: int = 4000
+    minutes: float = 60.0
+    resin: str = "elastic-50a-v1"
+    minimize: tuple[str, ...] = ()
+    maximize: tuple[str, ...] = ()
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """What is run of every study."""
+        return tuple(self.inputs.tables)
+
+    @property
+    def size(self) -> int:
+        """Number of points: a grid's is its levels'."""
+        if self.method != "grid":
+            return self.count
+        return int(np.prod([len(v.levels) for v in self.variables]))
+
+    def values(
+        self, before: Array | None = None, count: int | None = None
+    ) -> tuple[list[dict[str, Any]], Array]:
+        """What each point varies, and places (n, d) in the unit cube; `before` are an earlier plan's."""
+        if self.method == "grid":
+            grid = itertools.product(*(v.levels for v in self.variables))
+            names = [v.name for v in self.variables]
+            return [dict(zip(names, row, strict=True)) for row in grid], np.empty((0, len(names)))
+        places = sample(self.method, count or self.count, len(self.variables), self.seed, before)
+        rows = [
+            {v.name: v.at(u) for v, u in zip(self.variables, row, strict=True)} for row in places.tolist()
+        ]
+        return rows, places
+
+    def points(self, rows: list[dict[str, Any]]) -> list[Point]:
+        """The study of every row; one that breaks a rule is a point that has failed already."""
+        found = []
+        for number, values in enumerate(rows, 1):
+            try:
+                with_them = put(self.inputs, values, self.folder)
+                job = job_with(
+                    with_them.tables, "[vary]", unit=with_them.unit, protocol=with_them.protocol, workers=1
+                )
+                found.append(Point(number, values, job))
+            except MuError as error:
+                found.append(Point(number, values, None, error))
+        return found
+
+    def texts(self) -> dict[str, str]:
+        """Text of every file of inputs, by name; not how many points, since more may be added."""
+        head = {
+            "format": FORMAT,
+            "method": self.method,
+            "seed": self.seed,
+            "memory_MB": self.memory_MB,
+            "minutes": self.minutes,
+            "resin": self.resin,
+            "minimize": self.minimize,
+            "maximize": self.maximize,
+        }
+        lines = [HEADER, *(f"{key} = {toml_value(value)}" for key, value in head.items())]
+        for stage, table in self.inputs.tables.items():
+            lines += table_lines(stage, table)
+        lines += ["", "[vary]", *(f'"{v.name}" = {toml_value(v.table)}' for v in self.variables)]
+        return {
+            "sweep.toml": "\n".join(lines) + "\n",
+            "unit.toml": to_toml(self.inputs.unit),
+            "protocol.csv": protocol_text(self.inputs.protocol),
+        }
+
+
+def read_plan(path: Path) -> Plan:
+    """The sweep of a TOML file; raises InputError."""
+    where = str(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise InputError(
+            f"cannot read the sweep: {error.strerror}", where, "give the path of a TOML file"
+        ) from error
+    except UnicodeDecodeError as error:
+        raise InputError("this is not UTF-8 text", where, "save it as UTF-8") from error
+    return parse_plan(text, path.parent, where)
+
+
+def parse_plan(text: str, folder: Path, where: str = "sweep.toml") -> Plan:
+    """The sweep of TOML text; folder: where the files lie that it names. Raises InputError."""
+    try:
+        document = tomllib.loads(text)
+    # Thousands of nested brackets exhaust the parser's stack.
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"this is not TOML: {error}", where, "correct that line") from error
+    for key in document:
+        if key not in _KEYS:
+            raise InputError(f"unknown key {key!r}{nearest(key, _KEYS)}", where, f"known: {', '.join(_KEYS)}")
+    if document.get("format") != FORMAT or isinstance(document.get("format"), bool):
+        raise InputError(f"format = {document.get('format', 'missing')}", where, f"write format = {FORMAT}")
+    vary = document.get("vary")
+    if not isinstance(vary, dict) or not vary:
+        raise InputError(
+            "nothing is varied",
+            where,
+            'add [vary] and lines like "chambers.wall_mm" = { low = .., high = .. }',
+        )
+    stage = _one_of(document, "stages", STAGES, "simulate", where)
+    stages = STAGES[: STAGES.index(stage) + 1]
+    tables: dict[str, dict[str, Any]] = {name: _settings(document, name, where) for name in stages}
+    for name in STAGES[len(stages) :]:
+        if name in document:
+            raise InputError(
+                f"[{name}] has no part in it", where, f'write stages = "{name}", or leave it out'
+            )
+    variables = tuple(variable(name, given, where) for name, given in _flat(vary).items())
+    inputs = Inputs(_unit(document, folder, where), _protocol(document, folder), tables)
+    plan = Plan(
+        inputs=inputs,
+        variables=variables,
+        folder=folder,
+        method=_one_of(document, "method", METHODS, "sobol", where),
+        count=int(_number(document, "points", 16, 2, MOST_POINTS, where, whole=True)),
+        seed=int(_number(document, "seed", 0, 0, 2**31, where, whole=True)),
+        memory_MB=int(_number(document, "memory_MB", 4000, 300, 10_000_000, where, whole=True)),
+        minutes=_number(document, "minutes", 60, 0.01, 1e5, where),
+        resin=_word(document, "resin", "elastic-50a-v1", where),
+        minimize=_words(document, "minimize", where),
+        maximize=_words(document, "maximize", where),
+    )
+    if plan.size > MOST_POINTS:
+        raise InputError(
+            f"the grid has {plan.size} points", where, f"give fewer steps: {MOST_POINTS} at most"
+        )
+    # A setting that is wrong for every point is told before any work, and not as many failures.
+    job_with(tables, where, unit=inputs.unit, protocol=inputs.protocol, workers=1)
+    for v in variables:
+        if v.name == FILE:
+            for name in v.values:
+                protocol_of(folder / str(name))
+    return plan
+
+
+def _flat(vary: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    """Variables by their whole name: TOML reads chambers.wall_mm without quotes as a table in a table."""
+    found: dict[str, Any] = {}
+    for key, value in vary.items():
+        name = f"{before}{key}"
+        last = not isinstance(value, dict) or not value or any(k in value for k in ("low", "high", "values"))
+        found |= {name: value} if last else _flat(value, f"{name}.")
+    return found
+
+
+def _settings(document: Mapping[str, Any], stage: str, where: str) -> dict[str, Any]:
+    found = document.get(stage, {})
+    if not isinstance(found, dict):
+        raise InputError(f"{stage} is not a table", where, f"write it as [{stage}]")
+    for key in found:
+        if key in FILES or key in OF_FILES:
+            raise InputError(
+                f"a sweep takes no {key}",
+                f"{where}, [{stage}]",
+                "leave it out; unit and protocol stand at the top of the file",
+            )
+    return dict(found)
+
+
+def _unit(document: Mapping[str, Any], folder: Path, where: str) -> Unit:
+    if ("preset" in document) == ("unit" in document):
+        raise InputError("which unit?", where, 'write preset = "mu-1.0x" or unit = "my-unit.toml"')
+    if "preset" in document:
+        return load_preset(_word(document, "preset", "", where))
+    return read_unit(folder / _word(document, "unit", "", where))
+
+
+def _protocol(document: Mapping[str, Any], folder: Path) -> Protocol:
+    name = document.get("protocol")
+    return protocol_of(None if name is None else folder / str(name))
+
+
+def _word(document: Mapping[str, Any], key: str, default: str, where: str) -> str:
+    found = document.get(key, default)
+    if not isinstance(found, str):
+        raise InputError(f"{key} = {found!r} is no text", where, "write it in quotes")
+    return found
+
+
+def _words(document: Mapping[str, Any], key: str, where: str) -> tuple[str, ...]:
+    found = document.get(key, [])
+    if not isinstance(found, list) or not all(isinstance(word, str) for word in found):
+        raise InputError(f"{key} = {found!r} is no list of names", where, f'write {key} = ["mass_g"]')
+    return tuple(found)
+
+
+def _one_of(document: Mapping[str, Any], key: str, allowed: tuple[str, ...], default: str, where: str) -> str:
+    found = document.get(key, default)
+    if found not in allowed:
+        raise InputError(f"{key} = {found!r} is not offered", where, f"one of: {', '.join(allowed)}")
+    return str(found)
+
+
+def _number(
+    document: Mapping[str, Any],
+    key: str,
+    default: float,
+    low: float,
+    high: float,
+    where: str,
+    whole: bool = False,
+) -> float:
+    found = document.get(key, default)
+    kinds = int if whole else (int, float)
+    if isinstance(found, bool) or not isinstance(found, kinds) or not low <= found <= high:
+        what = "a whole number" if whole else "a number"
+        raise InputError(
+            f"{key} = {found!r} is out of bounds", where, f"give {what} from {low:g} to {high:g}"
+        )
+    return found

@@ -1,0 +1,153 @@
+"""One point of a sweep: its study in a process of its own, within the memory and time that it may take.
+
+A worker on any machine runs this: what it needs comes with the task, and what it found goes back as a row.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from ...errors import MuError
+from ...files import plain
+from ...run.cache import REVISION, key
+from ...run.child import RUNNING, Child
+from ...run.folder import keep_inputs
+from ..simulate_and_place.report_data import package_versions
+
+# Seconds between two looks at a study's memory.
+LOOK_S = 0.05
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@attrs.frozen
+class Task:
+    """One study to run: files of inputs by name, and what it may take; plain data, so that it travels.
+
+    version: of the program that asks, which has to be the worker's; module: what the process runs.
+    """
+
+    files: Mapping[str, str]
+    memory_MB: int
+    minutes: float
+    version: str
+    module: tuple[str, ...] = ("-m", "mu_addon.cli", "resume")
+
+    @property
+    def name(self) -> str:
+        """Hash of all that decides what is found."""
+        return key(*(part for item in sorted(self.files.items()) for part in item))
+
+
+def version() -> str:
+    """What has to be the same on every worker."""
+    return f"{package_versions()['mu_addon']} revision {REVISION}"
+
+
+def run_point(task: Task) -> dict[str, Any]:
+    """What a study found or why it failed, as plain data; never raises for a study's own failure.
+
+    status: "done" with the study's `summary`, or "failed" with what, where and what_to_do; and what it took,
+    seconds and memory_MB, and where. Raises MuError where this worker is of another version.
+    """
+    if task.version != version():
+        raise MuError(
+            f"the worker has mu_addon {version()}, the sweep {task.version}",
+            os.uname().nodename if hasattr(os, "uname") else "",
+            "install the same version on every worker",
+        )
+    start = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="mu-point-", ignore_cleanup_errors=True) as name:
+        folder = Path(name)
+        keep_inputs(folder / "study", task.files)
+        command = [
+            sys.executable, *task.module, str(folder / "study"), "--json", "--no-report", "--workers", "1",
+        ]  # fmt: skip
+        child = Child(command, folder / "words", _environment(task), ends_with_parent=True)
+        try:
+            peak_MB, stopped = _watch(child, task)
+        finally:
+            child.kill()
+    row: dict[str, Any] = {
+        "seconds": round(time.monotonic() - start, 3),
+        "memory_MB": round(peak_MB),
+        "worker": _worker(),
+    }
+    if stopped is None and child.result is not None and child.error is None:
+        return {"status": "done", **row, "summary": plain(child.result.get("summary", {}))}
+    told = stopped or child.error or {}
+    words = {
+        name: str(told.get(name, "")).replace(str(folder), "") for name in ("what", "where", "what_to_do")
+    }
+    return {"status": "failed", **row, **words}
+
+
+def _worker() -> str:
+    """Name of the Dask worker that this runs in, or nothing."""
+    try:
+        from distributed import get_worker
+
+        return str(get_worker().name)
+    except (ImportError, ValueError):
+        return ""
+
+
+def _environment(task: Task) -> dict[str, str]:
+    threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
+    return {**os.environ, **threads, "PYTHONPATH": path, "MU_MEMORY_MB": str(task.memory_MB)}
+
+
+def _watch(child: Child, task: Task) -> tuple[float, dict[str, str] | None]:
+    """The most memory that a study took, in MB, and why it was stopped if it was."""
+    peak = 0.0
+    while child.state == RUNNING:
+        child.poll()
+        peak = max(peak, _memory_MB(child.pid))
+        over = _too_much(child, task, peak)
+        if over is not None:
+            child.kill()
+            return peak, over
+        time.sleep(LOOK_S)
+    return peak, None
+
+
+def _too_much(child: Child, task: Task, peak_MB: float) -> dict[str, str] | None:
+    if peak_MB > task.memory_MB:
+        return {
+            "what": f"the study took more than the {task.memory_MB} MB of memory that it may",
+            "where": str(child.progress.get("stage", "at its start")),
+            "what_to_do": "raise memory_MB, or take a coarser mesh",
+        }
+    if child.seconds > 60 * task.minutes:
+        return {
+            "what": f"the study took longer than the {task.minutes:g} minutes that it may",
+            "where": str(child.progress.get("stage", "at its start")),
+            "what_to_do": "raise minutes, or take a coarser mesh",
+        }
+    return None
+
+
+def _memory_MB(pid: int) -> float:
+    """Memory that a process and its children hold, in MB; 0 once it has ended."""
+    import psutil
+
+    try:
+        process = psutil.Process(pid)
+        family: Sequence[Any] = [process, *process.children(recursive=True)]
+    except psutil.Error:
+        return 0.0
+    found = 0
+    for one in family:
+        try:
+            found += one.memory_info().rss
+        except psutil.Error:
+            continue
+    return found / 1e6

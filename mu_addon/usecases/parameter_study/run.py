@@ -1,0 +1,220 @@
+"""A sweep in its folder: points that are there are taken, the others run; the table is kept up to date."""
+
+from __future__ import annotations
+
+import csv
+import json
+import time
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...errors import InputError
+from ...files import write_csv
+from ...materials.library import load_material, read_material
+from ...run.cache import Cache
+from ...run.context import Ending
+from ...run.folder import begin
+from ...run.progress import Progress
+from .cluster import Cluster, Work
+from .columns import Row, cell, columns, figures
+from .plan import HEADER, Plan, Point
+from .point import Task, run_point, version
+
+Array = np.ndarray[Any, Any]
+
+PLAN, TABLE, REPORT = "plan.csv", "points.csv", "report.html"
+RESULTS = (PLAN, TABLE, REPORT)
+# Columns after the figures: what a point took, and why it failed.
+LAST = ("seconds", "memory_MB", "worker", "what", "where", "what_to_do")
+# Seconds between two writings of the table.
+EVERY_S = 10.0
+
+
+@attrs.frozen(eq=False)
+class Found:
+    """A sweep's rows, one a point: `number`, `status`, its inputs and figures, or why it failed.
+
+    inputs, outputs: names of the columns that are varied and found.
+    """
+
+    plan: Plan
+    rows: tuple[Row, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    @property
+    def done(self) -> list[Row]:
+        """Rows of the points that were solved."""
+        return [row for row in self.rows if row["status"] == "done"]
+
+    @property
+    def failed(self) -> list[Row]:
+        """Rows of the points that were not."""
+        return [row for row in self.rows if row["status"] == "failed"]
+
+
+def sweep(
+    plan: Plan,
+    folder: Path,
+    progress: Progress,
+    ending: Ending,
+    scheduler: str | None = None,
+    workers: int = 2,
+    add: int = 0,
+    retry: bool = False,
+    work: Work = run_point,
+) -> Found:
+    """Run a plan's points, as far as they are not there, and write points.csv and report.html.
+
+    add: so many points more than there are; retry: whether those that failed are run again. Raises
+    InputError, OutputError, and MuError where the scheduler stays away.
+    """
+    from .report import write_report
+
+    density = _density(plan)
+    if add and plan.method == "grid":
+        raise InputError("a grid has its levels' points", "--add", "give more steps in sweep.toml instead")
+    begin(ending, folder, HEADER, plan.texts(), RESULTS)
+    values, places = _extended(plan, folder, add)
+    points = plan.points(values)
+    run = Run(plan, points, folder, places, density)
+    run.look(retry)
+    run.write()
+    ending.on_stop = lambda _: run.write()
+    with progress.stage("points"):
+        run.solve(progress, scheduler, workers, work)
+    found = run.found()
+    ending.summary |= summary(found)
+    with progress.stage("report", expected_s=5.0):
+        write_report(found, folder / REPORT)
+    return found
+
+
+@attrs.define
+class Run:
+    """A sweep under way in its folder: its points, their places (n, d), and what is known of them by number.
+
+    density: of the resin, in g/ml.
+    """
+
+    plan: Plan
+    points: list[Point]
+    folder: Path
+    places: Array
+    density: float
+    known: dict[int, dict[str, Any]] = attrs.field(factory=dict)
+
+    @property
+    def cache(self) -> Cache:
+        """What points have found."""
+        return Cache(self.folder / "cache")
+
+    def task(self, point: Point) -> Task:
+        """The task of a point that breaks no rule."""
+        assert point.job is not None
+        return Task(point.job.texts(), self.plan.memory_MB, self.plan.minutes, version())
+
+    def look(self, retry: bool) -> None:
+        """Take what earlier runs found; with `retry`, not what failed."""
+        for point in self.points:
+            stored = None if point.job is None else self.cache.get("point", self.task(point).name)
+            if stored is not None:
+                row = json.loads(str(stored["row"]))
+                if not (retry and row["status"] == "failed"):
+                    self.known[point.number] = row
+
+    def solve(self, progress: Progress, scheduler: str | None, workers: int, work: Work) -> None:
+        """Run the points of which nothing is known; what each finds is kept at once."""
+        todo = [p for p in self.points if p.job is not None and p.number not in self.known]
+        if not todo:
+            return
+        tasks = [self.task(point) for point in todo]
+        written = time.monotonic()
+        with closing(Cluster(scheduler, workers)) as cluster:
+            for done, (position, row) in enumerate(cluster.results(tasks, work, progress.warning), 1):
+                self.known[todo[position].number] = row
+                if not row.get("again"):
+                    self.cache.put("point", tasks[position].name, {"row": np.array(json.dumps(row))})
+                progress.update(done / len(todo))
+                if time.monotonic() - written > EVERY_S:
+                    self.write()
+                    written = time.monotonic()
+        self.write()
+
+    def found(self) -> Found:
+        """The table as far as it is known."""
+        rows = [self._row(point) for point in self.points]
+        inputs = tuple(v.name for v in self.plan.variables)
+        told = ("point", "status", *inputs, *LAST)
+        outputs = tuple(name for name in columns(rows) if name not in told)
+        return Found(self.plan, tuple(rows), inputs, outputs)
+
+    def _row(self, point: Point) -> Row:
+        row: Row = {"point": point.number, "status": "waiting", **point.values}
+        if point.error is not None:
+            e = point.error
+            return row | {"status": "failed", "what": e.what, "where": e.where, "what_to_do": e.remedy}
+        found = self.known.get(point.number)
+        if found is None:
+            return row
+        figured = figures(found["summary"], self.density) if found["status"] == "done" else {}
+        return row | figured | {name: found[name] for name in ("status", *LAST) if name in found}
+
+    def write(self) -> None:
+        """points.csv, a row a point whatever became of it, and plan.csv, by which more can be added."""
+        found = self.found()
+        names = ["point", "status", *found.inputs, *found.outputs, *LAST]
+        write_csv(self.folder / TABLE, names, [[cell(row.get(name)) for name in names] for row in found.rows])
+        write_csv(self.folder / PLAN, found.inputs, self.places.tolist())
+
+
+def _extended(plan: Plan, folder: Path, add: int) -> tuple[list[dict[str, Any]], Array]:
+    """Values and places of the points: those of the folder's plan.csv first, then what is new."""
+    before = _places(folder / PLAN, [v.name for v in plan.variables])
+    if before is None:
+        return plan.values(count=plan.count + add)
+    return plan.values(before, max(plan.count, len(before)) if not add else len(before) + add)
+
+
+def _places(path: Path, names: list[str]) -> Array | None:
+    """Places (n, d) that a plan.csv holds, or None where there is none or it is damaged."""
+    try:
+        with path.open(newline="", encoding="utf-8") as stream:
+            head, *rows = csv.reader(stream)
+        found = np.array([[float(value) for value in row] for row in rows])
+    except (OSError, ValueError):
+        return None
+    sound = head == names and found.ndim == 2 and len(found) and bool(((found >= 0) & (found < 1)).all())
+    return found if sound else None
+
+
+def _density(plan: Plan) -> float:
+    path = plan.folder / plan.resin
+    material = read_material(path) if path.suffix == ".toml" else load_material(plan.resin)
+    return material.density_g_per_ml
+
+
+def summary(found: Found) -> dict[str, Any]:
+    """Figures of a sweep for summary.json."""
+    done = found.done
+    seconds = [row["seconds"] for row in done]
+    return {
+        "points": len(found.rows),
+        "done": len(done),
+        "failed": len(found.failed),
+        "failures": sorted({str(row.get("what", "")) for row in found.failed}),
+        "seconds_a_point": float(np.mean(seconds)) if seconds else None,
+        "most_memory_MB": max((row["memory_MB"] for row in done), default=None),
+    }
+
+
+def answer(summary: dict[str, Any]) -> list[str]:
+    """What a sweep came to, in a few lines of text."""
+    lines = [f"{summary['done']} of {summary['points']} points done, {summary['failed']} failed"]
+    if summary["seconds_a_point"] is not None:
+        lines[0] += f"; {summary['seconds_a_point']:.1f} s and up to {summary['most_memory_MB']} MB each"
+    return [*lines, *(f"failed: {what}" for what in summary["failures"][:5])]

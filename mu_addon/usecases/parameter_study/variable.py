@@ -1,0 +1,166 @@
+"""One input that a sweep varies: its name, the values it may take, and how it is put into a study."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...design.parameters import SECTIONS, Unit
+from ...design.quantity import describe
+from ...design.toml_text import nearest
+from ...errors import InputError
+from ...fem.protocol import Protocol, read_protocol
+from ...meshing.settings import MeshSettings
+from ...placement.graph import Limits
+from ..simulate_and_place.job import SETTINGS
+
+FACTOR = "protocol.factor"
+FILE = "simulate.protocol"
+# Levels of a range in a grid, unless it says how many.
+STEPS = 3
+
+
+@attrs.frozen
+class Variable:
+    """A range from low to high (whole numbers if both are), or a choice among `values`.
+
+    log: whether the range is sampled evenly in its logarithm; steps: its levels in a grid.
+    """
+
+    name: str
+    low: float | None = None
+    high: float | None = None
+    values: tuple[Any, ...] = ()
+    log: bool = False
+    steps: int = STEPS
+
+    def at(self, u: float) -> Any:
+        """The value at a place u in [0, 1)."""
+        if self.values:
+            return self.values[min(int(u * len(self.values)), len(self.values) - 1)]
+        assert self.low is not None
+        assert self.high is not None
+        if isinstance(self.low, int) and isinstance(self.high, int):
+            return min(self.low + int(u * (self.high - self.low + 1)), self.high)
+        width = self.high - self.low
+        found = self.low * (self.high / self.low) ** u if self.log else self.low + u * width
+        # Digits that mean nothing would only be in the way of a reader.
+        return float(f"{found:.8g}")
+
+    @property
+    def levels(self) -> list[Any]:
+        """Its values in a grid."""
+        if self.values:
+            return list(self.values)
+        assert self.low is not None
+        assert self.high is not None
+        if self.log:
+            found = np.geomspace(self.low, self.high, self.steps)
+        else:
+            found = np.linspace(self.low, self.high, self.steps)
+        if isinstance(self.low, int) and isinstance(self.high, int):
+            return list(dict.fromkeys(round(float(v)) for v in found))
+        return [float(f"{v:.8g}") for v in found]
+
+    @property
+    def table(self) -> dict[str, Any]:
+        """As sweep.toml has it."""
+        if self.values:
+            return {"values": list(self.values)}
+        return {"low": self.low, "high": self.high, "log": self.log, "steps": self.steps}
+
+
+def variable(name: str, given: Any, where: str) -> Variable:
+    """A variable from its table in sweep.toml; raises InputError."""
+    where = f"{where}, [vary] {name}"
+    if name not in names():
+        raise InputError(
+            f"there is no input {name!r}{nearest(name, names())}",
+            where,
+            "name it as in unit.toml (chambers.wall_mm) or in study.toml (simulate.mesh.refine)",
+        )
+    if not isinstance(given, dict) or not (set(given) == {"values"} or {"low", "high"} <= set(given)):
+        raise InputError(
+            f"{given!r} says not what to vary",
+            where,
+            "write { low = 0.8, high = 1.2 } or { values = [1, 2] }",
+        )
+    if "values" in given:
+        values = given["values"]
+        if not isinstance(values, list) or not values:
+            raise InputError(f"values = {values!r} is no list", where, "write values = [1, 2]")
+        return Variable(name, values=tuple(values))
+    unknown = set(given) - {"low", "high", "log", "steps"}
+    if unknown:
+        raise InputError(
+            f"unknown key {unknown.pop()!r}", where, "known: low, high, log, steps, or values alone"
+        )
+    low, high, log, steps = given["low"], given["high"], given.get("log", False), given.get("steps", STEPS)
+    numbers = all(
+        isinstance(v, int | float) and not isinstance(v, bool) and math.isfinite(v) for v in (low, high)
+    )
+    if not numbers or not low < high:
+        raise InputError(
+            f"low = {low!r} and high = {high!r} are no range", where, "give two numbers that rise"
+        )
+    if not isinstance(log, bool) or (log and low <= 0):
+        raise InputError(f"log = {log!r} from {low!r}", where, "write log = true only where low is positive")
+    if isinstance(steps, bool) or not isinstance(steps, int) or not 2 <= steps <= 1000:
+        raise InputError(f"steps = {steps!r}", where, "give a whole number from 2 to 1000")
+    return Variable(name, low, high, log=log, steps=steps)
+
+
+def names() -> list[str]:
+    """Every input that can be varied, as unit.toml and study.toml name them."""
+    unit = [f"{s.section}.{d.name}" for s in SECTIONS for d in describe(s)]  # type: ignore[attr-defined]
+    study = [f"{stage}.{key}" for stage, keys in SETTINGS.items() for key in keys]
+    mesh = [f"simulate.mesh.{f.name}" for f in attrs.fields(MeshSettings)]
+    search = [f"place.search.{f.name}" for f in attrs.fields(Limits)]
+    return ["scale", *unit, FACTOR, FILE, *study, *mesh, *search, "place.search.most_checks"]
+
+
+@attrs.frozen
+class Inputs:
+    """What a study is made of: unit, protocol, and settings in tables like study.toml's."""
+
+    unit: Unit
+    protocol: Protocol
+    tables: Mapping[str, Mapping[str, Any]]
+
+
+def put(inputs: Inputs, values: Mapping[str, Any], folder: Path) -> Inputs:
+    """Inputs with some of them changed; raises InputError where the unit breaks a rule with them.
+
+    folder: where a file lies that a value names.
+    """
+    sections: dict[str, dict[str, Any]] = {}
+    tables = copy.deepcopy({stage: dict(table) for stage, table in inputs.tables.items()})
+    protocol, factor, scale = inputs.protocol, 1.0, inputs.unit.scale
+    own = {s.section for s in SECTIONS}  # type: ignore[attr-defined]
+    for name, value in values.items():
+        head, _, rest = name.partition(".")
+        if name == "scale":
+            scale = value
+        elif name == FACTOR:
+            factor = value
+        elif name == FILE:
+            protocol = read_protocol(folder / str(value))
+        elif head in own:
+            sections.setdefault(head, {})[rest] = value
+        elif head not in tables:
+            raise InputError(f"{name} has no part in these stages", "[vary]", f'write stages = "{head}"')
+        else:
+            *inner, key = rest.split(".")
+            table: dict[str, Any] = tables[head]
+            for part in inner:
+                table = table.setdefault(part, {})
+            table[key] = value
+    changed = {name: attrs.evolve(getattr(inputs.unit, name), **v) for name, v in sections.items()}
+    unit = attrs.evolve(inputs.unit, scale=scale, **changed)
+    return Inputs(unit, Protocol(protocol.time_s, protocol.pressure_kPa * factor), tables)

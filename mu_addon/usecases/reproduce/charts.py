@@ -1,0 +1,164 @@
+"""The pictures of a reproduction: the paper's own form, and beside it what the paper prints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...report.charts import GRID, INK, QUIET, WIDTH, canvas, label, signed
+from ...report.results import Path
+from .columns import TableColumn
+from .open_study import Effect
+from .open_values import OPEN
+from .published import Published
+from .scatter import Scatter
+
+Array = np.ndarray[Any, Any]
+
+# The paper's red, blue and green, dark enough for lines, and dashes for who sees no colour.
+SCALE_STYLE: Mapping[str, dict[str, Any]] = {
+    "0.75x": {"color": "#C4281C", "linestyle": "-"},
+    "1.0x": {"color": "#1B5FAA", "linestyle": "--"},
+    "1.5x": {"color": "#23803A", "linestyle": "-."},
+    "gripper": {"color": "#6B4C9A", "linestyle": ":"},
+}
+WIDE = 8.2  # inches: two columns of the page
+
+
+def deviations(columns: Sequence[TableColumn], rule: str, paths: Sequence[Path], along: str) -> str:
+    """Mean deviation of every path along "length" or over "time", a panel a path and a line a scale."""
+    rows, across = 2, (len(paths) + 1) // 2
+    with canvas(WIDE, 3.9) as (figure, svg):
+        grid = figure.subplots(rows, across, sharex=True, sharey=True, squeeze=False)
+        figure.subplots_adjust(left=0.07, right=0.99, top=0.86, bottom=0.13, wspace=0.2, hspace=0.30)
+        for number, (axes, path) in enumerate(zip(grid.flat, paths, strict=False)):
+            for c in columns:
+                d = c.fine.deviations(rule)[number]
+                values = d.over_length if along == "length" else d.over_time
+                at = np.linspace(0, 100, len(values))
+                axes.plot(at, values, linewidth=1.5, label=c.name, **SCALE_STYLE[c.name])
+            axes.set_title(f"{label(path.name)}  {path.anchors}", fontsize=8.5, pad=3)
+            axes.set(xlim=(0, 100), xticks=(0, 50, 100))
+            axes.margins(y=0.08)
+        grid[0, 0].set_ylim(bottom=0, auto=True)
+        handles, labels = grid[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="upper center", ncols=len(labels), handlelength=2.8)
+        words = "actuation time" if along == "time" else "actuator length"
+        figure.supxlabel(f"{words} [%]", fontsize=9)
+        figure.supylabel("mean deviation [mm]", fontsize=9)
+    return svg()
+
+
+def against_paper(table: Mapping[str, Array], paper: Published, paths: Sequence[Path]) -> str:
+    """J_hat of every path, ours as a line with dots and the paper's as crosses, a panel a column."""
+    with canvas(WIDE, 2.6) as (figure, svg):
+        grid = figure.subplots(1, len(table), sharey=True, squeeze=False)[0]
+        figure.subplots_adjust(left=0.07, right=0.99, top=0.88, bottom=0.17, wspace=0.08)
+        at = np.arange(len(paths))
+        for axes, (name, ours) in zip(grid, table.items(), strict=True):
+            style = SCALE_STYLE[name]
+            axes.plot(at, paper.J_hat[name], "x", color=INK, markersize=6, label="paper")
+            axes.plot(at, ours, "o", color=style["color"], markersize=4.5, label="here")
+            axes.vlines(at, paper.J_hat[name], ours, color=GRID, linewidth=2, zorder=0)
+            axes.set_title(name, fontsize=9, pad=3)
+            axes.set_xticks(at, [label(p.name) for p in paths], fontsize=7)
+        grid[0].set_ylim(bottom=0, auto=True)
+        grid[0].legend(loc="upper left")
+        grid[0].set_ylabel("Ĵ [mm]")
+    return svg()
+
+
+def bending(columns: Sequence[TableColumn], paper: Published) -> str:
+    """Angle against pressure of every scale, and the ends of the paper's ranges as bars of 5 degrees."""
+    with canvas(WIDTH, 3.4) as (figure, svg):
+        axes = figure.add_axes((0.15, 0.14, 0.82, 0.82))
+        axes.axhline(0, color=QUIET, linewidth=0.8)
+        axes.axvline(0, color=QUIET, linewidth=0.8)
+        for number, c in enumerate(columns):
+            style = SCALE_STYLE[c.name]
+            axes.plot(c.fine.pressure_kPa, c.fine.angle_deg, linewidth=1.6, label=c.name, **style)
+            # Beside each other, as the three ends nearly agree.
+            for end, sign in zip((0, 1), (-1, 1), strict=True):
+                x = paper.bending_kPa[end] + sign * (2.0 + 1.6 * number)
+                y = paper.bending_deg[c.scale][end]
+                axes.errorbar(x, y, yerr=2.5, color=style["color"], marker="x", markersize=6, elinewidth=1.4)
+        axes.set(xlabel="pressure [kPa]", ylabel="bending angle [deg]", xlim=(-28, 58))
+        axes.legend(loc="upper left")
+    return svg()
+
+
+def mesh_scatter(found: Mapping[str, Scatter], paths: Sequence[Path]) -> str:
+    """J_hat of every path on every mesh as dots, the paper's as crosses, a panel a column."""
+    with canvas(WIDE, 2.7) as (figure, svg):
+        grid = figure.subplots(1, len(found), sharey=True, squeeze=False)[0]
+        figure.subplots_adjust(left=0.07, right=0.99, top=0.88, bottom=0.17, wspace=0.08)
+        for axes, (name, s) in zip(grid, found.items(), strict=True):
+            at = np.arange(len(paths))
+            # Side by side, so that meshes that agree do not hide each other.
+            aside = np.linspace(-0.28, 0.28, len(s.J_hat))
+            for dx, J in zip(aside, s.J_hat, strict=True):
+                axes.plot(at + dx, J, "o", color=SCALE_STYLE[name]["color"], markersize=2, alpha=0.6)
+            axes.plot(at, s.theirs, "x", color=INK, markersize=7, markeredgewidth=1.4, label="paper")
+            axes.set_title(name, fontsize=9, pad=3)
+            axes.set_xticks(at, [label(p.name) for p in paths], fontsize=7)
+        grid[0].set_ylim(bottom=0, auto=True)
+        grid[0].legend(loc="upper left")
+        grid[0].set_ylabel("Ĵ [mm]")
+    return svg()
+
+
+def orders(found: Mapping[str, Scatter], paths: Sequence[Path]) -> str:
+    """In how many meshes two paths lie in the paper's order, a square a pair and a panel a column."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    with canvas(WIDE, 3.1) as (figure, svg):
+        grid = figure.subplots(1, len(found), squeeze=False)[0]
+        figure.subplots_adjust(left=0.05, right=0.90, top=0.90, bottom=0.12, wspace=0.16)
+        names = [label(p.name) for p in paths]
+        for axes, (name, s) in zip(grid, found.items(), strict=True):
+            share = np.where(np.tri(len(paths), k=-1, dtype=bool), s.agree, np.nan)
+            axes.imshow(share, cmap="cividis", vmin=0, vmax=1)
+            for i, j in zip(*np.tril_indices(len(paths), -1), strict=True):
+                if share[i, j] < 0.995:
+                    ink = "white" if share[i, j] < 0.55 else INK
+                    text = f"{100 * share[i, j]:.0f}"
+                    axes.text(j, i, text, ha="center", va="center", fontsize=6, color=ink)
+            axes.grid(False)
+            axes.set_title(name, fontsize=9, pad=3)
+            axes.set_xticks(range(len(paths)), names, fontsize=7)
+            axes.set_yticks(range(len(paths)), names, fontsize=7)
+            axes.tick_params(length=0)
+        scale = ScalarMappable(Normalize(0, 1), "cividis")
+        bar = figure.colorbar(scale, cax=figure.add_axes((0.92, 0.18, 0.014, 0.66)), ticks=[0, 0.5, 1])
+        bar.ax.set_yticklabels(["0", "50", "100 %"])
+        bar.outline.set_linewidth(0.6)
+    return svg()
+
+
+def shares(effects: Sequence[Effect]) -> str:
+    """Total share of each figure's variance that each open value makes, a square each."""
+    high = 0.75 + 0.36 * len(effects)
+    with canvas(WIDE, high) as (figure, svg):
+        axes = figure.add_axes((0.30, 0.03, 0.68, 0.97 - 0.70 / high))
+        values = np.array([e.shares.total for e in effects])
+        axes.imshow(values, cmap="Blues", vmin=0, vmax=1, aspect="auto")
+        for (i, j), value in np.ndenumerate(values):
+            if value >= 0.015:
+                ink = "white" if value > 0.6 else INK
+                axes.text(j, i, f"{100 * value:.0f}", ha="center", va="center", fontsize=8, color=ink)
+        axes.grid(False)
+        axes.xaxis.tick_top()
+        axes.set_xticks(range(len(OPEN)), [short(o.name) for o in OPEN], fontsize=7.5)
+        axes.set_yticks(range(len(effects)), [signed(e.name) for e in effects], fontsize=8)
+        axes.tick_params(length=0)
+    return svg()
+
+
+def short(name: str) -> str:
+    """An open value's name without its section, a line a word, its unit last."""
+    *words, last = name.split(".")[1].split("_")
+    unit = {"mm": "[mm]", "kPa": "[kPa]"}.get(last, last)
+    return "\n".join([*words, unit])

@@ -1,0 +1,67 @@
+"""The paper's fourth column: a finger of the gripper, closing on nothing and on each of the cubes.
+
+The paper does not say on what its simulated finger closes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...design.gripper import load_gripper
+from ...errors import ConvergenceError
+from ...placement.inclusion import RULES
+from ...run.cache import Cache, key
+from ..grip.grasp import Cube
+from ..grip.run import CUBES, gripper_column
+from .open_values import RULE, with_values
+from .published import GRIPPER
+
+Array = np.ndarray[Any, Any]
+
+# Contact makes every path's own equilibria necessary: a finer mesh would take longer than all the rest.
+REFINE = 0.5
+
+
+@attrs.frozen
+class Task:
+    """A column by one rule: values of the set, side of the cube in mm or 0 for none, refinement, paths."""
+
+    values: Mapping[str, Any]
+    rule: str
+    cube_mm: float
+    refine: float
+    paths: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """The column's."""
+        return f"{GRIPPER}, {self.cube_mm:g} mm" if self.cube_mm else GRIPPER
+
+
+def solved(task: Task, cache: Cache) -> Array | str:
+    """J_hat (paths,) in mm from the cache, or solved and put there; or why there is none."""
+    gripper = load_gripper("gripper")
+    gripper = attrs.evolve(gripper, unit=with_values(gripper.unit, task.values))
+    name = key(gripper.unit.hash(), attrs.astuple(gripper.fingers), attrs.astuple(task)[1:])
+    kept = cache.get("gripper", name)
+    if kept is not None:
+        return str(kept["failed"]) if "failed" in kept else kept["J_hat"]
+    cube = Cube(task.cube_mm) if task.cube_mm else None
+    try:
+        found = gripper_column(task.refine, task.rule, cube, gripper)
+    except ConvergenceError as error:
+        cache.put("gripper", name, {"failed": np.array(error.what)})
+        return error.what
+    J_hat = np.array([found[path] for path in task.paths])
+    cache.put("gripper", name, {"J_hat": J_hat})
+    return J_hat
+
+
+def tasks(values: Mapping[str, Any], paths: Sequence[str], refine: float) -> list[Task]:
+    """On nothing by both rules, on each cube by the one that decides."""
+    columns = [(rule, 0.0) for rule in RULES] + [(RULE, side) for side in CUBES]
+    return [Task(values, rule, side, refine, tuple(paths)) for rule, side in columns]

@@ -1,0 +1,297 @@
+"""From recorded bending to a sensor's calibration, checked on sweeps that it never saw, in one folder."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...errors import InputError
+from ...files import write_csv, write_text
+from ...measured import read_folder
+from ...report.charts import canvas
+from ...report.html import cards, figure, page, table
+from ...run.context import Ending
+from ...run.folder import begin
+from ...run.progress import Progress
+from ...sensing.calibration import Calibration, Sweep, calibrate, sweeps_of, write_calibration
+from ...sensing.recording import INDEX, Recording, read_recording
+
+Array = np.ndarray[Any, Any]
+
+HEADER = "# The inputs of this calibration."
+RESULTS = ("calibration.toml", "calibration.csv", "report.html")
+# After the mark "angle 30" the sensor is held there for that long.
+_HOLD_S = 1.0
+
+
+@attrs.frozen(eq=False)
+class Check:
+    """How the calibration does on a sweep it never saw: error in degrees, share within its 95 % band."""
+
+    name: str
+    rms_deg: float
+    within: float
+    possible: float
+
+
+def calibrate_sensor(
+    data: Sequence[Path],
+    out: Path,
+    *,
+    channel: str | None = None,
+    dark: str | None = None,
+    angles: Path | None = None,
+    progress: Progress,
+    ending: Ending,
+) -> Calibration:
+    """Fit a calibration to folders of measured data or recordings, and write it with its report into `out`.
+
+    channel: the column of the light, needed where there are several; dark: the column of the dark level, or
+    volts; angles: CSV of time_s, angle_deg for a recording whose marks do not say them ("angle 30"). Held-out
+    experiments are not fitted but checked. Raises InputError and OutputError.
+    """
+    fitted: list[Sweep] = []
+    held: list[tuple[str, Sweep]] = []
+    name, level = channel, _level(dark)
+    for folder in data:
+        if (folder / INDEX).exists():
+            recordings = read_recording(folder)
+            if not recordings:
+                raise InputError("that recording holds no samples", str(folder), "choose another one")
+            # The last file has the channels that the device has now.
+            name = _channel(recordings[-1], name, folder)
+            fitted += _of_recording(recordings[-1], name, level, angles, folder)
+        else:
+            name = name or "voltage_V"
+            more, others = _of_measured(folder, level)
+            fitted += more
+            held += others
+    inputs = {
+        "calibrate.toml": "\n".join(
+            [f"data = {[str(path) for path in data]!r}", f"channel = {name!r}", f"dark = {dark or 0!r}", ""]
+        )
+    }
+    begin(ending, out, HEADER, inputs, RESULTS)
+    with progress.stage("calibrate", expected_s=1.0):
+        found = calibrate(fitted, str(name), level)
+    checks = [_check(words, sweep, found) for words, sweep in held]
+    low, high = found.range_deg
+    write_calibration(
+        out / "calibration.toml",
+        found,
+        f"{len(fitted)} sweeps, {low:.1f} to {high:.1f} degrees, from {', '.join(p.name for p in data)}",
+    )
+    at = np.linspace(low, high, 201)
+    volts = found.voltage_of(at)
+    _, near, far, _ = found.angle_of(volts)
+    rows = np.column_stack([at, volts, near, far]).tolist()
+    write_csv(out / "calibration.csv", ("angle_deg", "voltage_V", "angle_low_deg", "angle_high_deg"), rows)
+    ending.summary |= summary(found, checks)
+    write_text(out / "report.html", _report(found, fitted, held, checks))
+    return found
+
+
+def summary(found: Calibration, checks: Sequence[Check]) -> dict[str, Any]:
+    """What was found, for summary.json."""
+    low, high = found.range_deg
+    volts = found.voltage_of(np.array([low, high]))
+    return {
+        "range_deg": [low, high],
+        "voltage_V": volts.tolist(),
+        "band_V": found.band_V,
+        "error_deg": found.error_deg,
+        "drift_per_h": found.drift_per_h,
+        "sweeps": found.sweeps,
+        "channel": found.channel,
+        "insensitive_deg": _insensitive(found),
+        "held_out": [attrs.asdict(check) for check in checks],
+    }
+
+
+def answer(summary: Mapping[str, Any]) -> list[str]:
+    """What was found, in a few lines of text, of its `summary`."""
+    low, high = summary["range_deg"]
+    lines = [
+        f"{summary['channel']}: {low:.1f} to {high:.1f} deg, {summary['sweeps']} sweeps, each foretold by "
+        f"the others to {summary['error_deg']:.2f} deg rms"
+    ]
+    lines += [
+        f"{c['name']}, never fitted: {c['rms_deg']:.2f} deg, {c['within']:.0%} within the 95 % band"
+        for c in summary["held_out"]
+    ]
+    blind = summary["insensitive_deg"]
+    return [*lines, *([f"says little between {blind[0]:.0f} and {blind[1]:.0f} deg"] if blind else [])]
+
+
+def _insensitive(found: Calibration) -> list[float]:
+    """The widest interval in degrees that the band cannot resolve, if it is a fifth of the range or more."""
+    low, high = found.range_deg
+    at = np.linspace(low, high, 401)
+    _, near, far, _ = found.angle_of(found.voltage_of(at))
+    widest = int(np.argmax(far - near))
+    return [float(near[widest]), float(far[widest])] if far[widest] - near[widest] > (high - low) / 5 else []
+
+
+def _level(dark: str | None) -> str | float:
+    try:
+        return 0.0 if dark is None else float(dark)
+    except ValueError:
+        return str(dark)
+
+
+def _channel(recording: Recording, name: str | None, folder: Path) -> str:
+    channels = recording.channels
+    if name is None and len(channels) == 1:
+        return channels[0]
+    if name is None or name not in channels:
+        what = f"{len(channels)} channels are there" if name is None else f"there is no channel {name}"
+        raise InputError(what, str(folder), f"--channel one of: {', '.join(channels)}")
+    return name
+
+
+def _of_recording(
+    recording: Recording, channel: str, dark: str | float, angles: Path | None, folder: Path
+) -> list[Sweep]:
+    time_s, volts = recording.columns["time_s"], recording.columns[channel]
+    if isinstance(dark, str):
+        if dark not in recording.columns:
+            raise InputError(
+                f"there is no channel {dark}", str(folder), f"--dark one of: {', '.join(recording.channels)}"
+            )
+        dark = recording.columns[dark]  # type: ignore[assignment]
+    volts = volts - dark
+    angle = _marked(recording, time_s) if angles is None else _joined_angles(angles, time_s)
+    if not np.isfinite(angle).any():
+        raise InputError(
+            "nothing says at which angle the sensor was",
+            str(folder),
+            'leave marks such as "angle 30" while recording, or give --angles FILE (time_s,angle_deg)',
+        )
+    return sweeps_of(time_s, angle, volts)
+
+
+def _marked(recording: Recording, time_s: Array) -> Array:
+    """Angles (n,) in degrees held after marks that say them, nan elsewhere."""
+    angle = np.full(len(time_s), math.nan)
+    marks = [m for m in recording.messages if m.get("event") == "mark"]
+    for k, mark in enumerate(marks):
+        word, _, value = str(mark.get("text", "")).partition(" ")
+        try:
+            held = float(value)
+        except ValueError:
+            continue
+        if word != "angle":
+            continue
+        start = float(mark["time_s"])
+        end = min(start + _HOLD_S, float(marks[k + 1]["time_s"]) if k + 1 < len(marks) else math.inf)
+        angle[(time_s >= start) & (time_s < end)] = held
+    return angle
+
+
+def _joined_angles(path: Path, time_s: Array) -> Array:
+    """Angles (n,) in degrees at given times, interpolated in a CSV file, nan beyond its ends."""
+    try:
+        with path.open(newline="") as stream:
+            rows = list(csv.DictReader(line for line in stream if not line.lstrip().startswith("#")))
+        t, a = np.array([[float(row["time_s"]), float(row["angle_deg"])] for row in rows]).T
+    except OSError as error:
+        raise InputError(f"cannot read {path.name}: {error.strerror}", str(path), "check its name") from None
+    except (KeyError, TypeError, ValueError):
+        raise InputError(
+            "not a table of time_s,angle_deg", str(path), "numbers in these two columns"
+        ) from None
+    if (np.diff(t) <= 0).any():
+        raise InputError("its times do not rise", str(path), "sort the rows by time_s")
+    return np.asarray(np.interp(time_s, t, a, left=math.nan, right=math.nan))
+
+
+def _of_measured(folder: Path, dark: str | float) -> tuple[list[Sweep], list[tuple[str, Sweep]]]:
+    experiments = read_folder(folder).of("waveguide_bending")
+    if not experiments:
+        raise InputError("no experiment bends a waveguide", str(folder), 'kind = "waveguide_bending"')
+    if isinstance(dark, str):
+        raise InputError("measured data have no channel of the dark level", "--dark", "give it in V")
+    fitted: list[Sweep] = []
+    held: list[tuple[str, Sweep]] = []
+    for experiment in experiments:
+        time_s, angle, volts = (experiment[name] for name in ("time_s", "angle_deg", "voltage_V"))
+        if experiment.role == "held_out":
+            seen = np.isfinite(angle) & np.isfinite(volts)
+            held.append((experiment.name, Sweep(time_s[seen], angle[seen], volts[seen] - dark)))
+        else:
+            fitted += sweeps_of(time_s, angle, volts - dark, fewest=1)
+    return fitted, held
+
+
+def _check(name: str, sweep: Sweep, found: Calibration) -> Check:
+    angle, low, high, possible = found.angle_of(sweep.voltage_V)
+    error = angle - sweep.angle_deg
+    within = (low <= sweep.angle_deg) & (sweep.angle_deg <= high)
+    return Check(name, float(np.sqrt(np.mean(error**2))), float(within.mean()), float(possible.mean()))
+
+
+def _report(
+    found: Calibration, fitted: Sequence[Sweep], held: Sequence[tuple[str, Sweep]], checks: Sequence[Check]
+) -> str:
+    low, high = found.range_deg
+    facts = [
+        ("range", f"{low:.1f} to {high:.1f} deg"),
+        ("error in sweeps left out", f"{found.error_deg:.2f} deg rms"),
+        ("95 % band", f"{1000 * found.band_V:.1f} mV"),
+        ("drift taken out", f"{100 * found.drift_per_h:.2f} % an hour" if found.drift_per_h else "none seen"),
+    ]
+    blind = _insensitive(found)
+    words = (
+        f"<p>Between {blind[0]:.0f} and {blind[1]:.0f} degrees the voltage hardly changes: the sensor cannot "
+        "tell these angles apart.</p>"
+        if blind
+        else ""
+    )
+    head = [("sweep", ""), ("error, deg rms", "n"), ("within the 95 % band", "n"), ("within its range", "n")]
+    rows = [([c.name, f"{c.rms_deg:.2f}", f"{c.within:.0%}", f"{c.possible:.0%}"], False) for c in checks]
+    checked = table("Sweeps that were not fitted", head, rows) if rows else ""
+    chart = figure(
+        _chart(found, fitted, held), "Readings, the map, and its 95 % band", "voltage against angle"
+    )
+    return page(
+        "Calibration",
+        f"{escape(found.channel)}, {found.sweeps} sweeps",
+        "",
+        cards(facts) + words,
+        [("map", "The map", chart), ("held-out", "On sweeps it never saw", checked)],
+    )
+
+
+def _chart(found: Calibration, fitted: Sequence[Sweep], held: Sequence[tuple[str, Sweep]]) -> str:
+    with canvas(6.4, 3.6) as (drawing, svg):
+        axes = drawing.add_axes((0.11, 0.15, 0.86, 0.82))
+        at = np.linspace(*found.range_deg, 201)
+        volts = found.voltage_of(at)
+        axes.fill_between(at, volts - found.band_V, volts + found.band_V, color="0.85", label="95 % band")
+        for k, sweep in enumerate(fitted):
+            few = slice(None, None, max(1, len(sweep.angle_deg) // 400))
+            axes.plot(
+                sweep.angle_deg[few], sweep.voltage_V[few], ".", ms=2, color="C0", label="" if k else "fitted"
+            )
+        for k, (_, sweep) in enumerate(held):
+            few = slice(None, None, max(1, len(sweep.angle_deg) // 400))
+            axes.plot(
+                sweep.angle_deg[few],
+                sweep.voltage_V[few],
+                ".",
+                ms=2,
+                color="C1",
+                label="" if k else "held out",
+            )
+        axes.plot(at, volts, color="black", lw=1, label="map")
+        axes.set_xlabel("bending angle, deg")
+        axes.set_ylabel("voltage, V")
+        axes.legend(frameon=False, fontsize=8)
+    return svg()

@@ -1,0 +1,181 @@
+"""The real sensor from the command line and from Blender: ports, streams, recordings, replays."""
+
+from __future__ import annotations
+
+import math
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TextIO
+
+from ...errors import InputError
+from ...run.context import Ending
+from ...run.progress import Progress, Sink
+from ...sensing.calibration import deriver, read_calibration
+from ...sensing.session import Control, run_session
+from ...sensing.sources import SerialLine, Simulated, Source, ports
+
+
+def port_lines() -> list[str]:
+    """A line a serial port: its device, the name that finds it in any socket, and what it says it is."""
+    return [f"{port.device:20s} {port.identity or '-':32s} {port.description}" for port in ports()]
+
+
+def serial_source(port: str | None, baud: int) -> Source:
+    """The port of that name, or the only USB one there is; raises InputError."""
+    if port is not None:
+        return SerialLine(port, baud)
+    usb = [p for p in ports() if p.identity is not None]
+    if len(usb) == 1 and usb[0].identity is not None:
+        return SerialLine(usb[0].identity, baud)
+    what = "no USB serial port is there" if not usb else f"{len(usb)} USB serial ports are there"
+    raise InputError(what, "--port", "plug the sensor in, or name its port (`ports` lists them)")
+
+
+def simulated_source(rate_hz: float = 100.0) -> Source:
+    """A sensor that bends to and fro by 45 degrees in 8 s and loses 0.6 % of its light a degree."""
+
+    def volts(t: float) -> tuple[float, ...]:
+        angle_deg = 22.5 * (1 - math.cos(2 * math.pi * t / 8.0))
+        return (2.4 * math.exp(-0.006 * angle_deg), 0.02)
+
+    return Simulated(volts, ("light", "dark"), rate_hz, noise_V=0.004)
+
+
+def stream(
+    source: Source,
+    folder: Path,
+    *,
+    seconds: float | None,
+    about: Mapping[str, Any],
+    progress: Progress,
+    ending: Ending,
+    controlled: bool = False,
+    calibration: str | None = None,
+    keep_time: bool = False,
+    show: Sink | None = None,
+) -> None:
+    """Record a source into `folder`, telling what happens; Ctrl-C ends it well.
+
+    show: hears how it goes five times a second, and of what happens. keep_time: see run_session.
+    calibration: a file whose map is shown beside the voltages. controlled:
+    lines on standard input ask for "pause", "resume", "stop" and "mark WORDS", as Blender does; its end ends
+    the session. Raises InputError and OutputError.
+    """
+    control = Control()
+    if controlled:
+        threading.Thread(target=_obey, args=(control,), daemon=True).start()
+    derive = None if calibration is None else deriver(read_calibration(Path(calibration)))
+    ending.open_folder(folder)
+
+    def tell(event: str, details: dict[str, Any]) -> None:
+        message = {"type": "stream", "event": event, **details}
+        if show is not None:
+            show(message)
+        if event != "status":
+            # Into the log, which five lines a second would fill.
+            progress.emit(message)
+        if event in ("disconnected", "waiting"):
+            words = "the sensor is unplugged" if event == "disconnected" else "the sensor is not there"
+            progress.warning(f"{words}: {details.get('detail', '')}", "", "it is looked for until it comes")
+
+    with _ctrl_c_stops(control):
+        status = run_session(
+            source,
+            folder,
+            about=about,
+            control=control,
+            seconds=seconds,
+            tell=tell,
+            keep_time=keep_time,
+            derive=derive,
+        )
+    ending.summary.update(status)
+
+
+@contextmanager
+def _ctrl_c_stops(control: Control) -> Iterator[None]:
+    """A stream has no end of its own: asked by Ctrl-C or SIGTERM to stop, it ends well."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, lambda *_: control.stop.set()) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+
+
+def _obey(control: Control) -> None:
+    for line in sys.stdin:
+        word, _, rest = line.strip().partition(" ")
+        if word == "pause":
+            control.pause.set()
+        elif word == "resume":
+            control.pause.clear()
+        elif word == "mark":
+            control.marks.put(rest)
+        elif word == "stop":
+            break
+    control.stop.set()
+
+
+class Display:
+    """Shows a stream to people: one live line on a terminal, else a line every five seconds."""
+
+    def __init__(self, out: TextIO, clock: Callable[[], float] = time.monotonic) -> None:
+        self.out, self.live, self.clock = out, out.isatty(), clock
+        self._last, self._open = -math.inf, False
+
+    def __call__(self, message: Mapping[str, Any]) -> None:
+        """Show a message of `stream`."""
+        if message["event"] != "status":
+            words = str(message.get("detail") or message.get("text") or "")
+            self._write(f"{message['event']}{': ' if words else ''}{words}\n")
+        elif self.live or self.clock() - self._last >= 5.0:
+            self._last = self.clock()
+            self._write(f"\r\x1b[K{said(message)}" if self.live else said(message) + "\n", self.live)
+
+    def _write(self, text: str, stays_open: bool = False) -> None:
+        self.out.write("\n" + text if self._open and not stays_open else text)
+        self.out.flush()
+        self._open = stays_open
+
+
+def said(status: Mapping[str, Any]) -> str:
+    """A session's status in a line: time, rate, the latest values, what was lost."""
+    values = [
+        f"{name} {value:.4g}"
+        for name, value in zip(status["columns"][3:], list(status["latest"])[3:], strict=False)
+    ]
+    parts = [f"{status['duration_s']:.1f} s", status["state"], f"{status['rate_hz']:.0f} Hz", *values]
+    return "  ".join([*parts, *_losses(status)])
+
+
+def _losses(status: Mapping[str, Any]) -> list[str]:
+    words = {
+        "lost": "lost",
+        "crc_errors": "wrong CRC",
+        "malformed": "unreadable",
+        "repeated": "repeated",
+        "overlong": "bytes without an end",
+        "restarts": "restarts",
+        "reconnects": "reconnects",
+    }
+    return [f"{status[key]} {word}" for key, word in words.items() if status[key]]
+
+
+def answer(summary: Mapping[str, Any]) -> list[str]:
+    """What a session recorded, in a few lines of text, of its `summary`."""
+    rows, seconds = summary["rows"], summary["duration_s"]
+    losses = _losses(summary) or ["nothing lost"]
+    return [
+        f"{rows} samples in {seconds:.1f} s, format {summary['format'] or 'not found'}",
+        ", ".join(losses),
+    ]

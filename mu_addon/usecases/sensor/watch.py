@@ -1,0 +1,96 @@
+"""A sensor's session seen from another process: its status, and its samples as they come. Nothing waits."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...sensing.ring import Ring
+from ...sensing.session import STATUS
+
+Array = np.ndarray[Any, Any]
+
+
+class Watched:
+    """The session that records into `folder`; `status` is what it said last, empty before that."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.status: dict[str, Any] = {}
+        self._written = 0
+        self._heard = self._sampled = time.monotonic()
+        self._ring: Ring | None = None
+        self._name = ""
+        self._next = 0
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns of `fresh`."""
+        return tuple(self.status.get("columns", ()))
+
+    @property
+    def silent_s(self) -> float:
+        """Seconds since the session last said how it goes; it says so five times a second."""
+        return time.monotonic() - self._heard
+
+    @property
+    def starved_s(self) -> float:
+        """Seconds since the last sample was seen."""
+        return time.monotonic() - self._sampled
+
+    def look(self) -> bool:
+        """Read the status if there is a newer one; returns whether there was."""
+        path = self.folder / STATUS
+        try:
+            written = path.stat().st_mtime_ns
+            if written == self._written:
+                return False
+            status = json.loads(path.read_bytes())
+        except (OSError, ValueError):
+            return False
+        if not isinstance(status, dict):
+            return False
+        self._written, self._heard = written, time.monotonic()
+        self.status = status
+        self._attach(str(status.get("live", "")))
+        return True
+
+    def _attach(self, name: str) -> None:
+        if name == self._name:
+            return
+        self.close()
+        if name:
+            try:
+                self._ring = Ring.attach(self.folder / name)
+            except InputError:
+                # Made this moment, or gone with the session: the next status says which.
+                return
+        self._name, self._next = name, 0
+
+    def fresh(self) -> Array:
+        """Samples (m, columns) that came since the last call; of more than half a ring the latest half."""
+        if self._ring is None:
+            return np.empty((0, len(self.columns)))
+        rows, self._next = self._ring.since(self._next)
+        if len(rows):
+            self._sampled = time.monotonic()
+        return rows
+
+    def latest(self, n: int) -> Array:
+        """The last samples (m, columns), at most n."""
+        return np.empty((0, len(self.columns))) if self._ring is None else self._ring.latest(n)
+
+    def rewind(self) -> None:
+        """Have `fresh` begin again with the oldest samples that are still there."""
+        self._next = 0
+
+    def close(self) -> None:
+        """Let go of the samples."""
+        if self._ring is not None:
+            self._ring.close()
+        self._ring, self._name = None, ""

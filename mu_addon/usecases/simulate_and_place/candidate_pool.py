@@ -1,0 +1,206 @@
+"""Many candidates on several cores: processes that are each given the mesh and the baseline once."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import attrs
+import numpy as np
+
+from ...errors import MuError
+from ...fem.equilibrium import State
+from ...fem.kinematics import probe
+from ...fem.materials import Materials
+from ...fem.model import Model
+from ...meshing.mesh import Mesh
+from ...placement.batch import Sweep
+from ...placement.candidates import Candidate, roi
+from ...placement.inclusion import sensor_share
+from ...run.processes import ctrl_c_ignored, end_with_parent, one_thread_each
+
+if TYPE_CHECKING:
+    from .job import Job
+
+Array = np.ndarray[Any, Any]
+
+
+@attrs.frozen(eq=False)
+class Setting:
+    """What a sweep is about; plain data, so that it travels to another process.
+
+    jobs: candidates and the inclusion rule of each; anchors (p, 3) in mm are the monitored points. whole:
+    the jobs, by number, whose displacement of the whole mesh is wanted, too. study: whose unit it is, with
+    its effects and obstacles; without it nothing but pressure acts.
+    """
+
+    mesh: Mesh
+    materials: Materials
+    anchors: Array
+    jobs: tuple[tuple[Candidate, str], ...]
+    radius_mm: float
+    sensor_MPa: float
+    whole: tuple[int, ...] = ()
+    study: Job | None = None
+
+
+class Moved(NamedTuple):
+    """What all jobs do at one state: anchors (jobs, p, 3) in mm, and of the `whole` ones the differences.
+
+    whole: displacements (w, n, 3) in mm against Model A's, single precision.
+    """
+
+    anchors: Array
+    whole: Array
+
+
+class Evaluator:
+    """Solves all jobs of a setting at one state of Model A, having built its model once."""
+
+    def __init__(self, setting: Setting, threads: int) -> None:
+        s = setting
+        found = {c.name: roi(s.mesh, c, s.radius_mm) for c, _ in s.jobs}
+        shares = [sensor_share(rule, found[c.name]) for c, rule in s.jobs]
+        monitored = s.anchors, probe(s.mesh, s.anchors)
+        model = Model(s.mesh, threads=threads) if s.study is None else s.study.model(s.mesh, threads)
+        newton = None if s.study is None else s.study.effects.newton
+        self._sweep = Sweep(model, s.materials, monitored, shares, s.sensor_MPa, newton)
+        self._whole = s.whole
+
+    def __call__(self, state: State) -> Moved:
+        """What all jobs do at a state of Model A. Raises ConvergenceError."""
+        states = self._sweep.states(state)
+        apart = [(states[job].u - state.u).astype(np.float32) for job in self._whole]
+        return Moved(self._sweep.points(states), np.array(apart, np.float32).reshape(-1, *state.u.shape))
+
+    def alone(self, job: int, pressures_MPa: Array) -> Array:
+        """Anchors (s, p, 3) in mm that a job moves along its path from rest. Raises ConvergenceError."""
+        return self._sweep.alone(job, pressures_MPa)
+
+    def marched(self, job: int, time_s: Array, pressure_kPa: Array) -> Array:
+        """Anchors (k, p, 3) in mm that a job moves at k instants, beside obstacles; ConvergenceError."""
+        return self._sweep.marched(job, time_s, pressure_kPa)
+
+
+_evaluator: Evaluator | None = None
+
+
+def _start(setting: Setting) -> None:
+    global _evaluator
+    end_with_parent()
+    _evaluator = Evaluator(setting, threads=1)
+
+
+def _work(state: State) -> Moved:
+    assert _evaluator is not None
+    return _evaluator(state)
+
+
+def _work_alone(job: int, pressures_MPa: Array) -> Array:
+    assert _evaluator is not None
+    return _evaluator.alone(job, pressures_MPa)
+
+
+def _work_marched(job: int, time_s: Array, pressure_kPa: Array) -> Array:
+    assert _evaluator is not None
+    return _evaluator.marched(job, time_s, pressure_kPa)
+
+
+def _survive_broken_pipes() -> None:
+    """Writing to a process that has ended must be an error, as Python has it, not the end of this one.
+
+    The compiler inside Warp resets what Python had set when it starts.
+    """
+    if hasattr(signal, "SIGPIPE"):
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+
+
+@contextmanager
+def _worker_errors() -> Iterator[None]:
+    try:
+        yield
+    except BrokenProcessPool:
+        raise MuError(
+            "a worker process ended before its time",
+            "candidates",
+            "run again, it resumes; if memory is short give --workers 1",
+        ) from None
+
+
+class Sweeper:
+    """Processes that solve a setting's jobs at states of Model A; started when first needed, until closed."""
+
+    def __init__(self, setting: Setting, workers: int) -> None:
+        self.setting, self.workers = setting, workers
+        self._alone: Evaluator | None = None
+        self._pool: ProcessPoolExecutor | None = None
+        self._submitted: dict[float, Future[Moved]] = {}
+
+    def submit(self, state: State) -> None:
+        """Have a process solve a state; needs two workers or more."""
+        if state.pressure_MPa not in self._submitted:
+            self._submitted[state.pressure_MPa] = self._submit(_work, state)
+
+    def _submit(self, work: Any, *arguments: Any) -> Future[Any]:
+        with one_thread_each():
+            _survive_broken_pipes()
+            if self._pool is None:
+                context = multiprocessing.get_context("spawn")
+                self._pool = ProcessPoolExecutor(self.workers, context, _start, (self.setting,))
+            with ctrl_c_ignored(), _worker_errors():
+                return self._pool.submit(work, *arguments)
+
+    def alone(self, tasks: Sequence[tuple[int, Array]]) -> list[Array]:
+        """Anchors (s, p, 3) in mm that jobs, by number, move along their paths through pressures (s,)."""
+        if self.workers == 1:
+            self._alone = self._alone or Evaluator(self.setting, threads=1)
+            return [self._alone.alone(*task) for task in tasks]
+        waiting = [self._submit(_work_alone, *task) for task in tasks]
+        with _worker_errors():
+            return [done.result() for done in waiting]
+
+    def marched(self, jobs: Sequence[int], time_s: Array, pressure_kPa: Array) -> Iterator[tuple[int, Array]]:
+        """Each of some jobs, by number, as it is done, and anchors (k, p, 3) in mm it moves at k instants."""
+        if self.workers == 1:
+            for job in jobs:
+                self._alone = self._alone or Evaluator(self.setting, threads=1)
+                yield job, self._alone.marched(job, time_s, pressure_kPa)
+            return
+        waiting = {self._submit(_work_marched, job, time_s, pressure_kPa): job for job in jobs}
+        for done in as_completed(waiting):
+            with _worker_errors():
+                found = done.result()
+            yield waiting[done], found
+
+    def solve(self, states: Sequence[State]) -> Iterator[tuple[int, Moved]]:
+        """Number of each state as it is done, and what all jobs do there.
+
+        The same for any `workers`. Raises the first ConvergenceError of any.
+        """
+        if self.workers == 1:
+            for number, state in enumerate(states):
+                self._alone = self._alone or Evaluator(self.setting, threads=1)
+                yield number, self._alone(state)
+            return
+        for state in states:
+            self.submit(state)
+        numbers = {self._submitted[s.pressure_MPa]: n for n, s in enumerate(states)}
+        for done in as_completed(numbers):
+            with _worker_errors():
+                found = done.result()
+            yield numbers[done], found
+
+    def close(self) -> None:
+        """End the processes, at once: whoever stops early does not wait for what nobody will read."""
+        if self._pool is None:
+            return
+        processes = list((self._pool._processes or {}).values())
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.terminate()
+            process.join()

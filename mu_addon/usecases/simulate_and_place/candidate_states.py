@@ -1,0 +1,209 @@
+"""A study's candidates on one mesh: solved state by state as Model A reaches them, and kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from ...design.anchors import anchors
+from ...fem.equilibrium import State
+from ...fem.kinematics import probe
+from ...fem.trajectory import Trajectory
+from ...meshing.mesh import Mesh
+from ...placement.candidates import Candidate, Evaluation, evaluation
+from ...placement.sampling import between, estimate, rounds
+from ...run.cache import Cache, key
+from .candidate_pool import Setting, Sweeper
+from .job import Job
+
+Array = np.ndarray[Any, Any]
+
+# Pressures between those solved are interpolated where that changes no path's mean deviation by more.
+SAMPLING_ERROR = 0.02
+# A candidate along its whole path from rest and one that started from Model A's state agree to this.
+PATH_DIFFERENCE_MM = 1e-5
+
+
+class Sweep:
+    """Candidates, each under an inclusion rule, through a protocol's distinct pressures (s,) in kPa.
+
+    What is solved is kept in the cache. Close it, also when Model A failed. whole: the rule whose
+    candidates' displacements of the whole mesh are kept, too, to be looked at.
+    """
+
+    def __init__(
+        self,
+        job: Job,
+        cache: Cache,
+        mesh: Mesh,
+        jobs: list[tuple[Candidate, str]],
+        pressure_kPa: Array,
+        whole: str = "",
+    ) -> None:
+        self._job, self._cache, self._mesh, self._jobs = job, cache, mesh, jobs
+        unit = job.unit
+        self._anchors = anchors(unit)
+        self._radius = unit.dimensions.inclusion_radius
+        sensor = unit.material.sensor_modulus_kPa / 1e3
+        materials = job.materials(mesh)
+        self._whole = tuple(i for i, (_, rule) in enumerate(jobs) if rule == whole)
+        self._sweeper = Sweeper(
+            Setting(mesh, materials, self._anchors, tuple(jobs), self._radius, sensor, self._whole, job),
+            job.workers,
+        )
+        self._key = key(
+            mesh.hash(),
+            materials.hash(),
+            pressure_kPa,
+            job.newton,
+            self._anchors,
+            *(part for candidate, rule in jobs for part in (candidate.points, rule)),
+            self._radius,
+            sensor,
+            *job.effects.parts,
+        )
+        distinct = np.unique(pressure_kPa) / 1e3
+        # What is solved whatever comes of it; the rest only where these do not tell enough.
+        self._certain = {float(distinct[i]) for pair in self._rounds(distinct)[:2] for i in pair}
+        self.solved_kPa: list[float] = []
+        self.error = 0.0
+        self.path_difference_mm = 0.0
+
+    def _rounds(self, distinct: Array) -> list[list[int]]:
+        return rounds(distinct, self._job.effects.weighs)
+
+    def _name(self, state: State) -> str:
+        return key(self._key, state.pressure_MPa)
+
+    def reached(self, state: State) -> None:
+        """Start on a state that Model A has just reached, beside Model A's next one."""
+        wanted = any(abs(state.pressure_MPa - p) < 1e-12 for p in self._certain)
+        if wanted and not all(self._cache.has(kind, self._name(state)) for kind in self._kinds):
+            self._sweeper.submit(state)
+
+    @property
+    def _kinds(self) -> tuple[str, ...]:
+        """What is kept of a state."""
+        return ("sweep", "whole") if self._whole else ("sweep",)
+
+    def evaluations(
+        self, trajectory: Trajectory, on_progress: Callable[[float], None], verify: bool = False
+    ) -> list[Evaluation]:
+        """Evaluation of every job against Model A's whole trajectory. Raises ConvergenceError.
+
+        verify: whether one of them is also followed along its whole path from rest, and all of them should
+        that lead elsewhere.
+        """
+        distinct = np.array([s.pressure_MPa for s in trajectory.states])
+        order = self._rounds(distinct)
+        loaded = sum(map(len, order))
+        weight = np.bincount(trajectory.index, minlength=len(distinct))
+        monitor = probe(self._mesh, self._anchors)
+        still = np.array([self._anchors + monitor.displacement(s.u) for s in trajectory.states])
+        known: dict[int, Array] = {}
+        for pair in order:
+            for number, points in self._solved(trajectory, pair):
+                known[number] = points - still[number]
+                on_progress(len(known) / loaded)
+            self.error = 0.0
+            if len(known) < loaded:
+                without_last = {n: d for n, d in known.items() if n != pair[-1]}
+                full, sparse = between(distinct, known), between(distinct, without_last)
+                self.error = estimate(full, sparse, weight)
+            if self.error <= SAMPLING_ERROR:
+                break
+        if verify and known and not self._independent_of_path(distinct, known, still):
+            known = self._along_paths(distinct, still, known)
+        self.solved_kPa = sorted(float(distinct[n]) * 1e3 for n in known)
+        difference = between(distinct, known) if known else np.zeros((len(distinct), len(self._jobs), 1, 3))
+        baseline = trajectory.of_time(still)
+        moved = baseline[:, None] + trajectory.of_time(difference)
+        return [
+            evaluation(self._mesh, candidate, rule, self._radius, moved[:, i], baseline, self._job.stations)
+            for i, (candidate, rule) in enumerate(self._jobs)
+        ]
+
+    def _independent_of_path(self, distinct: Array, known: dict[int, Array], still: Array) -> bool:
+        """Whether the job that deviates most is, where it does, what its whole path from rest leads to.
+
+        An elastic body without limit points has one state a pressure, and candidates may start from Model
+        A's. Should this one have another, all are solved along their paths.
+        """
+        kept = self._cache.get("path", self._key)
+        if kept is not None:
+            self.path_difference_mm = float(kept["difference_mm"])
+            return self.path_difference_mm <= PATH_DIFFERENCE_MM
+        numbers = [n for n in known if distinct[n]]
+        size = np.array([np.linalg.norm(known[n], axis=2).max(axis=1) for n in numbers])
+        state, job = np.unravel_index(size.argmax(), size.shape)
+        number = numbers[int(state)]
+        way = _outward(distinct, distinct[number])
+        (moved,) = self._sweeper.alone([(int(job), distinct[way])])
+        self.path_difference_mm = float(np.abs(moved[-1] - still[number] - known[number][job]).max())
+        self._cache.put("path", self._key, {"difference_mm": self.path_difference_mm})
+        return self.path_difference_mm <= PATH_DIFFERENCE_MM
+
+    def _along_paths(self, distinct: Array, still: Array, before: dict[int, Array]) -> dict[int, Array]:
+        """Differences (jobs, p, 3) in mm at every pressure but 0, each job along its whole path.
+
+        At 0, where weight alone acts and every path begins, they stay as they were found before.
+        """
+        sides = [_outward(distinct, p) for p in (distinct.min(), distinct.max())]
+        sides = [side for side in sides if len(side)]
+        tasks = [(job, distinct[side]) for job in range(len(self._jobs)) for side in sides]
+        moved = iter(self._sweeper.alone(tasks))
+        known = {int(n): np.zeros((len(self._jobs), *still.shape[1:])) for side in sides for n in side}
+        known |= {n: values for n, values in before.items() if not distinct[n]}
+        for job in range(len(self._jobs)):
+            for side in sides:
+                for n, points in zip(side.tolist(), next(moved), strict=True):
+                    known[n][job] = points - still[n]
+        return known
+
+    def _solved(self, trajectory: Trajectory, numbers: list[int]) -> Iterator[tuple[int, Array]]:
+        """Number of each of some states and the anchors moved by every job, from the cache where there."""
+        missing = []
+        for number in numbers:
+            name = self._name(trajectory.states[number])
+            kept = self._cache.get("sweep", name)
+            if kept is None or not all(self._cache.has(kind, name) for kind in self._kinds):
+                missing.append(number)
+            else:
+                yield number, kept["moved_mm"]
+        for position, moved in self._sweeper.solve([trajectory.states[n] for n in missing]):
+            number = missing[position]
+            name = self._name(trajectory.states[number])
+            if self._whole:
+                self._cache.put("whole", name, {"difference_mm": moved.whole})
+            self._cache.put("sweep", name, {"moved_mm": moved.anchors})
+            yield number, moved.anchors
+
+    def whole(self, trajectory: Trajectory) -> Iterator[tuple[str, Array, Array]]:
+        """Name of each path whose displacement was kept, pressures (r,) in kPa and differences (r, n, 3).
+
+        In mm against Model A's, at the pressures that were solved from its states; none where every path was
+        solved from rest instead.
+        """
+        found = {
+            s.pressure_MPa * 1e3: self._cache.get("whole", self._name(s))
+            for s in trajectory.states
+            if any(abs(s.pressure_MPa * 1e3 - p) < 1e-9 for p in self.solved_kPa)
+        }
+        if self.path_difference_mm > PATH_DIFFERENCE_MM or not found:
+            return
+        kept = {p: arrays["difference_mm"] for p, arrays in found.items() if arrays is not None}
+        for row, job in enumerate(self._whole if len(kept) == len(found) else ()):
+            yield self._jobs[job][0].name, np.array(list(kept)), np.array([d[row] for d in kept.values()])
+
+    def close(self) -> None:
+        """End the processes."""
+        self._sweeper.close()
+
+
+def _outward(distinct: Array, target: float) -> Array:
+    """Numbers of the pressures (s,) from 0, without it, to a target on one side of it, in that order."""
+    between = (distinct * np.sign(target) > 0) & (np.abs(distinct) <= np.abs(target) * (1 + 1e-12))
+    numbers = np.flatnonzero(between)
+    return numbers[np.argsort(np.abs(distinct[numbers]))]

@@ -1,0 +1,183 @@
+"""A unit as an extended model has it: what model.toml says is wrong, put into parameters and mechanics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import attrs
+
+from ...design.parameters import Printing, Unit
+from ...design.strut_cell import strut_cell
+from ...errors import InputError
+from ...evidence.extended import ExtendedModel, Fitted, load_model
+from ...evidence.lattice_fem import printed
+from ...evidence.prediction.lattice import SLENDER, ComputedCell
+from ...evidence.unit_effects import EFFECTS, Body
+from ...homogenize.effective import Effective
+from ..diagnose.run import spoken
+from .static_effects import NAMES, StaticEffects
+
+Values = Mapping[str, Fitted]
+# A unit with a value in it, and what changed in words.
+Put = Callable[[Unit, float], tuple[Unit, str]]
+
+# Effects that the unit has parameters for.
+_SAID = {
+    "overcure": "every printed surface moves outward by {:.3g} mm",
+    "skin_cure": "a skin of {:.3g} mm times the excess of its modulus over the core's",
+    "wall_thickness": "walls are {:.3g} times as thick as drawn",
+}
+# Effects that a simulation is told of otherwise.
+_ELSEWHERE = {
+    "contact": "what a unit touches is given with --obstacle",
+    "mesh_error": "a finer mesh is made with --refine",
+}
+_NOWHERE = "it is of time, gauge or bench, and a quasi-static simulation of the unit has neither"
+
+
+@attrs.frozen
+class Extended:
+    """A unit with an extended model in it; applied, left_out: in words, what of the model is in it.
+
+    effects: what of it is no parameter of a unit and belongs into a simulation of one. kept: the model with
+    these effects alone.
+    """
+
+    unit: Unit
+    applied: tuple[str, ...]
+    left_out: tuple[str, ...]
+    effects: StaticEffects
+    kept: ExtendedModel
+
+    def of_parameters(self) -> Extended:
+        """As far as the unit's parameters go, for what simulates no whole unit."""
+        said = self.effects.words()
+        whole = tuple(f"{words}: only `simulate` and `place` know the unit as a whole" for words in said)
+        applied = tuple(words for words in self.applied if words not in said)
+        return attrs.evolve(self, applied=applied, left_out=(*self.left_out, *whole), effects=StaticEffects())
+
+
+def read_extended(unit: Unit, path: str | Path) -> Extended:
+    """The unit as the model of a file has it; raises InputError for a file or value that cannot be used."""
+    return extend(unit, load_model(Path(path)), str(path))
+
+
+def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Extended:
+    """The unit as a model has it. Raises InputError where the unit breaks a rule, or an effect its bounds.
+
+    overcure moves the print's surfaces, skin_cure gives it a skin, wall_thickness changes its wall, and
+    moduli that were fitted take the place of the unit's. A fitted modulus of the lattice is of the lattice as
+    drawn at 1.0x, so the unit gets that of its own scale. Effects that no parameter of a unit stands for, and
+    that are as static as a simulation of it, are for that, see `StaticEffects`.
+    """
+    applied: list[str] = []
+    left_out: list[str] = []
+    static = {name: values for name, values in model.effects.items() if name in NAMES}
+    for name, values in model.effects.items():
+        if name in static:
+            continue
+        effect = EFFECTS.get(name)
+        known = effect is not None and tuple(values) == (effect.parameter.name,)
+        put = _of_effect(name) if known and name in _SAID else None
+        if put is None:
+            left_out.append(f"{spoken(name)} ({_said(values)}): {_ELSEWHERE.get(name, _NOWHERE)}")
+            continue
+        for p, fitted in values.items():
+            unit, words = _put(unit, origin, f"{name}.{p}", fitted, put)
+            applied.append(words)
+    for name, fitted in model.nuisances.items():
+        if name == "modulus_factor":
+            unit, words = _put(unit, origin, name, fitted, _all_moduli)
+            applied.append(words)
+        elif name == "lattice_modulus_kPa":
+            unit, words = _put(unit, origin, name, fitted, _as_printed(model))
+            applied.append(words)
+        else:
+            left_out.append(f"{spoken(name)} ({fitted.value:.4g}) is of the bench, not of the unit")
+    named = {name: {p: fitted.value for p, fitted in values.items()} for name, values in static.items()}
+    effects = StaticEffects(named, where=f"{origin}, [effect]")
+    applied += effects.words()
+    if model.verdict == "ambiguous" and applied:
+        left_out.insert(0, "the verdict is ambiguous: other effects fit these data as well, see its report")
+    if model.verdict == "unexplained":
+        left_out.insert(0, "the verdict is unexplained: no effect is in the model, though something is wrong")
+    kept = ExtendedModel(model.verdict, {n: v for n, v in static.items() if n in effects.values}, {})
+    return Extended(unit, tuple(applied), tuple(left_out), effects, kept)
+
+
+def require_same_print(unit: Unit, lattice: Effective, origin: str | Path) -> None:
+    """Raise InputError where a law of the lattice is of another print than a unit with a model in it.
+
+    Offset and skin change struts as they change walls: a law of struts as drawn would leave half of the
+    model out.
+    """
+    own = strut_cell(unit)
+    for name in (f.name for f in attrs.fields(Printing)):
+        if name not in lattice.cell:
+            continue
+        law, mine = float(lattice.cell[name]), float(getattr(own, name))
+        if not math.isclose(law, mine, rel_tol=1e-6, abs_tol=1e-9):
+            raise InputError(
+                f"the model prints {name} = {mine:.4g}, and the lattice's law is of struts with {law:.4g}",
+                f"--model {origin} with --lattice",
+                f"homogenize the lattice with --model {origin} too, and give --lattice what that finds",
+            )
+
+
+def _put(unit: Unit, origin: str, key: str, fitted: Fitted, put: Put) -> tuple[Unit, str]:
+    try:
+        return put(unit, fitted.value)
+    except InputError as error:
+        raise InputError(
+            f"the unit cannot have {key} = {fitted.value:.4g}: {error.what}", origin, error.remedy
+        ) from error
+
+
+def _said(values: Values) -> str:
+    return ", ".join(f"{p} {f.value:.4g}" for p, f in values.items())
+
+
+def _of_effect(name: str) -> Put:
+    """An effect put into a unit as the evidence's own simulator puts it."""
+    change = EFFECTS[name].body
+    assert change is not None
+
+    def put(unit: Unit, size: float) -> tuple[Unit, str]:
+        return change(Body(unit), size).unit, _SAID[name].format(size)
+
+    return put
+
+
+def _all_moduli(unit: Unit, factor: float) -> tuple[Unit, str]:
+    m = unit.material
+    scaled = attrs.evolve(
+        m,
+        lattice_modulus_kPa=m.lattice_modulus_kPa * factor,
+        membrane_modulus_kPa=m.membrane_modulus_kPa * factor,
+        sensor_modulus_kPa=m.sensor_modulus_kPa * factor,
+    )
+    return attrs.evolve(unit, material=scaled), f"all moduli are {factor:.4g} times as large"
+
+
+def _as_printed(model: ExtendedModel) -> Put:
+    values = model.values
+    offset = values.get("overcure.offset_mm", 0.0)
+    excess = values.get("skin_cure.excess_mm", 0.0)
+
+    def put(unit: Unit, drawn_kPa: float) -> tuple[Unit, str]:
+        if model.lattice:
+            # The unit has the effects by now, beside what it had of them before.
+            factor = ComputedCell(model.lattice, None, *printed(unit.print)).stiffness(unit.scale, 0.0, 0.0)
+        else:
+            factor = SLENDER.stiffness(unit.scale, offset, excess)
+        modulus = drawn_kPa * factor
+        if not math.isfinite(modulus):
+            raise InputError(f"its lattice's modulus would be {modulus}", "lattice_modulus_kPa", "")
+        material = attrs.evolve(unit.material, lattice_modulus_kPa=modulus)
+        return attrs.evolve(unit, material=material), (
+            f"the lattice's modulus at {unit.scale:g}x is {modulus:.4g} kPa ({drawn_kPa:.4g} kPa as drawn)"
+        )
+
+    return put

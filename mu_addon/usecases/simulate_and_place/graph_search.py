@@ -1,0 +1,193 @@
+"""The stages of a study beyond the windows: the sensitivity map, and the best path of the whole lattice."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...fem.kinematics import probe
+from ...files import write_csv
+from ...placement.candidates import Candidate
+from ...placement.graph import Graph, lattice_graph
+from ...placement.influence import (
+    deviation_map,
+    gradients_of,
+    influence,
+    loaded,
+    mean_deviation,
+    shares_of_time,
+    telling_pressures,
+)
+from ...placement.response import response
+from ...placement.search import SearchSettings, front, search
+from ...placement.whole import whole_body
+from ...report.results import LatticePath, LatticeSearch
+from ...report.vtk import write_fields
+from .motion import write_sensitivity
+
+if TYPE_CHECKING:
+    from .job import Job
+    from .run import Study
+
+Array = np.ndarray[Any, Any]
+
+MAP = "sensitivity.vtu"
+PATHS = "paths.csv"
+# Beyond this their list alone takes gigabytes.
+MOST_PATHS = 200_000
+
+
+def sensitivity_map(study: Study) -> Array:
+    """dJ_hat (m,) in mm by each element's relative stiffening, from Model A on, as `sensitivity.vtu`."""
+    assert study.mesh is not None
+    assert study.trajectory is not None
+    with study.progress.stage("map"):
+        model = study.job.model(study.mesh)
+        monitor = probe(study.mesh, study.anchors)
+        materials = study.job.materials(study.mesh)
+        chosen = telling_pressures(study.trajectory)
+        found = influence(model, materials, study.trajectory, monitor, chosen)
+        pressures = np.array([s.pressure_MPa for s in loaded(study.trajectory)])
+        gradients = gradients_of(study.trajectory, study.anchors, monitor, study.job.stations)
+        dJ = deviation_map(found.at(pressures), gradients, shares_of_time(study.trajectory))
+        modulus, _ = materials.small_strain(len(dJ))
+        fields = {
+            "dJ_by_relative_stiffening_mm": dJ,
+            "dJ_by_modulus_mm_per_MPa": dJ / modulus,
+            "modulus_MPa": modulus,
+        }
+        write_fields(study.folder / MAP, study.mesh, fields)
+        write_sensitivity(study.folder, study.mesh, dJ / modulus)
+    study.ending.summary["sensitivity"] = {"file": MAP, "largest_mm": float(dJ.max())}
+    return dJ
+
+
+def chains_within(job: Job) -> tuple[Graph, list[tuple[int, ...]]]:
+    """The lattice graph and its chains within a job's limits; raises InputError for none or too many."""
+    graph = lattice_graph(job.unit.printed)
+    chains = list(itertools.islice(graph.chains(job.limits), MOST_PATHS + 1))
+    options = "--shortest-cells, --longest-cells, --bend-deg"
+    if not chains:
+        raise InputError(
+            "no path of the lattice is within the limits",
+            options,
+            "admit shorter or longer paths, or sharper bends",
+        )
+    if len(chains) > MOST_PATHS:
+        raise InputError(
+            f"more than {MOST_PATHS} paths of the lattice are within the limits",
+            options,
+            "shorten the longest path or forbid sharper bends",
+        )
+    return graph, chains
+
+
+def search_graph(study: Study) -> LatticeSearch:
+    """The path of the whole lattice graph that disturbs Model A least, within the study's limits.
+
+    All chains are ranked by a reduced response; the best are then solved on the whole body, until no
+    other is likely to beat them. Raises InputError where no chain is within the limits.
+    """
+    assert study.mesh is not None
+    assert study.trajectory is not None
+    job, rule = study.job, study.headline_rule
+    graph, chains = chains_within(job)
+    lengths = np.array([graph.lengths[graph.steps_of(c)].sum() for c in chains])
+    with study.progress.stage("ranking of the lattice's paths"):
+        predicted = _predicted(study, graph, chains, rule)
+    mesh, trajectory = whole_body(study.mesh, study.trajectory)
+
+    def check(numbers: Array) -> Array:
+        jobs = [(Candidate(f"path{n}", 0, graph.nodes[list(chains[n])]), rule) for n in numbers]
+        return np.array([e.deviation.J_hat for e in study.sweep(mesh, trajectory, jobs)])
+
+    with study.progress.stage("check of the best paths"):
+        outcome = search(predicted, check, SearchSettings(most=job.most_checks))
+    if not outcome.complete:
+        study.warn(
+            f"After {job.most_checks} checks an unchecked path may still be better than the best one, with a "
+            f"probability of up to {outcome.risk:.0%}: give more checks (--checks)."
+        )
+    best = set(front(lengths, outcome.exact_mm).tolist())
+    known = np.isfinite(outcome.exact_mm)
+    order = np.lexsort((predicted, np.where(known, outcome.exact_mm, np.inf))).tolist()
+    every = [
+        LatticePath(
+            f"path{n}",
+            graph.nodes[list(chains[n])],
+            float(lengths[n]),
+            float(predicted[n]),
+            float(outcome.exact_mm[n]),
+            n in best,
+        )
+        for n in order
+    ]
+    _write(study, every)
+    study.search = LatticeSearch(rule, every[: len(outcome.checked)], len(chains), outcome.risk)
+    first = every[0]
+    # A motion to look at is of a whole mesh, or of a half and its image.
+    if study.mesh.symmetry in ((), ("x",)):
+        with study.progress.stage("motion of the best path"):
+            alone = Candidate(first.name, 0, first.points)
+            study.sweep(mesh, trajectory, [(alone, rule)], to_look_at=True)
+    study.ending.summary["search"] = {
+        "rule": rule,
+        "paths": len(chains),
+        "checked": len(outcome.checked),
+        "risk_that_an_unchecked_one_is_better": outcome.risk,
+        "best": {
+            "name": first.name,
+            "points_mm": first.points.tolist(),
+            "length_mm": first.length_mm,
+            "J_hat_mm": first.j_hat,
+            "predicted_J_hat_mm": first.predicted_mm,
+        },
+    }
+    return study.search
+
+
+def _predicted(study: Study, graph: Graph, chains: list[tuple[int, ...]], rule: str) -> Array:
+    """Predicted J_hat (n,) in mm of every chain."""
+    assert study.mesh is not None
+    assert study.trajectory is not None
+    unit = study.job.unit
+    model = study.job.model(study.mesh)
+    monitor = probe(study.mesh, study.anchors)
+    found = response(
+        model,
+        study.job.materials(study.mesh),
+        unit.material.sensor_modulus_kPa / 1e3,
+        study.trajectory,
+        monitor,
+        graph,
+        rule,
+        unit.dimensions.inclusion_radius,
+    )
+    pressures = np.array([s.pressure_MPa for s in loaded(study.trajectory)])
+    gradients = gradients_of(study.trajectory, study.anchors, monitor, study.job.stations)
+    shares = shares_of_time(study.trajectory)
+    # Not all displacements at once: there may be tens of thousands of paths.
+    parts = [chains[i : i + 2000] for i in range(0, len(chains), 2000)]
+    return np.concatenate(
+        [mean_deviation(gradients, found.displacements(part, pressures), shares) for part in parts]
+    )
+
+
+def _write(study: Study, paths: list[LatticePath]) -> None:
+    """paths.csv: every path, the solved ones first, by J_hat or else by its prediction."""
+    rows = [
+        (
+            p.name,
+            f"{p.length_mm:.6g}",
+            f"{p.predicted_mm:.6g}",
+            f"{p.j_hat:.9g}" if np.isfinite(p.j_hat) else "",
+            "yes" if p.on_front else "no",
+            "; ".join(" ".join(f"{c:.6g}" for c in point) for point in p.points),
+        )
+        for p in paths
+    ]
+    columns = ["path", "length_mm", "predicted_J_hat_mm", "J_hat_mm", "on_front", "points_mm"]
+    write_csv(study.folder / PATHS, columns, rows)

@@ -1,0 +1,334 @@
+"""What a study is asked to do: its inputs, and the text that stands for them in study.toml."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import attrs
+
+from ...design.assets import asset_root
+from ...design.body import Body, read_body
+from ...design.parameters import Unit, read_unit, to_toml
+from ...design.rigid_body import RigidBody, mirrored, read_rigid_bodies, to_obj
+from ...design.solid import QUALITY
+from ...errors import InputError
+from ...fem.obstacle import CONTACT
+from ...fem.protocol import Protocol, read_protocol
+from ...fem.unit import materials_of
+from ...homogenize.effective import Effective, read_effective
+from ...meshing.settings import MeshSettings
+from ...placement.graph import Limits
+from ...placement.inclusion import RULES
+from ...sensing.optics import Optics
+from .contact_history import obstacles_of
+from .static_effects import StaticEffects
+from .study_file import FILES, NAME, STAGES, Tables, compose, digest, holds
+from .study_file import read as read_tables
+
+if TYPE_CHECKING:
+    from ...fem.descent import NewtonSettings
+    from ...fem.materials import Materials
+    from ...fem.model import Model
+    from ...meshing.mesh import Mesh
+
+GRASP = "protocols/grasp.csv"
+LATTICE_LAW = FILES["lattice"]
+
+
+def _whole(low: int, high: int, what: str) -> Any:
+    def check(_: object, field: attrs.Attribute[int], value: int) -> None:
+        if not low <= value <= high:
+            raise InputError(f"{what} is {value}", field.name, f"give a whole number from {low} to {high}")
+
+    return check
+
+
+def _rules(_: object, field: attrs.Attribute[Any], value: tuple[str, ...]) -> None:
+    if not value or any(rule not in RULES for rule in value):
+        raise InputError(f"the rules are {value!r}", field.name, f"give some of {', '.join(RULES)}")
+
+
+@attrs.frozen
+class Job:
+    """Inputs of a study. times: samples k of the protocol; stations: j along the backbone.
+
+    The 13 samples of the grasp protocol are 1 s or 10 kPa apart and meet each of its corners.
+    """
+
+    unit: Unit
+    protocol: Protocol
+    mesh: MeshSettings = attrs.field(factory=MeshSettings)
+    mesher: str = attrs.field(default="auto", validator=attrs.validators.in_(("auto", "gmsh", "pytetwild")))
+    times: int = attrs.field(default=13, validator=_whole(2, 1001, "the number of time samples"))
+    stations: int = attrs.field(default=51, validator=_whole(2, 10_001, "the number of stations"))
+    rules: tuple[str, ...] = attrs.field(default=RULES, validator=_rules)
+    quality: str = attrs.field(default="interactive", validator=attrs.validators.in_(tuple(QUALITY)))
+    workers: int = attrs.field(default=2, validator=_whole(1, 256, "the number of workers"))
+    # Whether a second, coarser mesh is solved to tell how far the mesh moves a ranking.
+    mesh_check: bool = attrs.field(default=True, validator=attrs.validators.instance_of(bool))
+    # Which paths: the windows of anchors alone, or the whole lattice graph besides.
+    paths: str = attrs.field(default="windows", validator=attrs.validators.in_(("windows", "graph")))
+    limits: Limits = attrs.field(factory=Limits)
+    # What the resin does to light, for the signal beside each path's disturbance.
+    optics: Optics = attrs.field(factory=Optics)
+    most_checks: int = attrs.field(default=100, validator=_whole(2, 100_000, "the number of checks"))
+    # The lattice's law, by homogenizing its cell, in place of the unit's one modulus for it.
+    lattice: Effective | None = None
+    # A sound body that takes the place of the lattice's box.
+    body: Body | None = None
+    # Rigid bodies that the unit may touch, fixed in its frame.
+    obstacles: tuple[RigidBody, ...] = attrs.field(default=(), converter=tuple)
+    # What measured data named beside what the unit has parameters for, and the direction of gravity.
+    effects: StaticEffects = attrs.field(factory=StaticEffects)
+    # What is run of it: the first, the first two or all.
+    stages: tuple[str, ...] = STAGES
+
+    def __attrs_post_init__(self) -> None:
+        if self.obstacles and "place" in self.stages and self.paths == "graph":
+            raise InputError(
+                "the search of the whole lattice knows a unit that touches nothing",
+                "obstacles, paths",
+                "leave one of them out",
+            )
+        if self.effects.clogged and "place" in self.stages and self.paths == "graph":
+            raise InputError(
+                "the search of the whole lattice knows a unit whose chambers share one pressure",
+                "clogged_chamber, paths",
+                "leave one of them out",
+            )
+        _, pressure = self.protocol.sample(self.times)
+        if not pressure.any():
+            raise InputError(
+                f"none of the {self.times} samples of the protocol has any pressure",
+                "times",
+                "give more samples, or a protocol that leaves 0 kPa",
+            )
+
+    def tables(self) -> Tables:
+        """Everything that decides the results, a table a stage, as study.toml has it.
+
+        Not `workers`, which decides nothing.
+        """
+        mesh = attrs.asdict(self.mesh)
+        tables: Tables = {
+            "design": _named("unit", self.unit_text())
+            | _named("body", self.body_text())
+            | {"quality": self.quality},
+            "simulate": _named("protocol", self.protocol_text())
+            | {"times": self.times, "mesher": self.mesher}
+            | _named("lattice", self.lattice_text())
+            | _named("obstacles", self.obstacles_text())
+            | ({"friction": [o.friction for o in self.obstacles]} if self.obstacles else {})
+            | {"mesh": mesh}
+            | self.effects.tables,
+            "place": {
+                "stations": self.stations,
+                "rules": list(self.rules),
+                "mesh_check": self.mesh_check,
+                "paths": self.paths,
+            },
+        }
+        if self.optics != Optics():
+            tables["place"]["optics"] = attrs.asdict(self.optics)
+        if self.paths == "graph":
+            tables["place"]["search"] = attrs.asdict(self.limits) | {"most_checks": self.most_checks}
+        return {stage: tables[stage] for stage in self.stages}
+
+    def text(self) -> str:
+        """study.toml, see `tables`."""
+        return compose(self.tables())
+
+    def materials(self, mesh: Mesh) -> Materials:
+        """Materials of the unit's mesh, effects and all."""
+        drawn = materials_of(self.unit, mesh, None if self.lattice is None else self.lattice.law)
+        return self.effects.materials(drawn, mesh)
+
+    def model(self, mesh: Mesh, threads: int = 2) -> Model:
+        """Model of the unit's mesh: pressure, what weighs, what it may touch. Raises InputError."""
+        model = self.effects.model(self.unit, mesh, threads)
+        if self.obstacles:
+            model.obstacles = obstacles_of(self.obstacles, self.unit, mesh)
+        return model
+
+    @property
+    def newton(self) -> NewtonSettings:
+        """Settings of Newton's method for this unit."""
+        return CONTACT if self.obstacles else self.effects.newton
+
+    def texts(self) -> dict[str, str]:
+        """Text of every file of inputs, by name; study.toml is the first."""
+        found = {NAME: self.text(), "unit.toml": self.unit_text()}
+        body = self.body_text()
+        if body is not None:
+            found[FILES["body"]] = body
+        if "simulate" in self.stages:
+            found["protocol.csv"] = self.protocol_text()
+            lattice = self.lattice_text()
+            if lattice is not None:
+                found[LATTICE_LAW] = lattice
+            obstacles = self.obstacles_text()
+            if obstacles is not None:
+                found[FILES["obstacles"]] = obstacles
+        return found
+
+    def texts_in(self, folder: Path) -> tuple[dict[str, str], bool]:
+        """As `texts`, for a folder: with the inputs of further stages that lie there and are still good.
+
+        So `design` in the folder of a `place` of the same unit leaves what that found. And whether what lies
+        in the folder belongs to these inputs. Raises InputError for a study.toml that cannot be used.
+        """
+        own = self.tables()
+        old = read_tables(folder)
+        if old is None or any(old[stage] != own[stage] for stage in own if stage in old):
+            return self.texts(), False
+        files = holds(folder, old)
+        if files is None:
+            return self.texts(), False
+        merged = old | own
+        tables = {stage: merged[stage] for stage in STAGES if stage in merged}
+        return {**self.texts(), **files, NAME: compose(tables)}, True
+
+    def lattice_text(self) -> str | None:
+        """effective.toml: the lattice's law and where it is from, or None where it is the unit's modulus."""
+        return None if self.lattice is None else self.lattice.text()
+
+    def body_text(self) -> str | None:
+        """body.obj: the body in place of the lattice's box, or None where there is none."""
+        return None if self.body is None else self.body.text()
+
+    def obstacles_text(self) -> str | None:
+        """obstacles.obj: the rigid bodies that the unit may touch, or None where there are none."""
+        return to_obj(self.obstacles) if self.obstacles else None
+
+    def mesh_settings(self, settings: MeshSettings) -> MeshSettings:
+        """Settings of a mesh for these obstacles: of the whole unit where one is not its own mirror image."""
+        if not self.obstacles or settings.fraction == "full":
+            return settings
+        return attrs.evolve(settings, fraction="half" if mirrored(self.obstacles) else "full")
+
+    def unit_text(self) -> str:
+        """unit.toml: the unit's parameters with units, meaning and source."""
+        return to_toml(self.unit)
+
+    def protocol_text(self) -> str:
+        """protocol.csv: corner points of the pressure protocol."""
+        return protocol_text(self.protocol)
+
+
+def protocol_text(protocol: Protocol) -> str:
+    """The corner points of a protocol as CSV, to their last digit."""
+    rows = zip(protocol.time_s, protocol.pressure_kPa, strict=True)
+    return "time_s,pressure_kPa\n" + "".join(f"{float(t)!r},{float(p)!r}\n" for t, p in rows)
+
+
+def _named(key: str, text: str | None) -> dict[str, str]:
+    """How a table of study.toml names a file of inputs."""
+    return {} if text is None else {key: FILES[key], f"{key}_sha256": digest(text)}
+
+
+def read_job(folder: Path, workers: int = 2) -> Job:
+    """The job that a study's folder describes; raises InputError where it cannot be used, and OutputError."""
+    where = str(folder / NAME)
+    tables = read_tables(folder)
+    if tables is None:
+        raise InputError("there is no study in this folder", where, "give a folder that holds study.toml")
+    if holds(folder, tables) is None:
+        raise InputError(
+            "a file of inputs is not the one that this study was made with",
+            str(folder),
+            "put it back, or start a new study with it: --unit, --protocol, --lattice, --obstacle",
+        )
+    return job_of(tables, folder, workers)
+
+
+def job_of(tables: Mapping[str, Mapping[str, Any]], folder: Path, workers: int = 2) -> Job:
+    """The job of study.toml's tables and the files beside it; raises InputError that names an unknown key."""
+    where = str(folder / NAME)
+    job: dict[str, Any] = {"unit": read_unit(folder / FILES["unit"]), "protocol": grasp()}
+    if "body" in tables["design"]:
+        job["body"] = read_body(folder / FILES["body"])
+    if "simulate" in tables:
+        job["protocol"] = read_protocol(folder / FILES["protocol"])
+        if "lattice" in tables["simulate"]:
+            job["lattice"] = read_effective(folder / FILES["lattice"])
+        if "obstacles" in tables["simulate"]:
+            friction = tables["simulate"].get("friction")
+            job["obstacles"] = read_rigid_bodies(folder / FILES["obstacles"], friction)
+    return job_with(tables, where, workers=workers, **job)
+
+
+def job_with(tables: Mapping[str, Mapping[str, Any]], where: str, **given: Any) -> Job:
+    """The job of the settings in tables like study.toml's, and of what is given beside them; InputError."""
+    job = dict(given)
+    for stage, table in tables.items():
+        own = (*FILES, *OF_FILES)
+        values = {k: v for k, v in table.items() if k not in own and not k.endswith("_sha256")}
+        if stage == "simulate" and ("effects" in values or "orientation_deg" in values):
+            named, turn = values.pop("effects", {}), values.pop("orientation_deg", 0.0)
+            job["effects"] = StaticEffects(named, turn, f"{where}, [{stage}.effects]")
+        for key, kind in (("mesh", MeshSettings), ("search", Limits), ("optics", Optics)):
+            if key in values:
+                inner = _inner(values.pop(key), f"{where}, [{stage}.{key}]")
+                if key == "search" and "most_checks" in inner:
+                    job["most_checks"] = inner.pop("most_checks")
+                job["limits" if key == "search" else key] = _built(kind, inner, f"{where}, [{stage}.{key}]")
+        known = SETTINGS[stage]
+        for key in values:
+            if key not in known:
+                raise InputError(f"unknown key {key!r}", f"{where}, [{stage}]", f"known: {', '.join(known)}")
+        job |= values
+    if isinstance(job.get("rules"), list):
+        job["rules"] = tuple(job["rules"])
+    return _built(Job, {**job, "stages": tuple(tables)}, where)
+
+
+def _inner(value: Any, where: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise InputError(f"{value!r} is not a table", where, "write it as a table")
+    return dict(value)
+
+
+# Keys that belong to a file of inputs beside them.
+OF_FILES = ("friction",)
+# Keys of each stage's table besides files and inner tables.
+SETTINGS = {
+    "design": ("quality",),
+    "simulate": ("times", "mesher", "orientation_deg"),
+    "place": ("stations", "rules", "mesh_check", "paths"),
+}
+
+
+def _built(kind: Any, values: dict[str, Any], where: str) -> Any:
+    try:
+        return kind(**values)
+    except TypeError as error:
+        raise InputError(f"this is no study: {error}", where, "correct that key") from error
+    except ValueError as error:
+        raise InputError(f"a value is not offered: {error.args[0]}", where, "correct that key") from error
+
+
+def grasp() -> Protocol:
+    """The protocol that comes with the package."""
+    return read_protocol(asset_root() / GRASP)
+
+
+def protocol_of(path: str | Path | None) -> Protocol:
+    """The protocol in a CSV file, or the one that comes with the package. Raises InputError."""
+    return grasp() if path is None else read_protocol(Path(path))
+
+
+def optics_of(words: Sequence[str]) -> Optics:
+    """The resin's optics with what NAME=VALUE pairs change; raises InputError."""
+    names = [field.name for field in attrs.fields(Optics)]
+    values: dict[str, float] = {}
+    for word in words:
+        name, _, value = word.partition("=")
+        try:
+            values[name] = float(value)
+        except ValueError:
+            name = ""
+        if name not in names:
+            raise InputError(f"{word!r} is not understood", "--light", f"NAME=VALUE with {', '.join(names)}")
+    return Optics(**values)

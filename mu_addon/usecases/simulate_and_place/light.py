@@ -1,0 +1,198 @@
+"""The second aim of a placement: how well light along each candidate path would tell the bending."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from ...design.waveguide import waveguide
+from ...errors import InputError
+from ...fem.kinematics import bending_angle_deg
+from ...files import write_csv
+from ...report.results import Checks, Signals
+from ...run.cache import key
+from ...sensing.embedded_waveguide import Held, Joints, held
+from ...sensing.law import CURVATURE_OF_WELLS, Law, features, fit_law
+from ...sensing.optics import Optics
+from ...sensing.signal import best_sets, differential_pairs, pareto, response, signal_of_nodes, traced_signal
+
+if TYPE_CHECKING:
+    from .run import Study
+
+Array = np.ndarray[Any, Any]
+
+TABLE = "signals.csv"
+# Of what is read, as a share of the light: a photodiode and a 10 bit converter.
+NOISE = 0.005
+# How much the curvature of one cell of the backbone varies, 1/mm: a fifth of the unit's at 40 degrees.
+SPREAD = 0.002
+_CHECKS = 5
+
+
+def signals(study: Study, optics: Optics) -> Signals | None:
+    """Follow light along every candidate path through the motion of Model A, after the paths were ranked.
+
+    None, and a warning, where there is nothing to follow: a unit that does not bend, a resin too dark.
+    """
+    try:
+        return _signals(study, optics)
+    except InputError as error:
+        study.warn(f"What the light would tell is not known: {error.what} ({error.where}).")
+        return None
+
+
+def _signals(study: Study, optics: Optics) -> Signals:
+    assert study.mesh is not None
+    assert study.trajectory is not None
+    unit = study.job.unit
+    with study.progress.stage("light", expected_s=10.0):
+        law = _law(study, optics)
+        states = study.trajectory.states
+        # What no pressure acts on comes first, whether or not a sample meets it.
+        still = next((s.u for s in states if not s.pressure_MPa), np.zeros_like(study.mesh.nodes))
+        displacements = [still, *(s.u for s in states)]
+        angle = np.array([bending_angle_deg(study.mesh, u) + 0.0 for u in displacements])
+        joints = Joints.of(study.mesh, study.anchors, unit.dimensions.cell)
+        moved = [joints.moved(u) for u in displacements]
+        bars = _bars(study)
+        own = {name: [(at[i], turned[i]) for at, turned in moved] for name, (i, _) in bars.items()}
+        found = {name: signal_of_nodes(law, bar, own[name]) for name, (_, bar) in bars.items()}
+        responses = [response(angle, signal.transmitted, float(angle[0])) for signal in found.values()]
+        errors, slopes = [], []
+        for name, (_, bar) in bars.items():
+            # Over the whole motion: the law's error grows with what changes.
+            ends = [features(bar.guided, bar.legs(*own[name][i])) for i in (angle.argmin(), angle.argmax())]
+            errors.append(law.error(ends[1] - ends[0]) / float(np.ptp(angle)))
+            slopes.append(_by_cell(law, bar, study.anchors))
+        names = tuple(bars)
+        J = np.array([study.evaluations[name, study.headline_rule].deviation.J_hat for name in names])
+        best = names[int(J.argmin())]
+        weighs = study.job.effects.weighs
+        checks = _checked(bars[best][1], own[best], angle, optics, weighs)
+    sizes = [size for size in (2, 3) if size <= len(names)]
+    sets = [best for size in sizes for best in best_sets(SPREAD * np.array(slopes), NOISE, size)]
+    pairs = differential_pairs([r.sensitivity_per_deg for r in responses])
+    told = Signals(
+        optics=optics,
+        law=law,
+        names=names,
+        responses=tuple(responses),
+        errors_per_deg=np.array(errors),
+        at_rest=np.array([s.transmitted[0] if weighs else s.at_rest for s in found.values()]),
+        checks=checks,
+        j_hat=J,
+        front=tuple(pareto(J.tolist(), [r.sensitivity_per_deg for r in responses])),
+        sets=_named(names, sets),
+        differential=_named(names, pairs),
+    )
+    study.light = told
+    _write(study, told)
+    return told
+
+
+def _bars(study: Study) -> dict[str, tuple[list[int], Held]]:
+    """Anchors' numbers and waveguide of every candidate path; one without room for it is left out and told.
+
+    Raises InputError where there is room for none.
+    """
+    unit = study.job.unit
+    found, why = {}, None
+    for window in study.windows:
+        numbers = list(window.indices)
+        try:
+            bar = waveguide(unit, window)
+        except InputError as error:
+            why = error
+            study.warn(f"What light along {window.name} would tell is not known: {error.what}.")
+            continue
+        found[window.name] = numbers, held(bar, study.anchors[numbers], unit.printed)
+    if why is not None and not found:
+        raise why
+    return found
+
+
+def _checked(
+    bar: Held, moved: list[tuple[Array, Array]], angle: Array, optics: Optics, weighs: bool
+) -> Checks:
+    """Rays through a bar at rest, at its ends of the motion and between them; `moved` begins with rest.
+
+    weighs: whether rest is not as drawn.
+    """
+    order = np.argsort(angle, kind="stable")
+    some = order[np.unique(np.linspace(0, len(order) - 1, _CHECKS).astype(int))]
+    light = traced_signal(bar, [*moved[:weighs], *(moved[i] for i in some)], optics)
+    share, errors = light.transmitted[weighs:], light.errors[weighs:]
+    delta = 1 - share / (light.transmitted[0] if weighs else light.at_rest)
+    return Checks(angle[some], delta, errors * (1 - delta))
+
+
+def _named(names: Sequence[str], chosen: Any) -> tuple[tuple[tuple[str, ...], float], ...]:
+    return tuple((tuple(names[i] for i in numbers), float(value)) for numbers, value in chosen)
+
+
+def _law(study: Study, optics: Optics) -> Law:
+    """The fast law of this unit's waveguide, from the cache if it was fitted before."""
+    d = study.job.unit.printed
+    sizes = (
+        d.cell, d.waveguide_section, d.well_width, d.well_depth, d.well_pitch, d.waveguide_end,
+        d.junction_diameter,
+    )  # fmt: skip
+    name = key("light", 3, sizes, attrs.astuple(optics))
+    stored = study.cache.get("light", name)
+    if stored is None:
+        law = fit_law(d, optics, on_trace=study.progress.update)
+        arrays = {"coefficients": law.coefficients, "covariance": law.covariance, "rms": np.array(law.rms)}
+        study.cache.put("light", name, arrays)
+        return law
+    return Law(stored["coefficients"], stored["covariance"], float(stored["rms"]))
+
+
+def _by_cell(law: Law, bar: Held, anchors: Array) -> Array:
+    """d log(light) by the curvature of each cell along the anchors, (n,) in mm, at rest."""
+    wells = np.asarray(bar.guided.wells) + bar.points[0, 2]
+    edges = np.concatenate([[-np.inf], (anchors[1:, 2] + anchors[:-1, 2]) / 2, [np.inf]])
+    return -law.coefficients[CURVATURE_OF_WELLS] * np.histogram(wells, edges)[0]
+
+
+def _write(study: Study, found: Signals) -> None:
+    rows = []
+    for k, name in enumerate(found.names):
+        r = found.responses[k]
+        rows.append(
+            (
+                name,
+                f"{found.j_hat[k]:.9g}",
+                f"{r.sensitivity_per_deg:.6g}",
+                f"{found.errors_per_deg[k]:.3g}",
+                f"{r.monotonic_deg[0]:.4g}",
+                f"{r.monotonic_deg[1]:.4g}",
+                f"{r.span:.6g}",
+                f"{found.at_rest[k]:.6g}",
+                int(found.front[k]),
+            )
+        )
+    columns = [
+        "path", "J_hat_mm", "sensitivity_per_deg", "its_error", "monotonic_from_deg", "monotonic_to_deg",
+        "span", "transmitted_at_rest", "pareto",
+    ]  # fmt: skip
+    write_csv(study.folder / TABLE, columns, rows)
+    by_name = dict(zip(found.names, found.responses, strict=True))
+    study.ending.summary["light"] = {
+        "optics": attrs.asdict(found.optics),
+        "law_rms": found.law.rms,
+        "sensitivity_per_deg": {n: r.sensitivity_per_deg for n, r in by_name.items()},
+        "monotonic_deg": {n: r.monotonic_deg for n, r in by_name.items()},
+        "pareto": [n for n, on in zip(found.names, found.front, strict=True) if on],
+        "differential_pairs": [
+            {"paths": names, "sensitivity_per_deg": value} for names, value in found.differential
+        ],
+        "traced": {
+            "angle_deg": found.checks.angle_deg.tolist(),
+            "delta": found.checks.delta.tolist(),
+            "error": found.checks.errors.tolist(),
+        },
+        "sets": [{"paths": names, "information": value} for names, value in found.sets],
+    }

@@ -1,0 +1,74 @@
+"""A study's candidates beside obstacles: each through its whole motion, since friction has memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from typing import Any
+
+import numpy as np
+
+from ...design.anchors import anchors
+from ...fem.kinematics import probe
+from ...fem.obstacle import CONTACT
+from ...fem.trajectory import Trajectory
+from ...meshing.mesh import Mesh
+from ...placement.candidates import Candidate, Evaluation, evaluation
+from ...run.cache import Cache, key
+from .candidate_pool import Setting, Sweeper
+from .contact_history import HALVINGS, DEPTH_mm, PRESSURE_MPa
+from .job import Job
+
+Array = np.ndarray[Any, Any]
+
+
+def evaluations(
+    job: Job,
+    cache: Cache,
+    mesh: Mesh,
+    trajectory: Trajectory,
+    jobs: list[tuple[Candidate, str]],
+    on_progress: Callable[[float], None],
+) -> list[Evaluation]:
+    """Evaluation of every candidate, each under an inclusion rule, against Model A's motion.
+
+    None of the shortcuts of `sweeping` holds beside obstacles, which make a state depend on those before it:
+    every candidate is marched through all instants, and kept in the cache. Raises ConvergenceError.
+    """
+    unit, materials = job.unit, job.materials(mesh)
+    points, radius = anchors(unit), unit.dimensions.inclusion_radius
+    sensor = unit.material.sensor_modulus_kPa / 1e3
+    time, pressure = trajectory.time_s, trajectory.pressure_kPa
+    setting = Setting(mesh, materials, points, tuple(jobs), radius, sensor, study=job)
+    contact = CONTACT, PRESSURE_MPa, DEPTH_mm, HALVINGS, [o.friction for o in job.obstacles]
+    names = [
+        key(
+            mesh.hash(),
+            materials.hash(),
+            time,
+            pressure,
+            *contact,
+            job.obstacles_text() or "",
+            points,
+            candidate.points,
+            rule,
+            radius,
+            sensor,
+            *job.effects.parts,
+        )
+        for candidate, rule in jobs
+    ]
+    kept = {n: cache.get("march", name) for n, name in enumerate(names)}
+    moved = {n: arrays["moved_mm"] for n, arrays in kept.items() if arrays is not None}
+    with closing(Sweeper(setting, job.workers)) as sweeper:
+        missing = [n for n in range(len(jobs)) if n not in moved]
+        for n, found in sweeper.marched(missing, time, pressure):
+            cache.put("march", names[n], {"moved_mm": found})
+            moved[n] = found
+            on_progress(len(moved) / len(jobs))
+    monitor = probe(mesh, points)
+    still = trajectory.of_time(np.array([points + monitor.displacement(s.u) for s in trajectory.states]))
+    return [
+        evaluation(mesh, candidate, rule, radius, moved[n], still, job.stations)
+        for n, (candidate, rule) in enumerate(jobs)
+    ]

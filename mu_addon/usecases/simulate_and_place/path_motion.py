@@ -1,0 +1,66 @@
+"""The motion of a unit with a sensor in place, to look at: its differences from Model A's, fields and all."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...meshing.mesh import Mesh
+from ...placement.candidates import Candidate, roi, with_sensor
+from ...placement.inclusion import sensor_share
+from .motion import IMAGE, REGIONS, SurfaceFields, surface_of, write_path
+
+if TYPE_CHECKING:
+    from ...fem.trajectory import Trajectory
+    from .candidate_states import Sweep
+    from .run import Study
+
+Array = np.ndarray[Any, Any]
+
+
+def keep_motion(
+    study: Study, mesh: Mesh, trajectory: Trajectory, sweep: Sweep, jobs: list[tuple[Candidate, str]]
+) -> None:
+    """Write the motion of every path whose displacement a sweep on a mesh has kept. Raises OutputError.
+
+    The mesh is the study's, or the whole body of which the study's is a half.
+    """
+    unit, rule = study.job.unit, study.headline_rule
+    assert study.mesh is not None
+    image = images(study.mesh, mesh)
+    nodes = {region: surface_of(study.mesh, number).node for region, number in REGIONS.items()}
+    both = {r: n if image is None else np.concatenate([n, image[n]]) for r, n in nodes.items()}
+    looked, materials = SurfaceFields(mesh, both), study.job.materials(mesh)
+    candidates = {candidate.name: candidate for candidate, of in jobs if of == rule}
+    by_pressure = {state.pressure_MPa * 1e3: state.u for state in trajectory.states}
+    without: dict[str, Array] = {}
+    for name, pressure_kPa, difference_mm in sweep.whole(trajectory):
+        still = [by_pressure[p] for p in pressure_kPa]
+        without = without or looked.of_states(still, materials)
+        share = sensor_share(rule, roi(mesh, candidates[name], unit.dimensions.inclusion_radius))
+        stiff = with_sensor(materials, share, unit.material.sensor_modulus_kPa / 1e3)
+        moved = [u + apart for u, apart in zip(still, difference_mm, strict=True)]
+        fields = {key: values - without[key] for key, values in looked.of_states(moved, stiff).items()}
+        further = {}
+        if image is not None:
+            further["image_mm"] = difference_mm[:, image] * np.array([-1.0, 1.0, 1.0])
+            for key, values in fields.items():
+                own = len(nodes[key.partition("_")[0]])
+                fields[key], further[IMAGE + key] = values[:, :own], values[:, own:]
+            difference_mm = difference_mm[:, : len(study.mesh.nodes)]
+        write_path(study.folder, name, pressure_kPa, difference_mm, **fields, **further)
+
+
+def images(half: Mesh, mesh: Mesh) -> Array | None:
+    """Number in the whole body's mesh of the mirror image (n,) of each of its half's nodes.
+
+    None where the mesh is the half itself. Sides are numbered as `mirror` does it.
+    """
+    if mesh.symmetry == half.symmetry:
+        return None
+    off = np.ones(len(half.nodes), bool)
+    off[half.symmetry_nodes("x")] = False
+    found = np.arange(len(half.nodes))
+    found[off] = len(half.nodes) + np.arange(np.count_nonzero(off))
+    return found

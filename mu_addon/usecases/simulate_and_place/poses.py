@@ -1,0 +1,67 @@
+"""The simulated unit at a measured bending angle: between Model A's states, and never beyond them.
+
+Under pressure alone the elastic unit has one state a pressure. Where its angle rises with pressure all the
+way from rest, an angle belongs to one state; beyond the first turn it would belong to two, so that there the
+twin has nothing to show. Between two states displacements go straight, as the motion on the timeline does.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...errors import InputError
+from ...fem.kinematics import bending_angle_deg
+from .motion import Motion
+
+Array = np.ndarray[Any, Any]
+
+
+@attrs.frozen(eq=False)
+class Poses:
+    """States (s,) of a motion by rising angle: angle_deg, pressure_kPa, and their numbers in the motion."""
+
+    angle_deg: Array
+    pressure_kPa: Array
+    state: Array
+
+    @property
+    def range_deg(self) -> tuple[float, float]:
+        """The angles that were simulated."""
+        return float(self.angle_deg[0]), float(self.angle_deg[-1])
+
+    def at(self, angle_deg: float) -> tuple[int, int, float] | None:
+        """The two states about an angle and the share of the second; None beyond what was simulated."""
+        low, high = self.range_deg
+        if not low <= angle_deg <= high:
+            return None
+        k = int(np.clip(np.searchsorted(self.angle_deg, angle_deg) - 1, 0, len(self.angle_deg) - 2))
+        first, second = self.angle_deg[k : k + 2]
+        return int(self.state[k]), int(self.state[k + 1]), float((angle_deg - first) / (second - first))
+
+    def pressure_at(self, angle_deg: float) -> float:
+        """The pressure in kPa at which Model A bends so far; nan beyond what was simulated."""
+        return float(np.interp(angle_deg, self.angle_deg, self.pressure_kPa, left=np.nan, right=np.nan))
+
+
+def poses(motion: Motion) -> Poses:
+    """The states that an angle belongs to; raises InputError where the motion does not bend about rest."""
+    order = np.argsort(motion.state_kPa, kind="stable")
+    angles = np.array([bending_angle_deg(motion.mesh, motion.model_a[k].astype(float)) for k in order])
+    pressure = motion.state_kPa[order]
+    rest = int(np.argmin(np.abs(pressure)))
+    first = last = rest
+    while first > 0 and angles[first - 1] < angles[first]:
+        first -= 1
+    while last + 1 < len(angles) and angles[last + 1] > angles[last]:
+        last += 1
+    if first == last:
+        raise InputError(
+            "the simulated unit does not bend as its pressure rises",
+            str(motion.folder),
+            "simulate it with a protocol that inflates it",
+        )
+    kept = slice(first, last + 1)
+    return Poses(angles[kept], pressure[kept], order[kept])

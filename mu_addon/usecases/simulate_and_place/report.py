@@ -1,0 +1,461 @@
+"""One run as one HTML file: styles and pictures are inside, it runs no script and asks no server.
+
+It answers first (which path), then shows why, and ends with what the answer rests on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path as File
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...files import write_text
+from ...report import charts as plots
+from ...report.charts import label, signed
+from ...report.html import cards, facts_table, figure, note, number, page, picture_figure, table
+from ...report.results import ReportData, RuleResult
+from ...run.progress import spell
+from .light_charts import front_chart, response_chart
+
+RULE = {
+    "volume_fraction": "volume fraction",
+    "intersect": "intersect",
+}
+RULE_MEANS = {
+    "volume_fraction": "E blended by the share of each element inside the sensor; converges with the mesh",
+    "intersect": "The paper's: every element the sensor touches gets the sensor's E; depends on the mesh",
+}
+
+
+def write_report(path: File, results: ReportData) -> None:
+    """Write `results` to `path` as a self-contained HTML file; raises OutputError."""
+    write_text(path, report_html(results))
+
+
+def report_html(results: ReportData) -> str:
+    """The whole report as HTML text; the headline's rule comes before any other."""
+    first = sorted(results.rules.items(), key=lambda item: item[0] != results.headline_rule)
+    results = attrs.evolve(results, rules=dict(first))
+    return page(results.title, results.unit, _notes(results), _answer(results), _sections(results))
+
+
+def _sections(r: ReportData) -> list[tuple[str, str, str]]:
+    return [
+        ("ranking", "Ranking of the paths", _ranking(r)),
+        ("search", "The whole lattice", _search(r)),
+        ("light", "What the light would tell", _light(r)),
+        ("motion", "How the unit moves", _motion(r)),
+        ("contact", "What the unit touches", _contact(r)),
+        ("where", "Where and when each path disturbs the motion", _heatmaps(r)),
+        ("marginals", "Along the unit, and over time", _marginals(r)),
+        ("mesh", "Solid, mesh and solver", _mesh(r)),
+        ("assumed", "What was assumed", _assumed(r)),
+        ("parameters", "All parameters", _parameters(r)),
+        ("time", "How long each stage took", _time(r)),
+        ("files", "Files of this run", facts_table("file", "what it holds", r.files)),
+        ("versions", "Versions", facts_table("program", "version", r.versions)),
+    ]
+
+
+def _notes(r: ReportData) -> str:
+    html = ""
+    if r.status != "complete":
+        html += (
+            '<div class="note" role="alert"><p><strong>This run is partial.</strong> '
+            f"{escape(r.reason or 'It stopped before its end.')}</p>"
+            "<p>What is shown was finished before it stopped; the rest is missing, not zero.</p></div>"
+        )
+    return html + note(r.warnings)
+
+
+def _answer(r: ReportData) -> str:
+    rule = r.rules.get(r.headline_rule)
+    html = ""
+    if rule is not None:
+        best = _index(r, rule.chosen)
+        path = r.paths[best]
+        html += (
+            f'<p class="answer">Put the sensor along <strong>{_name(path.name)}</strong>, anchors '
+            f"{path.anchors}: of {len(r.paths)} candidates it disturbs the motion least, by "
+            f"{rule.j_hat[best]:.3f}&nbsp;mm on average.</p><p>{_caveat(r, rule)}</p>{_key_figures(r, rule)}"
+        )
+    pictures = "".join(picture_figure(picture) for picture in r.pictures[:1])
+    if r.view is None:
+        return html + pictures
+    chosen = rule.chosen if rule is not None else ""
+    sensor = f" and the sensor along {_name(chosen)}" if chosen else ""
+    section = figure(
+        plots.unit_with_paths(r.view, r.paths, chosen, rule.j_hat if rule is not None else None),
+        "Left: the unit cut open along its sagittal plane, inlet below, with anchors P1 to "
+        f"P{len(r.view.anchors)}{sensor}. Right: every candidate path at its true height"
+        + (", with its mean deviation in mm." if rule is not None else "."),
+        "Section of the unit, and the candidate paths beside it"
+        + (f"; the chosen path {chosen} runs through anchors {path.anchors}." if chosen else "."),
+    )
+    return f'{html}<div class="lead">{section}{pictures}</div>'
+
+
+def _caveat(r: ReportData, rule: RuleResult) -> str:
+    """What qualifies the answer: ties within the mesh's uncertainty, and what the other rule says."""
+    words = []
+    if rule.tied:
+        names = _listed([_name(name) for name in rule.tied])
+        within = f" ({rule.uncertainty_mm:.3f} mm)" if rule.uncertainty_mm is not None else ""
+        words.append(
+            f"On this mesh it is tied with {names}: they differ by less than the mesh's uncertainty{within}."
+        )
+    for name, other in r.rules.items():
+        if name == r.headline_rule:
+            continue
+        same = other.chosen == rule.chosen
+        words.append(
+            f"This is by the rule “{_rule(r.headline_rule)}”; by “{_rule(name)}” "
+            + ("the same path is best." if same else f"{_name(other.chosen)} would be best.")
+        )
+    return " ".join(words)
+
+
+def _key_figures(r: ReportData, rule: RuleResult) -> str:
+    order = np.argsort(np.asarray(rule.rank), kind="stable")
+    facts = [("mean deviation Ĵ", f"{rule.j_hat[order[0]]:.3f} mm")]
+    if len(order) > 1:
+        second = order[1]
+        facts.append(("runner-up", f"{_name(r.paths[second].name)}, {rule.j_hat[second]:.3f} mm"))
+        worst = order[-1]
+        facts.append(("worst", f"{_name(r.paths[worst].name)}, {rule.j_hat[worst]:.3f} mm"))
+    if len(r.angle_deg):
+        low, high = int(np.argmin(r.pressure_kPa)), int(np.argmax(r.pressure_kPa))
+        for i in (low, high):
+            facts.append((f"bends at {r.pressure_kPa[i]:g} kPa", f"{r.angle_deg[i]:.1f}°"))
+    return cards(facts)
+
+
+def _ranking(r: ReportData) -> str:
+    if not r.rules:
+        return ""
+    html = (
+        "<p>Ĵ is the distance between the unit with the sensor and the unit without, averaged over the line "
+        "of anchors and over the whole pressure cycle. Less is better.</p>"
+    )
+    html += '<div class="pair">'
+    for name, rule in r.rules.items():
+        title = _rule(name)
+        tied = f" Hatched: tied with {_name(rule.chosen)}." if rule.tied else ""
+        bars = (
+            f" Whiskers: ± {rule.uncertainty_mm:.3f} mm by the mesh."
+            if rule.uncertainty_mm is not None
+            else ""
+        )
+        html += (
+            f"<div><h3>Rule “{title}”</h3><p>{escape(RULE_MEANS.get(name, ''))}.</p>"
+            + figure(
+                plots.ranking(rule, r.paths),
+                f"Mean deviation of every path, best first.{tied}{bars}",
+                f"Bar chart of the mean deviation by the rule {title}; {rule.chosen} is best.",
+            )
+            + "</div>"
+        )
+    html += "</div>"
+    head = [("path", ""), ("anchors", "line")]
+    groups = [("", 2)]
+    for name in r.rules:
+        groups.append((f"rule “{RULE.get(name, name)}”", 4))
+        head += [("rank", "n first"), ("Ĵ [mm]", "n"), ("J cont [mm]", "n"), ("volume ratio", "n")]
+    rows = []
+    headline = r.rules.get(r.headline_rule)
+    for i, path in enumerate(r.paths):
+        cells: list[Any] = [label(path.name), path.anchors]
+        for rule in r.rules.values():
+            cells += [
+                rule.rank[i],
+                f"{rule.j_hat[i]:.4f}",
+                f"{rule.j_cont[i]:.4f}",
+                f"{rule.stiffened_mm3[i] / rule.cylinder_mm3[i]:.2f}",
+            ]
+        rows.append((cells, headline is not None and path.name == headline.chosen))
+    caption = (
+        "Every path by every rule. J cont: root mean square instead of mean. Volume ratio: what was "
+        "stiffened over the sensor's own volume."
+    )
+    html += table(caption, head, rows, groups)
+    return html
+
+
+def _search(r: ReportData) -> str:
+    if r.search is None:
+        return ""
+    s = r.search
+    best = s.solved[0]
+    certain = f"less than {max(s.risk, 1e-3):.1%}" if s.risk < 0.5 else f"up to {s.risk:.0%}"
+    html = (
+        f"<p>Of {s.paths} paths through nodes of the lattice, bent ones too, <strong>{escape(best.name)}"
+        f"</strong> disturbs the motion least: {best.j_hat:.3f}&nbsp;mm by the rule “{_rule(s.rule)}”. "
+        f"All were ranked by a reduced model, and the {len(s.solved)} below solved exactly; the chance that "
+        f"another is better is {certain}, as far as the others are predicted as well as these. Paths marked "
+        "as best for their length are beaten by no longer one.</p>"
+    )
+    if r.search_picture is not None:
+        html += f'<div class="triple">{picture_figure(r.search_picture)}</div>'
+    head = [
+        ("path", ""), ("length [mm]", "n"), ("Ĵ [mm]", "n"), ("predicted [mm]", "n"),
+        ("best for its length", ""), ("nodes (x y z) [mm]", ""),
+    ]  # fmt: skip
+    rows = [
+        (
+            [
+                p.name,
+                f"{p.length_mm:.1f}",
+                f"{p.j_hat:.4f}",
+                f"{p.predicted_mm:.4f}",
+                "yes" if p.on_front else "",
+                "; ".join(" ".join(f"{c:g}" for c in np.round(point, 2)) for point in p.points),
+            ],
+            i == 0,
+        )
+        for i, p in enumerate(s.solved)
+    ]
+    return html + table("Paths that were solved", head, rows)
+
+
+def _light(r: ReportData) -> str:
+    if r.light is None:
+        return ""
+    s, o = r.light, r.light.optics
+    chosen = r.rules[r.headline_rule].chosen if r.rules else ""
+    index = s.names.index(chosen) if chosen in s.names else 0
+    mine = s.responses[index]
+    low, high = mine.monotonic_deg
+    front = "No path disturbs less and tells more than those joined by the line."
+    told = "The chosen path in colour; dots are rays through its bent waveguide, bars twice their error."
+    way = "rises" if mine.sensitivity_per_deg < 0 else "falls"
+    html = (
+        f"<p>Along <strong>{escape(label(s.names[index]))}</strong> the light at the detector changes by "
+        f"{100 * abs(mine.sensitivity_per_deg):.2f} ± {100 * s.errors_per_deg[index]:.2f}&nbsp;% a degree "
+        f"about rest, and {way} without a turn from {signed(f'{low:.0f}')} to {high:.0f} degrees. Light is "
+        f"followed along each path by a law "
+        f"fitted to traced rays, which it misses by {100 * s.law.rms:.0f}&nbsp;%. Two things work "
+        f"against each other: light runs along the outer side of a bend, away from wells on its inner side; "
+        f"and a bar that is pulled gives way at its wells, and loses light there. The resin's optics are "
+        f"assumed, since nobody has published them: "
+        f"index {o.index:g}, attenuation {o.attenuation_per_mm:g} a mm, slopes of the walls "
+        f"{o.roughness:g}.</p>"
+        f'<div class="pair">{figure(front_chart(s, chosen), front, "disturbance against sensitivity")}'
+        f"{figure(response_chart(s, chosen), told, 'light against angle')}</div>"
+    )
+    head = [
+        ("path", ""), ("Ĵ [mm]", "n"), ("signal [%/deg]", "n"), ("±", "n"), ("one way from [deg]", "n"),
+        ("to [deg]", "n"), ("light at rest [%]", "n"), ("beaten by none", ""),
+    ]  # fmt: skip
+    rows = [
+        (
+            [
+                label(name),
+                f"{s.j_hat[k]:.4f}",
+                signed(f"{100 * s.responses[k].sensitivity_per_deg:.2f}"),
+                f"{100 * s.errors_per_deg[k]:.2f}",
+                signed(f"{s.responses[k].monotonic_deg[0]:.1f}"),
+                f"{s.responses[k].monotonic_deg[1]:.1f}",
+                f"{100 * s.at_rest[k]:.1f}",
+                "yes" if s.front[k] else "",
+            ],
+            name == chosen,
+        )
+        for k, name in enumerate(s.names)
+    ]
+    html += table("Disturbance and signal of every path", head, rows)
+    if s.differential:
+        names, slope = s.differential[0]
+        html += (
+            f"<p>Read against each other, {escape(_listed([label(n) for n in names]))} differ by "
+            f"{100 * abs(slope):.2f}&nbsp;% more a degree; what dims both alike, such as a light source that "
+            "warms, is not in their difference.</p>"
+        )
+    best = {len(names): names for names, _ in reversed(s.sets)}
+    for size, word in ((2, "pairs"), (3, "triples")):
+        if size in best:
+            html += (
+                f"<p>Of all {word} {escape(_listed([label(n) for n in best[size]]))} together tell most of "
+                "how the bending is spread along the unit.</p>"
+            )
+    return html
+
+
+def _motion(r: ReportData) -> str:
+    html = ""
+    if len(r.angle_deg):
+        low, high = float(r.pressure_kPa.min()), float(r.pressure_kPa.max())
+        html += figure(
+            plots.angle_against_pressure(r.pressure_kPa, r.angle_deg),
+            "Bending angle of the tip against the base, without a sensor; each dot is a converged state"
+            + (", in the order of time: friction makes the way back another." if r.contact else "."),
+            f"Bending angle against pressure from {low:g} to {high:g} kPa.",
+        )
+    if len(r.protocol_s):
+        html += figure(
+            plots.protocol(r.protocol_s, r.protocol_kPa),
+            "The pressure cycle; each dot is a time at which the paths are compared.",
+            "Pressure against time.",
+        )
+    html = f'<div class="pair">{html}</div>' if html else ""
+    if html and r.effects:
+        html = f"<p>With what measured data named: {escape('; '.join(r.effects))}.</p>{html}"
+    if r.pictures[1:]:
+        html += (
+            '<div class="triple">' + "".join(picture_figure(picture) for picture in r.pictures[1:]) + "</div>"
+        )
+    return html
+
+
+def _contact(r: ReportData) -> str:
+    c = r.contact
+    if c is None:
+        return ""
+    if not c.force_N.any():
+        return f"<p>The unit does not reach {escape(_listed(c.names))}.</p>"
+    rows, charts = [], ""
+    for b, name in enumerate(c.names):
+        k = int(c.force_N[b].argmax())
+        rows.append(
+            [
+                name,
+                f"{c.friction[b]:g}",
+                f"{c.force_N[b, k]:.3g}",
+                signed(f"{c.time_s[k]:g} s, {c.pressure_kPa[k]:g} kPa"),
+                f"{c.deepest_mm[b].max():.2g}",
+                f"{c.slid_mm[b].max():.2g}",
+                f"{c.lost_mJ[b].max():.2g}",
+            ]
+        )
+        if c.force_N[b].any():
+            sizes = (np.linalg.norm(force[b], axis=1) for force in (c.normal_N, c.tangential_N))
+            charts += figure(
+                plots.contact_force(c.time_s, *sizes),
+                f"Force of the unit on {escape(name)}.",
+                f"Normal force and friction on {name} over time.",
+            )
+    columns = ["friction", "largest force [N]", "when", "gap error [mm]", "slid [mm]", "lost [mJ]"]
+    head = [("obstacle", ""), *((name, "n") for name in columns)]
+    return (
+        "<p>The obstacles are rigid and fixed; friction is Coulomb's. The gap error is how deep the unit is "
+        "let into one at most.</p>"
+        + table("What the unit may touch", head, [(row, False) for row in rows])
+        + f'<div class="pair">{charts}</div>'
+    )
+
+
+def _heatmaps(r: ReportData) -> str:
+    html = ""
+    for name, rule in r.rules.items():
+        top = float(np.max(rule.delta))
+        maps = "".join(
+            figure(
+                plots.heatmap(rule.delta[i], top, path.name == rule.chosen),
+                f"{_name(path.name)}: {rule.j_hat[i]:.3f} mm",
+                f"Deviation of {path.name} over length and time, at most {np.max(rule.delta[i]):.2f} mm.",
+                "best" if path.name == rule.chosen else "",
+            )
+            for i, path in enumerate(r.paths)
+        )
+        bar = figure(plots.color_bar(top), "", f"Colour scale from 0 to {top:.2f} mm.", "bar")
+        html += f"<h3>Rule “{_rule(name)}”</h3>{bar}<div class='many'>{maps}</div>"
+    if not html:
+        return ""
+    return (
+        "<p>Each square is one path. To the right: length [%], from the inlet to the tip. Upward: time [%] "
+        "in the pressure cycle. The squares of a rule share one colour scale, by the square root of Δ; its "
+        "choice is framed.</p>" + html
+    )
+
+
+def _marginals(r: ReportData) -> str:
+    html = ""
+    for name, rule in r.rules.items():
+        html += f"<h3>Rule “{_rule(name)}”</h3><div class='pair'>"
+        for values, along, averaged in (
+            (rule.delta.mean(axis=1), "length", "time"),
+            (rule.delta.mean(axis=2), "time", "length"),
+        ):
+            html += figure(
+                plots.marginal(values, r.paths, rule.chosen, along),
+                f"Deviation along the {along}, averaged over {averaged}."
+                if along == "length"
+                else f"Deviation over time, averaged over the {averaged}.",
+                f"Mean deviation of every path against {along}.",
+            )
+        html += "</div>"
+    if not html:
+        return ""
+    return (
+        "<p>Colour tells how many anchors a path has, dashes at which anchor it starts; the thick orange "
+        "line is the rule's choice.</p>" + html
+    )
+
+
+def _mesh(r: ReportData) -> str:
+    html = ""
+    if r.gates:
+        head = [("check", "text"), ("found", "n"), ("asked", "ask"), ("result", "")]
+        rows = [
+            ([gate.name, number(gate.value), gate.limit, "passed" if gate.passed else "FAILED"], False)
+            for gate in r.gates
+        ]
+        html += table(
+            "The printable solid, checked after it was read back from its file.", head, rows, css="stack"
+        )
+    if r.mesh:
+        html += facts_table("mesh", "", r.mesh)
+    if r.solver:
+        html += facts_table("solver", "", r.solver)
+    return html
+
+
+def _assumed(r: ReportData) -> str:
+    rows = [([p.path, number(p.value), p.unit, p.source], False) for p in r.parameters if p.assumed]
+    if not rows:
+        return ""
+    head = [("parameter", ""), ("value", "n"), ("unit", ""), ("why", "text")]
+    return "<p>The source paper does not print these. The answer rests on them.</p>" + table(
+        "", head, rows, css="stack"
+    )
+
+
+def _parameters(r: ReportData) -> str:
+    if not r.parameters:
+        return ""
+    head = [("parameter", ""), ("value", "n"), ("unit", ""), ("source", "text")]
+    rows = [
+        ([p.path, number(p.value), p.unit, "assumed" if p.assumed else p.source], False) for p in r.parameters
+    ]
+    return table("", head, rows, css="stack")
+
+
+def _time(r: ReportData) -> str:
+    if not r.seconds:
+        return ""
+    whole = sum(r.seconds.values())
+    return figure(
+        plots.seconds(r.seconds),
+        f"Seconds a stage; {spell(whole)} in all.",
+        "Bar chart of seconds a stage.",
+        "chart",
+    )
+
+
+def _name(path: str) -> str:
+    return escape(label(path))
+
+
+def _rule(name: str) -> str:
+    return escape(RULE.get(name, name))
+
+
+def _index(r: ReportData, name: str) -> int:
+    return next(i for i, path in enumerate(r.paths) if path.name == name)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]

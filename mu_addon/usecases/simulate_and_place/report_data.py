@@ -1,0 +1,321 @@
+"""The report of a study, as far as the study came."""
+
+from __future__ import annotations
+
+import platform
+from importlib import metadata
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from ...design.parameters import SECTIONS, assumed
+from ...design.quantity import describe
+from ...evidence.unit_effects import EFFECTS
+from ...fem.kinematics import bending_angle_deg
+from ...files import write_bytes
+from ...report.results import Gate, Parameter, Path, Picture, ReportData, RuleResult, SideView
+from .job import LATTICE_LAW
+
+if TYPE_CHECKING:
+    from ...homogenize.effective import Effective
+    from .run import Study
+    from .static_effects import StaticEffects
+
+PACKAGES = ("numpy", "scipy", "warp-lang", "cvxopt", "pymetis", "manifold3d", "gmsh", "pytetwild", "meshio")
+# What the lattice's law stands in for.
+REPLACED = ("material.lattice_modulus_kPa", "material.lattice_poisson")
+FILES = {
+    "study.toml": "inputs of this run",
+    "unit.toml": "parameters of the unit",
+    "protocol.csv": "pressure protocol",
+    "effective.toml": "law of the lattice, from its struts and resin",
+    "obstacles.obj": "rigid bodies that the unit may touch, mm",
+    "unit.stl": "printable unit without a sensor, mm",
+    "anchors.txt": "lattice nodes and anchors, mm",
+    "mesh.vtu": "analysis mesh with regions and moduli",
+    "model_a.pvd": "motion without a sensor, a state a sample (ParaView)",
+    "angle.csv": "bending angle of every converged state",
+    "contact.csv": "what the unit touches, with what force, how deep and how far it slides, at every instant",
+    "deviation.csv": "deviation and rank of every path and rule",
+    "delta.npz": "deviation over time and length of every path and rule, mm",
+    "sensitivity.vtu": "how much stiffening each element alone would disturb the motion, mm (ParaView)",
+    "signals.csv": "what light along each path would tell of bending, beside how much it disturbs",
+    "paths.csv": "every path of the lattice: length, predicted and, where it was solved, exact deviation",
+    "motion": "displacements, stress and stretch of every state, with and without a sensor, to look at",
+    "summary.json": "every figure of this run",
+    "log.ndjson": "what was said while it ran",
+}
+
+
+def publish(study: Study, stopped: str = "") -> None:
+    """Write report.html (and unit.png); `stopped` says why a study that is not complete stopped.
+
+    A report that tells of more stages than were run now, from the same inputs, is left as it is.
+    """
+    from .report import write_report
+
+    if study.has_more and (study.folder / "report.html").is_file():
+        return
+    with study.progress.stage("report", expected_s=15.0):
+        versions = package_versions()
+        view, pictures = _pictures(study)
+        if pictures:
+            write_bytes(study.folder / "unit.png", pictures[0].png)
+        _panel_pictures(study)
+        data = report_data(study, view, pictures, versions, stopped, _search_picture(study))
+        write_report(study.folder / "report.html", data)
+
+
+def _panel_pictures(study: Study) -> None:
+    """The study's answers as pictures beside its motion, as far as the study came."""
+    from .panel_pictures import write_angle, write_delta
+
+    if study.trajectory is None or study.mesh is None:
+        return
+    states = study.trajectory.states
+    angles = np.array([bending_angle_deg(study.mesh, s.u) for s in states])
+    write_angle(study.folder, np.array([s.pressure_MPa * 1e3 for s in states]), angles)
+    rule = study.headline_rule
+    found = [e for e in study.evaluations.values() if e.rule == rule]
+    top = max((float(e.deviation.delta.max()) for e in found), default=0.0)
+    for e in found:
+        write_delta(study.folder, e.name, e.deviation.delta, study.trajectory.time_s, top)
+
+
+def report_data(
+    study: Study,
+    view: SideView | None,
+    pictures: list[Picture],
+    versions: dict[str, str],
+    stopped: str = "",
+    search_picture: Picture | None = None,
+) -> ReportData:
+    """What the report shows of a study, complete or stopped early for a reason."""
+    job, d = study.job, study.job.unit.dimensions
+    windows = study.windows
+    complete = all((w.name, rule) in study.evaluations for w in windows for rule in job.rules)
+    time, pressure = job.protocol.sample(job.times)
+    states = study.trajectory.states if study.trajectory else tuple(study.states)
+    if not job.obstacles:
+        # One state a pressure; beside obstacles one an instant, in the order of time.
+        states = tuple(sorted(states, key=lambda s: s.pressure_MPa))
+    rules = {rule: _rule_result(study, rule) for rule in job.rules} if complete else {}
+    return ReportData(
+        title=f"Sensor path for {job.unit.name}" if rules else f"Monolithic Unit {job.unit.name}",
+        unit=f"Monolithic Unit, scale {d.scale:g}, cell {d.cell:g} mm, {d.count} chambers",
+        status="partial" if stopped else "complete",
+        reason=stopped,
+        warnings=tuple(study.warnings),
+        view=view,
+        pictures=tuple(pictures),
+        paths=tuple(Path(w.name, w.start, w.length) for w in windows),
+        rules=rules,
+        headline_rule=study.headline_rule,
+        search=study.search,
+        search_picture=search_picture,
+        light=study.light,
+        contact=study.contact,
+        effects=tuple(_effect_words(job.effects)),
+        pressure_kPa=np.array([s.pressure_MPa * 1e3 for s in states]),
+        angle_deg=np.array([bending_angle_deg(study.mesh, s.u) for s in states if study.mesh]),
+        protocol_s=time if states else np.zeros(0),
+        protocol_kPa=pressure if states else np.zeros(0),
+        parameters=_parameters(study),
+        mesh=_mesh_figures(study),
+        solver={name.replace("_", " "): value for name, value in study.solver.items()},
+        gates=_gates(study),
+        seconds=study.progress.seconds,
+        versions=versions,
+        files={n: what for n, what in _files(study).items() if (study.folder / n).exists()},
+    )
+
+
+def _rule_result(study: Study, rule: str) -> RuleResult:
+    from ...placement.deviation import rank
+
+    found = [study.evaluations[w.name, rule] for w in study.windows]
+    j_hat = np.array([e.deviation.J_hat for e in found])
+    chosen = found[int(np.argmin(j_hat))].name
+    return RuleResult(
+        delta=np.array([e.deviation.delta for e in found]),
+        j_hat=j_hat,
+        j_cont=np.array([e.deviation.J_cont for e in found]),
+        rank=[int(r) for r in rank(j_hat)],
+        stiffened_mm3=np.array([e.stiffened_mm3 for e in found]),
+        cylinder_mm3=np.array([e.cylinder_mm3 for e in found]),
+        chosen=chosen,
+        tied=study.tied(rule, chosen),
+        uncertainty_mm=study.uncertainty_mm.get(rule),
+    )
+
+
+def _parameters(study: Study) -> list[Parameter]:
+    unit = study.job.unit
+    reasons = {a.path: a.reason for a in assumed(unit)}
+    rows = [Parameter("scale", unit.scale, "", "paper")]
+    for section in SECTIONS:
+        # Each section class names its table; the unit holds its values under the same name.
+        values = getattr(unit, section.section)  # type: ignore[attr-defined]
+        for d in describe(section):
+            value = getattr(values, d.name)
+            path = f"{section.section}.{d.name}"  # type: ignore[attr-defined]
+            if study.job.lattice is not None and path in REPLACED:
+                rows.append(Parameter(path, value, d.unit, f"not used: {LATTICE_LAW} has the lattice's law"))
+                continue
+            rows.append(Parameter(path, value, d.unit, reasons.get(path, d.source), d.assumed))
+    rows += _lattice_parameters(study.job.lattice)
+    rows += _effects(study.job.effects)
+    m, k, j = study.job.mesh, study.job.times, study.job.stations
+    rows += [
+        Parameter("study.times", k, "", "samples of the protocol; the paper prints none", True),
+        Parameter("study.stations", j, "", "stations along the backbone; the paper prints none", True),
+        Parameter("mesh.order", m.order, "", "1: linear elements, which lock in thin walls; 2: quadratic"),
+        Parameter("mesh.refine", m.refine, "", "divides every element size"),
+        Parameter(
+            "protocol", "protocol.csv", "", "between the paper's pressures, times are not printed", True
+        ),
+    ]
+    return rows
+
+
+def _effect_words(effects: StaticEffects) -> list[str]:
+    """What acts on the unit besides, in words."""
+    turned = (
+        [f"gravity turned {effects.orientation_deg:g}° about x, 0 being the tip down"]
+        if effects.weighs
+        else []
+    )
+    return [*effects.words(), *turned]
+
+
+def _effects(effects: StaticEffects) -> list[Parameter]:
+    """Size of every effect beside the unit's parameters, and the direction of gravity where it matters."""
+    rows = [
+        Parameter(f"effects.{name}.{p}", value, EFFECTS[name].parameter.unit, f"the model given: {words}")
+        for (name, given), words in zip(effects.values.items(), effects.words(), strict=True)
+        for p, value in given.items()
+    ]
+    if effects.weighs:
+        turned = Parameter("orientation", effects.orientation_deg, "deg", "asked for: 0 hangs, tip down")
+        rows.append(turned)
+    return rows
+
+
+def _lattice_parameters(lattice: Effective | None) -> list[Parameter]:
+    """The lattice's law, and what it was found from."""
+    if lattice is None:
+        return []
+    made = f"{LATTICE_LAW}: {lattice.cell.get('kind', 'a')} cell"
+    if "name" in lattice.resin:
+        made += f" of {lattice.resin['name']}"
+    low, high = lattice.stretch
+    fitted = f"{made}; fitted from stretch {low:g} to {high:g}"
+    rows = [
+        Parameter("lattice law.E100_kPa", lattice.E100_kPa, "kPa", f"{made}; small strain, along an axis"),
+        Parameter("lattice law.nu100", lattice.nu100, "", f"{made}; small strain, along an axis"),
+        Parameter("lattice law.C44_kPa", lattice.C44_kPa, "kPa", f"{made}; small strain, shear between axes"),
+        Parameter("lattice law.relative_density", lattice.relative_density, "", made),
+    ]
+    for law, values in lattice.law.layers:
+        for name, value in zip(law.parameter_names, values, strict=True):
+            unit = "MPa" if name.endswith("_MPa") else ""
+            rows.append(Parameter(f"lattice law.{law.name}.{name}", float(value), unit, fitted))
+    rows += [
+        Parameter(f"lattice law.misfit_{name}", value, "", "root mean square over the largest value")
+        for name, value in attrs.asdict(lattice.misfit).items()
+    ]
+    return rows
+
+
+def _gates(study: Study) -> list[Gate]:
+    if study.solid is None:
+        return []
+    # A solid exists only if every gate passed; see design.gates.
+    g = study.solid.gates
+    return [
+        Gate("genus of the bare lattice", g.lattice_genus, f"E − V + 1 = {g.lattice_genus_expected}", True),
+        Gate("components", g.components, "1", True),
+        Gate("open edges after reading the STL back", g.bad_edges_after_stl, "0", True),
+        Gate("inner shells with the inlet plugged", g.inner_shells, "1", True),
+        Gate(
+            "cavity's volume against its formula [%]", round(100 * g.inner_volume_error, 3), "within 1", True
+        ),
+        Gate("volume of resin [mm³]", round(g.volume_mm3, 1), "reported", True),
+    ]
+
+
+def _mesh_figures(study: Study) -> dict[str, Any]:
+    if study.quality is None:
+        return {}
+    return {name.replace("_", " "): value for name, value in attrs.asdict(study.quality).items()}
+
+
+def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
+    from ...report.render import png
+    from ...report.unit_pictures import motion, portrait, side_view, unit_parts
+
+    if study.solid is None:
+        return None, []
+    d = study.job.unit.dimensions
+    parts = unit_parts(d, study.solid.vertices, study.solid.triangles)
+    name = study.ending.summary.get("chosen", {}).get(study.headline_rule)
+    window = next((w for w in study.windows if w.name == name), None)
+    path = study.anchors[list(window.indices)] if window else study.anchors[:0]
+    radius = max(d.inclusion_radius, d.waveguide_section / 2)
+    with_sensor = f", with the sensor along {name}" if window else ""
+    pictures = [
+        Picture(
+            png(portrait(parts, study.anchors, path, radius)),
+            f"The printable unit cut open{with_sensor}.",
+            "Bellows of six chambers inside a lattice of struts, cut along the plane of bending.",
+        )
+    ]
+    if study.trajectory is not None and study.mesh is not None:
+        states = sorted(study.trajectory.states, key=lambda s: s.pressure_MPa)
+        shown = [states[0], min(states, key=lambda s: abs(s.pressure_MPa)), states[-1]]
+        shown = list({state.pressure_MPa: state for state in shown}.values())
+        texts = []
+        for state in shown:
+            angle = bending_angle_deg(study.mesh, state.u) + 0.0
+            words = f"{state.pressure_MPa * 1e3:g} kPa: {angle:.1f}°"
+            texts.append((state.u, words, f"The analysis mesh at {words}."))
+        pictures += motion(study.mesh, texts, beside=study.job.obstacles)
+    return side_view(parts, study.anchors, path, radius), pictures
+
+
+def _search_picture(study: Study) -> Picture | None:
+    """The best path of the whole lattice in the unit cut open, on the side where it is in view."""
+    from ...report.render import png
+    from ...report.unit_pictures import portrait, unit_parts
+
+    if study.search is None or study.solid is None:
+        return None
+    d = study.job.unit.dimensions
+    best = study.search.solved[0]
+    side = -1.0 if best.points[:, 0].sum() < 0 else 1.0
+    parts = unit_parts(d, study.solid.vertices, study.solid.triangles)
+    radius = max(d.inclusion_radius, d.waveguide_section / 2)
+    return Picture(
+        png(portrait(parts, study.anchors, best.points * [side, 1.0, 1.0], radius)),
+        f"The best path of the lattice, {best.name}, before the unit cut open; its mirror image is as good.",
+        "The unit cut along its plane of bending, and the path of the sensor through its lattice.",
+    )
+
+
+def _files(study: Study) -> dict[str, str]:
+    solids = sorted(p.name for p in study.folder.glob("unit_*.stl"))
+    return FILES | dict.fromkeys(solids, "printable unit with that waveguide, mm")
+
+
+def package_versions() -> dict[str, str]:
+    """Versions of the program, of Python and of every package that decides a figure."""
+    versions = {"mu_addon": _version("mu_addon"), "Python": platform.python_version()}
+    return versions | {name: _version(name) for name in PACKAGES}
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "not installed as a package"

@@ -1,0 +1,176 @@
+"""study.toml: what a study was asked for, a table a stage; read in this format and in older ones."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ...errors import InputError
+from ...files import write_text
+
+NAME = "study.toml"
+# The first line, by which a study's folder is known.
+HEADER = "# The inputs of this study; unit.toml and protocol.csv beside it belong to them."
+FORMAT = 2
+# In the order they need each other; a study has the first, the first two or all.
+STAGES = ("design", "simulate", "place")
+# Files of inputs that a stage's table names, each under the key that names it.
+FILES = {
+    "unit": "unit.toml",
+    "body": "body.obj",
+    "protocol": "protocol.csv",
+    "lattice": "effective.toml",
+    "obstacles": "obstacles.obj",
+}
+_FILES_OF = {"design": ("unit", "body"), "simulate": ("protocol", "lattice", "obstacles"), "place": ()}
+# Far more than any study.toml has: a file this long is not one.
+_LONGEST = 100_000
+
+Tables = dict[str, dict[str, Any]]
+
+
+def digest(text: str) -> str:
+    """SHA-256 of a file's text, in hexadecimal."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def compose(tables: Mapping[str, Mapping[str, Any]]) -> str:
+    """Text of study.toml with a table a stage; a value that is a table itself becomes [stage.key]."""
+    lines = [HEADER, f"format = {FORMAT}"]
+    for stage, values in tables.items():
+        lines += table_lines(stage, values)
+    return "\n".join(lines) + "\n"
+
+
+def table_lines(name: str, values: Mapping[str, Any]) -> list[str]:
+    """Lines of a TOML table, each value that is a table itself as [name.key] after it."""
+    flat = {key: value for key, value in values.items() if not isinstance(value, dict)}
+    lines = ["", f"[{name}]", *(f"{key} = {toml_value(value)}" for key, value in flat.items())]
+    for key, inner in values.items():
+        if isinstance(inner, dict):
+            lines += table_lines(f"{name}.{key}", inner)
+    return lines
+
+
+def toml_value(value: Any) -> str:
+    """A truth, number, text, or a list or table of them, on one line of TOML."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(toml_value(item) for item in value)}]"
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{key} = {toml_value(item)}' for key, item in value.items())} }}"
+    return repr(value)
+
+
+def read(folder: Path) -> Tables | None:
+    """The tables of a folder's study.toml by stage, or None where there is none.
+
+    A file of an older format is understood, and replaced by one of the present format. Raises InputError for
+    one that cannot be used, or that a newer version of this program wrote, and OutputError.
+    """
+    path = folder / NAME
+    if not path.is_file():
+        return None
+    tables, outdated = parse(_text(path), folder)
+    if outdated:
+        write_text(path, compose(tables))
+    return tables
+
+
+def _text(path: Path) -> str:
+    try:
+        with path.open(encoding="utf-8-sig") as stream:
+            text = stream.read(_LONGEST + 1)
+    except OSError as error:
+        raise InputError(
+            f"cannot read the study: {error.strerror or error}", str(path), "check the folder"
+        ) from error
+    except UnicodeDecodeError as error:
+        raise InputError("this is not UTF-8 text", str(path), "choose another folder") from error
+    if len(text) > _LONGEST:
+        raise InputError(f"more than {_LONGEST} characters are no study", str(path), "choose another folder")
+    return text
+
+
+def parse(text: str, folder: Path) -> tuple[Tables, bool]:
+    """Tables of study.toml's text by stage, and whether it is of an older format; raises InputError.
+
+    folder: where the files lie that it names; a format without their digests is given them.
+    """
+    where = str(folder / NAME)
+    try:
+        document = tomllib.loads(text)
+    # Thousands of nested brackets exhaust the parser's stack.
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"this is not TOML: {error}", where, "choose another folder") from error
+    found = document.pop("format", None)
+    if found == 1 and not isinstance(found, bool):
+        return _from_format_1(document, folder), True
+    if found != FORMAT or isinstance(found, bool):
+        newer = isinstance(found, int) and not isinstance(found, bool) and found > FORMAT
+        raise InputError(
+            f"study.toml is of format {found!r}, and this version knows 1 and {FORMAT}",
+            where,
+            "use the newer version that wrote it" if newer else "choose another folder",
+        )
+    stages = STAGES[: len(document)]
+    if set(document) != set(stages) or not document:
+        raise InputError(
+            f"the tables [{'], ['.join(map(str, document))}] are no study", where, "the tables are "
+            f"[{'], ['.join(STAGES)}], each with those before it"
+        )  # fmt: skip
+    for stage in stages:
+        if not isinstance(document[stage], dict):
+            raise InputError(f"{stage} is not a table", where, f"write it as [{stage}]")
+        for key in _FILES_OF[stage]:
+            # A name that leads elsewhere is not followed: each file has its one place.
+            if document[stage].get(key, FILES[key]) != FILES[key]:
+                raise InputError(
+                    f"{key} = {document[stage][key]!r} is not in the folder", where, f'write "{FILES[key]}"'
+                )
+    return {stage: document[stage] for stage in stages}, False
+
+
+def _from_format_1(document: dict[str, Any], folder: Path) -> Tables:
+    """Format 1 was flat, wrote every stage's inputs whether it was run or not, and no digest but one."""
+
+    def taken(*keys: str) -> dict[str, Any]:
+        return {key: document[key] for key in keys if key in document}
+
+    def with_digest(key: str) -> dict[str, Any]:
+        try:
+            text = (folder / FILES[key]).read_bytes().decode("utf-8")
+        except (OSError, UnicodeDecodeError):
+            text = ""
+        return {key: FILES[key], f"{key}_sha256": digest(text)}
+
+    tables: Tables = {"design": with_digest("unit") | taken("quality")}
+    simulate = with_digest("protocol") | taken("times", "mesher", "lattice", "lattice_sha256", "mesh")
+    place = taken("stations", "rules", "mesh_check", "paths", "search")
+    if (folder / "angle.csv").is_file():
+        tables["simulate"] = simulate
+        if (folder / "deviation.csv").is_file():
+            tables["place"] = place
+    return tables
+
+
+def holds(folder: Path, tables: Mapping[str, Mapping[str, Any]]) -> dict[str, str] | None:
+    """Texts of the files that some stages' tables name, by name, or None where one is not as it was then."""
+    texts = {}
+    for stage, values in tables.items():
+        for key in _FILES_OF[stage]:
+            if key in values:
+                try:
+                    texts[FILES[key]] = (folder / FILES[key]).read_bytes().decode("utf-8")
+                except (OSError, UnicodeDecodeError):
+                    return None
+                if digest(texts[FILES[key]]) != values.get(f"{key}_sha256"):
+                    return None
+    return texts

@@ -1,0 +1,471 @@
+"""From a followed video to an experiment in a folder of measured data: pressure, angle, places.
+
+What is followed comes from a tracker: Blender's, or a CSV file of pixels from any other.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import re
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...design.toml_text import line_of, parse, place
+from ...errors import InputError
+from ...files import write_text
+from ...measured import read_folder
+from ...measured.folder import FILE
+from ...measured.kinds import COMMON, KINDS
+from ...measured.rest import AT_REST, SAMPLES
+from ...measured.table import Remark, read_table
+from ...measured.video import Motion, Pair, Tracks, View, motion, resting
+
+Array = np.ndarray[Any, Any]
+
+KIND = "unit_pressure"
+HEAD = (
+    "camera",
+    "base",
+    "tip",
+    "ruler",
+    "ruler_mm",
+    "mm_per_pixel",
+    "follow_base",
+    "fps",
+    "starts_s",
+    "marks",
+    "pattern_px",
+    "search_px",
+    "marker",
+)
+OF_MARKER = ("name", "pixel", "place_mm")
+OF_EXPERIMENT = tuple(k for k in COMMON + KINDS[KIND].may_have_keys if k not in ("kind", "file"))
+MARKS = ("crosses", "dots")
+"""What markers look like: `crosses` show how they turn, `dots` do not."""
+
+
+@attrs.frozen
+class Marks:
+    """What a tracker is told of the markers.
+
+    pixels: place of each by name in the first frame, right and down from the upper left corner; kind: one of
+    `MARKS`; pattern_px: side of the square that is compared; search_px: of the one that is searched.
+    """
+
+    pixels: Mapping[str, tuple[float, float]]
+    kind: str = "crosses"
+    pattern_px: float = 25.0
+    search_px: float = 81.0
+
+
+@attrs.frozen
+class Bench:
+    """How a video was made: the view, the markers, the clock, and keys of the experiment.
+
+    fps: frames a second, the clip's own where it is None; starts_s: the pressure's clock at the first frame.
+    """
+
+    view: View
+    marks: Marks
+    fps: float | None = None
+    starts_s: float = 0.0
+    experiment: Mapping[str, Any] = attrs.field(factory=dict)
+
+
+Tracker = Callable[[Path, Marks], Tracks]
+
+
+@attrs.frozen(eq=False)
+class Filmed:
+    """An experiment made from a video: rows within the pressure's record, and what is odd about it."""
+
+    tracks: Tracks
+    time_s: Array
+    pressure_kPa: Array
+    motion: Motion
+    remarks: tuple[Remark, ...]
+
+
+def read_bench(path: Path) -> Bench:
+    """Read a TOML file that describes a video; raises InputError with line and what to do."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            "cannot read the description of the video", str(path), "check path and file"
+        ) from error
+    document = parse(text, {"": HEAD, "experiment": OF_EXPERIMENT}, str(path))
+
+    def at(key: str) -> str:
+        return place(str(path), line_of(text, key))
+
+    pixels, places = _markers(document.get("marker"), str(path))
+    base = _pair(document, "base", at)
+    if base is None:
+        raise InputError(
+            "the base is not named", str(path), 'name its two markers, base = ["low", "high"], see the page'
+        )
+    missing = [name for name in base if name not in places]
+    if missing:
+        raise InputError(
+            f"marker {missing[0]!r} of the base has no place_mm",
+            str(path),
+            "give its y and z in the unit's frame, in mm",
+        )
+    marks = Marks(
+        pixels, **_given(document, at, kind="marks", pattern_px="pattern_px", search_px="search_px")
+    )
+    if marks.kind not in MARKS:
+        raise InputError(f"marks = {marks.kind!r} is not known", at("marks"), f"say {' or '.join(MARKS)}")
+    if not 5 <= marks.pattern_px < marks.search_px <= 2000:
+        raise InputError(
+            f"pattern_px = {marks.pattern_px:g} and search_px = {marks.search_px:g} do not fit",
+            at("pattern_px"),
+            "a pattern of 5 pixels or more, and a larger square to search",
+        )
+    view = View(
+        base,
+        (places[base[0]], places[base[1]]),
+        _pair(document, "tip", at),
+        ruler=_pair(document, "ruler", at),
+        **_given(
+            document,
+            at,
+            camera="camera",
+            ruler_mm="ruler_mm",
+            mm_per_pixel="mm_per_pixel",
+            follow_base="follow_base",
+        ),
+    )
+    return Bench(
+        view,
+        marks,
+        experiment=document.get("experiment", {}),
+        **_given(document, at, fps="fps", starts_s="starts_s"),
+    )
+
+
+_TYPES = {"camera": str, "marks": str, "follow_base": bool}
+
+
+def _given(document: Mapping[str, Any], at: Callable[[str], str], **keys: str) -> dict[str, Any]:
+    """Values of the keys that are there, of their type, by the names they are wanted under."""
+    found = {}
+    for name, key in keys.items():
+        if key not in document:
+            continue
+        value, wanted = document[key], _TYPES.get(key, float)
+        if wanted is float and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        if not isinstance(value, wanted) or (isinstance(value, float) and not math.isfinite(value)):
+            kinds = {str: "a text", bool: "true or false", float: "a number"}
+            raise InputError(f"{key} = {value!r} is not {kinds[wanted]}", at(key), "correct that line")
+        found[name] = value
+    return found
+
+
+def _pair(document: Mapping[str, Any], key: str, at: Callable[[str], str]) -> Pair | None:
+    value = document.get(key)
+    if value is None:
+        return None
+    if not (isinstance(value, list) and len(value) == 2 and all(isinstance(v, str) for v in value)):
+        raise InputError(f"{key} = {value!r} is not two names", at(key), 'write it as ["one", "other"]')
+    return value[0], value[1]
+
+
+def _markers(
+    tables: Any, origin: str
+) -> tuple[dict[str, tuple[float, float]], dict[str, tuple[float, float]]]:
+    """Pixels and places of the markers by name."""
+    pixels: dict[str, tuple[float, float]] = {}
+    places: dict[str, tuple[float, float]] = {}
+    names: list[str] = []
+    for table in tables if isinstance(tables, list) else []:
+        name = table.get("name") if isinstance(table, dict) else None
+        if not isinstance(name, str) or not name or name in names:
+            raise InputError(f"a marker is named {name!r}", origin, "give each [[marker]] a name of its own")
+        names.append(name)
+        for key, value in table.items():
+            if key not in OF_MARKER:
+                raise InputError(
+                    f"marker {name!r} has an unknown key {key!r}", origin, f"known: {', '.join(OF_MARKER)}"
+                )
+            if key == "name":
+                continue
+            if not (isinstance(value, list) and len(value) == 2 and all(_finite(v) for v in value)):
+                raise InputError(
+                    f"{key} = {value!r} of marker {name!r} is not two numbers",
+                    origin,
+                    "write it as [1.0, 2.0]",
+                )
+            (pixels if key == "pixel" else places)[name] = float(value[0]), float(value[1])
+    if not names:
+        raise InputError("no marker is described", origin, "describe each under [[marker]]")
+    return pixels, places
+
+
+def _finite(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def read_pressure(path: Path) -> tuple[Array, Array]:
+    """Time in s and pressure in kPa, (k,) each, of a recording or a protocol; raises InputError."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            "cannot read the pressure", str(path), "give a CSV file of time_s,pressure_kPa"
+        ) from error
+    table = read_table(text, KINDS["pressure_hold"], Path(path))
+    return table.columns["time_s"], table.columns["pressure_kPa"]
+
+
+def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: str = "") -> Filmed:
+    """An experiment from followed markers and the pressure (time in s, kPa) of the same time.
+
+    Frames outside the pressure's record are left out. Raises InputError for a clip without a clock, one that
+    does not meet the record, and a view that does not fit.
+    """
+    fps = bench.fps if bench.fps is not None else tracks.fps
+    if not (math.isfinite(fps) and fps > 0):
+        raise InputError("the clip does not say how many frames a second it has", where, "give fps")
+    time = bench.starts_s + np.arange(len(tracks)) / fps
+    clock, kPa = pressure
+    slack = 0.5 / fps
+    inside = (time >= clock[0] - slack) & (time <= clock[-1] + slack)
+    told = []
+    if inside.sum() < 2:
+        raise InputError(
+            f"the clip lasts from {time[0]:.4g} to {time[-1]:.4g} s, the pressure's record from "
+            f"{clock[0]:.4g} to {clock[-1]:.4g} s",
+            where,
+            "give starts_s, the pressure's clock at the first frame",
+        )
+    if not inside.all():
+        told.append(
+            Remark(
+                f"{(~inside).sum()} of {len(inside)} frames are outside the pressure's record and left out",
+                where,
+                "start the pressure's record first and end it last",
+            )
+        )
+    kept = attrs.evolve(tracks, pixels=tracks.pixels[:, inside])
+    time = time[inside]
+    p = np.interp(time, clock, kPa)
+    needed = [*bench.view.base, *(bench.view.tip or ())]
+    seen = np.array([np.isfinite(kept.of(name)).all(axis=1) for name in needed])
+    rest = resting(p, seen, AT_REST, SAMPLES)
+    if not rest.any() and seen.all(axis=0).any():
+        first = int(np.argmax(seen.all(axis=0)))
+        rest[first] = True
+        told.append(
+            Remark(
+                f"no frame shows the unit at rest; the angle counts from {p[first]:.4g} kPa at "
+                f"{time[first]:.4g} s",
+                where,
+                "begin the clip at no pressure; the angle's zero is fitted by `diagnose` all the same",
+            )
+        )
+    found = motion(kept, bench.view, rest, time, where)
+    return Filmed(kept, time, p, found, (*told, *found.remarks))
+
+
+def write_experiment(found: Filmed, bench: Bench, name: str, folder: Path) -> tuple[Path, tuple[Remark, ...]]:
+    """Put an experiment into a folder of measured data; returns its CSV file and what the reader remarks.
+
+    An experiment of that name that was made from a video before is made anew. Raises InputError where
+    another holds the name, or the data could not be read again; OutputError.
+    """
+    stem = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or "video"
+    table = folder / f"{stem}.csv"
+    block = _block(name, table.name, bench)
+    text = _table(found, bench)
+    remarks = _tried(block, table.name, text)
+    listed = folder / FILE
+    before = ""
+    if listed.exists():
+        same = [e for e in read_folder(folder).experiments if e.name == name or e.file.name == table.name]
+        before = listed.read_text(encoding="utf-8")
+        if same and block not in before:
+            raise InputError(
+                f"an experiment named {same[0].name!r}, in {same[0].file.name}, is there already",
+                str(listed),
+                "give this one another name, or take that one out",
+            )
+    write_text(folder / f"{stem}.pixels.csv", _pixels(found))
+    write_text(table, text)
+    if block not in before:
+        write_text(listed, f"{before.rstrip()}\n\n{block}".lstrip())
+    return table, remarks
+
+
+def _block(name: str, file: str, bench: Bench) -> str:
+    keys = {"name": name, "kind": KIND, "file": file, "role": "fit"} | dict(bench.experiment) | {"name": name}
+    return "[[experiment]]\n" + "".join(f"{key} = {_toml(value)}\n" for key, value in keys.items())
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    return str(value).lower() if isinstance(value, bool) else repr(value)
+
+
+def _table(found: Filmed, bench: Bench) -> str:
+    """The CSV file of an experiment: a comment on where it comes from, then a row a frame."""
+    m, view = found.motion, bench.view
+    stream = io.StringIO()
+    stream.write(f"# from a video; {m.mm_per_pixel:.6g} mm a pixel, noise {m.noise_px:.2g} pixels\n")
+    # Clamp and ruler are not of the unit.
+    numbered = [name for name in m.names if name not in (*view.base, *(view.ruler or ()))]
+    for number, name in enumerate(numbered, 1):
+        stream.write(f"# marker{number} is {name!r}\n")
+    if view.tip:
+        against = "as it is in each frame" if view.follow_base else "taken to stand still"
+        stream.write(f"# angle of {view.tip[0]!r}, {view.tip[1]!r} against the base, {against}\n")
+    columns = {"time_s": found.time_s, "pressure_kPa": found.pressure_kPa}
+    if m.angle_deg is not None:
+        columns["angle_deg"] = m.angle_deg
+    for number, name in enumerate(numbered, 1):
+        at = m.places_mm[m.names.index(name)]
+        columns |= {f"marker{number}_{a}_mm": at[:, k] for k, a in enumerate("yz")}
+    return stream.getvalue() + _csv(columns)
+
+
+def _pixels(found: Filmed) -> str:
+    """Places in the picture, a row a frame, as `read_pixels` reads them."""
+    columns: dict[str, Array] = {"frame": np.arange(len(found.tracks))}
+    for name, at in zip(found.tracks.names, found.tracks.pixels, strict=True):
+        columns |= {f"{name} right_px": at[:, 0], f"{name} down_px": at[:, 1]}
+    return _csv(columns)
+
+
+def _csv(columns: Mapping[str, Array]) -> str:
+    """CSV text of columns (n,), empty where there is nothing; nobody measures less than a micrometre."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(columns)
+    for row in zip(*columns.values(), strict=True):
+        writer.writerow(["" if np.isnan(v) else f"{v:.10g}" if v == int(v) else f"{v:.6f}" for v in row])
+    return stream.getvalue()
+
+
+def _tried(block: str, file: str, text: str) -> tuple[Remark, ...]:
+    """What the reader of measured data says of an experiment before it is put anywhere."""
+    with tempfile.TemporaryDirectory() as scratch:
+        write_text(Path(scratch) / FILE, block)
+        write_text(Path(scratch) / file, text)
+        try:
+            measured = read_folder(Path(scratch))
+        except InputError as error:
+            where = error.where.replace(scratch, "").lstrip("/\\")
+            raise InputError(error.what, where, error.remedy) from error
+    return tuple(Remark(r.what, Path(r.where.replace(scratch, "")).name, r.remedy) for r in measured.remarks)
+
+
+def read_pixels(path: Path) -> Tracks:
+    """Markers that were followed by any tracker: a CSV with `NAME right_px`, `NAME down_px` for each.
+
+    One row a frame; empty where a marker was lost. Raises InputError.
+    """
+    try:
+        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError("cannot read the followed markers", str(path), "check path and file") from error
+    rows = [
+        (n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")
+    ]
+    head, *body = [[cell.strip() for cell in cells] for cells in csv.reader(line for _, line in rows)] or [[]]
+    names = tuple(h.removesuffix(" right_px") for h in head if h.endswith(" right_px"))
+    wanted = [f"{name} {side}_px" for name in names for side in ("right", "down")]
+    missing = [column for column in wanted if column not in head]
+    if not names or missing or len(body) < 2:
+        raise InputError(
+            f"column {missing[0]!r} is missing" if missing else "it holds no followed markers",
+            str(path),
+            "name the columns `NAME right_px` and `NAME down_px`, a row a frame",
+        )
+    pixels = np.empty((len(wanted), len(body)))
+    for i, ((number, _), cells) in enumerate(zip(rows[1:], body, strict=True)):
+        try:
+            pixels[:, i] = [float(cells[head.index(column)] or "nan") for column in wanted]
+        except (ValueError, IndexError) as error:
+            raise InputError(
+                "a row holds something that is not a number", f"{path}, row {number}", "correct that row"
+            ) from error
+    return Tracks(names, pixels.reshape(len(names), 2, -1).transpose(0, 2, 1))
+
+
+def track(
+    clip: Path,
+    bench: Bench,
+    pressure: Path,
+    folder: Path,
+    follow: Tracker,
+) -> tuple[dict[str, Any], tuple[Remark, ...]]:
+    """From a clip to an experiment in a folder; returns figures of it, and remarks.
+
+    follow: follows the markers, see `Tracker`; not asked where the clip is a CSV file of pixels.
+    """
+    if not Path(clip).exists():
+        raise InputError(
+            "there is no such clip", str(clip), "give a movie, or the first picture of a sequence"
+        )
+    recorded = read_pressure(pressure)
+    if Path(clip).suffix.lower() == ".csv":
+        tracks = read_pixels(clip)
+    else:
+        unplaced = {*bench.view.base, *(bench.view.tip or ()), *(bench.view.ruler or ())} - {
+            *bench.marks.pixels
+        }
+        if unplaced:
+            raise InputError(
+                f"marker {min(unplaced)!r} has no pixel", str(clip), "say where it is in the first frame"
+            )
+        tracks = follow(Path(clip), bench.marks)
+    found = filmed(tracks, bench, recorded, str(clip))
+    name = str(bench.experiment.get("name", Path(clip).stem))
+    table, remarks = write_experiment(found, bench, name, folder)
+    return figures(found, name, table), (*found.remarks, *remarks)
+
+
+def figures(found: Filmed, name: str, table: Path) -> dict[str, Any]:
+    """What an experiment from a video comes to, in plain data."""
+    m = found.motion
+    lost = {n: int(np.isnan(p[:, 0]).sum()) for n, p in zip(m.names, m.places_mm, strict=True)}
+    return {
+        "experiment": name,
+        "file": str(table),
+        "frames": len(found.tracks),
+        "duration_s": float(found.time_s[-1] - found.time_s[0]),
+        "pressure_kPa": [float(found.pressure_kPa.min()), float(found.pressure_kPa.max())],
+        "angle_deg": None
+        if m.angle_deg is None
+        else [float(np.nanmin(m.angle_deg)), float(np.nanmax(m.angle_deg))],
+        "mm_per_pixel": m.mm_per_pixel,
+        "noise_px": m.noise_px,
+        "frames_lost": lost,
+    }
+
+
+def answer(summary: Mapping[str, Any]) -> list[str]:
+    """What came of a video, in a few lines."""
+    low, high = summary["pressure_kPa"]
+    lines = [
+        f"{summary['experiment']}: {summary['frames']} frames, {summary['duration_s']:.4g} s, "
+        f"{low:g} to {high:g} kPa; {summary['mm_per_pixel']:.4g} mm a pixel"
+    ]
+    if summary["angle_deg"]:
+        least, most = summary["angle_deg"]
+        lines.append(f"angle: {least:+.2f} to {most:+.2f} deg")
+    lost = {name: count for name, count in summary["frames_lost"].items() if count}
+    if lost:
+        lines.append("lost: " + ", ".join(f"{name} in {count} frames" for name, count in lost.items()))
+    return lines

@@ -1,0 +1,57 @@
+"""Entries that come back whole, or not at all."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mu_addon.files import write_npz
+from mu_addon.run.cache import Cache, key
+
+
+def test_an_entry_comes_back(tmp_path):
+    cache = Cache(tmp_path)
+    cache.put("mesh", "a", {"x": np.arange(5.0), "n": 3})
+    found = cache.get("mesh", "a")
+    assert found is not None
+    np.testing.assert_array_equal(found["x"], np.arange(5.0))
+    assert cache.get("mesh", "b") is None
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.data())
+def test_a_damaged_entry_is_missing_or_whole(tmp_path_factory, data):
+    cache = Cache(tmp_path_factory.mktemp("cache"))
+    expected = np.random.default_rng(0).standard_normal(200)
+    cache.put("state", "a", {"u": expected})
+    path = cache.path("state", "a")
+    content = bytearray(path.read_bytes())
+    if data.draw(st.booleans()):
+        place = data.draw(st.integers(0, len(content) - 1))
+        content[place] ^= data.draw(st.integers(1, 255))
+    else:
+        del content[data.draw(st.integers(0, len(content) - 1)) :]
+    path.write_bytes(content)
+    found = cache.get("state", "a")
+    if found is not None and "u" in found:
+        np.testing.assert_array_equal(found["u"], expected)
+
+
+def test_another_entry_under_this_name_is_missing(tmp_path):
+    cache = Cache(tmp_path)
+    cache.put("mesh", "a", {"x": np.arange(5.0)})
+    cache.path("mesh", "a").replace(cache.path("mesh", "b"))
+    assert cache.get("mesh", "b") is None
+    write_npz(cache.path("mesh", "a"), {"x": np.arange(5.0)})
+    assert not cache.has("mesh", "a")
+    cache.put("mesh", "a", {"x": np.arange(5.0)})
+    assert cache.has("mesh", "a")
+
+
+def test_keys_tell_inputs_apart():
+    same = [key(1.0, "a", np.arange(3)) for _ in range(2)]
+    assert same[0] == same[1]
+    assert (
+        len({same[0], key(1.0, "a", np.arange(4)), key(1.0, "b", np.arange(3)), key(1, "a", np.arange(3))})
+        == 4
+    )
+    assert key("ab", "c") != key("a", "bc")

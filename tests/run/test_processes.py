@@ -1,0 +1,59 @@
+"""Workers leave Ctrl-C to their parent."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from mu_addon.run.processes import ctrl_c_ignored
+
+WORK = "import sys, time; print('ready', flush=True); time.sleep(30)"
+
+
+def child():
+    process = subprocess.Popen([sys.executable, "-c", WORK], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "ready\n"
+    return process
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for one process")
+def test_a_child_born_inside_outlives_ctrl_c_and_one_born_outside_does_not():
+    # A shell's background jobs are born deaf to Ctrl-C, and so would be their children.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    with ctrl_c_ignored():
+        inside = child()
+    outside = child()
+    try:
+        for process in (inside, outside):
+            process.send_signal(signal.SIGINT)
+        outside.wait(10)
+        with pytest.raises(subprocess.TimeoutExpired):
+            inside.wait(1)
+    finally:
+        signal.signal(signal.SIGINT, before)
+        for process in (inside, outside):
+            process.kill()
+            process.communicate()
+
+
+def test_the_parent_s_own_handler_is_back_afterwards():
+    before = signal.getsignal(signal.SIGINT)
+    with ctrl_c_ignored():
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_thread_that_may_not_set_signals_goes_on_without():
+    done = []
+
+    def work():
+        with ctrl_c_ignored():
+            done.append(True)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert done == [True]

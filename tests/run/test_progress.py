@@ -1,0 +1,164 @@
+"""What a run says, to people, to programs and to its log."""
+
+import io
+import json
+
+import pytest
+
+from mu_addon.errors import InputError, OutputError
+from mu_addon.run.progress import Progress, json_lines, log_file, spell, terminal
+
+
+class Clock:
+    now = 100.0
+
+    def __call__(self):
+        return self.now
+
+
+class Tty(io.StringIO):
+    def isatty(self):
+        return True
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+def run(progress, clock, updates=10, step=1.0):
+    with progress.stage("mesh"):
+        for i in range(1, updates + 1):
+            clock.now += step
+            progress.update(i / updates)
+
+
+def test_time_left_by_the_share_done(clock):
+    told = []
+    progress = Progress([told.append], clock)
+    with progress.stage("mesh", expected_s=20.0):
+        clock.now += 3.0
+        progress.update(0.25)
+    start, running, end = told
+    assert (start["state"], start["seconds_left"]) == ("start", 20.0)
+    assert running["seconds_left"] == pytest.approx(9.0)
+    assert (end["state"], end["fraction"], end["seconds"]) == ("end", 1.0, 3.0)
+    assert progress.seconds == {"mesh": 3.0}
+
+
+def test_a_failed_stage_is_not_told_as_ended(clock):
+    told = []
+    progress = Progress([told.append], clock)
+    with pytest.raises(ZeroDivisionError), progress.stage("mesh"):  # noqa: PT012
+        clock.now += 2.0
+        1 / 0  # noqa: B018
+    assert [m["state"] for m in told] == ["start"]
+    assert progress.seconds == {"mesh": 2.0}
+    with progress.stage("next"):
+        pass
+
+
+def test_stages_do_not_nest():
+    progress = Progress()
+    with progress.stage("a"), pytest.raises(ValueError, match="inside stage 'a'"), progress.stage("b"):
+        pass
+
+
+def test_plain_lines_at_start_end_and_every_five_seconds(clock):
+    stream = io.StringIO()
+    run(Progress([terminal(stream, clock)], clock), clock, updates=12)
+    assert stream.getvalue().splitlines() == [
+        "mesh ...",
+        "mesh: 42 %, 7.0 s left",
+        "mesh: 83 %, 2.0 s left",
+        "mesh: done in 12 s",
+    ]
+
+
+def test_live_line_is_redrawn_in_place_and_fits(clock):
+    stream = Tty()
+    progress = Progress([terminal(stream, clock)], clock)
+    run(progress, clock)
+    progress.warning("thin wall", "chamber 3", "thicken it")
+    lines = stream.getvalue().split("\n")
+    drawn = lines[0].split("\r")[1:]
+    assert len(drawn) == 12
+    assert "[############............]  50 %  5.0 s left" in drawn[5]
+    assert drawn[-1].startswith("mesh")
+    assert "100 %  10 s" in drawn[-1]
+    assert all(len(line.replace("\x1b[K", "")) < 80 for line in drawn)
+    assert lines[1:4] == ["warning: thin wall", "  where: chamber 3", "  what to do: thicken it"]
+
+
+def test_live_line_at_most_ten_times_a_second(clock):
+    stream = Tty()
+    run(Progress([terminal(stream, clock)], clock), clock, updates=1000, step=0.001)
+    assert stream.getvalue().count("\r") <= 2 + 11
+
+
+def test_an_error_does_not_write_into_the_live_line(clock):
+    stream = Tty()
+    progress = Progress([terminal(stream, clock)], clock)
+    with pytest.raises(InputError), progress.stage("mesh"):
+        raise InputError("no such preset")
+    progress.error(InputError("no such preset", "--preset", "choose another"))
+    assert "\nerror: no such preset\n  where: --preset\n  what to do: choose another\n" in stream.getvalue()
+
+
+def test_json_lines(clock):
+    stream = io.StringIO()
+    progress = Progress([json_lines(stream, clock)], clock)
+    run(progress, clock, updates=100, step=0.02)
+    progress.warning("w")
+    progress.result({"chosen": "alpha4"})
+    progress.error(InputError("bad", "here", "mend it"))
+    messages = [json.loads(line) for line in stream.getvalue().splitlines()]
+    kinds = [m["type"] for m in messages]
+    assert 8 <= kinds.count("progress") <= 13
+    assert kinds[-3:] == ["warning", "result", "error"]
+    assert messages[0] == {
+        "type": "progress",
+        "stage": "mesh",
+        "state": "start",
+        "fraction": None,
+        "seconds": 0.0,
+        "seconds_left": None,
+    }
+    assert messages[-1] == {
+        "type": "error",
+        "what": "bad",
+        "where": "here",
+        "what_to_do": "mend it",
+        "status": 2,
+    }
+
+
+def test_log_adds_and_survives_a_second_run(tmp_path, clock):
+    for _ in range(2):
+        run(Progress([log_file(tmp_path / "log.ndjson", clock)], clock), clock, updates=11)
+    messages = [json.loads(line) for line in (tmp_path / "log.ndjson").read_text().splitlines()]
+    assert [m["state"] for m in messages] == ["start", "run", "run", "run", "end"] * 2
+    assert all("time" in m for m in messages)
+
+
+def test_a_log_that_cannot_be_written(tmp_path):
+    with pytest.raises(OutputError):
+        log_file(tmp_path / "missing" / "log.ndjson")
+
+
+def test_an_error_reaches_the_sinks_that_still_work():
+    told = []
+
+    def broken(_):
+        raise BrokenPipeError
+
+    Progress([broken, told.append]).error(InputError("bad"))
+    assert told[0]["what"] == "bad"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(0.04, "0.0 s"), (9.96, "10 s"), (59.6, "1 min 00 s"), (185, "3 min 05 s"), (7800, "2 h 10 min")],
+)
+def test_spell(seconds, words):
+    assert spell(seconds) == words

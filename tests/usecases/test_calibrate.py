@@ -1,0 +1,110 @@
+"""`calibrate` on recordings and measured data, and its map applied to a stream, all as a user would."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mu_addon.cli.main import main
+from mu_addon.sensing.decoder import Layout, Samples
+from mu_addon.sensing.recording import Recorder, read_recording
+
+
+def volts_of(angle: np.ndarray) -> np.ndarray:
+    return 2.4 * np.exp(-0.006 * angle)
+
+
+def record(folder: Path, marked: bool = False, sweeps: int = 4) -> np.ndarray:
+    """A recording of some sweeps of 10 s, with dark level; marked: held at known angles that marks tell."""
+    generator = np.random.default_rng(0)
+    t = np.arange(0, 10 * sweeps, 0.02)
+    angle = 25 - 25 * np.cos(2 * np.pi * t / 10)
+    recorder = Recorder(folder, {})
+    if marked:
+        angle = np.round(angle / 10) * 10
+    dark = 0.05 + 0.001 * generator.normal(size=len(t))
+    light = volts_of(angle) + dark + 0.004 * generator.normal(size=len(t))
+    samples = Samples(Layout(("light", "dark"), "V"), t, t, np.arange(len(t)), np.column_stack([light, dark]))
+    recorder.write(samples, 0.0)
+    if marked:
+        for k in np.flatnonzero(np.diff(angle, prepend=-1.0)):
+            recorder.event("mark", float(t[k]), text=f"angle {angle[k]:g}")
+    recorder.close()
+    return angle
+
+
+def run(*arguments: object) -> int:
+    return main([str(argument) for argument in arguments])
+
+
+@pytest.mark.parametrize("marked", [False, True])
+def test_a_recording_is_calibrated(tmp_path: Path, marked: bool, capsys: pytest.CaptureFixture[str]) -> None:
+    angle = record(tmp_path / "bench", marked)
+    more: list[object] = []
+    if not marked:
+        table = np.column_stack([np.arange(len(angle)) * 0.02, angle])
+        lines = "time_s,angle_deg\n" + "".join(f"{t},{a}\n" for t, a in table.tolist())
+        (tmp_path / "angles.csv").write_text(lines)
+        more = ["--angles", tmp_path / "angles.csv"]
+    out = tmp_path / "out"
+    status = run(
+        "calibrate", tmp_path / "bench", "--channel", "light_V", "--dark", "dark_V", "--out", out, *more
+    )
+    assert status == 0
+    assert "4 sweeps" in capsys.readouterr().out
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["error_deg"] < 1.0
+    assert "<svg" in (out / "report.html").read_text() or "image/svg" in (out / "report.html").read_text()
+
+    # The map, applied while the recording plays again: shown, not recorded.
+    again = tmp_path / "again"
+    assert run("replay", tmp_path / "bench", "--speed", 0, "--calibration", out / "calibration.toml",
+               "--out", again) == 0  # fmt: skip
+    state = json.loads((again / "status.json").read_text())
+    assert state["columns"][-4:] == ["angle_deg", "angle_low_deg", "angle_high_deg", "in_range"]
+    assert state["latest"][-4] == pytest.approx(angle[-1], abs=2)
+    (recording,) = read_recording(again)
+    assert recording.channels == ("light_V", "dark_V")
+
+
+def test_measured_data_with_a_sweep_held_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    generator = np.random.default_rng(1)
+    blocks = []
+    for k in range(5):
+        t = np.arange(0, 10, 0.05)
+        angle = 25 - 25 * np.cos(2 * np.pi * t / 10)
+        volts = volts_of(angle) + 0.01 * generator.normal(size=len(t))
+        rows = "".join(f"{a},{b},{c}\n" for a, b, c in zip(t, angle, volts, strict=True))
+        (tmp_path / f"s{k}.csv").write_text("time_s,angle_deg,voltage_V\n" + rows)
+        role = "held_out" if k == 4 else "fit"
+        blocks.append(
+            f'[[experiment]]\nname = "sweep {k}"\nkind = "waveguide_bending"\nfile = "s{k}.csv"\n'
+            f'role = "{role}"\nspecimen = "A"\n'
+        )
+    (tmp_path / "experiments.toml").write_text("\n".join(blocks))
+    assert run("calibrate", tmp_path, "--out", tmp_path / "out") == 0
+    assert "sweep 4, never fitted" in capsys.readouterr().out
+    (check,) = json.loads((tmp_path / "out" / "summary.json").read_text())["held_out"]
+    assert check["rms_deg"] < 1.5
+    assert 0.9 < check["within"] <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ([], "2 channels are there"),
+        (["--channel", "lihgt_V"], "no channel lihgt_V"),
+        (["--channel", "light_V", "--dark", "drak_V"], "no channel drak_V"),
+        (["--channel", "light_V"], "nothing says at which angle"),
+        (["--channel", "light_V", "--angles", "nowhere.csv"], "cannot read nowhere.csv"),
+    ],
+)
+def test_what_is_missing_is_named(
+    tmp_path: Path, more: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record(tmp_path / "bench", sweeps=1)
+    assert run("calibrate", tmp_path / "bench", "--out", tmp_path / "out", *more) == 2
+    assert words in capsys.readouterr().err

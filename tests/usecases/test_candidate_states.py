@@ -1,0 +1,70 @@
+"""A study's sweep: what it solves, what it keeps, and what it does where a path leads elsewhere."""
+
+import attrs
+import numpy as np
+import pytest
+
+from mu_addon.design.anchors import anchors, windows
+from mu_addon.design.parameters import load_preset
+from mu_addon.fem.equilibrium import Equilibrium
+from mu_addon.fem.model import Model
+from mu_addon.fem.protocol import Protocol
+from mu_addon.fem.trajectory import simulate
+from mu_addon.fem.unit import materials_of
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.unit import mesh_unit
+from mu_addon.placement.candidates import candidates
+from mu_addon.run.cache import Cache
+from mu_addon.usecases.simulate_and_place.candidate_states import Sweep
+from mu_addon.usecases.simulate_and_place.job import Job
+
+UNIT = load_preset("mu-1.0x")
+PRESSURES = np.array([0.0, -10.0, 0.0, 10.0, 20.0])
+JOB = Job(
+    unit=UNIT,
+    protocol=Protocol(np.arange(5.0), PRESSURES),
+    mesh=MeshSettings(refine=0.5, order=1),
+    times=5,
+    stations=21,
+    workers=1,
+)
+JOBS = [(c, "volume_fraction") for c in candidates(anchors(UNIT), windows(6))[::3]]
+
+
+@pytest.fixture(scope="module")
+def model_a():
+    mesh = mesh_unit(UNIT, JOB.mesh)
+    return mesh, simulate(Equilibrium(Model(mesh), materials_of(UNIT, mesh)), np.arange(5.0), PRESSURES)
+
+
+def swept(model_a, folder, **changes):
+    mesh, trajectory = model_a
+    sweep = Sweep(attrs.evolve(JOB, **changes), Cache(folder), mesh, JOBS, PRESSURES)
+    told = []
+    found = sweep.evaluations(trajectory, told.append, verify=True)
+    sweep.close()
+    assert told == sorted(told)
+    return sweep, np.array([e.deviation.delta for e in found])
+
+
+def test_one_candidate_is_followed_along_its_whole_path(model_a, tmp_path):
+    sweep, _ = swept(model_a, tmp_path)
+    assert 0 < sweep.path_difference_mm < 1e-6
+
+
+def test_where_a_path_leads_elsewhere_every_candidate_is_followed(model_a, tmp_path, monkeypatch):
+    _, together = swept(model_a, tmp_path / "together")
+    monkeypatch.setattr("mu_addon.usecases.simulate_and_place.candidate_states.PATH_DIFFERENCE_MM", 0.0)
+    sweep, along = swept(model_a, tmp_path / "along")
+    assert sweep.solved_kPa == pytest.approx([-10, 10, 20])
+    solved = [0, 1, 2, 4]
+    np.testing.assert_allclose(along[:, solved], together[:, solved], atol=1e-6)
+    assert not np.array_equal(along, together)
+
+
+def test_what_was_solved_is_read_back_to_the_same_digits(model_a, tmp_path):
+    _, first = swept(model_a, tmp_path)
+    before = {p: p.stat().st_mtime_ns for p in tmp_path.iterdir()}
+    _, again = swept(model_a, tmp_path)
+    assert np.array_equal(first, again)
+    assert {p: p.stat().st_mtime_ns for p in tmp_path.iterdir()} == before

@@ -1,0 +1,137 @@
+"""`check` from the command line: its files, its report and its exit status."""
+
+import json
+
+import numpy as np
+import pytest
+
+from mu_addon.cli.main import main
+from mu_addon.design import shapes
+from mu_addon.design.printing.printer import MEANING, load_printer, printer_text, read_printer
+from mu_addon.design.solid import printable
+from mu_addon.design.surface import stl_bytes
+from mu_addon.errors import InputError
+from mu_addon.usecases.check_print.report import direction_name
+from mu_addon.usecases.check_print.run import read_surface
+
+
+def bottle(bore):
+    """A closed box of 14 mm with a chamber of 10 mm, and a bore to the bottom."""
+    body = shapes.box([-7, -7, 0], [7, 7, 14]) - shapes.box([-5, -5, 2], [5, 5, 12])
+    return printable(body - shapes.cylinder(bore / 2.0, -1.0, 3.0, 32))
+
+
+def run(tmp_path, surface, *options):
+    (tmp_path / "part.stl").write_bytes(stl_bytes(*surface))
+    out = tmp_path / "out"
+    status = main(["check", "--stl", str(tmp_path / "part.stl"), "--out", str(out), "--json", *options])
+    return status, out
+
+
+def test_a_part_that_can_be_printed(tmp_path, capsys):
+    status, out = run(tmp_path, bottle(4.0))
+    assert status == 0
+    found = json.loads((out / "check.json").read_text())
+    by_name = {f["check"]: f for f in found["findings"]}
+    assert by_name["drain"]["value"] == pytest.approx(4.0, abs=0.1)
+    assert by_name["chamber wall"]["value"] == pytest.approx(2.0, abs=1e-3)
+    assert found["figures"]["chamber_ml"] == pytest.approx(1.0, rel=0.05)
+    assert found["figures"]["volume_ml"] == pytest.approx((14**3 - 1000 - 8 * np.pi) / 1e3, rel=1e-3)
+    # With its opening toward the platform the chamber is no cup; turned over it is one of its volume.
+    ways = {tuple(np.round(b["direction"], 3)): b for b in found["orientation"]}
+    assert ways[0, 0, 1]["cup_ml"] == 0.0
+    assert ways[0, 0, -1]["cup_ml"] == pytest.approx(1.0, rel=0.1)
+    assert found["orientation"][0]["cup_ml"] < 0.25
+    report = (out / "report.html").read_text()
+    assert "It can be printed" in report
+    assert json.loads((out / "summary.json").read_text())["status"] == "complete"
+    assert '"type": "result"' in capsys.readouterr().out.splitlines()[-1].replace('"type":"', '"type": "')
+
+
+def test_a_part_that_must_not_be_printed_ends_with_status_6(tmp_path):
+    vertices, triangles = bottle(4.0)
+    status, out = run(tmp_path, (vertices, triangles[5:]))
+    assert status == 6
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["verdict"] == "error"
+    assert "open edges" in summary["reason"]["what"]
+    # What was found is told all the same.
+    assert "Do not print it" in (out / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--printer", "form-9"], "no printer 'form-9'"),
+        (["--path", "alpha4"], "a path belongs to a unit"),
+        (["--up", "0", "0", "0"], "is no direction"),
+    ],
+)
+def test_wrong_input_is_refused_in_words(tmp_path, capsys, options, words):
+    status, _ = run(tmp_path, bottle(4.0), *options)
+    assert status == 2
+    assert words in capsys.readouterr().out
+
+
+def test_text_stl_is_read_like_binary():
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.5]])
+    triangles = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    facets = "".join(
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join(f"vertex {x} {y} {z}\n" for x, y, z in corners[t])
+        + "endloop\nendfacet\n"
+        for t in triangles
+    )
+    text = read_surface(f"solid part\n{facets}endsolid part\n".encode(), "part.stl")
+    binary = read_surface(stl_bytes(corners, triangles), "part.stl")
+    assert (text[0] == binary[0]).all()
+    assert (text[1] == binary[1]).all()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"solid part\nvertex 1 2\n",
+        b"PK\x03\x04 no STL",
+        stl_bytes(np.zeros((0, 3)), np.zeros((0, 3), int)),
+    ],
+)
+def test_what_is_no_stl_is_refused(content):
+    with pytest.raises(InputError):
+        read_surface(content, "part.stl")
+
+
+def test_the_shipped_printer_names_a_source_for_every_limit(tmp_path):
+    printer = load_printer("form-4")
+    assert set(printer.limits) == set(MEANING)
+    assert all(limit.source for limit in printer.limits.values())
+    assert [printer[f"build_{axis}_mm"] for axis in "xyz"] == [200.0, 125.0, 210.0]
+    # Nobody has published what Elastic 50A needs of walls: that is said.
+    assert printer.limits["wall_mm"].assumed
+    (tmp_path / "mine.toml").write_text(printer_text(printer))
+    assert read_printer(tmp_path / "mine.toml") == printer
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("value = 0.6", "value = -0.6", "not a number above zero"),
+        ("[wall_mm]", "[walls_mm]", "did you mean 'wall_mm'"),
+        ("assumed = true", "assumed = 1", "is not true or false"),
+        ("format = 1", "format = 2", "no format = 1"),
+    ],
+)
+def test_a_printers_file_with_a_mistake_is_refused(tmp_path, old, new, words):
+    text = printer_text(load_printer())
+    assert old in text
+    (tmp_path / "mine.toml").write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match=words):
+        read_printer(tmp_path / "mine.toml")
+
+
+def test_directions_are_named_as_they_are_spoken_of():
+    assert direction_name((0, 0, 2)) == "+z"
+    assert direction_name((1, -1, 0)) == "+x−y"
+    lean = np.radians(20)
+    assert direction_name((-np.sin(lean), 0, np.cos(lean))) == "20° from +z toward −x"

@@ -1,0 +1,82 @@
+"""What planned experiments would show."""
+
+import attrs
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mu_addon.errors import InputError
+from mu_addon.run.context import run_to_end
+from mu_addon.run.progress import Progress
+from mu_addon.usecases.diagnose.design_experiments import NOISE, answer, design_experiments, noise_of, plan
+from tests.evidence import analytic
+
+from .diagnosis_data import weighed_blocks
+
+
+def planned(count=2, **how):
+    """Protocols of a unit that have not been measured yet."""
+    tests = analytic.protocols(0.5, count)
+    blank = dict.fromkeys(("angle_deg", "marker3_y_mm"), 0.0)
+    return [
+        analytic.experiment(n, t, p, {c: np.full(len(t), v) for c, v in blank.items()}, **(given | how))
+        for n, t, p, given in tests
+    ]
+
+
+def limits(experiments, noise=NOISE):
+    """The size each effect is seen from."""
+    found = plan(experiments, analytic.simulator(experiments), noise)
+    return {s.effect.name: s.limit for s in found.seen}
+
+
+@given(st.floats(0.1, 10.0))
+@settings(max_examples=5, deadline=None)
+def test_limits_are_in_proportion_to_the_noise(factor):
+    experiments = planned(1)
+    once = limits(experiments)
+    more = limits(experiments, {k: factor * v for k, v in NOISE.items()})
+    finite = [n for n in once if np.isfinite(once[n])]
+    assert finite
+    assert [more[n] for n in finite] == pytest.approx([factor * once[n] for n in finite], rel=1e-6)
+
+
+def test_one_more_experiment_hides_nothing():
+    few, many = planned(2), planned(4)
+    before, after = limits(few), limits(many)
+    assert all(after[n] <= before[n] * (1 + 1e-6) for n in before)
+
+
+def test_a_second_orientation_shows_weight():
+    """Hanging, weight is nearly a stiffness; held level it is not."""
+    hanging = planned(1)
+    level = attrs.evolve(hanging[0], name="level", orientation_deg=90.0)
+    assert limits([*hanging, level])["gravity"] < 0.5 * limits(hanging)["gravity"]
+
+
+def test_what_was_measured_does_not_matter():
+    experiments = planned(1)
+    other = [
+        attrs.evolve(e, columns={**e.columns, "angle_deg": np.sin(np.arange(len(e)))}) for e in experiments
+    ]
+    assert limits(experiments) == limits(other)
+
+
+def test_it_leaves_a_table_and_a_report(tmp_path):
+    progress = Progress()
+    with run_to_end(progress) as ending:
+        folder = weighed_blocks(tmp_path / "data", 0.0)
+        design_experiments(folder, tmp_path / "out", progress=progress, ending=ending)
+    assert ending.status == 0
+    # Weighed, the two are no longer one.
+    assert not {"overcure", "skin_cure"} <= {n for pair in ending.summary["alike"] for n in pair[:2]}
+    assert any(line.startswith("overcure: visible from offset 0.0") for line in answer(ending.summary))
+    assert (tmp_path / "out" / "limits.csv").read_text().startswith("effect,parameter,unit,visible_from")
+    assert "would show" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("word", ["angle", "angle=", "angle=-1", "loudness=3", "angle=nan"])
+def test_noise_that_is_none_is_refused(word):
+    with pytest.raises(InputError, match="is no noise"):
+        noise_of([word])

@@ -1,0 +1,228 @@
+"""diagnose from folder to report."""
+
+import csv
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mu_addon.design.parameters import load_preset
+from mu_addon.errors import InputError
+from mu_addon.evidence import unit_fem
+from mu_addon.evidence.extended import load_model
+from mu_addon.evidence.prediction.lattice import LatticeStress
+from mu_addon.measured import read_folder
+from mu_addon.run.context import Ending, run_to_end
+from mu_addon.run.progress import Progress
+from mu_addon.usecases.diagnose import run as diagnosing
+from mu_addon.usecases.diagnose.run import answer, diagnose_folder
+from mu_addon.usecases.simulate_and_place.extended_unit import read_extended
+from tests.evidence import analytic
+
+from .diagnosis_data import DRAWN_kPa, bent_unit, weighed_blocks
+
+ROOT = Path(__file__).parents[2]
+PAPER = ROOT / "assets" / "examples" / "paper-moduli"
+OFFSET_mm = 0.09
+
+
+def run(folder, out, *arguments, **options):
+    messages = []
+    progress = Progress([messages.append])
+    with run_to_end(progress) as ending:
+        diagnose_folder(folder, out, *arguments, progress=progress, ending=ending, **options)
+    return ending, messages
+
+
+@pytest.fixture(scope="module")
+def overcured(tmp_path_factory):
+    folder = weighed_blocks(tmp_path_factory.mktemp("data") / "blocks", OFFSET_mm)
+    out = tmp_path_factory.mktemp("diagnosis")
+    ending, messages = run(folder, out)
+    assert ending.status == 0, messages[-1]
+    return folder, out, ending.summary, messages
+
+
+def test_the_verdict_names_what_was_put_in(overcured):
+    _, out, summary, _ = overcured
+    found = json.loads((out / "verdict.json").read_text())
+    assert found["verdict"] == "named"
+    (cause,) = found["causes"]
+    assert cause["effect"] == "overcure"
+    offset = cause["parameters"]["offset_mm"]
+    assert offset["low95"] < OFFSET_mm < offset["high95"]
+    assert offset["value"] == pytest.approx(OFFSET_mm, rel=0.15)
+    keys = ("remaining_structure", "gain", "residual_table", "next_experiment", "identifiability")
+    assert all(key in found for key in keys)
+    assert summary["causes"] == found["causes"]
+
+
+def test_the_model_predicts_what_was_measured_and_the_table_holds_both(overcured):
+    folder, out, _, _ = overcured
+    model = load_model(out / "model.toml")
+    experiments = read_folder(folder).experiments
+    rows = list(csv.DictReader((out / "residuals.csv").open()))
+    assert len(rows) == sum(2 * len(e) for e in experiments)
+    for e in experiments:
+        mine = [r for r in rows if r["experiment"] == e.name and r["channel"] == "stress_kPa"]
+        assert [float(r["measured"]) for r in mine] == e["stress_kPa"].tolist()
+        assert [int(r["row"]) for r in mine] == e.rows.tolist()
+        after = LatticeStress(experiments).predict(e, model.values)[0]
+        assert [float(r["extended_model"]) for r in mine] == pytest.approx(after.tolist(), rel=1e-9)
+        assert after == pytest.approx(e["stress_kPa"], rel=0.02)
+    assert model.nuisances["lattice_modulus_kPa"].value == pytest.approx(DRAWN_kPa, rel=0.1)
+
+
+def test_the_report_says_it_in_a_sentence_and_needs_no_server(overcured):
+    html = (overcured[1] / "report.html").read_text(encoding="utf-8")
+    assert "Verdict: <strong>overcure</strong>" in html
+    assert "Light cures resin beyond the drawn surface: every part is thicker; offset 0.0" in html
+    assert "What to measure next." in html
+    for title in ("Measured and predicted", "Other explanations", "What mending it gains", "Noise"):
+        assert f">{title}</h2>" in html
+    # A panel a channel of three blocks, rivals, gain, dependence, and what is left against two conditions.
+    assert html.count("<figure") >= 6 + 3
+    assert not re.search(r"(src|href)=\"(?!data:|#)", html)
+    assert "<script" not in html
+
+
+def test_the_terminal_is_told_in_a_few_lines(overcured):
+    lines = answer(overcured[2])
+    assert lines[0] == "verdict: named: overcure"
+    assert lines[-1].startswith("next: ")
+    assert 3 <= len(lines) <= 6
+
+
+def test_every_stage_is_told(overcured):
+    told = [m["stage"] for m in overcured[3] if m["type"] == "progress" and m["state"] == "start"]
+    assert told[:3] == ["noise", "sensitivities", "single effects"]
+    assert told[-2:] == ["gain", "report"]
+    ended = [m["stage"] for m in overcured[3] if m["type"] == "progress" and m["state"] == "end"]
+    assert ended == told
+
+
+def test_equal_data_leave_equal_bytes(overcured, tmp_path):
+    folder, out, _, _ = overcured
+    run(folder, tmp_path)
+    for name in ("verdict.json", "model.toml", "residuals.csv", "report.html", "diagnose.toml"):
+        assert (tmp_path / name).read_bytes() == (out / name).read_bytes()
+
+
+def test_the_same_data_are_not_judged_twice(overcured, tmp_path, monkeypatch):
+    folder, out, summary, _ = overcured
+    shutil.copytree(out, tmp_path / "out")
+    monkeypatch.setattr(diagnosing, "diagnose", None)
+    ending, told = run(folder, tmp_path / "out")
+    assert ending.status == 0
+    assert answer(ending.summary) == answer(summary)
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["status"] == "complete"
+    assert [m["stage"] for m in told if m["type"] == "progress" and m["state"] == "end"] == [
+        "verdict of the same data, kept"
+    ]
+    # A result that is gone is made again.
+    (tmp_path / "out" / "report.html").unlink()
+    assert run(folder, tmp_path / "out")[0].status != 0
+
+
+def test_other_data_set_the_old_results_aside(overcured, tmp_path):
+    _, out, _, _ = overcured
+    shutil.copytree(out, tmp_path / "out")
+    other = weighed_blocks(tmp_path / "data", 0.0)
+    ending, _ = run(other, tmp_path / "out")
+    assert ending.status == 0
+    assert (tmp_path / "out" / "stale" / "verdict.json").read_bytes() == (out / "verdict.json").read_bytes()
+    assert json.loads((tmp_path / "out" / "verdict.json").read_text())["verdict"] == "none"
+
+
+def test_nothing_is_named_where_nothing_is_wrong(tmp_path):
+    ending, _ = run(weighed_blocks(tmp_path / "data", 0.0), tmp_path / "out")
+    assert ending.summary["verdict"] == "none"
+    assert load_model(tmp_path / "out" / "model.toml").effects == {}
+    html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "Verdict: <strong>nothing wrong</strong>" in html
+    assert ">What mending it gains</h2>" not in html
+
+
+def test_three_moduli_of_the_paper_are_not_enough_to_tell(tmp_path):
+    ending, _ = run(PAPER, tmp_path)
+    assert ending.status == 0
+    assert ending.summary["verdict"] == "ambiguous"
+    assert {"overcure", "skin cure"} <= set(re.split(", | or ", ending.summary["headline"]))
+    assert "weigh" in ending.summary["next"].lower()
+    # The extended model gives each unit the modulus that was measured at its scale, to the printed spread.
+    for preset, kPa, spread in (
+        ("mu-0.75x", 21.70, 0.35),
+        ("mu-1.0x", 18.34, 1.86),
+        ("mu-1.5x", 16.38, 1.21),
+    ):
+        extended = read_extended(load_preset(preset), tmp_path / "model.toml").unit
+        assert extended.material.lattice_modulus_kPa == pytest.approx(kPa, abs=spread)
+    assert load_model(tmp_path / "model.toml").nuisances["lattice_modulus_kPa"].unit == "kPa"
+    assert any("3 x 3 x 3 cells between plates that hold" in words for words in ending.summary["remarks"])
+
+
+@pytest.mark.parametrize("gauge_kPa", [0.0, 0.02])
+def test_a_unit_is_judged_by_its_angle_and_markers(tmp_path, monkeypatch, gauge_kPa):
+    """A clogged chamber; the unit's own simulation is stood in for by one that is written down."""
+    folder = bent_unit(tmp_path / "data", {"clogged_chamber.share_lost": 0.5}, gauge_kPa=gauge_kPa)
+
+    def responses(unit, experiments, settings, cache, progress):
+        assert unit.name
+        progress("base", 1.0)
+        kinds = sorted({(e.scale, e.orientation_deg) for e in experiments})
+        return tuple(analytic.response(*k) for k in kinds)
+
+    monkeypatch.setattr(unit_fem, "unit_responses", responses)
+    out = tmp_path / "out"
+    ending, messages = run(folder, out)
+    assert ending.status == 0, messages[-1]
+    assert ending.summary["verdict"] == "named"
+    assert [c["effect"] for c in ending.summary["causes"]] == ["clogged_chamber"]
+    told = [r.partition(";")[0] for r in ending.summary["remarks"] if "white noise" in r]
+    # What is predicted has noise as well, of which nothing is taken.
+    assert told == ["pressure_kPa was read with white noise of up to 0.022"] * (gauge_kPa > 0)
+    gain = ending.summary["gain"]["held_out"]
+    assert gain["unit"] == "deg"
+    assert gain["rmse_after"] < 0.15 < gain["rmse_before"]
+    assert 'name = "mu-1.0x"' in (out / "unit.toml").read_text()
+    html = (out / "report.html").read_text(encoding="utf-8")
+    assert "fast cycles" in html
+    # Of each experiment the angle and the two markers that move most; the rest is in the table.
+    assert f"{3 * (len(analytic.CHANNELS) - 3)} more channels are in residuals.csv." in html
+    channels = {r["channel"] for r in csv.DictReader((out / "residuals.csv").open())}
+    assert channels == set(analytic.CHANNELS)
+    after = [
+        float(r["measured"]) - float(r["extended_model"])
+        for r in csv.DictReader((out / "residuals.csv").open())
+        if r["channel"] == "angle_deg" and r["role"] == "held_out"
+    ]
+    assert np.sqrt(np.mean(np.square(after))) == pytest.approx(gain["rmse_after"], rel=0.3)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "what", "where"),
+    [
+        (lambda f: (f / "block_1.csv").write_text("strain,stress_kPa\n0,0\n0.1,x\n"), "x", "row 3"),
+        (lambda f: (f / "block_1.csv").unlink(), "cannot read block_1.csv", "experiments.toml"),
+        (lambda f: (f / "experiments.toml").unlink(), "cannot read experiments.toml", ""),
+        (
+            lambda f: (f / "experiments.toml").write_text(
+                (f / "experiments.toml").read_text().replace('"fit"', '"held_out"')
+            ),
+            "every experiment is held out",
+            "experiments.toml",
+        ),
+    ],
+)
+def test_what_cannot_be_judged_is_named_before_anything_is_written(tmp_path, spoil, what, where):
+    folder = weighed_blocks(tmp_path / "data", 0.0)
+    spoil(folder)
+    progress = Progress()
+    with pytest.raises(InputError) as caught:
+        diagnose_folder(folder, tmp_path / "out", progress=progress, ending=Ending(progress))
+    assert what in caught.value.what
+    assert where in f"{caught.value.where} {caught.value.remedy}"
+    assert not (tmp_path / "out").exists()

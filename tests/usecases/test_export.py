@@ -1,0 +1,303 @@
+"""Exports and specimens: written, read back by us and by others, and refused where they are broken."""
+
+import hashlib
+import io
+import json
+import tomllib
+import zipfile
+
+import attrs
+import numpy as np
+import pytest
+
+from mu_addon.design.anchors import window
+from mu_addon.design.beams import lattice_beams
+from mu_addon.design.lattice import lattice_of
+from mu_addon.design.parameters import Chambers, Unit
+from mu_addon.design.threemf import Beams, Part, read_3mf, write_3mf
+from mu_addon.design.waveguide import waveguide
+from mu_addon.errors import InputError
+from mu_addon.materials.library import load_material
+from mu_addon.measured.folder import read_folder
+from mu_addon.meshing import lattice as meshing_lattice
+from mu_addon.run.context import run_to_end
+from mu_addon.run.progress import Progress
+from mu_addon.usecases.export import run as exporting
+from mu_addon.usecases.export.print_offsets import read_sheet, sheet, taken_off
+from mu_addon.usecases.export.run import Job, export, path_of
+from mu_addon.usecases.export.specimens import make_specimens
+
+SMALL = Unit(name="three", chambers=Chambers(count=3))
+RESIN = load_material("elastic-50a-v1")
+
+
+def run(work, *arguments):
+    said = []
+    with run_to_end(Progress([said.append])) as ending:
+        work(*arguments, ending.progress, ending)
+    return ending, said
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("export")
+    job = Job(SMALL, RESIN, window(SMALL, "alpha1"), "alpha1", quality="interactive")
+    ending, _ = run(export, job, folder)
+    assert ending.status == 0
+    return folder, json.loads((folder / "manifest.json").read_text())
+
+
+def test_everything_is_there_and_as_the_manifest_says(exported):
+    folder, manifest = exported
+    assert [f["file"] for f in manifest["files"]] == [
+        "unit.stl",
+        "unit.3mf",
+        "unit-beams.3mf",
+        "cavity.step",
+        "membrane.step",
+        "envelope.step",
+        "waveguide.step",
+        "nodes.txt",
+    ]
+    for entry in manifest["files"]:
+        content = (folder / entry["file"]).read_bytes()
+        assert entry["bytes"] == len(content)
+        assert entry["sha256"] == hashlib.sha256(content).hexdigest()
+    assert manifest["refused"] == []
+    assert [a["file"] for a in manifest["assembly"]] == [
+        "envelope.step",
+        "membrane.step",
+        "waveguide.step",
+        "cavity.step",
+    ]
+    assert manifest["resin"]["g"] == pytest.approx(manifest["solid"]["volume_mm3"] / 1e3 * 1.01)
+    errors = {f["file"]: f["read_back"].get("volume_error") for f in manifest["files"]}
+    assert abs(errors["unit.stl"]) < 1e-4
+    assert abs(errors["unit.3mf"]) < 1e-4
+    assert all(abs(errors[f"{name}.step"]) < 5e-4 for name in ("cavity", "membrane", "envelope", "waveguide"))
+
+
+def test_parabolas_stay_parabolas_in_step(exported):
+    """Each outer arc sweeps a surface of revolution over a curve of degree 2, in millimetres."""
+    text = (exported[0] / "membrane.step").read_text()
+    assert text.count("B_SPLINE_CURVE_WITH_KNOTS('',2") >= 3 * 4
+    assert text.count("SURFACE_OF_REVOLUTION") >= 3 * 4 + 3 * 4
+    assert "SI_UNIT(.MILLI.,.METRE.)" in text
+
+
+def test_trees_of_the_package_are_what_the_core_specification_asks(exported):
+    """By another XML reader: parts, order of elements, attributes that the schema knows."""
+    from xml.dom import minidom
+
+    with zipfile.ZipFile(exported[0] / "unit-beams.3mf") as package:
+        assert package.namelist()[0] == "[Content_Types].xml"
+        assert package.testzip() is None
+        model = minidom.parseString(package.read("3D/3dmodel.model")).documentElement
+    children = [n.tagName for n in model.childNodes if n.nodeType == n.ELEMENT_NODE]
+    assert children == ["metadata", "resources", "build"]
+    assert model.getAttribute("unit") == "millimeter"
+    assert model.getAttribute("requiredextensions") == "b"
+    assert set(model.attributes.keys()) == {"unit", "xml:lang", "xmlns", "xmlns:b", "requiredextensions"}
+    lattice = model.getElementsByTagName("b:beamlattice")[0]
+    assert lattice.parentNode.tagName == "mesh"
+    assert set(lattice.attributes.keys()) == {"minlength", "radius", "cap", "clippingmode", "clippingmesh"}
+
+
+def test_both_packages_are_read_by_the_consortiums_own_library(exported):
+    lib3mf = pytest.importorskip("lib3mf")
+    wrapper = lib3mf.get_wrapper()
+    for name, meshes in (("unit.3mf", 1), ("unit-beams.3mf", 4)):
+        model = wrapper.CreateModel()
+        reader = model.QueryReader("3mf")
+        reader.SetStrictModeActive(True)
+        reader.ReadFromFile(str(exported[0] / name))
+        assert reader.GetWarningCount() == 0
+        found = model.GetMeshObjects()
+        count = 0
+        while found.MoveNext():
+            count += 1
+            mesh = found.GetCurrentMeshObject()
+            assert mesh.IsManifoldAndOriented() or mesh.BeamLattice().GetBeamCount()
+        assert count == meshes
+
+
+def test_beams_fill_what_the_lattice_fills():
+    """Frusta with round ends, united and cut to the box, against the bare lattice's volume."""
+    from manifold3d import Manifold, OpType
+
+    from mu_addon.design import shapes
+    from mu_addon.design.solid import QUALITY, lattice_solid
+
+    d = SMALL.dimensions
+    lattice = lattice_of(d)
+    wide = attrs.evolve(d, R=1e-3, r=5e-4)  # no actuator, so that no strut is left out
+    beams = lattice_beams(wide)
+    assert len(beams.pairs) == 8 * len(lattice.struts)
+    n = QUALITY["interactive"].around_strut
+    parts = []
+    for (a, b), (r, q) in zip(beams.nodes[beams.pairs], beams.radii, strict=True):
+        parts.append(shapes.spindle(b - a, np.array([r, q]), n).translate(a.tolist()))
+    parts += [shapes.ball(d.junction_diameter / 2, n).translate(node.tolist()) for node in lattice.nodes]
+    united = Manifold.batch_boolean(parts, OpType.Add) ^ shapes.box(*np.array(d.bounds).T)
+    fine = lattice_solid(d, lattice, attrs.evolve(QUALITY["interactive"], along_strut=8))
+    assert united.volume() == pytest.approx(fine.volume(), rel=0.003)
+
+
+def test_beams_leave_out_the_path_and_raise_its_neighbours():
+    unit = attrs.evolve(SMALL, scale=0.75)
+    bar = waveguide(unit, window(unit, "alpha1"))
+    plain, sensed = lattice_beams(unit.dimensions), lattice_beams(unit.dimensions, bar)
+    assert len(sensed.pairs) == len(plain.pairs)
+    assert sensed.volume > plain.volume
+    assert sensed.radii.max() == pytest.approx(0.75)
+
+
+def box():
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    return Part("box & <co>", corners, np.array([t for q in quads for t in (q[:3], [q[0], q[2], q[3]])]))
+
+
+def test_a_package_comes_back_as_it_was_written():
+    beams = Beams(np.array([[0, 0, 2], [0, 0, 3.5]]), np.array([[0, 1]]), np.array([[0.3, 0.4]]))
+    written = write_3mf([box(), Part("one", beams=beams, clipped_to=1)], [1, 2], 'a "title"')
+    assert written == write_3mf([box(), Part("one", beams=beams, clipped_to=1)], [1, 2], 'a "title"')
+    objects, printed = read_3mf(written)
+    assert printed == [1, 2]
+    assert objects[1].name == "box & <co>"
+    assert np.array_equal(objects[1].vertices, box().vertices)
+    assert np.array_equal(objects[1].triangles, box().triangles)
+    assert objects[2].clipped_to == 1
+    assert objects[2].beams.volume == pytest.approx(np.pi * 1.5 / 3 * (0.09 + 0.12 + 0.16))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('unit="millimeter"', 'unit="inch"', "its unit is inch"),
+        ('v3="2"', 'v3="99"', "vertex is missing"),
+        ('v1="0" v2="1" v3="3"', 'v1="1" v2="1" v3="3"', "a vertex twice"),
+        ("/core/2015/02", "/core/1999/02", "another namespace"),
+        ('<item objectid="1"/>', "", "nothing is to be built"),
+        ("</model>", "", "no 3MF package"),
+    ],
+)
+def test_a_package_that_breaks_a_rule_is_refused(old, new, words):
+    spoilt = io.BytesIO()
+    with (
+        zipfile.ZipFile(io.BytesIO(write_3mf([box()], [1], "t"))) as sound,
+        zipfile.ZipFile(spoilt, "w") as package,
+    ):
+        for name in sound.namelist():
+            text = sound.read(name).decode()
+            if name.endswith(".model"):
+                assert old in text
+                text = text.replace(old, new)
+            package.writestr(name, text)
+    with pytest.raises(InputError, match=words):
+        read_3mf(spoilt.getvalue())
+
+
+def test_without_gmsh_the_rest_is_written(tmp_path, monkeypatch):
+    def missing(*_):
+        raise meshing_lattice.GmshUnavailable("gmsh cannot load libGLU.so.1", remedy="install libglu1-mesa")
+
+    monkeypatch.setattr("mu_addon.meshing.step.load_gmsh", missing)
+    job = Job(SMALL, RESIN, formats=("stl", "step", "txt"), quality="interactive")
+    ending, said = run(export, job, tmp_path)
+    assert ending.status == 0
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert [f["file"] for f in manifest["files"]] == ["unit.stl", "nodes.txt"]
+    assert manifest["refused"][0]["why"] == "gmsh cannot load libGLU.so.1"
+    assert any(m["type"] == "warning" and "libglu1-mesa" in m["text"] for m in said if "text" in m) or any(
+        "libglu1-mesa" in str(m) for m in said
+    )
+    assert not list(tmp_path.glob("*.step"))
+
+
+def test_a_file_that_is_not_what_was_built_is_an_error(tmp_path, monkeypatch):
+    real = exporting.stl_bytes
+    monkeypatch.setattr(exporting, "stl_bytes", lambda v, t: real(v * 1.001, t))
+    ending, _ = run(export, Job(SMALL, RESIN, formats=("stl",), quality="interactive"), tmp_path)
+    assert ending.status == 5
+    assert "read back, encloses" in json.loads((tmp_path / "summary.json").read_text())["reason"]["what"]
+
+
+def test_a_path_is_a_window_or_a_row_of_the_search(tmp_path):
+    assert path_of(SMALL, None) == (None, "")
+    assert path_of(SMALL, "alpha1")[0].name == "alpha1"
+    table = tmp_path / "paths.csv"
+    table.write_text("path,points_mm\npath7,0 25 6.25; 0 25 18.75\npath9,0 25 6.25; 6.25 18.75 12.5\n")
+    points, name = path_of(SMALL, str(table))
+    assert (name, points.tolist()) == ("path7", [[0, 25, 6.25], [0, 25, 18.75]])
+    assert path_of(SMALL, str(table), "path9")[1] == "path9"
+    for text, words in (("path,points_mm\n", "there is no path"), ("path\npath7\n", "points_mm")):
+        table.write_text(text)
+        with pytest.raises(InputError, match=words):
+            path_of(SMALL, str(table))
+    with pytest.raises(InputError, match="cannot read the paths"):
+        path_of(SMALL, str(tmp_path / "none.csv"))
+
+
+def test_calliper_sheets_become_offsets(tmp_path):
+    path = tmp_path / "gauge.csv"
+    rows = [line.split(",") for line in sheet().splitlines()]
+    for row in rows[1:]:
+        offset = 0.08 if row[2] == "z" else 0.15
+        row[4] = f"{float(row[3]) + (2 if row[1] == 'solid' else -2) * offset:.3f}"
+    path.write_text("\n".join(",".join(row) for row in rows))
+    found, source = taken_off(SMALL, str(path))
+    assert found == pytest.approx((0.15, 0.08), abs=1e-3)
+    assert source.startswith("gauge.csv: 0.150 +- 0.00")
+    path.write_text(sheet())
+    with pytest.raises(InputError, match="0 sizes were measured"):
+        read_sheet(path)
+    path.write_text(sheet().replace("0.9,\n", "0.9,9.0\n"))
+    with pytest.raises(InputError, match="x1 measured as"):
+        read_sheet(path)
+    with pytest.raises(InputError, match="has no offsets"):
+        taken_off(SMALL, "unit")
+    assert taken_off(SMALL, None) == ((0.0, 0.0), "")
+
+
+@pytest.fixture(scope="module")
+def printed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("specimens")
+    ending, _ = run(make_specimens, Unit(), RESIN, folder)
+    assert ending.status == 0
+    return folder, json.loads((folder / "manifest.json").read_text())
+
+
+def test_specimens_weigh_what_they_should(printed):
+    folder, manifest = printed
+    rows = {row["name"]: row for row in manifest["specimens"]}
+    assert list(rows) == ["gauge", "cube-0.75x", "cube-1x", "cube-1.5x", "strut", "wall", "beam", "waveguide"]
+    for scale in (0.75, 1.0, 1.5):
+        row = rows[f"cube-{scale:g}x"]
+        assert row["size_mm"] == pytest.approx([37.5 * scale] * 3)
+        # The relative density of the paper's cell, 9.90 %, at every scale.
+        assert row["mass_g"] == pytest.approx(0.0990 * (3.75 * scale) ** 3 * 1.01, rel=0.005)
+    import trimesh
+
+    for row in manifest["specimens"]:
+        mesh = trimesh.load(folder / row["file"])
+        assert mesh.is_watertight
+        assert mesh.volume / 1e3 * 1.01 == pytest.approx(row["mass_g"], rel=1e-4)
+
+
+def test_the_template_is_a_folder_of_measured_data_but_for_its_rows(printed):
+    folder = printed[0] / "measured"
+    entries = tomllib.loads((folder / "experiments.toml").read_text())["experiment"]
+    assert {e["kind"] for e in entries} == {
+        "lattice_compression",
+        "coupon",
+        "beam_deadweight",
+        "waveguide_bending",
+    }
+    for number, entry in enumerate(entries, 1):
+        columns = (folder / entry["file"]).read_text().strip().split(",")
+        rows = [[str(0.01 * number * (k + 1)) for _ in columns] for k in range(5)]
+        (folder / entry["file"]).write_text("\n".join(",".join(r) for r in [columns, *rows]) + "\n")
+    found = read_folder(folder)
+    assert len(found.experiments) == len(entries) == 3 * 3 + 3 + 3 + 2
+    assert (printed[0] / "sheet.html").read_text().count("<tr") > 20

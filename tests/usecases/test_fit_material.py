@@ -1,0 +1,141 @@
+"""fit-material from folder to report."""
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mu_addon.errors import InputError
+from mu_addon.materials.coupon import incompressible
+from mu_addon.materials.forms import FORMS
+from mu_addon.materials.library import read_material
+from mu_addon.run.context import Ending, run_to_end
+from mu_addon.run.progress import Progress
+from mu_addon.usecases.fit_material.run import answer, fit_material
+
+DATA = Path(__file__).parent.parent / "data"
+
+
+def run(folder, out, *arguments, **options):
+    messages = []
+    progress = Progress([messages.append])
+    with run_to_end(progress) as ending:
+        fit_material(folder, out, *arguments, progress=progress, ending=ending, **options)
+    return ending, messages
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    out = tmp_path_factory.mktemp("fit")
+    ending, messages = run(DATA / "treloar", out, ("neo-hooke", "yeoh", "ogden-1"), ("equibiaxial",))
+    assert ending.status == 0
+    return out, ending.summary, messages
+
+
+def test_a_fit_leaves_a_material_that_gives_the_stresses_of_its_table(fitted):
+    out, summary, _ = fitted
+    material = read_material(out / "material.toml")
+    assert material.law.name == "Yeoh"
+    assert (summary["chosen"], summary["chosen_by"]) == ("yeoh", "held out")
+    assert material.fails == tuple(summary["laws"]["yeoh"]["fails"])
+    assert material.low95["c1_MPa"] < material.parameters[0] < material.high95["c1_MPa"]
+    material.require_stable()
+    rows = list(csv.DictReader((out / "fit.csv").open()))
+    assert len(rows) == 24 + 16 + 13
+    assert {r["role"] for r in rows if r["mode"] == "equibiaxial"} == {"held_out"}
+    for mode in ("uniaxial", "equibiaxial", "pure_shear"):
+        mine = [r for r in rows if r["mode"] == mode]
+        stretch = np.array([float(r["stretch"]) for r in mine])
+        stress = incompressible(material.law, material.parameters, mode, stretch)
+        assert stress == pytest.approx([float(r["yeoh_MPa"]) for r in mine], rel=1e-12)
+
+
+def test_the_tables_say_what_the_summary_says(fitted):
+    out, summary, _ = fitted
+    assert json.loads((out / "summary.json").read_text())["status"] == "complete"
+    for row in csv.DictReader((out / "parameters.csv").open()):
+        p = summary["laws"][row["law"]]["parameters"][row["parameter"]]
+        assert float(row["value"]) == p["value"]
+    errors = list(csv.DictReader((out / "errors.csv").open()))
+    assert len(errors) == 3 * 3
+    neo = next(e for e in errors if (e["law"], e["mode"]) == ("neo-hooke", "uniaxial"))
+    assert float(neo["share"]) > 0.1
+    assert "uniaxial" in summary["laws"]["neo-hooke"]["fails"]
+    # Two modes were fitted, so each can be predicted from the other.
+    assert set(summary["laws"]["yeoh"]["unseen"]) == {"uniaxial", "pure_shear"}
+
+
+def test_the_terminal_is_told_in_a_few_lines(fitted):
+    lines = answer(fitted[1])
+    assert lines[0].startswith("law: yeoh, c1_MPa 0.")
+    assert "in equibiaxial" in lines[1]
+    assert lines[2] == "misses equibiaxial by more than 10%"
+
+
+def test_the_report_answers_warns_and_needs_no_server(fitted):
+    html = (fitted[0] / "report.html").read_text(encoding="utf-8")
+    assert "Take <strong>Yeoh</strong>" in html
+    assert "but misses equibiaxial" in html
+    assert "Yeoh misses equibiaxial by more than 10%" in html
+    assert html.count("<figure") == 6
+    assert not re.search(r"(src|href)=\"(?!data:|#)", html)
+    assert "<script" not in html
+
+
+def test_charts_are_the_same_bytes_for_the_same_data(fitted, tmp_path):
+    run(DATA / "treloar", tmp_path, ("neo-hooke", "yeoh", "ogden-1"), ("equibiaxial",))
+    for name in ("fit_uniaxial.svg", "fit_equibiaxial.svg", "fit.csv", "material.toml"):
+        assert (tmp_path / name).read_bytes() == (fitted[0] / name).read_bytes()
+
+
+def test_results_of_other_inputs_are_set_aside(tmp_path):
+    run(DATA / "treloar", tmp_path, ("neo-hooke",))
+    first = (tmp_path / "material.toml").read_text()
+    ending, _ = run(DATA / "treloar", tmp_path, ("yeoh",))
+    assert ending.status == 0
+    assert (tmp_path / "stale" / "material.toml").read_text() == first
+    assert "Yeoh" in (tmp_path / "material.toml").read_text()
+
+
+def test_one_mode_alone_brings_a_warning_of_the_others(tmp_path):
+    """A resin's datasheet gives little more than this: stress at some strains, pulled one way."""
+    folder = tmp_path / "data"
+    folder.mkdir()
+    rng = np.random.default_rng(2)
+    stretch = np.linspace(1, 2.5, 40)[1:]
+    stress = incompressible(FORMS["yeoh"].law, [0.5, 0.02, 0.004, 1], "uniaxial", stretch)
+    rows = "".join(
+        f"{s:.5f},{1e3 * p:.3f}\n"
+        for s, p in zip(stretch - 1, stress * (1 + 0.01 * rng.normal(size=39)), strict=True)
+    )
+    (folder / "pull.csv").write_text("strain,stress_kPa\n" + rows)
+    (folder / "experiments.toml").write_text(
+        '[[experiment]]\nname = "pull"\nkind = "coupon"\nfile = "pull.csv"\nrole = "fit"\nmode = "uniaxial"\n'
+    )
+    ending, _ = run(folder, tmp_path / "out", ("yeoh", "ogden-1", "ogden-2"), weights="relative")
+    assert ending.status == 0
+    assert set(ending.summary["untested"]) == {"equibiaxial", "pure_shear"}
+    html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "Equibiaxial was not tested. Laws that fit the rest differ there by a factor of" in html
+    assert "relative" in (tmp_path / "out" / "fit.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("folder", "arguments", "what"),
+    [
+        ("measured", (), "there is no coupon among the experiments"),
+        ("treloar", (("gent",),), "there is no law 'gent' to fit"),
+        ("treloar", (("yeoh",), ("planar",)), "no coupon of mode 'planar' is there to hold out"),
+        ("treloar", (("yeoh",), ("uniaxial", "equibiaxial", "pure_shear")), "every coupon is held out"),
+        ("nowhere", (), "cannot read experiments.toml"),
+        ("treloar", (("yeoh",), (), "equal"), "there are no 'equal' weights"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused_before_anything_is_written(tmp_path, folder, arguments, what):
+    progress = Progress()
+    with pytest.raises(InputError, match=re.escape(what)):
+        fit_material(DATA / folder, tmp_path / "out", *arguments, progress=progress, ending=Ending(progress))
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,209 @@
+"""A gripper's run: its phases, a grasp with and without friction, its table of paths, its folder."""
+
+import json
+
+import numpy as np
+import pytest
+
+from mu_addon.cli.main import main
+from mu_addon.design.gripper import load_gripper
+from mu_addon.design.surface import bad_edges, stl_surface
+from mu_addon.errors import InputError
+from mu_addon.fem.protocol import Protocol
+from mu_addon.fem.unit import materials_of
+from mu_addon.files import read_npz
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.unit import mesh_unit
+from mu_addon.report.pc2 import read_pc2
+from mu_addon.usecases.grip.grasp import Cube, Grip, grasp
+from mu_addon.usecases.grip.motion import even
+from mu_addon.usecases.grip.path_deviation import Column, column, printed_column
+from mu_addon.usecases.grip.phases import NAMES, Phases, read_phases, shipped_phases
+from mu_addon.usecases.grip.run import Job
+from mu_addon.usecases.simulate_and_place.motion import read_motion
+
+COARSE = MeshSettings(refine=0.3)
+
+
+@pytest.fixture(scope="module")
+def finger():
+    gripper = load_gripper("gripper")
+    mesh = mesh_unit(gripper.unit, COARSE)
+    return gripper, mesh, materials_of(gripper.unit, mesh)
+
+
+def test_phases_cover_the_protocol_and_samples_meet_its_corners():
+    phases = shipped_phases()
+    time, pressure, names = phases.sample(0.7)
+    assert tuple(dict.fromkeys(names)) == NAMES
+    assert set(phases.protocol.time_s) <= set(time)
+    assert (np.diff(time) <= 0.7 + 1e-12).all()
+    np.testing.assert_allclose(
+        pressure, np.interp(time, phases.protocol.time_s, phases.protocol.pressure_kPa)
+    )
+    for name in NAMES:
+        start, end = phases.span(name)
+        assert all((name == own) == (start < t <= end) for t, own in zip(time[1:], names[1:], strict=True))
+    assert (pressure.min(), pressure.max()) == (-20.0, 40.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("time_s,pressure_kPa\n0,0\n1,10\n", "lacks the column phase"),
+        ("time_s,pressure_kPa,phase\n0,0,i\n1,10,i\n2,20,iii\n", "the phases are i, iii"),
+        (
+            "time_s,pressure_kPa,phase\n0,0,i\n1,1,i\n2,2,ii\n3,3,iii\n4,4,iv\n5,5,v\n6,0,i\n",
+            "the phases are",
+        ),
+    ],
+)
+def test_phases_out_of_order_are_refused(tmp_path, text, words):
+    (tmp_path / "p.csv").write_text(text)
+    with pytest.raises(InputError, match=words):
+        read_phases(tmp_path / "p.csv")
+
+
+def test_phases_survive_their_file(tmp_path):
+    (tmp_path / "p.csv").write_text(shipped_phases().text())
+    assert read_phases(tmp_path / "p.csv").text() == shipped_phases().text()
+
+
+def test_even_steps_keep_what_was_sampled():
+    time = np.array([0.0, 1.0, 1.5, 3.0])
+    values = np.arange(8.0).reshape(4, 2)
+    at, found = even(time, values)
+    assert np.diff(at) == pytest.approx(0.5)
+    for t, row in zip(time, values, strict=True):
+        assert found[np.argmin(abs(at - t))] == pytest.approx(row)
+
+
+def test_the_papers_gripper_column():
+    printed = printed_column()
+    assert len(printed) == 10
+    assert min(printed, key=printed.get) == "alpha4"
+    assert Column("intersect", None, printed).rank_correlation(printed) == pytest.approx(1.0)
+    # Without ties Spearman's is 1 - 6 sum d^2 / (n (n^2 - 1)), d the differences of the ranks.
+    other = printed_column("scale_1.00")
+    d = [sorted(printed.values()).index(printed[n]) - sorted(other.values()).index(other[n]) for n in printed]
+    expected = 1 - 6 * sum(x * x for x in d) / (10 * 99)
+    assert Column("intersect", None, printed).rank_correlation(other) == pytest.approx(expected)
+
+
+def test_a_cube_wider_than_the_gap_is_refused(finger):
+    gripper, mesh, materials = finger
+    with pytest.raises(InputError, match="does not fit"):
+        grasp(gripper, Cube(30.0), shipped_phases(), mesh, materials)
+    with pytest.raises(InputError, match="does not fit"):
+        Job(gripper, (Cube(31.0),))
+
+
+@pytest.fixture(scope="module")
+def smooth(finger):
+    """Grasps of both cubes without friction, by side."""
+    gripper, mesh, materials = finger
+    grip = Grip(friction=0.0, step_s=1.0, halvings=1)
+    corners = np.array([0.0, 1.0, 6.0, 6.5, 7.0, 11.0]), np.array([0.0, -10.0, 40.0, 40.0, 40.0, 0.0])
+    short = Phases(Protocol(*corners), ("i", *NAMES))
+    return {side: grasp(gripper, Cube(side), short, mesh, materials, grip) for side in (12.5, 25.0)}
+
+
+def test_without_friction_a_cycle_gives_all_work_back_and_lifts_nothing(smooth):
+    """Pressure and contact are then a potential: what closing took, opening returns."""
+    found = smooth[25.0]
+    hold = found.end("iii")
+    assert found.normal_N[hold] > 0.2
+    rise = np.diff(found.volume_mm3)
+    works = (found.pressure_kPa[1:] + found.pressure_kPa[:-1]) / 2e3 * rise
+    assert abs(found.pressure_work_mJ) < 1e-4 * np.abs(works).sum()
+    assert np.abs(found.u[-1]).max() < 1e-5
+    assert found.lost_mJ[-1] == 0.0
+    # Edges aside, a face without friction pushes square to itself.
+    assert abs(found.down_N[hold]) < 1e-3 * found.normal_N[hold]
+    assert not found.lift.held
+    assert 0 < found.deepest_mm.max() < 0.4
+
+
+def test_the_smaller_cube_bends_a_finger_more_and_is_pressed_less(smooth):
+    small, large = smooth[12.5], smooth[25.0]
+    hold = small.end("iii")
+    assert small.angle_deg[hold] > large.angle_deg[hold] + 3.0
+    assert 0 < small.normal_N[hold] < large.normal_N[hold]
+    # Before either is touched they are one.
+    assert small.angle_deg[small.end("i")] == pytest.approx(large.angle_deg[large.end("i")], abs=1e-6)
+
+
+def test_a_finger_that_closes_on_nothing_ranks_paths_as_the_paper_does(finger):
+    gripper, mesh, materials = finger
+    kept = {}
+    found = column(gripper, mesh, materials, "volume_fraction", None, store=kept.__setitem__)
+    assert found.chosen == "alpha4"
+    assert found.rank_correlation(printed_column()) > 0.9
+    again = column(gripper, mesh, materials, "volume_fraction", None, load=kept.get)
+    assert again.J_hat_mm == found.J_hat_mm
+
+
+def test_the_printable_part_from_the_command_line(tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["grip", "--preset", "gripper", "--out", str(out), "--solid-only"]) == 0
+    _, triangles = stl_surface((out / "gripper.stl").read_bytes())
+    assert bad_edges(triangles) == 0
+    assert (out / "gripper.3mf").stat().st_size > 10_000
+    assert "2 chambers" in capsys.readouterr().out
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["status"] == "complete"
+    assert summary["size_mm"] == pytest.approx([57.5, 150.0, 81.0], abs=1e-3)
+    assert "Gripper" in (out / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--preset", "gripper", "--cube", "40"], "does not fit"),
+        (["--preset", "mu-1.0x"], "no gripper"),
+        (["--preset", "gripper", "--friction", "-1"], "friction coefficient of -1"),
+        (["--preset", "gripper", "--cube", "25", "25"], "same side"),
+    ],
+)
+def test_wrong_input_is_refused_in_words(tmp_path, capsys, options, words):
+    assert main(["grip", *options, "--out", str(tmp_path / "out"), "--json"]) == 2
+    assert words in capsys.readouterr().out
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_a_grasp_with_friction_from_the_command_line(tmp_path):
+    """Grasp, hold, lift, release: forces, energy, light, files; and a second run finds it all done."""
+    out = tmp_path / "out"
+    line = ["grip", "--preset", "gripper", "--out", str(out), "--cube", "25", "--no-paths", "--coarse"]
+    assert main([*line, "--refine", "0.3"]) == 0
+    summary = json.loads((out / "summary.json").read_text())
+    g = summary["grasps"]["25"]
+    assert g["held"]
+    assert g["margin"] > 1.0
+    assert g["carried_after_lift_N"] == pytest.approx(g["weight_N"], rel=0.1)
+    # Sliding at the plateau: friction is at its bound, and drags the cube down.
+    assert g["down_at_hold_N"] == pytest.approx(0.5 * g["normal_at_hold_N"], rel=0.05)
+    # What pressure and the cube's way put in over the cycle is what friction took.
+    put_in = g["pressure_work_mJ"] + g["cube_work_mJ"]
+    assert put_in == pytest.approx(g["lost_to_friction_mJ"], rel=0.15)
+    light = summary["light"]["25"]
+    assert abs(light["lost_at_end_of"]["iii"]) > 4 * light["error_at_end_of"]["iii"]
+    assert light["lost_at_end_of"]["v"] == pytest.approx(0.0, abs=1e-3)
+    motion = read_motion(out / "cube-25")
+    assert len(motion.time_s) == len(motion.state_kPa)
+    whole = read_npz(out / "cube-25" / "gripper.npz")
+    for side, rest in zip(("left", "right"), whole["rest_mm"], strict=True):
+        positions, start, step = read_pc2(out / "cube-25" / f"{side}.pc2")
+        np.testing.assert_allclose(positions[0], rest, atol=1e-3)
+        assert (start, step) == (0.0, 1.0)
+        assert whole["triangles"].max() < positions.shape[1]
+    names = {p.name for p in out.iterdir()}
+    assert {"gripper.stl", "grasp_25.csv", "pull_25.csv", "report.html", "frame_25_iv.png"} <= names
+    report = (out / "report.html").read_text()
+    before = (out / "grasp_25.csv").read_text()
+    assert "over the weight" in report
+    assert main([*line, "--refine", "0.3"]) == 0
+    again = json.loads((out / "summary.json").read_text())
+    assert again["seconds"]["grasp of 25 mm"] < 0.3 * summary["seconds"]["grasp of 25 mm"]
+    assert (out / "grasp_25.csv").read_text() == before

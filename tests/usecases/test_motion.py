@@ -1,0 +1,289 @@
+"""The motion that a study keeps to be looked at: surfaces, states, sensor paths, point caches, pictures."""
+
+from types import SimpleNamespace
+
+import attrs
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from PIL import Image
+from scipy.spatial import KDTree
+
+from mu_addon.design.anchors import anchors, windows
+from mu_addon.design.parameters import load_preset
+from mu_addon.errors import InputError
+from mu_addon.fem.equilibrium import Equilibrium
+from mu_addon.fem.kinematics import probe
+from mu_addon.fem.model import Model
+from mu_addon.fem.protocol import Protocol
+from mu_addon.fem.trajectory import simulate
+from mu_addon.fem.unit import materials_of
+from mu_addon.files import write_npz
+from mu_addon.meshing.mesh import mirror
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.unit import mesh_unit
+from mu_addon.placement.candidates import Candidate, candidates, roi, with_sensor
+from mu_addon.placement.whole import whole_body
+from mu_addon.report.pc2 import read_pc2, write_pc2
+from mu_addon.run.cache import Cache
+from mu_addon.usecases.simulate_and_place.candidate_states import Sweep
+from mu_addon.usecases.simulate_and_place.job import Job
+from mu_addon.usecases.simulate_and_place.motion import (
+    FIELDS,
+    MODEL_A,
+    REGIONS,
+    SENSITIVITY,
+    SurfaceFields,
+    read_motion,
+    surface_of,
+    write_model_a,
+    write_sensitivity,
+)
+from mu_addon.usecases.simulate_and_place.panel_pictures import ANGLE, delta_name, write_angle, write_delta
+from mu_addon.usecases.simulate_and_place.path_motion import keep_motion
+
+UNIT = load_preset("mu-0.75x")
+PRESSURES = np.array([0.0, -10.0, 0.0, 10.0, 20.0])
+TIMES = np.arange(5.0)
+JOB = Job(
+    unit=UNIT,
+    protocol=Protocol(TIMES, PRESSURES),
+    mesh=MeshSettings(refine=0.5, order=1),
+    times=5,
+    stations=21,
+    workers=1,
+)
+PATHS = candidates(anchors(UNIT), windows(6))[::4]
+JOBS = [(path, rule) for rule in ("intersect", "volume_fraction") for path in PATHS]
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """A folder with a coarse unit's motion, its mesh and trajectory, and the sweep of its paths."""
+    folder = tmp_path_factory.mktemp("study")
+    mesh = mesh_unit(UNIT, JOB.mesh)
+    materials = materials_of(UNIT, mesh)
+    trajectory = simulate(Equilibrium(Model(mesh), materials), TIMES, PRESSURES)
+    write_model_a(folder, mesh, materials, trajectory)
+    write_sensitivity(folder, mesh, mesh.nodes[mesh.corners].mean(axis=1)[:, 2])
+    sweep, evaluations = swept(folder, mesh, mesh, trajectory, JOBS)
+    return folder, mesh, trajectory, sweep, evaluations
+
+
+def swept(folder, mesh, solved_on, trajectory, jobs):
+    """The sweep of some jobs on a mesh, the motion of its paths written, and its evaluations."""
+    sweep = Sweep(JOB, Cache(folder / "cache"), solved_on, jobs, PRESSURES, "volume_fraction")
+    evaluations = sweep.evaluations(trajectory, lambda _: None)
+    sweep.close()
+    of = SimpleNamespace(job=JOB, headline_rule="volume_fraction", mesh=mesh, folder=folder)
+    keep_motion(of, solved_on, trajectory, sweep, jobs)
+    return sweep, evaluations
+
+
+@pytest.fixture(scope="module")
+def motion(study):
+    return read_motion(study[0])
+
+
+def volume(vertices, triangles):
+    a, b, c = vertices[triangles].transpose(1, 0, 2)
+    return np.einsum("ij,ij->", a, np.cross(b, c)) / 6
+
+
+def test_model_a_comes_back(study, motion):
+    _, mesh, trajectory, *_ = study
+    assert motion.mesh.hash() == mesh.hash()
+    assert np.array_equal(motion.pressure_kPa, PRESSURES)
+    assert np.allclose(motion.displacement(MODEL_A), [s.u for s in trajectory.states], atol=1e-5)
+    for region in REGIONS:
+        at_rest = motion.fields[region]["von_mises_kPa"][motion.state_kPa == 0.0]
+        assert np.allclose(at_rest, 0.0, atol=1e-3)
+        assert set(motion.fields[region]) == set(FIELDS)
+        assert (motion.fields[region]["von_mises_kPa"] >= 0.0).all()
+        assert (motion.fields[region]["largest_stretch"] >= motion.fields[region]["smallest_stretch"]).all()
+    # The wall is a hundred times stiffer than the lattice that moves with it.
+    peak = {region: motion.fields[region]["von_mises_kPa"].max() for region in REGIONS}
+    assert peak["membrane"] > 10 * peak["lattice"]
+
+
+@pytest.mark.parametrize("cut", [True, False])
+@pytest.mark.parametrize("region", REGIONS)
+def test_surfaces_are_closed_and_face_outward(study, motion, region, cut):
+    _, mesh, *_ = study
+    skin = motion.skin(region, cut)
+    vertices = skin.of_nodes(mesh.nodes)
+    ends = np.sort(skin.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    assert (np.unique(ends, axis=0, return_counts=True)[1] % 2 == 0).all()
+    body = mesh if cut else mirror(mesh, "x")
+    corners = body.nodes[body.corners[body.region == REGIONS[region]]]
+    exact = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 6
+    assert volume(vertices, skin.triangles) == pytest.approx(exact, rel=1e-9)
+    assert vertices[:, 0].min() < -1.0
+    # Cut open it shows the side behind the plane to whoever looks along -x.
+    assert (vertices[:, 0].max() <= 0.0) == cut
+
+
+def test_a_whole_mesh_cannot_be_cut_open(study, tmp_path):
+    _, mesh, trajectory, *_ = study
+    whole = mirror(mesh, "x")
+    rest = attrs.evolve(trajectory.states[0], u=np.zeros_like(whole.nodes))
+    states = tuple(attrs.evolve(rest, pressure_MPa=s.pressure_MPa) for s in trajectory.states)
+    write_model_a(tmp_path, whole, materials_of(UNIT, whole), attrs.evolve(trajectory, states=states))
+    found = read_motion(tmp_path)
+    assert not found.halved
+    assert np.array_equal(found.skin("membrane", True).triangles, found.skin("membrane", False).triangles)
+
+
+def test_a_paths_motion_is_what_its_deviation_was_found_from(study, motion):
+    _, mesh, trajectory, sweep, _ = study
+    assert motion.paths == tuple(c.name for c, rule in JOBS if rule == "volume_fraction")
+    monitor = probe(mesh, anchors(UNIT))
+    name = motion.paths[-1]
+    job = next(i for i, (c, rule) in enumerate(JOBS) if (c.name, rule) == (name, "volume_fraction"))
+    moved = motion.displacement(name)
+    for number, state in enumerate(trajectory.states):
+        if round(state.pressure_MPa * 1e3, 9) not in np.round(sweep.solved_kPa, 9):
+            continue
+        kept = sweep._cache.get("sweep", sweep._name(state))["moved_mm"][job]
+        assert np.allclose(anchors(UNIT) + monitor.displacement(moved[number]), kept, atol=1e-5)
+        apart = np.linalg.norm(moved[number] - motion.model_a[number], axis=1)
+        assert apart.max() > 1e-3
+    with pytest.raises(InputError, match="no motion of alpha99"):
+        motion.displacement("alpha99")
+
+
+def test_stress_is_that_of_the_sensors_own_material(study):
+    """With one Poisson's ratio neo-Hookean stress goes as the modulus; without a sensor it is as it was."""
+    _, mesh, trajectory, *_ = study
+    materials, material = materials_of(UNIT, mesh), UNIT.material
+    nodes = {region: surface_of(mesh, number).node for region, number in REGIONS.items()}
+    looked, bent = SurfaceFields(mesh, nodes), [trajectory.states[-1].u]
+    before = looked.of_states(bent, materials)
+    share = (mesh.region == REGIONS["lattice"]).astype(float)
+    filled = looked.of_states(bent, with_sensor(materials, share, material.sensor_modulus_kPa / 1e3))
+    ratio = material.sensor_modulus_kPa / material.lattice_modulus_kPa
+    for field in FIELDS[:2]:
+        assert np.allclose(filled[f"lattice_{field}"], ratio * before[f"lattice_{field}"], rtol=1e-4)
+        assert np.array_equal(filled[f"membrane_{field}"], before[f"membrane_{field}"])
+
+
+def test_the_lattice_bears_more_where_the_sensor_is(study, motion):
+    _, mesh, *_ = study
+    path = max(PATHS, key=lambda c: c.length)
+    found = roi(mesh, path, UNIT.dimensions.inclusion_radius)
+    skin = motion.skin("lattice", True)
+    most = int(motion.state_kPa.argmax())
+    own, without = (motion.field(n, "lattice", "von_mises_kPa", skin)[most] for n in (path.name, MODEL_A))
+    near = np.isin(skin.node, mesh.tets[found.share > 0.1])
+    assert near.sum() > 10
+    assert np.median(own[near] / without[near]) > 1.1 > 1.02 > np.median(own[~near] / without[~near])
+
+
+def test_a_path_off_the_mirror_plane_moves_both_sides_apart(study, tmp_path):
+    """Solved on the whole body, shown by its half and the half's image: both are where the whole body is."""
+    _, mesh, trajectory, *_ = study
+    whole, there = whole_body(mesh, trajectory)
+    aside = Candidate("aside", 0, anchors(UNIT)[:4] + np.array([0.9 * UNIT.dimensions.cell, 0.0, 0.0]))
+    write_model_a(tmp_path, mesh, materials_of(UNIT, mesh), trajectory)
+    sweep, _ = swept(tmp_path, mesh, whole, there, [(aside, "volume_fraction")])
+    found = read_motion(tmp_path)
+    ((_, pressure_kPa, difference_mm),) = sweep.whole(there)
+    number = int(np.argmax(np.abs(pressure_kPa)))
+    state = int(np.flatnonzero(found.state_kPa == pressure_kPa[number])[0])
+    moved = whole.nodes + there.states[state].u + difference_mm[number]
+    skin = found.skin("lattice", False)
+    shown = skin.of_nodes(mesh.nodes) + skin.of_nodes(*found.sides("aside"))[state]
+    _, nearest = KDTree(whole.nodes).query(skin.of_nodes(mesh.nodes))
+    assert np.allclose(shown, moved[nearest], atol=1e-4)
+    own, image = found.sides("aside")
+    assert np.abs(own[state] - image[state]).max() > 1e-3, "not a mirror image of itself"
+    stress = found.field("aside", "lattice", "von_mises_kPa", skin)[state]
+    sided = [stress[skin.mirror == side].max() for side in (1, -1)]
+    assert abs(sided[0] / sided[1] - 1) > 0.05, "the sensor is on one side"
+    # An embedded body goes with its own side.
+    inside = whole.nodes[whole.tets[::50, :4]].mean(axis=1)
+    carried = found.embedding(inside)
+    weights = (there.states[state].u + difference_mm[number])[whole.tets[::50, :4]].mean(axis=1)
+    assert np.allclose(found.carried("aside", carried)[state], weights, atol=1e-4)
+
+
+def test_states_between_the_samples(motion):
+    assert motion.at(-1.0)[2] == 0.0
+    first, second, share = motion.at(3.25)
+    assert (motion.state_kPa[first], motion.state_kPa[second], share) == (10.0, 20.0, 0.25)
+    first, second, share = motion.at(99.0)
+    assert (motion.state_kPa[second], share) == (20.0, 1.0)
+
+
+def test_an_embedding_is_kept(study, motion):
+    _, mesh, *_ = study
+    points = np.random.default_rng(0).uniform(mesh.nodes.min(axis=0), mesh.nodes.max(axis=0), (50, 3))
+    first = motion.embedding(points)
+    (file,) = (motion.folder / "played").glob("embedding-*.npz")
+    before = file.stat().st_mtime_ns
+    again = motion.embedding(points)
+    u = motion.model_a[-1]
+    assert np.array_equal(first.displacement(u), again.displacement(u))
+    assert file.stat().st_mtime_ns == before
+    motion.embedding(points + 1.0)
+    assert len(list((motion.folder / "played").glob("embedding-*.npz"))) == 2
+
+
+def test_a_map_of_elements_becomes_one_of_nodes(motion):
+    # The map was the height of each element's middle.
+    for region, surface in motion.surfaces.items():
+        height = motion.mesh.nodes[surface.node, 2]
+        assert np.corrcoef(motion.sensitivity[region], height)[0, 1] > 0.98
+    assert SENSITIVITY.endswith("mm_per_MPa")
+
+
+def test_what_is_missing_is_said(study, tmp_path):
+    with pytest.raises(InputError, match="holds no motion"):
+        read_motion(tmp_path)
+    (tmp_path / "motion").mkdir()
+    for name in ("mesh.npz", "model_a.npz"):
+        (tmp_path / "motion" / name).write_bytes((study[0] / "motion" / name).read_bytes())
+    assert read_motion(tmp_path).paths == ()
+    assert read_motion(tmp_path).sensitivity == {}
+    stored = dict(np.load(tmp_path / "motion" / "model_a.npz"))
+    for name, wrong in (
+        ("displacement_mm", stored["displacement_mm"][:, :-1]),
+        ("state", stored["state"] + 9),
+    ):
+        write_npz(tmp_path / "motion" / "model_a.npz", stored | {name: wrong})
+        with pytest.raises(InputError, match="do not fit together"):
+            read_motion(tmp_path)
+    write_npz(tmp_path / "motion" / "model_a.npz", {n: a for n, a in stored.items() if n != "state_kPa"})
+    with pytest.raises(InputError, match="lacks 'state_kPa'"):
+        read_motion(tmp_path)
+    damaged = (tmp_path / "motion" / "model_a.npz").read_bytes()
+    (tmp_path / "motion" / "model_a.npz").write_bytes(damaged[: len(damaged) // 2])
+    with pytest.raises(InputError, match="holds no motion"):
+        read_motion(tmp_path)
+
+
+@given(arrays(np.float32, (3, 4, 3), elements=st.floats(-1e3, 1e3, width=32)))
+def test_point_caches_come_back(tmp_path_factory, positions):
+    path = tmp_path_factory.mktemp("pc2") / "cache.pc2"
+    write_pc2(path, positions, 0.5, 0.25)
+    found, start, step = read_pc2(path)
+    assert np.array_equal(found, positions)
+    assert (start, step) == (0.5, 0.25)
+    path.write_bytes(path.read_bytes()[:-4])
+    with pytest.raises(InputError, match="not a whole point cache"):
+        read_pc2(path)
+
+
+def test_pictures_for_a_panel_are_small_and_square(study):
+    folder, _, trajectory, _, evaluations = study
+    write_angle(folder, np.unique(PRESSURES), np.array([-3.0, 0.0, 2.0, 5.0]))
+    found = evaluations[-1]
+    write_delta(folder, found.name, found.deviation.delta, trajectory.time_s, found.deviation.delta.max())
+    for name in (ANGLE, delta_name(found.name)):
+        path = folder / "motion" / name
+        with Image.open(path) as image:
+            assert image.size[0] == image.size[1] <= 600
+            assert len(image.convert("RGB").getcolors(10**6)) > 50
+        assert path.stat().st_size < 100_000

@@ -1,0 +1,379 @@
+"""A sweep from its file to its table: failures are rows, what is done stays done, and workers may be lost."""
+
+import csv
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mu_addon.design.parameters import from_toml
+from mu_addon.errors import InputError, MuError
+from mu_addon.run.child import RUNNING, Child
+from mu_addon.run.context import run_to_end
+from mu_addon.run.progress import Progress
+from mu_addon.usecases.parameter_study import cluster as cluster_module
+from mu_addon.usecases.parameter_study.plan import parse_plan
+from mu_addon.usecases.parameter_study.point import Task, run_point, version
+from mu_addon.usecases.parameter_study.run import sweep
+
+pytest.importorskip("distributed", reason="sweeps are an extra")
+
+ROOT = Path(__file__).resolve().parents[2]
+FAKE = str(Path(__file__).with_name("fake_worker.py"))
+TEXT = """
+format = 1
+preset = "mu-1.0x"
+stages = "simulate"
+method = "latin_hypercube"
+points = 6
+memory_MB = 2000
+minimize = ["mass_g"]
+maximize = ["angle_range_deg"]
+[simulate]
+times = 3
+mesh = { order = 1, refine = 0.4 }
+[vary]
+"chambers.wall_mm" = { low = 0.8, high = 1.2 }
+"""
+asked = []
+
+
+def formula(task):
+    """A study whose answer is known: it stands where a worker's process would be."""
+    asked.append(task.name)
+    wall = from_toml(task.files["unit.toml"]).chambers.wall_mm
+    if wall > 1.1:
+        return {
+            "status": "failed",
+            "seconds": 0.1,
+            "memory_MB": 1,
+            "what": "too thick",
+            "where": "",
+            "what_to_do": "",
+        }
+    summary = {
+        "gates": {"unit.stl": {"volume_mm3": 1000 * wall}},
+        "angle_deg": {"-20": -5.0, "20": 10 / wall},
+    }
+    return {"status": "done", "seconds": 0.1, "memory_MB": 1, "summary": summary}
+
+
+def swept(text, folder, work=formula, status=0, **options):
+    told = []
+    asked.clear()
+    with run_to_end(Progress([told.append])) as ending:
+        sweep(parse_plan(text, folder), folder, ending.progress, ending, work=work, **options)
+    assert ending.status == status, told[-1]
+    return list(csv.DictReader((folder / "points.csv").open(newline=""))), told
+
+
+def test_every_point_is_a_row_whatever_became_of_it(tmp_path):
+    text = TEXT.replace("{ low = 0.8, high = 1.2 }", "{ values = [0.9, 1.0, 1.15, 2.5] }")
+    rows, _ = swept(text.replace('"latin_hypercube"', '"grid"'), tmp_path)
+    assert [row["status"] for row in rows] == ["done", "done", "failed", "failed"]
+    assert [float(row["mass_g"]) for row in rows[:2]] == pytest.approx([0.9 * 1.01, 1.0 * 1.01])
+    assert [float(row["angle_range_deg"]) for row in rows[:2]] == pytest.approx([5 + 10 / 0.9, 15.0])
+    assert rows[2]["what"] == "too thick"
+    assert "wall" in rows[3]["what"], "the rule that it breaks, without a worker"
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert (summary["points"], summary["done"], summary["failed"]) == (4, 2, 2)
+    report = (tmp_path / "report.html").read_text()
+    for words in ("too thick", "chambers.wall_mm", "2 of 4 points failed"):
+        assert words in report
+    assert "<script" not in report
+
+
+def test_what_is_done_stays_done_and_more_can_be_added(tmp_path):
+    first, _ = swept(TEXT, tmp_path)
+    assert len(asked) == 6
+    again, _ = swept(TEXT, tmp_path)
+    assert (again, asked) == (first, [])
+    more, _ = swept(TEXT.replace("points = 6", "points = 8"), tmp_path)
+    assert (more[:6], len(more), len(asked)) == (first, 8, 2)
+    added, _ = swept(TEXT, tmp_path, add=4)
+    assert (added[:8], len(added), len(asked)) == (more, 12, 4)
+    # Fewer in the file leave those that are there.
+    assert len(swept(TEXT, tmp_path)[0]) == 12
+    assert not (tmp_path / "stale").exists()
+
+
+def test_failures_are_run_again_only_when_asked_for(tmp_path):
+    text = TEXT.replace("{ low = 0.8, high = 1.2 }", "{ values = [1.0, 1.15] }").replace(
+        '"latin_hypercube"', '"grid"'
+    )
+    swept(text, tmp_path)
+    swept(text, tmp_path)
+    assert len(asked) == 0
+    swept(text, tmp_path, retry=True)
+    assert len(asked) == 1
+
+
+def test_another_range_is_another_sweep_but_shares_its_equal_points(tmp_path):
+    text = TEXT.replace('"latin_hypercube"', '"grid"').replace("high = 1.2", "high = 1.0, steps = 3")
+    first, _ = swept(text, tmp_path)
+    rows, _ = swept(text.replace("steps = 3", "steps = 5"), tmp_path)
+    assert (len(first), len(rows), len(asked)) == (3, 5, 2)
+    assert (tmp_path / "stale" / "points.csv").is_file()
+
+
+def test_a_damaged_plan_or_point_is_made_again(tmp_path):
+    first, _ = swept(TEXT, tmp_path)
+    (tmp_path / "plan.csv").write_text("chambers.wall_mm\n7\n")
+    path = sorted((tmp_path / "cache").glob("point-*"))[0]
+    whole = bytearray(path.read_bytes())
+    whole[len(whole) // 2] ^= 1
+    path.write_bytes(whole)
+    again, _ = swept(TEXT, tmp_path)
+    assert (again, len(asked)) == (first, 1)
+
+
+def test_a_grid_cannot_be_added_to(tmp_path):
+    text = TEXT.replace('"latin_hypercube"', '"grid"')
+    _, told = [], []
+    with run_to_end(Progress([told.append])) as ending:
+        sweep(parse_plan(text, tmp_path), tmp_path / "out", ending.progress, ending, add=2, work=formula)
+    assert ending.status == 2
+    assert "--add" in told[-1]["where"]
+
+
+# One point, in a process of its own.
+
+
+def task(how, **limits):
+    files = {"study.toml": "", "unit.toml": ""}
+    given = {"memory_MB": 1000, "minutes": 1.0} | limits
+    return Task(files, version=version(), module=(FAKE, how), **given)
+
+
+@pytest.mark.parametrize(
+    ("how", "limits", "words"),
+    [
+        ("crash", {}, "SIGSEGV"),
+        ("wordless", {}, "without a word"),
+        ("told_error", {}, "no equilibrium"),
+        ("hang", {"minutes": 0.01}, "longer than the 0.01 minutes"),
+        ("hungry", {"memory_MB": 200}, "more than the 200 MB"),
+        ("greedy", {"memory_MB": 500}, "refused"),
+    ],
+)
+def test_whatever_happens_to_a_study_becomes_a_row(how, limits, words):
+    if how == "greedy" and sys.platform != "linux":
+        pytest.skip("only Linux refuses memory")
+    row = run_point(task(how, **limits))
+    assert row["status"] == "failed"
+    assert words in row["what"]
+    assert row["seconds"] > 0
+    # Looked at every 50 ms, a study that takes 20 MB every 20 ms is some 60 MB over when it is stopped.
+    assert row["memory_MB"] < limits.get("memory_MB", 1000) + 200
+
+
+def test_a_study_that_is_done_is_a_row_with_its_summary():
+    row = run_point(task("garbage"))
+    assert (row["status"], row["summary"]) == ("done", {})
+
+
+def test_a_worker_of_another_version_does_not_compute():
+    with pytest.raises(MuError, match=r"the sweep 0\.0\.0"):
+        run_point(Task({}, 1000, 1.0, "0.0.0 revision 0"))
+
+
+def test_a_study_ends_with_the_worker_that_started_it(tmp_path):
+    """The worker is killed outright; its study hangs, and would go on for ever."""
+    script = f"""
+import os, sys, time
+from pathlib import Path
+from mu_addon.run.child import Child
+child = Child([sys.executable, {FAKE!r}, "orphan"], Path(sys.argv[1]), os.environ, ends_with_parent=True)
+while not child.progress:
+    child.poll()
+    time.sleep(0.02)
+print(child.progress["stage"], flush=True)
+time.sleep(600)
+"""
+    worker = subprocess.Popen(
+        [sys.executable, "-c", script, str(tmp_path)],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )
+    study = int(worker.stdout.readline())
+    worker.kill()
+    worker.wait()
+    end = time.monotonic() + 20
+    while _alive(study):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def _alive(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    # One that has ended stays until its new parent has asked for it.
+    return Path(f"/proc/{pid}/stat").exists() and Path(f"/proc/{pid}/stat").read_text().split()[2] != "Z"
+
+
+def test_child_runs_of_the_command_line_end_with_their_parent_and_tell_their_error(tmp_path):
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "mu_addon.cli", "resume", str(tmp_path), "--json", "--no-report"]
+    child = Child(command, tmp_path / "words", environment, ends_with_parent=True)
+    end = time.monotonic() + 60
+    while child.state == RUNNING:
+        assert time.monotonic() < end
+        child.poll()
+        time.sleep(0.05)
+    assert "no study in this folder" in child.error["what"]
+    assert child.error["status"] == 2
+
+
+def test_a_real_study_is_swept(tmp_path):
+    text = TEXT.replace("{ low = 0.8, high = 1.2 }", "{ values = [0.9, 1.0] }").replace(
+        "points = 6", "points = 2"
+    )
+    rows, _ = swept(text.replace('"latin_hypercube"', '"grid"'), tmp_path, work=run_point)
+    assert [row["status"] for row in rows] == ["done", "done"]
+    thin, thick = (float(row["angle_range_deg"]) for row in rows)
+    assert thin > thick > 1
+    assert all(200 < float(row["memory_MB"]) < 2000 for row in rows)
+
+
+# A real scheduler and its workers, on this machine's loopback.
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Farm:
+    """`dask scheduler` and `dask worker` as processes of their own."""
+
+    def __init__(self, folder):
+        self.port, self.folder, self.processes = free_port(), folder, []
+        self.address = f"tcp://127.0.0.1:{self.port}"
+
+    def _start(self, *words):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "distributed.cli.dask_" + words[0], *words[1:]],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            cwd=self.folder,
+            env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONSAFEPATH": "1"},
+        )
+        self.processes.append(process)
+        return process
+
+    def scheduler(self):
+        return self._start("scheduler", "--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard")
+
+    def worker(self):
+        words = (
+            "--nthreads",
+            "1",
+            "--no-nanny",
+            "--no-dashboard",
+            "--host",
+            "127.0.0.1",
+            "--death-timeout",
+            "60",
+        )
+        return self._start("worker", self.address, *words)
+
+    def close(self):
+        for process in self.processes:
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def farm(tmp_path):
+    found = Farm(tmp_path)
+    yield found
+    found.close()
+
+
+def slow_formula(task):
+    time.sleep(0.3)
+    return formula(task)
+
+
+@pytest.mark.slow
+def test_a_lost_worker_and_a_restarted_scheduler_lose_no_point(farm, tmp_path):
+    """Of two workers one is killed at work; then the scheduler itself, and started again."""
+    first = farm.scheduler()
+    lost = farm.worker()
+    farm.worker()
+    folder = tmp_path / "out"
+    folder.mkdir()
+    text = TEXT.replace("points = 6", "points = 24").replace("high = 1.2", "high = 1.09")
+    told = []
+
+    class Trouble:
+        """Kills what is to be killed as points are done, in the sweep's own process."""
+
+        def __call__(self, message):
+            told.append(message)
+            if message.get("state") != "run":
+                return
+            if message["fraction"] >= 4 / 24 and lost.poll() is None:
+                lost.send_signal(signal.SIGKILL)
+            elif message["fraction"] >= 10 / 24 and first.poll() is None:
+                first.send_signal(signal.SIGKILL)
+                first.wait()
+                farm.scheduler()
+                farm.worker()
+
+    with run_to_end(Progress([Trouble()])) as ending:
+        plan = parse_plan(text, tmp_path)
+        sweep(plan, folder, ending.progress, ending, scheduler=farm.address, work=slow_formula)
+    assert ending.status == 0, told[-1]
+    assert lost.poll() is not None
+    assert first.poll() is not None
+    rows = list(csv.DictReader((folder / "points.csv").open(newline="")))
+    assert [row["status"] for row in rows] == ["done"] * 24
+    walls = np.array([float(row["chambers.wall_mm"]) for row in rows])
+    np.testing.assert_allclose([float(row["mass_g"]) for row in rows], 1.01 * walls)
+    assert any("the scheduler was lost" in m.get("what", "") for m in told)
+
+
+def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster_module, "PATIENCE_S", 4.0)
+    told = []
+    with run_to_end(Progress([told.append])) as ending:
+        sweep(
+            parse_plan(TEXT, tmp_path),
+            tmp_path / "out",
+            ending.progress,
+            ending,
+            scheduler=f"tcp://127.0.0.1:{free_port()}",
+        )
+    assert ending.status == 1
+    assert "no scheduler answers" in told[-1]["what"]
+    assert "dask scheduler" in told[-1]["what_to_do"]
+    assert (tmp_path / "out" / "points.csv").is_file()
+
+
+def test_without_dask_it_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match="not installed") as caught:
+        cluster_module.Cluster(None, 1)
+    assert "mu_addon[sweeps]" in caught.value.remedy
+
+
+def test_the_example_is_a_sweep_that_can_be_read(tmp_path):
+    from mu_addon.usecases.parameter_study.plan import read_plan
+
+    example = ROOT / "assets" / "examples" / "sweep"
+    shutil.copytree(example, tmp_path / "sweep")
+    plan = read_plan(tmp_path / "sweep" / "sweep.toml")
+    assert all(point.job is not None for point in plan.points(plan.values()[0]))

@@ -1,0 +1,391 @@
+"""What evidence named, in a designer's simulation: as the evidence computes it, kept, refused, resumed."""
+
+import json
+import shutil
+
+import attrs
+import numpy as np
+import pytest
+
+from mu_addon.cli.main import main, parser
+from mu_addon.cli.options import modelled, modelled_unit
+from mu_addon.cli.study_options import run_stages
+from mu_addon.design import shapes
+from mu_addon.design.body import body_of
+from mu_addon.design.parameters import load_preset
+from mu_addon.design.rigid_body import RigidBody
+from mu_addon.errors import InputError
+from mu_addon.evidence.extended import ExtendedModel, Fitted
+from mu_addon.evidence.unit_effects import EFFECTS, Body
+from mu_addon.evidence.unit_fem import Run, run
+from mu_addon.fem.equilibrium import Equilibrium
+from mu_addon.fem.kinematics import bending_angle_deg, probe
+from mu_addon.fem.protocol import Protocol
+from mu_addon.fem.time_stepping import march
+from mu_addon.fem.trajectory import simulate
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.unit import mesh_unit
+from mu_addon.placement.candidates import candidates, evaluate
+from mu_addon.run.context import run_to_end
+from mu_addon.run.folder import keep_inputs
+from mu_addon.run.progress import Progress
+from mu_addon.usecases.parameter_study.plan import parse_plan
+from mu_addon.usecases.simulate_and_place.extended_unit import extend
+from mu_addon.usecases.simulate_and_place.job import Job, read_job
+from mu_addon.usecases.simulate_and_place.run import Study
+from mu_addon.usecases.simulate_and_place.static_effects import NAMES, StaticEffects
+
+UNIT = load_preset("mu-1.0x")
+ROUGH = MeshSettings(refine=0.4, order=1)
+TIME, PRESSURE = np.arange(4.0), np.array([0.0, -10.0, 0.0, 20.0])
+JOB = Job(
+    unit=UNIT,
+    protocol=Protocol(TIME, PRESSURE),
+    mesh=ROUGH,
+    times=4,
+    stations=11,
+    rules=("volume_fraction",),
+    mesh_check=False,
+    workers=1,
+)
+SIZES = {
+    "gravity": 1300.0,
+    "strain_stiffening": 0.4,
+    "anisotropy": 1.3,
+    "tension_compression_asymmetry": 1.5,
+    "clogged_chamber": 0.65,
+}
+
+
+def named(**sizes):
+    """Effects of these sizes, as a table has them."""
+    return {name: {EFFECTS[name].parameter.name: size} for name, size in sizes.items()}
+
+
+def with_effects(orientation_deg=0.0, job=JOB, **sizes):
+    return attrs.evolve(job, effects=StaticEffects(named(**sizes), orientation_deg))
+
+
+def model_file(path, **sizes):
+    """model.toml of a diagnosis that named these effects."""
+    effects = {
+        n: {p: Fitted(s, 0.1 * s, 0.8 * s, 1.2 * s) for p, s in v.items()} for n, v in named(**sizes).items()
+    }
+    ExtendedModel("named", effects, {}).save(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return mesh_unit(UNIT, ROUGH)
+
+
+def moved(job, mesh):
+    """Model A of a job, and its angles by pressure."""
+    found = simulate(Equilibrium(job.model(mesh), job.materials(mesh), job.newton), TIME, PRESSURE)
+    return found, np.array([bending_angle_deg(mesh, s.u) for s in found.states])
+
+
+def ran(job, folder):
+    """Its summary; the report, which takes longest, is left out."""
+    told = []
+    with run_to_end(Progress([told.append])) as ending:
+        run_stages(Study.open(job, folder, ending.progress, ending))
+    assert ending.status == 0, told[-1]
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_every_static_effect_of_the_evidence_can_be_simulated():
+    assert set(SIZES) == set(NAMES)
+    assert set(EFFECTS) - set(NAMES) == {"overcure", "skin_cure", "wall_thickness", "mesh_error"}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_simulation_is_what_the_evidence_computes_of_the_same_effect(name, mesh):
+    """On one mesh at the same pressures there is nothing to tell the two apart."""
+    of_model = ExtendedModel(
+        "named", {name: {EFFECTS[name].parameter.name: Fitted(SIZES[name], 0, 0, 0)}}, {}
+    )
+    effects = attrs.evolve(extend(UNIT, of_model).effects, orientation_deg=90.0)
+    _, angles = moved(attrs.evolve(JOB, effects=effects), mesh)
+    body = Body(UNIT, ROUGH, ROUGH, orientation_deg=90.0)
+    (expected,) = run(Run(body, (-10.0, 0.0, 20.0), (), name, SIZES[name])).values
+    np.testing.assert_allclose(angles, expected, rtol=1e-9, atol=1e-9)
+    _, without = moved(JOB, mesh)
+    assert np.abs(angles - without).max() > 0.02
+
+
+def test_weight_alone_bends_a_unit_that_lies_and_none_that_hangs(mesh):
+    hanging, lying, turned = (
+        moved(with_effects(turn, gravity=1300.0), mesh)[1][1] for turn in (0.0, 90.0, -90.0)
+    )
+    # Not none at all: there is more lattice on one side.
+    assert abs(hanging) < 0.1 * abs(lying)
+    assert lying < -0.5
+    assert turned == pytest.approx(-lying, rel=0.05)
+
+
+def test_effects_side_by_side_are_the_sum_of_each_while_they_are_small(mesh):
+    small = {
+        "gravity": 100.0,
+        "strain_stiffening": 0.02,
+        "anisotropy": 0.05,
+        "tension_compression_asymmetry": 0.05,
+        "clogged_chamber": 0.03,
+    }
+    _, base = moved(JOB, mesh)
+    alone = [moved(with_effects(90.0, **{n: s}), mesh)[1] - base for n, s in small.items()]
+    together = moved(with_effects(90.0, **small), mesh)[1] - base
+    np.testing.assert_allclose(together, np.sum(alone, axis=0), atol=0.06 * np.abs(alone).max())
+    # And large ones are still one body in equilibrium, which has all of them.
+    _, large = moved(with_effects(90.0, **SIZES), mesh)
+    for name in SIZES:
+        rest = {n: s for n, s in SIZES.items() if n != name}
+        assert np.abs(moved(with_effects(90.0, **rest), mesh)[1] - large).max() > 1e-4, name
+
+
+def test_a_layered_wall_that_stiffens_does_so_in_what_of_it_is_isotropic(mesh):
+    """The order in which the two are given changes nothing."""
+    one = with_effects(anisotropy=1.3, strain_stiffening=0.4).materials(mesh)
+    other = attrs.evolve(
+        JOB, effects=StaticEffects(named(strain_stiffening=0.4) | named(anisotropy=1.3))
+    ).materials(mesh)
+    assert one.hash() == other.hash()
+    np.testing.assert_allclose(
+        one.small_strain(len(mesh.tets))[0],
+        with_effects(anisotropy=1.3).materials(mesh).small_strain(len(mesh.tets))[0],
+        rtol=1e-12,
+    )
+
+
+def test_beside_obstacles_weight_acts_from_the_first_instant_on(mesh):
+    block = shapes.box((-40, 300, 15), (40, 320, 50)).to_mesh64()
+    far = body_of(np.array(block.vert_properties)[:, :3], np.asarray(block.tri_verts).astype(int), "far.stl")
+    job = with_effects(90.0, gravity=1300.0)
+    beside = attrs.evolve(job, obstacles=(RigidBody(far),))
+    free, _ = moved(job, mesh)
+    model = beside.model(mesh)
+    assert len(model.obstacles) == 1
+    marched = march(Equilibrium(model, beside.materials(mesh), beside.newton), TIME, PRESSURE)
+    for k, state in enumerate(marched.states):
+        np.testing.assert_allclose(state.u, free.states[free.index[k]].u, atol=1e-6)
+
+
+@pytest.fixture(scope="module")
+def placed(tmp_path_factory):
+    """Folder and summary of a placement without effects, with weight, and with a wall that stiffens."""
+    root = tmp_path_factory.mktemp("placed")
+    jobs = {
+        "without": JOB,
+        "weight": with_effects(90.0, gravity=1300.0),
+        "stiffening": with_effects(strain_stiffening=0.4),
+    }
+    return {name: (root / name, ran(job, root / name), job) for name, job in jobs.items()}
+
+
+@pytest.mark.parametrize("name", ["weight", "stiffening"])
+def test_sensor_paths_are_ranked_in_the_unit_that_has_the_effect(placed, name, mesh):
+    """A candidate started from Model A's states is where its own path from no pressure leads it."""
+    folder, found, job = placed[name]
+    without = placed["without"][1]["J_hat_mm"]["volume_fraction"]
+    J = found["J_hat_mm"]["volume_fraction"]
+    assert all(abs(J[path] / without[path] - 1) > 2e-3 for path in without)
+    points = np.array([[0.0, 0.0, 0.0]])
+    with run_to_end(Progress()) as ending:
+        study = Study.open(job, folder, ending.progress, ending)
+        points, windows = study.anchors, study.windows
+    trajectory, _ = moved(job, mesh)
+    monitored, d = (points, probe(mesh, points)), UNIT.dimensions
+    sensor = UNIT.material.sensor_modulus_kPa / 1e3
+    for candidate in candidates(points, windows)[::4]:
+        alone = evaluate(
+            job.model(mesh), job.materials(mesh), trajectory, monitored, candidate, "volume_fraction",
+            d.inclusion_radius, sensor, JOB.stations,
+        )  # fmt: skip
+        assert J[candidate.name] == pytest.approx(alone.deviation.J_hat, rel=1e-5)
+        # Under its weight a unit with a sensor hangs otherwise; without weight everything is as drawn.
+        at_rest = alone.deviation.delta[0].mean()
+        assert at_rest > 0.01 if name == "weight" else at_rest == 0
+    assert (folder / "sensitivity.vtu").is_file()
+    # Light is told about the angle without pressure.
+    for low, high in found["light"]["monotonic_deg"].values():
+        assert low <= found["angle_deg"]["0"] <= high
+
+
+def same_digits(one, other):
+    assert (one / "angle.csv").read_bytes() == (other / "angle.csv").read_bytes()
+    with np.load(one / "delta.npz") as a, np.load(other / "delta.npz") as b:
+        for name in a.files:
+            np.testing.assert_array_equal(a[name], b[name])
+
+
+def test_a_run_that_was_stopped_goes_on_to_the_same_digits(placed, tmp_path):
+    """As far as it came: its mesh, and of the load steps and candidates every other."""
+    folder, found, _ = placed["weight"]
+    copy = shutil.copytree(folder, tmp_path / "stopped")
+    for kind in ("state", "sweep", "whole"):
+        kept = sorted((copy / "cache").glob(f"{kind}-*"))
+        assert len(kept) == 3, "one of them is of no pressure"
+        for path in kept[::2]:
+            path.unlink()
+    # By processes of their own, beside the motion, as far as there is something left to do.
+    job = read_job(copy, workers=2)
+    assert job.effects == with_effects(90.0, gravity=1300.0).effects
+    assert ran(job, copy)["J_hat_mm"] == found["J_hat_mm"]
+    same_digits(folder, copy)
+
+
+def test_another_size_or_direction_is_another_result_and_no_weight_has_no_direction(placed, tmp_path):
+    folder, found, _ = placed["weight"]
+    copy = shutil.copytree(folder, tmp_path / "changed")
+    other = ran(attrs.evolve(with_effects(0.0, gravity=1300.0), stages=("design", "simulate")), copy)
+    assert other["angle_deg"]["0"] != found["angle_deg"]["0"]
+    assert (copy / "stale" / "deviation.csv").is_file()
+    keys = {
+        json.dumps(with_effects(turn, gravity=density).tables())
+        for turn in (0.0, 90.0, 450.0 - 360.0)
+        for density in (1000.0, 1300.0)
+    }
+    assert len(keys) == 4
+    assert with_effects(90.0, strain_stiffening=0.4).text() == with_effects(0.0, strain_stiffening=0.4).text()
+    assert with_effects(90.0, gravity=0.0).text() == JOB.text()
+    assert with_effects(90.0, gravity=0.0).effects.parts == JOB.effects.parts == ()
+
+
+def test_a_job_with_effects_comes_back_from_its_folder(tmp_path):
+    job = with_effects(45.0, **SIZES)
+    keep_inputs(tmp_path, job.texts())
+    assert "[simulate.effects.gravity]" in job.text()
+    found = read_job(tmp_path)
+    assert found.effects == job.effects
+    assert found.texts() == job.texts()
+
+
+GRAVITY = "[simulate.effects.gravity]\ndensity_kg_m3 = 1300.0\n"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "what", "remedy"),
+    [
+        ("gravity", "magnetism", "no effect 'magnetism' is known", "known: gravity, strain"),
+        ("gravity", "gravitty", "did you mean 'gravity'", "known: gravity"),
+        ("gravity", "viscoelasticity", "not one that a simulation of the unit can have", "known: gravity"),
+        ("density", "mass", "gravity has density_kg_m3, not mass_kg_m3", "write density_kg_m3"),
+        ("1300.0", "-5.0", "density_kg_m3 = -5.0 is out of bounds", "give 0 to 4000 kg/m3"),
+        ("1300.0", "inf", "out of bounds", "give 0 to 4000"),
+        ("1300.0", "true", "out of bounds", "give 0 to 4000"),
+        (GRAVITY, "[simulate.effects]\ngravity = 3\n", "gravity has density_kg_m3, not 3", "write density"),
+    ],
+)
+def test_effects_that_are_none_are_refused_with_place_and_remedy(tmp_path, old, new, what, remedy):
+    keep_inputs(tmp_path, with_effects(90.0, gravity=1300.0).texts())
+    path = tmp_path / "study.toml"
+    empty, found = "[simulate.effects]\n\n", path.read_text()
+    assert empty + GRAVITY in found
+    path.write_text(found.replace(empty + GRAVITY, GRAVITY.replace(old, new)))
+    with pytest.raises(InputError) as caught:
+        read_job(tmp_path)
+    assert what in caught.value.what
+    assert f"{path}, [simulate.effects]" in caught.value.where
+    assert remedy in caught.value.remedy
+
+
+@pytest.mark.parametrize("turn", ["sideways", True, float("nan"), 400.0])
+def test_a_direction_that_is_none_is_refused(turn):
+    with pytest.raises(InputError, match="no direction of gravity"):
+        StaticEffects(named(gravity=1000.0), turn)
+
+
+def test_a_clog_is_refused_where_the_whole_lattice_is_searched():
+    with pytest.raises(InputError, match="whole lattice"):
+        with_effects(job=attrs.evolve(JOB, paths="graph"), clogged_chamber=0.5)
+
+
+def test_the_command_line_simulates_what_a_diagnosis_found(tmp_path, capsys, mesh):
+    path = model_file(tmp_path / "model.toml", gravity=1300.0, strain_stiffening=0.4)
+    (tmp_path / "up.csv").write_text("time_s,pressure_kPa\n0,0\n1,-10\n2,0\n3,20\n")
+    line = ["simulate", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--json", "--times", 4]
+    line += ["--protocol", tmp_path / "up.csv", "--order", 1, "--refine", 0.4]
+    assert main([str(word) for word in [*line, "--model", path, "--orientation", 90]]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    _, angles = moved(with_effects(90.0, gravity=1300.0, strain_stiffening=0.4), mesh)
+    assert list(summary["angle_deg"].values()) == pytest.approx(angles, rel=1e-9)
+    assert summary["study"]["orientation_deg"] == 90.0
+    assert summary["study"]["effects"] == named(gravity=1300.0, strain_stiffening=0.4)
+    assert len(summary["model"]["applied"]) == 2
+    report = (tmp_path / "out" / "report.html").read_text()
+    assert "effects.gravity.density_kg_m3" in report
+    assert "gravity turned 90° about x" in report
+    assert "not applied" not in capsys.readouterr().out
+
+
+def given(unit_of, *words):
+    """What a command makes of its options --preset and --model, its summary, and what it warns of."""
+    told = []
+    options = parser().parse_args([str(w) for w in [*words, "--preset", "mu-1.0x", "--out", "out"]])
+    with run_to_end(Progress([told.append])) as ending:
+        found = unit_of(options, ending.progress, ending)
+    assert ending.status == 0, told[-1]
+    return found, ending.summary, [m["what"] for m in told if m.get("type") == "warning"]
+
+
+def test_a_direction_of_nothing_that_weighs_is_told(tmp_path):
+    path = model_file(tmp_path / "model.toml", clogged_chamber=0.3)
+    (unit, effects), _, warned = given(modelled, "simulate", "--model", path, "--orientation", "90")
+    assert unit == UNIT
+    assert effects.tables == {"effects": named(clogged_chamber=0.3)}
+    assert warned == ["nothing here has weight, so that its direction changes nothing"]
+    path = model_file(tmp_path / "model.toml", gravity=1000.0)
+    (_, effects), _, warned = given(modelled, "place", "--model", path, "--orientation", "90")
+    assert effects == StaticEffects(named(gravity=1000.0), 90.0)
+    assert not warned
+
+
+def test_homogenize_says_that_it_knows_no_whole_unit(tmp_path):
+    path = model_file(tmp_path / "model.toml", gravity=1300.0)
+    unit, summary, (warned,) = given(modelled_unit, "homogenize", "--model", path)
+    assert unit == UNIT
+    assert "1300 kg/m³: only `simulate` and `place` know the unit as a whole" in warned
+    assert summary["model"]["applied"] == ()
+
+
+def test_what_has_no_place_in_a_static_simulation_is_left_out_and_says_why():
+    effects = {
+        "leak": {"conductance_ratio": Fitted(0.1, 0, 0, 0)},
+        "contact": {"reach_mm": Fitted(2.0, 0, 0, 0)},
+        "mesh_error": {"share": Fitted(1.0, 0, 0, 0)},
+        "gravity": {"density_kg_m3": Fitted(1100.0, 0, 0, 0)},
+    }
+    found = extend(UNIT, ExtendedModel("ambiguous", effects, {}))
+    assert found.unit == UNIT
+    assert found.effects.sizes == {"gravity": 1100.0}
+    assert found.applied == ("solid parts weigh 1100 kg/m³",)
+    ambiguous, leak, contact, finer = found.left_out
+    assert "ambiguous" in ambiguous
+    assert "time, gauge or bench" in leak
+    assert "--obstacle" in contact
+    assert "--refine" in finer
+    # What a file keeps of it says as much of gravity, and nothing of the rest.
+    assert list(found.kept.effects) == ["gravity"]
+    assert extend(UNIT, found.kept).effects == found.effects
+    part = found.of_parameters()
+    assert not part.effects
+    assert part.applied == ()
+    assert "1100" in part.left_out[-1]
+
+
+def test_an_effect_out_of_its_bounds_is_refused_by_the_models_name():
+    known = ExtendedModel("named", {"gravity": {"density_kg_m3": Fitted(9e3, 0, 0, 0)}}, {})
+    with pytest.raises(InputError, match="out of bounds") as caught:
+        extend(UNIT, known, "there/model.toml")
+    assert "there/model.toml" in caught.value.where
+
+
+def test_a_sweep_may_turn_a_unit_that_weighs_something(tmp_path):
+    plan = parse_plan(
+        'format = 1\npreset = "mu-1.0x"\nmethod = "grid"\n' + GRAVITY + "[vary]\n"
+        '"simulate.orientation_deg" = { values = [0.0, 90.0] }\n',
+        tmp_path,
+    )
+    found = [point.job.effects for point in plan.points(plan.values()[0])]
+    assert found == [with_effects(turn, gravity=1300.0).effects for turn in (0.0, 90.0)]

@@ -1,0 +1,174 @@
+"""study.toml: what it says comes back, older formats are understood, and hostile ones change nothing."""
+
+import shutil
+import tomllib
+from pathlib import Path
+
+import attrs
+import numpy as np
+import pytest
+
+from mu_addon.design.parameters import load_preset
+from mu_addon.errors import InputError
+from mu_addon.fem.protocol import Protocol
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.placement.graph import Limits
+from mu_addon.run.folder import keep_inputs
+from mu_addon.usecases.simulate_and_place.job import Job, read_job
+from mu_addon.usecases.simulate_and_place.study_file import FORMAT, STAGES, compose, parse, read
+
+from ..homogenize.lattice_laws import body_centred
+
+FORMAT_1 = Path(__file__).parents[1] / "data" / "studies" / "format-1"
+JOB = Job(
+    unit=load_preset("mu-0.75x"),
+    protocol=Protocol(np.arange(3.0), np.array([0.0, -10.0, 20.0])),
+    mesh=MeshSettings(refine=0.4, order=1),
+    mesher="gmsh",
+    times=3,
+    stations=11,
+    rules=("intersect",),
+    mesh_check=False,
+    quality="export",
+    paths="graph",
+    limits=Limits(3.0, np.inf, 60.0),
+    most_checks=7,
+    lattice=body_centred(),
+)
+
+
+def same(one, other):
+    """Whether two jobs ask for the same, to the last digit."""
+    return one.texts() == other.texts() and one.stages == other.stages
+
+
+@pytest.mark.parametrize("stages", [STAGES[:1], STAGES[:2], STAGES])
+def test_a_job_comes_back_from_its_folder(tmp_path, stages):
+    job = attrs.evolve(JOB, stages=stages)
+    keep_inputs(tmp_path, job.texts())
+    found = read_job(tmp_path)
+    assert same(found, job)
+    if stages == STAGES:
+        assert attrs.evolve(found, protocol=job.protocol, workers=job.workers) == job
+
+
+def test_a_study_of_format_1_is_understood_and_brought_up_to_date(tmp_path):
+    """The fixture was written by the last version that knew format 1 only."""
+    folder = shutil.copytree(FORMAT_1, tmp_path / "study")
+    old = tomllib.loads((folder / "study.toml").read_text())
+    assert old["format"] == 1
+    job = read_job(folder)
+    assert job.stages == ("design", "simulate"), "it has an angle.csv and no deviation.csv"
+    assert (job.times, job.mesher, job.quality) == (old["times"], old["mesher"], old["quality"])
+    assert attrs.asdict(job.mesh) == old["mesh"]
+    new = tomllib.loads((folder / "study.toml").read_text())
+    assert new["format"] == FORMAT
+    assert same(read_job(folder), job)
+    # Its protocol is known by its digest from now on.
+    (folder / "protocol.csv").write_text("time_s,pressure_kPa\n0,0\n1,5\n")
+    with pytest.raises(InputError, match="not the one that this study was made with"):
+        read_job(folder)
+
+
+def test_a_search_of_format_1_keeps_its_limits(tmp_path):
+    text = (FORMAT_1 / "study.toml").read_text().replace('paths = "windows"', 'paths = "graph"')
+    text += (
+        "\n[search]\nshortest_cells = 3.0\nlongest_cells = inf\nsharpest_bend_deg = 60.0\nmost_checks = 7\n"
+    )
+    folder = shutil.copytree(FORMAT_1, tmp_path / "study")
+    (folder / "study.toml").write_text(text)
+    (folder / "deviation.csv").write_text("path\n")
+    job = read_job(folder)
+    assert job.stages == STAGES
+    assert (job.paths, job.limits, job.most_checks) == ("graph", Limits(3.0, np.inf, 60.0), 7)
+
+
+def test_a_smaller_job_keeps_the_inputs_of_further_stages(tmp_path):
+    keep_inputs(tmp_path, JOB.texts())
+    small = attrs.evolve(JOB, stages=STAGES[:1], times=13, protocol=Protocol(np.arange(2.0), np.arange(2.0)))
+    texts, current = small.texts_in(tmp_path)
+    assert current
+    assert texts == JOB.texts()
+
+
+def test_a_larger_job_adds_its_stages(tmp_path):
+    keep_inputs(tmp_path, attrs.evolve(JOB, stages=STAGES[:1]).texts())
+    texts, current = JOB.texts_in(tmp_path)
+    assert current
+    assert texts == JOB.texts()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda folder: attrs.evolve(JOB, unit=load_preset("mu-1.0x"), stages=STAGES[:1]),
+        lambda folder: attrs.evolve(JOB, times=5, stages=STAGES[:2]),
+        lambda folder: attrs.evolve(JOB, lattice=None, stages=STAGES[:2]),
+        lambda folder: attrs.evolve(JOB, stations=12),
+        # The protocol was changed by hand: what was found with the old one holds no more.
+        lambda folder: (
+            (folder / "protocol.csv").write_text("time_s,pressure_kPa\n0.0,0.0\n1.0,5.0\n"),
+            attrs.evolve(JOB, stages=STAGES[:1]),
+        )[1],
+    ],
+    ids=["unit", "times", "lattice", "stations", "protocol.csv"],
+)
+def test_what_changed_is_not_current(tmp_path, change):
+    keep_inputs(tmp_path, JOB.texts())
+    job = change(tmp_path)
+    texts, current = job.texts_in(tmp_path)
+    assert not current
+    assert texts == job.texts()
+
+
+GOOD = compose(JOB.tables())
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("a = " + "[" * 100_000, "no study|not TOML"),
+        ("a = " + "[" * 50_000, "not TOML"),
+        ("# x\n" * 100_000, "100000 characters"),
+        ("format = 3\n[design]\n", "format 3"),
+        ("format = true\n[design]\n", "format True"),
+        ("format = 2\n", "are no study"),
+        ("format = 2\n[simulate]\n", "are no study"),
+        ("format = 2\ndesign = 3\n", "not a table"),
+        ('format = 2\n[design]\nunit = "../../unit.toml"\n', "not in the folder"),
+        (GOOD.replace('"unit.toml"', '"/etc/passwd"'), "not in the folder"),
+        (GOOD.replace('"effective.toml"', '"effective.toml\\u0000"'), "not in the folder"),
+        (GOOD.replace("times = 3", 'times = "__import__(\\"os\\")"'), "no study"),
+        (GOOD.replace("times = 3", "times = 3\nhook = 1"), "unknown key 'hook'"),
+        (GOOD.replace("times = 3", "times = 1000000000"), "1000000000"),
+        (GOOD.replace('"gmsh"', '"sh -c true"'), "not offered"),
+        (GOOD.replace('["intersect"]', '["eval"]'), "eval"),
+        (GOOD.replace('["intersect"]', "[{}]"), "rules"),
+        (GOOD.replace("refine = 0.4", "refine = nan"), "refine"),
+        (GOOD.replace("refine = 0.4", "refine = 0.4\nhook = 1"), "hook"),
+        (GOOD.replace("mesh_check = false", "mesh_check = []"), "no study"),
+    ],
+)  # fmt: skip
+def test_a_hostile_study_is_refused_in_words(tmp_path, text, words):
+    keep_inputs(tmp_path, JOB.texts())
+    (tmp_path / "study.toml").write_text(text)
+    with pytest.raises(InputError, match=words):
+        read_job(tmp_path)
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path):
+    (tmp_path / "study.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="UTF-8"):
+        read(tmp_path)
+
+
+def test_a_folder_without_a_study_is_none(tmp_path):
+    assert read(tmp_path) is None
+    with pytest.raises(InputError, match="no study in this folder"):
+        read_job(tmp_path)
+
+
+def test_what_is_composed_is_parsed(tmp_path):
+    tables = JOB.tables()
+    found, outdated = parse(compose(tables), tmp_path)
+    assert (found, outdated) == (tables, False)
