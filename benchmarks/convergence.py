@@ -25,7 +25,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place.job import Job, grasp
-from mu_addon.usecases.simulate_and_place.run import Study
+from mu_addon.usecases.simulate_and_place.study import Study
 
 PRESSURES = np.array([0.0, -10.0, -20.0, 0.0, 10.0, 20.0, 30.0, 40.0])
 
@@ -40,8 +40,8 @@ def angles(preset, refines):
     print("| refine | nodes | unknowns | -20 kPa | 20 kPa | 40 kPa | s |\n" + "| --- " * 7 + "|")
     for refine in refines:
         job = job_of(preset, refine)
-        with tempfile.TemporaryDirectory() as folder, run_to_end(Progress()) as ending:
-            mesh = Study(job, Path(folder), ending.progress, ending).make_mesh()
+        with tempfile.TemporaryDirectory() as folder, run_to_end(Progress()) as context:
+            mesh = Study(job, Path(folder), context.progress, context).make_mesh()
         start = time.perf_counter()
         model = Model(mesh)
         path = simulate(Equilibrium(model, materials_of(job.unit, mesh)), np.arange(8.0), PRESSURES)
@@ -54,8 +54,8 @@ def angles(preset, refines):
 def deviations(preset, refines):
     tables = {}
     for refine in refines:
-        with tempfile.TemporaryDirectory() as folder, run_to_end(Progress()) as ending:
-            study = Study.open(job_of(preset, refine), Path(folder), ending.progress, ending)
+        with tempfile.TemporaryDirectory() as folder, run_to_end(Progress()) as context:
+            study = Study.open(job_of(preset, refine), Path(folder), context.progress, context)
             study.make_mesh()
             study.simulate()
             study.place()

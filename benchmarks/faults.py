@@ -30,14 +30,14 @@ sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
 from circumstances import circumstances  # noqa: E402
 
-from mu_addon.cli.study_options import run_stages  # noqa: E402
 from mu_addon.design.parameters import load_preset  # noqa: E402
 from mu_addon.meshing.settings import MeshSettings  # noqa: E402
 from mu_addon.run.context import run_to_end  # noqa: E402
 from mu_addon.run.folder import keep_inputs  # noqa: E402
 from mu_addon.run.progress import Progress  # noqa: E402
 from mu_addon.usecases.simulate_and_place.job import Job, grasp  # noqa: E402
-from mu_addon.usecases.simulate_and_place.run import Study  # noqa: E402
+from mu_addon.usecases.simulate_and_place.run import run_stages  # noqa: E402
+from mu_addon.usecases.simulate_and_place.study import Study  # noqa: E402
 
 JOB = Job(
     load_preset("mu-1.0x"),
@@ -134,9 +134,9 @@ def forked(folder):
         return child
     status = 70
     try:
-        with run_to_end(Progress()) as ending:
-            run_stages(Study.open(attrs.evolve(JOB, workers=1), folder, ending.progress, ending))
-        status = ending.status
+        with run_to_end(Progress()) as context:
+            run_stages(Study.open(attrs.evolve(JOB, workers=1), folder, context.progress, context))
+        status = context.status
     finally:
         os._exit(status)
 

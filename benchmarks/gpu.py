@@ -26,7 +26,7 @@ from mu_addon.fem.model import Model
 from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.placement.batch import Sweep
+from mu_addon.placement.batch import CandidateBatch
 from mu_addon.placement.candidates import candidates, roi
 from mu_addon.placement.inclusion import sensor_share
 
@@ -91,7 +91,7 @@ def run(unit, mesh, device, pressure_kPa, quiet=False):
     ten = candidates(anchors(unit), windows(6))
     shares = [sensor_share("volume_fraction", roi(mesh, one, 1.0)) for one in ten]
     points = anchors(unit)
-    sweep = Sweep(model, materials, (points, probe(mesh, points)), shares, SENSOR_MPA)
+    sweep = CandidateBatch(model, materials, (points, probe(mesh, points)), shares, SENSOR_MPA)
     clock.tell(f"{len(ten)} candidates: inclusions")
     for state in states:
         sweep.at(state)

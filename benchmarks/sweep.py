@@ -32,7 +32,7 @@ from mu_addon.placement.candidates import Candidate, candidates, moved_points, r
 from mu_addon.placement.inclusion import sensor_share
 from mu_addon.placement.influence import influence, telling_pressures
 from mu_addon.placement.sampling import rounds
-from mu_addon.usecases.simulate_and_place.candidate_pool import Setting, Sweeper
+from mu_addon.usecases.simulate_and_place.candidate_pool import CandidatePool, CandidateProblem
 
 RADIUS_MM, SENSOR_MPA, RULE = 1.0, 2.5, "volume_fraction"
 
@@ -96,11 +96,11 @@ def main():
     wanted = {s.pressure_MPa for s in few}
     for name, every in (("ten", candidates(points, windows(6))), ("a hundred", hundred(points))):
         jobs = tuple((c, RULE) for c in every)
-        setting = Setting(mesh, materials, points, jobs, RADIUS_MM, SENSOR_MPA)
-        with closing(Sweeper(setting, given.workers)) as sweeper:
+        setting = CandidateProblem(mesh, materials, points, jobs, RADIUS_MM, SENSOR_MPA)
+        with closing(CandidatePool(setting, given.workers)) as sweeper:
             took, _ = seconds(lambda s=sweeper: beside(s, equilibrium(), times, pressure, wanted))
         row(f"{name} paths at {len(few)} pressures, beside Model A: beyond it", took - baseline_s)
-        with closing(Sweeper(setting, given.workers)) as sweeper:
+        with closing(CandidatePool(setting, given.workers)) as sweeper:
             took, found = seconds(lambda s=sweeper: dict(s.solve(states)))
         row(f"{name} paths at every pressure, after Model A, the processes' start included", took)
         swept[name] = found

@@ -199,17 +199,17 @@ def traffic():
 def real(count):
     print(f"\n| {count} real studies | seconds | a study [s] | studies an hour |\n| --- | --- | --- | --- |")
     for workers in (1, 2):
-        with tempfile.TemporaryDirectory() as name, run_to_end(Progress()) as ending:
+        with tempfile.TemporaryDirectory() as name, run_to_end(Progress()) as context:
             begun = time.perf_counter()
             found = sweep(
                 parse_plan(TEXT.format(points=count), ROOT),
                 Path(name),
-                ending.progress,
-                ending,
+                context.progress,
+                context,
                 workers=workers,
             )
             taken = time.perf_counter() - begun
-        assert ending.status == 0
+        assert context.status == 0
         assert not found.failed
         mean = sum(row["seconds"] for row in found.done) / count
         print(f"| {workers} workers | {taken:.0f} | {mean:.1f} | {3600 * count / taken:.0f} |", flush=True)

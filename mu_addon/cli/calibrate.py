@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .options import add_results, require_out
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
     from .options import Commands
 
@@ -32,7 +32,7 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Calibrate."""
     from ..usecases.sensor.calibrate import calibrate_sensor
 
@@ -44,12 +44,12 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
         dark=options.dark,
         angles=None if options.angles is None else Path(options.angles),
         progress=progress,
-        ending=ending,
+        context=context,
     )
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What was found, in a few lines."""
-    from ..usecases.sensor.calibrate import answer
+    from ..usecases.sensor.calibrate import console_summary
 
-    return answer(summary)
+    return console_summary(summary)

@@ -10,7 +10,7 @@ from .options import add_unit, unit_if_named
 from .study_options import add_solid
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
     from .options import Commands
 
@@ -42,7 +42,7 @@ def add(commands: Commands[Any]) -> None:
     add_solid(command)
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Check the part."""
     from ..design.anchors import window
     from ..design.printing.printer import load_printer
@@ -73,11 +73,11 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
         stl_name="" if options.stl is None else Path(options.stl).name,
         direction=tuple(options.up),
     )
-    check_print(job, Path(options.out), progress, ending)
+    check_print(job, Path(options.out), progress, context)
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What was found, in a few lines."""
-    from ..usecases.check_print.run import answer
+    from ..usecases.check_print.run import console_summary
 
-    return answer(summary)
+    return console_summary(summary)

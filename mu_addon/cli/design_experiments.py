@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .options import add_measured_folder, add_unit, unit_if_named
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
     from .options import Commands
 
@@ -33,17 +33,19 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Plan the folder's experiments."""
     from ..usecases.diagnose.design_experiments import design_experiments, noise_of
 
     unit = unit_if_named(options)
     noise = noise_of(options.noise)
-    design_experiments(Path(options.folder), Path(options.out), unit, noise, progress=progress, ending=ending)
+    design_experiments(
+        Path(options.folder), Path(options.out), unit, noise, progress=progress, context=context
+    )
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What the plan would show, in a few lines."""
-    from ..usecases.diagnose.design_experiments import answer
+    from ..usecases.diagnose.design_experiments import console_summary
 
-    return answer(summary)
+    return console_summary(summary)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .options import add_measured_folder, add_unit, unit_if_named
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
     from .options import Commands
 
@@ -25,16 +25,16 @@ def add(commands: Commands[Any]) -> None:
     add_unit(command, required=False)
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Diagnose the folder."""
     from ..usecases.diagnose.run import diagnose_folder
 
     unit = unit_if_named(options)
-    diagnose_folder(Path(options.folder), Path(options.out), unit, progress=progress, ending=ending)
+    diagnose_folder(Path(options.folder), Path(options.out), unit, progress=progress, context=context)
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What was found, in a few lines."""
-    from ..usecases.diagnose.run import answer
+    from ..usecases.diagnose.run import console_summary
 
-    return answer(summary)
+    return console_summary(summary)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .options import add_model, add_unit, modelled_unit
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
     from .options import Commands
 
@@ -58,13 +58,13 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Export the unit."""
     from ..materials.library import load_material, read_material
     from ..usecases.export.print_offsets import taken_off
     from ..usecases.export.run import Job, export, path_of
 
-    unit = modelled_unit(options, progress, ending)
+    unit = modelled_unit(options, progress, context)
     path, name = path_of(unit, options.path, options.path_row)
     offsets, source = taken_off(unit, options.compensate)
     resin = options.resin or "elastic-50a-v1"
@@ -78,11 +78,11 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
         take_off=offsets,
         offset_source=source,
     )
-    export(job, Path(options.out), progress, ending)
+    export(job, Path(options.out), progress, context)
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What was written, in a few lines."""
-    from ..usecases.export.run import answer
+    from ..usecases.export.run import console_summary
 
-    return answer(summary)
+    return console_summary(summary)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .options import add_measured_folder, add_results, require_out
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
     from .options import Commands
 
@@ -45,7 +45,7 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Fit laws to the folder's coupons."""
     from ..usecases.fit_material.run import fit_material
 
@@ -57,12 +57,12 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
         options.hold_out,
         options.weights,
         progress=progress,
-        ending=ending,
+        context=context,
     )
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What was found, in a few lines."""
-    from ..usecases.fit_material.run import answer
+    from ..usecases.fit_material.run import console_summary
 
-    return answer(summary)
+    return console_summary(summary)

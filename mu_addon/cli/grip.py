@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .options import add_results, require_out
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
     from .options import Commands
 
@@ -67,7 +67,7 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Design the gripper and let it grasp."""
     from ..design.gripper import load_gripper, read_gripper
     from ..meshing.settings import MeshSettings
@@ -89,11 +89,11 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
         rules=() if options.solid_only or options.no_paths else rules,
         quality=options.quality,
     )
-    grip(job, Path(options.out), progress, ending)
+    grip(job, Path(options.out), progress, context)
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What was found, in a few lines."""
-    from ..usecases.grip.run import answer
+    from ..usecases.grip.run import console_summary
 
-    return answer(summary)
+    return console_summary(summary)

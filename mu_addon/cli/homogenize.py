@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .options import add_model, add_unit, modelled_unit
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
     from .options import Commands
 
@@ -48,11 +48,11 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Homogenise the unit's lattice."""
     from ..usecases.homogenize.run import FRICTIONS, Job, homogenize, resin_of
 
-    unit = modelled_unit(options, progress, ending)
+    unit = modelled_unit(options, progress, context)
     frictions = FRICTIONS if options.friction == "both" else (options.friction,)
     job = Job(
         unit=unit,
@@ -62,11 +62,11 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
         strain=options.strain,
         refine=options.refine,
     )
-    homogenize(job, Path(options.out), progress, ending)
+    homogenize(job, Path(options.out), progress, context)
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What was found, in a few lines."""
-    from ..usecases.homogenize.run import answer
+    from ..usecases.homogenize.run import console_summary
 
-    return answer(summary)
+    return console_summary(summary)

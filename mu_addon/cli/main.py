@@ -42,9 +42,9 @@ def main(arguments: list[str]) -> int:
 
     json = getattr(options, "json", False)
     progress = Progress([json_lines(sys.stdout) if json else terminal(sys.stderr)])
-    with run_to_end(progress) as ending:
-        command.run(options, progress, ending)
-    if ending.status == 0 and not json:
-        results = [f"results: {ending.folder}"] if ending.folder is not None else []
-        sys.stdout.write("\n".join([*results, *command.answer(ending.summary)]) + "\n")
-    return ending.status
+    with run_to_end(progress) as context:
+        command.run(options, progress, context)
+    if context.status == 0 and not json:
+        results = [f"results: {context.folder}"] if context.folder is not None else []
+        sys.stdout.write("\n".join([*results, *command.console_summary(context.summary)]) + "\n")
+    return context.status

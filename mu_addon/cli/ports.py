@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
     from .options import Commands
 
@@ -16,13 +16,13 @@ def add(commands: Commands[Any]) -> None:
     commands.add_parser("ports", help="list the serial ports, for `stream` and `record`")
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Put a line for each port into the summary."""
     from ..usecases.sensor.stream import port_lines
 
-    ending.summary["ports"] = port_lines()
+    context.summary["ports"] = port_lines()
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """A line for each port."""
     return summary["ports"] or ["no serial port is there"]

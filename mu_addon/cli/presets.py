@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
     from .options import Commands
 
@@ -18,20 +18,20 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Put every preset's name and size into the summary."""
     from ..design.gripper import gripper_names, load_gripper
     from ..design.parameters import load_preset, preset_names
 
     for name in preset_names():
         d = load_preset(name).dimensions
-        ending.summary[name] = f"cell {d.cell:g} mm, {d.count} chambers, {d.height:g} mm long"
+        context.summary[name] = f"cell {d.cell:g} mm, {d.count} chambers, {d.height:g} mm long"
     for name in gripper_names():
         gripper = load_gripper(name)
-        ending.summary[name] = f"two fingers {gripper.unit.name}, {gripper.fingers.gap_mm:g} mm apart"
+        context.summary[name] = f"two fingers {gripper.unit.name}, {gripper.fingers.gap_mm:g} mm apart"
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """A line for each preset."""
     from ..design.gripper import gripper_names
     from ..design.parameters import preset_names

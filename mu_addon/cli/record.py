@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .stream import add_source, answer, run
+from .stream import add_source, console_summary, run
 
 if TYPE_CHECKING:
     from .options import Commands
 
-__all__ = ["add", "answer", "run"]
+__all__ = ["add", "console_summary", "run"]
 
 
 def add(commands: Commands[Any]) -> None:

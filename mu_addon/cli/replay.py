@@ -10,7 +10,7 @@ from .options import add_results, require_out
 from .stream import add_calibration, shown
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
     from .options import Commands
 
@@ -31,7 +31,7 @@ def add(commands: Commands[Any]) -> None:
     command.add_argument("--controlled", action="store_true", help="as for `stream`")
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Play the recording to its end."""
     from ..sensing.sources import Replay
     from ..usecases.sensor.stream import stream
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
         seconds=None,
         about={"source": f"replay of {Path(options.recording).name}"},
         progress=progress,
-        ending=ending,
+        context=context,
         controlled=options.controlled,
         calibration=options.calibration,
         keep_time=True,
@@ -51,8 +51,8 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
     )
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What was played, in a few lines."""
-    from ..usecases.sensor.stream import answer
+    from ..usecases.sensor.stream import console_summary
 
-    return answer(summary)
+    return console_summary(summary)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .options import add_results, require_out
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
     from .options import Commands
 
@@ -57,7 +57,7 @@ def add(commands: Commands[Any]) -> None:
     command.add_argument("--workers", type=int, default=2, metavar="N", help="processes (2)")
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Do the paper's table again."""
     from ..meshing.settings import MeshSettings
     from ..usecases.reproduce.run import reproduce
@@ -74,11 +74,11 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
         gripper=options.gripper and not coarse,
         workers=options.workers,
     )
-    reproduce(settings, Path(options.out), progress, ending)
+    reproduce(settings, Path(options.out), progress, context)
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What was found, in a few lines."""
-    from ..usecases.reproduce.run import answer
+    from ..usecases.reproduce.run import console_summary
 
-    return answer(summary)
+    return console_summary(summary)

@@ -6,14 +6,14 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .study_options import answer
+from .study_options import console_summary
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
     from .options import Commands
 
-__all__ = ["add", "answer", "run"]
+__all__ = ["add", "console_summary", "run"]
 
 
 def add(commands: Commands[Any]) -> None:
@@ -33,19 +33,19 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Run what study.toml says; what is finished is taken from the cache."""
     from ..usecases.simulate_and_place.job import read_job
-    from ..usecases.simulate_and_place.report_data import publish
-    from ..usecases.simulate_and_place.run import Study
+    from ..usecases.simulate_and_place.report_data import write_report
+    from ..usecases.simulate_and_place.run import run_stages
+    from ..usecases.simulate_and_place.study import Study
     from .options import require_out
-    from .study_options import run_stages
 
     require_out(options)
     folder = Path(options.out)
-    study = Study.open(read_job(folder, options.workers), folder, progress, ending)
+    study = Study.open(read_job(folder, options.workers), folder, progress, context)
     if options.report:
-        ending.on_stop = lambda reason: publish(study, reason["what"])
+        context.on_stop = lambda reason: write_report(study, reason["what"])
     run_stages(study)
     if options.report:
-        publish(study)
+        write_report(study)

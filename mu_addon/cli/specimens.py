@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .options import add_unit, unit_if_named
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
     from .options import Commands
 
@@ -27,7 +27,7 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Write the specimens of a unit, mu-1.0x unless one is named."""
     from ..design.parameters import load_preset
     from ..materials.library import load_material, read_material
@@ -36,11 +36,11 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
     unit = unit_if_named(options) or load_preset("mu-1.0x")
     resin = options.resin or "elastic-50a-v1"
     known = read_material(Path(resin)) if resin.endswith(".toml") else load_material(resin)
-    make_specimens(unit, known, Path(options.out), progress, ending)
+    make_specimens(unit, known, Path(options.out), progress, context)
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What was written, in a few lines."""
-    from ..usecases.export.specimens import answer
+    from ..usecases.export.specimens import console_summary
 
-    return answer(summary)
+    return console_summary(summary)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .options import add_results, require_out
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress, Sink
     from .options import Commands
 
@@ -54,7 +54,7 @@ def add_calibration(command: argparse.ArgumentParser) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Stream until Ctrl-C."""
     from ..usecases.sensor.stream import serial_source, simulated_source, stream
 
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
         seconds=options.seconds,
         about=about,
         progress=progress,
-        ending=ending,
+        context=context,
         controlled=options.controlled,
         calibration=options.calibration,
         show=shown(options) if options.show else None,
@@ -82,8 +82,8 @@ def shown(options: argparse.Namespace) -> Sink:
     return json_lines(sys.stdout) if options.json else Display(sys.stdout)
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What was recorded, in a few lines."""
-    from ..usecases.sensor.stream import answer
+    from ..usecases.sensor.stream import console_summary
 
-    return answer(summary)
+    return console_summary(summary)

@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 from .options import modelled, unit_of
 
 if TYPE_CHECKING:
-    from ..design.anchors import Window
     from ..design.body import Body
     from ..design.parameters import Unit
     from ..design.rigid_body import RigidBody
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
-    from ..usecases.simulate_and_place.run import Study
+    from ..usecases.simulate_and_place.study import Study
 
 EXAMPLE = "example: run.py place --preset mu-1.0x --out out/mu-1.0x"
 
@@ -98,28 +97,28 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Run the stages that `options.stages` names, and publish what they found."""
-    from ..usecases.simulate_and_place.report_data import publish
+    from ..usecases.simulate_and_place.report_data import write_report
 
-    study = _open(options, progress, ending)
-    ending.on_stop = lambda reason: publish(study, reason["what"])
+    study = _open(options, progress, context)
+    context.on_stop = lambda reason: write_report(study, reason["what"])
     _run(study, options)
 
 
-def _open(options: argparse.Namespace, progress: Progress, ending: Ending) -> Study:
+def _open(options: argparse.Namespace, progress: Progress, context: RunContext) -> Study:
     from ..homogenize.effective import read_effective
     from ..meshing.settings import MeshSettings
     from ..placement.graph import Limits
     from ..usecases.simulate_and_place.extended_unit import require_same_print
     from ..usecases.simulate_and_place.job import Job, optics_of, protocol_of
-    from ..usecases.simulate_and_place.run import Study
+    from ..usecases.simulate_and_place.study import Study
 
     extra: dict[str, Any] = {}
     if "simulate" not in options.stages:
         unit = unit_of(options)
     else:
-        unit, effects = modelled(options, progress, ending)
+        unit, effects = modelled(options, progress, context)
         extra = {
             "effects": effects,
             "mesh": MeshSettings(order=options.order, refine=options.refine),
@@ -139,7 +138,7 @@ def _open(options: argparse.Namespace, progress: Progress, ending: Ending) -> St
             "most_checks": options.checks,
             "optics": optics_of(options.light),
         }
-    if extra.get("lattice") is not None and ending.summary.get("model", {}).get("applied"):
+    if extra.get("lattice") is not None and context.summary.get("model", {}).get("applied"):
         require_same_print(unit, extra["lattice"], options.model)
     protocol = protocol_of(getattr(options, "protocol", None))
     if getattr(options, "body", None) is not None:
@@ -147,7 +146,7 @@ def _open(options: argparse.Namespace, progress: Progress, ending: Ending) -> St
     if getattr(options, "obstacles", None):
         extra["obstacles"] = _obstacles(options, unit, extra.get("body"))
     job = Job(unit=unit, protocol=protocol, quality=options.quality, stages=options.stages, **extra)
-    return Study.open(job, Path(options.out), progress, ending)
+    return Study.open(job, Path(options.out), progress, context)
 
 
 def _body(options: argparse.Namespace, unit: Unit) -> Body:
@@ -181,7 +180,8 @@ def _obstacles(options: argparse.Namespace, unit: Unit, own: Body | None) -> tup
 
 def _run(study: Study, options: argparse.Namespace) -> None:
     from ..design.anchors import window
-    from ..usecases.simulate_and_place.report_data import publish
+    from ..usecases.simulate_and_place.report_data import write_report
+    from ..usecases.simulate_and_place.run import run_stages
 
     # An unknown path is found out before an hour's work, not after.
     path = window(study.job.unit, options.path) if getattr(options, "path", None) is not None else None
@@ -190,44 +190,10 @@ def _run(study: Study, options: argparse.Namespace) -> None:
 
         chains_within(study.job)
     run_stages(study, path)
-    publish(study)
+    write_report(study)
 
 
-def run_stages(study: Study, path: Window | None = None) -> None:
-    """Every stage of a study's job; path: also the unit with a waveguide along it."""
-    from ..design.anchors import window
-
-    study.design()
-    if path is not None:
-        study.design(path)
-    stages = study.job.stages
-    if "simulate" in stages:
-        study.make_mesh()
-        study.simulate(candidates_beside="place" in stages)
-    if "place" in stages:
-        from ..usecases.simulate_and_place.graph_search import search_graph, sensitivity_map
-        from ..usecases.simulate_and_place.light import signals
-
-        chosen = study.place()
-        if study.job.obstacles:
-            study.warn(
-                "Beside obstacles neither the map of what each element would disturb nor what light would "
-                "tell is known: both take a unit with one state a pressure."
-            )
-        else:
-            if study.job.effects.clogged:
-                study.warn(
-                    "What each element alone would disturb is not known for a unit with a clogged neck."
-                )
-            else:
-                sensitivity_map(study)
-            signals(study, study.job.optics)
-        if study.job.paths == "graph":
-            search_graph(study)
-        study.design(window(study.job.unit, chosen[study.headline_rule]))
-
-
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """Angles, chosen paths and the best of a search, as far as the stages went."""
     lines = []
     angles = summary.get("angle_deg")

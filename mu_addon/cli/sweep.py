@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .options import add_results, require_out
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
     from .options import Commands
 
@@ -33,7 +33,7 @@ def add(commands: Commands[Any]) -> None:
     command.add_argument("--retry", action="store_true", help="run the points that failed again")
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Run the points that are not there yet, and report on all."""
     from ..errors import InputError
     from ..usecases.parameter_study.plan import read_plan
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
         read_plan(Path(options.file)),
         Path(options.out),
         progress,
-        ending,
+        context,
         scheduler=options.scheduler,
         workers=options.workers,
         add=options.add,
@@ -57,8 +57,8 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
     )
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What was found, in a few lines."""
-    from ..usecases.parameter_study.run import answer
+    from ..usecases.parameter_study.run import console_summary
 
-    return answer(summary)
+    return console_summary(summary)

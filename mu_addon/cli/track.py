@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from .options import add_results, require_out
 
 if TYPE_CHECKING:
-    from ..run.context import Ending
+    from ..run.context import RunContext
     from ..run.progress import Progress
     from ..usecases.track_video.run import Tracker
     from .options import Commands
@@ -37,7 +37,7 @@ def add(commands: Commands[Any]) -> None:
     add_results(command)
 
 
-def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None:
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
     """Follow the markers and put the experiment into the folder."""
     import attrs
 
@@ -47,14 +47,14 @@ def run(options: argparse.Namespace, progress: Progress, ending: Ending) -> None
     bench = read_bench(Path(options.markers))
     if options.fps is not None:
         bench = attrs.evolve(bench, fps=options.fps)
-    ending.open_folder(Path(options.out))
+    context.open_folder(Path(options.out))
     with progress.stage("track"):
         figures, remarks = track(
             Path(options.clip), bench, Path(options.pressure), Path(options.out), _tracker()
         )
     for remark in remarks:
         progress.warning(remark.what, remark.where, remark.remedy)
-    ending.summary |= figures | {"remarks": [remark.what for remark in remarks]}
+    context.summary |= figures | {"remarks": [remark.what for remark in remarks]}
 
 
 def _tracker() -> Tracker:
@@ -76,8 +76,8 @@ def _tracker() -> Tracker:
     return follow
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What was found, in a few lines."""
-    from ..usecases.track_video.run import answer
+    from ..usecases.track_video.run import console_summary
 
-    return answer(summary)
+    return console_summary(summary)

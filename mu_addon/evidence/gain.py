@@ -75,7 +75,7 @@ def gain(fitter: Fitter, base: Fit, extended: Fit, held_out: Sequence[Experiment
     known = [e for e in held_out if fitter.simulator.knows(e)]
     unseen = _errors(fitter, record(known, fitter.simulator), base, extended) if known else {}
     every = {name: (errors, unseen.get(name)) for name, errors in fitted.items()}
-    first = _told_by(base, extended, fitter.record)
+    first = _best_served_group(base, extended, fitter.record)
     # What was held out may be of another kind altogether.
     held = unseen.get(first) or next(iter(unseen.values()), None)
     return Gain(fitted[first], held, every)
@@ -85,7 +85,7 @@ def gain(fitter: Fitter, base: Fit, extended: Fit, held_out: Sequence[Experiment
 _CLEAR = 16.0
 
 
-def _told_by(base: Fit, extended: Fit, judged: Record) -> str:
+def _best_served_group(base: Fit, extended: Fit, judged: Record) -> str:
     """The first group of series of a kind that an effect is about and that is clearly served better.
 
     Others gain as well, where the modulus no longer makes up for what was missing. The first of all, if none.

@@ -18,9 +18,9 @@ from .sensitivity import ABSORBED, Sensitivity
 Array = np.ndarray[Any, Any]
 
 # Chance of naming an effect, any of the library, that is not there.
-CHANCE = 5e-4
+FALSE_ALARM_RATE = 5e-4
 # Rivals within this delta chi squared (99 % for two parameters) cannot be told apart.
-TOLD_APART = 9.2
+RIVAL_DELTA_CHI2 = 9.2
 MOST_EFFECTS = 3
 # Models that the next effect is added to: the best one may be wrong while two effects are seen as one.
 SEEDS = 4
@@ -30,7 +30,7 @@ NUMERICS = "mesh_error"
 # An effect is told of by one experiment alone where this share of what is known of it comes from there.
 ALONE = 0.9
 # Chi squared that an effect must take from a fit's residual, to first order, to be fitted beside it: a small
-# part of what `CHANCE` asks for.
+# part of what `FALSE_ALARM_RATE` asks for.
 PROMISING = 4.0
 
 
@@ -93,14 +93,14 @@ def select(
             pool = _extended(fitter, effects, levels[-1][:1], progress)
         if not pool:
             break
-        p = _chance(fitter, chosen, seen, _gain(fitter, chosen, pool[0]))
+        p = _false_alarm_probability(fitter, chosen, seen, _gain(fitter, chosen, pool[0]))
         p_best = p if level == 0 else p_best
         # What looked best alone may be neither of two that act together.
-        if level and (p < CHANCE or structure(strict_table(fitter, chosen))):
+        if level and (p < FALSE_ALARM_RATE or structure(strict_table(fitter, chosen))):
             more = _extended(fitter, effects, levels[-1][1:SEEDS], progress)
             pool = sorted([*pool, *more], key=_cost)
-            p = _chance(fitter, chosen, seen, _gain(fitter, chosen, pool[0]))
-        if p >= CHANCE:
+            p = _false_alarm_probability(fitter, chosen, seen, _gain(fitter, chosen, pool[0]))
+        if p >= FALSE_ALARM_RATE:
             break
         if _loss(fitter, chosen, pool[0]) <= 0.0:
             doubted = f"{pool[0].names[-1]} fits, yet does not predict experiments left out"
@@ -116,7 +116,7 @@ def select(
     return Selection(base, chosen, causes, singles, table_base, table, p_best, doubted)
 
 
-def reviewed(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) -> Selection:
+def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) -> Selection:
     """A selection under another noise: no effect is added, yet any may be doubted or get rivals."""
     base = fitter.fit((), found.base.values)
     chosen = fitter.fit(found.chosen.effects, found.chosen.values)
@@ -126,9 +126,11 @@ def reviewed(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) -> S
     for e in chosen.effects:
         less = fitter.fit([o for o in chosen.effects if o is not e], chosen.values)
         own = attrs.evolve(chosen, effects=(*less.effects, e))
-        p = _chance(fitter, less, seen, less.chi2 - chosen.chi2 - _by_gauges(fitter, less, own))
+        p = _false_alarm_probability(
+            fitter, less, seen, less.chi2 - chosen.chi2 - _by_gauges(fitter, less, own)
+        )
         ps.append(p)
-        if p >= CHANCE:
+        if p >= FALSE_ALARM_RATE:
             doubted = doubted or f"{e.name} gains no more than chance under the noise that the causes leave"
     table_base = tuple(dependence_table(fitter, base))
     doubted = doubted or _sudden(table_base, base, chosen)
@@ -157,8 +159,12 @@ def one_more(
     if not pool:
         return found
     best = pool[0]
-    p = _chance(fitter, found.chosen, seen, _gain(fitter, found.chosen, best))
-    if p >= CHANCE or max(_told(fitter, best).values()) > ALONE or _loss(fitter, found.chosen, best) <= 0.0:
+    p = _false_alarm_probability(fitter, found.chosen, seen, _gain(fitter, found.chosen, best))
+    if (
+        p >= FALSE_ALARM_RATE
+        or max(_share_by_experiment(fitter, best).values()) > ALONE
+        or _loss(fitter, found.chosen, best) <= 0.0
+    ):
         return found
     table = tuple(strict_table(fitter, best))
     if structure(table) or _sudden(found.table_base, found.base, best):
@@ -221,7 +227,7 @@ def _promises(fitter: Fitter, fit: Fit, effect: Effect) -> bool:
     return bool((along**2 > PROMISING).any())
 
 
-def _chance(fitter: Fitter, fit: Fit, seen: Sequence[Sensitivity], gain: float) -> float:
+def _false_alarm_probability(fitter: Fitter, fit: Fit, seen: Sequence[Sensitivity], gain: float) -> float:
     """Probability that noise alone lets some effect of the library gain as much on top of a fit.
 
     The parametric bootstrap of the linearised library: gains are squares of the noise along each effect's
@@ -268,7 +274,7 @@ def _gain(fitter: Fitter, less: Fit, more: Fit) -> float:
     swollen by a cause would hide it. What the gauges' noise alone would let it gain is taken off.
     """
     gain = less.chi2 - more.chi2
-    if gain < TOLD_APART:
+    if gain < RIVAL_DELTA_CHI2:
         return gain
     own = []
     for fit in (less, more):
@@ -309,7 +315,7 @@ def _loss(fitter: Fitter, less: Fit, more: Fit) -> float:
     return lost
 
 
-def _told(fitter: Fitter, fit: Fit) -> dict[int, float]:
+def _share_by_experiment(fitter: Fitter, fit: Fit) -> dict[int, float]:
     """The share of what is known of the last effect's size that each experiment tells."""
     record = fitter.record
     every, own = np.vstack([fit.jacobian, fit.prior]), len(fit.effects[-1].keys)
@@ -323,7 +329,7 @@ def _told(fitter: Fitter, fit: Fit) -> dict[int, float]:
 def _folds(fitter: Fitter, fit: Fit) -> list[Array]:
     record = fitter.record
     folds = []
-    for i, share in _told(fitter, fit).items():
+    for i, share in _share_by_experiment(fitter, fit).items():
         rows = record.rows(i)
         timed = "time_s" in record.experiments[i].columns
         if share < 0.6 or rows.sum() < (40 if timed else 12):
@@ -365,7 +371,7 @@ def _causes(
             ]
         rivals: dict[str, float] = {}
         for f in tried:
-            if f.chi2 - chosen.chi2 < TOLD_APART:
+            if f.chi2 - chosen.chi2 < RIVAL_DELTA_CHI2:
                 name = f.names[-1]
                 rivals[name] = min(f.chi2, rivals.get(name, f.chi2))
         if NUMERICS not in rivals:
@@ -396,7 +402,7 @@ def _by_numerics(
     for f in tried:
         if f.names[-1] != NUMERICS and _promises(fitter, f, mesh):
             other = meshed(f)
-            if other.chi2 - reference.chi2 < TOLD_APART:
+            if other.chi2 - reference.chi2 < RIVAL_DELTA_CHI2:
                 found[f.names[-1]] = other.chi2
     return found
 

@@ -40,7 +40,7 @@ NEXT_TO_NOTHING = 1e-3
 # A size whose path ends before the last pressure is of no use: it need not be followed to its very end.
 SMOOTH = NewtonSettings(min_step_MPa=1e-3)
 # Where the tangent jumps at rest, even the smallest step ends away from where it was predicted.
-KINKED = NewtonSettings(surprise=3.0)
+KINKED = NewtonSettings(predictor_tolerance=3.0)
 TONNE_PER_MM3 = 1e-12  # in kg/m3
 # A wall's contact pressure is some kPa; there the gap is off by this much at 1.0x.
 WALL_MPa, WALL_mm = 0.005, 0.02
@@ -98,7 +98,7 @@ class UnitEffect:
     materials: Callable[[Materials, Mesh, float], Materials] | None = None
     model: Callable[[Body, Mesh, float], Model] | None = None
     load: Callable[[Body, Mesh, float], Array] | None = None
-    weighs: bool = False
+    has_gravity: bool = False
     newton: NewtonSettings = SMOOTH
     length: int = 0
     larger: tuple[float, ...] = ()
@@ -285,7 +285,7 @@ EFFECTS = {
             _shared(beam.EFFECTS, "gravity"),
             (0.0, 1300.0, 4000.0),
             load=_weight,
-            weighs=True,
+            has_gravity=True,
             length=-1,
             larger=(6000.0, 9000.0),
         ),

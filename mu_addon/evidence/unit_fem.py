@@ -139,7 +139,7 @@ class Run:
         if effect:
             parts += [effect.name, self.size]
             parts += [body.distal if effect.name == "clogged_chamber" else 0]
-            parts += [body.orientation_deg if effect.weighs else 0.0]
+            parts += [body.orientation_deg if effect.has_gravity else 0.0]
         if self.outline:
             parts += ["outline"]
         return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
@@ -189,7 +189,7 @@ def run(case: Run, cache: Path | None = None) -> Result:
 
 def _states(equilibrium: Equilibrium, pressures_kPa: Array) -> Iterator[tuple[int, State]]:
     """Number of a pressure and its state, as far as they are reached; the last ConvergenceError is raised."""
-    start = equilibrium.unpressed()
+    start = equilibrium.at_zero_pressure()
     distinct, sides = branches(pressures_kPa)
     if 0.0 in distinct:
         yield int(np.flatnonzero(pressures_kPa == 0.0)[0]), start
@@ -356,7 +356,7 @@ class _Plan:
         yield self.case()
         for name in sorted(set(settings.effects) & set(EFFECTS), key=lambda n: (n != "mesh_error", n)):
             effect = EFFECTS[name]
-            for orientation in self.orientations if effect.weighs else (0.0,):
+            for orientation in self.orientations if effect.has_gravity else (0.0,):
                 for size in effect.sizes_at(self.enlarged):
                     if size != effect.parameter.null:
                         yield self.case(name, size, orientation)

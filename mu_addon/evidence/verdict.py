@@ -16,7 +16,7 @@ from .gain import Gain, gain
 from .next_experiment import Proposal, next_experiment
 from .noise import Source, estimate, span
 from .record import Record, record
-from .selection import Selection, interval, one_more, reviewed, select
+from .selection import Selection, interval, one_more, reselected, select
 from .sensitivity import ABSORBED, SEEN, Sensitivity, at_bounds, best_seen, sensitivities, signatures
 from .simulator import Composite
 
@@ -145,7 +145,7 @@ def diagnose(
         renewed = noise_of(measured, simulator, chosen.chosen.values)
         if any(_apart(sources[g], renewed[g]) for g in sources):
             sources, fitter = renewed, Fitter(measured, simulator, renewed)
-            chosen = reviewed(fitter, seen, chosen)
+            chosen = reselected(fitter, seen, chosen)
             if chosen.left:
                 seen = at_bounds(fitter, curved, sensitivities(fitter, curved))
                 chosen = one_more(fitter, seen, chosen, progress)

@@ -34,7 +34,7 @@ class ContinuationSettings:
     # The branch's direction shall turn by about this angle, in rad, from point to point.
     turn: float = 0.25
     # A point may lie this share of the step away from its prediction.
-    surprise: float = 0.3
+    predictor_tolerance: float = 0.3
     # The smallest step, as a share of the first.
     min_step: float = 1e-3
     # Relative accuracy of the pressure of a critical point.
@@ -124,7 +124,7 @@ class Arc:
 
         new = self._correct(predicted, condition, node)
         off = new.z - predicted
-        if np.sqrt(self.product(off, off)) > self.settings.surprise * length:
+        if np.sqrt(self.product(off, off)) > self.settings.predictor_tolerance * length:
             raise ConvergenceError("the branch bends away, or another one is near")
         return attrs.evolve(new, bend=(new.direction - node.direction) / length)
 

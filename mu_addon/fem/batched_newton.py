@@ -38,7 +38,7 @@ class Variant:
         return materials.blended(self.share, self.law, self.parameters)
 
 
-class Lockstep:
+class BatchedNewton:
     """Equilibria of many variants of one body, each state from the body's own at the same pressure.
 
     Every step is a quasi-Newton step with the variant's exact tangent at the body's state, for the price
@@ -100,7 +100,7 @@ class Lockstep:
                     search.move(search.pushed_forward(x, pulled[i][1]))
                 except ConvergenceError:
                     del searches[i]
-        limit = self.settings.surprise * np.abs(state.u).max()
+        limit = self.settings.predictor_tolerance * np.abs(state.u).max()
         for i, one in enumerate(found):
             if one is None or np.abs(one.u - state.u).max() > limit:
                 unfinished = searches.get(i)
@@ -114,7 +114,7 @@ class Lockstep:
     def _alone(self, i: int, state: State, near: Array | None) -> State:
         """A variant that the shared factor does not serve: with factors of its own, or along its path."""
         alone = self.alone(i)
-        limit = self.settings.surprise * np.abs(state.u).max()
+        limit = self.settings.predictor_tolerance * np.abs(state.u).max()
         for start in (near, state.u):
             if start is None:
                 continue
@@ -124,7 +124,7 @@ class Lockstep:
                 continue
             if np.abs(found.u - state.u).max() <= limit:
                 return found
-        return alone.reach(state.pressure_MPa, [alone.unpressed()])
+        return alone.reach(state.pressure_MPa, [alone.at_zero_pressure()])
 
 
 class _Part:

@@ -32,7 +32,7 @@ class NewtonSettings:
     # Shares of the undeformed body's tangent added, in turn, to one that is not definite.
     regularisation: tuple[float, ...] = (0.03, 0.3, 3.0, 30.0)
     # A state may lie this much of the predicted move away from its prediction.
-    surprise: float = 0.5
+    predictor_tolerance: float = 0.5
     # Many bodies on one factorisation: their tolerance, which leaves less than 1e-6 mm on the unit, and the
     # steps after which a body goes on with its own.
     shared_tolerance: float = 2e-8

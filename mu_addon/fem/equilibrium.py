@@ -81,7 +81,7 @@ class Equilibrium:
                 continue
         raise ConvergenceError("the tangent is far from definite")
 
-    def unpressed(self) -> State:
+    def at_zero_pressure(self) -> State:
         """The state without pressure: as drawn, or where the model's load takes it from there.
 
         Raises ConvergenceError where the body does not bear its load.
@@ -122,12 +122,12 @@ class Equilibrium:
             state = self._descend(state, factored=number > 0)
             if np.abs(state.u - u).max() > reach_mm:
                 raise ConvergenceError("the unit snaps to a distant equilibrium (limit point)")
-            unsettled = max((obstacle.unsettled(state.u) for obstacle in obstacles), default=0.0)
-            if unsettled <= FRICTION_TOLERANCE:
+            lag_change = max((obstacle.lag_change(state.u) for obstacle in obstacles), default=0.0)
+            if lag_change <= FRICTION_TOLERANCE:
                 return state
             for obstacle in obstacles:
-                obstacle.settle(state.u)
-        raise ConvergenceError(f"friction does not settle: it still changes by {unsettled:.1e} of its bound")
+                obstacle.update_lag(state.u)
+        raise ConvergenceError(f"friction does not settle: it still changes by {lag_change:.1e} of its bound")
 
     def _descend(self, start: State, factored: bool) -> State:
         """The equilibrium from a start, friction's bound held; its cost is added to the start's.
@@ -179,7 +179,7 @@ class Equilibrium:
             pressure = target if step == target - last.pressure_MPa else last.pressure_MPa + step
             try:
                 guess = self._predict(history, pressure)
-                state = self.newton(guess, pressure, s.surprise * np.abs(guess - last.u).max())
+                state = self.newton(guess, pressure, s.predictor_tolerance * np.abs(guess - last.u).max())
             except ConvergenceError as why:
                 if abs(step) / 2 < s.min_step_MPa:
                     raise self._failure(last, pressure, why.what) from None
@@ -251,5 +251,6 @@ def extrapolate(points: Sequence[State], pressure: float) -> Array:
 
 
 def rest(mesh: Mesh) -> State:
-    """The undeformed, unloaded state of a mesh; where something weighs ask for `Equilibrium.unpressed`."""
+    """The undeformed, unloaded state of a mesh; where something has weight ask for
+    `Equilibrium.at_zero_pressure`."""
     return State(0.0, np.zeros_like(mesh.nodes))

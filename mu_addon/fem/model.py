@@ -277,7 +277,7 @@ class Model:
             obstacle.move(time_s)
 
     @property
-    def rubs(self) -> bool:
+    def has_friction(self) -> bool:
         """Whether an obstacle has friction, so that a state depends on those before it."""
         return any(obstacle.friction for obstacle in self.obstacles)
 

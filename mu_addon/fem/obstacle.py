@@ -22,7 +22,7 @@ Array = np.ndarray[Any, Any]
 
 # Points that begin to touch change the tangent, so an old factor is soon of no use; and a body that is
 # stopped ends far from where it was predicted.
-CONTACT = NewtonSettings(keep_factor=0.2, max_factorisations=40, surprise=3.0)
+CONTACT = NewtonSettings(keep_factor=0.2, max_factorisations=40, predictor_tolerance=3.0)
 # A point slides where its friction is at least this share of its bound, which lags by less than the rest.
 _AT_BOUND = 0.999
 
@@ -63,13 +63,14 @@ class Obstacle:
     `stick_mm` (of None: depth_mm) gets there. Slip is relative to the obstacle, in its own frame. The bound
     lags: `Equilibrium.newton` finds an equilibrium with pressure and normal of an earlier one, and again
     until friction changes by less than equilibrium.FRICTION_TOLERANCE of its bound, so that energy, force
-    and symmetric tangent belong together. Such a body has memory: `marching.march` solves it, and commits.
+    and symmetric tangent belong together. Such a body has memory:
+    `time_stepping.simulate_in_time` solves it, and commits.
 
     `pose` may be set between equilibria, as an obstacle that moves has it; `path`, a function of time in s,
-    does so in `march`. Faces of the base, the cavity and mirror planes do not touch. halvings: of a face's
-    sides, before the quadrature's points are laid on the pieces: large faces feel an obstacle up to near
-    their edges only with some. faces: those of `outer_faces` that can touch, where others cannot: it saves
-    time. Raises InputError.
+    does so in `simulate_in_time`. Faces of the base, the cavity and mirror planes do not touch. halvings: of
+    a face's sides, before the quadrature's points are laid on the pieces: large faces feel an obstacle up to
+    near their edges only with some. faces: those of `outer_faces` that can touch, where others cannot: it
+    saves time. Raises InputError.
     """
 
     def __init__(
@@ -154,7 +155,7 @@ class Obstacle:
             m = self.memory
             self.lag = Lag(m.pressure, m.normal, np.ones_like(m.pressure))
 
-    def unsettled(self, u: Array) -> float:
+    def lag_change(self, u: Array) -> float:
         """How much friction at displacement u would change with the lag, as a share of its bound."""
         if not self.friction:
             return 0.0
@@ -167,7 +168,7 @@ class Obstacle:
         change = float((self._area[face] * np.linalg.norm(more - less, axis=-1)).sum())
         return change / most if most else float(change > 0)
 
-    def settle(self, u: Array) -> None:
+    def update_lag(self, u: Array) -> None:
         """Let the lag follow to displacement u (n, 3)."""
         if not self.friction:
             return
@@ -220,7 +221,7 @@ class Obstacle:
 
     def forces(self, u: Array) -> tuple[Array, Array]:
         """Nodes (j,) of faces in contact, and the energy's derivative by their displacement (j, 3) in N."""
-        face, y, g, n, _ = self._touching(u)
+        face, y, g, n, _ = self._contact_candidates(u)
         at_points = -self._pressure(g)[0][..., None] * n
         if self.friction:
             at_points += self._tractions(y, *self._of(face))
@@ -230,7 +231,7 @@ class Obstacle:
 
     def blocks(self, u: Array) -> tuple[Array, Array]:
         """Second derivative of the energy: pairs (j, 2) of nodes of one face, each once, blocks (j, 3, 3)."""
-        face, y, g, n, h = self._touching(u)
+        face, y, g, n, h = self._contact_candidates(u)
         pressure, slope = self._pressure(g)
         at_points = slope[..., None, None] * n[..., :, None] * n[..., None, :] - pressure[..., None, None] * h
         if self.friction:
@@ -312,7 +313,7 @@ class Obstacle:
         shape = x.shape[:2]
         return y, g.reshape(shape), n.reshape(*shape, 3), h.reshape(*shape, 3, 3)
 
-    def _touching(self, u: Array) -> tuple[Array, ...]:
+    def _contact_candidates(self, u: Array) -> tuple[Array, ...]:
         """Faces (f,) that press or rub, and what `_points` says of them."""
         near = self._near(u)
         y, g, n, h = self._points(u, near)

@@ -49,7 +49,7 @@ def _text(place: Array) -> str:
 
 
 @attrs.frozen(eq=False)
-class FirstContact:
+class FirstSelfIntersection:
     """The pressure in MPa at which walls first meet, between two states of a path, and where they do.
 
     Between the states the body is taken to move along a straight line; `crossings` are those at the
@@ -62,7 +62,7 @@ class FirstContact:
     crossings: tuple[Crossing, ...]
 
 
-def first_contact(mesh: Mesh, states: Sequence[State]) -> FirstContact | None:
+def first_self_intersection(mesh: Mesh, states: Sequence[State]) -> FirstSelfIntersection | None:
     """The first contact of walls along a path of states, or None. The first state must be free of it."""
     surface = _Boundary(mesh)
     for before, after in itertools.pairwise(states):
@@ -78,7 +78,7 @@ def first_contact(mesh: Mesh, states: Sequence[State]) -> FirstContact | None:
                 low = middle
         first = surface.crossings(before.u + high * (after.u - before.u))
         pressure = before.pressure_MPa + high * (after.pressure_MPa - before.pressure_MPa)
-        return FirstContact(pressure, before.pressure_MPa, after.pressure_MPa, first)
+        return FirstSelfIntersection(pressure, before.pressure_MPa, after.pressure_MPa, first)
     return None
 
 

@@ -35,7 +35,7 @@ class Instant:
     contacts: tuple[dict[str, Array], ...] = ()
 
 
-def march(
+def simulate_in_time(
     equilibrium: Equilibrium,
     time_s: Array,
     pressure_kPa: Array,
@@ -83,7 +83,7 @@ def _start(eq: Equilibrium, time: float) -> Instant:
     """The body before any pressure; what touches an obstacle there is remembered."""
     if eq.model.load is None:
         return Instant(time, rest(eq.model.mesh))
-    state = eq.unpressed()
+    state = eq.at_zero_pressure()
     eq.model.commit(state.u, eq.parameters)
     return Instant(time, state)
 

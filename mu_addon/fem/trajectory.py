@@ -56,7 +56,7 @@ def simulate(
     ConvergenceError where a pressure cannot be reached; `on_state` has then seen all before it, and
     InputError for a body with friction.
     """
-    if equilibrium.model.rubs:
+    if equilibrium.model.has_friction:
         raise InputError("a body with friction remembers", "trajectory.simulate", "use marching.march")
 
     def state_at(pressure_MPa: float, solve: Callable[[], State]) -> State:
@@ -70,7 +70,7 @@ def simulate(
 
     distinct, sides = branches(pressure_kPa)
     model = equilibrium.model
-    start = rest(model.mesh) if model.load is None else state_at(0.0, equilibrium.unpressed)
+    start = rest(model.mesh) if model.load is None else state_at(0.0, equilibrium.at_zero_pressure)
     found = {0.0: start}
     for side in sides:
         history = [start]

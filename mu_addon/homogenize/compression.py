@@ -15,7 +15,7 @@ from ..fem.model import Model
 from .curve import Curve
 from .specimen import Specimen
 from .stability import Loss, Motions, first_loss, interpolated
-from .strut_contact import Touch, first_touch
+from .strut_contact import StrutContact, first_strut_contact
 
 Array = np.ndarray[Any, Any]
 Friction = Literal["slide", "stick"]
@@ -54,7 +54,7 @@ class Compression:
     specimen: Specimen
     friction: Friction
     states: tuple[Compressed, ...]
-    touch: Touch | None = None
+    touch: StrutContact | None = None
     loss: Loss | None = None
     ended: str = ""
 
@@ -148,7 +148,7 @@ def compress(
     reached, moves, held = [s.strain for s in states], [s.u for s in states], plates.held
     # Its factor makes room for others.
     del plates
-    touch, loss = first_touch(specimen.mesh, reached, moves), None
+    touch, loss = first_strut_contact(specimen.mesh, reached, moves), None
     if stability:
         # Only what comes before is of interest.
         count = len(states) if touch is None else int(np.searchsorted(reached, touch.strain)) + 1
@@ -209,7 +209,7 @@ class Plates:
             guess = self._moved(u, strain)
         else:
             guess = self._along_tangent(last, strain)
-        state = eq.newton(guess, 0.0, eq.settings.surprise * np.abs(guess - last.u).max())
+        state = eq.newton(guess, 0.0, eq.settings.predictor_tolerance * np.abs(guess - last.u).max())
         model = eq.model
         # Four eighths of the block stand on a plate.
         force = -4 * float(model.residual(state.u, 0.0, eq.parameters)[self.specimen.mesh.tip, 2].sum())

@@ -39,7 +39,7 @@ class StretchSettings:
     max_iterations: int = 30
     min_step: float = 1e-3
     max_backtracks: int = 8
-    surprise: float = 0.5
+    predictor_tolerance: float = 0.5
     regularisation: tuple[float, ...] = (0.03, 0.3, 3.0, 30.0)
 
     def __attrs_post_init__(self) -> None:
@@ -178,7 +178,7 @@ class Stretching:
             target = strain if abs(left) <= abs(step) * (1 + 1e-9) else last.strain + step
             try:
                 guess = self.predicted(path[-3:], target)
-                reach = s.surprise * max(np.abs(guess[1] - last.u).max(), s.tolerance)
+                reach = s.predictor_tolerance * max(np.abs(guess[1] - last.u).max(), s.tolerance)
                 path.append(self.equilibrium(target, *guess, reach_mm=reach))
             except ConvergenceError as why:
                 if abs(target - last.strain) / 2 < s.min_step:

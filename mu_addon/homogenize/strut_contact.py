@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from ..fem.equilibrium import State
-from ..fem.self_intersection import first_contact
+from ..fem.self_intersection import first_self_intersection
 from ..meshing.mesh import AXES, Mesh
 
 Array = np.ndarray[Any, Any]
@@ -19,7 +19,7 @@ _ROUNDING = 1e-9
 
 
 @attrs.frozen(eq=False)
-class Touch:
+class StrutContact:
     """The nominal strain at which struts first meet, and what: "a plate" or "each other".
 
     place (3,): where, in the undeformed eighth, in mm from the block's middle.
@@ -45,7 +45,7 @@ class _Plane:
     on: Array
 
 
-def first_touch(mesh: Mesh, strains: Sequence[float], moves: Sequence[Array]) -> Touch | None:
+def first_strut_contact(mesh: Mesh, strains: Sequence[float], moves: Sequence[Array]) -> StrutContact | None:
     """The first contact along displacements (n, 3) of an eighth at ascending strains, the first free of it.
 
     Struts meet a plate where they pass the plane of the mesh's `tip`, and their own images where they pass
@@ -62,13 +62,15 @@ def first_touch(mesh: Mesh, strains: Sequence[float], moves: Sequence[Array]) ->
     # An image is met at its mirror plane, so that an eighth is enough; the load of its states is strain.
     part = attrs.evolve(mesh, symmetry=())
     states = [State(strain, u) for strain, u in zip(strains[:count], moves, strict=False)]
-    cut = first_contact(part, states)
+    cut = first_self_intersection(part, states)
     if cut is not None and (first is None or cut.pressure_MPa < first.strain):
-        return Touch(cut.pressure_MPa, "another", cut.crossings[0].walls[0])
+        return StrutContact(cut.pressure_MPa, "another", cut.crossings[0].walls[0])
     return first
 
 
-def _passed(mesh: Mesh, strains: Sequence[float], moves: Sequence[Array], plane: _Plane) -> Touch | None:
+def _passed(
+    mesh: Mesh, strains: Sequence[float], moves: Sequence[Array], plane: _Plane
+) -> StrutContact | None:
     """When nodes first pass a plane that they did not lie on."""
     off = np.setdiff1d(np.arange(len(mesh.nodes)), plane.on)
     least = _ROUNDING * mesh.nodes.max()
@@ -80,6 +82,6 @@ def _passed(mesh: Mesh, strains: Sequence[float], moves: Sequence[Array], plane:
         if k and len(past):
             share = -before[past] / (beyond[past] - before[past])
             strain = strains[k - 1] + share.min() * (strains[k] - strains[k - 1])
-            return Touch(float(strain), plane.what, mesh.nodes[off[past[share.argmin()]]])
+            return StrutContact(float(strain), plane.what, mesh.nodes[off[past[share.argmin()]]])
         before = np.minimum(beyond, 0.0)
     return None

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..fem.batched_newton import Lockstep, Variant
+from ..fem.batched_newton import BatchedNewton, Variant
 from ..fem.descent import NewtonSettings
 from ..fem.equilibrium import State
 from ..fem.kinematics import Probe
@@ -15,12 +15,12 @@ from ..fem.laws import NeoHooke
 from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.obstacle import CONTACT
-from ..fem.time_stepping import march
+from ..fem.time_stepping import simulate_in_time
 
 Array = np.ndarray[Any, Any]
 
 
-class Sweep:
+class CandidateBatch:
     """Many sensors in one unit: where each moves the monitored points at a state of Model A.
 
     shares: the part (m,) of every element that each sensor fills (see inclusion.sensor_share).
@@ -39,24 +39,26 @@ class Sweep:
         _, poisson = materials.small_strain(len(model.mesh.tets))
         stiff = NeoHooke.parameters(np.full(len(poisson), sensor_MPa), poisson)
         self._points, self._probe = monitored
-        self._lockstep = Lockstep(model, materials, [Variant(s, NeoHooke, stiff) for s in shares], settings)
+        self._batched_newton = BatchedNewton(
+            model, materials, [Variant(s, NeoHooke, stiff) for s in shares], settings
+        )
 
     def alone(self, number: int, pressures_MPa: Array) -> Array:
         """Monitored points (s, p, 3) in mm of one sensor's unit along its whole path through some pressures.
 
         They are visited in order from the state without pressure. Raises ConvergenceError.
         """
-        equilibrium = self._lockstep.alone(number)
-        return self.points(equilibrium.path(pressures_MPa, equilibrium.unpressed()))
+        equilibrium = self._batched_newton.alone(number)
+        return self.points(equilibrium.path(pressures_MPa, equilibrium.at_zero_pressure()))
 
-    def marched(self, number: int, time_s: Array, pressure_kPa: Array) -> Array:
+    def simulated_in_time(self, number: int, time_s: Array, pressure_kPa: Array) -> Array:
         """Monitored points (k, p, 3) in mm of one sensor's unit at k instants, beside the model's obstacles.
 
         Its whole motion is solved in the order of time, as friction remembers. Raises ConvergenceError.
         """
-        equilibrium = self._lockstep.alone(number)
+        equilibrium = self._batched_newton.alone(number)
         equilibrium.settings = CONTACT
-        return self.points(march(equilibrium, time_s, pressure_kPa).states)
+        return self.points(simulate_in_time(equilibrium, time_s, pressure_kPa).states)
 
     def at(self, state: State) -> Array:
         """Monitored points (sensors, p, 3) in mm, at the pressure of one of Model A's states.
@@ -67,7 +69,7 @@ class Sweep:
 
     def states(self, state: State) -> list[State]:
         """Every sensor's own state at the pressure of one of Model A's. Raises ConvergenceError, as `at`."""
-        return self._lockstep.at(state)
+        return self._batched_newton.at(state)
 
     def points(self, states: Sequence[State]) -> Array:
         """Monitored points (s, p, 3) in mm of some states."""

@@ -10,14 +10,14 @@ import numpy as np
 Array = np.ndarray[Any, Any]
 
 
-def rounds(pressure: Array, weighs: bool = False) -> list[list[int]]:
+def rounds(pressure: Array, has_gravity: bool = False) -> list[list[int]]:
     """In which order to solve distinct pressures (s,): two at a time, the extremes first.
 
     Each later pressure is the one farthest from those before it and from 0, where nothing deviates. Where
     the unit weighs something, it deviates there, too: 0, if it is met, is then solved beside the extremes.
     """
     pressure = np.asarray(pressure, float)
-    left = [i for i, p in enumerate(pressure) if p or weighs]
+    left = [i for i, p in enumerate(pressure) if p or has_gravity]
     order = [i for i in (int(np.argmin(pressure)), int(np.argmax(pressure))) if i in left]
     still = [i for i in left if not pressure[i]]
     order = list(dict.fromkeys(still + order))

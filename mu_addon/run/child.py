@@ -167,7 +167,7 @@ class Child:
     def _wordless(self, status: int) -> dict[str, Any]:
         tail = " / ".join(_last_lines(self.folder / ERRORS, 3)) or "it left no message"
         return {
-            "what": f"the process ended without a word ({_ending(status)}): {tail}",
+            "what": f"the process ended without a word ({_context(status)}): {tail}",
             "where": str(self.folder / ERRORS),
             "what_to_do": "open the log; run again, it resumes where it stopped. If memory was short, close "
             "other programs first",
@@ -175,7 +175,7 @@ class Child:
         }
 
 
-def _ending(status: int) -> str:
+def _context(status: int) -> str:
     if status >= 0:
         return f"exit status {status}"
     try:

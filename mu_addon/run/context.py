@@ -40,7 +40,7 @@ class _Unexpected(MuError):
 
 
 @attrs.define
-class Ending:
+class RunContext:
     """What a run leaves: its exit status, and the `summary` that its body fills and its folder keeps."""
 
     progress: Progress
@@ -84,76 +84,78 @@ class Ending:
 
 
 @contextmanager
-def run_to_end(progress: Progress) -> Iterator[Ending]:
-    """Run the body; whatever stops it becomes a message and `Ending.status`, never a traceback.
+def run_to_end(progress: Progress) -> Iterator[RunContext]:
+    """Run the body; whatever stops it becomes a message and `RunContext.status`, never a traceback.
 
     A body that ends well leaves summary.json with "status": "complete". Any other leaves what it has
     written, and summary.json with "status": "partial" and the reason. Exit status: 0, a MuError's own,
     130 after Ctrl-C, 143 after SIGTERM, 70 for a fault of this program, whose traceback goes to log.ndjson.
     """
-    ending = Ending(progress)
+    context = RunContext(progress)
     # Blender replaces Python's handler of Ctrl-C, and leaves SIGTERM to kill the process where it stands.
     with _signals_raise():
         try:
-            yield ending
-            _write_summary(ending, {"status": "complete"})
-            progress.result({"folder": ending.folder, "summary": ending.summary})
+            yield context
+            _write_summary(context, {"status": "complete"})
+            progress.result({"folder": context.folder, "summary": context.summary})
         except KeyboardInterrupt:
-            _stop(ending, _Interrupted("stopped by Ctrl-C", remedy=_kept(ending)))
+            _stop(context, _Interrupted("stopped by Ctrl-C", remedy=_kept(context)))
         except MuError as error:
-            _stop(ending, error)
+            _stop(context, error)
         except MemoryError:
             what = "there was not enough memory"
-            _stop(ending, MuError(what, _kept(ending), "take a coarser mesh, fewer workers or more memory"))
+            _stop(context, MuError(what, _kept(context), "take a coarser mesh, fewer workers or more memory"))
         except Exception as error:  # noqa: BLE001 - the last resort: told, logged and turned into exit status 70
-            _log_traceback(ending, error)
+            _log_traceback(context, error)
             fault = _Unexpected(
                 f"this program failed: {type(error).__name__}: {error}",
-                remedy="report it with log.ndjson, which holds the details" if ending.folder else "report it",
+                remedy="report it with log.ndjson, which holds the details"
+                if context.folder
+                else "report it",
             )
-            _stop(ending, fault)
+            _stop(context, fault)
         finally:
-            ending.unlock()
+            context.unlock()
 
 
-def _kept(ending: Ending) -> str:
-    return f"what was finished is in {ending.folder}" if ending.folder else ""
+def _kept(context: RunContext) -> str:
+    return f"what was finished is in {context.folder}" if context.folder else ""
 
 
-def _stop(ending: Ending, error: MuError) -> None:
+def _stop(context: RunContext, error: MuError) -> None:
     """The last words of a run that ends early: summary.json, what `on_stop` saves, and the error message."""
     _set_signals(signal.SIG_IGN)
-    ending.status = error.status
+    context.status = error.status
     reason = {"what": error.what, "where": error.where, "what_to_do": error.remedy}
     partial = {"status": "partial", "reason": reason}
     # The reason for stopping may be that nothing can be written any more.
     with suppress(MuError):
-        _write_summary(ending, partial)
-    if ending.on_stop is not None:
+        _write_summary(context, partial)
+    if context.on_stop is not None:
         # What takes long can be cut short by a second Ctrl-C; a failure here would only hide the first one.
         _set_signals(signal.default_int_handler)
         with suppress(Exception, KeyboardInterrupt):
-            ending.on_stop(reason)
+            context.on_stop(reason)
         _set_signals(signal.SIG_IGN)
         with suppress(MuError):
-            _write_summary(ending, partial)
-    ending.progress.error(error)
+            _write_summary(context, partial)
+    context.progress.error(error)
 
 
-def _write_summary(ending: Ending, state: dict[str, Any]) -> None:
-    seconds = {"seconds": {**ending.summary.get("seconds", {}), **ending.progress.seconds}}
+def _write_summary(context: RunContext, state: dict[str, Any]) -> None:
+    seconds = {"seconds": {**context.summary.get("seconds", {}), **context.progress.seconds}}
     # Twice, so that the state is read first and yet overrides an older one.
-    ending.summary = {**state, **ending.summary, **state, **seconds}
-    if ending.folder is not None:
-        write_json(ending.folder / "summary.json", ending.summary)
+    context.summary = {**state, **context.summary, **state, **seconds}
+    if context.folder is not None:
+        write_json(context.folder / "summary.json", context.summary)
 
 
-def _log_traceback(ending: Ending, error: Exception) -> None:
-    if ending.folder is None:
+def _log_traceback(context: RunContext, error: Exception) -> None:
+    if context.folder is None:
         return
     with suppress(MuError):
         trace = "".join(traceback.format_exception(error))
-        log_file(ending.folder / "log.ndjson")({"type": "traceback", "text": trace})
+        log_file(context.folder / "log.ndjson")({"type": "traceback", "text": trace})
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from ..files import make_folder, output_error, write_text
 from .lock import LOCK
 
 if TYPE_CHECKING:
-    from .context import Ending
+    from .context import RunContext
 
 # What every run writes.
 ALWAYS = ("summary.json", "log.ndjson")
@@ -22,7 +22,7 @@ OWN = ("cache", "stale", LOCK)
 
 
 def begin(
-    ending: Ending,
+    context: RunContext,
     folder: Path,
     header: str,
     inputs: Mapping[str, str],
@@ -33,9 +33,9 @@ def begin(
 
     See `claim`. Raises InputError, also where another process works in the folder, and OutputError.
     """
-    ending.lock_folder(folder)
+    context.lock_folder(folder)
     claim(folder, header, inputs, results, optional)
-    ending.open_folder(folder)
+    context.open_folder(folder)
     keep_inputs(folder, inputs)
 
 

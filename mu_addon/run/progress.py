@@ -132,7 +132,7 @@ class _Lines:
         if message["type"] == "progress":
             self.progress(message)
         elif message["type"] in ("warning", "error"):
-            self.write(_told(message) + "\n")
+            self.write(_formatted(message) + "\n")
 
     def progress(self, message: Message) -> None:
         raise NotImplementedError
@@ -194,7 +194,7 @@ class _PlainLines(_Lines):
             )
 
 
-def _told(message: Message) -> str:
+def _formatted(message: Message) -> str:
     lines = [f"{message['type']}: {message['what']}"]
     if message["where"]:
         lines.append(f"  where: {message['where']}")

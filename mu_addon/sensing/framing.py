@@ -31,7 +31,7 @@ def crc16(data: bytes) -> int:
     return binascii.crc_hqx(data, 0xFFFF)
 
 
-def stuffed(data: bytes) -> bytes:
+def cobs_encoded(data: bytes) -> bytes:
     """COBS: the same bytes without a zero among them, longer by one in 254 and one more at most."""
     out = bytearray()
     parts = data.split(END)
@@ -46,7 +46,7 @@ def stuffed(data: bytes) -> bytes:
     return bytes(out)
 
 
-def unstuffed(data: bytes) -> bytes | None:
+def cobs_decoded(data: bytes) -> bytes | None:
     """What COBS made these bytes from, or None if it cannot have made them."""
     out = bytearray()
     place, length = 0, len(data)
@@ -64,7 +64,7 @@ def unstuffed(data: bytes) -> bytes | None:
 
 def framed(payload: bytes) -> bytes:
     """A payload as it goes over the line, its end included."""
-    return stuffed(payload + _CRC.pack(crc16(payload))) + END
+    return cobs_encoded(payload + _CRC.pack(crc16(payload))) + END
 
 
 def sample_frame(sequence: int, time_us: int, counts: Sequence[int]) -> bytes:
@@ -80,7 +80,7 @@ def info_frame(info: dict[str, Any]) -> bytes:
 
 def payload_of(frame: bytes) -> bytes | None:
     """The payload of what stood between two zero bytes, or None if its CRC or its stuffing is wrong."""
-    data = unstuffed(frame)
+    data = cobs_decoded(frame)
     if data is None or len(data) < 3:
         return None
     payload, crc = data[:-2], data[-2:]

@@ -15,7 +15,7 @@ from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.record import KNOWN, record
-from mu_addon.evidence.selection import TOLD_APART
+from mu_addon.evidence.selection import RIVAL_DELTA_CHI2
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
 from mu_addon.measured import read_folder
@@ -203,9 +203,9 @@ def judged(order):
 
 
 IN_SET = ("exact", "exact_with_rivals", "in_set")
-# A rival whose chi squared, without noise, is less than this beats the truth's by `TOLD_APART` in fewer than
-# nine sets of ten, whoever judges: the difference is normal of variance four times its mean.
-TELLABLE = (1.28 + (1.28**2 + TOLD_APART) ** 0.5) ** 2
+# A rival whose chi squared, without noise, is less than this beats the truth's by `RIVAL_DELTA_CHI2` in
+# fewer than nine sets of ten, whoever judges: the difference is normal of variance four times its mean.
+TELLABLE = (1.28 + (1.28**2 + RIVAL_DELTA_CHI2) ** 0.5) ** 2
 
 
 def outcome(truth, verdict, allowed=frozenset()):

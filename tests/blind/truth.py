@@ -157,7 +157,7 @@ class Simulated:
         self.parameters = {"mesh_error": EFFECTS["mesh_error"].parameter}
         self._changes = {}
         for name, sizes in unit_runs.SIZES.items():
-            for turn in unit_runs.TURNS if EFFECTS[name].weighs else (0.0,):
+            for turn in unit_runs.TURNS if EFFECTS[name].has_gravity else (0.0,):
                 own = {s: self._runs.get(f"hidden {name} {s:g} {turn:g}") for s in sizes}
                 own = {s: v for s, v in own.items() if v is not None and np.isfinite(v).all()}
                 if len(own) == len(sizes):
@@ -165,7 +165,7 @@ class Simulated:
                     table = np.stack([0.0 * curve(base), *(curve(v - base) for v in own.values())])
                     self._changes[name, turn] = BarycentricInterpolator(at, table)
                     self.parameters[name] = EFFECTS[name].parameter
-        self._weighs = {name for name in unit_runs.SIZES if EFFECTS[name].weighs}
+        self._weighs = {name for name in unit_runs.SIZES if EFFECTS[name].has_gravity}
 
     def bench(self, dt, count):
         """As the written unit's, at four fifths of the pressure, hanging or level."""

@@ -47,7 +47,7 @@ def runs():
     yield "judged", Run(judged, JUDGED_kPa, POINTS)
     yield "hidden", Run(hidden, HIDDEN_kPa, POINTS)
     for name in JUDGED:
-        for turn in TURNS if EFFECTS[name].weighs else (0.0,):
+        for turn in TURNS if EFFECTS[name].has_gravity else (0.0,):
             for size in EFFECTS[name].sizes:
                 if size != EFFECTS[name].parameter.null:
                     body = attrs.evolve(judged, orientation_deg=turn)
@@ -86,7 +86,7 @@ def response(runs, turn):
     variants = {}
     for name in JUDGED:
         effect = EFFECTS[name]
-        at = turn if effect.weighs else 0.0
+        at = turn if effect.has_gravity else 0.0
         sizes = [
             s for s in effect.sizes if s == effect.parameter.null or f"judged {name} {s:g} {at:g}" in runs
         ]

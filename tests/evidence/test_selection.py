@@ -12,7 +12,7 @@ from mu_addon.evidence.noise import Source
 from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.record import record
 from mu_addon.evidence.residuals import dependence_table, strict_table, structure
-from mu_addon.evidence.selection import one_more, reviewed, select
+from mu_addon.evidence.selection import one_more, reselected, select
 from mu_addon.evidence.sensitivity import sensitivities
 from mu_addon.evidence.simulator import Composite, effect_named
 from mu_addon.evidence.verdict import diagnose
@@ -57,7 +57,7 @@ def test_what_a_smaller_noise_shows_is_looked_for_and_nothing_else(hidden, found
     before = select(loud, few(loud, *LIBRARY))
     assert before.chosen.names == ("rate_independent_hysteresis",)
     seen = few(quiet, *LIBRARY)
-    again = reviewed(quiet, seen, before)
+    again = reselected(quiet, seen, before)
     assert bool(again.left) == (len(found) > 1)
     after = one_more(quiet, seen, again)
     assert set(after.chosen.names) == found

@@ -12,7 +12,7 @@ from . import cook, land, thick
 
 
 @attrs.frozen
-class Answer:
+class PointResult:
     """What one mesh gave: the quantity asked for, free unknowns, seconds."""
 
     value: float
@@ -34,13 +34,13 @@ class Case:
     sizes: dict[int, tuple[int, ...]]
     solve: Callable[..., tuple[float, int]]
 
-    def answer(self, size: int, order: int, **options: object) -> Answer:
+    def answer(self, size: int, order: int, **options: object) -> PointResult:
         """Solve on one mesh."""
         start = time.perf_counter()
         value, unknowns = self.solve(size, order, **options)
-        return Answer(value, unknowns, time.perf_counter() - start)
+        return PointResult(value, unknowns, time.perf_counter() - start)
 
-    def error(self, answer: Answer) -> float:
+    def error(self, answer: PointResult) -> float:
         """Relative error of an answer."""
         return answer.value / self.known - 1
 

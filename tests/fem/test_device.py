@@ -15,7 +15,7 @@ from scipy.sparse.linalg import eigsh
 
 from mu_addon.errors import ConvergenceError
 from mu_addon.fem import conjugate_gradients, kernels, krylov_kernels
-from mu_addon.fem.batched_newton import Lockstep, Variant
+from mu_addon.fem.batched_newton import BatchedNewton, Variant
 from mu_addon.fem.conjugate_gradients import ConjugateGradients
 from mu_addon.fem.equilibrium import Equilibrium, rest
 from mu_addon.fem.factor import IndefiniteError
@@ -194,9 +194,9 @@ def variants(mesh):
 @pytest.mark.parametrize("device", DEVICES)
 def test_variants_in_lockstep_are_the_same(cpu, path, device, monkeypatch):
     materials, every = two_halves(MESH), list(variants(MESH))
-    expected = Lockstep(cpu, materials, every).at(path[-1])
+    expected = BatchedNewton(cpu, materials, every).at(path[-1])
     model = by_gradients(device)
-    together = Lockstep(model, materials, every)
+    together = BatchedNewton(model, materials, every)
     # None may be left to a solver of its own.
     monkeypatch.setattr(together, "_alone", None)
     for one, other in zip(expected, together.at(path[-1]), strict=True):

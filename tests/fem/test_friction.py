@@ -11,7 +11,7 @@ from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.obstacle import CONTACT, Obstacle
 from mu_addon.fem.rigid import Box, Plane, Pose, Sphere
-from mu_addon.fem.time_stepping import march
+from mu_addon.fem.time_stepping import simulate_in_time
 from mu_addon.fem.trajectory import simulate
 
 from .bodies import box, hollow_box
@@ -39,12 +39,14 @@ def along(time_s, places):
     return lambda t: Pose(shift=[np.interp(t, time_s, np.asarray(places)[:, i]) for i in range(3)])
 
 
-def marched(equilibrium, time_s, pressure_kPa=None):
+def simulated_in_time(equilibrium, time_s, pressure_kPa=None):
     """States at instants, and what the first obstacle's contact was at each."""
     found = []
     (obstacle,) = equilibrium.model.obstacles
     pressure = np.zeros(len(time_s)) if pressure_kPa is None else pressure_kPa
-    motion = march(equilibrium, time_s, pressure, lambda state: found.append(obstacle.contact(state.u)))
+    motion = simulate_in_time(
+        equilibrium, time_s, pressure, lambda state: found.append(obstacle.contact(state.u))
+    )
     return motion.states, found
 
 
@@ -58,10 +60,10 @@ def test_force_and_tangent_are_derivatives_of_the_energy(rigid, order):
     model, m = eq.model, eq.parameters
     random = np.random.default_rng(0)
     before, u = (0.02 * random.standard_normal(mesh.nodes.shape) for _ in range(2))
-    obstacle.settle(before)
+    obstacle.update_lag(before)
     model.commit(before, m)
     obstacle.pose = Pose(Rotation.from_rotvec((0.01, -0.02, 0.015)).as_matrix(), (0.02, -0.03, 0.05))
-    obstacle.settle(u + 0.005 * random.standard_normal(u.shape))
+    obstacle.update_lag(u + 0.005 * random.standard_normal(u.shape))
     assert 0.05 < obstacle.contact(u).sticking < 0.95
     assert_consistent(model, m, u, random, 1e-7)
 
@@ -71,7 +73,7 @@ def test_a_dragged_block_resists_with_mu_times_the_normal_force():
     mesh = box((3, 3, 3), clamp=True)
     path = along([0, 1, 2, 3], [(0, 0, 0), (0, 0, -0.05), (0.3, 0, -0.05), (0.4, 0, -0.05)])
     obstacle = Obstacle(mesh, LID, 0.05, 0.002, friction=MU, path=path)
-    _, contacts = marched(touched(mesh, obstacle), np.linspace(0, 3, 31))
+    _, contacts = simulated_in_time(touched(mesh, obstacle), np.linspace(0, 3, 31))
     pressed, drawn, last = contacts[10], contacts[20], contacts[30]
     assert pressed.sticking == 1.0
     assert pressed.lost_mJ < 1e-9
@@ -100,7 +102,7 @@ def test_a_turned_lid_is_held_by_the_moment_of_its_pressure():
 
     obstacle = Obstacle(mesh, LID, 0.05, 0.002, friction=MU, path=path)
     # Without a Poisson's ratio the clamped base leaves the pressure uniform.
-    states, contacts = marched(touched(mesh, obstacle, poisson=0.0), np.linspace(0, 2, 11))
+    states, contacts = simulated_in_time(touched(mesh, obstacle, poisson=0.0), np.linspace(0, 2, 11))
     nodes, forces = obstacle.forces(states[-1].u)
     arm = (mesh.nodes + states[-1].u)[nodes] - (0.5, 0.5, 0)
     mean = (np.sqrt(2) + np.arcsinh(1)) / 6
@@ -176,7 +178,7 @@ def cycle(friction, steps):
         volume.append(model.cavity_volume(state.u))
         stored.append(model.potential(state.u, 0.0, m))
 
-    march(eq, time, pressure, on_state)
+    simulate_in_time(eq, time, pressure, on_state)
     shifts = np.array([path(t).shift for t in time])
     force = np.array(force)
     by_ball = -((force[1:] + force[:-1]) / 2 * np.diff(shifts, axis=0)).sum(axis=1)
@@ -215,7 +217,7 @@ def test_what_comes_nearer_aslant_does_not_rub_before_it_touches():
 
     def rubbed(*times):
         lid = Obstacle(mesh, LID, 0.05, 1e-4, friction=MU, stick_mm=1.0, path=ways)
-        return marched(touched(mesh, lid), np.array(times))[1][-1].tangential_N[0]
+        return simulated_in_time(touched(mesh, lid), np.array(times))[1][-1].tangential_N[0]
 
     alone, fine = rubbed(0, 1), rubbed(*np.linspace(-0.1, 1, 12))
     assert fine == pytest.approx(alone, rel=0.02)

@@ -11,7 +11,7 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.laws import Friction, NeoHooke, OgdenRoxburgh, Prony, Yeoh
 from mu_addon.fem.materials import Layer, Materials
 from mu_addon.fem.model import Model
-from mu_addon.fem.time_stepping import march
+from mu_addon.fem.time_stepping import simulate_in_time
 from mu_addon.fem.trajectory import simulate
 from mu_addon.meshing.mesh import Mesh, boundary_faces
 
@@ -110,14 +110,14 @@ def test_creep_under_a_held_pressure_follows_its_closed_form():
     equilibrium = Equilibrium(Model(mesh), everywhere(mesh, (Prony, row)))
     time = np.concatenate([[0.0], np.linspace(0, 4, 41)])
     held = np.full(42, pressure * 1e3)
-    path = march(equilibrium, time, held)
+    path = simulate_in_time(equilibrium, time, held)
     top = mesh.nodes[:, 2] == 1
     strain = np.array([-s.u[top, 2].mean() for s in path.states])
     G, kappa = 2 * YEOH[0], YEOH[3]
     creep = 1 - beta / (1 + beta) * np.exp(-time / (tau * (1 + beta)))
     np.testing.assert_allclose(strain, pressure * (1 / (9 * kappa) + creep / (3 * G)), rtol=3e-4)
     # Steps of 0.1 s were asked for by the instants; larger ones can be cut instead.
-    coarse = march(equilibrium, [0.0, 0.0, 4.0], [0.0, held[0], held[0]], max_step_s=0.1)
+    coarse = simulate_in_time(equilibrium, [0.0, 0.0, 4.0], [0.0, held[0], held[0]], max_step_s=0.1)
     assert -coarse.states[-1].u[top, 2].mean() == pytest.approx(strain[-1], rel=1e-9)
 
 
@@ -183,7 +183,7 @@ def test_an_elastic_body_marches_where_its_path_goes():
     materials = Materials.neo_hooke(np.full(count, 0.3), np.full(count, 0.4))
     time, pressure = np.arange(6.0), np.array([0.0, 10, 25, -5, -5, 0])
     equilibrium = Equilibrium(Model(mesh), materials)
-    a, b = simulate(equilibrium, time, pressure), march(equilibrium, time, pressure)
+    a, b = simulate(equilibrium, time, pressure), simulate_in_time(equilibrium, time, pressure)
     for p, one, other in zip(pressure, a.of_time(np.arange(len(a.states))), b.states, strict=True):
         assert other.pressure_MPa == p / 1e3
         np.testing.assert_allclose(other.u, a.states[one].u, atol=1e-8)
@@ -195,10 +195,10 @@ def test_a_body_with_friction_stays_where_it_slid_and_forgets_when_it_starts_ane
     materials = everywhere(mesh, (NeoHooke, [0.1, 0.5]), (Friction, [0.2, 0.004]))
     equilibrium = Equilibrium(Model(mesh), materials)
     time, pressure = np.arange(3.0), np.array([0.0, 25, 0])
-    first = march(equilibrium, time, pressure)
+    first = simulate_in_time(equilibrium, time, pressure)
     largest = np.abs(first.states[1].u).max()
     assert np.abs(first.states[2].u).max() > 0.02 * largest
-    again = march(equilibrium, 60 * time, pressure)
+    again = simulate_in_time(equilibrium, 60 * time, pressure)
     np.testing.assert_allclose(again.states[2].u, first.states[2].u, atol=1e-9)
 
 
@@ -207,7 +207,7 @@ def test_failures_are_named():
     count = len(mesh.tets)
     equilibrium = Equilibrium(Model(mesh), Materials.neo_hooke(np.full(count, 0.02), np.full(count, 0.45)))
     with pytest.raises(ConvergenceError, match="no equilibrium at") as error:
-        march(equilibrium, [0.0, 10.0], [0.0, 50.0])
+        simulate_in_time(equilibrium, [0.0, 10.0], [0.0, 50.0])
     assert "the last converged state is at" in error.value.where
     with pytest.raises(InputError, match="backward"):
-        march(equilibrium, [0.0, 2.0, 1.0], [0.0, 1.0, 1.0])
+        simulate_in_time(equilibrium, [0.0, 2.0, 1.0], [0.0, 1.0, 1.0])

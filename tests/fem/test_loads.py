@@ -8,7 +8,7 @@ from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, rest
 from mu_addon.fem.loads import STANDARD_GRAVITY, gravity, traction
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.fem.time_stepping import march
+from mu_addon.fem.time_stepping import simulate_in_time
 from mu_addon.fem.trajectory import simulate
 from mu_addon.meshing.mesh import MEMBRANE, Mesh, boundary_faces
 
@@ -132,7 +132,7 @@ def bar(load_factor, direction):
 def test_a_body_that_weighs_nothing_is_as_drawn_without_pressure():
     body = bar(1.0, [0, -1, 0])
     body.model.load = None
-    state = body.unpressed()
+    state = body.at_zero_pressure()
     assert not state.loaded
     assert state.factorisations == 0
 
@@ -142,12 +142,12 @@ def test_weight_is_put_on_in_as_many_steps_as_it_takes():
     with pytest.raises(ConvergenceError):
         heavy.newton(rest(heavy.model.mesh).u, 0.0)
     load = heavy.model.load.copy()
-    state = heavy.unpressed()
+    state = heavy.at_zero_pressure()
     assert state.loaded
     assert state.residual < 1e-9
     np.testing.assert_array_equal(heavy.model.load, load)
     tip = light.model.mesh.nodes[:, 2] == 30.0
-    once, sixty = (s.u[tip, 1].mean() for s in (light.unpressed(), state))
+    once, sixty = (s.u[tip, 1].mean() for s in (light.at_zero_pressure(), state))
     # Longer than it is it cannot hang.
     assert -30.0 < sixty < 4 * once < 0
 
@@ -157,14 +157,14 @@ def test_a_weight_that_is_not_borne_is_said():
     body = bar(400.0, [0, 0, -1])
     load = body.model.load.copy()
     with pytest.raises(ConvergenceError, match="no equilibrium under the weight alone") as caught:
-        body.unpressed()
+        body.at_zero_pressure()
     assert caught.value.remedy
     np.testing.assert_array_equal(body.model.load, load)
 
 
 def test_motion_begins_where_the_weight_has_taken_the_body():
     body = bar(1.0, [0, -1, 0])
-    start, seen, kept = body.unpressed(), [], {}
+    start, seen, kept = body.at_zero_pressure(), [], {}
     found = simulate(
         body, np.arange(2.0), np.zeros(2), seen.append, kept.get, lambda s: kept.update({s.pressure_MPa: s})
     )
@@ -173,4 +173,4 @@ def test_motion_begins_where_the_weight_has_taken_the_body():
     # What was kept is not solved again.
     again = simulate(body, np.arange(2.0), np.zeros(2), load=kept.get)
     assert again.states[0] is kept[0.0]
-    np.testing.assert_array_equal(march(body, np.arange(2.0), np.zeros(2)).states[0].u, start.u)
+    np.testing.assert_array_equal(simulate_in_time(body, np.arange(2.0), np.zeros(2)).states[0].u, start.u)

@@ -6,7 +6,7 @@ import pytest
 from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, State, rest
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.fem.self_intersection import crossings, first_contact
+from mu_addon.fem.self_intersection import crossings, first_self_intersection
 from mu_addon.meshing.mesh import boundary_faces
 
 from . import bodies
@@ -87,13 +87,13 @@ def test_the_undeformed_body_and_rigid_motions_are_free_of_contact():
 def test_the_first_contact_lies_between_two_states():
     mesh = fork()
     states = [State(-0.01 * k, lean(mesh, 0.2 * k)) for k in range(5)]
-    found = first_contact(mesh, states)
+    found = first_self_intersection(mesh, states)
     # The left tip meets the right prong at its height, to which that slid up by 1 %.
     expected = -0.05 / (1 + 1 / 1.01)
     assert found.pressure_MPa == pytest.approx(expected, abs=1.1e-5)
     assert (found.before_MPa, found.after_MPa) == (-0.02, -0.03)
     assert found.crossings[0].place == pytest.approx([1.5, 0.5, 3.0], abs=0.3)
-    assert first_contact(mesh, states[:3]) is None
+    assert first_self_intersection(mesh, states[:3]) is None
 
 
 def test_a_vacuum_closes_a_pouch_and_says_where_and_when():
@@ -104,7 +104,7 @@ def test_a_vacuum_closes_a_pouch_and_says_where_and_when():
     body = Equilibrium(Model(mesh, threads=1), materials, NewtonSettings(min_step_MPa=1e-6))
     start = rest(mesh)
     states = [start, *body.path(-np.arange(1, 8) * 5e-5, start)]
-    found = first_contact(mesh, states)
+    found = first_self_intersection(mesh, states)
     middle = np.flatnonzero((mesh.nodes == [0, 0, GAP / 2]).all(axis=1))[0]
     sunk = np.array([-s.u[middle, 2] for s in states])
     expected = np.interp(GAP / 2, sunk, [s.pressure_MPa for s in states])

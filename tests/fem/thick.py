@@ -6,7 +6,7 @@ import numpy as np
 
 from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, rest
 from mu_addon.fem.model import Model
-from mu_addon.fem.time_stepping import march
+from mu_addon.fem.time_stepping import simulate_in_time
 
 from . import bodies
 from .radial import inner_stretch
@@ -65,7 +65,7 @@ def sphere_in_time(row, law, time_s, pressure_MPa, around=4):
     equilibrium = Equilibrium(
         Model(mesh), bodies.everywhere(mesh, law, *row), NewtonSettings(max_step_MPa=0.05)
     )
-    states = march(equilibrium, time_s, 1e3 * np.asarray(pressure_MPa)).states
+    states = simulate_in_time(equilibrium, time_s, 1e3 * np.asarray(pressure_MPa)).states
     inside = np.unique(mesh.cavity)
     return np.array([np.linalg.norm((mesh.nodes + s.u)[inside], axis=1).mean() - INNER for s in states])
 

@@ -34,7 +34,7 @@ def test_tool_is_content(command):
 @pytest.mark.parametrize(
     ("module", "line", "contract"),
     [
-        ("design", "from ..study import report", "imports run downward"),
+        ("design", "from ..usecases import report", "imports run downward"),
         ("fem", "import bpy", "only mu_addon.blender knows Blender"),
         ("placement", "import headless", "only mu_addon.blender knows Blender"),
         ("novelty", "", "imports run downward"),
@@ -42,11 +42,11 @@ def test_tool_is_content(command):
 )
 def test_the_import_contracts_can_fail(tmp_path, module, line, contract):
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
-    for name in ("", "design", "fem", "placement", "study", module):
+    for name in ("", "design", "fem", "placement", "usecases", module):
         folder = tmp_path / "mu_addon" / name
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "__init__.py").write_text("")
-    for name in ("errors.py", "files.py", "usecases/simulate_and_place/report.py"):
+    for name in ("errors.py", "files.py", "usecases/report.py"):
         (tmp_path / "mu_addon" / name).write_text("")
     (tmp_path / "mu_addon" / module / "new.py").write_text(line + "\n")
     status, said = run(tool("lint-imports"), "--no-cache", cwd=tmp_path)

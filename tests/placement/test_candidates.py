@@ -16,7 +16,7 @@ from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.mesh import mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.placement.batch import Sweep
+from mu_addon.placement.batch import CandidateBatch
 from mu_addon.placement.candidates import candidates, evaluate, evaluation, moved_points, roi
 from mu_addon.placement.inclusion import RULES, sensor_share
 
@@ -55,7 +55,7 @@ def sensors(mesh, jobs):
 def swept(half, monitored):
     """Evaluations of some candidates, all solved in lockstep."""
     mesh, model, baseline = half
-    sweep = Sweep(model, materials(mesh), monitored, sensors(mesh, JOBS), 2.5)
+    sweep = CandidateBatch(model, materials(mesh), monitored, sensors(mesh, JOBS), 2.5)
     moved = baseline.of_time(np.array([sweep.at(s) for s in baseline.states]))
     still = moved_points(monitored, baseline)
     every = {c.name: c for c in candidates(anchors(UNIT), windows(6))}
@@ -68,7 +68,7 @@ def swept(half, monitored):
 def test_a_sensor_as_soft_as_the_lattice_changes_nothing(half, monitored):
     mesh, model, baseline = half
     soft = UNIT.material.lattice_modulus_kPa / 1e3
-    sweep = Sweep(model, materials(mesh), monitored, sensors(mesh, [("alpha2", "intersect")]), soft)
+    sweep = CandidateBatch(model, materials(mesh), monitored, sensors(mesh, [("alpha2", "intersect")]), soft)
     moved = sweep.at(baseline.states[-1])[0]
     assert np.abs(moved - moved_points(monitored, baseline)[-1]).max() < 1e-6
 

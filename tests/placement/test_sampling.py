@@ -24,7 +24,7 @@ def test_every_pressure_but_zero_is_met_once(values):
 @given(st.lists(st.floats(-50, 50).filter(lambda p: abs(p) > 1e-3), min_size=1, max_size=9, unique=True))
 def test_where_the_unit_weighs_something_no_pressure_is_solved_beside_the_extremes(values):
     pressure = np.unique([0.0, *values])
-    order = rounds(pressure, weighs=True)
+    order = rounds(pressure, has_gravity=True)
     assert sorted(i for batch in order for i in batch) == list(range(len(pressure)))
     met = [pressure[i] for i in order[0]]
     assert {0.0, pressure.min(), pressure.max()} <= set(met)

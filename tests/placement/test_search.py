@@ -16,7 +16,7 @@ from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.mesh import LATTICE, mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.placement.batch import Sweep
+from mu_addon.placement.batch import CandidateBatch
 from mu_addon.placement.deviation import centreline, deviation
 from mu_addon.placement.graph import Limits, lattice_graph
 from mu_addon.placement.inclusion import sensor_share
@@ -63,7 +63,7 @@ def exact(half_mesh, rule, chains):
         sensor_share(rule, polyline_inclusion(corners, lattice, GRAPH.nodes[list(c)], D.inclusion_radius))
         for c in chains
     ]
-    sweep = Sweep(model, made, (POINTS, monitor), shares, SENSOR_MPA)
+    sweep = CandidateBatch(model, made, (POINTS, monitor), shares, SENSOR_MPA)
     moved = np.stack([sweep.at(state) for state in baseline.states], axis=1)
     still = centreline(np.array([POINTS + monitor.displacement(s.u) for s in baseline.states]), 21)
     curves = (baseline.of_time(centreline(points, 21)) for points in moved)

@@ -9,7 +9,7 @@ import pytest
 
 from mu_addon.errors import OutputError
 from mu_addon.report.results import Gate, Parameter, Picture, ReportData
-from mu_addon.usecases.simulate_and_place.report import report_html, write_report
+from mu_addon.usecases.simulate_and_place.report import report_html, write_html
 
 from .report_data import png, results
 
@@ -195,4 +195,4 @@ def test_numbers_of_all_kinds():
 def test_cannot_be_written(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError):
-        write_report(tmp_path / "file" / "report.html", brief())
+        write_html(tmp_path / "file" / "report.html", brief())

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mu_addon.usecases.simulate_and_place.report import write_report
+from mu_addon.usecases.simulate_and_place.report import write_html
 
 from .browser import EXECUTABLE, Browser, complaints, requests
 from .report_data import results
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.skipif(EXECUTABLE is None, reason="no chromium here")
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     path = tmp_path_factory.mktemp("report") / "report.html"
-    write_report(path, results())
+    write_html(path, results())
     return path
 
 

@@ -140,9 +140,9 @@ def test_handlers_are_put_back():
     from mu_addon.run.progress import Progress
 
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
-    with run_to_end(Progress()) as ending:
+    with run_to_end(Progress()) as context:
         raise KeyboardInterrupt
-    assert ending.status == 130
+    assert context.status == 130
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
 
 
@@ -153,8 +153,8 @@ def test_a_full_disk_still_ends_with_its_message(tmp_path, monkeypatch):
     from mu_addon.run.progress import Progress
 
     told = []
-    with run_to_end(Progress([told.append])) as ending:
-        ending.open_folder(tmp_path)
+    with run_to_end(Progress([told.append])) as context:
+        context.open_folder(tmp_path)
 
         def full(_):
             raise OSError(28, "No space left on device")
@@ -163,6 +163,6 @@ def test_a_full_disk_still_ends_with_its_message(tmp_path, monkeypatch):
         from mu_addon.files import write_text
 
         write_text(tmp_path / "a.csv", "x")
-    assert ending.status == 5
+    assert context.status == 5
     assert told[-1]["type"] == "error"
     assert "free some space" in told[-1]["what_to_do"]

@@ -141,9 +141,9 @@ def test_every_flipped_bit_is_found_out_or_harmless(tmp_path):
 
 def started(folder, results=("a.csv", "model_a")):
     told = []
-    with run_to_end(Progress([told.append])) as ending:
-        begin(ending, folder, HEADER, {"mine.toml": HEADER + "\n"}, results)
-    return ending, told
+    with run_to_end(Progress([told.append])) as context:
+        begin(context, folder, HEADER, {"mine.toml": HEADER + "\n"}, results)
+    return context, told
 
 
 @pytest.mark.parametrize(
@@ -155,8 +155,8 @@ def test_a_link_under_a_name_of_ours_is_refused(tmp_path, name):
     folder = tmp_path / "out"
     folder.mkdir()
     (folder / name).symlink_to(victim)
-    ending, told = started(folder)
-    assert ending.status == 2
+    context, told = started(folder)
+    assert context.status == 2
     assert f"{name} in the folder is a link to elsewhere" in told[-1]["what"]
     assert victim.read_text() == "precious"
 

@@ -84,17 +84,17 @@ def test_a_lock_that_is_a_link_is_not_followed(tmp_path):
 def test_a_run_in_a_folder_in_use_ends_and_touches_nothing(tmp_path, holder):
     before = sorted(path.name for path in tmp_path.iterdir())
     told = []
-    with run_to_end(Progress([told.append])) as ending:
-        begin(ending, tmp_path, "# mine", {"a.toml": "# mine\n"}, ())
-    assert ending.status == 2
+    with run_to_end(Progress([told.append])) as context:
+        begin(context, tmp_path, "# mine", {"a.toml": "# mine\n"}, ())
+    assert context.status == 2
     assert "another run works in this folder" in told[-1]["what"]
     assert sorted(path.name for path in tmp_path.iterdir()) == before
 
 
 def test_a_run_gives_its_folder_free_however_it_ends(tmp_path):
     for fault in (None, RuntimeError, KeyboardInterrupt):
-        with run_to_end(Progress()) as ending:
-            begin(ending, tmp_path, "# mine", {"a.toml": "# mine\n"}, ())
+        with run_to_end(Progress()) as context:
+            begin(context, tmp_path, "# mine", {"a.toml": "# mine\n"}, ())
             if fault is not None:
                 raise fault
         FolderLock(tmp_path).release()
@@ -108,7 +108,7 @@ def test_a_disk_without_locks_is_warned_of(tmp_path, monkeypatch):
 
     monkeypatch.setattr(fcntl, "flock", none)
     told = []
-    with run_to_end(Progress([told.append])) as ending:
-        begin(ending, tmp_path, "# mine", {"a.toml": "# mine\n"}, ())
-    assert ending.status == 0
+    with run_to_end(Progress([told.append])) as context:
+        begin(context, tmp_path, "# mine", {"a.toml": "# mine\n"}, ())
+    assert context.status == 0
     assert any(m["type"] == "warning" and "no locks" in m["what"] for m in told)

@@ -6,6 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mu_addon.sensing.framing import (
+    cobs_decoded,
+    cobs_encoded,
     crc16,
     framed,
     info_frame,
@@ -13,8 +15,6 @@ from mu_addon.sensing.framing import (
     payload_of,
     sample_frame,
     sample_of,
-    stuffed,
-    unstuffed,
 )
 
 
@@ -25,26 +25,26 @@ def test_crc_is_the_catalogues() -> None:
 
 def test_stuffing_by_the_papers_rules() -> None:
     ramp = bytes(range(1, 255))
-    assert stuffed(b"") == b"\x01"
-    assert stuffed(b"\x00") == b"\x01\x01"
-    assert stuffed(b"\x11\x22\x00\x33") == b"\x03\x11\x22\x02\x33"
-    assert stuffed(ramp) == b"\xff" + ramp
-    assert stuffed(ramp + b"\x00") == b"\xff" + ramp + b"\x01\x01"
-    assert stuffed(ramp + b"\xff") == b"\xff" + ramp + b"\x02\xff"
+    assert cobs_encoded(b"") == b"\x01"
+    assert cobs_encoded(b"\x00") == b"\x01\x01"
+    assert cobs_encoded(b"\x11\x22\x00\x33") == b"\x03\x11\x22\x02\x33"
+    assert cobs_encoded(ramp) == b"\xff" + ramp
+    assert cobs_encoded(ramp + b"\x00") == b"\xff" + ramp + b"\x01\x01"
+    assert cobs_encoded(ramp + b"\xff") == b"\xff" + ramp + b"\x02\xff"
 
 
 @given(st.binary(max_size=1100))
 def test_any_bytes_come_back(data: bytes) -> None:
-    line = stuffed(data)
+    line = cobs_encoded(data)
     assert 0 not in line
     assert len(line) <= len(data) + 1 + len(data) // 254
-    assert unstuffed(line) == data
+    assert cobs_decoded(line) == data
 
 
 @given(st.binary(max_size=300))
 def test_no_noise_raises(data: bytes) -> None:
     payload_of(data)
-    unstuffed(data)
+    cobs_decoded(data)
     sample_of(data)
     info_of(data)
 

@@ -15,7 +15,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.candidates import candidates
 from mu_addon.run.cache import Cache
-from mu_addon.usecases.simulate_and_place.candidate_states import Sweep
+from mu_addon.usecases.simulate_and_place.candidate_states import CandidateSolver
 from mu_addon.usecases.simulate_and_place.job import Job
 
 UNIT = load_preset("mu-1.0x")
@@ -39,7 +39,7 @@ def model_a():
 
 def swept(model_a, folder, **changes):
     mesh, trajectory = model_a
-    sweep = Sweep(attrs.evolve(JOB, **changes), Cache(folder), mesh, JOBS, PRESSURES)
+    sweep = CandidateSolver(attrs.evolve(JOB, **changes), Cache(folder), mesh, JOBS, PRESSURES)
     told = []
     found = sweep.evaluations(trajectory, told.append, verify=True)
     sweep.close()

@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 from mu_addon.errors import InputError
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.diagnose.design_experiments import NOISE, answer, design_experiments, noise_of, plan
+from mu_addon.usecases.diagnose.design_experiments import (
+    NOISE,
+    console_summary,
+    design_experiments,
+    noise_of,
+    plan,
+)
 from tests.evidence import analytic
 
 from .diagnosis_data import weighed_blocks
@@ -65,13 +71,15 @@ def test_what_was_measured_does_not_matter():
 
 def test_it_leaves_a_table_and_a_report(tmp_path):
     progress = Progress()
-    with run_to_end(progress) as ending:
+    with run_to_end(progress) as context:
         folder = weighed_blocks(tmp_path / "data", 0.0)
-        design_experiments(folder, tmp_path / "out", progress=progress, ending=ending)
-    assert ending.status == 0
+        design_experiments(folder, tmp_path / "out", progress=progress, context=context)
+    assert context.status == 0
     # Weighed, the two are no longer one.
-    assert not {"overcure", "skin_cure"} <= {n for pair in ending.summary["alike"] for n in pair[:2]}
-    assert any(line.startswith("overcure: visible from offset 0.0") for line in answer(ending.summary))
+    assert not {"overcure", "skin_cure"} <= {n for pair in context.summary["alike"] for n in pair[:2]}
+    assert any(
+        line.startswith("overcure: visible from offset 0.0") for line in console_summary(context.summary)
+    )
     assert (tmp_path / "out" / "limits.csv").read_text().startswith("effect,parameter,unit,visible_from")
     assert "would show" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 

@@ -15,10 +15,10 @@ from mu_addon.evidence import unit_fem
 from mu_addon.evidence.extended import load_model
 from mu_addon.evidence.prediction.lattice import LatticeStress
 from mu_addon.measured import read_folder
-from mu_addon.run.context import Ending, run_to_end
+from mu_addon.run.context import RunContext, run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.diagnose import run as diagnosing
-from mu_addon.usecases.diagnose.run import answer, diagnose_folder
+from mu_addon.usecases.diagnose.run import console_summary, diagnose_folder
 from mu_addon.usecases.simulate_and_place.extended_unit import read_extended
 from tests.evidence import analytic
 
@@ -32,18 +32,18 @@ OFFSET_mm = 0.09
 def run(folder, out, *arguments, **options):
     messages = []
     progress = Progress([messages.append])
-    with run_to_end(progress) as ending:
-        diagnose_folder(folder, out, *arguments, progress=progress, ending=ending, **options)
-    return ending, messages
+    with run_to_end(progress) as context:
+        diagnose_folder(folder, out, *arguments, progress=progress, context=context, **options)
+    return context, messages
 
 
 @pytest.fixture(scope="module")
 def overcured(tmp_path_factory):
     folder = weighed_blocks(tmp_path_factory.mktemp("data") / "blocks", OFFSET_mm)
     out = tmp_path_factory.mktemp("diagnosis")
-    ending, messages = run(folder, out)
-    assert ending.status == 0, messages[-1]
-    return folder, out, ending.summary, messages
+    context, messages = run(folder, out)
+    assert context.status == 0, messages[-1]
+    return folder, out, context.summary, messages
 
 
 def test_the_verdict_names_what_was_put_in(overcured):
@@ -90,7 +90,7 @@ def test_the_report_says_it_in_a_sentence_and_needs_no_server(overcured):
 
 
 def test_the_terminal_is_told_in_a_few_lines(overcured):
-    lines = answer(overcured[2])
+    lines = console_summary(overcured[2])
     assert lines[0] == "verdict: named: overcure"
     assert lines[-1].startswith("next: ")
     assert 3 <= len(lines) <= 6
@@ -115,9 +115,9 @@ def test_the_same_data_are_not_judged_twice(overcured, tmp_path, monkeypatch):
     folder, out, summary, _ = overcured
     shutil.copytree(out, tmp_path / "out")
     monkeypatch.setattr(diagnosing, "diagnose", None)
-    ending, told = run(folder, tmp_path / "out")
-    assert ending.status == 0
-    assert answer(ending.summary) == answer(summary)
+    context, told = run(folder, tmp_path / "out")
+    assert context.status == 0
+    assert console_summary(context.summary) == console_summary(summary)
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["status"] == "complete"
     assert [m["stage"] for m in told if m["type"] == "progress" and m["state"] == "end"] == [
         "verdict of the same data, kept"
@@ -131,15 +131,15 @@ def test_other_data_set_the_old_results_aside(overcured, tmp_path):
     _, out, _, _ = overcured
     shutil.copytree(out, tmp_path / "out")
     other = weighed_blocks(tmp_path / "data", 0.0)
-    ending, _ = run(other, tmp_path / "out")
-    assert ending.status == 0
+    context, _ = run(other, tmp_path / "out")
+    assert context.status == 0
     assert (tmp_path / "out" / "stale" / "verdict.json").read_bytes() == (out / "verdict.json").read_bytes()
     assert json.loads((tmp_path / "out" / "verdict.json").read_text())["verdict"] == "none"
 
 
 def test_nothing_is_named_where_nothing_is_wrong(tmp_path):
-    ending, _ = run(weighed_blocks(tmp_path / "data", 0.0), tmp_path / "out")
-    assert ending.summary["verdict"] == "none"
+    context, _ = run(weighed_blocks(tmp_path / "data", 0.0), tmp_path / "out")
+    assert context.summary["verdict"] == "none"
     assert load_model(tmp_path / "out" / "model.toml").effects == {}
     html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "Verdict: <strong>nothing wrong</strong>" in html
@@ -147,11 +147,11 @@ def test_nothing_is_named_where_nothing_is_wrong(tmp_path):
 
 
 def test_three_moduli_of_the_paper_are_not_enough_to_tell(tmp_path):
-    ending, _ = run(PAPER, tmp_path)
-    assert ending.status == 0
-    assert ending.summary["verdict"] == "ambiguous"
-    assert {"overcure", "skin cure"} <= set(re.split(", | or ", ending.summary["headline"]))
-    assert "weigh" in ending.summary["next"].lower()
+    context, _ = run(PAPER, tmp_path)
+    assert context.status == 0
+    assert context.summary["verdict"] == "ambiguous"
+    assert {"overcure", "skin cure"} <= set(re.split(", | or ", context.summary["headline"]))
+    assert "weigh" in context.summary["next"].lower()
     # The extended model gives each unit the modulus that was measured at its scale, to the printed spread.
     for preset, kPa, spread in (
         ("mu-0.75x", 21.70, 0.35),
@@ -161,7 +161,7 @@ def test_three_moduli_of_the_paper_are_not_enough_to_tell(tmp_path):
         extended = read_extended(load_preset(preset), tmp_path / "model.toml").unit
         assert extended.material.lattice_modulus_kPa == pytest.approx(kPa, abs=spread)
     assert load_model(tmp_path / "model.toml").nuisances["lattice_modulus_kPa"].unit == "kPa"
-    assert any("3 x 3 x 3 cells between plates that hold" in words for words in ending.summary["remarks"])
+    assert any("3 x 3 x 3 cells between plates that hold" in words for words in context.summary["remarks"])
 
 
 @pytest.mark.parametrize("gauge_kPa", [0.0, 0.02])
@@ -177,14 +177,14 @@ def test_a_unit_is_judged_by_its_angle_and_markers(tmp_path, monkeypatch, gauge_
 
     monkeypatch.setattr(unit_fem, "unit_responses", responses)
     out = tmp_path / "out"
-    ending, messages = run(folder, out)
-    assert ending.status == 0, messages[-1]
-    assert ending.summary["verdict"] == "named"
-    assert [c["effect"] for c in ending.summary["causes"]] == ["clogged_chamber"]
-    told = [r.partition(";")[0] for r in ending.summary["remarks"] if "white noise" in r]
+    context, messages = run(folder, out)
+    assert context.status == 0, messages[-1]
+    assert context.summary["verdict"] == "named"
+    assert [c["effect"] for c in context.summary["causes"]] == ["clogged_chamber"]
+    told = [r.partition(";")[0] for r in context.summary["remarks"] if "white noise" in r]
     # What is predicted has noise as well, of which nothing is taken.
     assert told == ["pressure_kPa was read with white noise of up to 0.022"] * (gauge_kPa > 0)
-    gain = ending.summary["gain"]["held_out"]
+    gain = context.summary["gain"]["held_out"]
     assert gain["unit"] == "deg"
     assert gain["rmse_after"] < 0.15 < gain["rmse_before"]
     assert 'name = "mu-1.0x"' in (out / "unit.toml").read_text()
@@ -222,7 +222,7 @@ def test_what_cannot_be_judged_is_named_before_anything_is_written(tmp_path, spo
     spoil(folder)
     progress = Progress()
     with pytest.raises(InputError) as caught:
-        diagnose_folder(folder, tmp_path / "out", progress=progress, ending=Ending(progress))
+        diagnose_folder(folder, tmp_path / "out", progress=progress, context=RunContext(progress))
     assert what in caught.value.what
     assert where in f"{caught.value.where} {caught.value.remedy}"
     assert not (tmp_path / "out").exists()

@@ -33,17 +33,17 @@ RESIN = load_material("elastic-50a-v1")
 
 def run(work, *arguments):
     said = []
-    with run_to_end(Progress([said.append])) as ending:
-        work(*arguments, ending.progress, ending)
-    return ending, said
+    with run_to_end(Progress([said.append])) as context:
+        work(*arguments, context.progress, context)
+    return context, said
 
 
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory):
     folder = tmp_path_factory.mktemp("export")
     job = Job(SMALL, RESIN, window(SMALL, "alpha1"), "alpha1", quality="interactive")
-    ending, _ = run(export, job, folder)
-    assert ending.status == 0
+    context, _ = run(export, job, folder)
+    assert context.status == 0
     return folder, json.loads((folder / "manifest.json").read_text())
 
 
@@ -204,8 +204,8 @@ def test_without_gmsh_the_rest_is_written(tmp_path, monkeypatch):
 
     monkeypatch.setattr("mu_addon.meshing.step.load_gmsh", missing)
     job = Job(SMALL, RESIN, formats=("stl", "step", "txt"), quality="interactive")
-    ending, said = run(export, job, tmp_path)
-    assert ending.status == 0
+    context, said = run(export, job, tmp_path)
+    assert context.status == 0
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     assert [f["file"] for f in manifest["files"]] == ["unit.stl", "nodes.txt"]
     assert manifest["refused"][0]["why"] == "gmsh cannot load libGLU.so.1"
@@ -218,8 +218,8 @@ def test_without_gmsh_the_rest_is_written(tmp_path, monkeypatch):
 def test_a_file_that_is_not_what_was_built_is_an_error(tmp_path, monkeypatch):
     real = exporting.stl_bytes
     monkeypatch.setattr(exporting, "stl_bytes", lambda v, t: real(v * 1.001, t))
-    ending, _ = run(export, Job(SMALL, RESIN, formats=("stl",), quality="interactive"), tmp_path)
-    assert ending.status == 5
+    context, _ = run(export, Job(SMALL, RESIN, formats=("stl",), quality="interactive"), tmp_path)
+    assert context.status == 5
     assert "read back, encloses" in json.loads((tmp_path / "summary.json").read_text())["reason"]["what"]
 
 
@@ -263,8 +263,8 @@ def test_calliper_sheets_become_offsets(tmp_path):
 @pytest.fixture(scope="module")
 def printed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("specimens")
-    ending, _ = run(make_specimens, Unit(), RESIN, folder)
-    assert ending.status == 0
+    context, _ = run(make_specimens, Unit(), RESIN, folder)
+    assert context.status == 0
     return folder, json.loads((folder / "manifest.json").read_text())
 
 

@@ -12,9 +12,9 @@ from mu_addon.errors import InputError
 from mu_addon.materials.coupon import incompressible
 from mu_addon.materials.forms import FORMS
 from mu_addon.materials.library import read_material
-from mu_addon.run.context import Ending, run_to_end
+from mu_addon.run.context import RunContext, run_to_end
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.fit_material.run import answer, fit_material
+from mu_addon.usecases.fit_material.run import console_summary, fit_material
 
 DATA = Path(__file__).parent.parent / "data"
 
@@ -22,17 +22,17 @@ DATA = Path(__file__).parent.parent / "data"
 def run(folder, out, *arguments, **options):
     messages = []
     progress = Progress([messages.append])
-    with run_to_end(progress) as ending:
-        fit_material(folder, out, *arguments, progress=progress, ending=ending, **options)
-    return ending, messages
+    with run_to_end(progress) as context:
+        fit_material(folder, out, *arguments, progress=progress, context=context, **options)
+    return context, messages
 
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory):
     out = tmp_path_factory.mktemp("fit")
-    ending, messages = run(DATA / "treloar", out, ("neo-hooke", "yeoh", "ogden-1"), ("equibiaxial",))
-    assert ending.status == 0
-    return out, ending.summary, messages
+    context, messages = run(DATA / "treloar", out, ("neo-hooke", "yeoh", "ogden-1"), ("equibiaxial",))
+    assert context.status == 0
+    return out, context.summary, messages
 
 
 def test_a_fit_leaves_a_material_that_gives_the_stresses_of_its_table(fitted):
@@ -69,7 +69,7 @@ def test_the_tables_say_what_the_summary_says(fitted):
 
 
 def test_the_terminal_is_told_in_a_few_lines(fitted):
-    lines = answer(fitted[1])
+    lines = console_summary(fitted[1])
     assert lines[0].startswith("law: yeoh, c1_MPa 0.")
     assert "in equibiaxial" in lines[1]
     assert lines[2] == "misses equibiaxial by more than 10%"
@@ -94,8 +94,8 @@ def test_charts_are_the_same_bytes_for_the_same_data(fitted, tmp_path):
 def test_results_of_other_inputs_are_set_aside(tmp_path):
     run(DATA / "treloar", tmp_path, ("neo-hooke",))
     first = (tmp_path / "material.toml").read_text()
-    ending, _ = run(DATA / "treloar", tmp_path, ("yeoh",))
-    assert ending.status == 0
+    context, _ = run(DATA / "treloar", tmp_path, ("yeoh",))
+    assert context.status == 0
     assert (tmp_path / "stale" / "material.toml").read_text() == first
     assert "Yeoh" in (tmp_path / "material.toml").read_text()
 
@@ -115,9 +115,9 @@ def test_one_mode_alone_brings_a_warning_of_the_others(tmp_path):
     (folder / "experiments.toml").write_text(
         '[[experiment]]\nname = "pull"\nkind = "coupon"\nfile = "pull.csv"\nrole = "fit"\nmode = "uniaxial"\n'
     )
-    ending, _ = run(folder, tmp_path / "out", ("yeoh", "ogden-1", "ogden-2"), weights="relative")
-    assert ending.status == 0
-    assert set(ending.summary["untested"]) == {"equibiaxial", "pure_shear"}
+    context, _ = run(folder, tmp_path / "out", ("yeoh", "ogden-1", "ogden-2"), weights="relative")
+    assert context.status == 0
+    assert set(context.summary["untested"]) == {"equibiaxial", "pure_shear"}
     html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "Equibiaxial was not tested. Laws that fit the rest differ there by a factor of" in html
     assert "relative" in (tmp_path / "out" / "fit.toml").read_text()
@@ -137,5 +137,7 @@ def test_one_mode_alone_brings_a_warning_of_the_others(tmp_path):
 def test_what_cannot_be_fitted_is_refused_before_anything_is_written(tmp_path, folder, arguments, what):
     progress = Progress()
     with pytest.raises(InputError, match=re.escape(what)):
-        fit_material(DATA / folder, tmp_path / "out", *arguments, progress=progress, ending=Ending(progress))
+        fit_material(
+            DATA / folder, tmp_path / "out", *arguments, progress=progress, context=RunContext(progress)
+        )
     assert not (tmp_path / "out").exists()

@@ -9,10 +9,10 @@ from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
 from mu_addon.homogenize.effective import read_effective
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.run.context import Ending, run_to_end
+from mu_addon.run.context import RunContext, run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place.job import Job
-from mu_addon.usecases.simulate_and_place.run import Study
+from mu_addon.usecases.simulate_and_place.study import Study
 
 from ..homogenize.lattice_laws import body_centred
 
@@ -27,22 +27,22 @@ JOB = Job(
 
 def simulated(folder, lattice):
     progress = Progress([])
-    with run_to_end(progress) as ending:
-        study = Study.open(attrs.evolve(JOB, lattice=lattice), folder, progress, ending)
+    with run_to_end(progress) as context:
+        study = Study.open(attrs.evolve(JOB, lattice=lattice), folder, progress, context)
         study.make_mesh()
         study.simulate()
-    assert ending.status == 0
+    assert context.status == 0
     return study
 
 
 def test_the_lattices_law_decides_the_motion_and_is_kept_with_it(tmp_path):
     own = simulated(tmp_path, None)
-    angle = own.ending.summary["angle_deg"]["20"]
+    angle = own.context.summary["angle_deg"]["20"]
     assert "lattice" not in (tmp_path / "study.toml").read_text()
     before = (tmp_path / "study.toml").read_text(), (tmp_path / "angle.csv").read_text()
 
     study = simulated(tmp_path, body_centred())
-    summary = study.ending.summary
+    summary = study.context.summary
     # As stiff along an axis, but three times stiffer in shear: it bends less.
     assert 0.3 * angle < summary["angle_deg"]["20"] < 0.9 * angle
     assert 'lattice = "effective.toml"' in (tmp_path / "study.toml").read_text()
@@ -61,12 +61,12 @@ def test_the_lattices_law_decides_the_motion_and_is_kept_with_it(tmp_path):
     again = simulated(tmp_path, narrow)
     assert (stale / "study.toml").read_text() == text
     assert read_effective(stale / "effective.toml") == body_centred()
-    assert again.ending.summary["angle_deg"] == summary["angle_deg"]
+    assert again.context.summary["angle_deg"] == summary["angle_deg"]
     (warning,) = (text for text in again.warnings if "fitted" in text)
     assert "was fitted from 0.97 to 1.02" in warning
     least = min(s["least"] for s in stretch.values())
     assert f"from {least:.2f} to" in warning
-    assert again.ending.summary["lattice_stretch"]["20"]["share_beyond_fit"] > 0.1
+    assert again.context.summary["lattice_stretch"]["20"]["share_beyond_fit"] > 0.1
 
     # And back to the unit's own modulus.
     simulated(tmp_path, None)
@@ -82,7 +82,7 @@ def test_a_law_of_another_cell_is_warned_of(tmp_path):
     for lattice in (same, other):
         progress = Progress([])
         folder = tmp_path / str(len(told))
-        study = Study.open(attrs.evolve(JOB, lattice=lattice), folder, progress, Ending(progress))
+        study = Study.open(attrs.evolve(JOB, lattice=lattice), folder, progress, RunContext(progress))
         told.append([text for text in study.warnings if "another cell" in text])
     assert told[0] == []
     assert "kind octet (unit: body-centred), offset_xy_mm 0.1 (unit: 0.0)" in told[1][0]
@@ -105,10 +105,10 @@ def test_a_file_of_the_law_that_is_there_already_is_no_obstacle_but_another_is(t
     law = body_centred()
     (tmp_path / "effective.toml").write_text(law.text())
     progress = Progress([])
-    Study.open(attrs.evolve(JOB, lattice=law), tmp_path, progress, Ending(progress))
+    Study.open(attrs.evolve(JOB, lattice=law), tmp_path, progress, RunContext(progress))
     other = tmp_path / "other"
     other.mkdir()
     (other / "effective.toml").write_text("not yours")
     with pytest.raises(InputError, match=r"somebody else's: effective\.toml"):
-        Study.open(attrs.evolve(JOB, lattice=law), other, progress, Ending(progress))
+        Study.open(attrs.evolve(JOB, lattice=law), other, progress, RunContext(progress))
     assert (other / "effective.toml").read_text() == "not yours"

@@ -28,7 +28,7 @@ from mu_addon.placement.candidates import Candidate, candidates, roi, with_senso
 from mu_addon.placement.whole import whole_body
 from mu_addon.report.pc2 import read_pc2, write_pc2
 from mu_addon.run.cache import Cache
-from mu_addon.usecases.simulate_and_place.candidate_states import Sweep
+from mu_addon.usecases.simulate_and_place.candidate_states import CandidateSolver
 from mu_addon.usecases.simulate_and_place.job import Job
 from mu_addon.usecases.simulate_and_place.motion import (
     FIELDS,
@@ -74,7 +74,7 @@ def study(tmp_path_factory):
 
 def swept(folder, mesh, solved_on, trajectory, jobs):
     """The sweep of some jobs on a mesh, the motion of its paths written, and its evaluations."""
-    sweep = Sweep(JOB, Cache(folder / "cache"), solved_on, jobs, PRESSURES, "volume_fraction")
+    sweep = CandidateSolver(JOB, Cache(folder / "cache"), solved_on, jobs, PRESSURES, "volume_fraction")
     evaluations = sweep.evaluations(trajectory, lambda _: None)
     sweep.close()
     of = SimpleNamespace(job=JOB, headline_rule="volume_fraction", mesh=mesh, folder=folder)

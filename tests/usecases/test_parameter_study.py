@@ -69,9 +69,9 @@ def formula(task):
 def swept(text, folder, work=formula, status=0, **options):
     told = []
     asked.clear()
-    with run_to_end(Progress([told.append])) as ending:
-        sweep(parse_plan(text, folder), folder, ending.progress, ending, work=work, **options)
-    assert ending.status == status, told[-1]
+    with run_to_end(Progress([told.append])) as context:
+        sweep(parse_plan(text, folder), folder, context.progress, context, work=work, **options)
+    assert context.status == status, told[-1]
     return list(csv.DictReader((folder / "points.csv").open(newline=""))), told
 
 
@@ -138,9 +138,9 @@ def test_a_damaged_plan_or_point_is_made_again(tmp_path):
 def test_a_grid_cannot_be_added_to(tmp_path):
     text = TEXT.replace('"latin_hypercube"', '"grid"')
     _, told = [], []
-    with run_to_end(Progress([told.append])) as ending:
-        sweep(parse_plan(text, tmp_path), tmp_path / "out", ending.progress, ending, add=2, work=formula)
-    assert ending.status == 2
+    with run_to_end(Progress([told.append])) as context:
+        sweep(parse_plan(text, tmp_path), tmp_path / "out", context.progress, context, add=2, work=formula)
+    assert context.status == 2
     assert "--add" in told[-1]["where"]
 
 
@@ -333,10 +333,10 @@ def test_a_lost_worker_and_a_restarted_scheduler_lose_no_point(farm, tmp_path):
                 farm.scheduler()
                 farm.worker()
 
-    with run_to_end(Progress([Trouble()])) as ending:
+    with run_to_end(Progress([Trouble()])) as context:
         plan = parse_plan(text, tmp_path)
-        sweep(plan, folder, ending.progress, ending, scheduler=farm.address, work=slow_formula)
-    assert ending.status == 0, told[-1]
+        sweep(plan, folder, context.progress, context, scheduler=farm.address, work=slow_formula)
+    assert context.status == 0, told[-1]
     assert lost.poll() is not None
     assert first.poll() is not None
     rows = list(csv.DictReader((folder / "points.csv").open(newline="")))
@@ -349,15 +349,15 @@ def test_a_lost_worker_and_a_restarted_scheduler_lose_no_point(farm, tmp_path):
 def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(cluster_module, "PATIENCE_S", 4.0)
     told = []
-    with run_to_end(Progress([told.append])) as ending:
+    with run_to_end(Progress([told.append])) as context:
         sweep(
             parse_plan(TEXT, tmp_path),
             tmp_path / "out",
-            ending.progress,
-            ending,
+            context.progress,
+            context,
             scheduler=f"tcp://127.0.0.1:{free_port()}",
         )
-    assert ending.status == 1
+    assert context.status == 1
     assert "no scheduler answers" in told[-1]["what"]
     assert "dask scheduler" in told[-1]["what_to_do"]
     assert (tmp_path / "out" / "points.csv").is_file()

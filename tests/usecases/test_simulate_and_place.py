@@ -7,16 +7,16 @@ import attrs
 import numpy as np
 import pytest
 
-from mu_addon.cli.study_options import run_stages
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.protocol import Protocol
 from mu_addon.files import write_npz
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.simulate_and_place import run as module
+from mu_addon.usecases.simulate_and_place import study as module
 from mu_addon.usecases.simulate_and_place.job import Job, read_job
-from mu_addon.usecases.simulate_and_place.run import Study
+from mu_addon.usecases.simulate_and_place.run import run_stages
+from mu_addon.usecases.simulate_and_place.study import Study
 
 JOB = Job(
     unit=load_preset("mu-1.0x"),
@@ -33,9 +33,9 @@ JOB = Job(
 def ran(job, folder):
     """Its summary; the report, which takes longest, is left out."""
     told = []
-    with run_to_end(Progress([told.append])) as ending:
-        run_stages(Study.open(job, folder, ending.progress, ending))
-    assert ending.status == 0, told[-1]
+    with run_to_end(Progress([told.append])) as context:
+        run_stages(Study.open(job, folder, context.progress, context))
+    assert context.status == 0, told[-1]
     return json.loads((folder / "summary.json").read_text())
 
 
@@ -115,11 +115,11 @@ def test_a_smaller_job_keeps_what_is_still_valid(copied, stages):
     assert (folder / "deviation.csv").is_file()
     assert not (folder / "stale").exists()
     assert read_job(folder).stages == JOB.stages
-    from mu_addon.usecases.simulate_and_place.report_data import publish
+    from mu_addon.usecases.simulate_and_place.report_data import write_report
 
-    with run_to_end(Progress()) as ending:
-        publish(Study.open(study, folder, ending.progress, ending))
-    assert ending.status == 0
+    with run_to_end(Progress()) as context:
+        write_report(Study.open(study, folder, context.progress, context))
+    assert context.status == 0
     assert (folder / "report.html").read_text() == "of the full study"
 
 
@@ -172,9 +172,9 @@ def test_too_little_room_is_told_before_any_work(tmp_path, monkeypatch):
     usage = shutil.disk_usage(tmp_path)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=20_000_000))
     told = []
-    with run_to_end(Progress([told.append])) as ending:
-        Study.open(JOB, tmp_path / "out", ending.progress, ending)
-    assert ending.status == 5
+    with run_to_end(Progress([told.append])) as context:
+        Study.open(JOB, tmp_path / "out", context.progress, context)
+    assert context.status == 5
     assert "20 MB are free" in told[-1]["what"]
     assert "free some space" in told[-1]["what_to_do"]
     assert not (tmp_path / "out" / "unit.stl").exists()

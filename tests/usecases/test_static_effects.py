@@ -9,7 +9,6 @@ import pytest
 
 from mu_addon.cli.main import main, parser
 from mu_addon.cli.options import modelled, modelled_unit
-from mu_addon.cli.study_options import run_stages
 from mu_addon.design import shapes
 from mu_addon.design.body import body_of
 from mu_addon.design.parameters import load_preset
@@ -21,7 +20,7 @@ from mu_addon.evidence.unit_fem import Run, run
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg, probe
 from mu_addon.fem.protocol import Protocol
-from mu_addon.fem.time_stepping import march
+from mu_addon.fem.time_stepping import simulate_in_time
 from mu_addon.fem.trajectory import simulate
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
@@ -32,8 +31,9 @@ from mu_addon.run.progress import Progress
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.simulate_and_place.extended_unit import extend
 from mu_addon.usecases.simulate_and_place.job import Job, read_job
-from mu_addon.usecases.simulate_and_place.run import Study
+from mu_addon.usecases.simulate_and_place.run import run_stages
 from mu_addon.usecases.simulate_and_place.static_effects import NAMES, StaticEffects
+from mu_addon.usecases.simulate_and_place.study import Study
 
 UNIT = load_preset("mu-1.0x")
 ROUGH = MeshSettings(refine=0.4, order=1)
@@ -89,9 +89,9 @@ def moved(job, mesh):
 def ran(job, folder):
     """Its summary; the report, which takes longest, is left out."""
     told = []
-    with run_to_end(Progress([told.append])) as ending:
-        run_stages(Study.open(job, folder, ending.progress, ending))
-    assert ending.status == 0, told[-1]
+    with run_to_end(Progress([told.append])) as context:
+        run_stages(Study.open(job, folder, context.progress, context))
+    assert context.status == 0, told[-1]
     return json.loads((folder / "summary.json").read_text())
 
 
@@ -166,8 +166,10 @@ def test_beside_obstacles_weight_acts_from_the_first_instant_on(mesh):
     free, _ = moved(job, mesh)
     model = beside.model(mesh)
     assert len(model.obstacles) == 1
-    marched = march(Equilibrium(model, beside.materials(mesh), beside.newton), TIME, PRESSURE)
-    for k, state in enumerate(marched.states):
+    simulated_in_time = simulate_in_time(
+        Equilibrium(model, beside.materials(mesh), beside.newton), TIME, PRESSURE
+    )
+    for k, state in enumerate(simulated_in_time.states):
         np.testing.assert_allclose(state.u, free.states[free.index[k]].u, atol=1e-6)
 
 
@@ -191,8 +193,8 @@ def test_sensor_paths_are_ranked_in_the_unit_that_has_the_effect(placed, name, m
     J = found["J_hat_mm"]["volume_fraction"]
     assert all(abs(J[path] / without[path] - 1) > 2e-3 for path in without)
     points = np.array([[0.0, 0.0, 0.0]])
-    with run_to_end(Progress()) as ending:
-        study = Study.open(job, folder, ending.progress, ending)
+    with run_to_end(Progress()) as context:
+        study = Study.open(job, folder, context.progress, context)
         points, windows = study.anchors, study.windows
     trajectory, _ = moved(job, mesh)
     monitored, d = (points, probe(mesh, points)), UNIT.dimensions
@@ -323,10 +325,10 @@ def given(unit_of, *words):
     """What a command makes of its options --preset and --model, its summary, and what it warns of."""
     told = []
     options = parser().parse_args([str(w) for w in [*words, "--preset", "mu-1.0x", "--out", "out"]])
-    with run_to_end(Progress([told.append])) as ending:
-        found = unit_of(options, ending.progress, ending)
-    assert ending.status == 0, told[-1]
-    return found, ending.summary, [m["what"] for m in told if m.get("type") == "warning"]
+    with run_to_end(Progress([told.append])) as context:
+        found = unit_of(options, context.progress, context)
+    assert context.status == 0, told[-1]
+    return found, context.summary, [m["what"] for m in told if m.get("type") == "warning"]
 
 
 def test_a_direction_of_nothing_that_weighs_is_told(tmp_path):

@@ -18,7 +18,7 @@ ICONS = {"none": "CHECKMARK", "named": "LIGHT", "ambiguous": "QUESTION"}
 ICONS |= {"unidentifiable": "QUESTION", "unexplained": "ERROR"}
 
 
-def spoken(name: str) -> str:
+def readable(name: str) -> str:
     """An effect's or quantity's name as it is said."""
     return name.replace("_", " ")
 
@@ -100,9 +100,9 @@ def _verdict(layout, root, judged):
     wrapped(column, str(judged.summary.get("sentence", "")))
     for cause in judged.verdict.get("causes") or ():
         if cause["rivals"]:
-            rivals = ", ".join(spoken(name) for name in cause["rivals"])
+            rivals = ", ".join(readable(name) for name in cause["rivals"])
             wrapped(
-                column, f"explained as well by {rivals}, in place of {spoken(cause['effect'])}", "QUESTION"
+                column, f"explained as well by {rivals}, in place of {readable(cause['effect'])}", "QUESTION"
             )
     gain = (judged.verdict.get("gain") or {}).get("held_out") or {}
     if gain.get("rmse_before") is not None and judged.verdict.get("causes"):
@@ -133,7 +133,7 @@ def _dependence(layout, judged):
     if body:
         for against, p, where in rows[:ROWS]:
             row = body.row()
-            row.label(text=spoken(against), icon="ERROR" if p < 0.01 else "BLANK1")
+            row.label(text=readable(against), icon="ERROR" if p < 0.01 else "BLANK1")
             row.label(text="p < 1e-16" if p < 1e-16 else f"p = {p:.2g}")
             if where and p < 0.01:
                 wrapped(body, where, "BLANK1")

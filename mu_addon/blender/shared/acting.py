@@ -96,14 +96,14 @@ def telling(execute):
     """`execute` that reports a MuError, what, where and remedy, and cancels: no undo step, no traceback."""
 
     @wraps(execute)
-    def told(self, context):
+    def reported(self, context):
         try:
             return execute(self, context)
         except MuError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
 
-    return told
+    return reported
 
 
 class OpensFile(OnUnit):

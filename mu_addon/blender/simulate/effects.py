@@ -34,7 +34,7 @@ def _tables(root: Any) -> dict[str, dict[str, dict[str, Any]]]:
     return found
 
 
-def weighs(root: Any) -> bool:
+def has_gravity(root: Any) -> bool:
     """Whether the direction of gravity matters to the unit's simulation."""
     return WEIGHT in _tables(root)
 
@@ -75,5 +75,5 @@ def arguments(root: Any, folder: Path) -> list[str]:
         return []
     path = folder / MODEL
     write_text(path, root.mu_unit.study.effects)
-    turned = ["--orientation", repr(_direction(root))] if weighs(root) else []
+    turned = ["--orientation", repr(_direction(root))] if has_gravity(root) else []
     return ["--model", str(path), *turned]

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-from ...usecases.track_video.run import answer, figures, filmed, read_pressure, write_experiment
+from ...usecases.track_video.run import console_summary, figures, filmed, read_pressure, write_experiment
 from ..shared.acting import telling
 from ..unit import object as unit_object
 from . import properties as bench
@@ -90,7 +90,7 @@ class MU_OT_track_write(bpy.types.Operator):
         table, remarks = write_experiment(found, described, name, folder)
         for remark in (*found.remarks, *remarks):
             self.report({"WARNING"}, remark.what)
-        self.report({"INFO"}, ". ".join(answer(figures(found, name, table))))
+        self.report({"INFO"}, ". ".join(console_summary(figures(found, name, table))))
         root = unit_object.active_root(context)
         if root is not None and not root.mu_evidence.folder:
             root.mu_evidence.folder = clip.mu_bench.folder

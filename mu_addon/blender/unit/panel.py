@@ -236,7 +236,7 @@ def _effects(layout, root) -> None:
     row.operator("mu.evidence_remove", text="", icon="X")
     for line in lines:
         wrapped(box, line)
-    if effects.weighs(root):
+    if effects.has_gravity(root):
         box.prop(root.mu_unit.study, "orientation_deg")
 
 

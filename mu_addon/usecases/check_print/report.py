@@ -38,7 +38,7 @@ GREY = (0.66, 0.70, 0.76)
 MOST_ROWS = 12
 
 
-def publish(
+def write_report(
     job: Job, vertices: Vertices, triangles: Triangles, found: PrintCheck, folder: Path, progress: Progress
 ) -> None:
     """Write places.png and report.html."""
@@ -60,11 +60,11 @@ def report(job: Job, found: PrintCheck, picture: Picture) -> str:
     ]
     assumed = sum(f.assumed for f in found.findings if f.limit is not None)
     notes = [f"{assumed} of these limits are assumed: nobody has published them for this resin. Set yours."]
-    lead = f'<div class="lead"><div>{_answer(job, found)}</div>{picture_figure(picture)}</div>'
+    lead = f'<div class="lead"><div>{_headline(job, found)}</div>{picture_figure(picture)}</div>'
     return page(f"Print check: {job.name}", job.printer.title, note(notes if assumed else []), lead, sections)
 
 
-def _answer(job: Job, found: PrintCheck) -> str:
+def _headline(job: Job, found: PrintCheck) -> str:
     faults = [f for f in found.findings if f.severity == "error"]
     warned = [f for f in found.findings if f.severity == "warning"]
     words = {

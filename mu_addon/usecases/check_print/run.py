@@ -19,7 +19,7 @@ from ...design.solid import build_solid
 from ...design.surface import Triangles, Vertices, stl_bytes, stl_surface
 from ...errors import InputError
 from ...files import write_bytes, write_json
-from ...run.context import Ending
+from ...run.context import RunContext
 from ...run.folder import begin
 from ...run.progress import Progress
 
@@ -65,11 +65,11 @@ class Job:
         return texts if self.unit is None else texts | {"unit.toml": to_toml(self.unit)}
 
 
-def check_print(job: Job, folder: Path, progress: Progress, ending: Ending) -> PrintCheck:
+def check_print(job: Job, folder: Path, progress: Progress, context: RunContext) -> PrintCheck:
     """Check a part and leave part.stl, check.json and report.html; GateError if it must not be printed."""
-    from .report import publish
+    from .report import write_report
 
-    begin(ending, folder, HEADER, job.texts(), RESULTS, optional=("unit.toml",))
+    begin(context, folder, HEADER, job.texts(), RESULTS, optional=("unit.toml",))
     with progress.stage("part"):
         vertices, triangles = surface_of(job)
     found = check(
@@ -81,10 +81,10 @@ def check_print(job: Job, folder: Path, progress: Progress, ending: Ending) -> P
         job.direction,
         stage=progress.stage,
     )
-    ending.summary |= summary(found)
+    context.summary |= summary(found)
     write_bytes(folder / "part.stl", stl_bytes(vertices, triangles))
     write_json(folder / "check.json", as_plain(job, found))
-    publish(job, vertices, triangles, found, folder, progress)
+    write_report(job, vertices, triangles, found, folder, progress)
     for finding in found.findings:
         if finding.severity == "warning":
             progress.warning(f"{finding.check}: {finding.what}", _where(finding.places), finding.remedy)
@@ -159,7 +159,7 @@ def summary(found: PrintCheck) -> dict[str, Any]:
     return {"verdict": found.worst, "count": count, "figures": found.figures, "faults": faults, **best}
 
 
-def answer(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What a check found, in a few lines of text, of its `summary`."""
     count = summary["count"]
     lines = [f"{count['pass']} checks passed, {count['warning']} warnings, {count['error']} errors"]

@@ -12,7 +12,7 @@ import numpy as np
 from ...evidence.gain import Errors
 from ...evidence.residuals import Dependence
 from ...report.charts import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas, signed
-from .run import Curve, spoken
+from .run import Curve, readable
 
 Array = np.ndarray[Any, Any]
 
@@ -43,7 +43,7 @@ def titled(channel: str) -> str:
     if head.startswith("marker"):
         number, _, axis = head[6:].partition("_")
         return f"marker {number}, {axis} [{unit}]"
-    return f"{QUANTITIES.get(head, spoken(head))} [{unit}]"
+    return f"{QUANTITIES.get(head, readable(head))} [{unit}]"
 
 
 def panel(curve: Curve, extends: bool) -> str:
@@ -119,7 +119,7 @@ def dependence_chart(
                 end = _unlikely(later[d.against].p_value)
                 axes.plot([start, end], [row, row], "-", color=QUIET, linewidth=1.2, zorder=1)
                 axes.plot(end, row, "o", color=CHOSEN, markersize=4, zorder=4)
-        axes.set_yticks(range(len(names)), [spoken(n) for n in names], fontsize=8.5)
+        axes.set_yticks(range(len(names)), [readable(n) for n in names], fontsize=8.5)
         axes.tick_params(axis="y", length=0)
         axes.grid(False, axis="y")
         ticks = [0, 3, 6, 9, 12]
@@ -170,7 +170,11 @@ def residual_panel(d: Dependent, extends: bool) -> str:
                 axes.fill_between(x, low, high, color=color, alpha=0.16, linewidth=0)
                 axes.plot(x, mean, color=color, linestyle=dashes, marker="o", markersize=3, linewidth=1.4)
         axes.set_title(
-            spoken(d.name), loc="left", fontsize=8.5, fontweight="bold", color=CHOSEN if d.structure else INK
+            readable(d.name),
+            loc="left",
+            fontsize=8.5,
+            fontweight="bold",
+            color=CHOSEN if d.structure else INK,
         )
         axes.set_ylabel(f"left over [{d.unit}]", fontsize=8)
         axes.tick_params(labelsize=7)
@@ -223,7 +227,7 @@ def rivals_chart(names: Sequence[str], left: Sequence[float], chosen: float, nam
 
         axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{100 * v:g} %"))
         axes.xaxis.set_minor_locator(NullLocator())
-        axes.set_yticks(rows, [spoken(n) for n in names], fontsize=8)
+        axes.set_yticks(rows, [readable(n) for n in names], fontsize=8)
         axes.tick_params(axis="y", length=0)
         axes.invert_yaxis()
         axes.grid(False, axis="y")

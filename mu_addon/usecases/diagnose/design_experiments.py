@@ -20,11 +20,11 @@ from ...evidence.simulator import Composite
 from ...files import write_csv, write_text
 from ...measured import Experiment, read_folder
 from ...report.html import facts_table, note, page, table
-from ...run.context import Ending
+from ...run.context import RunContext
 from ...run.folder import begin
 from ...run.progress import Progress
 from ..simulate_and_place.report_data import package_versions
-from .run import UNIT, bare, folder_inputs, listed, simulators_of, spoken, unit_behind
+from .run import UNIT, bare, folder_inputs, listed, readable, simulators_of, unit_behind
 
 Array = np.ndarray[Any, Any]
 
@@ -79,7 +79,7 @@ def design_experiments(
     noise: Mapping[str, float] = NOISE,
     *,
     progress: Progress,
-    ending: Ending,
+    context: RunContext,
 ) -> Plan:
     """What the experiments of a folder would show, made with instruments of this noise; results in `out`.
 
@@ -91,13 +91,13 @@ def design_experiments(
     inputs = folder_inputs(
         "protocols.toml", HEADER, measured, unit, [f"{k} = {v!r}" for k, v in noise.items()]
     )
-    begin(ending, out, HEADER, inputs, RESULTS, optional=(UNIT,))
+    begin(context, out, HEADER, inputs, RESULTS, optional=(UNIT,))
     simulators, told = simulators_of(measured.experiments, unit, out / "cache", progress)
     simulator = Composite(simulators)
     with progress.stage("sensitivities", expected_s=5.0):
         found = plan(measured.experiments, simulator, noise)
     _write(found, out / "limits.csv")
-    ending.summary |= summary(found)
+    context.summary |= summary(found)
     versions = package_versions()
     write_text(out / "report.html", _report(found, measured.folder.resolve().name, told, versions))
     return found
@@ -172,15 +172,15 @@ def _report(found: Plan, name: str, told: Sequence[str], versions: Mapping[str, 
     rows = []
     for s in found.seen:
         alike = [b if a == s.effect.name else a for a, b, _ in found.alike if s.effect.name in (a, b)]
-        by = listed([spoken(n) for n in s.absorbed_by]) if s.absorbed_by else ""
+        by = listed([readable(n) for n in s.absorbed_by]) if s.absorbed_by else ""
         cells = [
-            spoken(s.effect.name),
+            readable(s.effect.name),
             _limit(s),
             f"{s.unabsorbed:.1%}" if s.unabsorbed else "–",
             ""
             if s.identifiable
             else (f"absorbed by {by}" if by and s.unabsorbed else "nothing depends on it"),
-            listed([spoken(a) for a in alike]) if alike else "",
+            listed([readable(a) for a in alike]) if alike else "",
             s.effect.reveals,
         ]
         rows.append((cells, s.identifiable))
@@ -198,7 +198,7 @@ def _report(found: Plan, name: str, told: Sequence[str], versions: Mapping[str, 
         f"Effects that look alike by more than {ALIKE:g} (cosine) are told from each other only by another "
         "experiment.</p>" + table("", head, rows)
     )
-    noise = {spoken(k): v for k, v in found.noise.items()}
+    noise = {readable(k): v for k, v in found.noise.items()}
     sections = [
         ("limits", "What these experiments would show", html),
         (
@@ -226,10 +226,10 @@ def summary(found: Plan) -> dict[str, Any]:
     }
 
 
-def answer(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What a plan would show, in a few lines of text, of its `summary`."""
-    lines = [f"{spoken(name)}: visible from {limit}" for name, (limit, _) in summary["visible"].items()]
+    lines = [f"{readable(name)}: visible from {limit}" for name, (limit, _) in summary["visible"].items()]
     if summary["hidden"]:
-        lines.append(f"not visible: {listed([spoken(n) for n in summary['hidden']])}")
-    lines += [f"look alike: {spoken(a)} and {spoken(b)} ({c:.3f})" for a, b, c in summary["alike"][:5]]
+        lines.append(f"not visible: {listed([readable(n) for n in summary['hidden']])}")
+    lines += [f"look alike: {readable(a)} and {readable(b)} ({c:.3f})" for a, b, c in summary["alike"][:5]]
     return lines

@@ -14,15 +14,15 @@ from ...evidence.effect import Parameter
 from ...evidence.fit import Fit
 from ...evidence.record import KNOWN
 from ...evidence.residuals import CONDITIONS, COVARIATES, FALSE_ALARM, same_protocol
-from ...evidence.selection import TOLD_APART
+from ...evidence.selection import RIVAL_DELTA_CHI2
 from ...evidence.sensitivity import best_seen
 from ...files import write_text
 from ...report.charts import CHOSEN, INK, signed
 from ...report.html import cards, facts_table, figure, note, page, table
-from ...run.context import Ending
+from ...run.context import RunContext
 from ..simulate_and_place.report_data import package_versions
 from . import charts as pictures
-from .run import Curve, Diagnosis, advice, bare, between, curves, listed, sentence, spoken
+from .run import Curve, Diagnosis, advice, bare, between, curves, listed, readable, sentence
 
 FILES = {
     "diagnose.toml": "inputs of this run",
@@ -39,10 +39,10 @@ MOST_PANELS = 30
 MOST_NOTES = 3
 
 
-def publish(found: Diagnosis, out: Path, ending: Ending) -> None:
+def write_report(found: Diagnosis, out: Path, context: RunContext) -> None:
     """Write report.html; raises OutputError."""
     versions = package_versions()
-    ending.summary["versions"] = versions
+    context.summary["versions"] = versions
     write_text(out / "report.html", report(found, out, versions))
 
 
@@ -62,7 +62,7 @@ def report(found: Diagnosis, out: Path, versions: dict[str, str]) -> str:
     ]
     experiments = found.measured.experiments
     held = sum(e.role == "held_out" for e in experiments)
-    kinds = listed([spoken(k) for k in dict.fromkeys(e.kind for e in experiments)])
+    kinds = listed([readable(k) for k in dict.fromkeys(e.kind for e in experiments)])
     count = len(experiments)
     subtitle = f"{count} experiment{'s' if count > 1 else ''} ({kinds}), {held or 'none'} of them held out"
     name = found.measured.folder.resolve().name
@@ -70,7 +70,7 @@ def report(found: Diagnosis, out: Path, versions: dict[str, str]) -> str:
         f"What {name} says of the model",
         subtitle,
         _notes(found),
-        _answer(found),
+        _headline(found),
         sections,
     )
 
@@ -82,7 +82,7 @@ def _notes(found: Diagnosis) -> str:
     return note(told)
 
 
-def _answer(found: Diagnosis) -> str:
+def _headline(found: Diagnosis) -> str:
     verdict = found.verdict
     headline, words = sentence(verdict)
     html = (
@@ -110,7 +110,7 @@ def _answer(found: Diagnosis) -> str:
 
 
 def _extended_words(found: Diagnosis) -> str:
-    names = listed([spoken(n) for n in found.verdict.selection.chosen.names]) if found.extends else ""
+    names = listed([readable(n) for n in found.verdict.selection.chosen.names]) if found.extends else ""
     return f"with {names}" + ("" if found.verdict.names else " (not named)")
 
 
@@ -160,10 +160,10 @@ def _causes(found: Diagnosis) -> str:
     for cause in verdict.selection.causes:
         for i, (key, p) in enumerate(zip(cause.effect.keys, cause.effect.parameters, strict=True)):
             low, high = verdict.intervals.get(key, (math.nan, math.nan))
-            first = [spoken(cause.effect.name), cause.effect.mechanism] if i == 0 else ["", ""]
+            first = [readable(cause.effect.name), cause.effect.mechanism] if i == 0 else ["", ""]
             last = [
                 _chance(cause.p_value),
-                listed([spoken(r) for r in cause.rivals], "or") if cause.rivals else "none",
+                listed([readable(r) for r in cause.rivals], "or") if cause.rivals else "none",
             ]
             value = verdict.selection.chosen.values[key]
             rows.append(
@@ -237,7 +237,7 @@ def _rivals(found: Diagnosis) -> str:
         )
         rows.append(
             (
-                [spoken(name), size, f"{f.chi2:.4g}", _against(found, f, rivals)],
+                [readable(name), size, f"{f.chi2:.4g}", _against(found, f, rivals)],
                 name in selection.chosen.names or name in rivals,
             )
         )
@@ -250,7 +250,8 @@ def _rivals(found: Diagnosis) -> str:
     count = len(found.verdict.record)
     return (
         f"<p>The model as it was leaves χ² = {base:.4g} of {count} values; {len(names)} effects that these "
-        f"data could show were tried. Two that differ by less than {TOLD_APART:g} cannot be told apart.</p>"
+        f"data could show were tried. Two that differ by less than "
+        f"{RIVAL_DELTA_CHI2:g} cannot be told apart.</p>"
         + f'<div class="chart">{picture}</div>'
         + table(
             "",
@@ -272,7 +273,7 @@ def _against(found: Diagnosis, f: Fit, rivals: set[str]) -> str:
         return "part of the best attempt"
     if name in rivals:
         return f"nothing these data could tell: a rival{bound}"
-    if gained < TOLD_APART:
+    if gained < RIVAL_DELTA_CHI2:
         return f"gains no more than noise would ({_figures(max(gained, 0.0))}){bound}"
     if not selection.chosen.effects:
         return f"gains {gained:.3g}, too little for one of so many tried{bound}"
@@ -311,7 +312,7 @@ def _gain(found: Diagnosis) -> str:
     if gain.held_out is None:
         html += '<p>None was held out: give one role = "held_out", and its gain is that on unseen data.</p>'
     told = [name for name, (fit, _) in gain.by_quantity.items() if fit is gain.fit and name != KNOWN]
-    which = f" of {spoken(told[0])}" if told and len(gain.by_quantity) > 1 else ""
+    which = f" of {readable(told[0])}" if told and len(gain.by_quantity) > 1 else ""
     return (
         html
         + _by_quantity(found)
@@ -329,7 +330,7 @@ def _by_quantity(found: Diagnosis) -> str:
     rows: list[tuple[list[Any], bool]] = []
     for name, (fit, held) in every.items():
         cells = [f"{_figures(e.before)} → {_figures(e.after)}" if e else "" for e in (fit, held)]
-        rows.append(([spoken(name), fit.unit, *cells], fit is found.verdict.gain.fit))
+        rows.append(([readable(name), fit.unit, *cells], fit is found.verdict.gain.fit))
     head = [("quantity", ""), ("unit", "text"), ("fitted experiments", "n"), ("held out", "n")]
     return table("", head, rows)
 
@@ -344,7 +345,7 @@ def _dependence(found: Diagnosis) -> str:
     rows, structured = [], {}
     for d in before:
         now = later.get(d.against)
-        cells: list[Any] = [spoken(d.against), _chance(d.p_value), "yes" if d.p_value < level else "no"]
+        cells: list[Any] = [readable(d.against), _chance(d.p_value), "yes" if d.p_value < level else "no"]
         if found.extends:
             cells += [_chance(now.p_value), "yes" if now.p_value < level else "no"] if now else ["–", "–"]
         where = now if now is not None and now.p_value < level else d
@@ -363,7 +364,7 @@ def _dependence(found: Diagnosis) -> str:
         "Probability by chance of each dependence of the residual.",
     )
     shown = "".join(
-        figure(pictures.residual_panel(d, found.extends), "", f"What is left against {spoken(d.name)}.")
+        figure(pictures.residual_panel(d, found.extends), "", f"What is left against {readable(d.name)}.")
         for d in _dependents(found, structured)
     )
     panels = (
@@ -423,11 +424,11 @@ def _identifiability(found: Diagnosis) -> str:
         rows.append(
             (
                 [
-                    spoken(name),
+                    readable(name),
                     "yes" if s.identifiable else "no",
                     limit if s.identifiable else "–",
                     f"{s.unabsorbed:.1%}" if s.unabsorbed > 0 else "–",
-                    spoken(reason.partition(";")[0]),
+                    readable(reason.partition(";")[0]),
                     s.effect.reveals,
                 ],
                 False,
@@ -505,7 +506,7 @@ def _data(found: Diagnosis) -> str:
         (
             [
                 e.name,
-                spoken(e.kind),
+                readable(e.kind),
                 e.role.replace("_", " "),
                 e.file.name,
                 f"{len(e)}",

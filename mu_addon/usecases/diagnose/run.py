@@ -30,7 +30,7 @@ from ...evidence.verdict import Verdict, diagnose
 from ...files import write_csv, write_json
 from ...measured import Experiment, Measured, read_folder
 from ...measured.folder import FILE
-from ...run.context import Ending
+from ...run.context import RunContext
 from ...run.folder import begin
 from ...run.progress import Progress
 
@@ -97,7 +97,7 @@ def diagnose_folder(
     unit: Unit | None = None,
     *,
     progress: Progress,
-    ending: Ending,
+    context: RunContext,
     settings: UnitSettings | None = None,
 ) -> Diagnosis | None:
     """Judge the model by a folder of measured data; results in `out`.
@@ -107,7 +107,7 @@ def diagnose_folder(
     report.html. Where `out` holds this program's verdict on these inputs, nothing is done again, and None is
     returned. Raises InputError, OutputError.
     """
-    from .report import publish
+    from .report import write_report
 
     measured = read_folder(Path(folder))
     if not any(e.role == "fit" for e in measured.experiments):
@@ -119,18 +119,18 @@ def diagnose_folder(
     more += [] if settings is None else [f"settings = {json.dumps(repr(settings))}"]
     inputs = folder_inputs("diagnose.toml", HEADER, measured, unit, more)
     kept = _kept(out, inputs)
-    begin(ending, out, HEADER, inputs, RESULTS, optional=(UNIT,))
+    begin(context, out, HEADER, inputs, RESULTS, optional=(UNIT,))
     for remark in measured.remarks:
         progress.warning(remark.what, remark.where, remark.remedy)
     if kept:
         with progress.stage("verdict of the same data, kept"):
-            ending.summary |= kept
+            context.summary |= kept
         return None
     simulators, told = simulators_of(measured.experiments, unit, out / "cache", progress, settings)
     simulator = Composite(simulators)
     with _stages(progress, simulator) as tell:
         verdict = diagnose(measured.experiments, simulator, tell)
-    model, block = _told_by(verdict, simulator), simulators.get(lattice.KIND)
+    model, block = _extended_model(verdict, simulator), simulators.get(lattice.KIND)
     if isinstance(block, lattice.LatticeStress) and block.computed:
         model = attrs.evolve(model, lattice=block.computed)
         told += _resin(model, unit)
@@ -143,9 +143,9 @@ def diagnose_folder(
     write_json(out / "verdict.json", verdict.as_json())
     found.model.save(out / "model.toml")
     _write_residuals(found, out / "residuals.csv")
-    ending.summary |= summary(found)
+    context.summary |= summary(found)
     with progress.stage("report", expected_s=5.0):
-        publish(found, out, ending)
+        write_report(found, out, context)
     return found
 
 
@@ -221,7 +221,7 @@ def simulators_of(
     return found, told
 
 
-def _told_by(verdict: Verdict, simulator: Composite) -> ExtendedModel:
+def _extended_model(verdict: Verdict, simulator: Composite) -> ExtendedModel:
     """The extended model, without nuisances that these data say nothing of."""
     model = extended_model(verdict, {p.name: p.unit for p in simulator.nuisances})
     fit = verdict.selection.chosen if verdict.names else verdict.selection.base
@@ -260,7 +260,7 @@ def _bounds_met(verdict: Verdict, simulator: Composite) -> list[str]:
     """Which fitted values of the base model ended at a bound, in words."""
     values = verdict.selection.base.values
     return [
-        f"fitted without any effect, {spoken(p.name)} ends at its bound, {values[p.name]:.3g} ({p.source})"
+        f"fitted without any effect, {readable(p.name)} ends at its bound, {values[p.name]:.3g} ({p.source})"
         for p in simulator.nuisances
         if any(math.isclose(values.get(p.name, p.null), end, rel_tol=1e-6) for end in (p.low, p.high))
     ]
@@ -333,7 +333,7 @@ def _write_residuals(found: Diagnosis, path: Path) -> None:
     write_csv(path, head, rows)
 
 
-def spoken(name: str) -> str:
+def readable(name: str) -> str:
     """An effect's or quantity's name as it is said."""
     return name.replace("_", " ")
 
@@ -346,7 +346,7 @@ def listed(names: Sequence[str], last: str = "and") -> str:
 def bare(p: Parameter) -> str:
     """A parameter's name as it is said, without the unit that stands behind its value."""
     unit = p.unit.replace("1/", "per_").replace("/", "_")
-    return spoken(p.name.removesuffix(f"_{unit}") if unit else p.name)
+    return readable(p.name.removesuffix(f"_{unit}") if unit else p.name)
 
 
 def between(low: float, high: float) -> str:
@@ -378,10 +378,10 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
     found = verdict.selection
     if verdict.kind == "named":
         said = [f"{_upper(c.effect.mechanism)}; {sized(verdict, c)}." for c in found.causes]
-        return listed([spoken(n) for n in verdict.names]), " ".join(said)
+        return listed([readable(n) for n in verdict.names]), " ".join(said)
     if verdict.kind == "ambiguous":
-        choices = [listed([spoken(n) for n in (c.effect.name, *c.rivals)], "or") for c in found.causes]
-        said = [f"{spoken(c.effect.name)} has {sized(verdict, c)}" for c in found.causes]
+        choices = [listed([readable(n) for n in (c.effect.name, *c.rivals)], "or") for c in found.causes]
+        said = [f"{readable(c.effect.name)} has {sized(verdict, c)}" for c in found.causes]
         return (
             " and ".join(choices),
             "Something is wrong, and these data cannot tell which of these it is: each explains them. "
@@ -399,13 +399,13 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
             "The model follows the data only with a fitted value far from what is known of it. Whatever is "
             "behind that, these data could not show it, however many of their kind there were.",
         )
-    where = [spoken(n) for n in found.left if n != SPREAD]
+    where = [readable(n) for n in found.left if n != SPREAD]
     tried = "What it leaves is more than the spread that the data give. " if SPREAD in found.left else ""
     tried += f"What it leaves depends on {listed(where)}. " if where else ""
     if found.doubted:
-        tried += f"{_upper(spoken(found.doubted))}. "
+        tried += f"{_upper(readable(found.doubted))}. "
     if found.chosen.effects:
-        names = listed([spoken(n) for n in found.chosen.names])
+        names = listed([readable(n) for n in found.chosen.names])
         tried += f"The best attempt, {names}, is not named, since it leaves structure behind."
     return (
         "something no known effect explains",
@@ -416,7 +416,7 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
 def advice(verdict: Verdict) -> str:
     """What to measure next, in words."""
     if verdict.proposal is not None:
-        told = listed([spoken(n) for n in verdict.proposal.separates])
+        told = listed([readable(n) for n in verdict.proposal.separates])
         return f"{_upper(verdict.proposal.what)}. It tells {told} apart."
     found = verdict.selection
     if verdict.kind == "named":
@@ -432,7 +432,7 @@ def advice(verdict: Verdict) -> str:
     shown = dict.fromkeys(s.effect.reveals for s in hidden)
     some = list(shown)[:3]
     return (
-        f"These data could not show {listed([spoken(s.effect.name) for s in hidden])}. "
+        f"These data could not show {listed([readable(s.effect.name) for s in hidden])}. "
         f"To see more: {'; or '.join(some)}."
     )
 
@@ -459,7 +459,7 @@ def summary(found: Diagnosis) -> dict[str, Any]:
     }
 
 
-def answer(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What a diagnosis found, in a few lines of text, of its `summary`."""
     lines = [f"verdict: {summary['verdict']}: {summary['headline']}", summary["sentence"]]
     for name, words in (("fit", "data that were fitted"), ("held_out", "data held out")):

@@ -23,7 +23,7 @@ from ...design.threemf import Part, read_3mf, write_3mf
 from ...errors import InputError, MeshingError, OutputError
 from ...files import write_bytes, write_json
 from ...materials.library import Material
-from ...run.context import Ending
+from ...run.context import RunContext
 from ...run.folder import begin
 from ...run.progress import Progress
 
@@ -97,7 +97,7 @@ class Export:
     job: Job
     folder: Path
     progress: Progress
-    ending: Ending
+    context: RunContext
     files: list[dict[str, Any]] = attrs.field(factory=list)
     refused: list[dict[str, str]] = attrs.field(factory=list)
 
@@ -117,7 +117,7 @@ class Export:
                 }[name](solid)
         manifest = self._manifest(solid)
         write_json(self.folder / MANIFEST, manifest)
-        self.ending.summary |= manifest
+        self.context.summary |= manifest
 
     def _stl(self, solid: Solid) -> None:
         write_bytes(self.folder / "unit.stl", stl_bytes(solid.vertices, solid.triangles))
@@ -282,10 +282,10 @@ def _mismatch(name: str, what: str) -> OutputError:
     )
 
 
-def export(job: Job, folder: Path, progress: Progress, ending: Ending) -> None:
+def export(job: Job, folder: Path, progress: Progress, context: RunContext) -> None:
     """Run an export in a folder of its own; raises InputError, GateError and OutputError."""
-    begin(ending, folder, HEADER, job.texts(), RESULTS)
-    Export(job, folder, progress, ending).run()
+    begin(context, folder, HEADER, job.texts(), RESULTS)
+    Export(job, folder, progress, context).run()
 
 
 def path_of(unit: Unit, name: str | None, row: str | None = None) -> tuple[Window | Array | None, str]:
@@ -315,7 +315,7 @@ def path_of(unit: Unit, name: str | None, row: str | None = None) -> tuple[Windo
         ) from error
 
 
-def answer(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What was written, in a few lines of text, of a run's `summary`."""
     solid, resin = summary["solid"], summary["resin"]
     lines = [

@@ -20,7 +20,7 @@ from ...files import write_bytes, write_json, write_text
 from ...materials.library import Material
 from ...measured.kinds import KINDS
 from ...report.html import page, table
-from ...run.context import Ending
+from ...run.context import RunContext
 from ...run.folder import begin
 from ...run.progress import Progress
 from .print_offsets import sheet
@@ -137,10 +137,12 @@ def specimens(unit: Unit, scales: tuple[float, ...] = SCALES, cells: int = CELLS
     return found
 
 
-def make_specimens(unit: Unit, resin: Material, folder: Path, progress: Progress, ending: Ending) -> None:
+def make_specimens(
+    unit: Unit, resin: Material, folder: Path, progress: Progress, context: RunContext
+) -> None:
     """Write every specimen, the gauge's sheet, the manifest and the folder to fill; raises MuError."""
     inputs = {"specimens.toml": f'{HEADER}\nformat = 1\nunit = "unit.toml"\nresin = "{resin.name}"\n'}
-    begin(ending, folder, HEADER, inputs | {"unit.toml": to_toml(unit)}, RESULTS)
+    begin(context, folder, HEADER, inputs | {"unit.toml": to_toml(unit)}, RESULTS)
     every = specimens(unit)
     rows = []
     with progress.stage("specimens", 10.0):
@@ -149,8 +151,8 @@ def make_specimens(unit: Unit, resin: Material, folder: Path, progress: Progress
             progress.update(done / len(every))
     write_text(folder / "gauge.csv", sheet())
     _write_template(every, folder / TEMPLATE)
-    ending.summary |= {"resin": resin.name, "density_g_per_ml": resin.density_g_per_ml, "specimens": rows}
-    write_json(folder / "manifest.json", ending.summary)
+    context.summary |= {"resin": resin.name, "density_g_per_ml": resin.density_g_per_ml, "specimens": rows}
+    write_json(folder / "manifest.json", context.summary)
     write_text(folder / "sheet.html", _page(unit, resin, every, rows))
 
 
@@ -269,7 +271,7 @@ def _page(unit: Unit, resin: Material, every: list[Specimen], rows: list[dict[st
     )
 
 
-def answer(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What was written, in a few lines of text, of a run's `summary`."""
     return [f"{row['file']}: {row['mass_g']:.2f} g, {row['measure']}" for row in summary["specimens"]] + [
         "sheet.html says what to measure; measured/ takes it, for `diagnose`"

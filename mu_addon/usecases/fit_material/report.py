@@ -13,7 +13,7 @@ from ...files import write_text
 from ...materials.fit import FLOOR, POISSON, TOLERANCE
 from ...report.charts import signed
 from ...report.html import cards, facts_table, figure, note, page, table
-from ...run.context import Ending
+from ...run.context import RunContext
 from ..simulate_and_place.report_data import package_versions
 from .charts import TITLES, mode_chart, residual_chart
 from .run import Fitting, modes, tested
@@ -34,10 +34,10 @@ WEIGHTS_MEAN = {
 }
 
 
-def publish(found: Fitting, out: Path, ending: Ending) -> None:
+def write_report(found: Fitting, out: Path, context: RunContext) -> None:
     """Write report.html; raises OutputError."""
     versions = package_versions()
-    ending.summary["versions"] = versions
+    context.summary["versions"] = versions
     write_text(out / "report.html", report(found, versions))
 
 
@@ -55,7 +55,7 @@ def report(found: Fitting, versions: dict[str, str]) -> str:
     count = len(found.fitted) + len(found.held_out)
     subtitle = f"{count} coupon test{'s' if count > 1 else ''}: " + ", ".join(TITLES[m] for m in modes(found))
     return page(
-        f"A law for {found.material.name}", subtitle, note(_warnings(found)), _answer(found), sections
+        f"A law for {found.material.name}", subtitle, note(_warnings(found)), _headline(found), sections
     )
 
 
@@ -95,7 +95,7 @@ def _factor(ratio: float) -> str:
 _SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def _answer(found: Fitting) -> str:
+def _headline(found: Fitting) -> str:
     choice = found.choice
     chosen = choice.chosen
     kept = [e for e in chosen.errors if e.mode not in chosen.fails] or list(chosen.errors)

@@ -18,7 +18,7 @@ from ...materials.fit import POISSON, TOLERANCE, WEIGHTS, Fit, fit, leave_one_mo
 from ...materials.forms import FORMS, form
 from ...materials.library import Material, write_material
 from ...measured import Measured, read_folder
-from ...run.context import Ending
+from ...run.context import RunContext
 from ...run.folder import begin
 from ...run.progress import Progress
 
@@ -55,7 +55,7 @@ def fit_material(
     weights: str = "absolute",
     *,
     progress: Progress,
-    ending: Ending,
+    context: RunContext,
 ) -> Fitting:
     """Fit laws (all of them without names) to the coupons of a folder of measured data; results in `out`.
 
@@ -63,7 +63,7 @@ def fit_material(
     material.toml, fit.csv, parameters.csv, errors.csv, a chart a mode, report.html. Raises InputError,
     OutputError.
     """
-    from .report import publish
+    from .report import write_report
 
     forms = [form(name) for name in dict.fromkeys(laws)] or list(FORMS.values())
     if weights not in WEIGHTS:
@@ -73,7 +73,7 @@ def fit_material(
     measured = read_folder(Path(folder))
     fitted, held = _coupons(measured, held_out_modes)
     inputs = {"fit.toml": _inputs(measured, [f.name for f in forms], held_out_modes, weights)}
-    begin(ending, out, HEADER, inputs, RESULTS)
+    begin(context, out, HEADER, inputs, RESULTS)
     for remark in measured.remarks:
         progress.warning(remark.what, remark.where, remark.remedy)
     with progress.stage("fit", expected_s=2.0 * len(forms)):
@@ -97,9 +97,9 @@ def fit_material(
         material=material,
     )
     _write(found, out)
-    ending.summary |= summary(found)
+    context.summary |= summary(found)
     with progress.stage("report", expected_s=4.0):
-        publish(found, out, ending)
+        write_report(found, out, context)
     return found
 
 
@@ -262,7 +262,7 @@ def summary(found: Fitting) -> dict[str, Any]:
     }
 
 
-def answer(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What a fit found, in a few lines of text, of its `summary`."""
     chosen = summary["chosen"]
     law = summary["laws"][chosen]

@@ -23,7 +23,7 @@ from ...fem.materials import Materials
 from ...fem.model import Model
 from ...fem.obstacle import CONTACT, Obstacle, outer_faces
 from ...fem.rigid import Box, Pose
-from ...fem.time_stepping import march
+from ...fem.time_stepping import simulate_in_time
 from ...meshing.mesh import Mesh
 from .phases import Phases
 
@@ -275,7 +275,7 @@ class _Hand:
         return Pose(shift=self.place + np.array([0.0, 0.0, away + sinking]))
 
     def work(self) -> Grasp:
-        found = march(self.equilibrium, self.time, self.pressure, self._reached)
+        found = simulate_in_time(self.equilibrium, self.time, self.pressure, self._reached)
         assert self.lift is not None
         columns = np.array(self.rows).T
         u = np.array([state.u for state in found.states])

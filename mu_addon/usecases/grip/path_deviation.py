@@ -25,7 +25,7 @@ from ...fem.model import Model
 from ...fem.obstacle import CONTACT
 from ...fem.trajectory import Trajectory, simulate
 from ...meshing.mesh import Mesh
-from ...placement.batch import Sweep
+from ...placement.batch import CandidateBatch
 from ...placement.candidates import candidates, evaluation, moved_points, roi, with_sensor
 from ...placement.inclusion import sensor_share
 from ..simulate_and_place.job import grasp as grasp_protocol
@@ -135,7 +135,7 @@ def _together(
 ) -> dict[str, Array]:
     """Monitored points (k, p, 3) in mm of every path's unit, from Model A's states and on one factor."""
     points, _ = monitored
-    sweep = Sweep(model, materials, monitored, list(shares.values()), sensor_MPa)
+    sweep = CandidateBatch(model, materials, monitored, list(shares.values()), sensor_MPa)
     at_rest = np.broadcast_to(points, (len(shares), *points.shape))
     moved = np.array([sweep.at(s) if s.pressure_MPa else at_rest for s in base.states])
     return {name: base.of_time(moved[:, i]) for i, name in enumerate(shares)}

@@ -37,12 +37,12 @@ FILES = {
 }
 
 
-def publish(run: Gripping, stopped: str = "") -> None:
+def write_report(run: Gripping, stopped: str = "") -> None:
     """Write the pictures and report.html; `stopped` says why a run that is not complete stopped."""
     if run.solid is None:
         return
     with run.progress.stage("report", expected_s=20.0):
-        versions = run.ending.summary["versions"] = package_versions()
+        versions = run.context.summary["versions"] = package_versions()
         part = pictures.part_picture(run.job.gripper, run.solid)
         write_bytes(run.folder / "gripper.png", part.png)
         frames: dict[float, list[Picture]] = {}
@@ -78,12 +78,12 @@ def report(
     ]
     gap = job.gripper.fingers.gap_mm
     subtitle = f"Two {job.gripper.unit.name} {gap:g} mm apart, {label(job.gripper.path)} in each"
-    lead = f'<div class="lead"><div>{_answer(run)}</div>{picture_figure(part)}</div>'
+    lead = f'<div class="lead"><div>{_headline(run)}</div>{picture_figure(part)}</div>'
     return page(f"Gripper: {job.gripper.name}", subtitle, note(warnings), lead, sections)
 
 
-def _answer(run: Gripping) -> str:
-    summary = run.ending.summary
+def _headline(run: Gripping) -> str:
+    summary = run.context.summary
     x, y, z = summary["size_mm"]
     facts = [
         ("part", f"{x:g} x {y:g} x {z:.4g} mm"),

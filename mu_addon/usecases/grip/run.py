@@ -25,7 +25,7 @@ from ...meshing.settings import MeshSettings
 from ...meshing.unit import mesh_unit
 from ...placement.inclusion import RULES
 from ...run.cache import Cache, key
-from ...run.context import Ending
+from ...run.context import RunContext
 from ...run.folder import begin
 from ...run.progress import Progress
 from ...sensing.embedded_waveguide import Joints, held
@@ -37,7 +37,7 @@ from .motion import write_grasp
 from .path_deviation import Column, column, printed_column
 from .phases import MEANING, Phases, shipped_phases
 
-__all__ = ["Cube", "Grip", "Gripping", "Job", "answer", "grasp", "grip", "gripper_column"]
+__all__ = ["Cube", "Grip", "Gripping", "Job", "console_summary", "grasp", "grip", "gripper_column"]
 
 Array = np.ndarray[Any, Any]
 
@@ -107,7 +107,7 @@ class Gripping:
     job: Job
     folder: Path
     progress: Progress
-    ending: Ending
+    context: RunContext
     solid: GripperSolid | None = None
     mesh: Mesh | None = None
     grasps: dict[float, Grasp] = attrs.field(factory=dict)
@@ -116,16 +116,16 @@ class Gripping:
     warnings: list[str] = attrs.field(factory=list)
 
     @classmethod
-    def open(cls, job: Job, folder: Path, progress: Progress, ending: Ending) -> Gripping:
+    def open(cls, job: Job, folder: Path, progress: Progress, context: RunContext) -> Gripping:
         """Make the folder this run's; results of other inputs are moved to stale/. Raises InputError."""
-        begin(ending, folder, HEADER, job.texts(), RESULTS)
-        ending.summary["inputs"] = {
+        begin(context, folder, HEADER, job.texts(), RESULTS)
+        context.summary["inputs"] = {
             "gripper": attrs.asdict(job.gripper.fingers) | attrs.asdict(job.gripper.plate),
             "unit": job.gripper.unit.name,
             "path": job.gripper.path,
             "grip": attrs.asdict(job.grip),
         }
-        return cls(job, folder, progress, ending)
+        return cls(job, folder, progress, context)
 
     @property
     def cache(self) -> Cache:
@@ -161,15 +161,15 @@ class Gripping:
             if len(back.triangles) != len(found.triangles):
                 raise OutputError("the 3MF file does not hold the part that was written", "gripper.3mf")
             write_bytes(self.folder / "gripper.3mf", packed)
-        self.ending.summary["gates"] = attrs.asdict(found.gates)
+        self.context.summary["gates"] = attrs.asdict(found.gates)
         x, y = self.job.gripper.size_mm
-        self.ending.summary["size_mm"] = [x, y, float(np.ptp(found.vertices[:, 2]))]
+        self.context.summary["size_mm"] = [x, y, float(np.ptp(found.vertices[:, 2]))]
 
     def make_mesh(self) -> None:
         """Analysis mesh of half a finger."""
         with self.progress.stage("mesh", 5.0):
             mesh = self.mesh = mesh_unit(self.job.gripper.unit, self.job.mesh)
-        self.ending.summary["mesh"] = {"nodes": len(mesh.nodes), "tetrahedra": len(mesh.tets)}
+        self.context.summary["mesh"] = {"nodes": len(mesh.nodes), "tetrahedra": len(mesh.tets)}
 
     @property
     def materials(self) -> Materials:
@@ -211,7 +211,7 @@ class Gripping:
                 [(f"{way:.6g}", f"{force:.6g}") for way, force in rows],
             )
             write_grasp(self.folder / name, job.gripper, self.mesh, self.materials, found)
-        self.ending.summary.setdefault("grasps", {})[f"{cube.side_mm:g}"] = grasp_figures(found)
+        self.context.summary.setdefault("grasps", {})[f"{cube.side_mm:g}"] = grasp_figures(found)
         if not found.lift.held:
             self.warn(
                 f"The cube of {cube.side_mm:g} mm ({cube.mass_g:.3g} g) is not lifted: friction carries at "
@@ -239,7 +239,7 @@ class Gripping:
                 "lost_at_end_of": {name: float(signal.delta[k]) for name, k in ends.items()},
                 "error_at_end_of": {name: float(error[k]) for name, k in ends.items()},
             }
-        self.ending.summary["light"] = light
+        self.context.summary["light"] = light
 
     def rank(self, rule: str, cube: Cube | None) -> None:
         """J_hat of every path's finger, closing on a cube or on nothing."""
@@ -271,7 +271,7 @@ class Gripping:
                 on_path=self.progress.update,
             )
         self.columns.append(found)
-        table = self.ending.summary.setdefault("J_hat_mm", {})
+        table = self.context.summary.setdefault("J_hat_mm", {})
         table.setdefault(rule, {})[on] = {
             "J_hat_mm": found.J_hat_mm,
             "chosen": found.chosen,
@@ -299,17 +299,17 @@ class Gripping:
         if text not in self.warnings:
             self.warnings.append(text)
             self.progress.warning(text)
-        self.ending.summary["warnings"] = self.warnings
+        self.context.summary["warnings"] = self.warnings
 
 
-def grip(job: Job, folder: Path, progress: Progress, ending: Ending) -> Gripping:
+def grip(job: Job, folder: Path, progress: Progress, context: RunContext) -> Gripping:
     """Design a gripper, close it on cubes, follow its light, rank its paths, and leave a report."""
-    from .report import publish
+    from .report import write_report
 
-    run = Gripping.open(job, folder, progress, ending)
-    ending.on_stop = lambda reason: publish(run, reason["what"])
+    run = Gripping.open(job, folder, progress, context)
+    context.on_stop = lambda reason: write_report(run, reason["what"])
     run.run()
-    publish(run)
+    write_report(run)
     return run
 
 
@@ -354,7 +354,7 @@ def grasp_figures(found: Grasp) -> dict[str, Any]:
     }
 
 
-def answer(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What a run found, in a few lines of text, of its `summary`."""
     x, y, z = summary["size_mm"]
     lines = [f"one part of {x:g} x {y:g} x {z:.4g} mm, {summary['gates']['inner_shells']} chambers"]

@@ -32,11 +32,11 @@ FILES = {
 FRICTION = {"slide": "plates that slide", "stick": "plates that hold"}
 
 
-def publish(study: Homogenisation, stopped: str = "") -> None:
+def write_report(study: Homogenisation, stopped: str = "") -> None:
     """Write the pictures and report.html; `stopped` says why a run that is not complete stopped."""
     with study.progress.stage("report", expected_s=15.0):
         versions = package_versions()
-        study.ending.summary["versions"] = versions
+        study.context.summary["versions"] = versions
         write_text(study.folder / "report.html", report(study, versions, stopped))
 
 
@@ -59,10 +59,10 @@ def report(study: Homogenisation, versions: dict[str, str], stopped: str = "") -
         f"Cell of {cell.size_mm:g} mm, {cell.kind.name}, struts of {2 * cell.junction_radius_mm:g} to "
         f"{2 * cell.midspan_radius_mm:g} mm, resin of {kPa(1e3 * study.job.resin.modulus_MPa)}"
     )
-    return page(title, subtitle, note(warnings), _answer(study), sections)
+    return page(title, subtitle, note(warnings), _headline(study), sections)
 
 
-def _answer(study: Homogenisation) -> str:
+def _headline(study: Homogenisation) -> str:
     e = study.elasticity
     if e is None:
         return ""
@@ -89,7 +89,7 @@ def _answer(study: Homogenisation) -> str:
     )
     facts = [
         ("relative density", f"{e.relative_density:.1%}"),
-        (f"mass of {study.job.cells}³ cells", f"{study.ending.summary['specimen_mass_g']:.3g} g"),
+        (f"mass of {study.job.cells}³ cells", f"{study.context.summary['specimen_mass_g']:.3g} g"),
         ("E along an axis", kPa(1e3 * e.E100)),
         ("E along a strut", kPa(1e3 * e.E111)),
         ("Poisson's ratio", f"{e.nu100:.3f}"),
@@ -235,7 +235,7 @@ def _inputs(study: Homogenisation) -> str:
         "resin's Young's modulus [kPa]": 1e3 * resin.modulus_MPa,
         "resin's Poisson's ratio": resin.poisson,
         "resin's density [g/ml]": resin.density_g_per_ml,
-    } | {f"mesh: {k}": v for k, v in study.ending.summary.get("mesh", {}).items()}
+    } | {f"mesh: {k}": v for k, v in study.context.summary.get("mesh", {}).items()}
     return facts_table("input", "value", facts)
 
 

@@ -28,7 +28,7 @@ from ...materials.library import Material, load_material
 from ...meshing.mesh import Mesh
 from ...report.vtk import write_mesh
 from ...run.cache import Cache, key
-from ...run.context import Ending
+from ...run.context import RunContext
 from ...run.folder import begin
 from ...run.progress import Progress
 
@@ -146,7 +146,7 @@ class Homogenisation:
     job: Job
     folder: Path
     progress: Progress
-    ending: Ending
+    context: RunContext
     mesh: Mesh | None = None
     materials: Materials | None = None
     elasticity: Elasticity | None = None
@@ -157,12 +157,12 @@ class Homogenisation:
     warnings: list[str] = attrs.field(factory=list)
 
     @classmethod
-    def open(cls, job: Job, folder: Path, progress: Progress, ending: Ending) -> Homogenisation:
+    def open(cls, job: Job, folder: Path, progress: Progress, context: RunContext) -> Homogenisation:
         """Make the folder this run's; results of other inputs are moved to stale/. Raises InputError."""
         texts = job.texts()
-        begin(ending, folder, HEADER, texts, RESULTS)
-        ending.summary["inputs"] = {"cell": cell_table(job.cell), "resin": attrs.asdict(job.resin)}
-        return cls(job, folder, progress, ending)
+        begin(context, folder, HEADER, texts, RESULTS)
+        context.summary["inputs"] = {"cell": cell_table(job.cell), "resin": attrs.asdict(job.resin)}
+        return cls(job, folder, progress, context)
 
     @property
     def cache(self) -> Cache:
@@ -191,7 +191,7 @@ class Homogenisation:
             self.materials = cell_materials(job.cell, self.mesh, resin.modulus_MPa, resin.poisson)
             modulus, _ = self.materials.small_strain(len(self.mesh.tets))
             write_mesh(self.folder / "cell.vtu", self.mesh, modulus)
-        self.ending.summary["mesh"] = {"nodes": len(self.mesh.nodes), "tetrahedra": len(self.mesh.tets)}
+        self.context.summary["mesh"] = {"nodes": len(self.mesh.nodes), "tetrahedra": len(self.mesh.tets)}
 
     def find_moduli(self) -> None:
         """Effective elasticity of the endless lattice."""
@@ -205,11 +205,11 @@ class Homogenisation:
         write_csv(self.folder / "tensor.csv", ["C_kPa", *names], rows)
         cell, resin = self.job.cell, self.job.resin
         n = self.job.cells
-        self.ending.summary["moduli_kPa"] = {
+        self.context.summary["moduli_kPa"] = {
             name: 1e3 * getattr(found, name)
             for name in ("C11", "C12", "C44", "E100", "E110", "E111", "bulk", "shear")
         }
-        self.ending.summary |= {
+        self.context.summary |= {
             "poisson_100": found.nu100,
             "zener": found.zener,
             "cubic_error": found.cubic_error,
@@ -246,7 +246,7 @@ class Homogenisation:
         ]
         columns = ["strain", "stress_kPa", "lateral_stretch_x", "lateral_stretch_y"]
         write_csv(self.folder / "cell.csv", columns, rows)
-        self.ending.summary["cell_curve"] = {
+        self.context.summary["cell_curve"] = {
             "strain": [float(curve.strain[0]), float(curve.strain[-1])],
             "stopped": found.stopped,
         }
@@ -276,7 +276,7 @@ class Homogenisation:
             write_effective(self.folder / "effective.toml", self.effective)
         misfit = attrs.asdict(self.fit.misfit)
         law = {"E_kPa": 1e3 * self.fit.E_MPa, "poisson": self.fit.poisson, "C44_kPa": 1e3 * self.fit.C44_MPa}
-        self.ending.summary["law"] = {"misfit": misfit, "small_strain": law, "stretch": self.fit.stretch}
+        self.context.summary["law"] = {"misfit": misfit, "small_strain": law, "stretch": self.fit.stretch}
 
     def export_specimen(self) -> None:
         """The printable block, nominal: the printer adds its offset itself."""
@@ -339,7 +339,7 @@ class Homogenisation:
         ]
         columns = ["strain", "stress_kPa", "lateral_stretch_x", "lateral_stretch_y", "valid"]
         write_csv(self.folder / f"specimen_{friction}.csv", columns, rows)
-        self.ending.summary.setdefault("specimen", {})[friction] = {
+        self.context.summary.setdefault("specimen", {})[friction] = {
             "modulus_kPa": {p: 1e3 * m for p, m in moduli(curve).items()},
             "valid_to_strain": found.valid_to_strain,
             "why": found.why,
@@ -350,7 +350,7 @@ class Homogenisation:
         if text not in self.warnings:
             self.warnings.append(text)
             self.progress.warning(text)
-        self.ending.summary["warnings"] = self.warnings
+        self.context.summary["warnings"] = self.warnings
 
 
 def cell_table(cell: StrutCell) -> dict[str, str | float]:
@@ -362,14 +362,14 @@ def cell_table(cell: StrutCell) -> dict[str, str | float]:
     }
 
 
-def homogenize(job: Job, folder: Path, progress: Progress, ending: Ending) -> None:
+def homogenize(job: Job, folder: Path, progress: Progress, context: RunContext) -> None:
     """Run a homogenisation and leave its report, also where it is stopped."""
-    from .report import publish
+    from .report import write_report
 
-    study = Homogenisation.open(job, folder, progress, ending)
-    ending.on_stop = lambda reason: publish(study, reason["what"])
+    study = Homogenisation.open(job, folder, progress, context)
+    context.on_stop = lambda reason: write_report(study, reason["what"])
     study.run()
-    publish(study)
+    write_report(study)
 
 
 def resin_of(name: str | None, unit: Unit) -> Resin:
@@ -382,7 +382,7 @@ def resin_of(name: str | None, unit: Unit) -> Resin:
     return Resin.of(read_material(path) if path.suffix == ".toml" else load_material(name))
 
 
-def answer(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What a homogenisation found, in a few lines of text, of its `summary`."""
     moduli = summary["moduli_kPa"]
     lines = [

@@ -16,7 +16,7 @@ from ...errors import InputError
 from ...files import write_csv
 from ...materials.library import load_material, read_material
 from ...run.cache import Cache
-from ...run.context import Ending
+from ...run.context import RunContext
 from ...run.folder import begin
 from ...run.progress import Progress
 from .cluster import Cluster, Work
@@ -61,7 +61,7 @@ def sweep(
     plan: Plan,
     folder: Path,
     progress: Progress,
-    ending: Ending,
+    context: RunContext,
     scheduler: str | None = None,
     workers: int = 2,
     add: int = 0,
@@ -78,17 +78,17 @@ def sweep(
     density = _density(plan)
     if add and plan.method == "grid":
         raise InputError("a grid has its levels' points", "--add", "give more steps in sweep.toml instead")
-    begin(ending, folder, HEADER, plan.texts(), RESULTS)
+    begin(context, folder, HEADER, plan.texts(), RESULTS)
     values, places = _extended(plan, folder, add)
     points = plan.points(values)
     run = Run(plan, points, folder, places, density)
     run.look(retry)
     run.write()
-    ending.on_stop = lambda _: run.write()
+    context.on_stop = lambda _: run.write()
     with progress.stage("points"):
         run.solve(progress, scheduler, workers, work)
     found = run.found()
-    ending.summary |= summary(found)
+    context.summary |= summary(found)
     with progress.stage("report", expected_s=5.0):
         write_report(found, folder / REPORT)
     return found
@@ -212,7 +212,7 @@ def summary(found: Found) -> dict[str, Any]:
     }
 
 
-def answer(summary: dict[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What a sweep came to, in a few lines of text."""
     lines = [f"{summary['done']} of {summary['points']} points done, {summary['failed']} failed"]
     if summary["seconds_a_point"] is not None:

@@ -13,11 +13,11 @@ from ...design.parameters import Unit
 from ...fem.equilibrium import Equilibrium, State, rest
 from ...fem.kinematics import bending_angle_deg, probe
 from ...fem.model import Model
-from ...fem.self_intersection import first_contact
+from ...fem.self_intersection import first_self_intersection
 from ...fem.trajectory import simulate
 from ...fem.unit import materials_of
 from ...meshing.mesh import Mesh
-from ...placement.batch import Sweep
+from ...placement.batch import CandidateBatch
 from ...placement.candidates import candidates, roi
 from ...placement.deviation import Deviation, centreline, deviation
 from ...placement.inclusion import RULES, sensor_share
@@ -105,7 +105,7 @@ def _crossings(mesh: Mesh, states: Sequence[State]) -> tuple[float, ...]:
     found = []
     for sign in (-1, 1):
         outward = sorted((s for s in states if s.pressure_MPa * sign > 0), key=lambda s: abs(s.pressure_MPa))
-        contact = first_contact(mesh, [rest(mesh), *outward]) if outward else None
+        contact = first_self_intersection(mesh, [rest(mesh), *outward]) if outward else None
         if contact is not None:
             found.append(1e3 * contact.pressure_MPa)
     return tuple(found)
@@ -125,7 +125,7 @@ def paths(
     shares = [sensor_share(rule, one) for rule in rules for one in found]
     monitor = probe(mesh, points)
     states = [moved.states[int(np.argmin(np.abs(moved.pressure_kPa - p)))] for p in solved_kPa]
-    sweep = Sweep(
+    sweep = CandidateBatch(
         Model(mesh, threads=1),
         materials_of(unit, mesh),
         (points, monitor),

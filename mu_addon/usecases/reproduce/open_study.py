@@ -14,7 +14,7 @@ import numpy as np
 from ...design.parameters import Unit
 from ...errors import InputError
 from .agreement import objective, spearman
-from .open_values import MOTION_KPA, OPEN, Answer
+from .open_values import MOTION_KPA, OPEN, PointResult
 from .published import Published, name_of
 from .surrogate import Shares, Surrogate, fit, shares
 
@@ -48,7 +48,7 @@ class OpenPoint:
         return bool(np.isfinite(self.crossing_kPa).any())
 
 
-def point(name: str, values: Mapping[str, float], found: Answer | str, samples_kPa: Array) -> OpenPoint:
+def point(name: str, values: Mapping[str, float], found: PointResult | str, samples_kPa: Array) -> OpenPoint:
     """A point of the table from what was solved; values that are not given are nan."""
     row = np.array([values.get(o.name, np.nan) for o in OPEN], float)
     if isinstance(found, str):

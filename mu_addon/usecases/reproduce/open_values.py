@@ -84,7 +84,7 @@ MOTION_KPA = (*ENDS_KPA, 50.0)
 
 
 @attrs.frozen(eq=False)
-class Answer:
+class PointResult:
     """What one set of values gives in each column (c).
 
     angle_deg (c, 3) at MOTION_KPA, nan beyond a limit point; crossing_kPa (c, 2), the first vacuum and the
@@ -134,7 +134,7 @@ def solve(
     moduli_kPa: Mapping[float, float],
     mesh: MeshSettings,
     held_cells: float = 0.0,
-) -> Answer:
+) -> PointResult:
     """Every column with one set of values. Raises InputError, MeshingError and ConvergenceError."""
     same = with_values(attrs.evolve(unit, scale=1.0), values)
     body = held(mesh_unit(same, mesh), held_cells * same.dimensions.cell)
@@ -152,7 +152,7 @@ def solve(
         crossings.append([min(side, key=abs) if side else np.nan for side in sides])
         at_rest.append(anchors(one))
         found.append(paths(one, mine, moved, (RULE,), ENDS_KPA))
-    return Answer(tuple(moduli_kPa), np.array(angles), np.array(crossings), tuple(at_rest), tuple(found))
+    return PointResult(tuple(moduli_kPa), np.array(angles), np.array(crossings), tuple(at_rest), tuple(found))
 
 
 def kept(
@@ -162,7 +162,7 @@ def kept(
     moduli_kPa: Mapping[float, float],
     mesh: MeshSettings,
     held_cells: float = 0.0,
-) -> Answer | str:
+) -> PointResult | str:
     """`solve` from the cache, or solved and put there; a failure is kept as its reason."""
     figures = sorted(values.items()), sorted(moduli_kPa.items()), held_cells
     name = key(unit.hash(), figures, attrs.astuple(mesh), MOTION_KPA)
@@ -170,28 +170,28 @@ def kept(
     if stored is not None:
         return str(stored["failed"]) if "failed" in stored else _unpacked(stored)
     try:
-        answer = solve(unit, values, moduli_kPa, mesh, held_cells)
+        console_summary = solve(unit, values, moduli_kPa, mesh, held_cells)
     except MuError as error:
         reason = f"{error.what} ({error.where})" if error.where else error.what
         cache.put("open", name, {"failed": np.array(reason)})
         return reason
-    cache.put("open", name, _packed(answer))
-    return answer
+    cache.put("open", name, _packed(console_summary))
+    return console_summary
 
 
-def _packed(answer: Answer) -> dict[str, Array]:
+def _packed(console_summary: PointResult) -> dict[str, Array]:
     found = {
-        "scales": np.array(answer.scales),
-        "angle_deg": answer.angle_deg,
-        "crossing_kPa": answer.crossing_kPa,
+        "scales": np.array(console_summary.scales),
+        "angle_deg": console_summary.angle_deg,
+        "crossing_kPa": console_summary.crossing_kPa,
     }
-    for i, (at_rest, p) in enumerate(zip(answer.anchors, answer.paths, strict=True)):
+    for i, (at_rest, p) in enumerate(zip(console_summary.anchors, console_summary.paths, strict=True)):
         found |= {f"anchors{i}": at_rest, f"rules{i}": np.array(p.rules)}
         found |= {f"{n}{i}": getattr(p, n) for n in ("pressure_kPa", "still", "apart", "volume_ratio")}
     return found
 
 
-def _unpacked(stored: Mapping[str, Array]) -> Answer:
+def _unpacked(stored: Mapping[str, Array]) -> PointResult:
     numbers = range(len(stored["scales"]))
     found = [
         Paths(
@@ -200,7 +200,7 @@ def _unpacked(stored: Mapping[str, Array]) -> Answer:
         )
         for i in numbers
     ]
-    return Answer(
+    return PointResult(
         tuple(float(s) for s in stored["scales"]),
         stored["angle_deg"],
         stored["crossing_kPa"],

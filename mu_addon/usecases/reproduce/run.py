@@ -17,7 +17,7 @@ from ...files import write_csv
 from ...meshing.settings import MeshSettings
 from ...placement.inclusion import RULES
 from ...run.cache import Cache
-from ...run.context import Ending
+from ...run.context import RunContext
 from ...run.folder import begin
 from ...run.pool import each
 from ...run.progress import Progress
@@ -27,7 +27,7 @@ from . import gripper, open_study, scatter
 from .agreement import Agreement, Statement, agreement, statements
 from .columns import BENDING_KPA, Solved, TableColumn, solved, tasks
 from .open_study import OpenPoint, point
-from .open_values import BESIDE, RULE, Answer, Beside, column_unit, design, kept
+from .open_values import BESIDE, RULE, Beside, PointResult, column_unit, design, kept
 from .published import Published, name_of, published
 from .settings import FOLDER, HEADER, Settings
 
@@ -109,12 +109,12 @@ def reproduce(
     settings: Settings,
     folder: Path,
     progress: Progress,
-    ending: Ending,
+    context: RunContext,
 ) -> Found:
     """Make a folder with table, figures and report. Raises InputError, MeshingError and ConvergenceError."""
     from .report import write_report
 
-    begin(ending, folder, HEADER, {INPUTS: settings.text()}, RESULTS)
+    begin(context, folder, HEADER, {INPUTS: settings.text()}, RESULTS)
     paper, unit = published(), settings.unit
     _, samples = grasp().sample(TIMES)
     units = [column_unit(unit, scale, modulus) for scale, modulus in paper.modulus_kPa.items()]
@@ -136,7 +136,7 @@ def reproduce(
         origin["points"] = "this run"
     found = Found(settings, paper, columns, others, tuple(drawn), tuple(points), samples, origin)
     write_tables(found, folder)
-    ending.summary |= summary(found)
+    context.summary |= summary(found)
     with progress.stage("report", expected_s=10.0):
         write_report(found, folder / REPORT)
     return found
@@ -194,7 +194,7 @@ def _points(
     sets = [Beside("", values) for values in design(settings.points)]
     sets = [*BESIDE, *sets]
     work = partial(_open, unit=unit, cache=cache, moduli=dict(paper.modulus_kPa))
-    known: dict[int, Answer | str] = {}
+    known: dict[int, PointResult | str] = {}
     for number, found in each(work, sets, settings.workers):
         known[number] = found
         progress.update(len(known) / len(sets))
@@ -207,7 +207,7 @@ def _points(
     return points
 
 
-def _open(one: Beside, unit: Unit, cache: Cache, moduli: Mapping[float, float]) -> Answer | str:
+def _open(one: Beside, unit: Unit, cache: Cache, moduli: Mapping[float, float]) -> PointResult | str:
     return kept(cache, unit, one.values, moduli, OPEN_MESH, one.held_cells)
 
 
@@ -310,7 +310,7 @@ def summary(found: Found) -> dict[str, Any]:
     }
 
 
-def answer(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What a reproduction came to, in a few lines of text."""
     lines = []
     for rule, by_column in summary.get("agreement", {}).items():

@@ -17,7 +17,7 @@ from ...files import write_csv, write_text
 from ...measured import read_folder
 from ...report.charts import canvas
 from ...report.html import cards, figure, page, table
-from ...run.context import Ending
+from ...run.context import RunContext
 from ...run.folder import begin
 from ...run.progress import Progress
 from ...sensing.calibration import Calibration, Sweep, calibrate, sweeps_of, write_calibration
@@ -49,7 +49,7 @@ def calibrate_sensor(
     dark: str | None = None,
     angles: Path | None = None,
     progress: Progress,
-    ending: Ending,
+    context: RunContext,
 ) -> Calibration:
     """Fit a calibration to folders of measured data or recordings, and write it with its report into `out`.
 
@@ -78,7 +78,7 @@ def calibrate_sensor(
             [f"data = {[str(path) for path in data]!r}", f"channel = {name!r}", f"dark = {dark or 0!r}", ""]
         )
     }
-    begin(ending, out, HEADER, inputs, RESULTS)
+    begin(context, out, HEADER, inputs, RESULTS)
     with progress.stage("calibrate", expected_s=1.0):
         found = calibrate(fitted, str(name), level)
     checks = [_check(words, sweep, found) for words, sweep in held]
@@ -93,7 +93,7 @@ def calibrate_sensor(
     _, near, far, _ = found.angle_of(volts)
     rows = np.column_stack([at, volts, near, far]).tolist()
     write_csv(out / "calibration.csv", ("angle_deg", "voltage_V", "angle_low_deg", "angle_high_deg"), rows)
-    ending.summary |= summary(found, checks)
+    context.summary |= summary(found, checks)
     write_text(out / "report.html", _report(found, fitted, held, checks))
     return found
 
@@ -115,7 +115,7 @@ def summary(found: Calibration, checks: Sequence[Check]) -> dict[str, Any]:
     }
 
 
-def answer(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What was found, in a few lines of text, of its `summary`."""
     low, high = summary["range_deg"]
     lines = [

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from ...errors import InputError
-from ...run.context import Ending
+from ...run.context import RunContext
 from ...run.progress import Progress, Sink
 from ...sensing.calibration import deriver, read_calibration
 from ...sensing.session import Control, run_session
@@ -53,7 +53,7 @@ def stream(
     seconds: float | None,
     about: Mapping[str, Any],
     progress: Progress,
-    ending: Ending,
+    context: RunContext,
     controlled: bool = False,
     calibration: str | None = None,
     keep_time: bool = False,
@@ -70,7 +70,7 @@ def stream(
     if controlled:
         threading.Thread(target=_obey, args=(control,), daemon=True).start()
     derive = None if calibration is None else deriver(read_calibration(Path(calibration)))
-    ending.open_folder(folder)
+    context.open_folder(folder)
 
     def tell(event: str, details: dict[str, Any]) -> None:
         message = {"type": "stream", "event": event, **details}
@@ -94,7 +94,7 @@ def stream(
             keep_time=keep_time,
             derive=derive,
         )
-    ending.summary.update(status)
+    context.summary.update(status)
 
 
 @contextmanager
@@ -171,7 +171,7 @@ def _losses(status: Mapping[str, Any]) -> list[str]:
     return [f"{status[key]} {word}" for key, word in words.items() if status[key]]
 
 
-def answer(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What a session recorded, in a few lines of text, of its `summary`."""
     rows, seconds = summary["rows"], summary["duration_s"]
     losses = _losses(summary) or ["nothing lost"]

@@ -19,7 +19,7 @@ from ...fem.kinematics import probe
 from ...fem.materials import Materials
 from ...fem.model import Model
 from ...meshing.mesh import Mesh
-from ...placement.batch import Sweep
+from ...placement.batch import CandidateBatch
 from ...placement.candidates import Candidate, roi
 from ...placement.inclusion import sensor_share
 from ...run.processes import ctrl_c_ignored, end_with_parent, one_thread_each
@@ -31,7 +31,7 @@ Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)
-class Setting:
+class CandidateProblem:
     """What a sweep is about; plain data, so that it travels to another process.
 
     jobs: candidates and the inclusion rule of each; anchors (p, 3) in mm are the monitored points. whole:
@@ -62,14 +62,14 @@ class Moved(NamedTuple):
 class Evaluator:
     """Solves all jobs of a setting at one state of Model A, having built its model once."""
 
-    def __init__(self, setting: Setting, threads: int) -> None:
+    def __init__(self, setting: CandidateProblem, threads: int) -> None:
         s = setting
         found = {c.name: roi(s.mesh, c, s.radius_mm) for c, _ in s.jobs}
         shares = [sensor_share(rule, found[c.name]) for c, rule in s.jobs]
         monitored = s.anchors, probe(s.mesh, s.anchors)
         model = Model(s.mesh, threads=threads) if s.study is None else s.study.model(s.mesh, threads)
         newton = None if s.study is None else s.study.effects.newton
-        self._sweep = Sweep(model, s.materials, monitored, shares, s.sensor_MPa, newton)
+        self._sweep = CandidateBatch(model, s.materials, monitored, shares, s.sensor_MPa, newton)
         self._whole = s.whole
 
     def __call__(self, state: State) -> Moved:
@@ -82,15 +82,15 @@ class Evaluator:
         """Anchors (s, p, 3) in mm that a job moves along its path from rest. Raises ConvergenceError."""
         return self._sweep.alone(job, pressures_MPa)
 
-    def marched(self, job: int, time_s: Array, pressure_kPa: Array) -> Array:
+    def simulated_in_time(self, job: int, time_s: Array, pressure_kPa: Array) -> Array:
         """Anchors (k, p, 3) in mm that a job moves at k instants, beside obstacles; ConvergenceError."""
-        return self._sweep.marched(job, time_s, pressure_kPa)
+        return self._sweep.simulated_in_time(job, time_s, pressure_kPa)
 
 
 _evaluator: Evaluator | None = None
 
 
-def _start(setting: Setting) -> None:
+def _start(setting: CandidateProblem) -> None:
     global _evaluator
     end_with_parent()
     _evaluator = Evaluator(setting, threads=1)
@@ -106,9 +106,9 @@ def _work_alone(job: int, pressures_MPa: Array) -> Array:
     return _evaluator.alone(job, pressures_MPa)
 
 
-def _work_marched(job: int, time_s: Array, pressure_kPa: Array) -> Array:
+def _work_in_time(job: int, time_s: Array, pressure_kPa: Array) -> Array:
     assert _evaluator is not None
-    return _evaluator.marched(job, time_s, pressure_kPa)
+    return _evaluator.simulated_in_time(job, time_s, pressure_kPa)
 
 
 def _survive_broken_pipes() -> None:
@@ -132,10 +132,10 @@ def _worker_errors() -> Iterator[None]:
         ) from None
 
 
-class Sweeper:
+class CandidatePool:
     """Processes that solve a setting's jobs at states of Model A; started when first needed, until closed."""
 
-    def __init__(self, setting: Setting, workers: int) -> None:
+    def __init__(self, setting: CandidateProblem, workers: int) -> None:
         self.setting, self.workers = setting, workers
         self._alone: Evaluator | None = None
         self._pool: ProcessPoolExecutor | None = None
@@ -164,14 +164,16 @@ class Sweeper:
         with _worker_errors():
             return [done.result() for done in waiting]
 
-    def marched(self, jobs: Sequence[int], time_s: Array, pressure_kPa: Array) -> Iterator[tuple[int, Array]]:
+    def simulated_in_time(
+        self, jobs: Sequence[int], time_s: Array, pressure_kPa: Array
+    ) -> Iterator[tuple[int, Array]]:
         """Each of some jobs, by number, as it is done, and anchors (k, p, 3) in mm it moves at k instants."""
         if self.workers == 1:
             for job in jobs:
                 self._alone = self._alone or Evaluator(self.setting, threads=1)
-                yield job, self._alone.marched(job, time_s, pressure_kPa)
+                yield job, self._alone.simulated_in_time(job, time_s, pressure_kPa)
             return
-        waiting = {self._submit(_work_marched, job, time_s, pressure_kPa): job for job in jobs}
+        waiting = {self._submit(_work_in_time, job, time_s, pressure_kPa): job for job in jobs}
         for done in as_completed(waiting):
             with _worker_errors():
                 found = done.result()

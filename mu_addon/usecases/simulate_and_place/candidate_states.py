@@ -15,7 +15,7 @@ from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, Evaluation, evaluation
 from ...placement.sampling import between, estimate, rounds
 from ...run.cache import Cache, key
-from .candidate_pool import Setting, Sweeper
+from .candidate_pool import CandidatePool, CandidateProblem
 from .job import Job
 
 Array = np.ndarray[Any, Any]
@@ -26,7 +26,7 @@ SAMPLING_ERROR = 0.02
 PATH_DIFFERENCE_MM = 1e-5
 
 
-class Sweep:
+class CandidateSolver:
     """Candidates, each under an inclusion rule, through a protocol's distinct pressures (s,) in kPa.
 
     What is solved is kept in the cache. Close it, also when Model A failed. whole: the rule whose
@@ -49,8 +49,10 @@ class Sweep:
         sensor = unit.material.sensor_modulus_kPa / 1e3
         materials = job.materials(mesh)
         self._whole = tuple(i for i, (_, rule) in enumerate(jobs) if rule == whole)
-        self._sweeper = Sweeper(
-            Setting(mesh, materials, self._anchors, tuple(jobs), self._radius, sensor, self._whole, job),
+        self._sweeper = CandidatePool(
+            CandidateProblem(
+                mesh, materials, self._anchors, tuple(jobs), self._radius, sensor, self._whole, job
+            ),
             job.workers,
         )
         self._key = key(
@@ -72,7 +74,7 @@ class Sweep:
         self.path_difference_mm = 0.0
 
     def _rounds(self, distinct: Array) -> list[list[int]]:
-        return rounds(distinct, self._job.effects.weighs)
+        return rounds(distinct, self._job.effects.has_gravity)
 
     def _name(self, state: State) -> str:
         return key(self._key, state.pressure_MPa)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-import attrs
 import numpy as np
 
 from ...errors import InputError
 from ...fem.obstacle import Contact, Obstacle
 from ...fem.rigid_surface import Surface
 from ...meshing.settings import CELL_MM
+from ...report.results import ContactHistory
 
 if TYPE_CHECKING:
     from ...design.parameters import Unit
@@ -26,75 +26,6 @@ PRESSURE_MPa, DEPTH_mm = 0.02, 0.05
 HALVINGS = 2
 # Deeper than this at rest, as a share of DEPTH_mm, is an overlap and no rounding of the mesh.
 _OVERLAP = 0.2
-COLUMNS = (
-    "time_s",
-    "pressure_kPa",
-    "obstacle",
-    "normal_N",
-    "friction_N",
-    "force_x_N",
-    "force_y_N",
-    "force_z_N",
-    "area_mm2",
-    "sticking",
-    "gap_error_mm",
-    "slid_mm",
-    "lost_mJ",
-)
-
-
-@attrs.frozen(eq=False)
-class ContactHistory:
-    """A whole unit's contact with b rigid bodies at k instants; forces (b, k, 3) are its on them, in N.
-
-    area_mm2, sticking, deepest_mm, slid_mm and lost_mJ (b, k): see `fem.obstacle.Contact`; slid_mm is the
-    farthest that a point has slid so far.
-    """
-
-    names: tuple[str, ...]
-    friction: tuple[float, ...]
-    time_s: Array
-    pressure_kPa: Array
-    normal_N: Array
-    tangential_N: Array
-    area_mm2: Array
-    sticking: Array
-    deepest_mm: Array
-    slid_mm: Array
-    lost_mJ: Array
-
-    @property
-    def force_N(self) -> Array:
-        """Size (b, k) of the whole force."""
-        return np.asarray(np.linalg.norm(self.normal_N + self.tangential_N, axis=2))
-
-    def rows(self) -> list[tuple[Any, ...]]:
-        """A row of contact.csv an instant and body, see COLUMNS."""
-        found = []
-        for k, (time, pressure) in enumerate(zip(self.time_s, self.pressure_kPa, strict=True)):
-            for b, name in enumerate(self.names):
-                normal, rubbing = self.normal_N[b, k], self.tangential_N[b, k]
-                values = [np.linalg.norm(normal), np.linalg.norm(rubbing), *(normal + rubbing)]
-                values += [self.area_mm2[b, k], self.sticking[b, k], self.deepest_mm[b, k]]
-                values += [self.slid_mm[b, k], self.lost_mJ[b, k]]
-                found.append((f"{time:.9g}", f"{pressure:.9g}", name, *(f"{v + 0.0:.6g}" for v in values)))
-        return found
-
-    def summary(self) -> dict[str, Any]:
-        """Its figures by name of the body; two of a name are told apart by their number."""
-        found = {}
-        for b, name in enumerate(self.names):
-            k = int(self.force_N[b].argmax())
-            found[f"{b + 1} {name}"] = {
-                "friction": self.friction[b],
-                "largest_force_N": float(self.force_N[b, k]),
-                "at_s": float(self.time_s[k]),
-                "at_kPa": float(self.pressure_kPa[k]),
-                "largest_gap_error_mm": float(self.deepest_mm[b].max()),
-                "slid_mm": float(self.slid_mm[b].max()),
-                "lost_mJ": float(self.lost_mJ[b].max()),
-            }
-        return found
 
 
 def obstacles_of(bodies: Sequence[RigidBody], unit: Unit, mesh: Mesh) -> tuple[Obstacle, ...]:

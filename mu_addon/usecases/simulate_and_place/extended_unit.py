@@ -16,7 +16,7 @@ from ...evidence.lattice_fem import printed
 from ...evidence.prediction.lattice import SLENDER, ComputedCell
 from ...evidence.unit_effects import EFFECTS, Body
 from ...homogenize.effective import Effective
-from ..diagnose.run import spoken
+from ..diagnose.run import readable
 from .static_effects import NAMES, StaticEffects
 
 Values = Mapping[str, Fitted]
@@ -24,7 +24,7 @@ Values = Mapping[str, Fitted]
 Put = Callable[[Unit, float], tuple[Unit, str]]
 
 # Effects that the unit has parameters for.
-_SAID = {
+_DESCRIPTIONS = {
     "overcure": "every printed surface moves outward by {:.3g} mm",
     "skin_cure": "a skin of {:.3g} mm times the excess of its modulus over the core's",
     "wall_thickness": "walls are {:.3g} times as thick as drawn",
@@ -80,9 +80,9 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
             continue
         effect = EFFECTS.get(name)
         known = effect is not None and tuple(values) == (effect.parameter.name,)
-        put = _of_effect(name) if known and name in _SAID else None
+        put = _of_effect(name) if known and name in _DESCRIPTIONS else None
         if put is None:
-            left_out.append(f"{spoken(name)} ({_said(values)}): {_ELSEWHERE.get(name, _NOWHERE)}")
+            left_out.append(f"{readable(name)} ({_said(values)}): {_ELSEWHERE.get(name, _NOWHERE)}")
             continue
         for p, fitted in values.items():
             unit, words = _put(unit, origin, f"{name}.{p}", fitted, put)
@@ -95,7 +95,7 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
             unit, words = _put(unit, origin, name, fitted, _as_printed(model))
             applied.append(words)
         else:
-            left_out.append(f"{spoken(name)} ({fitted.value:.4g}) is of the bench, not of the unit")
+            left_out.append(f"{readable(name)} ({fitted.value:.4g}) is of the bench, not of the unit")
     named = {name: {p: fitted.value for p, fitted in values.items()} for name, values in static.items()}
     effects = StaticEffects(named, where=f"{origin}, [effect]")
     applied += effects.words()
@@ -145,7 +145,7 @@ def _of_effect(name: str) -> Put:
     assert change is not None
 
     def put(unit: Unit, size: float) -> tuple[Unit, str]:
-        return change(Body(unit), size).unit, _SAID[name].format(size)
+        return change(Body(unit), size).unit, _DESCRIPTIONS[name].format(size)
 
     return put
 

@@ -30,7 +30,7 @@ from .motion import write_sensitivity
 
 if TYPE_CHECKING:
     from .job import Job
-    from .run import Study
+    from .study import Study
 
 Array = np.ndarray[Any, Any]
 
@@ -61,7 +61,7 @@ def sensitivity_map(study: Study) -> Array:
         }
         write_fields(study.folder / MAP, study.mesh, fields)
         write_sensitivity(study.folder, study.mesh, dJ / modulus)
-    study.ending.summary["sensitivity"] = {"file": MAP, "largest_mm": float(dJ.max())}
+    study.context.summary["sensitivity"] = {"file": MAP, "largest_mm": float(dJ.max())}
     return dJ
 
 
@@ -133,7 +133,7 @@ def search_graph(study: Study) -> LatticeSearch:
         with study.progress.stage("motion of the best path"):
             alone = Candidate(first.name, 0, first.points)
             study.sweep(mesh, trajectory, [(alone, rule)], to_look_at=True)
-    study.ending.summary["search"] = {
+    study.context.summary["search"] = {
         "rule": rule,
         "paths": len(chains),
         "checked": len(outcome.checked),

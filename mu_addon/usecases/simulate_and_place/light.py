@@ -20,7 +20,7 @@ from ...sensing.optics import Optics
 from ...sensing.signal import best_sets, differential_pairs, pareto, response, signal_of_nodes, traced_signal
 
 if TYPE_CHECKING:
-    from .run import Study
+    from .study import Study
 
 Array = np.ndarray[Any, Any]
 
@@ -70,8 +70,8 @@ def _signals(study: Study, optics: Optics) -> Signals:
         names = tuple(bars)
         J = np.array([study.evaluations[name, study.headline_rule].deviation.J_hat for name in names])
         best = names[int(J.argmin())]
-        weighs = study.job.effects.weighs
-        checks = _checked(bars[best][1], own[best], angle, optics, weighs)
+        has_gravity = study.job.effects.has_gravity
+        checks = _checked(bars[best][1], own[best], angle, optics, has_gravity)
     sizes = [size for size in (2, 3) if size <= len(names)]
     sets = [best for size in sizes for best in best_sets(SPREAD * np.array(slopes), NOISE, size)]
     pairs = differential_pairs([r.sensitivity_per_deg for r in responses])
@@ -81,7 +81,7 @@ def _signals(study: Study, optics: Optics) -> Signals:
         names=names,
         responses=tuple(responses),
         errors_per_deg=np.array(errors),
-        at_rest=np.array([s.transmitted[0] if weighs else s.at_rest for s in found.values()]),
+        at_rest=np.array([s.transmitted[0] if has_gravity else s.at_rest for s in found.values()]),
         checks=checks,
         j_hat=J,
         front=tuple(pareto(J.tolist(), [r.sensitivity_per_deg for r in responses])),
@@ -115,7 +115,7 @@ def _bars(study: Study) -> dict[str, tuple[list[int], Held]]:
 
 
 def _checked(
-    bar: Held, moved: list[tuple[Array, Array]], angle: Array, optics: Optics, weighs: bool
+    bar: Held, moved: list[tuple[Array, Array]], angle: Array, optics: Optics, has_gravity: bool
 ) -> Checks:
     """Rays through a bar at rest, at its ends of the motion and between them; `moved` begins with rest.
 
@@ -123,9 +123,9 @@ def _checked(
     """
     order = np.argsort(angle, kind="stable")
     some = order[np.unique(np.linspace(0, len(order) - 1, _CHECKS).astype(int))]
-    light = traced_signal(bar, [*moved[:weighs], *(moved[i] for i in some)], optics)
-    share, errors = light.transmitted[weighs:], light.errors[weighs:]
-    delta = 1 - share / (light.transmitted[0] if weighs else light.at_rest)
+    light = traced_signal(bar, [*moved[:has_gravity], *(moved[i] for i in some)], optics)
+    share, errors = light.transmitted[has_gravity:], light.errors[has_gravity:]
+    delta = 1 - share / (light.transmitted[0] if has_gravity else light.at_rest)
     return Checks(angle[some], delta, errors * (1 - delta))
 
 
@@ -180,7 +180,7 @@ def _write(study: Study, found: Signals) -> None:
     ]  # fmt: skip
     write_csv(study.folder / TABLE, columns, rows)
     by_name = dict(zip(found.names, found.responses, strict=True))
-    study.ending.summary["light"] = {
+    study.context.summary["light"] = {
         "optics": attrs.asdict(found.optics),
         "law_rms": found.law.rms,
         "sensitivity_per_deg": {n: r.sensitivity_per_deg for n, r in by_name.items()},

@@ -15,7 +15,7 @@ from ...fem.trajectory import Trajectory
 from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, Evaluation, evaluation
 from ...run.cache import Cache, key
-from .candidate_pool import Setting, Sweeper
+from .candidate_pool import CandidatePool, CandidateProblem
 from .contact_history import HALVINGS, DEPTH_mm, PRESSURE_MPa
 from .job import Job
 
@@ -39,7 +39,7 @@ def evaluations(
     points, radius = anchors(unit), unit.dimensions.inclusion_radius
     sensor = unit.material.sensor_modulus_kPa / 1e3
     time, pressure = trajectory.time_s, trajectory.pressure_kPa
-    setting = Setting(mesh, materials, points, tuple(jobs), radius, sensor, study=job)
+    setting = CandidateProblem(mesh, materials, points, tuple(jobs), radius, sensor, study=job)
     contact = CONTACT, PRESSURE_MPa, DEPTH_mm, HALVINGS, [o.friction for o in job.obstacles]
     names = [
         key(
@@ -60,9 +60,9 @@ def evaluations(
     ]
     kept = {n: cache.get("march", name) for n, name in enumerate(names)}
     moved = {n: arrays["moved_mm"] for n, arrays in kept.items() if arrays is not None}
-    with closing(Sweeper(setting, job.workers)) as sweeper:
+    with closing(CandidatePool(setting, job.workers)) as sweeper:
         missing = [n for n in range(len(jobs)) if n not in moved]
-        for n, found in sweeper.marched(missing, time, pressure):
+        for n, found in sweeper.simulated_in_time(missing, time, pressure):
             cache.put("march", names[n], {"moved_mm": found})
             moved[n] = found
             on_progress(len(moved) / len(jobs))

@@ -13,14 +13,18 @@ from .motion import IMAGE, REGIONS, SurfaceFields, surface_of, write_path
 
 if TYPE_CHECKING:
     from ...fem.trajectory import Trajectory
-    from .candidate_states import Sweep
-    from .run import Study
+    from .candidate_states import CandidateSolver
+    from .study import Study
 
 Array = np.ndarray[Any, Any]
 
 
 def keep_motion(
-    study: Study, mesh: Mesh, trajectory: Trajectory, sweep: Sweep, jobs: list[tuple[Candidate, str]]
+    study: Study,
+    mesh: Mesh,
+    trajectory: Trajectory,
+    sweep: CandidateSolver,
+    jobs: list[tuple[Candidate, str]],
 ) -> None:
     """Write the motion of every path whose displacement a sweep on a mesh has kept. Raises OutputError.
 

@@ -31,7 +31,7 @@ RULE_MEANS = {
 }
 
 
-def write_report(path: File, results: ReportData) -> None:
+def write_html(path: File, results: ReportData) -> None:
     """Write `results` to `path` as a self-contained HTML file; raises OutputError."""
     write_text(path, report_html(results))
 
@@ -40,7 +40,7 @@ def report_html(results: ReportData) -> str:
     """The whole report as HTML text; the headline's rule comes before any other."""
     first = sorted(results.rules.items(), key=lambda item: item[0] != results.headline_rule)
     results = attrs.evolve(results, rules=dict(first))
-    return page(results.title, results.unit, _notes(results), _answer(results), _sections(results))
+    return page(results.title, results.unit, _notes(results), _headline(results), _sections(results))
 
 
 def _sections(r: ReportData) -> list[tuple[str, str, str]]:
@@ -72,7 +72,7 @@ def _notes(r: ReportData) -> str:
     return html + note(r.warnings)
 
 
-def _answer(r: ReportData) -> str:
+def _headline(r: ReportData) -> str:
     rule = r.rules.get(r.headline_rule)
     html = ""
     if rule is not None:

@@ -19,8 +19,8 @@ from .job import LATTICE_LAW
 
 if TYPE_CHECKING:
     from ...homogenize.effective import Effective
-    from .run import Study
     from .static_effects import StaticEffects
+    from .study import Study
 
 PACKAGES = ("numpy", "scipy", "warp-lang", "cvxopt", "pymetis", "manifold3d", "gmsh", "pytetwild", "meshio")
 # What the lattice's law stands in for.
@@ -48,12 +48,12 @@ FILES = {
 }
 
 
-def publish(study: Study, stopped: str = "") -> None:
+def write_report(study: Study, stopped: str = "") -> None:
     """Write report.html (and unit.png); `stopped` says why a study that is not complete stopped.
 
     A report that tells of more stages than were run now, from the same inputs, is left as it is.
     """
-    from .report import write_report
+    from .report import write_html
 
     if study.has_more and (study.folder / "report.html").is_file():
         return
@@ -64,7 +64,7 @@ def publish(study: Study, stopped: str = "") -> None:
             write_bytes(study.folder / "unit.png", pictures[0].png)
         _panel_pictures(study)
         data = report_data(study, view, pictures, versions, stopped, _search_picture(study))
-        write_report(study.folder / "report.html", data)
+        write_html(study.folder / "report.html", data)
 
 
 def _panel_pictures(study: Study) -> None:
@@ -183,7 +183,7 @@ def _effect_words(effects: StaticEffects) -> list[str]:
     """What acts on the unit besides, in words."""
     turned = (
         [f"gravity turned {effects.orientation_deg:g}° about x, 0 being the tip down"]
-        if effects.weighs
+        if effects.has_gravity
         else []
     )
     return [*effects.words(), *turned]
@@ -196,7 +196,7 @@ def _effects(effects: StaticEffects) -> list[Parameter]:
         for (name, given), words in zip(effects.values.items(), effects.words(), strict=True)
         for p, value in given.items()
     ]
-    if effects.weighs:
+    if effects.has_gravity:
         turned = Parameter("orientation", effects.orientation_deg, "deg", "asked for: 0 hangs, tip down")
         rows.append(turned)
     return rows
@@ -259,7 +259,7 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
         return None, []
     d = study.job.unit.dimensions
     parts = unit_parts(d, study.solid.vertices, study.solid.triangles)
-    name = study.ending.summary.get("chosen", {}).get(study.headline_rule)
+    name = study.context.summary.get("chosen", {}).get(study.headline_rule)
     window = next((w for w in study.windows if w.name == name), None)
     path = study.anchors[list(window.indices)] if window else study.anchors[:0]
     radius = max(d.inclusion_radius, d.waveguide_section / 2)

@@ -27,7 +27,7 @@ _LAWS = ("anisotropy", "strain_stiffening", "tension_compression_asymmetry")
 # The other effects change the unit that is meshed, or the mesh.
 NAMES = tuple(name for name, e in EFFECTS.items() if e.materials or e.model or e.load)
 # Of each in a few words, its size included.
-_SAID = {
+_DESCRIPTIONS = {
     "gravity": "solid parts weigh {:.4g} kg/m³",
     "strain_stiffening": "the wall stiffens at large stretch, c2/c1 = {:.3g}",
     "anisotropy": "the wall is stiffer by {:.0%} along the print's layers than across them",
@@ -97,9 +97,9 @@ class StaticEffects:
         return {name: given[EFFECTS[name].parameter.name] for name, given in self.values.items()}
 
     @property
-    def weighs(self) -> bool:
+    def has_gravity(self) -> bool:
         """Whether the direction of gravity matters."""
-        return any(EFFECTS[name].weighs for name in self.values)
+        return any(EFFECTS[name].has_gravity for name in self.values)
 
     @property
     def clogged(self) -> bool:
@@ -114,7 +114,7 @@ class StaticEffects:
         """What study.toml has of them: nothing where there is none, no direction where nothing weighs."""
         if not self:
             return {}
-        turned = {"orientation_deg": self.orientation_deg} if self.weighs else {}
+        turned = {"orientation_deg": self.orientation_deg} if self.has_gravity else {}
         return {**turned, "effects": {name: dict(given) for name, given in self.values.items()}}
 
     @property
@@ -130,7 +130,7 @@ class StaticEffects:
 
     def words(self) -> list[str]:
         """Each effect in words."""
-        return [_SAID[name].format(size) for name, size in self.sizes.items()]
+        return [_DESCRIPTIONS[name].format(size) for name, size in self.sizes.items()]
 
     def materials(self, base: Materials, mesh: Mesh) -> Materials:
         """Materials of a unit's mesh with these effects, of those without."""

@@ -455,7 +455,7 @@ def figures(found: Filmed, name: str, table: Path) -> dict[str, Any]:
     }
 
 
-def answer(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What came of a video, in a few lines."""
     low, high = summary["pressure_kPa"]
     lines = [

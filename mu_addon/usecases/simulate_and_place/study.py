@@ -1,0 +1,654 @@
+"""One study from a unit to a ranked sensor path, stage by stage, in one folder."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...design.anchors import Window, anchors, windows
+from ...design.export import write_nodes, write_stl
+from ...design.parameters import Material
+from ...design.solid import Solid, build_solid
+from ...design.strut_cell import strut_cell
+from ...errors import ConvergenceError, MeshingError
+from ...fem.equilibrium import Equilibrium, State, rest
+from ...fem.kinematics import bending_angle_deg
+from ...fem.lattice_law import deformation_gradients, stretches
+from ...fem.model import Model
+from ...fem.obstacle import Contact as Touch
+from ...fem.self_intersection import first_self_intersection
+from ...fem.time_stepping import Instant, simulate_in_time
+from ...fem.trajectory import Trajectory, simulate
+from ...files import write_csv, write_npz
+from ...homogenize.foam_response import ellipticity
+from ...meshing.mesh import LATTICE, Mesh
+from ...meshing.quality import Quality, quality
+from ...meshing.settings import MeshSettings
+from ...meshing.unit import MeshingWarning, mesh_unit
+from ...placement.candidates import Candidate, Evaluation, candidates
+from ...placement.deviation import rank
+from ...report.results import CONTACT_COLUMNS, ContactHistory, LatticeSearch, Signals
+from ...report.vtk import write_mesh, write_trajectory
+from ...run.cache import Cache, key
+from ...run.context import RunContext
+from ...run.folder import begin, keep_inputs, require_space
+from ...run.progress import Progress
+from .candidate_states import PATH_DIFFERENCE_MM, CandidateSolver
+from .contact_history import history
+from .job import Job
+from .motion import FOLDER as MOTION
+from .motion import write_model_a
+from .obstacle_candidates import evaluations
+from .path_motion import keep_motion
+from .report_data import package_versions
+from .study_file import FILES, HEADER, STAGES
+from .study_file import NAME as STUDY
+
+Array = np.ndarray[Any, Any]
+
+RESULTS = (
+    "unit.stl",
+    "anchors.txt",
+    "mesh.vtu",
+    "model_a.pvd",
+    "angle.csv",
+    "contact.csv",
+    "deviation.csv",
+    "delta.npz",
+    "sensitivity.vtu",
+    "signals.csv",
+    "paths.csv",
+    "report.html",
+    "unit.png",
+    MOTION,
+)
+# Figures of summary.json that tell that a stage was run.
+_TELLS = {"design": "gates", "simulate": "angle_deg", "place": "chosen"}
+# What a study writes, with as much to spare: so much anyway, and so much a node and distinct pressure.
+_BYTES = {"interactive": 30_000_000, "export": 150_000_000}
+_BYTES_A_NODE = {"simulate": 300, "place": 1000}
+# A coarser twin of the mesh, to tell how far the mesh moves a ranking.
+COARSER = 0.7
+
+
+@attrs.define
+class Study:
+    """A study under way: what has been found so far is here, and in `folder` as soon as it is whole."""
+
+    job: Job
+    folder: Path
+    progress: Progress
+    context: RunContext
+    solid: Solid | None = None
+    mesh: Mesh | None = None
+    quality: Quality | None = None
+    trajectory: Trajectory | None = None
+    states: list[State] = attrs.field(factory=list)
+    evaluations: dict[tuple[str, str], Evaluation] = attrs.field(factory=dict)
+    uncertainty_mm: dict[str, float] = attrs.field(factory=dict)
+    warnings: list[str] = attrs.field(factory=list)
+    solver: dict[str, Any] = attrs.field(factory=dict)
+    contact: ContactHistory | None = None
+    search: LatticeSearch | None = None
+    light: Signals | None = None
+    _ahead: CandidateSolver | None = None
+
+    @classmethod
+    def open(cls, job: Job, folder: Path, progress: Progress, context: RunContext) -> Study:
+        """Make the folder a study's; results of other inputs are moved to stale/, never shown as current.
+
+        What a job of more stages found there from the same inputs is kept. Raises InputError, also where
+        another process works in the folder, and OutputError, also where the disk has too little room.
+        """
+        context.lock_folder(folder)
+        texts, current = job.texts_in(folder)
+        if current:
+            # Further stages of the same inputs make study.toml longer, and nothing stale.
+            keep_inputs(folder, {STUDY: texts[STUDY]})
+            context.summary = _earlier(folder) | context.summary
+        optional = [name for name in FILES.values() if name not in texts]
+        begin(context, folder, HEADER, texts, (*RESULTS, "unit_alpha[0-9]*.stl", "model_a"), optional)
+        study = cls(job, folder, progress, context)
+        study._require_space(_expected_nodes(job) if "simulate" in job.stages else 0)
+        context.summary["versions"] = package_versions()
+        context.summary["parameters"] = attrs.asdict(job.unit)
+        if job.body is not None:
+            low, high = job.body.bounds.tolist()
+            context.summary["body"] = {"low_mm": low, "high_mm": high, "triangles": len(job.body.triangles)}
+        if "simulate" in job.stages:
+            study._tell_settings()
+        return study
+
+    def _tell_settings(self) -> None:
+        """Settings of the simulation in the summary, and warnings of what they leave out."""
+        job, summary = self.job, self.context.summary
+        summary["study"] = {"times": job.times, "stations": job.stations, "rules": job.rules}
+        summary["study"] |= {"mesh": attrs.asdict(job.mesh), "mesher": job.mesher}
+        if job.lattice is not None:
+            summary["study"]["lattice"] = attrs.asdict(job.lattice)
+            self._warn_of_another_cell()
+        if job.effects:
+            summary["study"] |= job.effects.tables
+        self._warn_of_missed_corners()
+        if job.mesh.order == 1:
+            self.warn("Linear elements lock in thin walls: these answers are for a quick look only.")
+
+    def _require_space(self, nodes: int) -> None:
+        """Raise OutputError where the disk has less room than a study with so many nodes takes."""
+        _, pressure = self.job.protocol.sample(self.job.times)
+        per_node = _BYTES_A_NODE["place" if "place" in self.job.stages else "simulate"]
+        require_space(self.folder, _BYTES[self.job.quality] + nodes * per_node * len(np.unique(pressure)))
+
+    @property
+    def has_more(self) -> bool:
+        """Whether the folder has the results of a further stage than this job's, from the same inputs."""
+        further = STAGES[len(self.job.stages) :]
+        return any(_TELLS[stage] in self.context.summary for stage in further)
+
+    @property
+    def cache(self) -> Cache:
+        """Finished work, so that a killed run resumes."""
+        return Cache(self.folder / "cache")
+
+    @property
+    def anchors(self) -> Array:
+        """P1..Pn in mm, (n, 3)."""
+        return anchors(self.job.unit)
+
+    @property
+    def windows(self) -> list[Window]:
+        """The candidate paths' windows of anchors."""
+        return windows(len(self.anchors))
+
+    @property
+    def headline_rule(self) -> str:
+        """The rule whose best path is the answer: the one that converges with the mesh, if asked for."""
+        return "volume_fraction" if "volume_fraction" in self.job.rules else self.job.rules[0]
+
+    # Stages, in the order they need each other.
+
+    def design(self, window: Window | None = None) -> Solid:
+        """Printable solid, its STL and the lattice nodes; with a window, the unit with that waveguide."""
+        name = "unit.stl" if window is None else f"unit_{window.name}.stl"
+        with self.progress.stage("solid" if window is None else f"solid with {window.name}", 3.0):
+            solid = build_solid(self.job.unit, window, self.job.quality, self.job.body)
+            write_stl(solid, self.folder / name)
+            write_nodes(self.job.unit, self.folder / "anchors.txt")
+        gates = {**attrs.asdict(solid.gates), "inner_volume_error": solid.gates.inner_volume_error}
+        self.context.summary.setdefault("gates", {})[name] = gates
+        if window is None:
+            self.solid = solid
+        return solid
+
+    def make_mesh(self) -> Mesh:
+        """Analysis mesh and its quality; kept, since one of its meshers is not repeatable."""
+        with self.progress.stage("mesh"):
+            self.mesh = self._mesh(self.job.mesh)
+            self._require_space(len(self.mesh.nodes))
+            self.quality = quality(self.mesh, self.job.unit, self.job.body)
+            modulus, _ = self.job.materials(self.mesh).small_strain(len(self.mesh.tets))
+            write_mesh(self.folder / "mesh.vtu", self.mesh, modulus)
+        self.context.summary["mesh"] = {**attrs.asdict(self.quality), "hash": self.mesh.hash()}
+        return self.mesh
+
+    def _mesh(self, settings: MeshSettings) -> Mesh:
+        settings = self.job.mesh_settings(settings)
+        # Only the shape: what it is made of, or called, leaves a mesh as it is.
+        shape = attrs.evolve(self.job.unit, name="shape", material=Material())
+        body = [] if self.job.body is None else [self.job.body.hash]
+        name = key(shape.hash(), attrs.astuple(settings), self.job.mesher, *body)
+        found = self.cache.get("mesh", name)
+        fields = [f.name for f in attrs.fields(Mesh)]
+        if found is not None and set(found) == set(fields):
+            symmetry = tuple(str(axis) for axis in found.pop("symmetry"))
+            return Mesh(**found, symmetry=symmetry)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            mesh = mesh_unit(
+                self.job.unit,
+                settings,
+                lambda _, share: self.progress.update(share),
+                self.job.mesher,
+                self.cache.folder,
+                self.job.body,
+            )
+        fallback = [w for w in caught if issubclass(w.category, MeshingWarning)]
+        for warning in fallback:
+            self.warn(str(warning.message))
+        # A stand-in's mesh is kept by its mesher; here it would pass for the one asked for.
+        if not fallback:
+            arrays = {f: getattr(mesh, f) for f in fields}
+            self.cache.put("mesh", name, {**arrays, "symmetry": np.array(mesh.symmetry, dtype="U1")})
+        return mesh
+
+    def simulate(self, candidates_beside: bool = False) -> Trajectory:
+        """Model A: the unit without a sensor through the pressure protocol.
+
+        candidates_beside: whether other processes go on with the candidates as soon as a state is there.
+        """
+        assert self.mesh is not None
+        time, pressure = self.job.protocol.sample(self.job.times)
+        with self.progress.stage("Model A"):
+            model = self.job.model(self.mesh)
+            if candidates_beside and self.job.workers > 1 and not self.job.obstacles:
+                self._ahead = CandidateSolver(
+                    self.job, self.cache, self.mesh, self._jobs(), pressure, self.headline_rule
+                )
+            try:
+                self.trajectory = self._model_a(model, time, pressure, self._reached)
+            except BaseException:
+                if self._ahead is not None:
+                    self._ahead.close()
+                self._keep_partial_motion()
+                raise
+            self._write_motion(self.trajectory.states)
+            self._write_contact()
+            write_model_a(self.folder, self.mesh, self.job.materials(self.mesh), self.trajectory)
+            self._look_for_contact(self.trajectory.states)
+            self._look_beyond_the_fit(self.trajectory.states)
+        states = [s for s in self.trajectory.states if s.loaded]
+        self.solver = {
+            "unknowns": len(model.free),
+            "states": len(states),
+            "newton_iterations": sum(s.iterations for s in states),
+            "factorisations": sum(s.factorisations for s in states),
+            "largest_relative_residual": max((s.residual for s in states), default=0.0),
+        }
+        self.context.summary["solver"] = self.solver
+        return self.trajectory
+
+    def _reached(self, state: State) -> None:
+        self.states.append(state)
+        if self._ahead is not None:
+            self._ahead.reached(state)
+
+    def _model_a(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
+        """Model A's trajectory on a model's mesh, load step by load step from the cache where it is there."""
+        materials = self.job.materials(model.mesh)
+        if self.job.obstacles:
+            return self._touching(model, time, pressure, on_state)
+        # A state's last digits depend on the pressures visited before it.
+        visited = np.unique(pressure)
+        name = key(model.mesh.hash(), materials.hash(), visited, self.job.newton, *self.job.effects.parts)
+        total = len(np.union1d(visited, 0.0))
+        done = 0
+
+        def keep(state: State) -> None:
+            nonlocal done
+            done += 1
+            self.progress.update(
+                done / total, f"{state.pressure_MPa * 1e3:.4g} kPa, residual {state.residual:.1e}"
+            )
+            on_state(state)
+
+        return simulate(
+            Equilibrium(model, materials, self.job.newton),
+            time,
+            pressure,
+            keep,
+            load=lambda p: self._stored(name, p, model),
+            store=lambda state: self.cache.put(
+                "state", key(name, state.pressure_MPa), attrs.asdict(state, recurse=False)
+            ),
+        )
+
+    def _touching(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
+        """Model A beside obstacles: instant by instant, since friction remembers, from the cache likewise."""
+        job, materials = self.job, self.job.materials(model.mesh)
+        parts = [(o.depth_mm, o.stiffness, o.stick_stiffness, o.friction) for o in model.obstacles]
+        name = key(
+            model.mesh.hash(),
+            materials.hash(),
+            time,
+            pressure,
+            job.newton,
+            job.obstacles_text() or "",
+            parts,
+            *job.effects.parts,
+        )
+        found: list[list[Touch]] = []
+
+        def keep(state: State) -> None:
+            found.append([o.contact(state.u) for o in model.obstacles])
+            force = sum(float(np.linalg.norm(c.force_N)) for c in found[-1])
+            self.progress.update(
+                len(found) / len(time), f"{state.pressure_MPa * 1e3:.4g} kPa, contact {force:.3g} N"
+            )
+            on_state(state)
+
+        motion = simulate_in_time(
+            Equilibrium(model, materials, job.newton),
+            time,
+            pressure,
+            keep,
+            load=lambda number: self._kept_instant(key(name, number), model),
+            store=lambda number, instant: self._keep_instant(key(name, number), instant),
+        )
+        if model.mesh is self.mesh:
+            self.contact = history(job.obstacles, model.mesh, time, pressure, found)
+        return motion
+
+    def _keep_instant(self, name: str, instant: Instant) -> None:
+        arrays = attrs.asdict(instant.state, recurse=False) | {"time_s": instant.time_s}
+        if instant.rate is not None:
+            arrays["rate"] = instant.rate
+        for number, memory in enumerate(instant.contacts):
+            arrays |= {f"{number} {part}": values for part, values in memory.items()}
+        self.cache.put("instant", name, arrays)
+
+    def _kept_instant(self, name: str, model: Model) -> Instant | None:
+        found = self.cache.get("instant", name)
+        if found is None or found.get("u", np.empty(0)).shape != model.mesh.nodes.shape:
+            return None
+        contacts = [
+            {part.partition(" ")[2]: a for part, a in found.items() if part.startswith(f"{number} ")}
+            for number in range(len(model.obstacles))
+        ]
+        return Instant(float(found["time_s"]), _state(found), found.get("rate"), tuple(contacts))
+
+    def _stored(self, name: str, pressure_MPa: float, model: Model) -> State | None:
+        found = self.cache.get("state", key(name, pressure_MPa))
+        if found is None or found.get("u", np.empty(0)).shape != model.mesh.nodes.shape:
+            return None
+        return _state(found)
+
+    def _write_motion(self, states: Any) -> None:
+        assert self.mesh is not None
+        if self.job.obstacles:
+            self._write_in_time(states)
+            return
+        ordered = sorted(states, key=lambda s: s.pressure_MPa)
+        angles = [bending_angle_deg(self.mesh, s.u) for s in ordered]
+        pressures = [s.pressure_MPa * 1e3 for s in ordered]
+        write_csv(
+            self.folder / "angle.csv",
+            ["pressure_kPa", "angle_deg"],
+            [(f"{p:.6g}", f"{a:.6g}") for p, a in zip(pressures, angles, strict=True)],
+        )
+        self.context.summary["angle_deg"] = {f"{p:.6g}": a for p, a in zip(pressures, angles, strict=True)}
+        by_pressure = {round(s.pressure_MPa * 1e3, 9): s for s in ordered}
+        time, pressure = self.job.protocol.sample(self.job.times)
+        reached = [(t, by_pressure[p]) for t, p in zip(time, pressure, strict=True) if p in by_pressure]
+        write_trajectory(self.folder / "model_a.pvd", self.mesh, reached)
+
+    def _write_in_time(self, states: Any) -> None:
+        """As `_write_motion`, of states an instant: what touches moves otherwise on the way back."""
+        assert self.mesh is not None
+        time, _ = self.job.protocol.sample(self.job.times)
+        reached = list(zip(time.tolist(), states, strict=False))
+        angles = [bending_angle_deg(self.mesh, s.u) for _, s in reached]
+        rows = [
+            (f"{t:.9g}", f"{s.pressure_MPa * 1e3:.6g}", f"{a:.6g}")
+            for (t, s), a in zip(reached, angles, strict=True)
+        ]
+        write_csv(self.folder / "angle.csv", ["time_s", "pressure_kPa", "angle_deg"], rows)
+        # Of a pressure met twice, what it was the first time.
+        first = {p: float(a) for _, p, a in reversed(rows)}
+        self.context.summary["angle_deg"] = dict(sorted(first.items(), key=lambda item: float(item[0])))
+        write_trajectory(self.folder / "model_a.pvd", self.mesh, reached)
+
+    def _write_contact(self) -> None:
+        """What the unit touched, where it may touch something."""
+        if self.contact is None:
+            return
+        write_csv(self.folder / "contact.csv", CONTACT_COLUMNS, self.contact.rows())
+        self.context.summary["contact"] = self.contact.summary()
+
+    def _look_for_contact(self, states: tuple[State, ...]) -> None:
+        """Name the first pressure, on either side, at which walls pass through each other, and which."""
+        assert self.mesh is not None
+        found: dict[str, Any] = {}
+        for sign in (-1, 1):
+            outward = sorted(
+                (s for s in states if s.pressure_MPa * sign > 0), key=lambda s: abs(s.pressure_MPa)
+            )
+            still = [s for s in states if s.loaded and not s.pressure_MPa]
+            contact = first_self_intersection(self.mesh, [rest(self.mesh), *still, *outward])
+            if contact is None:
+                continue
+            pressure = f"{contact.pressure_MPa * 1e3:.4g}"
+            found[pressure] = [str(c) for c in contact.crossings]
+            self.warn(
+                f"From {pressure} kPa on, walls pass through each other: {contact.crossings[0]}. Nothing "
+                "here resists contact, and the states beyond are wrong. Thicken the wall, or keep the "
+                "protocol short of this pressure."
+            )
+        self.context.summary["walls_cross_at_kPa"] = found
+
+    def _look_beyond_the_fit(self, states: tuple[State, ...]) -> None:
+        """Warn where the lattice is strained further than its law was fitted, or than it is stable."""
+        if self.job.lattice is None:
+            return
+        assert self.mesh is not None
+        law = self.job.lattice.law
+        low, high = law.stretch
+        inside = np.flatnonzero(self.mesh.region == LATTICE)
+        found = {}
+        for state in states:
+            F, volume = deformation_gradients(self.mesh, state.u, inside)
+            a = stretches(F)
+            beyond = (a[:, :, 0] < low) | (a[:, :, 2] > high)
+            # One point an element: it takes a while.
+            lost = ellipticity(law, F[:, 0]) <= 0
+            found[f"{state.pressure_MPa * 1e3:.6g}"] = {
+                "least": float(a.min()),
+                "largest": float(a.max()),
+                "share_beyond_fit": float((volume * beyond).sum() / volume.sum()),
+                "share_not_elliptic": float((volume.sum(axis=1) * lost).sum() / volume.sum()),
+            }
+        self.context.summary["lattice_stretch"] = found
+        least, largest = (
+            pick(s[n] for s in found.values()) for pick, n in ((min, "least"), (max, "largest"))
+        )
+        pressure, worst = max(found.items(), key=lambda item: item[1]["share_beyond_fit"])
+        if worst["share_beyond_fit"]:
+            self.warn(
+                f"The lattice is strained to stretches from {least:.2f} to {largest:.2f}, but its law was "
+                f"fitted from {low:g} to {high:g}: at {pressure} kPa {worst['share_beyond_fit']:.1%} of the "
+                "lattice's volume is beyond, and answers by extrapolation."
+            )
+        pressure, worst = max(found.items(), key=lambda item: item[1]["share_not_elliptic"])
+        if worst["share_not_elliptic"]:
+            self.warn(
+                f"At {pressure} kPa the law is not elliptic any more in {worst['share_not_elliptic']:.1%} of "
+                "the lattice's volume: struts buckle there, in patterns that depend on the mesh. Compare two "
+                "meshes (--refine)."
+            )
+
+    def _keep_partial_motion(self) -> None:
+        """What was found before a failure is kept; summary.json says that it is partial."""
+        if self.mesh is not None and self.states:
+            start = [] if self.job.obstacles or self.job.effects.has_gravity else [rest(self.mesh)]
+            self._write_motion([*start, *self.states])
+
+    def _jobs(self) -> list[tuple[Candidate, str]]:
+        return [(c, rule) for rule in self.job.rules for c in candidates(self.anchors, self.windows)]
+
+    def place(self) -> dict[str, str]:
+        """Every candidate under every rule against Model A; returns the chosen path of each rule."""
+        assert self.mesh is not None
+        assert self.trajectory is not None
+        jobs = self._jobs()
+        with self.progress.stage("candidates"):
+            found = self.sweep(self.mesh, self.trajectory, jobs, self._ahead, verify=True, to_look_at=True)
+        self.evaluations = {(e.name, e.rule): e for e in found}
+        every = candidates(self.anchors, self.windows)
+        chosen = self._write_ranking(every)
+        if self.job.mesh_check:
+            try:
+                self._compare_meshes(jobs)
+            except (ConvergenceError, MeshingError) as error:
+                self.warn(f"The mesh's uncertainty is not known: on a coarser mesh, {error.what}.")
+            chosen = self._write_ranking(every)
+        return chosen
+
+    def sweep(
+        self,
+        mesh: Mesh,
+        trajectory: Trajectory,
+        jobs: list[tuple[Candidate, str]],
+        under_way: CandidateSolver | None = None,
+        verify: bool = False,
+        to_look_at: bool = False,
+    ) -> list[Evaluation]:
+        """Evaluation of every (candidate, rule) on a mesh against its Model A; see `sweeping`.
+
+        to_look_at: whether the paths' motion is kept, too; of the study's own mesh or the whole body's.
+        """
+        if self.job.obstacles:
+            self.context.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = {"along_paths": True}
+            return evaluations(self.job, self.cache, mesh, trajectory, jobs, self.progress.update)
+        whole = self.headline_rule if to_look_at else ""
+        sweep = under_way or CandidateSolver(self.job, self.cache, mesh, jobs, trajectory.pressure_kPa, whole)
+        with closing(sweep):
+            found = sweep.evaluations(trajectory, self.progress.update, verify)
+            if to_look_at:
+                keep_motion(self, mesh, trajectory, sweep, jobs)
+        if sweep.path_difference_mm > PATH_DIFFERENCE_MM:
+            self.warn(
+                "A candidate started from Model A's states was not where its own path from rest leads "
+                f"({sweep.path_difference_mm:.2g} mm apart), so every candidate was solved along its path."
+            )
+        self.context.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = {
+            "pressures_solved_kPa": sweep.solved_kPa,
+            "relative_error_between": sweep.error,
+            "path_difference_mm": sweep.path_difference_mm,
+        }
+        return found
+
+    def _compare_meshes(self, jobs: list[tuple[Candidate, str]]) -> None:
+        """How far a coarser mesh moves each J_hat: the most of any path, by rule.
+
+        Both meshes are compared at the protocol's extreme pressures; the change there, relative to the
+        deviation there, stands for the change of J_hat.
+        """
+        assert self.trajectory is not None
+        coarse = attrs.evolve(self.job.mesh, refine=self.job.mesh.refine * COARSER)
+        _, pressure = self.job.protocol.sample(self.job.times)
+        chosen = extremes(pressure)
+        instants = [int(np.flatnonzero(pressure == p)[0]) for p in chosen]
+        time = np.arange(len(chosen), dtype=float)
+        if self.job.obstacles:
+            # What friction remembers is of the whole protocol.
+            time, chosen = self.job.protocol.sample(self.job.times)
+            instants = list(range(len(time)))
+        with self.progress.stage("mesh check"):
+            mesh = self._mesh(coarse)
+            model = self.job.model(mesh)
+            trajectory = self._model_a(model, time, chosen, lambda _: None)
+            ratio: dict[str, list[float]] = {rule: [] for rule in self.job.rules}
+            for found in self.sweep(mesh, trajectory, jobs):
+                fine = self.evaluations[found.name, found.rule].deviation
+                same = fine.delta[instants].mean()
+                # A sensor as soft as the lattice disturbs nothing, on any mesh.
+                scale = fine.J_hat / same if same else 0.0
+                ratio[found.rule].append(abs(found.deviation.J_hat - same) * scale)
+        self.uncertainty_mm = {rule: max(values) for rule, values in ratio.items()}
+
+    def _write_ranking(self, every: list[Candidate]) -> dict[str, str]:
+        chosen, rows, arrays = {}, [], {}
+        summary: dict[str, Any] = {"J_hat_mm": {}, "J_cont_mm": {}}
+        for rule in self.job.rules:
+            found = [self.evaluations[c.name, rule] for c in every]
+            ranks = rank(np.array([e.deviation.J_hat for e in found]))
+            chosen[rule] = found[int(np.argmin(ranks))].name
+            for c, e, r in zip(every, found, ranks, strict=True):
+                d = e.deviation
+                rows.append((c.name, c.start, c.length, rule, f"{d.J_hat:.9g}", f"{d.J_cont:.9g}", int(r)))
+            arrays[f"delta_{rule}_mm"] = np.array([e.deviation.delta for e in found])
+            summary["J_hat_mm"][rule] = {e.name: e.deviation.J_hat for e in found}
+            summary["J_cont_mm"][rule] = {e.name: e.deviation.J_cont for e in found}
+        columns = ["path", "start", "length", "rule", "J_hat_mm", "J_cont_mm", "rank"]
+        write_csv(self.folder / "deviation.csv", columns, rows)
+        time, pressure = self.job.protocol.sample(self.job.times)
+        arrays |= {
+            "path": np.array([c.name for c in every]),
+            "time_s": time,
+            "pressure_kPa": pressure,
+            "station": np.linspace(0, 1, self.job.stations),
+        }
+        write_npz(self.folder / "delta.npz", arrays)
+        summary |= {"chosen": chosen, "mesh_uncertainty_mm": self.uncertainty_mm}
+        summary["tied_with_chosen"] = {rule: self.tied(rule, chosen[rule]) for rule in self.job.rules}
+        self.context.summary |= summary
+        self.context.summary["warnings"] = self.warnings
+        return chosen
+
+    def tied(self, rule: str, chosen: str) -> list[str]:
+        """Paths whose J_hat is closer to the chosen one's than the mesh moves it."""
+        J = {name: e.deviation.J_hat for (name, r), e in self.evaluations.items() if r == rule}
+        limit = self.uncertainty_mm.get(rule, 0.0)
+        return [name for name, value in J.items() if name != chosen and value - J[chosen] < limit]
+
+    def _warn_of_another_cell(self) -> None:
+        """Say where the lattice's law was found for another cell than the unit's."""
+        assert self.job.lattice is not None
+        own = strut_cell(self.job.unit)
+        values = {f.name: getattr(own, f.name) for f in attrs.fields(type(own))} | {"kind": own.kind.name}
+        other = []
+        for name, value in self.job.lattice.cell.items():
+            mine = values.get(name, value)
+            words = isinstance(value, str) or isinstance(mine, str)
+            if value != mine and (words or not np.isclose(value, mine, rtol=1e-6)):
+                other.append(f"{name} {value} (unit: {mine})")
+        if other:
+            self.warn(f"The lattice's law is that of another cell than the unit's: {', '.join(other)}.")
+
+    def _warn_of_missed_corners(self) -> None:
+        """Say where uniform samples miss the protocol's extremes."""
+        corners = self.job.protocol.pressure_kPa
+        _, samples = self.job.protocol.sample(self.job.times)
+        for extreme, met in ((corners.min(), samples.min()), (corners.max(), samples.max())):
+            if abs(extreme - met) > 1e-6:
+                self.warn(
+                    f"The protocol goes to {extreme:g} kPa, but its {self.job.times} samples only to "
+                    f"{met:g} kPa: give a number of samples that meets its corners."
+                )
+
+    def warn(self, text: str) -> None:
+        """Tell something that the user should know, now and in the report."""
+        if text not in self.warnings:
+            self.warnings.append(text)
+            self.progress.warning(text)
+
+
+def _state(arrays: dict[str, Array]) -> State:
+    """The state that the cache kept."""
+    return State(
+        float(arrays["pressure_MPa"]),
+        arrays["u"],
+        float(arrays["residual"]),
+        int(arrays["iterations"]),
+        int(arrays["factorisations"]),
+    )
+
+
+def extremes(pressure_kPa: Array) -> Array:
+    """The pressures, ascending, that stand for a protocol: its extremes, without 0."""
+    found = np.unique([pressure_kPa.min(), pressure_kPa.max()])
+    return found[found != 0]
+
+
+def _earlier(folder: Path) -> dict[str, Any]:
+    """Figures of a folder's last run, as far as this version of the program found them."""
+    try:
+        found = json.loads((folder / "summary.json").read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return {}
+    if not isinstance(found, dict) or found.get("versions") != package_versions():
+        return {}
+    return {name: value for name, value in found.items() if name not in ("status", "reason", "warnings")}
+
+
+def _expected_nodes(job: Job) -> int:
+    """How many nodes a mesh will have, from those of mu-1.0x: 18 500 at a refinement of 1, 71 000 at 1.8."""
+    share = {"quarter": 0.5, "half": 1.0, "full": 2.0}[job.mesh.fraction]
+    of_order = {1: 0.15, 2: 1.0}[job.mesh.order]
+    units = job.unit.dimensions.count / 6
+    return int(share * of_order * units * (4_000 + 17_000 * job.mesh.refine**2.3))
