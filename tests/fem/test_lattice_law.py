@@ -16,7 +16,7 @@ from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.placement.batch import Sweep
+from mu_addon.placement.batch import CandidateBatch
 from mu_addon.placement.candidates import candidates, roi, with_sensor
 from mu_addon.placement.inclusion import sensor_share
 from mu_addon.placement.influence import influence, loaded
@@ -97,7 +97,7 @@ def test_sensors_in_lockstep_find_what_each_finds_alone(mesh, baseline):
     points = anchors(UNIT)
     every = {c.name: c for c in candidates(points, windows(6))}
     shares = [sensor_share("intersect", roi(mesh, every[n], 1.0)) for n in ("alpha2", "alpha10")]
-    sweep = Sweep(Model(mesh), materials, (points, probe(mesh, points)), shares, 2.5)
+    sweep = CandidateBatch(Model(mesh), materials, (points, probe(mesh, points)), shares, 2.5)
     together = sweep.at(baseline.states[-1])
     for number, found in enumerate(together):
         alone = sweep.alone(number, np.array([0.015]))[0]
