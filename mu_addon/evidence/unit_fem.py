@@ -17,9 +17,10 @@ import numpy as np
 
 from ..design.parameters import Unit
 from ..errors import ConvergenceError, InputError, MeshingError, MuError
-from ..fem.equilibrium import Equilibrium, State
+from ..fem.equilibrium import Equilibrium
 from ..fem.kinematics import bending_angle_deg
 from ..fem.lattice_law import LatticeLaw
+from ..fem.state import State
 from ..fem.trajectory import branches
 from ..files import read_npz, write_npz
 from ..measured import Experiment

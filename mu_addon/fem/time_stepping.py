@@ -9,8 +9,9 @@ import attrs
 import numpy as np
 
 from ..errors import ConvergenceError, InputError
-from .equilibrium import Equilibrium, State, rest
+from .equilibrium import Equilibrium
 from .factor import IndefiniteError
+from .state import State, rest
 from .trajectory import Trajectory
 
 Array = np.ndarray[Any, Any]

@@ -10,7 +10,8 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
-from .equilibrium import Equilibrium, State, rest
+from .equilibrium import Equilibrium
+from .state import State, rest
 
 Array = np.ndarray[Any, Any]
 

@@ -10,7 +10,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from ..fem.equilibrium import State
+from ..fem.state import State
 from ..files import make_folder, replacing, write_text
 from ..meshing.mesh import Mesh
 

@@ -16,13 +16,14 @@ import numpy as np
 from ...design.anchors import anchors
 from ...design.gripper import Gripper
 from ...errors import ConvergenceError, InputError
-from ...fem.equilibrium import Equilibrium, State
+from ...fem.equilibrium import Equilibrium
 from ...fem.kinematics import bending_angle_deg, probe
 from ...fem.loads import STANDARD_GRAVITY
 from ...fem.materials import Materials
 from ...fem.model import Model
 from ...fem.obstacle import CONTACT, Obstacle, outer_faces
 from ...fem.rigid import Box, Pose
+from ...fem.state import State
 from ...fem.time_stepping import simulate_in_time
 from ...meshing.mesh import Mesh
 from .phases import Phases

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from ...design.gripper import Gripper
-from ...fem.equilibrium import State
 from ...fem.materials import Materials
+from ...fem.state import State
 from ...fem.trajectory import Trajectory
 from ...files import make_folder, write_npz
 from ...meshing.mesh import Mesh

@@ -10,10 +10,11 @@ import numpy as np
 
 from ...design.anchors import anchors, windows
 from ...design.parameters import Unit
-from ...fem.equilibrium import Equilibrium, State, rest
+from ...fem.equilibrium import Equilibrium
 from ...fem.kinematics import bending_angle_deg, probe
 from ...fem.model import Model
 from ...fem.self_intersection import first_self_intersection
+from ...fem.state import State, rest
 from ...fem.trajectory import simulate
 from ...fem.unit import materials_of
 from ...meshing.mesh import Mesh

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...design.anchors import anchors
-from ...fem.equilibrium import State
 from ...fem.kinematics import probe
+from ...fem.state import State
 from ...fem.trajectory import Trajectory
 from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, Evaluation, evaluation

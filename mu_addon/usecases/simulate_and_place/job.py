@@ -28,9 +28,9 @@ from .study_file import FILES, NAME, STAGES, Tables, compose, digest, holds
 from .study_file import read as read_tables
 
 if TYPE_CHECKING:
-    from ...fem.descent import NewtonSettings
     from ...fem.materials import Materials
     from ...fem.model import Model
+    from ...fem.newton_settings import NewtonSettings
     from ...meshing.mesh import Mesh
 
 GRASP = "protocols/grasp.csv"

@@ -17,12 +17,13 @@ from ...design.parameters import Material
 from ...design.solid import Solid, build_solid
 from ...design.strut_cell import strut_cell
 from ...errors import ConvergenceError, MeshingError
-from ...fem.equilibrium import Equilibrium, State, rest
+from ...fem.equilibrium import Equilibrium
 from ...fem.kinematics import bending_angle_deg
 from ...fem.lattice_law import deformation_gradients, stretches
 from ...fem.model import Model
 from ...fem.obstacle import Contact as Touch
 from ...fem.self_intersection import first_self_intersection
+from ...fem.state import State, rest
 from ...fem.time_stepping import Instant, simulate_in_time
 from ...fem.trajectory import Trajectory, simulate
 from ...files import write_csv, write_npz
