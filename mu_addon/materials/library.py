@@ -18,7 +18,7 @@ from ..fem import laws
 from ..fem.materials import Layer, Materials
 from ..files import write_text
 from .coupon import MODES, Array
-from .stability import Stability, stability, whole_ranges
+from .stability import Stability, check_stability, whole_ranges
 
 FORMAT = 1
 CONFIDENCE = ("datasheet", "measured", "fitted", "second hand", "derived", "assumed")
@@ -114,7 +114,9 @@ class Material:
     def stability(self) -> tuple[Stability, ...]:
         """The law's stability over its range, in every mode."""
         checked = whole_ranges(self.ranges)
-        return tuple(stability(self.law, self.parameters, mode, *span) for mode, span in checked.items())
+        return tuple(
+            check_stability(self.law, self.parameters, mode, *span) for mode, span in checked.items()
+        )
 
     def require_stable(self) -> None:
         """Raise InputError where the law is unstable within its range."""

@@ -9,7 +9,7 @@ def test_parts_show_the_cores_geometry(tmp_path):
     blender(
         """
         import numpy as np
-        from mu_addon.design.anchors import anchors
+        from mu_addon.design.anchors import anchor_points
         from mu_addon.design.lattice import lattice_of
         from mu_addon.design.profile import cavity_volume, outer_volume
         from mu_addon.design.surface import bad_edges, volume
@@ -56,7 +56,7 @@ def test_parts_show_the_cores_geometry(tmp_path):
         reach = np.abs(thick).max(0)[0] - high_x
         assert 0.3 * d.junction_diameter < reach < 0.6 * d.junction_diameter, reach
         assert skinned.materials[0].name == "MU Lattice"
-        assert np.allclose(points(unit_object.part(root, "anchors").data), anchors(core), atol=1e-5)
+        assert np.allclose(points(unit_object.part(root, "anchors").data), anchor_points(core), atol=1e-5)
         """,
         tmp_path,
     )

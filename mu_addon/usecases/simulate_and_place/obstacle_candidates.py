@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...design.anchors import anchors
+from ...design.anchors import anchor_points
 from ...fem.kinematics import probe
 from ...fem.obstacle import CONTACT
 from ...fem.trajectory import Trajectory
@@ -36,7 +36,7 @@ def evaluations(
     every candidate is marched through all instants, and kept in the cache. Raises ConvergenceError.
     """
     unit, materials = job.unit, job.materials(mesh)
-    points, radius = anchors(unit), unit.dimensions.inclusion_radius
+    points, radius = anchor_points(unit), unit.dimensions.inclusion_radius
     sensor = unit.material.sensor_modulus_MPa
     time, pressure = trajectory.time_s, trajectory.pressure_kPa
     setting = CandidateProblem(mesh, materials, points, tuple(jobs), radius, sensor, study=job)

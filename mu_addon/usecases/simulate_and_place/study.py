@@ -12,7 +12,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.anchors import Window, anchors, windows
+from ...design.anchors import Window, anchor_points, windows
 from ...design.export import write_nodes, write_stl
 from ...design.parameters import Material
 from ...design.quantity import in_kPa
@@ -31,10 +31,10 @@ from ...fem.trajectory import Trajectory, simulate
 from ...files import write_csv, write_npz
 from ...homogenize.foam_response import ellipticity
 from ...meshing.mesh import LATTICE, Mesh
-from ...meshing.quality import Quality, quality
+from ...meshing.quality import Quality, mesh_quality
 from ...meshing.settings import MeshSettings
 from ...meshing.unit import MeshingWarning, mesh_unit
-from ...placement.candidates import Candidate, Evaluation, candidates
+from ...placement.candidates import Candidate, Evaluation, candidate_paths
 from ...placement.deviation import rank
 from ...report.results import CONTACT_COLUMNS, ContactHistory, LatticeSearch, Signals
 from ...report.vtk import write_mesh, write_trajectory
@@ -171,7 +171,7 @@ class Study:
     @property
     def anchors(self) -> Array:
         """P1..Pn in mm, (n, 3)."""
-        return anchors(self.job.unit)
+        return anchor_points(self.job.unit)
 
     @property
     def windows(self) -> list[Window]:
@@ -203,7 +203,7 @@ class Study:
         with self.progress.stage("mesh"):
             self.mesh = self._mesh(self.job.mesh)
             self._require_space(len(self.mesh.nodes))
-            self.quality = quality(self.mesh, self.job.unit, self.job.body)
+            self.quality = mesh_quality(self.mesh, self.job.unit, self.job.body)
             modulus, _ = self.job.materials(self.mesh).small_strain(len(self.mesh.tets))
             write_mesh(self.folder / "mesh.vtu", self.mesh, modulus)
         self.context.summary["mesh"] = {**attrs.asdict(self.quality), "hash": self.mesh.hash()}
@@ -478,7 +478,7 @@ class Study:
             self._write_motion([*start, *self.states])
 
     def _jobs(self) -> list[tuple[Candidate, str]]:
-        return [(c, rule) for rule in self.job.rules for c in candidates(self.anchors, self.windows)]
+        return [(c, rule) for rule in self.job.rules for c in candidate_paths(self.anchors, self.windows)]
 
     def place(self) -> dict[str, str]:
         """Every candidate under every rule against Model A; returns the chosen path of each rule."""
@@ -488,7 +488,7 @@ class Study:
         with self.progress.stage("candidates"):
             found = self.sweep(self.mesh, self.trajectory, jobs, self._ahead, verify=True, to_look_at=True)
         self.evaluations = {(e.name, e.rule): e for e in found}
-        every = candidates(self.anchors, self.windows)
+        every = candidate_paths(self.anchors, self.windows)
         chosen = self._write_ranking(every)
         if self.job.mesh_check:
             try:
