@@ -43,7 +43,7 @@ def worker_command(worker: Path, arguments: Sequence[str], blender: str = "") ->
 
 
 def environment(more: Iterable[Path] = ()) -> dict[str, str]:
-    """Environment of such a process: it finds the packages that this one finds, and those in folders `more`."""
+    """Environment of such a process: it finds the packages that this one finds, and those in `more`."""
     found = [Path(p) for p in sys.path if Path(p).name in _LIBRARY_FOLDERS]
     folders = dict.fromkeys(str(p) for p in [*more, *found])
     return {**os.environ, "PYTHONPATH": os.pathsep.join(folders), "PYTHONUNBUFFERED": "1"}

@@ -16,7 +16,7 @@ PACKAGE = Path(__file__).resolve().parents[2]
 WITHOUT_SOLVER = (
     "presets", "design", "check", "export", "specimens", "ports", "stream", "record", "replay", "calibrate",
 )  # fmt: skip
-"""Commands for design, the sensor on the bench and the printer: they start at once, also without the solver."""
+"""Commands for design, the printer and the sensor on the bench: they need no solver."""
 
 
 def _provide_package():
@@ -50,7 +50,7 @@ _provide_gmsh()
 
 
 def _trouble(solves):
-    """Why nothing can be done here, as the words of an error message, or None. solves: whether it needs Warp."""
+    """Why a command cannot run here, as an error message, or None. solves: whether it needs the solver."""
     try:
         import attrs  # noqa: F401
 
@@ -65,8 +65,8 @@ def _trouble(solves):
             if missing
             else f"the solver cannot load: {error}",
             "where": f"Python {sys.version.split()[0]}, {sys.executable}",
-            "what_to_do": "install the extension built for this Blender and system (blender --command extension "
-            "install-file -r user_default -e mu_addon-VERSION-SYSTEM.zip)"
+            "what_to_do": "install the extension built for this Blender and system (blender --command "
+            "extension install-file -r user_default -e mu_addon-VERSION-SYSTEM.zip)"
             + ("; design and export work without the solver" if solves else ""),
             "status": 1,
         }
@@ -83,7 +83,8 @@ def main(arguments):
             sys.stdout.write(json.dumps(trouble) + "\n")
         else:
             sys.stderr.write(
-                f"error: {trouble['what']}\n  where: {trouble['where']}\n  what to do: {trouble['what_to_do']}\n"
+                f"error: {trouble['what']}\n  where: {trouble['where']}\n"
+                f"  what to do: {trouble['what_to_do']}\n"
             )
         return 1
     if arguments == ["check"]:
