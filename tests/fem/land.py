@@ -10,10 +10,10 @@ import numpy as np
 from mu_addon.errors import ConvergenceError
 from mu_addon.fem.equilibrium import Equilibrium, rest
 from mu_addon.fem.factor import IndefiniteError
-from mu_addon.fem.laws import Guccione
 from mu_addon.fem.model import Model
 
 from . import bodies
+from .guccione import Guccione
 from .thick import STIFF
 
 
