@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..design.printed import skin_stiffening
+from ..design.quantity import in_MPa
 from ..meshing.mesh import LATTICE
 from .laws import NeoHooke
 from .materials import Layer, Materials
@@ -28,18 +29,13 @@ def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> M
     """
     m, p = unit.material, unit.print
     stiffer = skin_stiffening(unit.printed.wall, p.skin_depth_mm, p.skin_factor)
-    membrane_MPa = stiffer * m.membrane_modulus_kPa / 1e3
+    membrane_MPa = in_MPa(stiffer * m.membrane_modulus_kPa)
     inside = mesh.region == LATTICE
-    if unit.wall.names:
-        wall_ = wall_layers(unit.wall, np.flatnonzero(~inside), membrane_MPa, m.membrane_poisson)
-        return Materials((*wall_, *_lattice_layers(unit, np.flatnonzero(inside), lattice)))
-    if lattice is not None:
-        wall = np.flatnonzero(~inside)
-        moduli = np.full(len(wall), membrane_MPa)
-        membrane = Layer(NeoHooke, wall, NeoHooke.parameters(moduli, m.membrane_poisson))
-        return Materials((membrane, *lattice.fill(np.flatnonzero(inside))))
+    if unit.wall.names or lattice is not None:
+        wall = wall_layers(unit.wall, np.flatnonzero(~inside), membrane_MPa, m.membrane_poisson)
+        return Materials((*wall, *_lattice_layers(unit, np.flatnonzero(inside), lattice)))
     return Materials.neo_hooke(
-        np.where(inside, m.lattice_modulus_kPa / 1e3, membrane_MPa),
+        np.where(inside, m.lattice_modulus_MPa, membrane_MPa),
         np.where(inside, m.lattice_poisson, m.membrane_poisson),
     )
 
@@ -48,5 +44,5 @@ def _lattice_layers(unit: Unit, elements: Array, law: LatticeLaw | None) -> tupl
     if law is not None:
         return law.fill(elements)
     m = unit.material
-    row = NeoHooke.parameters(m.lattice_modulus_kPa / 1e3, m.lattice_poisson)
+    row = NeoHooke.parameters(m.lattice_modulus_MPa, m.lattice_poisson)
     return (Layer(NeoHooke, elements, np.tile(row, (len(elements), 1))),)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..design.quantity import in_MPa
 from .laws import Friction, Layered, NeoHooke, OgdenRoxburgh, Prony, Yeoh
 from .materials import Layer
 
@@ -33,7 +34,7 @@ def wall_layers(wall: Wall, elements: Array, modulus_MPa: float, poisson: float)
         more = Layered.parameters(max(added, 0.0), -less, LAYER_NORMAL)[0]
         found.append(_layer(Layered, elements, more, share))
     if wall.friction_share:
-        sliding = np.array([wall.friction_share * mu, wall.friction_yield_kPa / 1e3])
+        sliding = np.array([wall.friction_share * mu, in_MPa(wall.friction_yield_kPa)])
         found.append(_layer(Friction, elements, sliding))
     return tuple(found)
 
@@ -54,7 +55,7 @@ def law_row(wall: Wall, mu_MPa: float, kappa_MPa: float) -> Array:
         for g, tau in zip(wall.prony_shares, wall.prony_times_s, strict=True):
             row += [g / rest, tau]
     elif wall.law == "ogden-roxburgh":
-        row += [wall.mullins_r, wall.mullins_m_kPa / 1e3, wall.mullins_beta]
+        row += [wall.mullins_r, in_MPa(wall.mullins_m_kPa), wall.mullins_beta]
     return np.array(row)
 
 
