@@ -9,7 +9,7 @@ from mu_addon.errors import InputError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg, probe
 from mu_addon.fem.lattice_law import LatticeLaw, deformation_gradients, stretches
-from mu_addon.fem.laws import Cubic, CubicShear, DiagonalStretch, Foam, NeoHooke
+from mu_addon.fem.laws import CubicShear, DiagonalStretch, Foam, NeoHooke
 from mu_addon.fem.model import Model
 from mu_addon.fem.state import rest
 from mu_addon.fem.trajectory import simulate
@@ -21,6 +21,8 @@ from mu_addon.placement.batch import CandidateBatch
 from mu_addon.placement.candidates import candidate_paths, roi, with_sensor
 from mu_addon.placement.inclusion import sensor_share
 from mu_addon.placement.influence import influence_map, loaded
+
+from .cubic import Cubic
 
 UNIT = load_preset("mu-1.0x")
 FOAM = np.array([0.006, 5.0, 0.006, 4.0, 0.01, -2.0])

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from mu_addon.design.lattices import kind
 from mu_addon.design.strut_cell import Facets, StrutCell
 from mu_addon.errors import InputError, MeshingError
-from mu_addon.fem.laws import Cubic
 from mu_addon.fem.materials import Materials
 from mu_addon.homogenize.bounds import hashin_shtrikman
 from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell
 from mu_addon.homogenize.elasticity import Elasticity, effective_tensor, young_modulus
 from tests.fem import bodies
+from tests.fem.cubic import Cubic
 
 from . import cells
 

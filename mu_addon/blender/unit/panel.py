@@ -9,6 +9,7 @@ import bpy
 from ...design.anchors import windows
 from ...design.parameters import SECTIONS
 from ...design.quantity import describe
+from ...design.wall import Wall, offered
 from ...run.child import CANCELLED, DONE, FAILED, RUNNING
 from ...run.progress import spell
 from ..body import state as bodies
@@ -27,6 +28,7 @@ PLACES = {
     "lattice": "lattice",
     "waveguide": "path",
     "material": "simulate",
+    "wall": "simulate",
     "print": "print",
 }
 CHARACTERS = 34
@@ -49,8 +51,10 @@ def parameters(layout, props, place: str) -> None:
         if PLACES.get(section.section, "design") == place:
             group = getattr(props, section.section)
             column = layout.column(align=True)
+            shown = offered(group.law, group.friction_share) if section is Wall else None
             for d in describe(section):
-                column.prop(group, d.name)
+                if shown is None or d.name in shown:
+                    column.prop(group, d.name)
 
 
 class InTab:

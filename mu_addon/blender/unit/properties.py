@@ -23,7 +23,7 @@ from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
 from . import live_update as live
 
-UNITS = ("mm", "kPa")
+UNITS = ("mm", "kPa", "s")
 BESIDE_BLEND_FILE = {"PATH_SUPPORTS_BLEND_RELATIVE"}
 
 

@@ -1,4 +1,4 @@
-"""A study's candidates beside obstacles: each through its whole motion, since friction has memory."""
+"""A study's candidates where contact or wall has memory: each through its whole motion."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def evaluations(
 ) -> list[Evaluation]:
     """Evaluation of every candidate, each under an inclusion rule, against Model A's motion.
 
-    None of the shortcuts of `sweeping` holds beside obstacles, which make a state depend on those before it:
-    every candidate is marched through all instants, and kept in the cache. Raises ConvergenceError.
+    None of the shortcuts of `candidate_states` holds where a state depends on those before it:
+    every candidate is solved through all instants, and kept in the cache. Raises ConvergenceError.
     """
     unit, materials = job.unit, job.materials(mesh)
     points, radius = anchor_points(unit), unit.dimensions.inclusion_radius
