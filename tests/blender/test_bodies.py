@@ -159,16 +159,20 @@ def test_an_inside_out_or_mirrored_body_is_turned(tmp_path):
 def test_a_simulation_is_given_the_body(tmp_path):
     session(
         """
-        from mu_addon.blender.simulate import state as simulation, study_folder as studies
+        from mu_addon.blender.jobs import start_child as jobs
+        from mu_addon.blender.simulate import study_folder as studies
+        from mu_addon.blender.simulate.job import SIMULATION
+        from mu_addon.blender.unit.properties import to_unit
         from mu_addon.design.body import read_body
 
         root = add()
         choose(barrel(), root)
         bpy.ops.mu.body()
         given = []
-        simulation.start = lambda *arguments: given.append(arguments)
+        jobs.JobKind.start = lambda *arguments: given.append(arguments)
         assert bpy.ops.mu.simulate() == {"FINISHED"}
-        (_, core, folder, arguments) = given[0]
+        (_, _, arguments, folder) = given[0]
+        core = to_unit(root.mu_unit)
         path = arguments[arguments.index("--body") + 1]
         body = read_body(path)
         assert body.hash == bodies.envelope_in(root, core).hash

@@ -10,7 +10,9 @@ MET = """
 import numpy as np
 from mathutils import Vector
 from mu_addon.blender.obstacles import state as obstacles
-from mu_addon.blender.simulate import state as simulation, study_folder as studies
+from mu_addon.blender.jobs import start_child as jobs
+from mu_addon.blender.simulate import study_folder as studies
+from mu_addon.blender.simulate.job import SIMULATION
 from mu_addon.design.body import read_body
 from mu_addon.design.surface import volume
 
@@ -33,9 +35,9 @@ def choose(root, *objects):
 
 def asked():
     given = []
-    simulation.start = lambda *arguments: given.append(arguments)
+    jobs.JobKind.start = lambda *arguments: given.append(arguments)
     assert bpy.ops.mu.simulate() == {"FINISHED"}
-    return given[0][3]
+    return given[0][2]
 
 """
 
@@ -64,7 +66,7 @@ def test_what_a_simulation_is_given(tmp_path):
         near, far = (read_body(path) for path in words[first + 1 :: 4])
         assert np.allclose(near.bounds.mean(axis=0), [0, 60, 60], atol=0.5)
         assert far.bounds.mean(axis=0).max() > 100 and volume(far.vertices, far.triangles) > 0
-        assert obstacles.given(root) == sorted([(near.hash, 0.3), (far.hash, 0.0)])
+        assert obstacles.inputs(root) == sorted([(near.hash, 0.3), (far.hash, 0.0)])
 
         assert bpy.ops.mu.obstacle_remove(name="Far") == {"FINISHED"}
         assert asked().count("--obstacle") == 1 and "Far" in bpy.data.objects
@@ -83,12 +85,12 @@ def test_what_moves_or_is_edited_is_another_obstacle(tmp_path):
         one = ball((0, 60, 60))
         choose(root, one)
         bpy.ops.mu.obstacle()
-        seen = [obstacles.given(root)]
-        assert obstacles.given(root) == seen[0]
+        seen = [obstacles.inputs(root)]
+        assert obstacles.inputs(root) == seen[0]
 
         def changed():
             bpy.context.view_layer.update()
-            seen.append(obstacles.given(root))
+            seen.append(obstacles.inputs(root))
             return seen[-1] not in seen[:-1]
 
         one.location.y = 70.0
@@ -179,7 +181,7 @@ def test_a_box_in_the_way_is_met_and_its_move_makes_the_study_stale(tmp_path):
         def bent(folder):
             root.mu_unit.study.folder = sys.argv[2] + folder
             assert bpy.ops.mu.simulate() == {"FINISHED"}
-            child = simulation.of(root.mu_unit.uuid)
+            child = SIMULATION.child(root)
             watch(lambda: child.state != "running")
             assert child.state == "done", child.error
             return dict(studies.findings(root).angles)[40.0]
@@ -187,17 +189,17 @@ def test_a_box_in_the_way_is_met_and_its_move_makes_the_study_stale(tmp_path):
         root = add(preset="mu-0.75x")
         root.mu_unit.study.command, root.mu_unit.study.detail = "simulate", "quick"
         free = bent("/free")
-        assert studies.touches(root) == []
+        assert studies.contact_forces(root) == []
         assert bpy.ops.mu.obstacle_box(size=(20, 12, 12), gap=0.6) == {"FINISHED"}
         bpy.context.view_layer.update()
         assert studies.findings(root).stale, "it was free to move then"
         stopped = bent("/met")
         assert 1.0 < stopped < free - 1.0, (stopped, free)
-        (touch,) = studies.touches(root)
+        (touch,) = studies.contact_forces(root)
         assert touch.name == "Obstacle" and touch.force_N[0] == 0.0
         assert touch.time_s[touch.force_N.argmax()] == 8.0, "at the protocol's peak"
         bpy.context.scene.frame_set(193)
-        said = legend.words(root, motion_parts.motion_of(root), bpy.context.scene)
+        said = legend.lines(root, motion_parts.motion_of(root), bpy.context.scene)
         assert f"Obstacle: {touch.force_N.max():.2f} N" in said
 
         assert not studies.findings(root).stale

@@ -42,7 +42,7 @@ def test_add_makes_a_unit_in_millimetres(tmp_path):
 def test_operators_without_a_unit_say_what_is_missing(tmp_path):
     blender(
         """
-        from mu_addon.blender.operators import CLASSES
+        CLASSES = operators()
 
         for cls in CLASSES:
             name = cls.bl_idname.split(".")[1]
@@ -69,7 +69,7 @@ def test_operators_without_a_unit_say_what_is_missing(tmp_path):
 def test_what_changes_the_file_is_one_undo_step(tmp_path):
     blender(
         """
-        from mu_addon.blender.operators import CLASSES
+        CLASSES = operators()
 
         # What these do is in files, processes or preferences, and no undo takes it back.
         outside = {"simulate", "cancel", "dismiss", "open", "export_stl", "preset_save", "preset_remove"}

@@ -149,11 +149,11 @@ def test_a_preview_that_fell_behind_is_caught_up(tmp_path):
         from mu_addon.blender.unit import live_update as live
 
         root = add()
-        with live.held():
+        with updates.paused():
             root.mu_unit.chambers.count = 4
         assert unit_object.behind(root)
         for handler in bpy.app.handlers.undo_post:
-            if handler is live._catch_up:
+            if handler is live._after_undo_or_load:
                 handler(bpy.context.scene)
         assert not unit_object.behind(root)
         tall = max(v.co.z for v in unit_object.part(root, "actuator").data.vertices)

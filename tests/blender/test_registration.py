@@ -120,7 +120,7 @@ def test_a_new_section_of_the_core_appears_by_itself(tmp_path):
         root = bpy.data.objects.new("x", None)
         group = root.mu_unit.novelty
         group.depth_mm, group.way = 1.25, "right"
-        from mu_addon.blender.unit.panel import parameters as draw
+        from mu_addon.blender.shared.panels import parameters as draw
         from mu_addon.blender.unit.properties import section_of
         assert section_of(root.mu_unit, "novelty") == {"depth_mm": 1.25, "way": "right"}
 
@@ -142,14 +142,14 @@ def test_a_new_section_of_the_core_appears_by_itself(tmp_path):
 def test_values_survive_single_precision(tmp_path):
     blender(
         """
-        from mu_addon.blender.unit.live_update import held
+        from mu_addon.blender.shared import updates
         from mu_addon.blender.unit.properties import exact, from_unit, to_unit
         from mu_addon.design.parameters import preset_names
 
         assert exact(0.8999999761581421) == 0.9 and exact(3.125) == 3.125 and exact(1e6) == 1e6
         root = add()
         for name in preset_names():
-            with held():
+            with updates.paused():
                 from_unit(root.mu_unit, load_preset(name))
             assert to_unit(root.mu_unit) == load_preset(name)
             assert to_unit(root.mu_unit).hash() == load_preset(name).hash()
@@ -164,7 +164,7 @@ def test_everything_a_designer_meets_says_what_it_is(tmp_path):
         ours = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("MU_")]
         silent = [cls.__name__ for cls in ours if not (cls.__doc__ or "").strip()]
         groups = [cls for cls in bpy.types.PropertyGroup.__subclasses__() if cls.__name__.startswith("MU_")]
-        from mu_addon.blender.operators import CLASSES
+        CLASSES = operators()
 
         shown = [(cls.__name__, cls.bl_rna) for cls in groups]
         shown += [(c.bl_idname, getattr(bpy.ops.mu, c.bl_idname[3:]).get_rna_type()) for c in CLASSES]
