@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `ports`."""
-    commands.add_parser("ports", help="list the serial ports, for `stream` and `record`")
+    commands.add_parser("ports", help="List the serial ports, for `stream` and `record`.")
 
 
 def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
@@ -25,4 +25,4 @@ def run(options: argparse.Namespace, progress: Progress, context: RunContext) ->
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
     """A line for each port."""
-    return summary["ports"] or ["no serial port is there"]
+    return summary["ports"] or ["no serial port was found"]

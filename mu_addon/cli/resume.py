@@ -20,16 +20,21 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `resume`."""
     command = commands.add_parser(
         "resume",
-        help="go on with the study of a folder, or do again what its study.toml says",
+        help="Resume a stopped study, or run again what the study.toml of a folder describes.",
         epilog="example: run.py resume out/mu-1.0x",
     )
-    command.add_argument("out", metavar="FOLDER", help="a folder of `design`, `simulate` or `place`")
-    command.add_argument("--json", action="store_true", help="one JSON message a line on standard output")
+    command.add_argument("out", metavar="FOLDER", help="Folder written by `design`, `simulate` or `place`.")
     command.add_argument(
-        "--workers", type=int, default=2, metavar="N", help="processes for the candidates (2)"
+        "--json", action="store_true", help="Write one JSON message per line to standard output."
     )
     command.add_argument(
-        "--no-report", dest="report", action="store_false", help="figures only: no pictures, no report.html"
+        "--workers", type=int, default=2, metavar="N", help="Number of worker processes (default: 2)."
+    )
+    command.add_argument(
+        "--no-report",
+        dest="report",
+        action="store_false",
+        help="Compute the numbers only: no pictures, no report.html.",
     )
 
 
