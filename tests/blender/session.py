@@ -5,20 +5,90 @@ MU_BPY names further Pythons that have bpy, those of other versions (`conftest.p
 
 import importlib.util
 import os
+import pickle
 import subprocess
 import sys
 import textwrap
+import threading
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-python = sys.executable
-"""The Python that sessions run in; the fixture `each_bpy` sets it."""
 OTHERS = [path for path in os.environ.get("MU_BPY", "").split(os.pathsep) if path]
 PASSED_ON = "PATH", "LD_LIBRARY_PATH", "LANG", "WARP_CACHE_PATH"
+PATIENCE_S = 3600.0
+"""No measure of speed: a process that hangs must end some time."""
+python = sys.executable
 needs_bpy = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="bpy is not installed")
 
+
+class Blender:
+    """One process with bpy, which calls functions of modules under tests/ one after another; see `worker`."""
+
+    def __init__(self, python, folder):
+        self.python, self.folder = python, Path(folder)
+        self.process, self.log = None, self.folder / "said.txt"
+
+    def call(self, module, function, *, registered=True, **arguments):
+        """What `function` returns in a Blender as new; a failure there is a failure here."""
+        if self.process is None:
+            self._start()
+        start = self.log.stat().st_size
+        limit = threading.Timer(PATIENCE_S, self.process.kill)
+        limit.start()
+        try:
+            pickle.dump((module, function, registered, arguments), self.process.stdin)
+            self.process.stdin.flush()
+            failure, found = pickle.load(self.process.stdout)
+        except (EOFError, BrokenPipeError, pickle.UnpicklingError):
+            status = self.close()
+            failure, found = f"Blender ended with status {status} in {function}", None
+        finally:
+            limit.cancel()
+        if failure:
+            with self.log.open("rb") as file:
+                file.seek(start)
+                said = file.read().decode(errors="replace")
+            pytest.fail(f"{failure}\n-- what Blender printed --\n{said}", pytrace=False)
+        return found
+
+    def _start(self):
+        self.folder.mkdir(parents=True, exist_ok=True)
+        environment = {
+            **{name: os.environ[name] for name in PASSED_ON if name in os.environ},
+            "HOME": str(self.folder),
+            "BLENDER_USER_RESOURCES": str(self.folder / "blender"),
+            # A process that ends as these do leaves its folder of temporary files.
+            "TMPDIR": str(self.folder),
+            "OPENBLAS_NUM_THREADS": "1",
+            "PYTHONPATH": str(ROOT),
+        }
+        with self.log.open("ab") as log:
+            self.process = subprocess.Popen(
+                [self.python, "-m", "tests.blender.worker"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                cwd=self.folder,
+                env=environment,
+            )
+
+    def close(self):
+        """End the process as Blender ends; returns its exit status."""
+        if self.process is None:
+            return None
+        process, self.process = self.process, None
+        process.stdin.close()
+        process.stdout.close()
+        limit = threading.Timer(PATIENCE_S, process.kill)
+        limit.start()
+        status = process.wait()
+        limit.cancel()
+        return status
+
+
+# --- strings, until every file is converted ---
 PRELUDE = """
 import sys
 import bpy

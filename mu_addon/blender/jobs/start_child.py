@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import atexit
 import importlib.util
-import os
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,6 +17,7 @@ import bpy
 
 from ...errors import InputError
 from ...run.child import RUNNING, Child
+from ...run.interpreter import environment, worker_command
 from ..shared import viewports
 from ..shared.updates import Signal
 
@@ -40,43 +39,10 @@ def missing(modules: Sequence[str] = SOLVER) -> list[str]:
     return [name for name in modules if importlib.util.find_spec(name) is None]
 
 
-def interpreter() -> list[str]:
-    """Command that runs a Python file with this Blender's Python: itself where there is none beside it."""
-    python = Path(sys.executable)
-    if python.is_file() and "python" in python.name.lower():
-        return [str(python), "-P"]
-    if bpy.app.binary_path:
-        return [
-            bpy.app.binary_path,
-            "--background",
-            "--factory-startup",
-            "--python-exit-code",
-            "70",
-            "--python",
-        ]
-    raise InputError(
-        "there is no Python to run the simulation with",
-        str(python),
-        "use Blender as its makers ship it, or run headless/run.py from a terminal",
-    )
-
-
-def environment() -> dict[str, str]:
-    """The child's environment: it finds the modules that Blender's Python and the extension's wheels give."""
-    folders = [p for p in sys.path if Path(p).name in ("site-packages", "dist-packages")]
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(folders), "PYTHONUNBUFFERED": "1"}
-
-
-def command_of(arguments: Sequence[str]) -> list[str]:
-    """The command that runs one command line of the core in a process of its own."""
-    prefix = interpreter()
-    separator = ["--"] if prefix[-1] == "--python" else []
-    return [*prefix, str(CHILD_MAIN), *separator, *arguments]
-
-
 def start(arguments: Sequence[str], folder: Path, ends_with_parent: bool = False) -> Child:
     """Start one command line of the core for a run in `folder`; raises MuError. See `Child`."""
-    return Child(command_of(arguments), folder / OWN_FOLDER, environment(), ends_with_parent)
+    command = worker_command(CHILD_MAIN, arguments, bpy.app.binary_path)
+    return Child(command, folder / OWN_FOLDER, environment(), ends_with_parent)
 
 
 @attrs.frozen(eq=False)
