@@ -8,22 +8,13 @@ from math import isfinite
 import bpy
 
 from ...run.child import FAILED
+from ...sensing.session import LOSSES
 from ..jobs.panel import job_state
 from ..shared.panels import UnitPanel, large_button, wrapped
 from ..simulate import study_folder as studies
 from . import state as sensor
 from . import twin
 
-LOSSES = {
-    "lost": "lost",
-    "crc_errors": "wrong CRC",
-    "malformed": "unreadable",
-    "repeated": "repeated",
-    "overlong": "bytes without an end",
-    "restarts": "restarts",
-    "reconnects": "reconnects",
-}
-"""Counters of a session's status, and what they are called."""
 STATES = {
     "starting": ("The reader starts", "TIME"),
     "searching": ("Looking for the sensor", "VIEWZOOM"),
@@ -114,6 +105,8 @@ def _session(layout, settings, session):
     column.label(text=f"{status.get('rows', 0)} samples on disk in {status.get('duration_s', 0):.0f} s")
     losses = [f"{status[key]} {word}" for key, word in LOSSES.items() if status.get(key)]
     wrapped(column, ", ".join(losses) or "nothing lost", "ERROR" if losses else "CHECKMARK")
+    for words in status.get("complaint", ()):
+        wrapped(column, words, "INFO")
     for name, value in zip(session.channels, list(status.get("latest", ()))[3:], strict=False):
         row = column.row()
         row.label(text=name)
