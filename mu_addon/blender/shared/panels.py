@@ -6,6 +6,7 @@ import textwrap
 
 from ...design.parameters import SECTIONS
 from ...design.quantity import describe
+from ...design.wall import Wall, offered
 from ..unit.object import active_root
 
 # Where a section's parameters are shown. A section that the core gains appears under Design by itself.
@@ -14,6 +15,7 @@ PLACES = {
     "lattice": "lattice",
     "waveguide": "path",
     "material": "simulate",
+    "wall": "simulate",
     "print": "print",
 }
 CHARACTERS = 34
@@ -81,5 +83,7 @@ def parameters(layout, props, place: str) -> None:
         if PLACES.get(section.section, "design") == place:
             group = getattr(props, section.section)
             column = layout.column(align=True)
+            shown = offered(group.law, group.friction_share) if section is Wall else None
             for d in describe(section):
-                column.prop(group, d.name)
+                if shown is None or d.name in shown:
+                    column.prop(group, d.name)

@@ -218,7 +218,7 @@ DRAWN: dict[str, tuple[str, Callable[[Any, Any, bool], preview.Skeleton | None]]
     "struts": ("lattice", lambda value, given, cut: preview.lattice(value, cut)),
     "anchors": (
         "anchors",
-        lambda value, given, cut: preview.anchor_points(value, stack.STACK.value("struts", given)),
+        lambda value, given, cut: preview.anchor_skeleton(value, stack.STACK.value("struts", given)),
     ),
     "path": ("path", lambda value, given, cut: preview.line_through(value)),
     "wells": ("waveguide", lambda value, given, cut: preview.bar(value)),

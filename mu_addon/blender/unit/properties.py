@@ -27,7 +27,7 @@ from ..shared.updates import Signal
 
 PARAMETERS_CHANGED, VIEW_CHANGED = Signal(), Signal()
 """Sent with the root whose parameters changed, and with one of which other parts are to be seen."""
-UNITS = ("mm", "kPa")
+UNITS = ("mm", "kPa", "s")
 BESIDE_BLEND_FILE = {"PATH_SUPPORTS_BLEND_RELATIVE"}
 
 

@@ -19,9 +19,10 @@ def run_stages(study: Study, path: Window | None = None) -> None:
         study.simulate(candidates_beside="place" in stages)
     if "place" in stages:
         chosen = study.place()
-        if study.job.obstacles:
+        if study.job.in_time:
+            where = "Beside obstacles" if study.job.obstacles else "With a wall that remembers"
             study.warn(
-                "Beside obstacles neither the map of what each element would disturb nor what light would "
+                f"{where} neither the map of what each element would disturb nor what light would "
                 "tell is known: both take a unit with one state a pressure."
             )
         else:
