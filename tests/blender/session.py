@@ -93,6 +93,7 @@ PRELUDE = """
 import sys
 import bpy
 import mu_addon
+import mu_addon.blender
 
 bpy.ops.wm.read_factory_settings(use_empty=True)
 mu_addon.register()
@@ -103,6 +104,12 @@ from mu_addon.design.parameters import load_preset
 def add(**settings):
     assert bpy.ops.mu.add(**settings) == {"FINISHED"}
     return unit_object.active_root(bpy.context)
+
+
+def operators():
+    modules = mu_addon.blender._modules()
+    classes = [cls for module in modules for cls in getattr(module, "CLASSES", ())]
+    return [cls for cls in classes if issubclass(cls, bpy.types.Operator)]
 
 
 def refused(operator, **settings):
@@ -118,18 +125,25 @@ def refused(operator, **settings):
 FAKE = ROOT / "tests" / "run" / "fake_worker.py"
 WATCHING = """
 import time
-from mu_addon.blender.simulate import state as simulation, study_folder as studies
+from mu_addon.run.child import Child
+from mu_addon.blender.jobs import start_child as jobs
+from mu_addon.blender.simulate import study_folder as studies
+from mu_addon.blender.simulate.job import SIMULATION
 
 def launch(root, how):
     command = [sys.executable, sys.argv[1], how]
-    return simulation.launch(root.mu_unit.uuid, command, studies.folder_of(root) / "blender")
+    return launch_as(SIMULATION, root, command)
+
+def launch_as(kind, root, command, folder=None):
+    folder = folder or kind.folder_of(root) / "blender"
+    return jobs.watch(kind.key(root), Child(command, folder, jobs.environment()))
 
 def watch(until, seconds=300):
     # Timers never fire in background: the test is the timer.
     end = time.monotonic() + seconds
     while not until():
         assert time.monotonic() < end
-        simulation.poll()
+        jobs.poll()
         time.sleep(0.05)
 
 """
@@ -149,7 +163,7 @@ def drawn():
     layout.template_icon.side_effect = lambda icon, scale: said.append("a picture")
     for cls in PANELS:
         if getattr(cls, "poll", lambda _: True)(bpy.context):
-            seat = MagicMock(layout=layout, seek=getattr(cls, "seek", None))
+            seat = MagicMock(layout=layout, find_root=getattr(cls, "find_root", None))
             seat.show = lambda *a, c=cls: c.show(seat, *a)
             cls.draw(seat, bpy.context)
     return " ".join(said)
