@@ -78,4 +78,4 @@ def test_a_second_run_in_the_folder_is_refused_and_names_the_first(tmp_path):
 
 
 def test_a_folder_without_a_study_is_told(tmp_path):
-    assert_clear_failure(run("resume", tmp_path), 2, "no study in this folder", "study.toml")
+    assert_clear_failure(run("resume", tmp_path), 2, "this folder contains no study", "study.toml")

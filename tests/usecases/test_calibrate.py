@@ -98,7 +98,7 @@ def test_measured_data_with_a_sweep_held_out(tmp_path: Path, capsys: pytest.Capt
         ([], "2 channels are there"),
         (["--channel", "lihgt_V"], "no channel lihgt_V"),
         (["--channel", "light_V", "--dark", "drak_V"], "no channel drak_V"),
-        (["--channel", "light_V"], "nothing says at which angle"),
+        (["--channel", "light_V"], "has no reference angles"),
         (["--channel", "light_V", "--angles", "nowhere.csv"], "cannot read nowhere.csv"),
     ],
 )

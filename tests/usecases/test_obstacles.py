@@ -68,7 +68,7 @@ def test_one_off_the_middle_plane_asks_for_the_whole_unit():
     assert beside.mesh_settings(attrs.evolve(job.mesh, fraction="quarter")).fraction == "half"
     off = attrs.evolve(job, obstacles=[RigidBody(block((1, 40, 0), (20, 50, 30)))])
     assert off.mesh_settings(job.mesh).fraction == "full"
-    with pytest.raises(InputError, match="touches nothing"):
+    with pytest.raises(InputError, match="does not support obstacles"):
         attrs.evolve(beside, stages=("design", "simulate", "place"), paths="graph")
 
 
@@ -123,7 +123,7 @@ def test_a_unit_that_meets_a_wall(files, capsys):
     summary = json.loads((out / "summary.json").read_text())
     assert summary["contact"]["1 wall.stl"]["friction"] == 0.3
     assert summary["contact"]["1 wall.stl"]["at_kPa"] == 40
-    assert "What the unit touches" in (out / "report.html").read_text()
+    assert "Contact with obstacles" in (out / "report.html").read_text()
 
     # Again from the cache: the same to the last digit, also where the last instant is missing.
     before = (out / "contact.csv").read_text()

@@ -231,7 +231,7 @@ def test_child_runs_of_the_command_line_end_with_their_parent_and_tell_their_err
         assert time.monotonic() < end
         child.poll()
         time.sleep(0.05)
-    assert "no study in this folder" in child.error["what"]
+    assert "this folder contains no study" in child.error["what"]
     assert child.error["status"] == 2
 
 

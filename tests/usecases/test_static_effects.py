@@ -271,7 +271,12 @@ GRAVITY = "[simulate.effects.gravity]\ndensity_kg_m3 = 1300.0\n"
     [
         ("gravity", "magnetism", "no effect 'magnetism' is known", "known: gravity, strain"),
         ("gravity", "gravitty", "did you mean 'gravity'", "known: gravity"),
-        ("gravity", "viscoelasticity", "not one that a simulation of the unit can have", "known: gravity"),
+        (
+            "gravity",
+            "viscoelasticity",
+            "not an effect that a simulation of the unit can contain",
+            "known: gravity",
+        ),
         ("density", "mass", "gravity has density_kg_m3, not mass_kg_m3", "write density_kg_m3"),
         ("1300.0", "-5.0", "density_kg_m3 = -5.0 is out of bounds", "give 0 to 4000 kg/m3"),
         ("1300.0", "inf", "out of bounds", "give 0 to 4000"),
@@ -294,7 +299,7 @@ def test_effects_that_are_none_are_refused_with_place_and_remedy(tmp_path, old, 
 
 @pytest.mark.parametrize("turn", ["sideways", True, float("nan"), 400.0])
 def test_a_direction_that_is_none_is_refused(turn):
-    with pytest.raises(InputError, match="no direction of gravity"):
+    with pytest.raises(InputError, match="not a valid orientation"):
         StaticEffects(named(gravity=1000.0), turn)
 
 
@@ -364,7 +369,7 @@ def test_what_has_no_place_in_a_static_simulation_is_left_out_and_says_why():
     assert found.applied == ("solid parts weigh 1100 kg/m³",)
     ambiguous, leak, contact, finer = found.left_out
     assert "ambiguous" in ambiguous
-    assert "time, gauge or bench" in leak
+    assert "time, gauge or test bench" in leak
     assert "--obstacle" in contact
     assert "--refine" in finer
     # What a file keeps of it says as much of gravity, and nothing of the rest.

@@ -130,7 +130,7 @@ def test_never_at_rest_is_told():
 
 
 def test_a_clip_without_a_clock_and_one_at_another_time():
-    with pytest.raises(InputError, match="does not say how many frames"):
+    with pytest.raises(InputError, match="has no frame rate"):
         filmed(attrs.evolve(clip(), fps=0.0), Bench(VIEW, Marks({})), PRESSURE)
     with pytest.raises(InputError, match=r"from 100 to 104\.9 s, the pressure's record from 0 to 5 s"):
         filmed(clip(), Bench(VIEW, Marks({}), starts_s=100.0), PRESSURE)
@@ -208,7 +208,7 @@ def test_the_command_line_from_followed_pixels(tmp_path, capsys):
     assert main([*line[:2], *line[2:-1], str(tmp_path / "out2"), "--fps", "0"]) == 2
     assert "give fps" in capsys.readouterr().err
     assert main(["track", str(tmp_path / "none.mp4"), *line[2:]]) == 2
-    assert "there is no such clip" in capsys.readouterr().err
+    assert "the clip does not exist" in capsys.readouterr().err
 
 
 def test_without_blender_a_movie_is_refused_with_what_to_do(tmp_path, capsys, monkeypatch):

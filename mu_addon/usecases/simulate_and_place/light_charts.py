@@ -32,7 +32,7 @@ def front_chart(found: Signals, chosen: str) -> str:
         axes.set_xlim(left=0)
         axes.set_ylim(bottom=0)
         axes.set_xlabel("mean deviation Ĵ [mm]")
-        axes.set_ylabel("signal [% of light a degree]")
+        axes.set_ylabel("signal [% of light per degree]")
     return svg()
 
 
@@ -51,5 +51,5 @@ def response_chart(found: Signals, chosen: str) -> str:
         )
         axes.axhline(0, color=QUIET, lw=0.6)
         axes.set_xlabel("bending angle [deg]")
-        axes.set_ylabel("light lost [% of that at rest]")
+        axes.set_ylabel("light loss [% of light at rest]")
     return svg()
