@@ -58,7 +58,11 @@ def simulate(
     InputError for a body with friction.
     """
     if equilibrium.model.has_friction:
-        raise InputError("a body with friction remembers", "trajectory.simulate", "use marching.march")
+        raise InputError(
+            "the state of a body with friction depends on its history",
+            "trajectory.simulate",
+            "use time_stepping",
+        )
 
     def state_at(pressure_MPa: float, solve: Callable[[], State]) -> State:
         state = load(pressure_MPa)

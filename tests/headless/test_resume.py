@@ -71,7 +71,7 @@ def test_a_second_run_in_the_folder_is_refused_and_names_the_first(tmp_path):
         time.sleep(0.01)
     second = run("design", "--preset", "mu-0.75x", "--out", tmp_path)
     assert first.poll() is None
-    assert_clear_failure(second, 2, "another run works in this folder", f"process {first.pid} ", "what to do")
+    assert_clear_failure(second, 2, "another run uses this folder", f"process {first.pid} ", "what to do")
     assert not (tmp_path / "stale").exists()
     first.kill()
     first.wait()

@@ -190,7 +190,12 @@ def test_rows_that_a_logger_wrote_twice_are_left_out(tmp_path):
         (LATTICE, "strain,stress_kPa\n0,0\n40,5\n", "leaves nothing", "row 3, column strain"),
         (HOLD, "pressure_kPa\n1\n2\n", "time_s is missing", "a.csv"),
         (HOLD, "time_s,pressure_torr\n0,1\n1,2\n", "it is read in kPa", "column pressure_torr"),
-        (HOLD, "time_s,pressure_bar,pressure_kPa\n0,1,100\n1,2,200\n", "one column in two units", "a.csv"),
+        (
+            HOLD,
+            "time_s,pressure_bar,pressure_kPa\n0,1,100\n1,2,200\n",
+            "the same column in two units",
+            "a.csv",
+        ),
         (HOLD, "time_h,pressure_kPa\n0,1\n1,2\n", "it is read in s", "column time_h"),
         (
             HOLD,
@@ -228,9 +233,9 @@ def test_what_cannot_be_used_is_refused_by_file_and_row(tmp_path, keys, text, wh
 @pytest.mark.parametrize(
     ("toml", "what", "where"),
     [
-        ("", "no experiment is described", "experiments.toml"),
+        ("", "no experiment is defined", "experiments.toml"),
         ("[[experiment]\n", "not TOML", "experiments.toml"),
-        ("[experiment]\nname = 1\n", "no experiment is described", "experiments.toml"),
+        ("[experiment]\nname = 1\n", "no experiment is defined", "experiments.toml"),
         ("experiment = [1]\n", "is not a table", "experiments.toml"),
         ("[[experiments]]\n", "did you mean 'experiment'", "experiments.toml"),
         (entry(kind="coupons"), "did you mean 'coupon'", "line 3"),

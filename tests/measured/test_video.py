@@ -145,11 +145,11 @@ def test_noise_is_found_and_the_angle_is_as_uncertain_as_geometry_says():
         ({"camera": "left"}, "a camera at 'left'"),
         ({"tip": ("c", "c")}, "the tip is marker 'c' twice"),
         ({"tip": ("c", "x")}, "no marker 'x' was followed"),
-        ({"places_mm": ((1.0, 2.0), (1.0, 2.0))}, "have one place"),
-        ({"ruler": ("c", "d")}, "the ruler has no length"),
+        ({"places_mm": ((1.0, 2.0), (1.0, 2.0))}, "have the same position"),
+        ({"ruler": ("c", "d")}, "ruler_mm is missing or 0"),
         ({"mm_per_pixel": -1.0}, "mm_per_pixel = -1"),
         ({"mm_per_pixel": float("nan")}, "mm_per_pixel = nan"),
-        ({"base": ("a", "gone")}, "never seen together"),
+        ({"base": ("a", "gone")}, "never visible together"),
     ],
 )
 def test_views_that_do_not_fit(change, what):

@@ -126,7 +126,7 @@ def test_one_mode_alone_brings_a_warning_of_the_others(tmp_path):
 @pytest.mark.parametrize(
     ("folder", "arguments", "what"),
     [
-        ("measured", (), "there is no coupon among the experiments"),
+        ("measured", (), "the folder contains no coupon test"),
         ("treloar", (("gent",),), "there is no law 'gent' to fit"),
         ("treloar", (("yeoh",), ("planar",)), "no coupon of mode 'planar' is there to hold out"),
         ("treloar", (("yeoh",), ("uniaxial", "equibiaxial", "pure_shear")), "every coupon is held out"),

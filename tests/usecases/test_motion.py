@@ -272,7 +272,7 @@ def test_point_caches_come_back(tmp_path_factory, positions):
     assert np.array_equal(found, positions)
     assert (start, step) == (0.5, 0.25)
     path.write_bytes(path.read_bytes()[:-4])
-    with pytest.raises(InputError, match="not a whole point cache"):
+    with pytest.raises(InputError, match="not a complete point cache"):
         read_pc2(path)
 
 

@@ -52,7 +52,7 @@ def test_bodies_survive_their_file(tmp_path):
     assert [f.body.hash for f in found] == [g.body.hash for g in given]
     assert mirrored(given[:1])
     assert not mirrored(given)
-    with pytest.raises(InputError, match="not a coefficient an obstacle"):
+    with pytest.raises(InputError, match="not one coefficient per obstacle"):
         read_rigid_bodies(tmp_path / "o.obj", [0.25])
     (tmp_path / "o.obj").write_text("o 1 x\nv 0 0 zero\n")
     with pytest.raises(InputError, match="cannot be read"):
@@ -137,7 +137,7 @@ def test_a_unit_that_meets_a_wall(files, capsys):
     ("words", "said"),
     [
         (["--obstacle", "none.stl"], "no body can be read from it"),
-        (["--obstacle", "inside.stl"], "it stands in the unit, up to"),
+        (["--obstacle", "inside.stl"], "it overlaps the unit by up to"),
         (["--obstacle", "wall.stl", "--friction", "-1"], "a friction coefficient of -1"),
     ],
 )

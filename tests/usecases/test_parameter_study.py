@@ -157,7 +157,7 @@ def task(how, **limits):
     ("how", "limits", "words"),
     [
         ("crash", {}, "SIGSEGV"),
-        ("wordless", {}, "without a word"),
+        ("wordless", {}, "without a message"),
         ("told_error", {}, "no equilibrium"),
         ("hang", {"minutes": 0.01}, "longer than the 0.01 minutes"),
         ("hungry", {"memory_MB": 200}, "more than the 200 MB"),
