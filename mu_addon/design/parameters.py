@@ -15,7 +15,7 @@ from . import lattices, rules, toml_text
 from .assets import asset_file, asset_names
 from .dimensions import Dimensions
 from .printed import as_printed
-from .quantity import PAPER, choice, describe, quantity
+from .quantity import PAPER, choice, describe, in_MPa, quantity
 
 FORMAT = 1
 
@@ -343,6 +343,21 @@ class Material:
         "Young's modulus E_sens of a virtual inclusion",
         "assumed: the paper says bulk-like and prints none; that of the membrane",
     )
+
+    @property
+    def lattice_modulus_MPa(self) -> float:
+        """Effective Young's modulus of the lattice in MPa."""
+        return in_MPa(self.lattice_modulus_kPa)
+
+    @property
+    def membrane_modulus_MPa(self) -> float:
+        """Young's modulus of the membrane in MPa."""
+        return in_MPa(self.membrane_modulus_kPa)
+
+    @property
+    def sensor_modulus_MPa(self) -> float:
+        """Young's modulus of a virtual inclusion in MPa."""
+        return in_MPa(self.sensor_modulus_kPa)
 
 
 def _printable(unit: Any, field: Any, value: Any) -> None:

@@ -35,7 +35,7 @@ class Critical:
 
     def __str__(self) -> str:
         x, y, z = self.place
-        return f"{self.kind} at {self.state.pressure_MPa * 1e3:.4g} kPa near ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        return f"{self.kind} at {self.state.pressure_kPa:.4g} kPa near ({x:.1f}, {y:.1f}, {z:.1f}) mm"
 
 
 @attrs.frozen(eq=False)
@@ -206,7 +206,7 @@ def _failure(body: Body, node: Node, why: str) -> ConvergenceError:
     nodes = body.model.mesh.tets[element]
     x, y, z = (body.model.mesh.nodes[nodes] + point.state.u[nodes]).mean(axis=0)
     return ConvergenceError(
-        f"the branch cannot be followed beyond {point.state.pressure_MPa * 1e3:.4g} kPa and "
+        f"the branch cannot be followed beyond {point.state.pressure_kPa:.4g} kPa and "
         f"{point.volume_mm3:.4g} mm3: {why}",
         f"its last point's most distorted element is {element} near ({x:.1f}, {y:.1f}, {z:.1f}) mm with "
         f"det F = {least:.3g}",

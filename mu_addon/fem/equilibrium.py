@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..design.quantity import in_kPa
 from ..errors import ConvergenceError
 from .continuation import limit_pressure
 from .descent import Descent
@@ -215,8 +216,8 @@ class Equilibrium:
         nodes = self.model.mesh.tets[element]
         place = (self.model.mesh.nodes[nodes] + last.u[nodes]).mean(axis=0)
         return ConvergenceError(
-            f"no equilibrium at {pressure * 1e3:.4g} kPa: {why}",
-            f"the last converged state is {last.pressure_MPa * 1e3:.4g} kPa; its most distorted element is "
+            f"no equilibrium at {in_kPa(pressure):.4g} kPa: {why}",
+            f"the last converged state is {last.pressure_kPa:.4g} kPa; its most distorted element is "
             f"{element} near ({place[0]:.1f}, {place[1]:.1f}, {place[2]:.1f}) mm with det F = {least:.3g}",
             "lower the pressure, thicken the wall or stiffen the material",
         )

@@ -8,6 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..design.quantity import in_kPa
 from ..meshing.mesh import Mesh
 
 Array = np.ndarray[Any, Any]
@@ -22,6 +23,11 @@ class State:
     residual: float = 0.0
     iterations: int = 0
     factorisations: int = 0
+
+    @property
+    def pressure_kPa(self) -> float:
+        """Pressure in kPa, as files and people have it."""
+        return in_kPa(self.pressure_MPa)
 
     @property
     def loaded(self) -> bool:

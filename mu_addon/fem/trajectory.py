@@ -9,6 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..design.quantity import in_MPa
 from ..errors import InputError
 from .equilibrium import Equilibrium
 from .state import State, rest
@@ -61,7 +62,7 @@ def simulate(
         raise InputError(
             "the state of a body with friction depends on its history",
             "trajectory.simulate",
-            "use time_stepping",
+            "use time_stepping.simulate_in_time",
         )
 
     def state_at(pressure_MPa: float, solve: Callable[[], State]) -> State:
@@ -80,7 +81,9 @@ def simulate(
     for side in sides:
         history = [start]
         for pressure in side:
-            found[pressure] = state_at(pressure / 1e3, partial(equilibrium.reach, pressure / 1e3, history))
+            found[pressure] = state_at(
+                in_MPa(pressure), partial(equilibrium.reach, in_MPa(pressure), history)
+            )
             history.append(found[pressure])
     return _assemble(time_s, pressure_kPa, distinct, found)
 

@@ -36,7 +36,7 @@ ROWS = {
 }
 
 seeds = st.integers(0, 2**32 - 1)
-few = settings(max_examples=8, deadline=None)
+few = settings(max_examples=8)
 
 
 def patchwork(mesh):

@@ -5,7 +5,7 @@ import tomllib
 import attrs
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mu_addon.design.parameters import load_preset
@@ -39,7 +39,6 @@ def occupied(points, strata):
     return [len(np.unique(np.floor(axis * strata))) for axis in points.T]
 
 
-@settings(deadline=None)
 @given(st.integers(1, 40), st.integers(1, 4), st.integers(1, 5), st.integers(0, 99))
 def test_a_latin_hypercube_that_is_added_to_is_one_again(count, times, dimensions, seed):
     first = sample("latin_hypercube", count, dimensions, seed)
@@ -50,7 +49,6 @@ def test_a_latin_hypercube_that_is_added_to_is_one_again(count, times, dimension
     assert ((more >= 0) & (more < 1)).all()
 
 
-@settings(deadline=None)
 @given(st.integers(2, 30), st.integers(1, 30), st.integers(1, 4))
 def test_points_that_are_added_fill_what_is_empty(count, added, dimensions):
     first = sample("latin_hypercube", count, dimensions, 3)
@@ -60,7 +58,6 @@ def test_points_that_are_added_fill_what_is_empty(count, added, dimensions):
     assert occupied(more, count + added) == [count + added - s for s in shared]
 
 
-@settings(deadline=None)
 @given(st.integers(1, 40), st.integers(1, 40), st.integers(1, 5))
 def test_a_longer_sobol_sequence_begins_as_the_shorter(count, added, dimensions):
     whole = sample("sobol", count + added, dimensions, 5)

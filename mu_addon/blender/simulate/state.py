@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import atexit
 import importlib.util
-import os
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +16,7 @@ import bpy
 from ...design.parameters import Unit, write_unit
 from ...errors import InputError
 from ...run.child import RUNNING, Child
+from ...run.interpreter import environment, worker_command
 from ..unit import live_update as live
 
 INTERVAL_S = 0.2
@@ -43,33 +42,6 @@ def running() -> list[str]:
     return [uuid for uuid, child in _children.items() if child.state == RUNNING]
 
 
-def interpreter() -> list[str]:
-    """Command that runs a Python file with this Blender's Python: itself where there is none beside it."""
-    python = Path(sys.executable)
-    if python.is_file() and "python" in python.name.lower():
-        return [str(python), "-P"]
-    if bpy.app.binary_path:
-        return [
-            bpy.app.binary_path,
-            "--background",
-            "--factory-startup",
-            "--python-exit-code",
-            "70",
-            "--python",
-        ]
-    raise InputError(
-        "there is no Python to run the simulation with",
-        str(python),
-        "use Blender as its makers ship it, or run headless/run.py from a terminal",
-    )
-
-
-def environment() -> dict[str, str]:
-    """The child's environment: it finds the modules that Blender's Python and the extension's wheels give."""
-    folders = [p for p in sys.path if Path(p).name in ("site-packages", "dist-packages")]
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(folders), "PYTHONUNBUFFERED": "1"}
-
-
 def start(uuid: str, unit: Unit, folder: Path, arguments: list[str]) -> Child:
     """Start `arguments` of the command line for a unit, results in `folder`; raises MuError."""
     if uuid in running():
@@ -82,10 +54,8 @@ def start(uuid: str, unit: Unit, folder: Path, arguments: list[str]) -> Child:
 
 
 def of_worker(line: list[str]) -> list[str]:
-    """The command that runs a line of the core's command line in a process of its own."""
-    prefix = interpreter()
-    separator = ["--"] if prefix[-1] == "--python" else []
-    return [*prefix, str(WORKER), *separator, *line]
+    """The command that runs a line of the core's command line in a process of its own; raises InputError."""
+    return worker_command(WORKER, line, bpy.app.binary_path)
 
 
 def launch(uuid: str, command: list[str], folder: Path) -> Child:

@@ -238,7 +238,7 @@ def _resin(model: ExtendedModel, unit: Unit | None) -> list[str]:
     return [
         f"the lattice's modulus as drawn, {fitted.value:.3g} kPa, corresponds to a resin of "
         f"{fitted.value / 1e3 / drawn:.3g} MPa, but the modulus of the unit's walls is "
-        f"{unit.material.membrane_modulus_kPa / 1e3:.3g} MPa"
+        f"{unit.material.membrane_modulus_MPa:.3g} MPa"
     ]
 
 

@@ -17,7 +17,7 @@ from ...design.anchors import anchors
 from ...design.gripper import Gripper
 from ...errors import ConvergenceError, InputError
 from ...fem.equilibrium import Equilibrium
-from ...fem.kinematics import bending_angle_deg, probe
+from ...fem.kinematics import TipSection, probe
 from ...fem.loads import STANDARD_GRAVITY
 from ...fem.materials import Materials
 from ...fem.model import Model
@@ -250,6 +250,7 @@ class _Hand:
     ) -> None:
         self.cube, self.grip, self.phases, self.mesh = cube, grip, phases, mesh
         self.anchors = anchors(gripper.unit)
+        self.tip = TipSection.of(mesh)
         self.place = place_of(gripper, grip)
         self.obstacle = obstacle_of(gripper, cube, grip, mesh)
         self.obstacle.path = self.pose
@@ -308,7 +309,7 @@ class _Hand:
         contact = self.obstacle.contact(state.u)
         self.rows.append(
             (
-                bending_angle_deg(self.mesh, state.u),
+                self.tip.angle_deg(state.u),
                 2.0 * float(contact.normal_N[1]),
                 2.0 * float(contact.force_N[2]),
                 2.0 * contact.area_mm2,

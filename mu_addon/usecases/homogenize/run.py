@@ -69,8 +69,8 @@ class Resin:
     def of_unit(cls, unit: Unit, known: Material) -> Resin:
         """The unit's own: its struts are printed with its membrane, of a known resin's density."""
         m = unit.material
-        modulus = m.membrane_modulus_kPa / 1e3
-        return cls("of the unit's membrane", modulus, m.membrane_poisson, known.density_g_per_ml)
+        modulus = m.membrane_modulus_MPa
+        return cls("that of the unit's membrane", modulus, m.membrane_poisson, known.density_g_per_ml)
 
     @classmethod
     def of(cls, known: Material) -> Resin:

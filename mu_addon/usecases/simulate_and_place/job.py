@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import attrs
+import numpy as np
 
 from ...design.assets import asset_root
 from ...design.body import Body, read_body
@@ -98,13 +100,18 @@ class Job:
                 "clogged_chamber, paths",
                 "leave one of them out",
             )
-        _, pressure = self.protocol.sample(self.times)
+        _, pressure = self.samples
         if not pressure.any():
             raise InputError(
                 f"none of the {self.times} samples of the protocol has a pressure other than 0",
                 "times",
                 "give more samples, or a protocol that leaves 0 kPa",
             )
+
+    @cached_property
+    def samples(self) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+        """Time in s and pressure in kPa, (k,) each, at which the protocol is solved."""
+        return self.protocol.sample(self.times)
 
     def tables(self) -> Tables:
         """Everything that decides the results, a table a stage, as study.toml has it.
