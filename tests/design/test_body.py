@@ -69,7 +69,7 @@ def test_one_face_that_looks_inward_is_found_and_all_of_them_are_turned(ellipse)
     turned = ellipse.triangles.copy()
     turned[5] = turned[5, ::-1]
     (flaw,) = flaws(Body(ellipse.vertices, turned))
-    assert "3 edges are open or have neighbours facing the other way" in flaw.what
+    assert "3 edges are open or have inconsistently oriented neighbours" in flaw.what
     inside_out = body_of(ellipse.vertices, ellipse.triangles[:, ::-1])
     assert volume(inside_out.vertices, inside_out.triangles) > 0
     assert flaws(inside_out) == []
@@ -210,7 +210,7 @@ def test_cells_cover_a_body_wider_than_the_box():
 
 def test_a_path_outside_the_body_is_refused():
     narrow = envelope(cylinder(20.0, 20.0, 0.0, -1.0, 76.0), D)
-    with pytest.raises(InputError, match="waveguide along alpha4 comes out of the body"):
+    with pytest.raises(InputError, match="waveguide along alpha4 leaves the body"):
         build_solid(UNIT, window(UNIT, "alpha4"), body=narrow)
 
 

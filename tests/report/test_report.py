@@ -69,7 +69,7 @@ def test_sections_in_the_order_a_designer_reads(page):
         "Solid, mesh and solver",
         "Assumptions",
         "All parameters",
-        "How long each stage took",
+        "Computing time of each stage",
         "Files of this run",
         "Versions",
     ]
@@ -78,16 +78,16 @@ def test_sections_in_the_order_a_designer_reads(page):
 def test_the_answer_comes_first(page):
     answer = page.words.index("Put the sensor along α₄, anchors P4 to P6")
     assert answer < page.words.index("Ranking of the paths")
-    assert "of 10 candidates it disturbs the motion least, by 0.048" in page.words
+    assert "of 10 candidates it has the smallest mean deviation, 0.048" in page.words
     assert "tied with α₁" in page.words
-    assert "by “intersect” the same path is best" in page.words
+    assert "for “intersect” the same path is best" in page.words
 
 
 def test_disagreement_of_the_rules_is_told():
     data = results()
     other = attrs.evolve(data.rules["intersect"], chosen="alpha2")
     words = Page(report_html(attrs.evolve(data, rules={**data.rules, "intersect": other}))).words
-    assert "by “intersect” α₂ would be best" in words
+    assert "for “intersect” α₂ would be best" in words
 
 
 def test_the_headline_rule_comes_first():
@@ -137,7 +137,7 @@ def test_partial_says_so_at_the_top(page):
 
 def test_a_run_that_stopped_early_shows_what_it_has():
     page = Page(report_html(ReportData("t", "u", status="partial", seconds={"solid": 1.0})))
-    assert page.headings == ["How long each stage took"]
+    assert page.headings == ["Computing time of each stage"]
     page = Page(report_html(results(status="partial", rules={})))
     assert len(page.all("img")) == 1 + 4 + 2 + 1
     assert "Put the sensor" not in page.words

@@ -79,7 +79,7 @@ def test_the_model_predicts_what_was_measured_and_the_table_holds_both(overcured
 def test_the_report_says_it_in_a_sentence_and_needs_no_server(overcured):
     html = (overcured[1] / "report.html").read_text(encoding="utf-8")
     assert "Verdict: <strong>overcure</strong>" in html
-    assert "Light cures resin beyond the drawn surface: every part is thicker; offset 0.0" in html
+    assert "Light cures resin beyond the nominal surface, so every part is thicker; offset 0.0" in html
     assert "Next measurement." in html
     for title in ("Measured and predicted", "Rival explanations", "Error reduction", "Noise"):
         assert f">{title}</h2>" in html

@@ -77,8 +77,8 @@ def test_the_terminal_is_told_in_a_few_lines(fitted):
 
 def test_the_report_answers_warns_and_needs_no_server(fitted):
     html = (fitted[0] / "report.html").read_text(encoding="utf-8")
-    assert "Take <strong>Yeoh</strong>" in html
-    assert "but misses equibiaxial" in html
+    assert "Recommended law: <strong>Yeoh</strong>" in html
+    assert "but it does not fit equibiaxial" in html
     assert "Yeoh misses equibiaxial by more than 10%" in html
     assert html.count("<figure") == 6
     assert not re.search(r"(src|href)=\"(?!data:|#)", html)
@@ -128,10 +128,10 @@ def test_one_mode_alone_brings_a_warning_of_the_others(tmp_path):
     [
         ("measured", (), "the folder contains no coupon test"),
         ("treloar", (("gent",),), "there is no law 'gent' to fit"),
-        ("treloar", (("yeoh",), ("planar",)), "no coupon of mode 'planar' is there to hold out"),
+        ("treloar", (("yeoh",), ("planar",)), "there is no coupon of mode 'planar' to hold out"),
         ("treloar", (("yeoh",), ("uniaxial", "equibiaxial", "pure_shear")), "every coupon is held out"),
         ("nowhere", (), "cannot read experiments.toml"),
-        ("treloar", (("yeoh",), (), "equal"), "there are no 'equal' weights"),
+        ("treloar", (("yeoh",), (), "equal"), "unknown weights 'equal'"),
     ],
 )
 def test_what_cannot_be_fitted_is_refused_before_anything_is_written(tmp_path, folder, arguments, what):

@@ -386,7 +386,7 @@ def test_the_page_of_the_papers_own_table_agrees_with_it():
     page = report(found)
     for part in ("table", "deviation", "statements", "bending", "meshes", "open", "sampling", "versions"):
         assert f'<section id="{part}"' in page
-    assert page.count("1.00 (wanted") == 4
+    assert page.count("1.00 (goal") == 4
     assert "4 of 4" in page  # chosen paths
     words = re.sub(r'src="[^"]*"', "", page)
     assert "nan" not in re.sub(r"<style>.*</style>", "", words, flags=re.DOTALL)
@@ -403,7 +403,7 @@ def test_the_page_says_what_is_missing_and_what_is_wrong():
         first.fine, angle_deg=angle, crossing_kPa=np.array([-15.2, np.nan]), stopped="limit point at 47 kPa"
     )
     page = report(shown(columns=(attrs.evolve(first, fine=bad), *others), others={}, drawn=(), points=()))
-    assert "from -15.2 kPa on walls pass through each other" in page
+    assert "from -15.2 kPa on, walls intersect" in page
     assert "the range of bending was not reached: limit point at 47 kPa" in page
     assert "gripper&#x27;s column is not part" in page
     assert '<section id="meshes"' not in page

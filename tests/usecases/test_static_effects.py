@@ -352,7 +352,7 @@ def test_homogenize_says_that_it_knows_no_whole_unit(tmp_path):
     path = model_file(tmp_path / "model.toml", gravity=1300.0)
     unit, summary, (warned,) = given(modelled_unit, "homogenize", "--model", path)
     assert unit == UNIT
-    assert "1300 kg/m³: only `simulate` and `place` know the unit as a whole" in warned
+    assert "1300 kg/m³: only `simulate` and `place` simulate the whole unit" in warned
     assert summary["model"]["applied"] == ()
 
 
@@ -366,7 +366,7 @@ def test_what_has_no_place_in_a_static_simulation_is_left_out_and_says_why():
     found = extend(UNIT, ExtendedModel("ambiguous", effects, {}))
     assert found.unit == UNIT
     assert found.effects.sizes == {"gravity": 1100.0}
-    assert found.applied == ("solid parts weigh 1100 kg/m³",)
+    assert found.applied == ("solid parts have a density of 1100 kg/m³",)
     ambiguous, leak, contact, finer = found.left_out
     assert "ambiguous" in ambiguous
     assert "time, gauge or test bench" in leak
