@@ -1,4 +1,4 @@
-"""`check`: what a printer would stumble over."""
+"""`check`: the printability of a part."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def asset_file(folder: str, what: str, name: str, kind: str = "") -> Path:
         )
         raise InputError(what_it_is, what, f"choose one of {', '.join(names)}")
     raise InputError(
-        f"there is not a {what} {name!r}{nearest(name, names)}",
+        f"there is no {what} {name!r}{nearest(name, names)}",
         what,
         f"choose one of {', '.join(names)}, or give the path of a TOML file",
     )

@@ -56,11 +56,11 @@ def simulate(
     run finds the same states to the last digit, since each starts from those before it alone. The state
     without pressure is one of them where the model has a load, else it is as drawn and not solved for. Raises
     ConvergenceError where a pressure cannot be reached; `on_state` has then seen all before it, and
-    InputError for a body with friction.
+    InputError for a body with friction or a law with history.
     """
-    if equilibrium.model.has_friction:
+    if equilibrium.model.has_friction or equilibrium.parameters.has_history:
         raise InputError(
-            "the state of a body with friction depends on its history",
+            "the state of a body with friction or memory depends on its history",
             "trajectory.simulate",
             "use time_stepping.simulate_in_time",
         )

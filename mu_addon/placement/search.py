@@ -70,7 +70,7 @@ def chance_of_better(predicted_mm: Array, exact_mm: Array) -> float:
     return float(min(t.cdf(needed / spread, n - 1).sum(), 1.0))
 
 
-def search(
+def search_paths(
     predicted_mm: Array,
     check: Callable[[Array], Array],
     settings: SearchSettings | None = None,
@@ -103,7 +103,7 @@ def search(
 
 
 def front(length: Array, deviation_mm: Array) -> Array:
-    """Numbers of the paths that no other beats in both length and deviation, shortest first (Pareto).
+    """Numbers of the paths that are Pareto-optimal in length and deviation, shortest first (Pareto).
 
     Longer is better, for a longer path senses more of the unit; NaN deviations are left out.
     """

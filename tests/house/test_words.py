@@ -26,7 +26,6 @@ PHRASES = {
     "hangs on nothing": "is not connected",
     "begins on nothing": "island",
     "of one's own": "user-defined",
-    "of your own": "user-defined",
     "what was said while it ran": "log of this run",
     "what mending": "error reduction",
 }

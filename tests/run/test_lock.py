@@ -111,4 +111,4 @@ def test_a_disk_without_locks_is_warned_of(tmp_path, monkeypatch):
     with run_to_end(Progress([told.append])) as context:
         begin(context, tmp_path, "# mine", {"a.toml": "# mine\n"}, ())
     assert context.status == 0
-    assert any(m["type"] == "warning" and "no locks" in m["what"] for m in told)
+    assert any(m["type"] == "warning" and "does not support file locks" in m["what"] for m in told)

@@ -236,7 +236,7 @@ def test_a_cut_line_is_left_out_and_a_bad_one_named(tmp_path: Path) -> None:
         stream.write("\n0.4,nan,2,1.7\n")
     with pytest.raises(InputError, match="row 4 of"):
         read_recording(folder)
-    with pytest.raises(InputError, match="no recording"):
+    with pytest.raises(InputError, match="the recording is invalid"):
         read_recording(tmp_path / "nowhere")
 
 

@@ -127,7 +127,7 @@ def test_one_mode_alone_brings_a_warning_of_the_others(tmp_path):
     ("folder", "arguments", "what"),
     [
         ("measured", (), "the folder contains no coupon test"),
-        ("treloar", (("gent",),), "there is no law 'gent' to fit"),
+        ("treloar", (("gent",),), "unknown law 'gent'"),
         ("treloar", (("yeoh",), ("planar",)), "there is no coupon of mode 'planar' to hold out"),
         ("treloar", (("yeoh",), ("uniaxial", "equibiaxial", "pure_shear")), "every coupon is held out"),
         ("nowhere", (), "cannot read experiments.toml"),

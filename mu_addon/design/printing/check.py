@@ -1,4 +1,4 @@
-"""Everything a printer would stumble over in a triangle surface, with value, limit, place and source."""
+"""Printability check of a triangle surface, with value, limit, place and source."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from ...errors import InputError
 from ...files import write_csv, write_text
 from ...materials.choice import Choice, choose, disagreement
 from ...materials.coupon import Array, Coupon, response
-from ...materials.fit import POISSON, TOLERANCE, WEIGHTS, Fit, fit, leave_one_mode_out, ranges
+from ...materials.fit import POISSON, TOLERANCE, WEIGHTS, Fit, fit_coupons, leave_one_mode_out, ranges
 from ...materials.forms import FORMS, form
 from ...materials.library import Material, write_material
 from ...measured import Measured, read_folder
@@ -77,7 +77,7 @@ def fit_material(
     with progress.stage("fit", expected_s=2.0 * len(forms)):
         fits, unseen = [], {}
         for i, one in enumerate(forms):
-            fits.append(fit(one, fitted, held, weights, profile=True))
+            fits.append(fit_coupons(one, fitted, held, weights, profile=True))
             unseen[one.name] = _unseen(one, fitted, weights)
             progress.update((i + 1) / len(forms))
         choice = choose(fits)

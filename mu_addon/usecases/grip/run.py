@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.anchors import anchors, window
+from ...design.anchors import anchor_points, window
 from ...design.gripper import Gripper, GripperSolid, build_gripper, load_gripper, to_toml
 from ...design.parameters import to_toml as unit_toml
 from ...design.solid import QUALITY
@@ -28,7 +28,7 @@ from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.folder import begin
 from ...run.progress import Progress
-from ...sensing.embedded_waveguide import Joints, held
+from ...sensing.embedded_waveguide import Joints, embed_waveguide
 from ...sensing.optics import Optics
 from ...sensing.signal import Signal, traced_signal
 from ..simulate_and_place.study_file import table_lines, toml_value
@@ -73,6 +73,7 @@ class Job:
     optics: Optics = attrs.field(factory=Optics)
 
     def __attrs_post_init__(self) -> None:
+        self.gripper.unit.wall.require_without_memory("a grasp")
         sides = [cube.side_mm for cube in self.cubes]
         if len(set(sides)) < len(sides):
             raise InputError("two cubes have the same side", "--cube", "name each side once")
@@ -226,8 +227,8 @@ class Gripping:
         unit, optics = self.job.gripper.unit, self.job.optics
         with self.progress.stage("light", 20.0):
             path = window(unit, self.job.gripper.path)
-            nodes = anchors(unit)[list(path.indices)]
-            bar = held(waveguide(unit, path), nodes, unit.printed)
+            nodes = anchor_points(unit)[list(path.indices)]
+            bar = embed_waveguide(waveguide(unit, path), nodes, unit.printed)
             joints = Joints.of(self.mesh, nodes, unit.dimensions.cell)
             for side, found in self.grasps.items():
                 moved = [joints.moved(u) for u in found.u]

@@ -159,7 +159,7 @@ def _fronts(found: Found) -> str:
 def front_chart(
     rows: list[dict[str, Any]], first: tuple[str, float], second: tuple[str, float], front: Array
 ) -> str:
-    """Studies by two figures; those that no other beats in both are joined and numbered."""
+    """Studies by two figures; the Pareto-optimal ones are joined and numbered."""
     x, y = (np.array([float(row[name]) for row in rows]) for name, _ in (first, second))
     with canvas(4.0, 3.2) as (drawn, svg):
         axes = drawn.add_axes((0.16, 0.15, 0.80, 0.80))

@@ -11,7 +11,7 @@ from ...report.results import Signals
 
 
 def front_chart(found: Signals, chosen: str) -> str:
-    """Disturbance against sensitivity of every path, those that no other beats joined by a line."""
+    """Disturbance against sensitivity of every path, the Pareto-optimal ones joined by a line."""
     sense = 100 * np.abs([r.sensitivity_per_deg for r in found.responses])
     with canvas(WIDTH, 3.0) as (figure, svg):
         axes = figure.add_axes((0.13, 0.17, 0.83, 0.79))

@@ -19,10 +19,13 @@ def run_stages(study: Study, path: Window | None = None) -> None:
         study.simulate(candidates_beside="place" in stages)
     if "place" in stages:
         chosen = study.place()
-        if study.job.obstacles:
+        if study.job.in_time:
+            where = (
+                "With obstacles" if study.job.obstacles else "With a wall whose state depends on its history"
+            )
             study.warn(
-                "With obstacles neither the sensitivity map nor the light signal is computed: both need a "
-                "unit whose state depends on pressure only."
+                f"{where} neither the sensitivity map nor the light signal is computed: both need a unit "
+                "whose state depends on pressure only."
             )
         else:
             if study.job.effects.clogged:
