@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from .kinematics import probe as probe
     from .lattice_law import LatticeLaw as LatticeLaw
     from .laws import Foam as Foam
-    from .laws import Guccione as Guccione
     from .laws import Law as Law
     from .laws import Layered as Layered
     from .laws import MooneyRivlin as MooneyRivlin
@@ -38,7 +37,6 @@ if TYPE_CHECKING:
     from .laws import Ogden as Ogden
     from .laws import OgdenRoxburgh as OgdenRoxburgh
     from .laws import Prony as Prony
-    from .laws import TransverselyIsotropic as TransverselyIsotropic
     from .laws import Yeoh as Yeoh
     from .loads import gravity as gravity
     from .loads import traction as traction
@@ -76,8 +74,7 @@ else:
             "equilibrium": "Equilibrium",
             "kinematics": "Probe TipSection bending_angle_deg probe",
             "lattice_law": "LatticeLaw",
-            "laws": "Foam Guccione Law Layered MooneyRivlin NeoHooke "
-            "Ogden OgdenRoxburgh Prony TransverselyIsotropic Yeoh",
+            "laws": "Foam Law Layered MooneyRivlin NeoHooke Ogden OgdenRoxburgh Prony Yeoh",
             "loads": "gravity traction",
             "materials": "Layer Materials",
             "model": "Model",

@@ -17,6 +17,7 @@ from ...design.lattice import Graph
 from ...design.parameters import Unit
 from ...design.steps import Path, Section, Struts, Trimmed, along
 from ...design.waveguide import Bar
+from ..shared.texts import path_symbol
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -140,7 +141,7 @@ def candidates(unit: Unit) -> dict[str, Skeleton]:
         points[:, 1] = edge + side * LADDER_STEP * d.cell * (number + 0.5)
         radius = np.full(len(points), 0.06 * d.cell)
         name = {
-            "Label": window.name.replace("alpha", "α"),
+            "Label": path_symbol(window.name),
             "At": (0.1 * d.cell, float(points[0, 1]) - 0.1 * d.cell, float(points[0, 2]) - 0.4 * d.cell),
             "Size": 0.3 * d.cell,
         }

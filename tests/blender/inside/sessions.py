@@ -3,8 +3,8 @@
 import bpy
 
 import mu_addon
+from mu_addon.blender.jobs import start_child as jobs
 from mu_addon.blender.sensor import state as sensor
-from mu_addon.blender.simulate import state as simulation
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit import presets
 
@@ -61,12 +61,12 @@ def leave_a_simulation():
     uuid = root.mu_unit.uuid
     child = launch(root, "hang")
     watch(lambda: child.progress)
-    assert bpy.app.timers.is_registered(simulation._poll)
+    assert bpy.app.timers.is_registered(jobs._poll)
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert simulation.running() == [uuid]
-    assert bpy.app.timers.is_registered(simulation._poll)
+    assert jobs.running() == [f"{uuid}:simulate"]
+    assert bpy.app.timers.is_registered(jobs._poll)
     add()
-    assert "other simulation" in drawn()
+    assert "other job" in drawn()
     return child._process.pid
 
 

@@ -14,10 +14,10 @@ from mu_addon.blender.evidence import motion as evidence_motion
 from mu_addon.blender.evidence import panel as evidence_panel
 from mu_addon.blender.evidence import state as evidence
 from mu_addon.blender.simulate import effects
-from mu_addon.blender.simulate import state as simulation
+from mu_addon.blender.simulate import panel as panels
 from mu_addon.blender.simulate import study_folder as studies
+from mu_addon.blender.simulate.job import SIMULATION
 from mu_addon.blender.unit import object as unit_object
-from mu_addon.blender.unit import panel as panels
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.evidence.extended import ExtendedModel, Fitted
 from mu_addon.fem.protocol import read_protocol
@@ -30,7 +30,7 @@ from .jobs import ended, fake, watch
 
 def diagnose(root):
     assert bpy.ops.mu.evidence_diagnose() == {"FINISHED"}
-    child = simulation.of(evidence.job(root))
+    child = evidence.DIAGNOSIS.child(root)
     ended(child)
     assert child.state == "done", child.error
 
@@ -117,7 +117,7 @@ def test_a_diagnosis_that_fails_and_one_that_is_stopped(blocks):
     root.mu_evidence.folder = str(blocks)
 
     def start(how):
-        return fake(evidence.job(root), how, evidence.folder_of(root))
+        return fake(evidence.DIAGNOSIS, root, how)
 
     for how, expected in {"told_error": "thicker wall", "crash": "SIGSEGV", "good": "see below"}.items():
         child = start(how)
@@ -131,7 +131,7 @@ def test_a_diagnosis_that_fails_and_one_that_is_stopped(blocks):
     assert "mu.evidence_cancel" in drawn()
     assert not bpy.ops.mu.evidence_diagnose.poll()
     # The unit's own simulation is another one.
-    assert simulation.of(root.mu_unit.uuid) is None
+    assert SIMULATION.child(root) is None
     assert not bpy.ops.mu.cancel.poll()
     assert bpy.ops.mu.evidence_cancel() == {"FINISHED"}
     ended(child)
@@ -161,7 +161,7 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
     assert to_unit(root.mu_unit).chambers == unit.chambers
     share = json.loads((folder / "study/evidence/verdict.json").read_text())
     share = share["causes"][0]["parameters"]["share_lost"]["value"]
-    (line,) = effects.said(root)
+    (line,) = effects.lines(root)
     assert line.startswith(f"clogged chamber, share lost: {share:.4g} (")
     assert " to " in line
     said = drawn(panels.MU_PT_simulate)
@@ -171,24 +171,24 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
     assert "the last chamber lacks" in said, said
     assert not bpy.ops.mu.evidence_apply.poll()
     # Pressure alone knows no direction.
-    assert not effects.weighs(root)
+    assert not effects.has_gravity(root)
     assert "--orientation" not in effects.arguments(root, folder)
 
     bpy.ops.ed.undo()
     root = unit_object.active_root(bpy.context)
-    assert effects.asked(root) == {}
+    assert effects.inputs(root) == {}
     assert bpy.ops.mu.evidence_apply.poll()
     bpy.ops.ed.redo()
     bpy.ops.wm.save_mainfile()
     bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
     (root,) = unit_object.roots()
     asked = {"effects": {"clogged_chamber": {"share_lost": share}}}
-    assert effects.asked(root) == asked
+    assert effects.inputs(root) == asked
     assert "The unit has it" in drawn(panels.MU_PT_simulate)
 
     def simulated():
         assert bpy.ops.mu.simulate() == {"FINISHED"}
-        child = simulation.of(root.mu_unit.uuid)
+        child = SIMULATION.child(root)
         ended(child)
         assert child.state == "done", child.error
         return studies.findings(root)
@@ -232,7 +232,7 @@ def test_measured_and_simulated_motion_on_the_timeline(clogged):
     first = measured[0]
 
     assert "Named: clogged chamber" in drawn()
-    assert not evidence.said(root).stale
+    assert not evidence.diagnosis(root).stale
     assert bpy.ops.mu.evidence_motion(experiment=first.name) == {"FINISHED"}
     found = parts(root)
     assert {"measured|angle", "model|angle", "extended|angle", "|dial", "measured|marker 1"} <= set(found)

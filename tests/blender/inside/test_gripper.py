@@ -6,12 +6,12 @@ import bpy
 import numpy as np
 import pytest
 
+from mu_addon.blender.gripper import motion as grasp_motion
 from mu_addon.blender.gripper import object as gripper_object
 from mu_addon.blender.gripper import panel as gripper_panel
 from mu_addon.blender.gripper import state as grasps
 from mu_addon.blender.gripper.properties import to_gripper
 from mu_addon.blender.results import motion as motion_parts
-from mu_addon.blender.simulate import state as simulation
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.design.gripper import load_gripper, read_gripper
 from mu_addon.design.gripper import to_toml as gripper_toml
@@ -121,17 +121,17 @@ def test_what_a_grasp_is_asked_and_how_it_ends(tmp_path):
     assert "was not grasped yet" in drawn()
     assert "there is no grasp" in refused(bpy.ops.mu.grasp_show)
 
-    child = fake(grasps.job(root), "hang", grasps.folder_of(root))
+    child = fake(grasps.GRASP, root, "hang")
     watch(lambda: child.progress)
     assert "0.50 Model A" in drawn()
     assert "mu.grasp_cancel" in drawn()
-    assert "at work" in refused(bpy.ops.mu.grasp)
+    assert "job of this gripper is running" in refused(bpy.ops.mu.grasp)
     assert bpy.ops.mu.grasp_cancel() == {"FINISHED"}
     ended(child)
     assert "Cancelled" in drawn()
     assert bpy.ops.mu.grasp_dismiss() == {"FINISHED"}
     assert "Cancelled" not in drawn()
-    child = fake(grasps.job(root), "crash", grasps.folder_of(root))
+    child = fake(grasps.GRASP, root, "crash")
     ended(child)
     assert "SIGSEGV" in drawn()
     assert bpy.ops.mu.grasp_open(what="errors") == {"FINISHED"}
@@ -183,7 +183,7 @@ def test_a_grasp_plays_on_the_timeline(tmp_path):
     scene = bpy.context.scene
     scene.render.fps = 10
     assert bpy.ops.mu.grasp_show() == {"FINISHED"}
-    left, right, cube = gripper_object.moving(root)
+    left, right, cube = grasp_motion.parts(root)
     assert scene.frame_end == 21
     for frame, way, height, said in (
         (1, 0.0, 98.0, "i, opening: 0.00 N"),
@@ -201,9 +201,9 @@ def test_a_grasp_plays_on_the_timeline(tmp_path):
     assert gripper_object.part(root, "cube").hide_viewport
     assert not cube.hide_viewport
     assert bpy.ops.mu.grasp_show() == {"FINISHED"}
-    assert len(gripper_object.moving(root)) == 3
+    assert len(grasp_motion.parts(root)) == 3
     bpy.ops.mu.grasp_show(on=False)
-    assert not gripper_object.moving(root)
+    assert not grasp_motion.parts(root)
     assert not gripper_object.part(root, "cube").hide_viewport
     for name, value in (("friction", 0.4), ("density_g_per_ml", 1.0), ("path", "alpha3")):
         before = getattr(props, name)
@@ -227,14 +227,14 @@ def test_a_coarse_grasp_from_start_to_timeline(tmp_path):
     props = root.mu_gripper
     props.folder, props.cube_mm = str(tmp_path / "out"), 25.0
     assert bpy.ops.mu.grasp() == {"FINISHED"}
-    child = simulation.of(grasps.job(root))
+    child = grasps.GRASP.child(root)
     ended(child)
     assert child.state == "done", child.error
     found = grasps.of(root)
     assert not found.stale
     assert found.figures["normal_at_hold_N"] > 0
     assert bpy.ops.mu.grasp_show() == {"FINISHED"}
-    left, _, cube = gripper_object.moving(root)
+    left, _, cube = grasp_motion.parts(root)
     hold = found.columns["time_s"][max(i for i, p in enumerate(found.phase) if p == "iii")]
     bpy.context.scene.frame_set(1 + round(24 * hold))
     graph = bpy.context.evaluated_depsgraph_get()

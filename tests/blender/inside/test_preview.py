@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from mu_addon.blender.preview import arrays as preview
+from mu_addon.blender.shared import updates
 from mu_addon.blender.unit import live_update as live
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.design.anchors import anchor_points
@@ -124,13 +125,12 @@ def test_every_slider_reaches_the_preview_quickly():
 
 
 def test_a_preview_that_fell_behind_is_caught_up():
-
     root = add()
-    with live.held():
+    with updates.paused():
         root.mu_unit.chambers.count = 4
     assert unit_object.behind(root)
     for handler in bpy.app.handlers.undo_post:
-        if handler is live._catch_up:
+        if handler is live._after_undo_or_load:
             handler(bpy.context.scene)
     assert not unit_object.behind(root)
     tall = max(v.co.z for v in unit_object.part(root, "actuator").data.vertices)

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
+from mu_addon.blender.jobs import start_child as jobs
+from mu_addon.blender.printing import markers
 from mu_addon.blender.printing import panel as print_panel
 from mu_addon.blender.printing import state as printing
 from mu_addon.blender.printing.operators import MU_OT_print_export as operator
-from mu_addon.blender.simulate import state as simulation
 from mu_addon.blender.simulate import study_folder as studies
+from mu_addon.blender.simulate.job import SIMULATION
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.parameters import write_unit
@@ -28,7 +30,7 @@ PANELS = print_panel.CLASSES
 
 
 def done(root, *, state="done"):
-    child = simulation.of(printing.job(root))
+    child = printing.PRINTING.child(root)
     ended(child)
     assert child.state == state, (child.state, child.error)
     return child
@@ -99,7 +101,7 @@ def test_a_check_from_start_to_markers(tmp_path):
     assert f"{best['islands']} islands" in said
 
     assert bpy.ops.mu.print_show(finding=0) == {"FINISHED"}
-    balls = [m for m in printing.marks(root) if m.data is not None]
+    balls = [m for m in markers.marks(root) if m.data is not None]
     assert len(balls) == sum(len(f["places"]) > 0 for f in faults)
     (chosen,) = bpy.context.selected_objects
     first = found.findings[0]
@@ -113,7 +115,7 @@ def test_a_check_from_start_to_markers(tmp_path):
     bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
     (root,) = unit_object.roots()
     assert printing.checked(root).stale == ""
-    assert len(printing.marks(root)) == len(balls) + 1
+    assert len(markers.marks(root)) == len(balls) + 1
     assert "place 1 of" in drawn()
     (folder,) = (tmp_path / "seat.mu").glob("*/check")
     assert (folder / "report.html").is_file()
@@ -169,7 +171,7 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
     assert "There are 4 findings" in refused(bpy.ops.mu.print_show, finding=9)
     assert "has 2 places" in refused(bpy.ops.mu.print_show, finding=0, place=2)
 
-    marks = {m.get("mu_check"): m for m in printing.marks(root)}
+    marks = {m.get("mu_check"): m for m in markers.marks(root)}
     assert set(marks) == {"0", "1", "up"}
     colours = [marks[k].data.materials[0].name for k in "01"]
     assert colours == ["MU Flaws", "MU Doubt"]
@@ -182,7 +184,7 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
     assert abs(width() - 2 * 0.8) < 0.05
     bpy.ops.mu.print_show(finding=0)
     bpy.context.view_layer.update()
-    assert abs(width() - 0.8 * (1 + printing.LARGER)) < 0.1  # the place that is looked at is larger
+    assert abs(width() - 0.8 * (1 + markers.LARGER)) < 0.1  # the place that is looked at is larger
     bpy.ops.mu.print_show(finding=1)
     root.mu_print.marker = 2.0
     bpy.context.view_layer.update()
@@ -190,20 +192,20 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
     up = marks["up"].rotation_quaternion @ Vector((0, 0, 1))
     assert (up - Vector((0, 0, 1))).length < 1e-5
 
-    while printing.marks(root):
+    while markers.marks(root):
         bpy.ops.ed.undo()
         (root,) = unit_object.roots()
     assert "No place is marked" in refused(bpy.ops.mu.print_clear)
     bpy.ops.mu.print_marks()
     root.mu_unit.chambers.wall_mm = 1.0  # a rebuild leaves them, and the panel says that they are old
-    assert len(printing.marks(root)) == 3
+    assert len(markers.marks(root)) == 3
     assert "Stale: it is of the unit with other parameters" in drawn()
     assert "The check is stale" in refused(bpy.ops.mu.print_marks)
     root.mu_unit.chambers.wall_mm = 0.9
     write_check(root, [finding("cup", "warning", [[0, 0, 0]])])
     assert "markers are of an earlier check" in drawn().replace("  ", " ")
     assert bpy.ops.mu.print_clear() == {"FINISHED"}
-    assert not printing.marks(root)
+    assert not markers.marks(root)
 
     assert bpy.ops.mu.print_up(direction=(0.6, 0, 0.8)) == {"FINISHED"}
     assert "Stale: it is of another build direction" in drawn()
@@ -257,7 +259,7 @@ def test_an_export_as_chosen(tmp_path):
     context = MagicMock(wraps=bpy.context, window_manager=Manager(), object=root)
     assert operator.invoke(MagicMock(), context, None) == {"RUNNING_MODAL"}
     assert "chamber wall" in asked["message"]
-    assert not simulation.running()
+    assert not jobs.running()
 
     assert bpy.ops.mu.print_export() == {"FINISHED"}
     done(root)
@@ -287,7 +289,7 @@ def test_jobs_that_fail_and_one_that_is_stopped():
     root = add()
 
     def start(how):
-        return fake(printing.job(root), how, printing.folder_of(root, "check"))
+        return fake(printing.PRINTING, root, how, printing.folder_of(root, "check"))
 
     for how, expected in {
         "told_error": "thicker wall",
@@ -308,7 +310,7 @@ def test_jobs_that_fail_and_one_that_is_stopped():
     child = start("hang")
     watch(lambda: child.progress)
     # The unit's own simulation is another one.
-    assert simulation.of(root.mu_unit.uuid) is None
+    assert SIMULATION.child(root) is None
     assert not bpy.ops.mu.cancel.poll()
     assert bpy.ops.mu.print_cancel() == {"FINISHED"}
     ended(child)
@@ -348,7 +350,7 @@ def test_a_body_of_ones_own_is_checked_by_its_solid():
     bpy.context.view_layer.objects.active = root
     assert "only STL is written" in refused(bpy.ops.mu.print_export)
     assert bpy.ops.mu.print_check() == {"FINISHED"}
-    child = simulation.of(printing.job(root))
+    child = printing.PRINTING.child(root)
     ended(child)
     found = printing.checked(root)
     assert found is not None, child.error

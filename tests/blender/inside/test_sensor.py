@@ -20,12 +20,13 @@ import numpy as np
 import pytest
 
 import mu_addon
+from mu_addon.blender.jobs import start_child as jobs
 from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.sensor import panel as sensor_panel
 from mu_addon.blender.sensor import plot as sensor_plot
+from mu_addon.blender.sensor import session as sensor_session
 from mu_addon.blender.sensor import state as sensor
 from mu_addon.blender.sensor import twin
-from mu_addon.blender.simulate import state as simulation
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.sensing.calibration import Sweep, calibrate, write_calibration
 from mu_addon.sensing.recording import read_recording
@@ -43,7 +44,7 @@ def watch(until):
     while not until():
         assert time.monotonic() < end, drawn()
         sensor.poll()
-        simulation.poll()
+        jobs.poll()
         time.sleep(0.02)
 
 
@@ -260,7 +261,7 @@ def test_a_guided_sweep_calibrates_and_a_zero_mends_weaker_light(tmp_path, monke
     assert found.dark == "dark"
     assert s.guide is None
     assert "0 to 45" in drawn()
-    child = simulation.of(sensor.calibrating(root))
+    child = sensor.CALIBRATION.child(root)
     assert child.state == "done", child.error
     assert child.result, child.error
 
@@ -288,8 +289,8 @@ def test_a_guided_sweep_calibrates_and_a_zero_mends_weaker_light(tmp_path, monke
     watch(lambda: sensor.calibration(root)[0] is not None)
     assert sensor.calibration(root)[0].gain == 1.0
     assert bpy.ops.mu.sensor_calibrate(data=str(tmp_path / "study")) == {"FINISHED"}
-    watch(lambda: simulation.of(sensor.calibrating(root)).state != "running")
-    assert simulation.of(sensor.calibrating(root)).state == "failed"
+    watch(lambda: sensor.CALIBRATION.child(root).state != "running")
+    assert sensor.CALIBRATION.child(root).state == "failed"
     assert "experiments.toml" in drawn()
     assert sensor.calibration(root)[0] is not None, "the one that was there stays"
 
@@ -303,14 +304,14 @@ def test_the_twin_follows_the_simulated_sensor_and_never_beyond(tmp_path):
     assert bpy.ops.mu.sensor_twin() == {"FINISHED"}
     (membrane,) = (part for part in twin.parts(root) if part["mu_twin"] == "membrane")
     rest = motion_parts.vertices_of(membrane.data)
-    assert twin.said(root) == ("waiting", "no signal")
+    assert twin.status(root) == ("waiting", "no signal")
     assert membrane.data.materials[0].name == "MU Twin Waiting"
     s = connected(root)
     seen = []
 
     def look():
         r, tip = s.reading, motion_parts.vertices_of(membrane.data)
-        if r is not None and twin.said(root)[0] == "live":
+        if r is not None and twin.status(root)[0] == "live":
             top = tip[rest[:, 2] > rest[:, 2].max() - 1e-6]
             about = top - top.mean(axis=0)
             widest = about[np.abs(about[:, 1]).argmax()]
@@ -323,7 +324,7 @@ def test_the_twin_follows_the_simulated_sensor_and_never_beyond(tmp_path):
     slope = np.minimum(np.abs(shown), 180.0 - np.abs(shown))
     assert np.abs(slope - asked).max() < 0.5, np.abs(slope - asked).max()
     assert membrane.data.materials[0].name == "MU Twin"
-    assert "Model A at" in twin.said(root)[1]
+    assert "Model A at" in twin.status(root)[1]
 
     class Reading:
         light_V, angle_deg, low_deg, high_deg, possible = 2.0, 30.0, 29.0, 31.0, True
@@ -332,28 +333,28 @@ def test_the_twin_follows_the_simulated_sensor_and_never_beyond(tmp_path):
         reading = Reading()
         for name, value in values.items():
             setattr(reading, name, value)
-        twin.follow(root, reading, fresh)
+        twin.set_pose(root, reading, fresh)
         return motion_parts.vertices_of(membrane.data)
 
     at_30 = follow()
     for beyond in ({"angle_deg": 51.0}, {"angle_deg": -17.0}, {"possible": False}):
         assert np.array_equal(follow(**beyond), at_30), "it stays where it was"
-        state, words = twin.said(root)
+        state, words = twin.status(root)
         assert state == "outside"
         assert membrane.data.materials[0].name == "MU Out of Range"
         assert ("calibration" in words) == ("possible" in beyond), words
         assert words in drawn().replace("  ", " ") or state == "outside"
     assert np.array_equal(follow(fresh=False), at_30)
-    assert twin.said(root)[0] == "waiting"
+    assert twin.status(root)[0] == "waiting"
     assert not np.array_equal(follow(angle_deg=10.0), at_30)
-    assert twin.said(root)[0] == "live"
+    assert twin.status(root)[0] == "live"
     assert follow(angle_deg=float("nan")).shape == at_30.shape
-    assert twin.said(root) == ("waiting", "not calibrated")
+    assert twin.status(root) == ("waiting", "not calibrated")
 
     # Another motion than the one it was made from: cut open or not, for one.
     root.mu_motion.cut = not root.mu_motion.cut
     follow(angle_deg=10.0)
-    assert twin.said(root)[0] == "waiting"
+    assert twin.status(root)[0] == "waiting"
     assert "show the twin again" in drawn(), drawn()
     root.mu_motion.cut = not root.mu_motion.cut
 
@@ -365,7 +366,7 @@ def test_the_twin_follows_the_simulated_sensor_and_never_beyond(tmp_path):
     watch(lambda: True)
     bpy.ops.ed.undo()
     (root,) = unit_object.roots()
-    watch(lambda: twin.parts(root) and twin.said(root)[0] != "waiting")
+    watch(lambda: twin.parts(root) and twin.status(root)[0] != "waiting")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "study" / "seat.blend"))
     bpy.ops.mu.sensor_disconnect()
     ended(s)
@@ -435,7 +436,7 @@ def test_what_is_drawn_does_not_grow_with_the_rate_and_stays_in_its_axes(tmp_pat
     curves = plotted()
     assert len(curves) == 3, "light, dark and angle"
     for points in curves:
-        assert len(points) <= 2 * sensor.BINS
+        assert len(points) <= 2 * sensor_session.BINS
         assert np.isfinite(points).all()
         assert points[:, 0].min() >= 99.0
         assert points[:, 0].max() <= 900.0
@@ -474,7 +475,7 @@ def test_the_angles_of_a_sweep():
         (10.0, -10.0, 10.0, [10, 0, -10, 0] * 2 + [10]),
     ):
         settings.sweep_from, settings.sweep_to, settings.sweep_step = low, high, step
-        assert sensor.sweep(settings) == expected, sensor.sweep(settings)
+        assert sensor.sweep_angles(settings) == expected, sensor.sweep_angles(settings)
     connected(unit_object.roots()[0])
     settings.sweep_to, settings.sweep_step = 10.0, 0.5
     settings.sweep_to = 10.0

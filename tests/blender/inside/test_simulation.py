@@ -7,20 +7,24 @@ import bpy
 import pytest
 
 import mu_addon
+from mu_addon.blender.jobs import start_child as jobs
 from mu_addon.blender.obstacles import panel as obstacle_panel
+from mu_addon.blender.path import panel as path_panel
 from mu_addon.blender.printing import panel as print_panel
-from mu_addon.blender.simulate import state as simulation
+from mu_addon.blender.results import panel as results_panel
+from mu_addon.blender.simulate import panel as simulate_panel
 from mu_addon.blender.simulate import study_folder as studies
+from mu_addon.blender.simulate.job import SIMULATION
 from mu_addon.blender.unit import object as unit_object
-from mu_addon.blender.unit import panel as panels
-from mu_addon.blender.unit.properties import to_unit
+from mu_addon.blender.unit import panel as unit_panel
 from mu_addon.errors import InputError
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by
 from .jobs import ended, launch, watch
 
-PANELS = [*panels.CLASSES, obstacle_panel.MU_PT_obstacles, *print_panel.CLASSES]
+PANELS = [*unit_panel.CLASSES, *path_panel.CLASSES, *simulate_panel.CLASSES]
+PANELS += [results_panel.MU_PT_results, obstacle_panel.MU_PT_obstacles, *print_panel.CLASSES]
 
 
 def drawn():
@@ -57,7 +61,7 @@ def test_panels_tell_what_a_child_says():
         ended(child)
         assert expected in drawn(), (how, drawn())
     launch(root, "told_error")
-    watch(lambda: not simulation.running())
+    watch(lambda: not jobs.running())
     assert "thicker wall" in drawn()
     assert "at 12 kPa" in drawn()
     assert bpy.ops.mu.open(what="errors") == {"FINISHED"}
@@ -65,7 +69,7 @@ def test_panels_tell_what_a_child_says():
 
     root.mu_unit.chambers.wall_mm = 3.0
     assert "too thick" in drawn()
-    assert "last design that was possible" in drawn()
+    assert "last valid design" in drawn()
     bpy.context.scene.unit_settings.scale_length = 1.0
     assert "not in millimetres" in drawn()
 
@@ -77,7 +81,7 @@ def test_without_the_solver_geometry_works_and_the_panel_says_why(monkeypatch):
         importlib.util, "find_spec", lambda name, *a: None if name == "warp" else find(name, *a)
     )
     add()
-    assert simulation.missing() == ["warp"]
+    assert jobs.missing() == ["warp"]
     assert "Cannot simulate: warp not found" in drawn()
     assert "Not in this Blender: warp" in refused(bpy.ops.mu.simulate)
     assert bpy.ops.mu.solid() == {"FINISHED"}
@@ -87,12 +91,12 @@ def test_a_worker_whose_solver_does_not_load_says_so(tmp_path, monkeypatch):
     broken = tmp_path / "broken" / "warp"
     broken.mkdir(parents=True)
     (broken / "__init__.py").write_text("raise ImportError('libwarp.so: not for this machine')")
-    found = simulation.environment()
+    found = jobs.environment()
     found["PYTHONPATH"] = f"{broken.parent.resolve()}:{found['PYTHONPATH']}"
-    monkeypatch.setattr(simulation, "environment", lambda: found)
+    monkeypatch.setattr(jobs, "environment", lambda: found)
     root = add()
     assert bpy.ops.mu.simulate() == {"FINISHED"}
-    child = simulation.of(root.mu_unit.uuid)
+    child = SIMULATION.child(root)
     ended(child)
     assert child.state == "failed"
     assert "libwarp.so: not for this machine" in child.error["what"]
@@ -104,7 +108,7 @@ def test_unregister_ends_what_runs():
     watch(lambda: child.progress)
     mu_addon.unregister()
     assert child._process.returncode is not None
-    assert simulation.running() == []
+    assert jobs.running() == []
     mu_addon.register()
 
 
@@ -116,7 +120,7 @@ def test_folders_of_studies(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "seat.blend"))
     here = tmp_path
     assert studies.folder_of(root) == here / "seat.mu" / f"Grip-no.-1-{short}"
-    assert studies.settle(root) == studies.folder_of(root)
+    assert studies.assign_folder(root) == studies.folder_of(root)
     assert root.mu_unit.study.folder.startswith("//seat.mu")
     root.mu_unit.title = "renamed"  # the results stay where they are
     assert studies.folder_of(root) == here / "seat.mu" / f"Grip-no.-1-{short}"
@@ -126,7 +130,7 @@ def test_two_simulations_of_one_unit_are_refused():
     root = add()
     launch(root, "hang")
     with pytest.raises(InputError, match="already"):
-        simulation.start(root.mu_unit.uuid, to_unit(root.mu_unit), studies.folder_of(root), ["simulate"])
+        SIMULATION.start(root, ["simulate"], studies.folder_of(root))
 
 
 @pytest.mark.slow
@@ -135,7 +139,7 @@ def test_a_quick_look_from_start_to_stale(tmp_path):
     root = add(preset="mu-0.75x")
     root.mu_unit.study.command, root.mu_unit.study.detail = "simulate", "quick"
     assert bpy.ops.mu.simulate() == {"FINISHED"}
-    child = simulation.of(root.mu_unit.uuid)
+    child = SIMULATION.child(root)
     fractions = []
     watch(lambda: fractions.append(child.progress.get("fraction")) or child.state != "running")
     assert child.state == "done", child.error
