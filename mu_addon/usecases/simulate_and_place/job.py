@@ -18,6 +18,7 @@ from ...design.solid import QUALITY
 from ...errors import InputError
 from ...fem.obstacle import CONTACT
 from ...fem.protocol import Protocol, read_protocol
+from ...fem.solver import SolverChoice
 from ...fem.unit import materials_of
 from ...homogenize.effective import Effective, read_effective
 from ...meshing.settings import MeshSettings
@@ -84,6 +85,8 @@ class Job:
     obstacles: tuple[RigidBody, ...] = attrs.field(default=(), converter=tuple)
     # What measured data named beside what the unit has parameters for, and the direction of gravity.
     effects: StaticEffects = attrs.field(factory=StaticEffects)
+    # How linear systems are solved: within their tolerance it decides nothing, and is no part of study.toml.
+    solver: SolverChoice = attrs.field(factory=SolverChoice)
     # What is run of it: the first, the first two or all.
     stages: tuple[str, ...] = STAGES
 
@@ -113,6 +116,20 @@ class Job:
                 "clogged_chamber, paths",
                 "leave one of them out",
             )
+        if (
+            self.solver.method == "iterative"
+            and "place" in self.stages
+            and self.solver.device in ("auto", "cpu")
+        ):
+            raise InputError(
+                "on the CPU all paths are solved with one factor, which two levels do not make",
+                "--solver",
+                "give --solver direct or auto, or a CUDA device with --device",
+            )
+        if self.solver.method == "iterative" and self.mesh.order == 1 and "simulate" in self.stages:
+            raise InputError(
+                "two levels need quadratic elements", "--solver, --order", "give --order 2 or --solver direct"
+            )
         _, pressure = self.samples
         if not pressure.any():
             raise InputError(
@@ -129,7 +146,7 @@ class Job:
     def tables(self) -> Tables:
         """Everything that decides the results, a table a stage, as study.toml has it.
 
-        Not `workers`, which decides nothing.
+        Not `workers` and `solver`, which decide nothing.
         """
         mesh = attrs.asdict(self.mesh)
         tables: Tables = {
@@ -167,7 +184,9 @@ class Job:
 
     def model(self, mesh: Mesh, threads: int = 2) -> Model:
         """Model of the unit's mesh: pressure, what weighs, what it may touch. Raises InputError."""
-        model = self.effects.model(self.unit, mesh, threads)
+        device, solver = self.solver.resolved(mesh, needs_factor="place" in self.stages)
+        model = self.effects.model(self.unit, mesh, threads, device)
+        model.solver = solver
         if self.obstacles:
             model.obstacles = obstacles_of(self.obstacles, self.unit, mesh)
         return model
@@ -253,7 +272,7 @@ def _named(key: str, text: str | None) -> dict[str, str]:
     return {} if text is None else {key: FILES[key], f"{key}_sha256": digest(text)}
 
 
-def read_job(folder: Path, workers: int = 2) -> Job:
+def read_job(folder: Path, workers: int = 2, solver: SolverChoice | None = None) -> Job:
     """The job that a study's folder describes; raises InputError where it cannot be used, and OutputError."""
     where = str(folder / NAME)
     tables = read_tables(folder)
@@ -265,7 +284,7 @@ def read_job(folder: Path, workers: int = 2) -> Job:
             str(folder),
             "put it back, or start a new study with it: --unit, --protocol, --lattice, --obstacle",
         )
-    return job_of(tables, folder, workers)
+    return attrs.evolve(job_of(tables, folder, workers), solver=solver or SolverChoice())
 
 
 def job_of(tables: Mapping[str, Mapping[str, Any]], folder: Path, workers: int = 2) -> Job:
