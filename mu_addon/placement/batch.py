@@ -1,4 +1,4 @@
-"""Every candidate on one mesh at once: Model A's states, each with all sensors in lockstep."""
+"""Every candidate on one mesh at once: Model A's states, all sensors of one state solved together."""
 
 from __future__ import annotations
 
