@@ -23,8 +23,8 @@ _PREDICTED = 0.5
 def sections(found: LongFound) -> tuple[Section, Section]:
     """The sections that the long studies add to the table's page."""
     return (
-        ("meshes", "How much of the table is the mesh", _meshes(found)),
-        ("open", "What the paper leaves open", _open(found)),
+        ("meshes", "Mesh dependence of the table", _meshes(found)),
+        ("open", "Parameters that the paper does not print", _open(found)),
     )
 
 
@@ -62,24 +62,24 @@ def _meshes(found: LongFound) -> str:
         ("size", "n"),
     ]  # fmt: skip
     html += (
-        "<p>Meshes as the paper's may have been: the whole body in linear tetrahedra of about 5 mm, by "
-        "Gmsh, without regard to the anchors. A seed moves all sizes by up to a tenth: no one would call two "
-        "of them different. <i>grown</i>: elements grow with the unit; <i>same</i>: 5 mm at every scale; "
-        "<i>coarse</i>: 9 mm at 1.0x. "
-        "Volume: what the rule stiffens over the sensor's own. Rank correlation: least, median, most of all "
-        "meshes. Size: mean J_hat over the paper's.</p>"
+        "<p>Random meshes of the kind the paper may have used: the whole body in linear tetrahedra of about "
+        "5 mm by Gmsh, not aligned with the anchors. The seed varies all element sizes by up to 10 %, so "
+        "that any of them could have been used. <i>grown</i>: elements grow with the unit; <i>same</i>: 5 "
+        "mm at every scale; <i>coarse</i>: 9 mm at 1.0x. Volume: stiffened volume over the sensor's volume. "
+        "Rank correlation: minimum, median and maximum over all meshes. Magnitude: mean J_hat over the "
+        "paper's.</p>"
     )
     html += table(f"From: {found.origin['meshes']}.", head, rows)
     for family in ("grown", "same", "coarse"):
         picked = _by_column(found, family, "intersect")
         if picked:
             svg = charts.mesh_scatter(picked, found.table.paper.paths)
-            words = f"Every dot is a mesh ({family}, intersect); crosses are the paper's."
+            words = f"Dots: one mesh each ({family}, intersect). Crosses: the paper."
             html += figure(svg, words, words)
             svg = charts.orders(picked, found.table.paper.paths)
             words = (
-                "In how many of a hundred meshes two paths lie in the paper's order "
-                f"({family}, intersect); no number: in all."
+                f"Percentage of meshes in which two paths are in the paper's order ({family}, intersect); "
+                "no number: 100 %."
             )
             html += figure(svg, words, words)
     return html
@@ -93,15 +93,18 @@ def _open(found: LongFound) -> str:
     failed = sum(bool(p.failed) for p in found.points)
     touching = sum(p.touches for p in solved)
     html = (
-        f"<p>{len(solved) + failed} sets of values within the ranges below, one set for all three units each "
-        f"(refine 0.5, volume fraction): {failed} have a limit point on the way, in {touching} of the others "
-        "walls pass through each other before the end of the range, which nothing here resists.</p>"
+        f"<p>{len(solved) + failed} sets of values within the ranges below, one set for all three units "
+        f"each (refine 0.5, volume fraction): {failed} have a limit point within the range; in {touching} "
+        "of the others walls intersect before the end of the range; self-contact is not modelled.</p>"
     )
     rows = [([o.name, f"{o.variable.low:g} to {o.variable.high:g}", o.why], False) for o in OPEN]
-    html += table(f"From: {found.origin['points']}.", [("open value", ""), ("range", ""), ("why", "")], rows)
+    html += table(f"From: {found.origin['points']}.", [("parameter", ""), ("range", ""), ("why", "")], rows)
     found_effects = effects(solved, paper)
     told = [e for e in found_effects if e.Q2 >= _PREDICTED]
-    words = "Percent of a figure's variance that a value makes, alone and with others (Sobol's total index)."
+    words = (
+        "Share in percent of a result's variance due to a parameter, alone and in interaction (Sobol "
+        "total index)."
+    )
     if told:
         html += figure(charts.shares(told), words, words)
     head = [("figure", ""), ("least", "n"), ("most", "n"), ("variance predicted", "n")]
@@ -110,7 +113,10 @@ def _open(found: LongFound) -> str:
         for e in found_effects
     ]
     html += table(
-        "Over all sets; the last column: of sets left out, by the polynomial behind the shares.", head, rows
+        "Over all sets; last column: variance of held-out sets predicted by the polynomial that the indices "
+        "are computed from.",
+        head,
+        rows,
     )
     return html + _sets(found, solved)
 
@@ -125,7 +131,7 @@ def _sets(found: LongFound, solved: list[OpenPoint]) -> str:
         *((f"{name_of(s)} size", "n") for s in paper.scales),
         ("chosen", ""),
         *((f"{p:g} kPa", "n") for p in MOTION_KPA),
-        ("walls meet", ""),
+        ("self-contact", ""),
         ("goals", ""),
         ("distance", "n"),
     ]
@@ -151,9 +157,9 @@ def _sets(found: LongFound, solved: list[OpenPoint]) -> str:
             )
         )
     words = (
-        "Sets told beside, and the five of the design that agree best with walls apart. Rank "
-        "correlation; size, the mean over the paper's; path chosen at 0.75x, 1.0x and 1.5x; angles at "
-        "1.0x; distance as docs/reproduce.md has it."
+        "Named sets, and the five sampled sets without self-contact that agree best. Rank correlation; "
+        "magnitude, the mean J_hat over the paper's; path chosen at 0.75x, 1.0x and 1.5x; angles at 1.0x; "
+        "distance as docs/reproduce.md has it."
     )
     return table(words, head, rows)
 

@@ -91,7 +91,7 @@ class Job:
 
     def __attrs_post_init__(self) -> None:
         if not 1 <= self.cells <= 12:
-            raise InputError(f"a specimen of {self.cells} cells a side", "--cells", "give 1 to 12")
+            raise InputError(f"a specimen of {self.cells} cells per side", "--cells", "give 1 to 12")
         if not 0.01 <= self.strain <= 0.8:
             raise InputError(f"a compression to {self.strain:g}", "--strain", "give a share from 0.01 to 0.8")
         if not 0.3 <= self.refine <= 4.0:
@@ -251,7 +251,7 @@ class Homogenisation:
             "stopped": found.stopped,
         }
         if found.stopped:
-            self.warn(f"The endless lattice's curve ends early: {found.stopped}.")
+            self.warn(f"The curve of the periodic lattice ends early: {found.stopped}.")
 
     def fit_law(self) -> None:
         """The law that the analysis mesh takes, in effective.toml."""

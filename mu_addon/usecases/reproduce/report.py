@@ -26,8 +26,8 @@ Array = np.ndarray[Any, Any]
 Section = tuple[str, str, str]
 
 _WORDS = {
-    "volume_fraction": "each element stiffened by the share of it that lies in the sensor",
-    "intersect": "the paper's own: every element that the sensor touches, whole",
+    "volume_fraction": "each element is stiffened by the volume fraction of it inside the sensor",
+    "intersect": "the rule of the paper: every element that the sensor intersects is stiffened entirely",
 }
 # The rule that decides comes first.
 _ORDER = sorted(RULES, key=lambda rule: rule != RULE)
@@ -43,18 +43,18 @@ def write_report(found: Found, path: Path, further: Sequence[Section] = ()) -> N
 def report(found: Found, further: Sequence[Section] = ()) -> str:
     """The page as HTML text; further: sections of other studies, before that on sampling."""
     return page(
-        "The paper, done again",
+        "Reproduction of the paper",
         "Exley, Nardin, Trunin, Cafiso, Beccai, Monolithic Units, arXiv:2511.13120: Table I, bending, and "
-        f"how much of either is the mesh or an assumption. Values: {found.settings.values_name}.",
+        f"the share of mesh and assumptions in the differences. Values: {found.settings.values_name}.",
         note(_remarks(found)),
         cards(_facts(found)),
         [
             ("table", "Table I", _table(found)),
             ("deviation", "Deviation along the length and over time", _deviations(found)),
-            ("statements", "What the paper states", _statements(found)),
+            ("statements", "Statements of the paper", _statements(found)),
             ("bending", "Bending", _bending(found)),
             *further,
-            ("sampling", "The protocol's sampling", _sampling(found)),
+            ("sampling", "Sampling of the protocol", _sampling(found)),
             ("versions", "Versions", facts_table("package", "version", package_versions())),
         ],
     )
@@ -64,7 +64,7 @@ def _facts(found: Found) -> list[tuple[str, str]]:
     facts = []
     printed = {name: a for name, a in found.agreements(RULE).items() if name in found.paper.J_hat}
     for name, a in printed.items():
-        facts.append((f"{name}, rank correlation", f"{a.spearman:.2f} (wanted {GOALS[name]:g})"))
+        facts.append((f"{name}, rank correlation", f"{a.spearman:.2f} (goal {GOALS[name]:g})"))
     same = [a.same_choice for a in printed.values()]
     facts.append(("the paper's path chosen, or tied", f"{sum(same)} of {len(same)}"))
     middle = next(c for c in found.columns if c.scale == 1.0)
@@ -85,8 +85,8 @@ def _remarks(found: Found) -> list[str]:
         if len(crossing):
             where = " and ".join(f"{p:.3g}" for p in crossing)
             remarks.append(
-                f"{c.name}: from {where} kPa on walls pass through each other. Nothing here resists contact, "
-                "and the states beyond are wrong."
+                f"{c.name}: from {where} kPa on, walls intersect. Self-contact is not modelled, so states "
+                "beyond this pressure are invalid."
             )
         if c.fine.stopped:
             remarks.append(f"{c.name}: the range of bending was not reached: {c.fine.stopped}.")
@@ -94,18 +94,18 @@ def _remarks(found: Found) -> list[str]:
     if GRIPPER in found.others:
         refine = min(found.settings.mesh.refine, gripper.REFINE)
         remarks.append(
-            f"The gripper's columns are of one finger on a mesh of refine {refine:g}, closing on nothing and "
-            "on each of the paper's cubes, without friction. How far their mesh moves them is not known."
+            f"The gripper's columns are of one finger on a mesh of refine {refine:g}, closing freely and on "
+            "each of the paper's cubes, without friction. Their mesh uncertainty is not known."
         )
     else:
         remarks.append("The gripper's column is not part of this run.")
     if found.settings.held_cells:
         remarks.append(
-            f"The three units are held fast up to {found.settings.held_cells:g} cells above the base; the "
+            f"The three units are clamped up to {found.settings.held_cells:g} cells above the base; the "
             "gripper's fingers are not."
         )
     if found.settings.mesh.order == 1:
-        remarks.append("Linear elements lock in thin walls: these answers are for a quick look only.")
+        remarks.append("Linear elements lock in thin walls: these results are for a quick look only.")
     return remarks
 
 
@@ -127,10 +127,11 @@ def _table(found: Found) -> str:
             rows.append((cells, False))
         rows += [(cells, False) for cells in _feet(agreed, spread)]
         groups = [("", 1), *((name, 2) for name in ours)]
-        words = f"{rule.replace('_', ' ')}: {_WORDS[rule]}. J_hat in mm, * the best of its column."
+        words = f"{rule.replace('_', ' ')}: {_WORDS[rule]}. J_hat in mm, * smallest of its column."
         html += table(words, head, rows, groups)
         alt = (
-            "J_hat of every path here and in the paper, a panel a column; the numbers are in the table above."
+            "J_hat of every path, here and in the paper, one panel per column; the table above holds the "
+            "numbers."
         )
         printed = {name: J for name, J in ours.items() if name in paper.J_hat}
         html += figure(charts.against_paper(printed, paper, paper.paths), "", alt)
@@ -141,8 +142,8 @@ def _feet(agreed: Mapping[str, Agreement], spread: Mapping[str, float]) -> list[
     """The last rows of a table: how its columns agree with the paper's."""
     feet = {
         "rank correlation": [f"{a.spearman:.2f}" for a in agreed.values()],
-        "here over paper": [f"{a.magnitude:.2f}" for a in agreed.values()],
-        "mesh moves it by": [_doubt(spread[name]) for name in agreed],
+        "ratio to paper": [f"{a.magnitude:.2f}" for a in agreed.values()],
+        "mesh uncertainty": [_doubt(spread[name]) for name in agreed],
         "tied with the best": [" ".join(map(label, a.tied)) or "-" for a in agreed.values()],
     }
     return [[title, *(cell for value in values for cell in (value, ""))] for title, values in feet.items()]
@@ -158,7 +159,7 @@ def _deviations(found: Found) -> str:
         svg = charts.deviations(found.columns, RULE, found.paper.paths, along)
         words = "actuator's length" if along == "length" else "actuation"
         html += figure(
-            svg, f"Average deviation along the {words}.", f"A panel a path, a line a scale: {along}."
+            svg, f"Average deviation along the {words}.", f"One panel per path, one line per scale: {along}."
         )
     return html
 
@@ -170,7 +171,10 @@ def _statements(found: Found) -> str:
         rows = [([s.text, s.verdict, s.numbers], False) for s in found.statements(rule)]
         held = sum(s.verdict == HELD for s in found.statements(rule))
         unclear = sum(s.verdict == CANNOT_TELL for s in found.statements(rule))
-        words = f"{rule.replace('_', ' ')}: {held} of {len(rows)} hold, of {unclear} the mesh cannot tell."
+        words = (
+            f"{rule.replace('_', ' ')}: {held} of {len(rows)} hold; {unclear} cannot be decided within "
+            "the mesh uncertainty."
+        )
         html += table(words, head, rows, css="stack")
     relative = {c.name: c.fine.J_hat(RULE).mean() / c.scale for c in found.columns}
     words = ", ".join(f"{name} {value:.3f}" for name, value in relative.items())
@@ -190,7 +194,7 @@ def _bending(found: Found) -> str:
         rows.append(
             ([c.name, *angles, f"{c.angle_uncertainty_deg():.1f}", signed(f"{low:g} to {high:g}")], False)
         )
-    caption = "Bending angle in degrees; mesh: how far the coarser mesh moves it at most."
+    caption = "Bending angle in degrees; mesh: largest difference to the coarser mesh."
     chart = figure(
         charts.bending(found.columns, paper),
         "Lines: here. Crosses: ends of the ranges that the paper prints as approximate, with 2.5 degrees.",
@@ -204,7 +208,7 @@ def weightings(samples_kPa: Array) -> Mapping[str, Array]:
     ones = np.ones(len(samples_kPa))
     _, inverse, count = np.unique(samples_kPa, return_inverse=True, return_counts=True)
     return {
-        "the grasp, uniform in time": ones,
+        "the grasp protocol, uniform in time": ones,
         "every pressure once": 1.0 / count[inverse],
         "vacuum alone": (samples_kPa < 0) * 1.0,
         "pressure alone": (samples_kPa > 0) * 1.0,
@@ -224,7 +228,7 @@ def _sampling(found: Found) -> str:
             chosen.append(label(a.chosen))
         rows.append(([*cells, " ".join(chosen)], False))
     words = (
-        "The paper prints neither times nor rates. Rank correlation, size and chosen path by column, volume "
-        "fraction."
+        "The paper prints neither times nor rates. Rank correlation, magnitude and chosen path by column, "
+        "volume fraction."
     )
     return table(words, head, rows)
