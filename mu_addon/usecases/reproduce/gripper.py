@@ -17,8 +17,8 @@ from ...placement.inclusion import RULES
 from ...run.cache import Cache, key
 from ..grip.grasp import Cube
 from ..grip.run import CUBES, gripper_column
-from .open_values import RULE, with_values
 from .published import GRIPPER
+from .values import RULE, with_values
 
 Array = np.ndarray[Any, Any]
 
