@@ -43,8 +43,8 @@ def main(arguments: list[str]) -> int:
     json = getattr(options, "json", False)
     progress = Progress([json_lines(sys.stdout) if json else terminal(sys.stderr)])
     with run_to_end(progress) as context:
-        command.run(options, progress, context)
+        command.run(options, context)
     if context.status == 0 and not json:
         results = [f"results: {context.folder}"] if context.folder is not None else []
-        sys.stdout.write("\n".join([*results, *command.console_summary(context.summary)]) + "\n")
+        sys.stdout.write("\n".join([*results, *context.console_summary(context.summary)]) + "\n")
     return context.status

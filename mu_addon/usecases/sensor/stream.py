@@ -14,7 +14,7 @@ from typing import Any, TextIO
 
 from ...errors import InputError
 from ...run.context import RunContext
-from ...run.progress import Progress, Sink
+from ...run.progress import Sink
 from ...sensing.calibration import deriver, read_calibration
 from ...sensing.session import Control, run_session
 from ...sensing.sources import SerialLine, Simulated, Source, ports
@@ -52,7 +52,6 @@ def stream(
     *,
     seconds: float | None,
     about: Mapping[str, Any],
-    progress: Progress,
     context: RunContext,
     controlled: bool = False,
     calibration: str | None = None,
@@ -71,6 +70,8 @@ def stream(
         threading.Thread(target=_obey, args=(control,), daemon=True).start()
     derive = None if calibration is None else deriver(read_calibration(Path(calibration)))
     context.open_folder(folder)
+    context.console_summary = console_summary
+    progress = context.progress
 
     def tell(event: str, details: dict[str, Any]) -> None:
         message = {"type": "stream", "event": event, **details}
@@ -171,7 +172,7 @@ def _losses(status: Mapping[str, Any]) -> list[str]:
     return [f"{status[key]} {word}" for key, word in words.items() if status[key]]
 
 
-def console_summary(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What a session recorded, in a few lines of text, of its `summary`."""
     rows, seconds = summary["rows"], summary["duration_s"]
     losses = _losses(summary) or ["nothing lost"]
