@@ -19,10 +19,11 @@ from circumstances import circumstances
 
 from mu_addon.design.anchors import anchors, windows
 from mu_addon.design.parameters import load_preset
-from mu_addon.fem.descent import NewtonSettings
-from mu_addon.fem.equilibrium import Equilibrium, rest
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg, probe
 from mu_addon.fem.model import Model
+from mu_addon.fem.newton_settings import NewtonSettings
+from mu_addon.fem.state import rest
 from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit

@@ -26,9 +26,10 @@ from multigrid import KINDS, measure
 from peers.chamber import chamber
 from peers.problem import Problem
 
-from mu_addon.fem.equilibrium import Equilibrium, rest
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
+from mu_addon.fem.state import rest
 
 # Refinements of the unit and element sizes (mm) of the chamber, all of order 2.
 BODIES = {

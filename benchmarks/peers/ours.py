@@ -6,9 +6,11 @@ import time
 
 import numpy as np
 
-from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, rest
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
+from mu_addon.fem.newton_settings import NewtonSettings
+from mu_addon.fem.state import rest
 
 from .problem import TOLERANCE, Result
 from .process import answer

@@ -17,17 +17,29 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `calibrate`."""
     command = commands.add_parser(
         "calibrate",
-        help="a sensor's map from voltage to bending angle, from recorded sweeps",
+        help="Calibrate a sensor: fit the map from voltage to bending angle to recorded bending sweeps.",
         epilog="example: run.py calibrate out/bench-1 --channel light_V --dark dark_V --out out/calibration",
     )
     command.add_argument(
-        "data", nargs="+", metavar="FOLDER", help="recordings, or measured data of waveguide_bending"
+        "data",
+        nargs="+",
+        metavar="FOLDER",
+        help="Recordings, or folders of measured data of the kind waveguide_bending.",
     )
     add_results(command)
-    command.add_argument("--channel", metavar="NAME", help="column of the light (the only one)")
-    command.add_argument("--dark", metavar="NAME|V", help="column of the dark level, or volts (0)")
     command.add_argument(
-        "--angles", metavar="CSV", help='time_s,angle_deg of a recording without marks such as "angle 30"'
+        "--channel", metavar="NAME", help="Column of the light signal (default: the only column)."
+    )
+    command.add_argument(
+        "--dark", metavar="NAME|V", help="Dark level: the name of a column, or a voltage in V (default: 0)."
+    )
+    command.add_argument(
+        "--angles",
+        metavar="CSV",
+        help=(
+            "Reference angles, CSV with the columns time_s,angle_deg, for a recording without marks "
+            'such as "angle 30".'
+        ),
     )
 
 

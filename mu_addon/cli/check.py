@@ -18,17 +18,30 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `check`."""
     command = commands.add_parser(
         "check",
-        help="print check of a unit or an STL file, and the best way up; exit status 6: do not print it",
+        help=(
+            "Check the printability of a unit or an STL file and find the best build direction. Exit "
+            "status 6 means not printable."
+        ),
         epilog="example: run.py check --preset mu-1.0x --path alpha4 --out out/check",
     )
     add_unit(command, required=False)
-    command.add_argument("--stl", metavar="FILE", help="check this file; with a unit, against its drawing")
-    command.add_argument("--path", metavar="NAME", help="the unit's waveguide, alpha1 ..")
+    command.add_argument(
+        "--stl",
+        metavar="FILE",
+        help=(
+            "STL file to check; if a unit is given too, the file is compared with the unit's nominal "
+            "geometry."
+        ),
+    )
+    command.add_argument("--path", metavar="NAME", help="Path of the unit's waveguide: alpha1, alpha2, ...")
     command.add_argument(
         "--printer",
         default="form-4-elastic-50a",
         metavar="NAME|FILE",
-        help="limits of a printer and its resin: a shipped name, or a TOML file (form-4-elastic-50a)",
+        help=(
+            "Limits of the printer and its resin: a shipped name or a TOML file (default: "
+            "form-4-elastic-50a)."
+        ),
     )
     command.add_argument(
         "--up",
@@ -36,7 +49,7 @@ def add(commands: Commands[Any]) -> None:
         type=float,
         default=(0.0, 0.0, 1.0),
         metavar=("X", "Y", "Z"),
-        help="build direction, away from the platform (0 0 1: inlet toward the platform)",
+        help="Build direction, pointing away from the platform (default: 0 0 1, inlet toward the platform).",
     )
     add_solid(command)
 
@@ -51,11 +64,11 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 
     unit = unit_if_named(options)
     if unit is None and options.stl is None:
-        raise InputError("nothing to check was named", "--preset, --unit or --stl", "give one of them")
+        raise InputError("no part to check was given", "--preset, --unit or --stl", "give one of them")
     if unit is None and options.path is not None:
-        raise InputError("a path belongs to a unit", "--path", "give --preset or --unit as well")
+        raise InputError("--path needs a unit", "--path", "give --preset or --unit as well")
     if not 1e-6 < sum(x * x for x in options.up) < 1e12:
-        raise InputError(f"{options.up} is no direction", "--up", "give three figures, such as 0 0 1")
+        raise InputError(f"{options.up} is not a direction", "--up", "give three numbers, such as 0 0 1")
     stl = None if options.stl is None else Path(options.stl)
     job = Job(
         printer=load_printer(options.printer),

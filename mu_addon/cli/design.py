@@ -16,11 +16,15 @@ __all__ = ["add", "run"]
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `design`."""
-    command = commands.add_parser("design", help="printable solid, STL and lattice nodes", epilog=EXAMPLE)
+    command = commands.add_parser(
+        "design", help="Generate the printable solid of a unit: STL file and lattice nodes.", epilog=EXAMPLE
+    )
     add_unit(command)
     add_solid(command)
     add_body(command)
     command.add_argument(
-        "--path", metavar="NAME", help="also the unit with a waveguide along this path, alpha1 .."
+        "--path",
+        metavar="NAME",
+        help="Also write the unit with a waveguide along this path: alpha1, alpha2, ...",
     )
     command.set_defaults(stages=("design",))

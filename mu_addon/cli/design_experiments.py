@@ -17,18 +17,27 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `design-experiments`."""
     command = commands.add_parser(
         "design-experiments",
-        help="before measuring: which effects planned experiments would show, from which size on",
+        help=(
+            "Design experiments before measuring: compute which effects planned experiments can detect, "
+            "and the smallest detectable size of each."
+        ),
         epilog="example: run.py design-experiments my-protocols --noise angle=0.5 --out out/plan",
     )
-    add_measured_folder(command, "as for `diagnose`; what would be measured may hold any numbers")
+    add_measured_folder(
+        command,
+        (
+            "Folder of planned experiments, in the format of `diagnose`; the measured columns may hold any "
+            "numbers."
+        ),
+    )
     add_unit(command, required=False)
     command.add_argument(
         "--noise",
         nargs="+",
         default=(),
         metavar="QUANTITY=VALUE",
-        help="standard deviation of a reading, in the unit of its column (angle=0.3 marker=0.1 stress=0.1 "
-        "pressure=0.1 tip_deflection=0.1 voltage=0.002)",
+        help="Standard deviation of a reading, in the unit of its column (default: angle=0.3 marker=0.1 "
+        "stress=0.1 pressure=0.1 tip_deflection=0.1 voltage=0.002).",
     )
 
 

@@ -19,7 +19,10 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `export`."""
     command = commands.add_parser(
         "export",
-        help="STL, 3MF, STEP and nodes of a unit, each read back, with a manifest",
+        help=(
+            "Export a unit as STL, 3MF, STEP and node list. Each file is read back and verified; a "
+            "manifest lists them."
+        ),
         epilog="example: run.py export --preset mu-1.0x --path alpha4 --out out/print",
     )
     add_unit(command)
@@ -27,33 +30,41 @@ def add(commands: Commands[Any]) -> None:
     command.add_argument(
         "--path",
         metavar="NAME|CSV",
-        help="a waveguide along this path, alpha1 .., or the best of a paths.csv of `place --paths graph`",
+        help=(
+            "Path of the waveguide: alpha1, alpha2, ..., or a paths.csv of `place --paths graph`, whose "
+            "best path is taken."
+        ),
     )
-    command.add_argument("--path-row", metavar="NAME", help="another path of that paths.csv")
+    command.add_argument(
+        "--path-row", metavar="NAME", help="Take this path of the paths.csv instead of the best one."
+    )
     command.add_argument(
         "--formats",
         nargs="+",
         choices=FORMATS,
         default=FORMATS,
         metavar="F",
-        help=f"{', '.join(FORMATS)} (all)",
+        help=f"File formats: {', '.join(FORMATS)} (default: all).",
     )
     command.add_argument(
         "--quality",
         choices=("interactive", "export"),
         default="export",
-        help="facets of the solid (export)",
+        help="Facet resolution of the solid (default: export).",
     )
     command.add_argument(
         "--compensate",
         nargs="?",
         const="unit",
         metavar="CSV",
-        help="take the printer's offsets off the drawing: the unit's [print] (or --model's), or what "
-        "calipers found on the calibration coupon of `specimens`",
+        help="Compensate the print offset: subtract it from the nominal geometry. Without a value it is the "
+        "[print] offset of the unit (or of --model); with a CSV file, the offset measured on the "
+        "calibration coupon of `specimens`.",
     )
     command.add_argument(
-        "--resin", metavar="NAME|FILE", help="a material of the library, or its TOML file (elastic-50a-v1)"
+        "--resin",
+        metavar="NAME|FILE",
+        help="Resin: a material of the library or a TOML file (default: elastic-50a-v1).",
     )
 
 

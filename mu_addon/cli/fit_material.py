@@ -17,7 +17,7 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `fit-material`."""
     command = commands.add_parser(
         "fit-material",
-        help="laws fitted to coupon tests, and the best as a material for simulations",
+        help="Fit hyperelastic laws to coupon tests and write the best one as a material for simulations.",
         epilog="example: run.py fit-material my-coupons --out out/resin",
     )
     add_measured_folder(command)
@@ -27,20 +27,26 @@ def add(commands: Commands[Any]) -> None:
         nargs="+",
         default=(),
         metavar="LAW",
-        help="neo-hooke, mooney-rivlin, yeoh, ogden-1, ogden-2, ogden-3 (all)",
+        help="Laws to fit: neo-hooke, mooney-rivlin, yeoh, ogden-1, ogden-2, ogden-3 (default: all).",
     )
     command.add_argument(
         "--hold-out",
         nargs="+",
         default=(),
         metavar="MODE",
-        help="modes to check and not to fit: uniaxial, equibiaxial, pure_shear (none)",
+        help=(
+            "Test modes held out of the fit for validation: uniaxial, equibiaxial, pure_shear (default: "
+            "none)."
+        ),
     )
     command.add_argument(
         "--weights",
         choices=("absolute", "relative"),
         default="absolute",
-        help="residuals as a share of their test's largest stress, or of the stress itself (absolute)",
+        help=(
+            "Weights of the residuals: absolute divides them by the test's largest stress, relative by the "
+            "stress itself (default: absolute)."
+        ),
     )
 
 

@@ -19,12 +19,15 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `grip`."""
     command = commands.add_parser(
         "grip",
-        help="a gripper of two units: printable part, grasp of cubes with friction, light, sensor paths",
+        help=(
+            "Design a gripper of two units and simulate its grasp of cubes with friction: printable part, "
+            "forces, light signal, sensor paths."
+        ),
         epilog="example: run.py grip --preset gripper --out out/gripper",
     )
     which = command.add_mutually_exclusive_group(required=True)
-    which.add_argument("--preset", metavar="NAME", help="a shipped gripper: gripper")
-    which.add_argument("--gripper", metavar="FILE", help="a gripper's parameters, TOML")
+    which.add_argument("--preset", metavar="NAME", help="Gripper preset: gripper.")
+    which.add_argument("--gripper", metavar="FILE", help="Gripper parameters, a TOML file.")
     add_results(command)
     command.add_argument(
         "--cube",
@@ -32,37 +35,57 @@ def add(commands: Commands[Any]) -> None:
         type=float,
         default=(12.5, 25.0),
         metavar="MM",
-        help="sides of the cubes to grasp; the last is the sensor table's (12.5 25)",
+        help=(
+            "Side lengths of the cubes to grasp, in mm; the sensor paths are ranked with the last one "
+            "(default: 12.5 25)."
+        ),
     )
     command.add_argument(
-        "--density", type=float, default=1.24, metavar="G_PER_ML", help="of the cubes (1.24: solid PLA)"
+        "--density",
+        type=float,
+        default=1.24,
+        metavar="G_PER_ML",
+        help="Density of the cubes in g/ml (default: 1.24, solid PLA).",
     )
     command.add_argument(
-        "--friction", type=float, default=0.5, metavar="MU", help="Coulomb's coefficient (0.5)"
+        "--friction",
+        type=float,
+        default=0.5,
+        metavar="MU",
+        help="Coulomb friction coefficient (default: 0.5).",
     )
     command.add_argument(
         "--beyond",
         type=float,
         default=3.0,
         metavar="MM",
-        help="how far the cubes' middle lies beyond the tips at rest (3)",
+        help="Distance of the cubes' centre beyond the tips at rest, in mm (default: 3).",
     )
     command.add_argument(
-        "--protocol", metavar="CSV", help="pressure and phases i to v (protocols/gripper.csv)"
+        "--protocol",
+        metavar="CSV",
+        help="Pressure protocol with the phases i to v (default: protocols/gripper.csv).",
     )
     command.add_argument(
-        "--refine", type=float, metavar="F", help="divides the sizes of the mesh's elements (0.5)"
+        "--refine",
+        type=float,
+        metavar="F",
+        help="Mesh refinement: element sizes are divided by F (default: 0.5).",
     )
     command.add_argument(
-        "--coarse", action="store_true", help="a quick look: a coarser mesh, longer steps, one inclusion rule"
+        "--coarse",
+        action="store_true",
+        help="Quick, less accurate run: coarser mesh, longer time steps, one inclusion rule.",
     )
-    command.add_argument("--no-paths", action="store_true", help="leave out the table of sensor paths")
-    command.add_argument("--solid-only", action="store_true", help="only the printable part")
+    command.add_argument("--no-paths", action="store_true", help="Do not rank the sensor paths.")
+    command.add_argument(
+        "--solid-only", action="store_true", help="Write only the printable part; simulate nothing."
+    )
     command.add_argument(
         "--quality",
         choices=("interactive", "export"),
         default="interactive",
-        help="how fine the printable surface is (interactive)",
+        help="Facet resolution of the printable surface (default: interactive).",
     )
 
 

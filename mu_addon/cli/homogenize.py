@@ -17,7 +17,10 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `homogenize`."""
     command = commands.add_parser(
         "homogenize",
-        help="the lattice's moduli from its struts and resin, virtual compression tests, its law for `place`",
+        help=(
+            "Homogenize the lattice: compute effective moduli from struts and resin, run virtual "
+            "compression tests, and fit the lattice law for `place`."
+        ),
         epilog="example: run.py homogenize --preset mu-1.0x --out out/lattice",
     )
     add_unit(command)
@@ -25,25 +28,45 @@ def add(commands: Commands[Any]) -> None:
     command.add_argument(
         "--resin",
         metavar="NAME|FILE",
-        help="a material of the library, or its TOML file (the modulus of the unit's membrane)",
+        help=(
+            "Resin: a material of the library or a TOML file (default: the modulus of the unit's membrane)."
+        ),
     )
     command.add_argument(
-        "--cells", type=int, default=3, metavar="N", help="cells along each side of the specimen (3)"
+        "--cells",
+        type=int,
+        default=3,
+        metavar="N",
+        help="Number of cells along each side of the specimen (default: 3).",
     )
     command.add_argument(
         "--friction",
         choices=("both", "slide", "stick"),
         default="both",
-        help="whether plates let the specimen's faces slide or hold them (both)",
+        help=(
+            "Contact of the specimen with the plates: frictionless (slide), bonded (stick) or both "
+            "(default: both)."
+        ),
     )
     command.add_argument(
-        "--strain", type=float, default=0.4, metavar="E", help="nominal compression to go to (0.4)"
+        "--strain",
+        type=float,
+        default=0.4,
+        metavar="E",
+        help="Largest nominal compressive strain (default: 0.4).",
     )
     command.add_argument(
-        "--no-specimen", dest="specimen", action="store_false", help="only the endless lattice"
+        "--no-specimen",
+        dest="specimen",
+        action="store_false",
+        help="Do not simulate the specimen, only the periodic lattice.",
     )
     command.add_argument(
-        "--refine", type=float, default=1.0, metavar="F", help="divides the size of the cell's elements (1)"
+        "--refine",
+        type=float,
+        default=1.0,
+        metavar="F",
+        help="Mesh refinement: the cell's element size is divided by F (default: 1).",
     )
 
 

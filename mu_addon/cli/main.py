@@ -4,28 +4,46 @@ from __future__ import annotations
 
 import argparse
 import sys
+from typing import Any
 
 from . import all_commands
 
 STATUSES = (
-    "exit status: 0 done, 1 any other failure, 2 wrong input, 3 no mesh, 4 no equilibrium, 5 cannot write, "
-    "6 not printable, 70 fault of this program, 130 Ctrl-C, 143 terminated"
+    "exit status: 0 success, 1 other failure, 2 invalid input, 3 meshing failed, 4 no equilibrium found, 5 "
+    "cannot write, 6 not printable, 70 internal error, 130 Ctrl-C, 143 terminated"
 )
+
+
+class _Commands(argparse._SubParsersAction):
+    """Shows a subcommand's summary in its own --help, too."""
+
+    def add_parser(self, name: str, **options: Any) -> Any:
+        return super().add_parser(name, description=options["help"], **options)
 
 
 class _Parser(argparse.ArgumentParser):
     """Says what is wrong in one line, and where help is."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
-        self.exit(2, f"error: {message}\n  what to do: {self.prog} --help lists what there is\n")
+        self.exit(
+            2,
+            (f"error: {message}\n  what to do: `{self.prog} --help` lists the commands and options\n"),
+        )
 
 
 def parser() -> argparse.ArgumentParser:
     """The parser of the whole command line."""
     top = _Parser(
-        "run.py", description="Monolithic Units: design, simulate, place the sensor.", epilog=STATUSES
+        "run.py",
+        description=(
+            "Design, simulate and sensorise Monolithic Units, soft pneumatic actuators with a lattice "
+            "and an optical waveguide."
+        ),
+        epilog=STATUSES,
     )
-    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+    commands = top.add_subparsers(
+        dest="command", required=True, metavar="COMMAND", parser_class=_Parser, action=_Commands
+    )
     for command in all_commands().values():
         command.add(commands)
     return top

@@ -16,22 +16,30 @@ Commands = argparse._SubParsersAction  # what add_subparsers returns; argparse g
 
 def add_results(command: argparse.ArgumentParser) -> None:
     """--out and --json."""
-    command.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
-    command.add_argument("--json", action="store_true", help="one JSON message a line on standard output")
+    command.add_argument(
+        "--out", required=True, metavar="DIR", help="Folder in which the results are written."
+    )
+    command.add_argument(
+        "--json", action="store_true", help="Write one JSON message per line to standard output."
+    )
 
 
 def add_unit(command: argparse.ArgumentParser, required: bool = True) -> None:
     """--preset or --unit, and where the results go."""
     which = command.add_mutually_exclusive_group(required=required)
-    which.add_argument("--preset", metavar="NAME", help="a preset: mu-0.75x, mu-1.0x, mu-1.5x")
-    which.add_argument("--unit", metavar="FILE", help="a unit's parameters, TOML")
+    which.add_argument("--preset", metavar="NAME", help="Unit preset: mu-0.75x, mu-1.0x or mu-1.5x.")
+    which.add_argument("--unit", metavar="FILE", help="Unit parameters, a TOML file.")
     add_results(command)
 
 
 def add_model(command: argparse.ArgumentParser) -> None:
     """--model, what a diagnosis found."""
     command.add_argument(
-        "--model", metavar="FILE", help="model.toml of `diagnose`: what it found is put into the unit"
+        "--model",
+        metavar="FILE",
+        help=(
+            "Extended model, the model.toml of `diagnose`: its identified effects are applied to the unit."
+        ),
     )
 
 
@@ -42,14 +50,14 @@ def add_orientation(command: argparse.ArgumentParser) -> None:
         type=float,
         default=0.0,
         metavar="DEG",
-        help="direction of gravity about x, as in measured data: 0 hangs, tip down (0). Of use where what "
-        "--model gives has weight",
+        help="Orientation of the unit, degrees about x; 0: hanging, tip down (default: 0). Has an effect "
+        "only if --model includes gravity.",
     )
 
 
 def add_measured_folder(command: argparse.ArgumentParser, help_: str = "") -> None:
     """FOLDER, a folder of measured data."""
-    words = help_ or "measured data: experiments.toml and its CSV files"
+    words = help_ or "Folder of measured data: experiments.toml and its CSV files."
     command.add_argument("folder", metavar="FOLDER", help=words)
 
 
@@ -58,7 +66,9 @@ def require_out(options: argparse.Namespace) -> None:
     from ..errors import InputError
 
     if not options.out.strip():
-        raise InputError("no folder was named", "--out", "give a folder for the results")
+        raise InputError(
+            "no output folder was given", "--out", "give the folder in which to write the results"
+        )
 
 
 def unit_of(options: argparse.Namespace) -> Unit:
@@ -94,7 +104,7 @@ def modelled(options: argparse.Namespace, context: RunContext) -> tuple[Unit, St
         unit, effects = found.unit, attrs.evolve(found.effects, orientation_deg=turn)
     if turn and not effects.has_gravity:
         context.progress.warning(
-            "nothing here has weight, so that its direction changes nothing", "--orientation"
+            "gravity is not part of this model, so the orientation has no effect", "--orientation"
         )
     return unit, effects
 

@@ -17,7 +17,12 @@ __all__ = ["add", "run"]
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `place`."""
     command = commands.add_parser(
-        "place", help="... and the ranking of sensor paths (the main job)", epilog=EXAMPLE
+        "place",
+        help=(
+            "Run `design` and `simulate`, then rank the sensor paths by how much each disturbs the "
+            "motion (the main job)."
+        ),
+        epilog=EXAMPLE,
     )
     add_unit(command)
     add_model(command)
@@ -27,45 +32,73 @@ def add(commands: Commands[Any]) -> None:
     add_obstacles(command)
     add_simulation(command)
     command.add_argument(
-        "--stations", type=int, default=51, metavar="J", help="stations along the backbone (51)"
+        "--stations",
+        type=int,
+        default=51,
+        metavar="J",
+        help="Number of stations along the backbone (default: 51).",
     )
     command.add_argument(
         "--rule",
         choices=("both", "intersect", "volume_fraction"),
         default="both",
-        help="how an inclusion stiffens the elements it touches (both)",
+        help="Inclusion rule: how the sensor stiffens the elements it intersects (default: both).",
     )
     command.add_argument(
-        "--workers", type=int, default=2, metavar="N", help="processes for the candidates (2)"
+        "--workers", type=int, default=2, metavar="N", help="Number of worker processes (default: 2)."
     )
     command.add_argument(
         "--no-mesh-check",
         dest="mesh_check",
         action="store_false",
-        help="leave out the second mesh that tells how far the mesh moves the ranking",
+        help="Skip the second mesh, from which the mesh uncertainty of the ranking is estimated.",
     )
     command.add_argument(
         "--paths",
         choices=("windows", "graph"),
         default="windows",
-        help="graph: search the whole lattice for the best path, bent ones too (windows)",
+        help=(
+            "Candidate paths: windows of consecutive anchors, or graph, every path through the lattice, "
+            "bent ones included (default: windows)."
+        ),
     )
     command.add_argument(
         "--light",
         nargs="+",
         default=(),
         metavar="NAME=VALUE",
-        help="the resin's optics: index, attenuation_per_mm, roughness (1.5, 0.01, 0.02, assumed)",
+        help=(
+            "Optical constants of the resin: index, attenuation_per_mm, roughness (default: 1.5, 0.01, "
+            "0.02, assumed)."
+        ),
     )
     search = command.add_argument_group("limits of --paths graph")
     search.add_argument(
-        "--shortest-cells", type=float, default=2.0, metavar="C", help="shortest path, in cells (2)"
+        "--shortest-cells",
+        type=float,
+        default=2.0,
+        metavar="C",
+        help="Length of the shortest path, in cells (default: 2).",
     )
     search.add_argument(
-        "--longest-cells", type=float, default=float("inf"), metavar="C", help="longest path, in cells (any)"
+        "--longest-cells",
+        type=float,
+        default=float("inf"),
+        metavar="C",
+        help="Length of the longest path, in cells (default: no limit).",
     )
-    search.add_argument("--bend-deg", type=float, default=75.0, metavar="A", help="sharpest bend (75)")
     search.add_argument(
-        "--checks", type=int, default=100, metavar="N", help="paths solved exactly at most (100)"
+        "--bend-deg",
+        type=float,
+        default=75.0,
+        metavar="A",
+        help="Largest bend at a node, in degrees (default: 75).",
+    )
+    search.add_argument(
+        "--checks",
+        type=int,
+        default=100,
+        metavar="N",
+        help="Largest number of paths solved by the full model (default: 100).",
     )
     command.set_defaults(stages=("design", "simulate", "place"))

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `ports`."""
-    commands.add_parser("ports", help="list the serial ports, for `stream` and `record`")
+    commands.add_parser("ports", help="List the serial ports, for `stream` and `record`.")
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
@@ -20,4 +20,4 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
     from ..usecases.sensor.stream import port_lines
 
     context.summary["ports"] = port_lines()
-    context.console_summary = lambda summary: summary["ports"] or ["no serial port is there"]
+    context.console_summary = lambda summary: summary["ports"] or ["no serial port was found"]

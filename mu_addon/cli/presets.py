@@ -12,9 +12,7 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `presets`."""
-    commands.add_parser(
-        "presets", help="list the presets that come with the package: units, and grippers for `grip`"
-    )
+    commands.add_parser("presets", help="List the shipped presets: units, and grippers for `grip`.")
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:

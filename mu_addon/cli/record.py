@@ -16,7 +16,7 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `record`."""
     command = commands.add_parser(
         "record",
-        help="record the sensor over serial, showing nothing",
+        help="Record the sensor over the serial port without displaying it.",
         epilog="example: run.py record --port /dev/ttyACM0 --seconds 60 --out out/bench-1",
     )
     add_source(command)

@@ -18,16 +18,20 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `replay`."""
     command = commands.add_parser(
         "replay",
-        help="play a recording as if it came from the sensor",
+        help="Replay a recording as if it came from the sensor.",
         epilog="example: run.py replay out/bench-1 --out out/again",
     )
-    command.add_argument("recording", metavar="RECORDING", help="folder of `stream` or `record`")
+    command.add_argument("recording", metavar="RECORDING", help="Folder written by `stream` or `record`.")
     add_results(command)
     command.add_argument(
-        "--speed", type=float, default=1.0, metavar="F", help="times as fast as it was; 0: at once (1)"
+        "--speed",
+        type=float,
+        default=1.0,
+        metavar="F",
+        help="Replay speed relative to real time; 0: as fast as possible (default: 1).",
     )
     add_calibration(command)
-    command.add_argument("--controlled", action="store_true", help="as for `stream`")
+    command.add_argument("--controlled", action="store_true", help="As for `stream`.")
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:

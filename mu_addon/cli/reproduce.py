@@ -17,27 +17,37 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `reproduce`."""
     command = commands.add_parser(
         "reproduce",
-        help="the paper's Table I and bending at three scales beside ours, in one page",
+        help=(
+            "Reproduce the paper: compare its Table I and bending angles at three scales with this "
+            "simulation."
+        ),
         epilog="example: run.py reproduce --out out/reproduce",
     )
     add_results(command)
     command.add_argument(
         "--coarse",
         action="store_true",
-        help="coarse meshes and no random ones: a minute or two, a quick look",
+        help="Quick, less accurate run of one to two minutes: coarse meshes, no random meshes.",
     )
     command.add_argument(
-        "--refine", type=float, default=None, metavar="F", help="divides element sizes (1; 0.4 with --coarse)"
+        "--refine",
+        type=float,
+        default=None,
+        metavar="F",
+        help="Mesh refinement: element sizes are divided by F (default: 1; 0.4 with --coarse).",
     )
     command.add_argument(
-        "--set", default="default", metavar="NAME|FILE", help="values that the paper leaves open (default)"
+        "--set",
+        default="default",
+        metavar="NAME|FILE",
+        help="Set of values for the parameters that the paper does not print (default: default).",
     )
     command.add_argument(
         "--meshes",
         type=int,
         default=None,
         metavar="N",
-        help="random meshes of each kind; 0: those that come with the package (12; 0 with --coarse)",
+        help="Number of random meshes of each kind; 0: the shipped ones (default: 12; 0 with --coarse).",
     )
     command.add_argument(
         "--open",
@@ -45,15 +55,19 @@ def add(commands: Commands[Any]) -> None:
         type=int,
         default=0,
         metavar="N",
-        help="solve N sets of open values, hours; 0: those that come with the package (0)",
+        help=(
+            "Number of sampled parameter sets to solve, which takes hours; 0: the shipped ones (default: 0)."
+        ),
     )
     command.add_argument(
         "--no-gripper",
         dest="gripper",
         action="store_false",
-        help="leave out the gripper's column, as --coarse",
+        help="Leave out the gripper's column, as --coarse does.",
     )
-    command.add_argument("--workers", type=int, default=2, metavar="N", help="processes (2)")
+    command.add_argument(
+        "--workers", type=int, default=2, metavar="N", help="Number of worker processes (default: 2)."
+    )
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:

@@ -17,14 +17,19 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `resume`."""
     command = commands.add_parser(
         "resume",
-        help="go on with the run of a folder, or do again what its inputs say",
+        help="Resume a stopped run, or run again what the inputs in a folder describe.",
         epilog="example: run.py resume out/mu-1.0x",
     )
-    command.add_argument("out", metavar="FOLDER", help="a folder of any run: its --out, or inputs alone")
-    command.add_argument("--json", action="store_true", help="one JSON message a line on standard output")
-    command.add_argument("--workers", type=int, metavar="N", help="processes, where a run takes several (2)")
+    command.add_argument("out", metavar="FOLDER", help="Folder of any run: its --out, or its inputs alone.")
     command.add_argument(
-        "--no-report", dest="report", action="store_false", help="figures only: no pictures, no report.html"
+        "--json", action="store_true", help="Write one JSON message per line to standard output."
+    )
+    command.add_argument("--workers", type=int, metavar="N", help="Number of worker processes (default: 2).")
+    command.add_argument(
+        "--no-report",
+        dest="report",
+        action="store_false",
+        help="Compute the numbers only: no pictures, no report.html.",
     )
 
 

@@ -17,7 +17,9 @@ __all__ = ["add", "run"]
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `simulate`."""
     command = commands.add_parser(
-        "simulate", help="... and its motion under a pressure protocol", epilog=EXAMPLE
+        "simulate",
+        help="Run `design`, then simulate the unit's motion under a pressure protocol.",
+        epilog=EXAMPLE,
     )
     add_unit(command)
     add_model(command)

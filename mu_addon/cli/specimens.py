@@ -17,12 +17,17 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `specimens`."""
     command = commands.add_parser(
         "specimens",
-        help="lattice cubes, coupons and a gauge for the printer as STL, with sheets for what to measure",
+        help=(
+            "Write test specimens as STL: lattice cubes, coupons and a gauge for the printer, with data "
+            "sheets for the measurements."
+        ),
         epilog="example: run.py specimens --out out/specimens",
     )
     add_unit(command, required=False)
     command.add_argument(
-        "--resin", metavar="NAME|FILE", help="a material of the library, or its TOML file (elastic-50a-v1)"
+        "--resin",
+        metavar="NAME|FILE",
+        help="Resin: a material of the library or a TOML file (default: elastic-50a-v1).",
     )
 
 

@@ -19,7 +19,7 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `stream`."""
     command = commands.add_parser(
         "stream",
-        help="read the sensor over serial: record every sample, then show it",
+        help="Read the sensor over the serial port: record every sample and display it.",
         epilog="example: run.py stream --port usb:2341:0043 --out out/bench-1",
     )
     add_source(command)
@@ -32,25 +32,43 @@ def add_source(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--port",
         metavar="NAME",
-        help="a port's device, or usb:VID:PID[:SERIAL], which finds it in any socket (the only USB port)",
+        help=(
+            "Serial port: a device name, or usb:VID:PID[:SERIAL], which identifies the board at any USB "
+            "socket (default: the only USB serial port)."
+        ),
     )
-    command.add_argument("--baud", type=int, default=115200, metavar="B", help="bits a second (115200)")
     command.add_argument(
-        "--simulate", action="store_true", help="a simulated sensor instead, bending to and fro"
+        "--baud",
+        type=int,
+        default=115200,
+        metavar="B",
+        help="Baud rate in bits per second (default: 115200).",
+    )
+    command.add_argument(
+        "--simulate",
+        action="store_true",
+        help="Read a simulated sensor that bends periodically instead of a port.",
     )
     add_calibration(command)
-    command.add_argument("--seconds", type=float, metavar="S", help="stop after that long (Ctrl-C)")
+    command.add_argument(
+        "--seconds", type=float, metavar="S", help="Duration in seconds (default: until Ctrl-C)."
+    )
     command.add_argument(
         "--controlled",
         action="store_true",
-        help="obey pause, resume, mark WORDS and stop on standard input, and end with it",
+        help=(
+            "Accept the commands pause, resume, mark WORDS and stop on standard input, and end when it "
+            "closes."
+        ),
     )
 
 
 def add_calibration(command: argparse.ArgumentParser) -> None:
     """--calibration, a map from voltage to angle."""
     command.add_argument(
-        "--calibration", metavar="FILE", help="calibration.toml of `calibrate`: shows angles beside voltages"
+        "--calibration",
+        metavar="FILE",
+        help="Calibration, the calibration.toml of `calibrate`: angles are displayed beside voltages.",
     )
 
 

@@ -14,7 +14,7 @@ def add_solid(command: argparse.ArgumentParser) -> None:
         "--quality",
         choices=("interactive", "export"),
         default="interactive",
-        help="facets of the STL (interactive)",
+        help="Facet resolution of the STL (default: interactive).",
     )
 
 
@@ -23,8 +23,8 @@ def add_body(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--body",
         metavar="FILE",
-        help="closed surface (STL, OBJ or PLY; mm, in the unit's frame) that the lattice fills in place of "
-        "its box; cut off flat at the unit's ends",
+        help="Closed surface that the lattice fills in place of its box: STL, OBJ or PLY, in mm, in the "
+        "unit's frame. It is cut flat at both ends of the unit.",
     )
 
 
@@ -36,15 +36,15 @@ def add_obstacles(command: argparse.ArgumentParser) -> None:
         dest="obstacles",
         default=[],
         metavar="FILE",
-        help="closed surface (STL, OBJ or PLY; mm, in the unit's frame) of something rigid and fixed that "
-        "the unit may touch; give it again for each",
+        help="Closed surface of a rigid, fixed obstacle: STL, OBJ or PLY, in mm, in the unit's frame. "
+        "Repeat the option for each obstacle.",
     )
     command.add_argument(
         "--friction",
         action=_Friction,
         type=float,
         metavar="MU",
-        help="coefficient of friction of the obstacle before it (0.5, assumed)",
+        help="Coulomb friction coefficient of the preceding --obstacle (default: 0.5, assumed).",
     )
 
 
@@ -68,19 +68,40 @@ class _Friction(argparse.Action):
 def add_simulation(command: argparse.ArgumentParser) -> None:
     """Protocol, mesh and material of a simulation."""
     command.add_argument(
-        "--protocol", metavar="CSV", help="time_s,pressure_kPa (the grasp that comes with it)"
+        "--protocol",
+        metavar="CSV",
+        help=(
+            "Pressure protocol, CSV with the columns time_s,pressure_kPa (default: the shipped grasp "
+            "protocol)."
+        ),
     )
-    command.add_argument("--order", type=int, choices=(1, 2), default=2, help="order of the elements (2)")
     command.add_argument(
-        "--refine", type=float, default=1.0, metavar="F", help="divides every element size (1)"
+        "--order", type=int, choices=(1, 2), default=2, help="Order of the finite elements (default: 2)."
+    )
+    command.add_argument(
+        "--refine",
+        type=float,
+        default=1.0,
+        metavar="F",
+        help="Mesh refinement: every element size is divided by F (default: 1).",
     )
     command.add_argument(
         "--lattice",
         metavar="FILE",
-        help="effective.toml of `homogenize`: the lattice's law, from its struts and resin, kept in the "
-        "results (without it the unit's material.lattice_modulus_kPa and lattice_poisson, neo-Hookean)",
+        help="Lattice law computed from struts and resin, the effective.toml of `homogenize`; a copy is "
+        "stored with the results (default: neo-Hookean with the unit's material.lattice_modulus_kPa "
+        "and lattice_poisson).",
     )
-    command.add_argument("--times", type=int, default=13, metavar="K", help="samples of the protocol (13)")
     command.add_argument(
-        "--mesher", choices=("auto", "gmsh", "pytetwild"), default="auto", help="who makes the mesh (auto)"
+        "--times",
+        type=int,
+        default=13,
+        metavar="K",
+        help="Number of time samples of the protocol (default: 13).",
+    )
+    command.add_argument(
+        "--mesher",
+        choices=("auto", "gmsh", "pytetwild"),
+        default="auto",
+        help="Mesh generator (default: auto).",
     )

@@ -17,19 +17,32 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `sweep`."""
     command = commands.add_parser(
         "sweep",
-        help="many studies over ranges of inputs: one table, effects, best compromises",
+        help=(
+            "Run a parameter study: many studies over ranges of inputs, with one table, main effects and "
+            "the Pareto front."
+        ),
         epilog="example: run.py sweep assets/examples/sweep/sweep.toml --out out/sweep",
     )
-    command.add_argument("file", metavar="FILE", help="sweep.toml: what is varied, and how")
+    command.add_argument(
+        "file",
+        metavar="FILE",
+        help="Plan of the parameter study, a sweep.toml: which inputs are varied, and how.",
+    )
     add_results(command)
     command.add_argument(
-        "--workers", type=int, default=2, metavar="N", help="studies at the same time, on this machine (2)"
+        "--workers",
+        type=int,
+        default=2,
+        metavar="N",
+        help="Number of studies run in parallel on this machine (default: 2).",
     )
     command.add_argument(
-        "--scheduler", metavar="ADDRESS", help="run on that Dask scheduler's workers: tcp://host:8786"
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Address of a Dask scheduler whose workers run the studies, such as tcp://host:8786.",
     )
-    command.add_argument("--add", type=int, default=0, metavar="N", help="so many points more than there are")
-    command.add_argument("--retry", action="store_true", help="run the points that failed again")
+    command.add_argument("--add", type=int, default=0, metavar="N", help="Add N points to the study.")
+    command.add_argument("--retry", action="store_true", help="Run the failed points again.")
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:

@@ -20,19 +20,33 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `track`."""
     command = commands.add_parser(
         "track",
-        help="a video of the bench as measured data: markers followed by Blender, in mm and degrees",
+        help=(
+            "Track markers in a video of the bench with Blender's tracker and write measured data in mm "
+            "and degrees."
+        ),
         epilog="example: run.py track bench.mp4 --markers bench.toml --pressure ladder.csv --out measured",
     )
     command.add_argument(
-        "clip", metavar="CLIP", help="a movie, the first picture of a sequence, or a CSV of followed pixels"
+        "clip", metavar="CLIP", help="Movie, first image of a sequence, or a CSV file of tracked pixels."
     )
     command.add_argument(
-        "--markers", required=True, metavar="FILE", help="TOML: camera, base, tip, scale and markers"
+        "--markers",
+        required=True,
+        metavar="FILE",
+        help="Description of the video, a TOML file: camera, base, tip, scale and markers.",
     )
     command.add_argument(
-        "--pressure", required=True, metavar="CSV", help="time_s,pressure_kPa: a recording, or the protocol"
+        "--pressure",
+        required=True,
+        metavar="CSV",
+        help="Pressure, CSV with the columns time_s,pressure_kPa: a recording or the protocol.",
     )
-    command.add_argument("--fps", type=float, metavar="F", help="frames a second (as FILE or the clip says)")
+    command.add_argument(
+        "--fps",
+        type=float,
+        metavar="F",
+        help="Frame rate in frames per second (default: as given in FILE or in the clip).",
+    )
     add_results(command)
 
 
@@ -57,10 +71,10 @@ def _tracker() -> Tracker:
 
         if find_spec("bpy") is None:
             raise InputError(
-                "following markers needs Blender",
+                "tracking markers needs Blender",
                 str(clip),
                 "run it in Blender, blender -b -P headless/run.py -- track ..., or with the bpy wheel; or "
-                "give a CSV of pixels that another tracker followed",
+                "give a CSV of pixel positions from another tracker",
             )
         # By name: the command line knows the core, and Blender's side only where it is asked for.
         return import_module("...blender.tracking", __package__).follow(clip, marks)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import shapes
+from .dimensions import Dimensions
 from .lattice import Lattice, lattice_of
-from .parameters import Dimensions
 from .profile import cavity_polygon, outer_polygon, outer_radius
 from .solid import Facets, printable
 from .threemf import Beams, Part

@@ -13,13 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from . import shapes
+from .dimensions import Dimensions
 from .printing.crossing import crossings
 from .profile import outer_polygon
 from .surface import Triangles, Vertices, volume, weld
 
 if TYPE_CHECKING:
     from .anchors import Window
-    from .parameters import Dimensions, Unit
+    from .parameters import Unit
 
 MOST_TRIANGLES = 60_000
 """A finer body would take minutes to examine and to mesh, and say no more: the mesh is coarser by far."""

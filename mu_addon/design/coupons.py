@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import shapes
-from .parameters import Dimensions
+from .dimensions import Dimensions
 from .solid import printable
 from .surface import Triangles, Vertices
 from .waveguide import free_bar

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .dimensions import Dimensions
 from .lattices import LatticeKind
-
-if TYPE_CHECKING:
-    from .parameters import Dimensions
 
 
 @attrs.frozen(eq=False)

@@ -7,17 +7,13 @@ D = diag(offset_xy, offset_xy, offset_z), see `shapes.offset_along`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from .dimensions import Dimensions
 from .profile import outer_radius, outer_slope
 from .shapes import offset_along, ring
-
-if TYPE_CHECKING:
-    from .parameters import Dimensions
 
 Array = NDArray[np.float64]
 

@@ -8,15 +8,11 @@ two end caps.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .dimensions import Dimensions
 from .shapes import offset_along
-
-if TYPE_CHECKING:
-    from .parameters import Dimensions
 
 Array = NDArray[np.float64]
 

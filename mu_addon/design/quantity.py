@@ -5,13 +5,34 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import attrs
+import numpy as np
 
 from ..errors import InputError
 
 PAPER = "paper"
+
+Number = TypeVar("Number", float, np.ndarray[Any, Any])
+
+
+def in_MPa(value_kPa: Number) -> Number:
+    """Convert a pressure, stress or modulus from kPa (files, panels) to MPa (mechanics).
+
+    >>> in_MPa(50.0)
+    0.05
+    """
+    return value_kPa / 1e3
+
+
+def in_kPa(value_MPa: Number) -> Number:
+    """Convert a pressure, stress or modulus from MPa (mechanics) to kPa (files, panels).
+
+    >>> in_kPa(0.05)
+    50.0
+    """
+    return value_MPa * 1e3
 
 
 class Description(NamedTuple):

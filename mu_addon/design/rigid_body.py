@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InputError
 from .body import Body, flaws, half, overlaps, require_sound
-from .parameters import Dimensions
+from .dimensions import Dimensions
 
 FRICTION = 0.5
 """Assumed: published coefficients of dry elastomers on hard plastics are mostly 0.5 to 1 and above, and the

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 from ..errors import InputError
+from .dimensions import Dimensions
 from .printed import as_printed
-
-if TYPE_CHECKING:
-    from .parameters import Dimensions
 
 
 def check(d: Dimensions, allow_symmetric: bool = False) -> None:

@@ -12,9 +12,10 @@ from ..errors import InputError
 from . import shapes
 from .anchors import Window
 from .body import Body, covering, require_path_inside
+from .dimensions import Dimensions
 from .gates import Gates, check_solid, check_waveguide
 from .lattice import Lattice, lattice_of
-from .parameters import Dimensions, Unit
+from .parameters import Unit
 from .profile import cavity_polygon, cavity_volume, outer_polygon, revolved_volume
 from .rules import check_printed
 from .surface import Triangles, Vertices, bad_edges, weld

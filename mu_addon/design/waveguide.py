@@ -19,8 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from .anchors import Window, anchors
 from .block import Block, face_moves
+from .dimensions import Dimensions
 from .lattice import Lattice, lattice_of
-from .parameters import Dimensions, Unit
+from .parameters import Unit
 from .profile import outer_radius
 
 Array = NDArray[np.float64]

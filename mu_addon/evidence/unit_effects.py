@@ -14,12 +14,12 @@ from ..design.parameters import Unit
 from ..design.strut_cell import relative_density, strut_cell
 from ..errors import InputError
 from ..fem.clogged import CloggedModel
-from ..fem.descent import NewtonSettings
 from ..fem.lattice_law import LatticeLaw
 from ..fem.laws import Foam, Layered, NeoHooke, Yeoh
 from ..fem.loads import gravity
 from ..fem.materials import Layer, Materials
 from ..fem.model import Model
+from ..fem.newton_settings import NewtonSettings
 from ..fem.obstacle import CONTACT, Obstacle
 from ..fem.rigid import Plane
 from ..fem.unit import materials_of

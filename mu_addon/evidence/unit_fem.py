@@ -16,10 +16,12 @@ import attrs
 import numpy as np
 
 from ..design.parameters import Unit
+from ..design.quantity import in_MPa
 from ..errors import ConvergenceError, InputError, MeshingError, MuError
-from ..fem.equilibrium import Equilibrium, State
-from ..fem.kinematics import bending_angle_deg
+from ..fem.equilibrium import Equilibrium
+from ..fem.kinematics import TipSection
 from ..fem.lattice_law import LatticeLaw
+from ..fem.state import State
 from ..fem.trajectory import branches
 from ..files import read_npz, write_npz
 from ..measured import Experiment
@@ -163,6 +165,7 @@ def run(case: Run, cache: Path | None = None) -> Result:
     try:
         body, effect = case.changed
         mesh = body.meshed(cache)
+        tip = TipSection.of(mesh)
         points = followed(mesh, np.array(case.points).reshape(-1, 3))
         materials, model = body.materials(mesh), body.model(mesh)
         if effect and effect.materials:
@@ -177,7 +180,7 @@ def run(case: Run, cache: Path | None = None) -> Result:
         outline = walled(body, mesh, 1e6).obstacles[0] if case.outline else None
         places = slice(1, 1 + 3 * len(case.points))
         for at, state in _states(equilibrium, np.array(case.pressures_kPa)):
-            values[0, at] = bending_angle_deg(mesh, state.u)
+            values[0, at] = tip.angle_deg(state.u)
             values[places, at] = points.at(state.u).ravel()
             if outline:
                 y, still = (outline.places(u)[..., 1] for u in (state.u, np.zeros_like(state.u)))
@@ -198,7 +201,7 @@ def _states(equilibrium: Equilibrium, pressures_kPa: Array) -> Iterator[tuple[in
         history = [start]
         for pressure in side:
             try:
-                history.append(equilibrium.reach(pressure / 1e3, history))
+                history.append(equilibrium.reach(in_MPa(pressure), history))
             except ConvergenceError as error:
                 failed = error
                 break

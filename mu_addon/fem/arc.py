@@ -10,14 +10,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 import attrs
 import numpy as np
 
 from ..errors import ConvergenceError
-from .equilibrium import Equilibrium, State
 from .inertia import Inertia
+from .model import MaterialData, Model
+from .newton_settings import NewtonSettings
+from .state import State
 
 Array = np.ndarray[Any, Any]
 
@@ -89,12 +91,23 @@ class Node:
 Condition = Callable[[Array, Array], tuple[float, Array]]
 
 
+class Body(Protocol):
+    """What a branch is traced of: a model, its materials on the device, and the tolerances of its states.
+
+    An `Equilibrium` is one.
+    """
+
+    model: Model
+    parameters: MaterialData
+    settings: NewtonSettings
+
+
 class Arc:
     """Finds the points of one branch, of a body and materials, that begins at a converged state."""
 
-    def __init__(self, equilibrium: Equilibrium, start: State, settings: ContinuationSettings) -> None:
-        self.model, self.parameters = equilibrium.model, equilibrium.parameters
-        self.tolerance = equilibrium.settings.tolerance
+    def __init__(self, body: Body, start: State, settings: ContinuationSettings) -> None:
+        self.model, self.parameters = body.model, body.parameters
+        self.tolerance = body.settings.tolerance
         self.settings = settings
         self.inertia = Inertia(self.model)
         self._start = start

@@ -11,13 +11,16 @@ from scipy import sparse
 
 from ..errors import ConvergenceError
 from ..meshing.mesh import Mesh
-from .descent import Descent, NewtonSettings
+from .conjugate_gradients import Change
+from .descent import Descent
 from .elementwise import element_stiffness, rotations
-from .equilibrium import Equilibrium, State, rest
+from .equilibrium import Equilibrium
 from .factor import IndefiniteError
 from .materials import Layer, Materials
 from .model import Model
-from .variants import Change, make_variants
+from .newton_settings import NewtonSettings
+from .state import State, rest
+from .variants import make_variants
 
 Array = np.ndarray[Any, Any]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import attrs
 import numpy as np
@@ -13,9 +13,6 @@ from scipy import sparse
 from ..errors import ConvergenceError
 from . import krylov_kernels as kernels
 from .factor import IndefiniteError
-
-if TYPE_CHECKING:
-    from .variants import Change
 
 Array = np.ndarray[Any, Any]
 
@@ -47,6 +44,14 @@ class Rows:
         width = next((w for w in WIDTHS if k <= w), WIDTHS[-1])
         inputs = [self.offsets, self.columns, self.values, x, y]
         wp.launch(kernels.product_kernel(width), (-(-k // width), n), inputs, device=x.device)
+
+
+@attrs.frozen(eq=False)
+class Change:
+    """What a variant adds to the tangent: `matrix` (c, c) on the free unknowns (c,)."""
+
+    unknowns: Array
+    matrix: sparse.csr_matrix
 
 
 class Changes:

@@ -9,8 +9,8 @@ import attrs
 import numpy as np
 
 from ..errors import ConvergenceError
-from .arc import Arc, ContinuationSettings, Node, Point
-from .equilibrium import Equilibrium, State
+from .arc import Arc, Body, ContinuationSettings, Node, Point
+from .state import State
 
 Array = np.ndarray[Any, Any]
 
@@ -35,7 +35,7 @@ class Critical:
 
     def __str__(self) -> str:
         x, y, z = self.place
-        return f"{self.kind} at {self.state.pressure_MPa * 1e3:.4g} kPa near ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        return f"{self.kind} at {self.state.pressure_kPa:.4g} kPa near ({x:.1f}, {y:.1f}, {z:.1f}) mm"
 
 
 @attrs.frozen(eq=False)
@@ -62,8 +62,8 @@ class Branch:
         return np.array([p.negative for p in self.points])
 
 
-def follow(
-    equilibrium: Equilibrium,
+def trace_branch(
+    body: Body,
     start: State,
     *,
     until_MPa: float | None = None,
@@ -80,7 +80,7 @@ def follow(
     smallest step fails.
     """
     s = settings or ContinuationSettings()
-    arc = Arc(equilibrium, start, s)
+    arc = Arc(body, start, s)
     node = arc.begin()
     if until_MPa is not None:
         toward = until_MPa - node.z[-1]
@@ -101,7 +101,7 @@ def follow(
         except ConvergenceError as why:
             ended, step = None, step / 2
             if step < s.min_step * first:
-                raise _failure(equilibrium, node, why.what) from None
+                raise _failure(body, node, why.what) from None
             continue
         criticals += found
         points.append(new.point)
@@ -115,15 +115,15 @@ def follow(
     return Branch(tuple(points), tuple(criticals), ended or "most points")
 
 
-def limit_pressure(equilibrium: Equilibrium, last: State, toward: float) -> Critical | None:
+def limit_pressure(body: Body, last: State, toward: float) -> Critical | None:
     """What stops load stepping on the way from a converged state to a pressure `toward` in MPa.
 
     The first critical point of the branch, or None where it goes on to that pressure without one, or
     for many points. Raises ConvergenceError where the branch cannot be followed.
     """
     # Load stepping gives up within its smallest step of what stops it.
-    settings = ContinuationSettings(first_step_MPa=equilibrium.settings.min_step_MPa, max_points=30)
-    branch = follow(equilibrium, last, until_MPa=toward, stop_at_critical=True, settings=settings)
+    settings = ContinuationSettings(first_step_MPa=body.settings.min_step_MPa, max_points=30)
+    branch = trace_branch(body, last, until_MPa=toward, stop_at_critical=True, settings=settings)
     return branch.criticals[0] if branch.criticals else None
 
 
@@ -200,13 +200,13 @@ def _locate(arc: Arc, before: Node, after: Node, kind: Kind) -> Critical:
     return Critical(kind, node.point.state, error, node.point.volume_mm3, mode, place)
 
 
-def _failure(equilibrium: Equilibrium, node: Node, why: str) -> ConvergenceError:
+def _failure(body: Body, node: Node, why: str) -> ConvergenceError:
     point = node.point
-    least, element = equilibrium.model.smallest_jacobian(point.state.u, equilibrium.parameters)
-    nodes = equilibrium.model.mesh.tets[element]
-    x, y, z = (equilibrium.model.mesh.nodes[nodes] + point.state.u[nodes]).mean(axis=0)
+    least, element = body.model.smallest_jacobian(point.state.u, body.parameters)
+    nodes = body.model.mesh.tets[element]
+    x, y, z = (body.model.mesh.nodes[nodes] + point.state.u[nodes]).mean(axis=0)
     return ConvergenceError(
-        f"the branch cannot be followed beyond {point.state.pressure_MPa * 1e3:.4g} kPa and "
+        f"the branch cannot be followed beyond {point.state.pressure_kPa:.4g} kPa and "
         f"{point.volume_mm3:.4g} mm3: {why}",
         f"its last point's most distorted element is {element} near ({x:.1f}, {y:.1f}, {z:.1f}) mm with "
         f"det F = {least:.3g}",

@@ -7,15 +7,17 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from typing import Any
 
-import attrs
 import numpy as np
 
+from ..design.quantity import in_kPa
 from ..errors import ConvergenceError
-from ..meshing.mesh import Mesh
-from .descent import Descent, NewtonSettings
+from .continuation import limit_pressure
+from .descent import Descent
 from .factor import IndefiniteError
 from .materials import Materials
 from .model import Model
+from .newton_settings import NewtonSettings
+from .state import State, extrapolate, rest
 
 Array = np.ndarray[Any, Any]
 
@@ -24,22 +26,6 @@ FRICTION_TOLERANCE = 1e-4
 MOST_LAGS = 40
 # In how many steps a weight is put on, where fewer are not enough.
 WEIGHT_STEPS = (1, 4, 16)
-
-
-@attrs.frozen(eq=False)
-class State:
-    """A converged equilibrium: pressure in MPa, displacement (n, 3) in mm, relative residual, cost."""
-
-    pressure_MPa: float
-    u: Array
-    residual: float = 0.0
-    iterations: int = 0
-    factorisations: int = 0
-
-    @property
-    def loaded(self) -> bool:
-        """Whether anything acts on the body: without pressure and weight it is as drawn."""
-        return bool(self.pressure_MPa) or bool(self.u.any())
 
 
 class Equilibrium:
@@ -219,9 +205,6 @@ class Equilibrium:
         return found[1:]
 
     def _failure(self, last: State, pressure: float, why: str) -> ConvergenceError:
-        # It follows the branch with this module's classes.
-        from .continuation import limit_pressure
-
         # Load steps may give up a little before the limit.
         ahead = last.pressure_MPa + 8 * (pressure - last.pressure_MPa)
         if self.explains:
@@ -231,26 +214,8 @@ class Equilibrium:
         nodes = self.model.mesh.tets[element]
         place = (self.model.mesh.nodes[nodes] + last.u[nodes]).mean(axis=0)
         return ConvergenceError(
-            f"no equilibrium at {pressure * 1e3:.4g} kPa: {why}",
-            f"the last converged state is {last.pressure_MPa * 1e3:.4g} kPa; its most distorted element is "
+            f"no equilibrium at {in_kPa(pressure):.4g} kPa: {why}",
+            f"the last converged state is {last.pressure_kPa:.4g} kPa; its most distorted element is "
             f"{element} near ({place[0]:.1f}, {place[1]:.1f}, {place[2]:.1f}) mm with det F = {least:.3g}",
             "lower the pressure, thicken the wall or stiffen the material",
         )
-
-
-def extrapolate(points: Sequence[State], pressure: float) -> Array:
-    """Displacement (n, 3) at another pressure of the polynomial through some states."""
-    u = np.zeros_like(points[-1].u)
-    for a in points:
-        weight = 1.0
-        for b in points:
-            if a is not b:
-                weight *= (pressure - b.pressure_MPa) / (a.pressure_MPa - b.pressure_MPa)
-        u += weight * a.u
-    return u
-
-
-def rest(mesh: Mesh) -> State:
-    """The undeformed, unloaded state of a mesh; where something has weight ask for
-    `Equilibrium.at_zero_pressure`."""
-    return State(0.0, np.zeros_like(mesh.nodes))

@@ -75,20 +75,42 @@ def _outside(point: Array) -> InputError:
     )
 
 
+@attrs.frozen(eq=False)
+class TipSection:
+    """The end plane of a mesh's tip, whose rotation is the bending angle.
+
+    nodes: (t,) that integrate over it. yz: their places (t, 2) at rest in mm. area: the share of the plane
+    that each stands for, (t,) in mm2.
+    """
+
+    nodes: Array
+    yz: Array
+    area: Array
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> TipSection:
+        """The end plane at the height of the mesh's `tip` nodes."""
+        nodes, area = _tip_areas(mesh)
+        return cls(nodes, mesh.nodes[nodes, 1:], area)
+
+    def angle_deg(self, u: Array) -> float:
+        """Bending angle in degrees under nodal displacements (n, 3) in mm, see `bending_angle_deg`."""
+        area, before, after = self.area, self.yz, self.yz + u[self.nodes, 1:]
+        before = before - np.average(before, axis=0, weights=area)
+        after = after - np.average(after, axis=0, weights=area)
+        sine = (area * (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])).sum()
+        cosine = (area[:, None] * before * after).sum()
+        return float(-np.degrees(np.arctan2(sine, cosine)))
+
+
 def bending_angle_deg(mesh: Mesh, u: Array) -> float:
     """Rotation of the tip's cross-section against the fixed base, positive toward +y, in degrees.
 
-    Area-weighted best-fit rotation of the end plane in the sagittal (y, z) plane. Toward +y because
-    that is how the unit bends when pressure grows; as a right-hand rotation about x it is negative.
+    Area-weighted best-fit rotation (orthogonal Procrustes) of the end plane in the sagittal (y, z) plane.
+    Toward +y because that is how the unit bends when pressure grows; as a right-hand rotation about x it is
+    negative. u: (n, 3) in mm. For many states of one mesh, `TipSection` finds the plane once.
     """
-    nodes, area = _tip_areas(mesh)
-    before = mesh.nodes[nodes, 1:]
-    after = before + u[nodes, 1:]
-    before = before - np.average(before, axis=0, weights=area)
-    after = after - np.average(after, axis=0, weights=area)
-    sine = (area * (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])).sum()
-    cosine = (area[:, None] * before * after).sum()
-    return float(-np.degrees(np.arctan2(sine, cosine)))
+    return TipSection.of(mesh).angle_deg(u)
 
 
 def _tip_areas(mesh: Mesh) -> tuple[Array, Array]:

@@ -12,9 +12,9 @@ from ..errors import InputError
 from ..meshing.mesh import AXES, TRIANGLE_EDGES, Mesh, boundary_faces
 from ..meshing.quality import shapes
 from . import friction
-from .descent import NewtonSettings
 from .elements import triangle_quadrature
 from .friction import Lag, Memory
+from .newton_settings import NewtonSettings
 from .rigid import Pose, Rigid
 from .self_intersection import with_middles
 

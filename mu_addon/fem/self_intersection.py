@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from ..meshing.mesh import TET_EDGES, Mesh, boundary_faces, mirror, mirror_displacement
-from .equilibrium import State
+from .state import State
 
 Array = np.ndarray[Any, Any]
 

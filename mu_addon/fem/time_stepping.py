@@ -8,9 +8,11 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..design.quantity import in_kPa, in_MPa
 from ..errors import ConvergenceError, InputError
-from .equilibrium import Equilibrium, State, rest
+from .equilibrium import Equilibrium
 from .factor import IndefiniteError
+from .state import State, rest
 from .trajectory import Trajectory
 
 Array = np.ndarray[Any, Any]
@@ -54,7 +56,7 @@ def simulate_in_time(
     earlier run by its number, if it kept one with `store`; for bodies whose materials have no history, which
     is not kept. Raises ConvergenceError naming instant and cause.
     """
-    time, pressure = np.asarray(time_s, float), np.asarray(pressure_kPa, float) / 1e3
+    time, pressure = np.asarray(time_s, float), in_MPa(np.asarray(pressure_kPa, float))
     if (np.diff(time) < 0).any():
         raise InputError(
             "time runs backward", f"instant {int(np.argmax(np.diff(time) < 0)) + 1} of the protocol"
@@ -107,9 +109,8 @@ def _interval(eq: Equilibrium, start: Instant, time: float, pressure: float, max
             if step < SMALLEST:
                 instant = start.time_s + share * span
                 raise ConvergenceError(
-                    f"no equilibrium at {instant:.6g} s, {target * 1e3:.4g} kPa: {why.what}",
-                    f"the last converged state is at {last.time_s:.6g} s, "
-                    f"{last.state.pressure_MPa * 1e3:.4g} kPa",
+                    f"no equilibrium at {instant:.6g} s, {in_kPa(target):.4g} kPa: {why.what}",
+                    f"the last converged state is at {last.time_s:.6g} s, {last.state.pressure_kPa:.4g} kPa",
                     "lower the pressure or its rate, thicken the wall or stiffen the material",
                 ) from None
             continue

@@ -9,8 +9,10 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..design.quantity import in_MPa
 from ..errors import InputError
-from .equilibrium import Equilibrium, State, rest
+from .equilibrium import Equilibrium
+from .state import State, rest
 
 Array = np.ndarray[Any, Any]
 
@@ -57,7 +59,9 @@ def simulate(
     InputError for a body with friction.
     """
     if equilibrium.model.has_friction:
-        raise InputError("a body with friction remembers", "trajectory.simulate", "use marching.march")
+        raise InputError(
+            "a body with friction remembers", "trajectory.simulate", "use time_stepping.simulate_in_time"
+        )
 
     def state_at(pressure_MPa: float, solve: Callable[[], State]) -> State:
         state = load(pressure_MPa)
@@ -75,7 +79,9 @@ def simulate(
     for side in sides:
         history = [start]
         for pressure in side:
-            found[pressure] = state_at(pressure / 1e3, partial(equilibrium.reach, pressure / 1e3, history))
+            found[pressure] = state_at(
+                in_MPa(pressure), partial(equilibrium.reach, in_MPa(pressure), history)
+            )
             history.append(found[pressure])
     return _assemble(time_s, pressure_kPa, distinct, found)
 

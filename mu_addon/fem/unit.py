@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..design.printed import skin_stiffening
+from ..design.quantity import in_MPa
 from ..meshing.mesh import LATTICE
 from .laws import NeoHooke
 from .materials import Layer, Materials
@@ -25,7 +26,7 @@ def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> M
     """
     m, p = unit.material, unit.print
     stiffer = skin_stiffening(unit.printed.wall, p.skin_depth_mm, p.skin_factor)
-    membrane_MPa = stiffer * m.membrane_modulus_kPa / 1e3
+    membrane_MPa = in_MPa(stiffer * m.membrane_modulus_kPa)
     inside = mesh.region == LATTICE
     if lattice is not None:
         wall = np.flatnonzero(~inside)
@@ -33,6 +34,6 @@ def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> M
         membrane = Layer(NeoHooke, wall, NeoHooke.parameters(moduli, m.membrane_poisson))
         return Materials((membrane, *lattice.fill(np.flatnonzero(inside))))
     return Materials.neo_hooke(
-        np.where(inside, m.lattice_modulus_kPa / 1e3, membrane_MPa),
+        np.where(inside, m.lattice_modulus_MPa, membrane_MPa),
         np.where(inside, m.lattice_poisson, m.membrane_poisson),
     )

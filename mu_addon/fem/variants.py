@@ -5,25 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-import attrs
 import numpy as np
 import scipy.linalg
-from scipy import sparse
 
-from .conjugate_gradients import Changes, ConjugateGradients
+from .conjugate_gradients import Change, Changes, ConjugateGradients
 from .factor import IndefiniteError, make_factor
 from .model import Model, Pattern
 from .triangular import Triangular
 
 Array = np.ndarray[Any, Any]
-
-
-@attrs.frozen(eq=False)
-class Change:
-    """What a variant adds to the tangent: `matrix` (c, c) on the free unknowns (c,)."""
-
-    unknowns: Array
-    matrix: sparse.csr_matrix
 
 
 class SharedTangent(Protocol):

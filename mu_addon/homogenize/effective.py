@@ -13,6 +13,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..design.quantity import in_kPa
 from ..errors import InputError
 from ..fem.lattice_law import LatticeLaw
 from ..fem.laws import Foam
@@ -168,7 +169,7 @@ def effective(
         "version": _version(),
         "inputs_sha256": hashlib.sha256(inputs.encode()).hexdigest(),
     }
-    C11, C12, C44 = (float(c) * 1e3 for c in moduli_MPa)
+    C11, C12, C44 = (in_kPa(float(c)) for c in moduli_MPa)
     parameters = tuple(float(p) for p in fit.parameters)
     return Effective(
         cell,

@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 from scipy.optimize import least_squares
 
+from ..design.quantity import in_kPa
 from ..errors import InputError
 from ..fem.lattice_law import LatticeLaw
 from ..fem.laws import CubicShear, DiagonalStretch, Foam
@@ -257,7 +258,7 @@ def require_stable(law: LatticeLaw) -> None:
     if least[worst] <= 0:
         place = " x ".join(f"{s:.3g}" for s in np.diagonal(F[worst]))
         raise InputError(
-            f"the lattice's law is unstable: it loses ellipticity, by {-least[worst] * 1e3:.3g} kPa",
+            f"the lattice's law is unstable: it loses ellipticity, by {in_kPa(-least[worst]):.3g} kPa",
             f"stretches {place} along the axes",
             remedy,
         )

@@ -8,8 +8,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..fem.equilibrium import State
 from ..fem.self_intersection import first_self_intersection
+from ..fem.state import State
 from ..meshing.mesh import AXES, Mesh
 
 Array = np.ndarray[Any, Any]

@@ -11,6 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..design.quantity import in_MPa
 from ..errors import ConvergenceError, InputError
 from ..fem.point import evaluate
 from ..fem.point import stress as point_stress
@@ -58,7 +59,7 @@ class Coupon:
     def of(cls, experiment: Experiment) -> Coupon:
         """The coupon of an experiment of that kind."""
         return cls(
-            experiment.name, str(experiment.mode), 1 + experiment["strain"], experiment["stress_kPa"] / 1e3
+            experiment.name, str(experiment.mode), 1 + experiment["strain"], in_MPa(experiment["stress_kPa"])
         )
 
 

@@ -12,7 +12,7 @@ from itertools import pairwise
 import attrs
 import numpy as np
 
-from ..design.parameters import Dimensions
+from ..design.dimensions import Dimensions
 from ..design.profile import outer_radius, outer_slope
 from ..errors import InputError
 from .mesh import Array, boundary_faces, edges_of, oriented

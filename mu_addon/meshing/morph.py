@@ -7,7 +7,8 @@ import math
 import attrs
 import numpy as np
 
-from ..design.parameters import Dimensions, Unit
+from ..design.dimensions import Dimensions
+from ..design.parameters import Unit
 from ..errors import MeshingError
 from .harmonic import harmonic
 from .membrane import Membrane, Meridian, division, membrane_mesh, stations

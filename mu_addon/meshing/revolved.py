@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..design.parameters import Dimensions
+from ..design.dimensions import Dimensions
 from ..design.profile import cavity_radius, outer_radius
 from .mesh import LATTICE, MEMBRANE, Array
 from .surface import VOID, Surface

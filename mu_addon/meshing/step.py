@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..design.block import FACES
-from ..design.parameters import Dimensions
+from ..design.dimensions import Dimensions
 from ..design.profile import cavity_arcs, cavity_volume, outer_arcs, outer_volume
 from ..design.waveguide import Bar
 from ..errors import InputError, MeshingError

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from ..design.body import Body, half
-from ..design.parameters import Dimensions, Unit
+from ..design.dimensions import Dimensions
+from ..design.parameters import Unit
 from ..errors import InputError, MeshingError
 from .curving import relieved
 from .lattice import GmshUnavailable, Sizes, lattice_mesh

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from ..fem.batched_newton import BatchedNewton, Variant
-from ..fem.descent import NewtonSettings
-from ..fem.equilibrium import State
 from ..fem.kinematics import Probe
 from ..fem.laws import NeoHooke
 from ..fem.materials import Materials
 from ..fem.model import Model
+from ..fem.newton_settings import NewtonSettings
 from ..fem.obstacle import CONTACT
+from ..fem.state import State
 from ..fem.time_stepping import simulate_in_time
 
 Array = np.ndarray[Any, Any]

@@ -10,8 +10,8 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..design.dimensions import Dimensions
 from ..design.lattice import lattice_of
-from ..design.parameters import Dimensions
 from ..design.profile import outer_radius
 from ..errors import InputError
 

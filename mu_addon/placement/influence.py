@@ -10,10 +10,10 @@ import numpy as np
 
 from ..errors import MeshingError
 from ..fem.elementwise import element_forces
-from ..fem.equilibrium import State
 from ..fem.kinematics import Probe
 from ..fem.materials import Materials
 from ..fem.model import Model
+from ..fem.state import State
 from ..fem.trajectory import Trajectory
 from ..meshing.mesh import Mesh
 from .deviation import centreline

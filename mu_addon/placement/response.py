@@ -18,12 +18,12 @@ from scipy import sparse
 
 from ..errors import InputError
 from ..fem.elementwise import element_stiffness, rotations
-from ..fem.equilibrium import State
 from ..fem.factor import Cholesky, SuperLU
 from ..fem.kinematics import Probe
 from ..fem.laws import NeoHooke
 from ..fem.materials import Layer, Materials
 from ..fem.model import Model
+from ..fem.state import State
 from ..fem.trajectory import Trajectory
 from ..fem.triangular import Triangular
 from ..meshing.mesh import LATTICE, Mesh

@@ -56,7 +56,7 @@ def draw(
         if area == 0.0:
             continue
         # Rows run downward, so outward faces turn their front to the viewer where this is negative.
-        bias = 0.0
+        bias = float(0.0)
         if area > 0.0:
             bias = back_bias
         near = wp.max(a[2], wp.max(b[2], c[2]))
@@ -194,8 +194,8 @@ def shade(
     # Off the surface by more than a map's pixel, or it would shade itself where light grazes it.
     p = position[row, column] - center + n * (1.5 / scale)
     half = float(maps.shape[1]) * 0.5
-    arrives = 0.0
-    whole = 0.0
+    arrives = float(0.0)
+    whole = float(0.0)
     for k in range(row % samples * samples + column % samples, axes.shape[0], samples * samples):
         weight = wp.dot(n, axes[k, 2]) * radiance[k]
         if weight > 0.0:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..design.parameters import Dimensions
+from ..design.dimensions import Dimensions
 from ..design.profile import outer_radius
 from ..design.rigid_body import RigidBody
 from ..meshing.mesh import LATTICE, MEMBRANE, Mesh, boundary_faces

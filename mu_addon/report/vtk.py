@@ -10,7 +10,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from ..fem.equilibrium import State
+from ..fem.state import State
 from ..files import make_folder, replacing, write_text
 from ..meshing.mesh import Mesh
 
@@ -54,7 +54,7 @@ def write_trajectory(path: Path, mesh: Mesh, states: Sequence[tuple[float, State
             moved = {"displacement_mm": state.u.astype(np.float32)}
             _write(folder / name, mesh, moved, {"region": mesh.region.astype(np.int32)})
         file = quoteattr(f"{folder.name}/{files[id(state)]}")
-        pressure = f"{state.pressure_MPa * 1e3:.9g} kPa"
+        pressure = f"{state.pressure_kPa:.9g} kPa"
         lines.append(f'    <DataSet timestep="{time:.9g}" name="{pressure}" file={file}/>')
     write_text(
         path,

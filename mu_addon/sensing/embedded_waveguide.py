@@ -14,7 +14,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..design.parameters import Dimensions
+from ..design.dimensions import Dimensions
 from ..design.waveguide import Bar
 from ..fem.embedding import Embedding, embed
 from ..meshing.mesh import Mesh

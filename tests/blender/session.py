@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 python = sys.executable
 """The Python that sessions run in; the fixture `each_bpy` sets it."""
 OTHERS = [path for path in os.environ.get("MU_BPY", "").split(os.pathsep) if path]
+PASSED_ON = "PATH", "LD_LIBRARY_PATH", "LANG", "WARP_CACHE_PATH"
 needs_bpy = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="bpy is not installed")
 
 PRELUDE = """
@@ -44,7 +45,7 @@ def refused(operator, **settings):
 """
 
 # A child that says what a test wants, and the wait for it; the fake's file is the session's first argument.
-FAKE = ROOT / "tests" / "study" / "fake_worker.py"
+FAKE = ROOT / "tests" / "run" / "fake_worker.py"
 WATCHING = """
 import time
 from mu_addon.blender.simulate import state as simulation, study_folder as studies
@@ -105,7 +106,7 @@ os._exit(status)
 def blender(code, folder, *arguments, prelude=PRELUDE):
     """Run `code` in a Python with bpy, its user files under `folder`; returns what it printed, or fails."""
     environment = {
-        **{name: os.environ[name] for name in ("PATH", "LD_LIBRARY_PATH", "LANG") if name in os.environ},
+        **{name: os.environ[name] for name in PASSED_ON if name in os.environ},
         "HOME": str(folder),
         "BLENDER_USER_RESOURCES": str(folder / "blender"),
         # A session that ends as these do leaves its folder of temporary files.

@@ -127,7 +127,7 @@ def test_a_body_must_hold_the_chambers_from_end_to_end():
     assert misfits(cylinder(12.7, 12.7, 0.0, 0.0, 75.0, 256), D) == []
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1))
 def test_inside_is_what_winding_says(seed):
     from mu_addon.meshing.surface import Surface, winding_number

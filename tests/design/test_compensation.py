@@ -55,7 +55,7 @@ def test_the_profile_moves_by_its_offset():
 
 
 @given(st.floats(0.02, 0.3), st.floats(0.02, 0.3))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_drawn_cavity_is_larger_by_its_skin(xy, z):
     """The first order of the volume is the mean offset times the area: what is left is of second order."""
     d = load_preset("mu-1.0x").dimensions
@@ -103,7 +103,7 @@ def test_offsets_that_erase_or_contradict_are_refused():
 
 
 @given(st.floats(-0.2, 0.4), st.floats(-0.2, 0.4), st.floats(-0.02, 0.02))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_calipers_on_the_gauge_give_the_offsets_back(xy, z, scale):
     sizes = []
     for feature in coupons.FEATURES:

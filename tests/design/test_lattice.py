@@ -12,7 +12,7 @@ from .units import units
 
 
 @given(units())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_lattice_is_lattice_of(unit):
     d = unit.dimensions
     lattice = lattice_of(d)
@@ -82,7 +82,7 @@ def test_the_papers_ten_windows():
 
 
 @given(units())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_anchors_are_lattice_centres_in_the_bending_plane(unit):
     d, points = unit.dimensions, anchors(unit)
     assert points.shape == (d.count, 3)

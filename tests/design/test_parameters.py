@@ -27,7 +27,7 @@ PRESETS = {"mu-0.75x": (0.75, 21.70), "mu-1.0x": (1.0, 18.34), "mu-1.5x": (1.5, 
 
 
 @given(units())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_any_unit_survives_toml(unit):
     for comments in (True, False):
         assert from_toml(to_toml(unit, comments)) == unit

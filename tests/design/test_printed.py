@@ -28,7 +28,7 @@ def printed(unit, *offsets, **more):
 
 
 @given(units(), st.floats(-0.3, 0.5))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_same_offset_thickens_struts_and_walls_alike(unit, offset):
     try:
         unit = printed(unit, offset, offset)
@@ -50,7 +50,7 @@ def test_the_same_offset_thickens_struts_and_walls_alike(unit, offset):
 
 
 @given(units())
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_without_an_offset_the_printed_unit_is_the_nominal_one(unit):
     assert unit.printed is unit.dimensions
 

@@ -55,7 +55,7 @@ def parabolas(d, z):
 
 
 @given(units(), st.floats(0.0, 1.0))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_profile_is_the_parabolas(unit, t):
     d = unit.dimensions
     z = np.append(d.height * np.linspace(0, 1, 50), d.height * t)
@@ -63,7 +63,7 @@ def test_profile_is_the_parabolas(unit, t):
 
 
 @given(units())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_profile_is_c1(unit):
     d = unit.dimensions
     joints = np.concatenate([np.arange(d.count) * d.cell + d.b, (np.arange(d.count) + 1) * d.cell - d.b])
@@ -86,7 +86,7 @@ def test_slope_is_the_derivative():
 
 
 @given(units())
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_cavity_lies_one_wall_inside(unit):
     d = unit.dimensions
     z = np.linspace(d.base_cap, d.height - d.tip_cap, 9)
@@ -133,7 +133,7 @@ def test_inner_arcs_keep_the_wall(unit):
 
 
 @given(units())
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_cavity_arcs_run_from_cap_to_cap(unit):
     d = unit.dimensions
     arcs = profile.cavity_arcs(d)
@@ -185,7 +185,7 @@ def test_a_thin_wall_weighs_area_times_wall():
 
 
 @given(units(), st.integers(1, 12))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_polygons_are_inscribed_sections(unit, per_arc):
     d = unit.dimensions
     outer, cavity = profile.outer_polygon(d, per_arc), profile.cavity_polygon(d, per_arc)

@@ -115,6 +115,6 @@ def test_a_symmetric_envelope_can_be_asked_for():
 
 
 @given(units())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_units_drawn_for_the_properties_keep_every_rule(unit):
     rules.check(unit.dimensions, unit.lattice.allow_symmetric)

@@ -8,8 +8,9 @@ import pytest
 
 from mu_addon.design import steps
 from mu_addon.design.anchors import window
+from mu_addon.design.dimensions import Dimensions
 from mu_addon.design.lattice import lattice_of
-from mu_addon.design.parameters import SECTIONS, Dimensions, Unit, load_preset
+from mu_addon.design.parameters import SECTIONS, Unit, load_preset
 from mu_addon.design.quantity import describe
 from mu_addon.design.steps import STEPS, Given, Stack, downstream
 from mu_addon.errors import InputError

@@ -91,7 +91,7 @@ def test_density_approaches_its_limit_from_any_facets():
 
 
 @given(st.floats(0.4, 1.2), st.floats(1.0, 1.5), st.floats(-0.3, 0.4))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_an_equal_offset_is_a_thicker_strut(junction, swell, offset):
     midspan = junction * swell
     thick = StrutCell(BODY_CENTRED, 12.5, junction + offset, midspan + offset)

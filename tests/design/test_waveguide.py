@@ -61,7 +61,7 @@ def test_number_of_wells_follows_the_length(name, per_span):
 
 
 @given(units())
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_wells_keep_their_pitch_and_clear_of_the_junctions(unit):
     d, w = unit.dimensions, windows(unit.dimensions.count)[-1]
     bar = waveguide(unit, w)
@@ -285,7 +285,7 @@ def test_a_coupon_has_every_well():
 
 
 @given(st.floats(0.1, 3.0), st.floats(-3.0, 3.0), st.integers(0, 2), st.integers(0, 10_000))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_block_is_its_corners(half, shift, axis, seed):
     q, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     axes = q * np.linalg.det(q)

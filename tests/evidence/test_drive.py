@@ -11,7 +11,7 @@ from mu_addon.evidence.verdict import diagnose
 from tests.evidence import analytic
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(1e-3, 1.0), st.integers(100, 400), st.integers(0, 10_000))
 def test_noise_is_told_from_what_is_read(sd, many, seed):
     """On ramps, holds and waves of sixteen samples a turn."""

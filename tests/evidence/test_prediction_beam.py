@@ -60,7 +60,7 @@ def test_published_sags():
     np.testing.assert_allclose(found, [0.30172, 0.49346, 0.71379, 0.81061], atol=6e-6)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(load=st.floats(0.05, 40.0))
 def test_tip_loads_follow_the_elliptic_integrals(load):
     assert cantilever(np.array([load]), 0.0)[0] == pytest.approx(elliptic(load), rel=1e-6)

@@ -106,7 +106,7 @@ def test_parameters_are_described(kind, effect):
     assert effect.parameters[0].starts
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_predictions_are_finite_within_all_bounds(data):
     kind = data.draw(st.sampled_from(sorted(CASES)))

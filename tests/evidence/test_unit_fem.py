@@ -247,7 +247,7 @@ def test_pressures_out_of_reach_are_named():
         unit_responses(soft, [bench(markers={}, pressure=100 * PRESSURE)], attrs.evolve(QUICK, effects=()))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.floats(-90, 90), st.floats(0.5, 90), st.integers(5, 20))
 def test_pressures_span_the_readings_with_rest_among_them(low, width, count):
     found = np.array(pressures(np.array([low, low + width]), count, 0.05))

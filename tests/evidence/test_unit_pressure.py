@@ -59,7 +59,7 @@ def test_behind_a_shut_valve_the_gauge_sees_what_leaks():
     assert np.abs(MODEL.predict(ONE, values) - MODEL.predict(ONE, {})).max() > 1.0
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.floats(0.01, 20.0), st.floats(0.02, 0.5))
 # Steps that differ by less than a thousandth.
 @example(1.0, 0.3394)
@@ -85,7 +85,7 @@ def test_a_held_pressure_creeps_as_a_standard_linear_solid():
     np.testing.assert_allclose(q[1:], expected, rtol=2e-5)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.lists(st.floats(-40, 40), min_size=2, max_size=30), st.floats(0.1, 20))
 def test_play_stays_within_its_width_and_forgets_the_rate(levels, width):
     p = np.array(levels)

@@ -8,10 +8,11 @@ import attrs
 import numpy as np
 
 from mu_addon.fem.elements import reference_gradients, shape_functions, shape_gradients
-from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.laws import NeoHooke
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
+from mu_addon.fem.newton_settings import NewtonSettings
 
 from . import bodies
 

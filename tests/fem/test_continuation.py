@@ -10,12 +10,14 @@ from scipy.sparse.linalg import splu
 
 from mu_addon.errors import ConvergenceError
 from mu_addon.fem.arc import ContinuationSettings
-from mu_addon.fem.continuation import follow, limit_pressure
-from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, rest
+from mu_addon.fem.continuation import limit_pressure, trace_branch
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.factor import LDL, IndefiniteError
 from mu_addon.fem.inertia import Inertia
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
+from mu_addon.fem.newton_settings import NewtonSettings
+from mu_addon.fem.state import rest
 from mu_addon.meshing.mesh import boundary_faces, edges_of, mirror
 
 from . import bodies
@@ -80,7 +82,7 @@ def inflated():
     mesh, body = balloon()
     empty = body.model.cavity_volume(np.zeros_like(mesh.nodes))
     settings = ContinuationSettings(first_step_MPa=0.01)
-    return body, empty, follow(body, rest(mesh), until_mm3=2.2**3 * empty, settings=settings)
+    return body, empty, trace_branch(body, rest(mesh), until_mm3=2.2**3 * empty, settings=settings)
 
 
 def test_a_balloon_follows_its_closed_form_through_the_limit_point(inflated):
@@ -133,7 +135,9 @@ def test_what_stops_load_stepping_is_named(inflated):
 
 def test_a_branch_lands_on_the_state_that_load_stepping_finds():
     mesh, body = balloon(2)
-    branch = follow(body, rest(mesh), until_MPa=0.08, settings=ContinuationSettings(first_step_MPa=0.01))
+    branch = trace_branch(
+        body, rest(mesh), until_MPa=0.08, settings=ContinuationSettings(first_step_MPa=0.01)
+    )
     assert branch.ended == "pressure reached"
     assert branch.pressure_MPa[-1] == pytest.approx(0.08, rel=1e-12)
     stepped = body.path([0.08], rest(mesh))[-1]
@@ -145,7 +149,7 @@ def test_a_collapsing_arch_is_the_one_that_displacement_control_finds():
     mesh = arch()
     body = equilibrium(mesh, 1.0, 0.3, far_side(mesh))
     settings = ContinuationSettings(first_step_MPa=1e-4)
-    branch = follow(body, rest(mesh), until_MPa=-4e-4, settings=settings)
+    branch = trace_branch(body, rest(mesh), until_MPa=-4e-4, settings=settings)
     assert [c.kind for c in branch.criticals] == ["limit point", "limit point"]
     assert branch.criticals[0].state.pressure_MPa < 2 * branch.criticals[1].state.pressure_MPa
     assert branch.negative.max() == 1
@@ -179,7 +183,7 @@ def test_a_whole_arch_buckles_sideways_before_its_limit_point():
     branches = {}
     for name, mesh in (("half", half), ("whole", whole)):
         body = equilibrium(mesh, 1.0, 0.3, far_side(mesh))
-        branches[name] = follow(body, rest(mesh), toward=-1, settings=settings)
+        branches[name] = trace_branch(body, rest(mesh), toward=-1, settings=settings)
     buckling, limit = branches["whole"].criticals[:2]
     assert (buckling.kind, limit.kind) == ("bifurcation", "limit point")
     assert branches["half"].criticals[0].kind == "limit point"
@@ -265,11 +269,11 @@ def test_a_branch_must_start_at_an_equilibrium():
     mesh, body = balloon(2)
     start = rest(mesh)
     with pytest.raises(ConvergenceError, match="converged state"):
-        follow(body, type(start)(0.01, start.u))
+        trace_branch(body, type(start)(0.01, start.u))
 
 
 def test_a_branch_that_cannot_be_followed_says_where():
     mesh, body = balloon(2)
     with pytest.raises(ConvergenceError, match=r"beyond 0 kPa and .* mm3") as caught:
-        follow(body, rest(mesh), settings=ContinuationSettings(max_iterations=1))
+        trace_branch(body, rest(mesh), settings=ContinuationSettings(max_iterations=1))
     assert "mm" in caught.value.where

@@ -16,13 +16,14 @@ from scipy.sparse.linalg import eigsh
 from mu_addon.errors import ConvergenceError
 from mu_addon.fem import conjugate_gradients, kernels, krylov_kernels
 from mu_addon.fem.batched_newton import BatchedNewton, Variant
-from mu_addon.fem.conjugate_gradients import ConjugateGradients
-from mu_addon.fem.equilibrium import Equilibrium, rest
+from mu_addon.fem.conjugate_gradients import Change, ConjugateGradients
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.factor import IndefiniteError
 from mu_addon.fem.laws import NeoHooke
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.fem.variants import Change, IterativeVariants
+from mu_addon.fem.state import rest
+from mu_addon.fem.variants import IterativeVariants
 
 from .bodies import hollow_box
 

@@ -21,7 +21,7 @@ def scattered(count, low, high, seed=0):
 
 
 @pytest.mark.parametrize("order", [1, 2])
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(A=matrices, shift=st.lists(numbers, min_size=3, max_size=3))
 def test_an_affine_motion_carries_every_point_exactly_inside_and_outside(order, A, shift):
     mesh = bodies.box((3, 2, 2), (3.0, 2.0, 2.0), order=order, jiggle=0.1)

@@ -5,12 +5,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mu_addon.errors import ConvergenceError, InputError
-from mu_addon.fem.equilibrium import Equilibrium, rest
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.loads import gravity
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.obstacle import CONTACT, Obstacle
 from mu_addon.fem.rigid import Box, Plane, Pose, Sphere
+from mu_addon.fem.state import rest
 from mu_addon.fem.time_stepping import simulate_in_time
 from mu_addon.fem.trajectory import simulate
 

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import InputError
-from mu_addon.fem.equilibrium import Equilibrium, rest
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.factor import IndefiniteError
 from mu_addon.fem.iterative import TwoLevel, interpolation
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
+from mu_addon.fem.state import rest
 
 from .bodies import box, hollow_box
 

@@ -6,11 +6,12 @@ import pytest
 from mu_addon.design.anchors import anchors, windows
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
-from mu_addon.fem.equilibrium import Equilibrium, rest
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg, probe
 from mu_addon.fem.lattice_law import LatticeLaw, deformation_gradients, stretches
 from mu_addon.fem.laws import Cubic, CubicShear, DiagonalStretch, Foam, NeoHooke
 from mu_addon.fem.model import Model
+from mu_addon.fem.state import rest
 from mu_addon.fem.trajectory import simulate
 from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.mesh import LATTICE

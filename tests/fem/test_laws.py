@@ -86,7 +86,7 @@ def test_stress_and_tangent_are_derivatives(law):
 
 
 @LAWS
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(Q=rotations, seed=st.integers(0, 2**32 - 1))
 def test_a_turned_body_has_the_same_energy_and_its_stress_turns(law, Q, seed):
     Q = Q * np.linalg.det(Q)

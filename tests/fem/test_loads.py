@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import ConvergenceError
-from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, rest
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.loads import STANDARD_GRAVITY, gravity, traction
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
+from mu_addon.fem.newton_settings import NewtonSettings
+from mu_addon.fem.state import rest
 from mu_addon.fem.time_stepping import simulate_in_time
 from mu_addon.fem.trajectory import simulate
 from mu_addon.meshing.mesh import MEMBRANE, Mesh, boundary_faces

@@ -5,10 +5,12 @@ import pytest
 from scipy.optimize import brentq
 
 from mu_addon.errors import ConvergenceError
-from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, rest
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.factor import Cholesky, IndefiniteError, SuperLU
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
+from mu_addon.fem.newton_settings import NewtonSettings
+from mu_addon.fem.state import rest
 
 from . import bodies
 

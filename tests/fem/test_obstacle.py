@@ -9,11 +9,12 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from mu_addon.errors import InputError
-from mu_addon.fem.equilibrium import Equilibrium, rest
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.obstacle import CONTACT, Obstacle
 from mu_addon.fem.rigid import Box, Plane, Pose, Sphere
+from mu_addon.fem.state import rest
 
 from .bodies import box, make
 from .derivatives import assert_consistent

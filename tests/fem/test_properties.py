@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, rest
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.laws import (
     Cubic,
     Foam,
@@ -19,6 +19,8 @@ from mu_addon.fem.laws import (
 )
 from mu_addon.fem.materials import Layer, Materials
 from mu_addon.fem.model import Model
+from mu_addon.fem.newton_settings import NewtonSettings
+from mu_addon.fem.state import rest
 
 from . import bodies
 
@@ -34,7 +36,7 @@ ROWS = {
 }
 
 seeds = st.integers(0, 2**32 - 1)
-few = settings(max_examples=8, deadline=None)
+few = settings(max_examples=8)
 
 
 def patchwork(mesh):

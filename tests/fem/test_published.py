@@ -5,9 +5,10 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import erf
 
-from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.laws import OgdenRoxburgh, Prony, Yeoh
 from mu_addon.fem.model import Model
+from mu_addon.fem.newton_settings import NewtonSettings
 
 from . import bodies, cases, thick
 from .radial import incompressible_pressure, inner_stretch

@@ -5,12 +5,13 @@ import pytest
 from scipy.spatial import ConvexHull, Delaunay
 
 from mu_addon.errors import InputError
-from mu_addon.fem.equilibrium import Equilibrium, rest
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.obstacle import CONTACT, Obstacle
 from mu_addon.fem.rigid import Box, Pose, Sphere
 from mu_addon.fem.rigid_surface import Surface, _closest
+from mu_addon.fem.state import rest
 
 from .bodies import _grid, make
 from .test_obstacle import approached, half_space, hertz

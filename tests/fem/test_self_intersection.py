@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, State, rest
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
+from mu_addon.fem.newton_settings import NewtonSettings
 from mu_addon.fem.self_intersection import crossings, first_self_intersection
+from mu_addon.fem.state import State, rest
 from mu_addon.meshing.mesh import boundary_faces
 
 from . import bodies

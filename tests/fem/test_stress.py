@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import InputError
-from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, rest
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.laws import NeoHooke, OgdenRoxburgh
 from mu_addon.fem.model import Model
+from mu_addon.fem.newton_settings import NewtonSettings
+from mu_addon.fem.state import rest
 from mu_addon.fem.stress import NodalMean, cauchy, von_mises
 
 from . import bodies, thick

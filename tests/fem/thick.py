@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings, rest
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
+from mu_addon.fem.newton_settings import NewtonSettings
+from mu_addon.fem.state import rest
 from mu_addon.fem.time_stepping import simulate_in_time
 
 from . import bodies

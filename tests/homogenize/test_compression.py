@@ -3,7 +3,7 @@
 import attrs
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
@@ -296,7 +296,6 @@ def test_a_cancelled_run_goes_on_to_the_same_states():
         assert one.force_N == other.force_N
 
 
-@settings(deadline=None)
 @given(st.floats(1.0, 100.0), st.floats(-1.0, 0.9))
 def test_procedures_read_a_parabola(young, softening):
     """Of s = E (e - b e^2): the slope of the best line over 0 to r is E (1 - b r), and so is the secant's."""

@@ -17,7 +17,7 @@ COUNTS = st.tuples(*[st.integers(1, 4)] * 3)
 SIZES = st.tuples(*[st.floats(0.1, 7.3)] * 3)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(COUNTS, SIZES, st.sampled_from([1, 2]))
 def test_boxes_fill_a_box(counts: tuple[int, int, int], size: tuple[float, float, float], order: int) -> None:
     mesh = bodies.box((2, 1, 2), size, order, jiggle=0.1)

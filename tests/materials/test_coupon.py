@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mu_addon.errors import ConvergenceError, InputError
@@ -90,7 +90,6 @@ def test_a_small_stretch_is_hookes(mode):
     st.floats(-4, 8).filter(lambda a: abs(a) > 0.3),
     st.lists(st.floats(0.5, 2.0), min_size=1, max_size=5),
 )
-@settings(deadline=None)
 def test_hyperfoam_has_the_closed_form_of_its_one_term(mu, nu, alpha, stretch):
     # Storakers (1986): lateral stretch a^-nu, so J = a^(1 - 2 nu);
     # stress 2 mu/alpha (a^alpha - J^(-alpha beta))/a.

@@ -287,7 +287,7 @@ def test_the_profile_covers_too_and_says_what_the_data_leave_open():
     st.sampled_from(["mooney-rivlin", "yeoh", "ogden-2"]),
     st.sampled_from(["absolute", "relative"]),
 )
-@settings(deadline=None, max_examples=12)
+@settings(max_examples=12)
 def test_a_stiffer_rubber_has_larger_factors_and_the_same_exponents(scale, name, weights):
     _, coupons = synthetic(name, *CASES[name], np.random.default_rng(1), 0.02)
     stiffer = [Coupon(c.name, c.mode, c.stretch, scale * c.stress_MPa) for c in coupons]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mu_addon.errors import InputError
@@ -30,7 +30,6 @@ def work(law_energy, e, de, h=1e-4):
     st.floats(0.5, 2.5),
     st.integers(0, 1000),
 )
-@settings(deadline=None)
 def test_no_increment_costs_less_than_the_least(c1, c2, mode, stretch, seed):
     def energy(e):
         x = np.exp(2 * e)
@@ -51,7 +50,6 @@ def test_no_increment_costs_less_than_the_least(c1, c2, mode, stretch, seed):
     ),
     st.sampled_from(MODES),
 )
-@settings(deadline=None)
 def test_ogden_laws_whose_terms_all_stiffen_are_stable(terms, mode):
     row = np.append(np.ravel([(2 * c / a, a) for c, a in terms]), 1000.0)
     found = stability(Ogden, row, mode, 0.3, 3.0)

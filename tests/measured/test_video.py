@@ -45,7 +45,7 @@ def tracks(pixels):
     return Tracks(NAMES[: len(pixels)], pixels, 10.0)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     camera=st.sampled_from(["+x", "-x"]),
     scale=st.floats(0.01, 5.0),

@@ -41,14 +41,14 @@ def test_known_angles_and_volume() -> None:
     assert element_volumes(single(CORNERS)) == pytest.approx([1 / 6])
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(arrays(float, (6, 3), elements=st.floats(-0.2, 0.2)))
 def test_a_curved_volume_is_that_within_its_faces(bend: np.ndarray) -> None:
     mesh = single(curved(CORNERS, bend))
     assert element_volumes(mesh)[0] == pytest.approx(cavity_enclosed(mesh), rel=1e-10)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(arrays(float, (6, 3), elements=st.floats(-0.1, 0.1)), st.floats(0.1, 10), st.floats(0, 6))
 def test_quality_does_not_depend_on_size_or_place(bend: np.ndarray, size: float, angle: float) -> None:
     c, s = np.cos(angle), np.sin(angle)

@@ -132,7 +132,7 @@ def test_a_missing_pytetwild_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         mesh_surface(ball.vertices, ball.faces, 2.0)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(arrays(float, (5, 3), elements=st.floats(-9, 9)))
 def test_winding_number_counts_inside_once(points: np.ndarray) -> None:
     ball = sphere(5.0)

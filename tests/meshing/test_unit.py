@@ -286,7 +286,7 @@ chambers = st.builds(
 )
 
 
-@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
+@settings(max_examples=6, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
 @given(chambers)
 def test_any_printable_unit_is_meshed_without_inversion(values: dict[str, float]) -> None:
     try:

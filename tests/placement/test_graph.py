@@ -129,7 +129,7 @@ def test_a_straight_polyline_is_the_cylinder():
     )
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.integers(0, 2**32 - 1))
 def test_a_bent_tube_has_the_volume_of_its_length_whatever_its_bends(seed):
     rng = np.random.default_rng(seed)

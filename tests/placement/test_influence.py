@@ -7,10 +7,11 @@ import pytest
 from mu_addon.design.anchors import anchors
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MeshingError
-from mu_addon.fem.equilibrium import Equilibrium, NewtonSettings
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import probe
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
+from mu_addon.fem.newton_settings import NewtonSettings
 from mu_addon.fem.trajectory import simulate
 from mu_addon.meshing.mesh import LATTICE, mirror
 from mu_addon.meshing.settings import MeshSettings

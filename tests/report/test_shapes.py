@@ -27,7 +27,7 @@ def test_ball():
 steps = st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda s: np.linalg.norm(s) > 0.2)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.lists(steps, min_size=1, max_size=6))
 def test_tube_is_outward_and_closed_along_any_line(moves):
     directions = np.array(moves)

@@ -6,7 +6,7 @@ import meshio
 import numpy as np
 import pytest
 
-from mu_addon.fem.equilibrium import State
+from mu_addon.fem.state import State
 from mu_addon.report.vtk import write_mesh, write_trajectory
 
 from .test_unit_pictures import cube

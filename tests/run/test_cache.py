@@ -17,7 +17,7 @@ def test_an_entry_comes_back(tmp_path):
     assert cache.get("mesh", "b") is None
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.data())
 def test_a_damaged_entry_is_missing_or_whole(tmp_path_factory, data):
     cache = Cache(tmp_path_factory.mktemp("cache"))

@@ -154,7 +154,7 @@ def test_too_little_or_nothing_to_see_is_refused() -> None:
 
 
 @given(st.floats(0.1, 10))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_volts_in_other_units_give_the_same_angles(scale: float) -> None:
     sweeps = [sweep(np.random.default_rng(k)) for k in range(3)]
     other = [attrs.evolve(s, voltage_V=scale * s.voltage_V) for s in sweeps]

@@ -38,7 +38,7 @@ def frames(n: int, first: int = 0, period_us: int = 200, start_us: int = 0) -> b
 
 
 @given(st.lists(st.integers(1, 300), min_size=1, max_size=5))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_frames_come_through_however_they_are_cut(sizes: list[int]) -> None:
     decoder = Decoder()
     groups = fed(decoder, INFO + frames(400), sizes)
@@ -200,7 +200,7 @@ def test_a_megabyte_without_an_end_is_thrown_away() -> None:
 
 
 @given(st.lists(st.binary(max_size=400), max_size=20))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_no_bytes_crash_it(chunks: list[bytes]) -> None:
     decoder = Decoder()
     for k, chunk in enumerate(chunks):
@@ -212,7 +212,7 @@ def test_no_bytes_crash_it(chunks: list[bytes]) -> None:
 @given(
     st.lists(st.sampled_from(["light:1\n", "dark:2,", "{", '{"a":1}\n', "1,2\n", "seq,a\n", "\x00", "nan\n"]))
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_no_lines_crash_it(parts: list[str]) -> None:
     decoder = Decoder()
     for k, part in enumerate(parts * 5):

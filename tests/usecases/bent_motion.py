@@ -3,7 +3,7 @@
 import numpy as np
 
 from mu_addon.design.parameters import load_preset
-from mu_addon.fem.equilibrium import State
+from mu_addon.fem.state import State
 from mu_addon.fem.trajectory import Trajectory
 from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.settings import MeshSettings

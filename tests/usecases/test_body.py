@@ -71,4 +71,4 @@ def test_a_search_of_the_whole_lattice_takes_no_body(files, capsys):
     out = files / "out"
     line = ["place", "--unit", str(files / "unit.toml"), "--out", str(out), "--json", "--paths", "graph"]
     assert main([*line, "--body", str(files / "body.stl")]) == 2
-    assert "knows the lattice's box only" in capsys.readouterr().out
+    assert "supports only the default box of the lattice" in capsys.readouterr().out

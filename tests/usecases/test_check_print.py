@@ -63,8 +63,8 @@ def test_a_part_that_must_not_be_printed_ends_with_status_6(tmp_path):
     ("options", "words"),
     [
         (["--printer", "form-9"], "no printer 'form-9'"),
-        (["--path", "alpha4"], "a path belongs to a unit"),
-        (["--up", "0", "0", "0"], "is no direction"),
+        (["--path", "alpha4"], "--path needs a unit"),
+        (["--up", "0", "0", "0"], "is not a direction"),
     ],
 )
 def test_wrong_input_is_refused_in_words(tmp_path, capsys, options, words):

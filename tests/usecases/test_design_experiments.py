@@ -40,7 +40,7 @@ def limits(experiments, noise=NOISE):
 
 
 @given(st.floats(0.1, 10.0))
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 def test_limits_are_in_proportion_to_the_noise(factor):
     experiments = planned(1)
     once = limits(experiments)

@@ -7,6 +7,7 @@ import tomllib
 import zipfile
 
 import attrs
+import lib3mf
 import numpy as np
 import pytest
 
@@ -106,7 +107,6 @@ def test_trees_of_the_package_are_what_the_core_specification_asks(exported):
 
 
 def test_both_packages_are_read_by_the_consortiums_own_library(exported):
-    lib3mf = pytest.importorskip("lib3mf")
     wrapper = lib3mf.get_wrapper()
     for name, meshes in (("unit.3mf", 1), ("unit-beams.3mf", 4)):
         model = wrapper.CreateModel()

@@ -46,7 +46,7 @@ def test_overcure_moves_every_surface_by_a_true_length():
 
 
 @given(st.floats(0.5, 2.0), st.floats(0.0, 0.25), st.floats(0.0, 0.4), st.floats(5.0, 50.0))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_the_lattice_gets_the_modulus_that_the_evidence_predicts_at_its_scale(scale, offset, excess, drawn):
     values = {
         "lattice_modulus_kPa": drawn,

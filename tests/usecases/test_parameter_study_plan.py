@@ -5,11 +5,12 @@ import tomllib
 import attrs
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
+from mu_addon.run.folder import keep_inputs, same_inputs
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.parameter_study.sampling import sample
 from mu_addon.usecases.parameter_study.sensitivity import main_effect, pareto_front
@@ -39,7 +40,6 @@ def occupied(points, strata):
     return [len(np.unique(np.floor(axis * strata))) for axis in points.T]
 
 
-@settings(deadline=None)
 @given(st.integers(1, 40), st.integers(1, 4), st.integers(1, 5), st.integers(0, 99))
 def test_a_latin_hypercube_that_is_added_to_is_one_again(count, times, dimensions, seed):
     first = sample("latin_hypercube", count, dimensions, seed)
@@ -50,7 +50,6 @@ def test_a_latin_hypercube_that_is_added_to_is_one_again(count, times, dimension
     assert ((more >= 0) & (more < 1)).all()
 
 
-@settings(deadline=None)
 @given(st.integers(2, 30), st.integers(1, 30), st.integers(1, 4))
 def test_points_that_are_added_fill_what_is_empty(count, added, dimensions):
     first = sample("latin_hypercube", count, dimensions, 3)
@@ -60,7 +59,6 @@ def test_points_that_are_added_fill_what_is_empty(count, added, dimensions):
     assert occupied(more, count + added) == [count + added - s for s in shared]
 
 
-@settings(deadline=None)
 @given(st.integers(1, 40), st.integers(1, 40), st.integers(1, 5))
 def test_a_longer_sobol_sequence_begins_as_the_shorter(count, added, dimensions):
     whole = sample("sobol", count + added, dimensions, 5)
@@ -161,7 +159,8 @@ def test_the_inputs_are_written_as_toml_that_says_the_same(tmp_path):
     assert document["vary"]["place.stations"] == {"low": 11, "high": 13, "log": False, "steps": 3}
     assert document["place"] == {"mesh_check": False, "rules": ["intersect"]}
     # How many points is no input: more may be added to those that are there.
-    assert attrs.evolve(plan, count=99).texts() == plan.texts()
+    keep_inputs(tmp_path, attrs.evolve(plan, count=99).texts())
+    assert same_inputs(tmp_path, plan.texts())
     again = parse_plan(
         text.replace("format = 1", 'format = 1\npreset = "mu-1.0x"\nstages = "place"'), tmp_path
     )

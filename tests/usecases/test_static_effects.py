@@ -336,7 +336,7 @@ def test_a_direction_of_nothing_that_weighs_is_told(tmp_path):
     (unit, effects), _, warned = given(modelled, "simulate", "--model", path, "--orientation", "90")
     assert unit == UNIT
     assert effects.tables == {"effects": named(clogged_chamber=0.3)}
-    assert warned == ["nothing here has weight, so that its direction changes nothing"]
+    assert warned == ["gravity is not part of this model, so the orientation has no effect"]
     path = model_file(tmp_path / "model.toml", gravity=1000.0)
     (_, effects), _, warned = given(modelled, "place", "--model", path, "--orientation", "90")
     assert effects == StaticEffects(named(gravity=1000.0), 90.0)

@@ -219,7 +219,7 @@ def test_without_blender_a_movie_is_refused_with_what_to_do(tmp_path, capsys, mo
     monkeypatch.setattr("mu_addon.cli.track.find_spec", lambda name: None)
     line = ["track", str(tmp_path / "bench.mp4"), "--markers", str(tmp_path / "bench.toml")]
     assert main([*line, "--pressure", str(tmp_path / "p.csv"), "--out", str(tmp_path / "out")]) == 2
-    assert "following markers needs Blender" in capsys.readouterr().err
+    assert "tracking markers needs Blender" in capsys.readouterr().err
 
 
 def test_a_marker_without_a_pixel_is_named(tmp_path):

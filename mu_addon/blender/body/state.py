@@ -10,7 +10,8 @@ import bpy
 import numpy as np
 
 from ...design.body import Body, Flaw, body_of, envelope, flaws, misfits
-from ...design.parameters import Dimensions, Unit
+from ...design.dimensions import Dimensions
+from ...design.parameters import Unit
 from ...errors import InputError
 from ...files import write_text
 

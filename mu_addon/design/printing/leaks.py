@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from .. import shapes
-from ..parameters import Dimensions, Unit
+from ..dimensions import Dimensions
+from ..parameters import Unit
 from .drain import Chambers, Opening
 from .finding import NOWHERE, Finding, Points, numbered
 from .neck import necks

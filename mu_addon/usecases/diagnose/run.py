@@ -101,7 +101,7 @@ def _resin(model: ExtendedModel, unit: Unit | None) -> list[str]:
     return [
         f"the lattice's modulus as drawn, {fitted.value:.3g} kPa, is that of a resin of "
         f"{fitted.value / 1e3 / drawn:.3g} MPa; the unit's walls have "
-        f"{unit.material.membrane_modulus_kPa / 1e3:.3g} MPa"
+        f"{unit.material.membrane_modulus_MPa:.3g} MPa"
     ]
 
 

@@ -16,13 +16,14 @@ import numpy as np
 from ...design.anchors import anchors
 from ...design.gripper import Gripper
 from ...errors import ConvergenceError, InputError
-from ...fem.equilibrium import Equilibrium, State
-from ...fem.kinematics import bending_angle_deg, probe
+from ...fem.equilibrium import Equilibrium
+from ...fem.kinematics import TipSection, probe
 from ...fem.loads import STANDARD_GRAVITY
 from ...fem.materials import Materials
 from ...fem.model import Model
 from ...fem.obstacle import CONTACT, Obstacle, outer_faces
 from ...fem.rigid import Box, Pose
+from ...fem.state import State
 from ...fem.time_stepping import simulate_in_time
 from ...meshing.mesh import Mesh
 from .phases import Phases
@@ -249,6 +250,7 @@ class _Hand:
     ) -> None:
         self.cube, self.grip, self.phases, self.mesh = cube, grip, phases, mesh
         self.anchors = anchors(gripper.unit)
+        self.tip = TipSection.of(mesh)
         self.place = place_of(gripper, grip)
         self.obstacle = obstacle_of(gripper, cube, grip, mesh)
         self.obstacle.path = self.pose
@@ -307,7 +309,7 @@ class _Hand:
         contact = self.obstacle.contact(state.u)
         self.rows.append(
             (
-                bending_angle_deg(self.mesh, state.u),
+                self.tip.angle_deg(state.u),
                 2.0 * float(contact.normal_N[1]),
                 2.0 * float(contact.force_N[2]),
                 2.0 * contact.area_mm2,

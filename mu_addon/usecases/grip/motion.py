@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 
 from ...design.gripper import Gripper
-from ...fem.equilibrium import State
+from ...design.quantity import in_MPa
 from ...fem.materials import Materials
+from ...fem.state import State
 from ...fem.trajectory import Trajectory
 from ...files import make_folder, write_npz
 from ...meshing.mesh import Mesh
@@ -36,7 +37,7 @@ MOST_SAMPLES = 1001
 def write_grasp(folder: Path, gripper: Gripper, mesh: Mesh, materials: Materials, found: Grasp) -> None:
     """Write a grasp's motion into `folder`. Raises OutputError."""
     make_folder(folder)
-    states = tuple(State(p / 1e3, u) for p, u in zip(found.pressure_kPa, found.u, strict=True))
+    states = tuple(State(in_MPa(p), u) for p, u in zip(found.pressure_kPa, found.u, strict=True))
     every = Trajectory(found.time_s, found.pressure_kPa, states, np.arange(len(states)))
     write_model_a(folder, mesh, materials, every)
     write_trajectory(folder / "finger.pvd", mesh, list(zip(found.time_s.tolist(), states, strict=True)))

@@ -89,7 +89,7 @@ def column(
     unit, grip = gripper.unit, grip or Grip()
     points = anchors(unit)
     monitored = (points, probe(mesh, points))
-    radius, sensor = unit.dimensions.inclusion_radius, unit.material.sensor_modulus_kPa / 1e3
+    radius, sensor = unit.dimensions.inclusion_radius, unit.material.sensor_modulus_MPa
     time, pressure = grasp_protocol().sample(TIMES)
     every = candidates(points, windows(len(points)))
     shares = {c.name: sensor_share(rule, roi(mesh, c, radius)) for c in every}

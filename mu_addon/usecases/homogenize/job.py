@@ -53,7 +53,7 @@ class Resin:
     def of_unit(cls, unit: Unit, known: Material) -> Resin:
         """The unit's own: its struts are printed with its membrane, of a known resin's density."""
         m = unit.material
-        modulus = m.membrane_modulus_kPa / 1e3
+        modulus = m.membrane_modulus_MPa
         return cls("that of the unit's membrane", modulus, m.membrane_poisson, known.density_g_per_ml)
 
     @classmethod

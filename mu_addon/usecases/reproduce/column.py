@@ -10,10 +10,12 @@ import numpy as np
 
 from ...design.anchors import anchors, windows
 from ...design.parameters import Unit
-from ...fem.equilibrium import Equilibrium, State, rest
-from ...fem.kinematics import bending_angle_deg, probe
+from ...design.quantity import in_kPa
+from ...fem.equilibrium import Equilibrium
+from ...fem.kinematics import TipSection, probe
 from ...fem.model import Model
 from ...fem.self_intersection import first_self_intersection
+from ...fem.state import State, rest
 from ...fem.trajectory import simulate
 from ...fem.unit import materials_of
 from ...meshing.mesh import Mesh
@@ -96,7 +98,8 @@ def motion(unit: Unit, mesh: Mesh, pressures_kPa: Sequence[float], look_for_cont
     pressure = np.unique([0.0, *pressures_kPa])
     body = Equilibrium(model, materials_of(unit, mesh))
     states = simulate(body, np.arange(len(pressure), dtype=float), pressure).states
-    angle = np.array([bending_angle_deg(mesh, s.u) for s in states])
+    tip = TipSection.of(mesh)
+    angle = np.array([tip.angle_deg(s.u) for s in states])
     crossing = _crossings(mesh, states) if look_for_contact else ()
     return Motion(pressure, angle, states, crossing)
 
@@ -107,7 +110,7 @@ def _crossings(mesh: Mesh, states: Sequence[State]) -> tuple[float, ...]:
         outward = sorted((s for s in states if s.pressure_MPa * sign > 0), key=lambda s: abs(s.pressure_MPa))
         contact = first_self_intersection(mesh, [rest(mesh), *outward]) if outward else None
         if contact is not None:
-            found.append(1e3 * contact.pressure_MPa)
+            found.append(in_kPa(contact.pressure_MPa))
     return tuple(found)
 
 
@@ -130,7 +133,7 @@ def paths(
         materials_of(unit, mesh),
         (points, monitor),
         shares,
-        unit.material.sensor_modulus_kPa / 1e3,
+        unit.material.sensor_modulus_MPa,
     )
     still = np.array([points + monitor.displacement(s.u) for s in states])
     apart = np.array([sweep.at(s) - at for s, at in zip(states, still, strict=True)])

@@ -14,7 +14,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.parameters import Dimensions, Unit
+from ...design.dimensions import Dimensions
+from ...design.parameters import Unit
 from ...errors import MeshingError
 from ...meshing.lattice import gmsh_model, load_gmsh
 from ...meshing.membrane import Meridian, division, membrane_mesh, stations

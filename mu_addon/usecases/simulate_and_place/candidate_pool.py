@@ -14,10 +14,10 @@ import attrs
 import numpy as np
 
 from ...errors import MuError
-from ...fem.equilibrium import State
 from ...fem.kinematics import probe
 from ...fem.materials import Materials
 from ...fem.model import Model
+from ...fem.state import State
 from ...meshing.mesh import Mesh
 from ...placement.batch import CandidateBatch
 from ...placement.candidates import Candidate, roi

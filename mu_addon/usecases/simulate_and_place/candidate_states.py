@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from ...design.anchors import anchors
-from ...fem.equilibrium import State
+from ...design.quantity import in_kPa, in_MPa
 from ...fem.kinematics import probe
+from ...fem.state import State
 from ...fem.trajectory import Trajectory
 from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, Evaluation, evaluation
@@ -46,7 +47,7 @@ class CandidateSolver:
         unit = job.unit
         self._anchors = anchors(unit)
         self._radius = unit.dimensions.inclusion_radius
-        sensor = unit.material.sensor_modulus_kPa / 1e3
+        sensor = unit.material.sensor_modulus_MPa
         materials = job.materials(mesh)
         self._whole = tuple(i for i, (_, rule) in enumerate(jobs) if rule == whole)
         self._sweeper = CandidatePool(
@@ -66,7 +67,7 @@ class CandidateSolver:
             sensor,
             *job.effects.parts,
         )
-        distinct = np.unique(pressure_kPa) / 1e3
+        distinct = in_MPa(np.unique(pressure_kPa))
         # What is solved whatever comes of it; the rest only where these do not tell enough.
         self._certain = {float(distinct[i]) for pair in self._rounds(distinct)[:2] for i in pair}
         self.solved_kPa: list[float] = []
@@ -118,7 +119,7 @@ class CandidateSolver:
                 break
         if verify and known and not self._independent_of_path(distinct, known, still):
             known = self._along_paths(distinct, still, known)
-        self.solved_kPa = sorted(float(distinct[n]) * 1e3 for n in known)
+        self.solved_kPa = sorted(in_kPa(float(distinct[n])) for n in known)
         difference = between(distinct, known) if known else np.zeros((len(distinct), len(self._jobs), 1, 3))
         baseline = trajectory.of_time(still)
         moved = baseline[:, None] + trajectory.of_time(difference)
@@ -189,9 +190,9 @@ class CandidateSolver:
         solved from rest instead.
         """
         found = {
-            s.pressure_MPa * 1e3: self._cache.get("whole", self._name(s))
+            s.pressure_kPa: self._cache.get("whole", self._name(s))
             for s in trajectory.states
-            if any(abs(s.pressure_MPa * 1e3 - p) < 1e-9 for p in self.solved_kPa)
+            if any(abs(s.pressure_kPa - p) < 1e-9 for p in self.solved_kPa)
         }
         if self.path_difference_mm > PATH_DIFFERENCE_MM or not found:
             return

@@ -159,7 +159,7 @@ def _predicted(study: Study, graph: Graph, chains: list[tuple[int, ...]], rule: 
     found = response(
         model,
         study.job.materials(study.mesh),
-        unit.material.sensor_modulus_kPa / 1e3,
+        unit.material.sensor_modulus_MPa,
         study.trajectory,
         monitor,
         graph,

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import attrs
+import numpy as np
 
 from ...design.anchors import windows
 from ...design.assets import asset_root
@@ -30,9 +32,9 @@ from .study_file import FILES, NAME, STAGES, Tables, compose, holds, read_run
 from .study_file import read as read_tables
 
 if TYPE_CHECKING:
-    from ...fem.descent import NewtonSettings
     from ...fem.materials import Materials
     from ...fem.model import Model
+    from ...fem.newton_settings import NewtonSettings
     from ...meshing.mesh import Mesh
 
 GRASP = "protocols/grasp.csv"
@@ -102,13 +104,18 @@ class Job:
                 "clogged_chamber, paths",
                 "leave one of them out",
             )
-        _, pressure = self.protocol.sample(self.times)
+        _, pressure = self.samples
         if not pressure.any():
             raise InputError(
                 f"none of the {self.times} samples of the protocol has any pressure",
                 "times",
                 "give more samples, or a protocol that leaves 0 kPa",
             )
+
+    @cached_property
+    def samples(self) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+        """Time in s and pressure in kPa, (k,) each, at which the protocol is solved."""
+        return self.protocol.sample(self.times)
 
     def tables(self) -> Tables:
         """Everything that decides the results, a table a stage, as study.toml has it.

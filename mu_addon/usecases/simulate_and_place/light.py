@@ -10,7 +10,6 @@ import numpy as np
 
 from ...design.waveguide import waveguide
 from ...errors import InputError
-from ...fem.kinematics import bending_angle_deg
 from ...files import write_csv
 from ...report.results import Checks, Signals
 from ...run.cache import key
@@ -54,7 +53,7 @@ def _signals(study: Study, optics: Optics) -> Signals:
         # What no pressure acts on comes first, whether or not a sample meets it.
         still = next((s.u for s in states if not s.pressure_MPa), np.zeros_like(study.mesh.nodes))
         displacements = [still, *(s.u for s in states)]
-        angle = np.array([bending_angle_deg(study.mesh, u) + 0.0 for u in displacements])
+        angle = np.array([study.bending_angle_deg(u) + 0.0 for u in displacements])
         joints = Joints.of(study.mesh, study.anchors, unit.dimensions.cell)
         moved = [joints.moved(u) for u in displacements]
         bars = _bars(study)

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from ...design.quantity import in_kPa
 from ...errors import InputError
 from ...fem.embedding import Embedding, embed
 from ...files import read_npz, write_npz
@@ -215,7 +216,7 @@ def write_model_a(folder: Path, mesh: Mesh, materials: Materials, trajectory: Tr
             "time_s": trajectory.time_s,
             "pressure_kPa": trajectory.pressure_kPa,
             "state": trajectory.index,
-            "state_kPa": np.array([s.pressure_MPa * 1e3 for s in trajectory.states]),
+            "state_kPa": np.array([s.pressure_kPa for s in trajectory.states]),
             "displacement_mm": np.array([s.u for s in trajectory.states], np.float32),
             **found,
         },
@@ -241,7 +242,7 @@ class SurfaceFields:
         for u in displacements:
             sigma, F = cauchy(self._mesh, u, materials)
             for region, mean in self._means.items():
-                stress_kPa = 1e3 * mean(sigma)[self._places[region]]
+                stress_kPa = in_kPa(mean(sigma))[self._places[region]]
                 stretch = stretches(mean(F)[self._places[region]])
                 principal = np.linalg.eigvalsh(stress_kPa)[:, 2]
                 values = von_mises(stress_kPa), principal, stretch[:, 2], stretch[:, 0]

@@ -37,7 +37,7 @@ def evaluations(
     """
     unit, materials = job.unit, job.materials(mesh)
     points, radius = anchors(unit), unit.dimensions.inclusion_radius
-    sensor = unit.material.sensor_modulus_kPa / 1e3
+    sensor = unit.material.sensor_modulus_MPa
     time, pressure = trajectory.time_s, trajectory.pressure_kPa
     setting = CandidateProblem(mesh, materials, points, tuple(jobs), radius, sensor, study=job)
     contact = CONTACT, PRESSURE_MPa, DEPTH_mm, HALVINGS, [o.friction for o in job.obstacles]

@@ -40,13 +40,13 @@ def keep_motion(
     both = {r: n if image is None else np.concatenate([n, image[n]]) for r, n in nodes.items()}
     looked, materials = SurfaceFields(mesh, both), job.materials(mesh)
     candidates = {candidate.name: candidate for candidate, of in jobs if of == rule}
-    by_pressure = {state.pressure_MPa * 1e3: state.u for state in trajectory.states}
+    by_pressure = {state.pressure_kPa: state.u for state in trajectory.states}
     without: dict[str, Array] = {}
     for name, pressure_kPa, difference_mm in sweep.whole(trajectory):
         still = [by_pressure[p] for p in pressure_kPa]
         without = without or looked.of_states(still, materials)
         share = sensor_share(rule, roi(mesh, candidates[name], unit.dimensions.inclusion_radius))
-        stiff = with_sensor(materials, share, unit.material.sensor_modulus_kPa / 1e3)
+        stiff = with_sensor(materials, share, unit.material.sensor_modulus_MPa)
         moved = [u + apart for u, apart in zip(still, difference_mm, strict=True)]
         fields = {key: values - without[key] for key, values in looked.of_states(moved, stiff).items()}
         further = {}

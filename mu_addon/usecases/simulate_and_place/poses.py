@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 
 from ...errors import InputError
-from ...fem.kinematics import bending_angle_deg
+from ...fem.kinematics import TipSection
 from .motion import Motion
 
 Array = np.ndarray[Any, Any]
@@ -49,7 +49,8 @@ class Poses:
 def poses(motion: Motion) -> Poses:
     """The states that an angle belongs to; raises InputError where the motion does not bend about rest."""
     order = np.argsort(motion.state_kPa, kind="stable")
-    angles = np.array([bending_angle_deg(motion.mesh, motion.model_a[k].astype(float)) for k in order])
+    tip = TipSection.of(motion.mesh)
+    angles = np.array([tip.angle_deg(motion.model_a[k].astype(float)) for k in order])
     pressure = motion.state_kPa[order]
     rest = int(np.argmin(np.abs(pressure)))
     first = last = rest

@@ -10,7 +10,6 @@ import numpy as np
 from ...design.parameters import SECTIONS, assumed
 from ...design.quantity import describe
 from ...evidence.unit_effects import EFFECTS
-from ...fem.kinematics import bending_angle_deg
 from ...files import write_bytes
 from ...report.results import Gate, Parameter, Path, Picture, ReportData, RuleResult, SideView
 from ...run.versions import package_versions
@@ -72,8 +71,8 @@ def _panel_pictures(study: Study) -> None:
     if study.trajectory is None or study.mesh is None:
         return
     states = study.trajectory.states
-    angles = np.array([bending_angle_deg(study.mesh, s.u) for s in states])
-    write_angle(study.folder, np.array([s.pressure_MPa * 1e3 for s in states]), angles)
+    angles = np.array([study.bending_angle_deg(s.u) for s in states])
+    write_angle(study.folder, np.array([s.pressure_kPa for s in states]), angles)
     rule = study.job.headline_rule
     found = [e for e in study.evaluations.values() if e.rule == rule]
     top = max((float(e.deviation.delta.max()) for e in found), default=0.0)
@@ -93,7 +92,7 @@ def report_data(
     job, d = study.job, study.job.unit.dimensions
     windows = study.windows
     complete = all((w.name, rule) in study.evaluations for w in windows for rule in job.rules)
-    time, pressure = job.protocol.sample(job.times)
+    time, pressure = job.samples
     states = study.trajectory.states if study.trajectory else tuple(study.states)
     if not job.obstacles:
         # One state a pressure; beside obstacles one an instant, in the order of time.
@@ -115,8 +114,8 @@ def report_data(
         light=study.light,
         contact=study.contact,
         effects=tuple(_effect_words(job.effects)),
-        pressure_kPa=np.array([s.pressure_MPa * 1e3 for s in states]),
-        angle_deg=np.array([bending_angle_deg(study.mesh, s.u) for s in states if study.mesh]),
+        pressure_kPa=np.array([s.pressure_kPa for s in states]),
+        angle_deg=np.array([study.bending_angle_deg(s.u) for s in states if study.mesh]),
         protocol_s=time if states else np.zeros(0),
         protocol_kPa=pressure if states else np.zeros(0),
         parameters=_parameters(study),
@@ -275,8 +274,8 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
         shown = list({state.pressure_MPa: state for state in shown}.values())
         texts = []
         for state in shown:
-            angle = bending_angle_deg(study.mesh, state.u) + 0.0
-            words = f"{state.pressure_MPa * 1e3:g} kPa: {angle:.1f}°"
+            angle = study.bending_angle_deg(state.u) + 0.0
+            words = f"{state.pressure_kPa:g} kPa: {angle:.1f}°"
             texts.append((state.u, words, f"The analysis mesh at {words}."))
         pictures += motion(study.mesh, texts, beside=study.job.obstacles)
     return side_view(parts, study.anchors, path, radius), pictures

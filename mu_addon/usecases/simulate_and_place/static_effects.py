@@ -13,7 +13,7 @@ from ...design.toml_text import nearest
 from ...errors import InputError
 from ...evidence.effect import LIBRARY
 from ...evidence.unit_effects import EFFECTS, SMOOTH, Body
-from ...fem.descent import NewtonSettings
+from ...fem.newton_settings import NewtonSettings
 
 if TYPE_CHECKING:
     from ...design.parameters import Unit

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import warnings
 from contextlib import closing
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +15,17 @@ import numpy as np
 from ...design.anchors import Window, anchors, windows
 from ...design.export import write_nodes, write_stl
 from ...design.parameters import Material
+from ...design.quantity import in_kPa
 from ...design.solid import Solid, build_solid
 from ...design.strut_cell import strut_cell
 from ...errors import ConvergenceError, MeshingError
-from ...fem.equilibrium import Equilibrium, State, rest
-from ...fem.kinematics import bending_angle_deg
+from ...fem.equilibrium import Equilibrium
+from ...fem.kinematics import TipSection
 from ...fem.lattice_law import deformation_gradients, stretches
 from ...fem.model import Model
 from ...fem.obstacle import Contact as Touch
 from ...fem.self_intersection import first_self_intersection
+from ...fem.state import State, rest
 from ...fem.time_stepping import Instant, simulate_in_time
 from ...fem.trajectory import Trajectory, simulate
 from ...files import write_csv, write_npz
@@ -122,9 +125,18 @@ class Study:
         if job.mesh.order == 1:
             self.warn("Linear elements lock in thin walls: these answers are for a quick look only.")
 
+    @cached_property
+    def _tip(self) -> TipSection:
+        assert self.mesh is not None
+        return TipSection.of(self.mesh)
+
+    def bending_angle_deg(self, u: Array) -> float:
+        """Bending angle in degrees of the study's mesh under displacements (n, 3) in mm."""
+        return self._tip.angle_deg(u)
+
     def _require_space(self, nodes: int) -> None:
         """Raise OutputError where the disk has less room than a study with so many nodes takes."""
-        _, pressure = self.job.protocol.sample(self.job.times)
+        _, pressure = self.job.samples
         per_node = _BYTES_A_NODE["place" if "place" in self.job.stages else "simulate"]
         require_space(self.folder, _BYTES[self.job.quality] + nodes * per_node * len(np.unique(pressure)))
 
@@ -211,7 +223,7 @@ class Study:
         candidates_beside: whether other processes go on with the candidates as soon as a state is there.
         """
         assert self.mesh is not None
-        time, pressure = self.job.protocol.sample(self.job.times)
+        time, pressure = self.job.samples
         with self.progress.stage("Model A"):
             model = self.job.model(self.mesh)
             if candidates_beside and self.job.workers > 1 and not self.job.obstacles:
@@ -260,9 +272,7 @@ class Study:
         def keep(state: State) -> None:
             nonlocal done
             done += 1
-            self.progress.update(
-                done / total, f"{state.pressure_MPa * 1e3:.4g} kPa, residual {state.residual:.1e}"
-            )
+            self.progress.update(done / total, f"{state.pressure_kPa:.4g} kPa, residual {state.residual:.1e}")
             on_state(state)
 
         return simulate(
@@ -296,7 +306,7 @@ class Study:
             found.append([o.contact(state.u) for o in model.obstacles])
             force = sum(float(np.linalg.norm(c.force_N)) for c in found[-1])
             self.progress.update(
-                len(found) / len(time), f"{state.pressure_MPa * 1e3:.4g} kPa, contact {force:.3g} N"
+                len(found) / len(time), f"{state.pressure_kPa:.4g} kPa, contact {force:.3g} N"
             )
             on_state(state)
 
@@ -342,27 +352,27 @@ class Study:
             self._write_in_time(states)
             return
         ordered = sorted(states, key=lambda s: s.pressure_MPa)
-        angles = [bending_angle_deg(self.mesh, s.u) for s in ordered]
-        pressures = [s.pressure_MPa * 1e3 for s in ordered]
+        angles = [self.bending_angle_deg(s.u) for s in ordered]
+        pressures = [s.pressure_kPa for s in ordered]
         write_csv(
             self.folder / "angle.csv",
             ["pressure_kPa", "angle_deg"],
             [(f"{p:.6g}", f"{a:.6g}") for p, a in zip(pressures, angles, strict=True)],
         )
         self.context.summary["angle_deg"] = {f"{p:.6g}": a for p, a in zip(pressures, angles, strict=True)}
-        by_pressure = {round(s.pressure_MPa * 1e3, 9): s for s in ordered}
-        time, pressure = self.job.protocol.sample(self.job.times)
+        by_pressure = {round(s.pressure_kPa, 9): s for s in ordered}
+        time, pressure = self.job.samples
         reached = [(t, by_pressure[p]) for t, p in zip(time, pressure, strict=True) if p in by_pressure]
         write_trajectory(self.folder / "model_a.pvd", self.mesh, reached)
 
     def _write_in_time(self, states: Any) -> None:
         """As `_write_motion`, of states an instant: what touches moves otherwise on the way back."""
         assert self.mesh is not None
-        time, _ = self.job.protocol.sample(self.job.times)
+        time, _ = self.job.samples
         reached = list(zip(time.tolist(), states, strict=False))
-        angles = [bending_angle_deg(self.mesh, s.u) for _, s in reached]
+        angles = [self.bending_angle_deg(s.u) for _, s in reached]
         rows = [
-            (f"{t:.9g}", f"{s.pressure_MPa * 1e3:.6g}", f"{a:.6g}")
+            (f"{t:.9g}", f"{s.pressure_kPa:.6g}", f"{a:.6g}")
             for (t, s), a in zip(reached, angles, strict=True)
         ]
         write_csv(self.folder / "angle.csv", ["time_s", "pressure_kPa", "angle_deg"], rows)
@@ -390,7 +400,7 @@ class Study:
             contact = first_self_intersection(self.mesh, [rest(self.mesh), *still, *outward])
             if contact is None:
                 continue
-            pressure = f"{contact.pressure_MPa * 1e3:.4g}"
+            pressure = f"{in_kPa(contact.pressure_MPa):.4g}"
             found[pressure] = [str(c) for c in contact.crossings]
             self.warn(
                 f"From {pressure} kPa on, walls pass through each other: {contact.crossings[0]}. Nothing "
@@ -414,7 +424,7 @@ class Study:
             beyond = (a[:, :, 0] < low) | (a[:, :, 2] > high)
             # One point an element: it takes a while.
             lost = ellipticity(law, F[:, 0]) <= 0
-            found[f"{state.pressure_MPa * 1e3:.6g}"] = {
+            found[f"{state.pressure_kPa:.6g}"] = {
                 "least": float(a.min()),
                 "largest": float(a.max()),
                 "share_beyond_fit": float((volume * beyond).sum() / volume.sum()),
@@ -509,13 +519,13 @@ class Study:
         """
         assert self.trajectory is not None
         coarse = attrs.evolve(self.job.mesh, refine=self.job.mesh.refine * COARSER)
-        _, pressure = self.job.protocol.sample(self.job.times)
+        _, pressure = self.job.samples
         chosen = extremes(pressure)
         instants = [int(np.flatnonzero(pressure == p)[0]) for p in chosen]
         time = np.arange(len(chosen), dtype=float)
         if self.job.obstacles:
             # What friction remembers is of the whole protocol.
-            time, chosen = self.job.protocol.sample(self.job.times)
+            time, chosen = self.job.samples
             instants = list(range(len(time)))
         with self.progress.stage("mesh check"):
             mesh = self._mesh(coarse)
@@ -545,7 +555,7 @@ class Study:
             summary["J_cont_mm"][rule] = {e.name: e.deviation.J_cont for e in found}
         columns = ["path", "start", "length", "rule", "J_hat_mm", "J_cont_mm", "rank"]
         write_csv(self.folder / "deviation.csv", columns, rows)
-        time, pressure = self.job.protocol.sample(self.job.times)
+        time, pressure = self.job.samples
         arrays |= {
             "path": np.array([c.name for c in every]),
             "time_s": time,
@@ -582,7 +592,7 @@ class Study:
     def _warn_of_missed_corners(self) -> None:
         """Say where uniform samples miss the protocol's extremes."""
         corners = self.job.protocol.pressure_kPa
-        _, samples = self.job.protocol.sample(self.job.times)
+        _, samples = self.job.samples
         for extreme, met in ((corners.min(), samples.min()), (corners.max(), samples.max())):
             if abs(extreme - met) > 1e-6:
                 self.warn(

@@ -68,7 +68,7 @@ def test_a_wedge_is_no_thin_wall():
     assert (found.cosine[thin] > -0.9).all()
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(width=st.floats(0.05, 2.0), turn=st.floats(0.0, 360.0))
 def test_a_slot_is_as_wide_as_it_is(width, turn):
     body = box(8, 8, 8) - box(width, 10, 6).translate([0, 0, 3])
@@ -81,7 +81,7 @@ def test_a_slot_is_as_wide_as_it_is(width, turn):
 # Grids.
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(way=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda w: sum(x * x for x in w) > 0.1))
 def test_columns_fill_the_same_volume_along_any_direction(way):
     body = shapes.ball(4.0, 48) - shapes.cylinder(1.0, -6, 6, 32)
@@ -271,7 +271,7 @@ def test_winding_counts_how_often_a_surface_goes_round():
     assert faces.winding(np.zeros(3), corners[:, ::-1]) == pytest.approx(-1.0)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000))
 def test_near_pairs_are_those_whose_boxes_overlap(seed):
     rng = np.random.default_rng(seed)

@@ -1,0 +1,71 @@
+"""The true lengths of a unit at its scale, which geometry and meshes are made from."""
+
+from __future__ import annotations
+
+import attrs
+
+from . import lattices
+
+
+@attrs.frozen
+class Dimensions:
+    """Lengths in mm at scale: U = `cell`, apex and neck radii R and r, arc half-lengths a and b."""
+
+    scale: float
+    cell: float
+    count: int
+    R: float
+    r: float
+    a: float
+    b: float
+    wall: float
+    base_cap: float
+    tip_cap: float
+    inlet_radius: float
+    inlet_length: float
+    inlet_wall: float
+    cells_x: int
+    cells_y_minus: int
+    cells_y_plus: int
+    kind: lattices.LatticeKind
+    junction_diameter: float
+    midspan_diameter: float
+    row: int
+    waveguide_section: float
+    waveguide_end: float
+    well_width: float
+    well_depth: float
+    well_pitch: float
+    seats: bool
+    part_length: float
+    part_width: float
+    part_height: float
+    seat_clearance: float
+    seat_wall: float
+    cable: float
+    inclusion_radius: float
+
+    @property
+    def height(self) -> float:
+        """Length of the unit along z without the inlet boss."""
+        return self.count * self.cell
+
+    @property
+    def joint_radius(self) -> float:
+        """Radius where bladder and neck meet with one slope."""
+        return (self.R * self.b + self.r * self.a) / (self.a + self.b)
+
+    @property
+    def apex_curvature_radius(self) -> float:
+        """Radius of curvature of the profile at an apex: the thickest wall before the inner offset folds."""
+        return self.a * (self.a + self.b) / (2.0 * (self.R - self.r))
+
+    @property
+    def bounds(self) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
+        """Box of the lattice envelope as (low, high) for x, y and z."""
+        x = self.cell * self.cells_x / 2.0
+        return (
+            (-x, x),
+            (-self.cell * (self.cells_y_minus + 0.5), self.cell * (self.cells_y_plus + 0.5)),
+            (0.0, self.height),
+        )

@@ -1,0 +1,28 @@
+"""Tolerances and limits of Newton's method."""
+
+from __future__ import annotations
+
+import attrs
+
+
+@attrs.frozen
+class NewtonSettings:
+    """When a state counts as converged, and how far the solver goes to get there."""
+
+    tolerance: float = 1e-9  # residual over the root sum of squares of all element forces
+    max_iterations: int = 60
+    max_factorisations: int = 12
+    # A factor is kept while each step with it shrinks the residual by at least this much: at 50k unknowns
+    # a factorisation costs as much as eight steps.
+    keep_factor: float = 0.7
+    max_step_MPa: float = 0.01
+    min_step_MPa: float = 1e-4
+    max_backtracks: int = 6
+    # Shares of the undeformed body's tangent added, in turn, to one that is not definite.
+    regularisation: tuple[float, ...] = (0.03, 0.3, 3.0, 30.0)
+    # A state may lie this much of the predicted move away from its prediction.
+    predictor_tolerance: float = 0.5
+    # Many bodies on one factorisation: their tolerance, which leaves less than 1e-6 mm on the unit, and the
+    # steps after which a body goes on with its own.
+    shared_tolerance: float = 2e-8
+    max_shared_steps: int = 40

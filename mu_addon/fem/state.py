@@ -1,0 +1,53 @@
+"""States of a body in equilibrium, and the undeformed one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..design.quantity import in_kPa
+from ..meshing.mesh import Mesh
+
+Array = np.ndarray[Any, Any]
+
+
+@attrs.frozen(eq=False)
+class State:
+    """A converged equilibrium: pressure in MPa, displacement (n, 3) in mm, relative residual, cost."""
+
+    pressure_MPa: float
+    u: Array
+    residual: float = 0.0
+    iterations: int = 0
+    factorisations: int = 0
+
+    @property
+    def pressure_kPa(self) -> float:
+        """Pressure in kPa, as files and people have it."""
+        return in_kPa(self.pressure_MPa)
+
+    @property
+    def loaded(self) -> bool:
+        """Whether anything acts on the body: without pressure and weight it is as drawn."""
+        return bool(self.pressure_MPa) or bool(self.u.any())
+
+
+def extrapolate(points: Sequence[State], pressure: float) -> Array:
+    """Displacement (n, 3) at another pressure of the polynomial through some states."""
+    u = np.zeros_like(points[-1].u)
+    for a in points:
+        weight = 1.0
+        for b in points:
+            if a is not b:
+                weight *= (pressure - b.pressure_MPa) / (a.pressure_MPa - b.pressure_MPa)
+        u += weight * a.u
+    return u
+
+
+def rest(mesh: Mesh) -> State:
+    """The undeformed, unloaded state of a mesh; where something has weight ask
+    `Equilibrium.at_zero_pressure`."""
+    return State(0.0, np.zeros_like(mesh.nodes))
