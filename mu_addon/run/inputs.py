@@ -12,7 +12,7 @@ from typing import Any, TypeVar, Union
 
 import attrs
 
-from ..errors import InputError, MuError
+from ..errors import InputError
 from .folder import RUN
 
 FORMAT = 1
@@ -85,8 +85,8 @@ def structured(kind: type[Made], table: Any, where: str, **given: Any) -> Made:
     values = {key: _value(hints[key], value, f"{where}, {key}") for key, value in table.items()}
     try:
         return kind(**values, **given)
-    except MuError:
-        raise
+    except InputError as error:
+        raise InputError(error.what, f"{where}, {error.where}", error.remedy) from error
     except (TypeError, ValueError) as error:
         raise InputError(f"a value is not offered: {error.args[0]}", where, "correct that key") from error
 

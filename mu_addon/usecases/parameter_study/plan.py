@@ -158,7 +158,7 @@ def read_plan_of_run(folder: Path) -> Plan:
 def _plan_of(document: dict[str, Any], folder: Path, where: str, files: Path | None = None) -> Plan:
     """The sweep of a document; files: where those lie that its variables name, its own folder without."""
     for key in document:
-        if key not in _KEYS:
+        if key not in (*_KEYS, RUN):
             raise InputError(f"unknown key {key!r}{nearest(key, _KEYS)}", where, f"known: {', '.join(_KEYS)}")
     if document.get("format") != FORMAT or isinstance(document.get("format"), bool):
         raise InputError(f"format = {document.get('format', 'missing')}", where, f"write format = {FORMAT}")
