@@ -7,6 +7,8 @@ blender -b -P headless/run.py -- place --preset mu-1.0x --out out
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -15,6 +17,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 ROOT = Path(__file__).resolve().parent.parent
+CHILD_MAIN = ROOT / "mu_addon" / "blender" / "jobs" / "child_main.py"
 
 
 def arguments() -> list[str]:
@@ -25,8 +28,61 @@ def arguments() -> list[str]:
     return [] if "bpy" in sys.modules and not sys.argv[0].endswith("run.py") else sys.argv[1:]
 
 
+def extension_packages() -> list[Path]:
+    """Folders where Blender unpacks the wheels of installed extensions, whether these are enabled or not."""
+    import bpy
+
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    root = Path(bpy.utils.user_resource("EXTENSIONS"), ".local")
+    return [
+        p for p in (root / "lib" / version / "site-packages", root / "Lib" / "site-packages") if p.is_dir()
+    ]
+
+
+def in_own_process(line: list[str]) -> int:
+    """Run a command line in a process without Blender; returns its exit status.
+
+    A process that Blender has loaded its libraries into cannot solve, see `mu_addon.run.interpreter`. Ctrl-C
+    reaches the child as it reaches this process, SIGTERM is passed on, and the child ends when this process
+    is killed.
+    """
+    import bpy
+
+    from mu_addon.errors import InputError
+    from mu_addon.run.interpreter import environment, worker_command
+
+    try:
+        command = worker_command(CHILD_MAIN, line, bpy.app.binary_path)
+    except InputError as error:
+        sys.stderr.write(f"error: {error}\n")
+        return error.status
+    # Commands that take words from standard input need the user's own.
+    reads = "--controlled" in line
+    settings = {**environment(extension_packages()), **({} if reads else {"MU_ENDS_WITH_INPUT": "1"})}
+    child = subprocess.Popen(command, env=settings, stdin=None if reads else subprocess.PIPE)
+    signal.signal(signal.SIGTERM, lambda number, frame: child.terminate())
+    while True:
+        try:
+            return child.wait()
+        except KeyboardInterrupt:
+            continue
+
+
+def main(line: list[str]) -> int:
+    """Run a command line here, or, inside Blender, in a process of its own; returns the exit status."""
+    if "bpy" in sys.modules:
+        return in_own_process(line)
+    try:
+        from mu_addon.cli.main import main as run
+    except ModuleNotFoundError as error:
+        sys.stderr.write(
+            f"error: the package {error.name} is not installed\n  where: {sys.executable}\n"
+            f"  what to do: {sys.executable} -m pip install -e {ROOT}\n"
+        )
+        return 1
+    return run(line)
+
+
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
-    from mu_addon.cli.main import main
-
     sys.exit(main(arguments()))

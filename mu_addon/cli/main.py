@@ -56,7 +56,7 @@ def main(arguments: list[str]) -> int:
 
     # Only now, so that --help answers at once.
     from ..run.context import run_to_end
-    from ..run.progress import Progress, json_lines, terminal
+    from ..run.progress import Progress, json_lines, printable, terminal
 
     json = getattr(options, "json", False)
     progress = Progress([json_lines(sys.stdout) if json else terminal(sys.stderr)])
@@ -64,5 +64,6 @@ def main(arguments: list[str]) -> int:
         command.run(options, context)
     if context.status == 0 and not json:
         results = [f"results: {context.folder}"] if context.folder is not None else []
-        sys.stdout.write("\n".join([*results, *context.console_summary(context.summary)]) + "\n")
+        lines = [*results, *context.console_summary(context.summary)]
+        sys.stdout.write(printable("\n".join(lines), sys.stdout) + "\n")
     return context.status

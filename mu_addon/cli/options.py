@@ -55,6 +55,18 @@ def add_orientation(command: argparse.ArgumentParser) -> None:
     )
 
 
+def add_resin(command: argparse.ArgumentParser) -> None:
+    """--resin, what the wall is made of."""
+    command.add_argument(
+        "--resin",
+        dest="wall_resin",
+        metavar="NAME|FILE",
+        help="Material of the wall: a name of the library or a material file, such as the material.toml of "
+        "`fit-material`. Its moduli, law and memory replace those of the unit's [material] and [wall] "
+        "(default: those of the unit).",
+    )
+
+
 def add_measured_folder(command: argparse.ArgumentParser, help_: str = "") -> None:
     """FOLDER, a folder of measured data."""
     words = help_ or "Folder of measured data: experiments.toml and its CSV files."
@@ -72,11 +84,17 @@ def require_out(options: argparse.Namespace) -> None:
 
 
 def unit_of(options: argparse.Namespace) -> Unit:
-    """The unit that --preset or --unit names; raises InputError."""
+    """The unit that --preset or --unit names, with the wall of --resin; raises InputError."""
     from ..design.parameters import load_preset, read_unit
 
     require_out(options)
-    return load_preset(options.preset) if options.preset is not None else read_unit(options.unit)
+    unit = load_preset(options.preset) if options.preset is not None else read_unit(options.unit)
+    resin = getattr(options, "wall_resin", None)
+    if resin is None:
+        return unit
+    from ..materials.library import load_material, read_material
+
+    return (read_material(resin) if resin.endswith(".toml") else load_material(resin)).in_unit(unit)
 
 
 def unit_if_named(options: argparse.Namespace) -> Unit | None:

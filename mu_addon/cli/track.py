@@ -77,6 +77,6 @@ def _tracker() -> Tracker:
                 "give a CSV of pixel positions from another tracker",
             )
         # By name: the command line knows the core, and Blender's side only where it is asked for.
-        return import_module("...blender.tracking", __package__).follow(clip, marks)
+        return import_module("..blender.track.state", __package__).track_markers(clip, marks)
 
     return follow

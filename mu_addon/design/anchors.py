@@ -27,7 +27,7 @@ class Window(NamedTuple):
         return range(self.start - 1, self.start - 1 + self.length)
 
 
-def anchors(unit: Unit) -> NDArray[np.float64]:
+def anchor_points(unit: Unit) -> NDArray[np.float64]:
     """Anchors P1..Pn (n, 3) in mm, from the inlet: the cell centres of column x = 0 in the anchor row."""
     d = unit.dimensions
     z = (np.arange(d.count) + 0.5) * d.cell

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -15,7 +16,8 @@ from . import lattices, rules, toml_text
 from .assets import asset_file, asset_names
 from .dimensions import Dimensions
 from .printed import as_printed
-from .quantity import PAPER, choice, describe, in_MPa, quantity
+from .quantity import PAPER, Description, choice, describe, in_MPa, quantity
+from .wall import Wall, require_used
 
 FORMAT = 1
 
@@ -382,6 +384,7 @@ class Unit:
     waveguide: Waveguide = Waveguide()
     print: Printing = Printing()
     material: Material = Material()
+    wall: Wall = attrs.field(factory=Wall)
 
     def __attrs_post_init__(self) -> None:
         rules.check(self.dimensions, self.lattice.allow_symmetric)
@@ -439,7 +442,7 @@ class Unit:
         return hashlib.sha256(to_toml(self, comments=False).encode()).hexdigest()
 
 
-SECTIONS: tuple[type, ...] = (Chambers, Envelope, Waveguide, Printing, Material)
+SECTIONS: tuple[type, ...] = (Chambers, Envelope, Waveguide, Printing, Material, Wall)
 
 
 class Assumption(NamedTuple):
@@ -454,24 +457,33 @@ class Assumption(NamedTuple):
 def assumed(unit: Unit) -> list[Assumption]:
     """Every value of the unit that is not the paper's: path `section.name`, value, unit, reason."""
     found = []
+    for section, d, value in stated(unit):
+        if d.assumed:
+            reason = d.source.removeprefix("assumed: ")
+            if value != d.default:
+                reason = f"chosen by the user (default {d.default!r}: {reason})"
+            found.append(Assumption(f"{section}.{d.name}", value, d.unit, reason))
+    return found
+
+
+def stated(unit: Unit) -> Iterator[tuple[str, Description, Any]]:
+    """Section, description and value of every parameter that counts, in the order of the unit's file.
+
+    Those of a wall's law are left out where its law has none of that name.
+    """
     for section in SECTIONS:
         values = getattr(unit, _attribute(section))
+        names = getattr(values, "names", None)
         for d in describe(section):
-            value = getattr(values, d.name)
-            if d.assumed:
-                reason = d.source.removeprefix("assumed: ")
-                if value != d.default:
-                    reason = f"chosen by the user (default {d.default!r}: {reason})"
-                found.append(Assumption(f"{_attribute(section)}.{d.name}", value, d.unit, reason))
-    return found
+            if names is None or d.name in names:
+                yield _attribute(section), d, getattr(values, d.name)
 
 
 def to_toml(unit: Unit, comments: bool = True) -> str:
     """The unit as TOML, in one canonical order; with comments that give unit, meaning and source."""
-    tables = {
-        _attribute(s): [(d, getattr(getattr(unit, _attribute(s)), d.name)) for d in describe(s)]
-        for s in SECTIONS
-    }
+    tables: dict[str, list[tuple[Description, Any]]] = {}
+    for section, d, value in stated(unit):
+        tables.setdefault(section, []).append((d, value))
     head = {"format": FORMAT, "name": unit.name, "scale": unit.scale}
     return toml_text.compose(head, tables, comments)
 
@@ -489,6 +501,7 @@ def from_toml(text: str, origin: str = "") -> Unit:
                 f"write format = {FORMAT}, the only one so far",
             )
         sections = {_attribute(s): s(**document.get(_attribute(s), {})) for s in SECTIONS}
+        require_used(sections["wall"], document.get("wall", {}))
         rest = {key: document[key] for key in ("name", "scale") if key in document}
         return Unit(**rest, **sections)
 

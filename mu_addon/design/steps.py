@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .anchors import SHORTEST, Window, anchors, window
+from .anchors import SHORTEST, Window, anchor_points, window
 from .body import Body, covering, inside
 from .lattice import Graph, Lattice, graph_of, thickened
 from .parameters import Chambers, Envelope, Unit, Waveguide
@@ -276,7 +276,7 @@ def _lines(given: Given, trimmed: Trimmed | None) -> Struts | None:
 
 
 def _anchors(given: Given, graph: Graph | None) -> Array:
-    return anchors(given.unit)
+    return anchor_points(given.unit)
 
 
 def _path(given: Given, points: Array | None) -> Path | None:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from .anchors import Window, anchors
+from .anchors import Window, anchor_points
 from .block import Block, face_moves
 from .dimensions import Dimensions
 from .lattice import Lattice, lattice_of
@@ -149,7 +149,7 @@ def waveguide(unit: Unit, path: Window | ArrayLike, within: Dimensions | None = 
     """
     d = unit.dimensions if within is None else within
     lattice = lattice_of(d)
-    nodes = anchors(unit)[list(path.indices)] if isinstance(path, Window) else np.asarray(path, float)
+    nodes = anchor_points(unit)[list(path.indices)] if isinstance(path, Window) else np.asarray(path, float)
     numbers = _numbers(lattice, nodes, isinstance(path, Window))
     _check_path(d, nodes)
     met = np.isin(lattice.struts, numbers)

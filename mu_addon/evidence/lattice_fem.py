@@ -15,11 +15,11 @@ from ..design.parameters import Printing, Unit
 from ..design.strut_cell import StrutCell, relative_density, strut_cell
 from ..errors import InputError
 from ..files import read_npz, write_npz, write_text
-from ..homogenize.cell_mesh import CellMeshSettings, cell_materials, cell_mesh
+from ..homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell
 from ..homogenize.compression import Friction, compress
 from ..homogenize.modulus import modulus
 from ..homogenize.offset_response import OffsetResponse
-from ..homogenize.specimen import specimen
+from ..homogenize.specimen import block_specimen
 from ..measured import Experiment
 from .prediction.lattice import KIND, ComputedCell, Scaling
 
@@ -98,10 +98,10 @@ def at_offset(block: Block, offset_mm: float, cache: Path | None = None) -> tupl
         offset_xy_mm=block.cell.offset_xy_mm + offset_mm,
         offset_z_mm=block.cell.offset_z_mm + offset_mm,
     )
-    mesh = cell_mesh(cell, MESH, cache)
+    mesh = mesh_cell(cell, MESH, cache)
     materials = cell_materials(cell, mesh, RESIN_MPa, block.poisson)
     test = compress(
-        specimen(mesh, block.cells, materials), (STRAIN,), FRICTION[block.plates], stability=False
+        block_specimen(mesh, block.cells, materials), (STRAIN,), FRICTION[block.plates], stability=False
     )
     return modulus(test.curve, "initial tangent") / RESIN_MPa, relative_density(cell)
 

@@ -28,7 +28,7 @@ class Proposal:
     expected: float
 
 
-def next_experiment(
+def propose_experiment(
     fitter: Fitter, found: Selection, seen: Sequence[Sensitivity], feasible: Sequence[Experiment] = ()
 ) -> Proposal | None:
     """The best of `feasible` experiments, else of variations of those made; None where nothing is in doubt.

@@ -13,7 +13,7 @@ from ..measured import Experiment
 from .drive import without_noise
 from .fit import Fitter
 from .gain import Gain, gain
-from .next_experiment import Proposal, next_experiment
+from .next_experiment import Proposal, propose_experiment
 from .noise import Source, estimate, span
 from .record import Record, record
 from .selection import Selection, interval, one_more, reselected, select
@@ -152,7 +152,7 @@ def diagnose(
     kind = _kind(fitter, chosen)
     progress("gain")
     gained = gain(fitter, chosen.base, chosen.chosen, [e for e in experiments if e.role == "held_out"])
-    proposal = next_experiment(fitter, chosen, seen)
+    proposal = propose_experiment(fitter, chosen, seen)
     known = chosen.chosen if chosen.causes else chosen.base
     bounds = {k: interval(fitter, known, k) for k in known.keys}
     told = _identifiability(seen, chosen)

@@ -56,11 +56,13 @@ def simulate(
     run finds the same states to the last digit, since each starts from those before it alone. The state
     without pressure is one of them where the model has a load, else it is as drawn and not solved for. Raises
     ConvergenceError where a pressure cannot be reached; `on_state` has then seen all before it, and
-    InputError for a body with friction.
+    InputError for a body with friction or a law with history.
     """
-    if equilibrium.model.has_friction:
+    if equilibrium.model.has_friction or equilibrium.parameters.has_history:
         raise InputError(
-            "a body with friction remembers", "trajectory.simulate", "use time_stepping.simulate_in_time"
+            "a body with friction or memory has no one state a pressure",
+            "trajectory.simulate",
+            "use time_stepping.simulate_in_time",
         )
 
     def state_at(pressure_MPa: float, solve: Callable[[], State]) -> State:

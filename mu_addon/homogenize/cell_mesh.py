@@ -49,7 +49,7 @@ class CellMeshSettings:
             raise InputError(f"tolerance = {self.tolerance:g} is out of bounds", "cell mesh", "1e-4 to 0.2")
 
 
-def cell_mesh(cell: StrutCell, settings: CellMeshSettings | None = None, cache: Path | None = None) -> Mesh:
+def mesh_cell(cell: StrutCell, settings: CellMeshSettings | None = None, cache: Path | None = None) -> Mesh:
     """Tetrahedra of the printed lattice within [0, size/2]^3 mm, nothing clamped.
 
     Nodes of its flat sides lie exactly on the six planes. Cells that differ in size only have the same

@@ -29,7 +29,7 @@ class Specimen:
     materials: Materials
 
 
-def specimen(octant: Mesh, cells: int, materials: Materials, axis: str = "z") -> Specimen:
+def block_specimen(octant: Mesh, cells: int, materials: Materials, axis: str = "z") -> Specimen:
     """A block of cells^3 cells, of the octant [0, U/2]^3 of one with a corner at the origin.
 
     The block's outer faces are faces of cells, cut flat. materials: of the octant. axis: that of the cell

@@ -71,7 +71,7 @@ class Stretched:
     stopped: str = ""
 
 
-def stretch(
+def stretch_lattice(
     mesh: Mesh,
     materials: Materials,
     box: Sequence[float] | None = None,
@@ -89,7 +89,7 @@ def stretch(
 
 
 class Stretching:
-    """A periodic lattice under prescribed stretch along one axis; see `stretch`."""
+    """A periodic lattice under prescribed stretch along one axis; see `stretch_lattice`."""
 
     def __init__(
         self,

@@ -52,9 +52,9 @@ class CandidateBatch:
         return self.points(equilibrium.path(pressures_MPa, equilibrium.at_zero_pressure()))
 
     def simulated_in_time(self, number: int, time_s: Array, pressure_kPa: Array) -> Array:
-        """Monitored points (k, p, 3) in mm of one sensor's unit at k instants, beside the model's obstacles.
+        """Monitored points (k, p, 3) in mm of one sensor's unit at k instants, in the order of time.
 
-        Its whole motion is solved in the order of time, as friction remembers. Raises ConvergenceError.
+        For what remembers: friction on the model's obstacles, or a law with history. Raises ConvergenceError.
         """
         equilibrium = self._batched_newton.alone(number)
         equilibrium.settings = CONTACT

@@ -15,7 +15,7 @@ from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.trajectory import Trajectory, simulate
 from ..meshing.mesh import LATTICE, Mesh
-from .deviation import Deviation, centreline, deviation
+from .deviation import Deviation, centreline, centreline_deviation
 from .inclusion import Inclusion, sensor_share, stiffened_volume_mm3
 from .polyline import polyline_inclusion
 
@@ -36,7 +36,7 @@ class Candidate:
         return len(self.points)
 
 
-def candidates(anchors: Array, windows: Any) -> list[Candidate]:
+def candidate_paths(anchors: Array, windows: Any) -> list[Candidate]:
     """Candidates of windows (name, start, length) over anchors (n, 3) in mm."""
     return [Candidate(w.name, w.start, anchors[w.start - 1 : w.start - 1 + w.length]) for w in windows]
 
@@ -90,7 +90,7 @@ def evaluation(
     return Evaluation(
         candidate.name,
         rule,
-        deviation(centreline(moved, stations), centreline(baseline, stations)),
+        centreline_deviation(centreline(moved, stations), centreline(baseline, stations)),
         whole * stiffened_volume_mm3(rule, found, volumes),
         found.cylinder_volume_mm3,
     )

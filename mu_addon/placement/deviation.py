@@ -51,7 +51,7 @@ class Deviation:
     J_cont: float
 
 
-def deviation(candidate: Array, baseline: Array) -> Deviation:
+def centreline_deviation(candidate: Array, baseline: Array) -> Deviation:
     """Compare two centrelines (k, j, 3) in mm on the same times and stations."""
     return deviation_of(np.linalg.norm(candidate - baseline, axis=2))
 

@@ -127,7 +127,7 @@ class Inclusion:
         return float(np.pi * self.radius_mm**2 * self.length_mm)
 
 
-def inclusion(
+def straight_inclusion(
     corners: Array, lattice: Array, start: Array, end: Array, radius: float, minimum_share: float = 1e-9
 ) -> Inclusion:
     """Inclusion of one straight path in the lattice elements of a mesh.

@@ -108,7 +108,7 @@ class Influence:
         return self.displacement / modulus_MPa
 
 
-def influence(
+def influence_map(
     model: Model,
     materials: Materials,
     trajectory: Trajectory,

@@ -28,7 +28,7 @@ from ..fem.trajectory import Trajectory
 from ..fem.triangular import Triangular
 from ..meshing.mesh import LATTICE, Mesh
 from .graph import Graph
-from .inclusion import Inclusion, inclusion, sensor_share
+from .inclusion import Inclusion, sensor_share, straight_inclusion
 from .influence import Parity, loaded, parities, probe_loads, telling_pressures
 from .sampling import polynomials
 
@@ -119,7 +119,7 @@ class Response:
         return found
 
 
-def response(
+def reduced_response(
     model: Model,
     materials: Materials,
     sensor_MPa: float,
@@ -219,7 +219,7 @@ def _patterns(
     number[model.free] = np.arange(len(model.free))
 
     def share(start: Array, end: Array) -> Array:
-        return inclusion(corners, lattice, start, end, radius_mm).share
+        return straight_inclusion(corners, lattice, start, end, radius_mm).share
 
     bars = []
     for start, end in graph.nodes[graph.steps[steps]]:

@@ -70,7 +70,7 @@ def chance_of_better(predicted_mm: Array, exact_mm: Array) -> float:
     return float(min(t.cdf(needed / spread, n - 1).sum(), 1.0))
 
 
-def search(
+def search_paths(
     predicted_mm: Array,
     check: Callable[[Array], Array],
     settings: SearchSettings | None = None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator
@@ -113,6 +114,9 @@ def run_to_end(progress: Progress) -> Iterator[RunContext]:
             _stop(context, _Interrupted("stopped by Ctrl-C", remedy=_where_results_are(context)))
         except MuError as error:
             _stop(context, error)
+        except ModuleNotFoundError as error:
+            what = f"the package {error.name} is not installed"
+            _stop(context, MuError(what, sys.executable, "install the packages that README.md names"))
         except MemoryError:
             what = "there was not enough memory"
             _stop(

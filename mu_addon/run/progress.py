@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+import unicodedata
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -120,6 +121,34 @@ def terminal(stream: TextIO = sys.stderr, clock: Clock = time.perf_counter) -> S
     return _LiveLine(stream, clock) if stream.isatty() else _PlainLines(stream, clock)
 
 
+def printable(text: str, stream: TextIO | None = None) -> str:
+    """`text` with everything but line ends that would not be shown as a character spelt as \\xNN or \\uNNNN.
+
+    Names and values come from devices and files: an escape sequence among them would be obeyed by a terminal,
+    a change of direction would show another text. Likewise what `stream` has no character for.
+    """
+    if not text.isascii() or not text.replace("\n", "").isprintable():
+        text = "".join(
+            _spelt(c) if c != "\n" and unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp") else c
+            for c in text
+        )
+    encoding = getattr(stream, "encoding", None) or "utf-8"
+    return text.encode(encoding, "backslashreplace").decode(encoding)
+
+
+def _spelt(character: str) -> str:
+    """A character's escape in the terms of Python."""
+    return character.encode("unicode_escape").decode()
+
+
+def _json_line(message: Mapping[str, Any]) -> str:
+    """A message as one line of JSON; what a terminal would obey and what is no text as JSON's own escapes."""
+    line = json.dumps(plain(message), ensure_ascii=False)
+    if line.isprintable():
+        return line + "\n"
+    return "".join(c if c.isprintable() else json.dumps(c)[1:-1] for c in line) + "\n"
+
+
 class _Lines:
     """What both terminal sinks say in the same words."""
 
@@ -132,7 +161,7 @@ class _Lines:
         if message["type"] == "progress":
             self.progress(message)
         elif message["type"] in ("warning", "error"):
-            self.write(_formatted(message) + "\n")
+            self.write(printable(_formatted(message), self.stream) + "\n")
 
     def progress(self, message: Message) -> None:
         raise NotImplementedError
@@ -225,7 +254,7 @@ def json_lines(stream: TextIO = sys.stdout, clock: Clock = time.perf_counter) ->
             if clock() - last < 0.2:
                 return
             last = clock()
-        stream.write(json.dumps(plain(message), ensure_ascii=False) + "\n")
+        stream.write(_json_line(message))
         stream.flush()
 
     return sink
@@ -247,7 +276,7 @@ def log_file(path: Path, clock: Clock = time.perf_counter) -> Sink:
         stamped = {"time": time.strftime("%Y-%m-%dT%H:%M:%S%z"), **plain(message)}
         try:
             with path.open("a", encoding="utf-8") as stream:
-                stream.write(json.dumps(stamped, ensure_ascii=False) + "\n")
+                stream.write(_json_line(stamped))
         except OSError as error:
             raise output_error(error, path) from error
 

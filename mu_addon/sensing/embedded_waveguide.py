@@ -27,7 +27,7 @@ _STRAIGHT = 1e-6
 
 
 @attrs.frozen(eq=False)
-class Guided:
+class WaveguideShape:
     """A waveguide's fixed part: section and wells in mm, lengths of wells' centres and of open junctions.
 
     Lengths count from the entry's end face along the axis at rest.
@@ -42,7 +42,7 @@ class Guided:
 
 
 @attrs.frozen(eq=False)
-class Held:
+class EmbeddedWaveguide:
     """A printed bar's axis at rest, by the lattice's nodes that hold it.
 
     nodes (h, 3) in mm; points (m, 3): the nodes, and before and after them the end faces; s (m,): lengths
@@ -50,7 +50,7 @@ class Held:
     the wells, a piece.
     """
 
-    guided: Guided
+    shape: WaveguideShape
     nodes: Array
     points: Array
     s: Array
@@ -108,7 +108,7 @@ def _joined(pieces: Sequence[tuple[Array, Array, Array]]) -> Centreline:
     return Centreline(*(np.concatenate(values) for values in zip(first, *rest, strict=True)))
 
 
-def held(bar: Bar, nodes: Array, d: Dimensions) -> Held:
+def embed_waveguide(bar: Bar, nodes: Array, d: Dimensions) -> EmbeddedWaveguide:
     """A printed bar with its own wells, held by its path's lattice nodes (h, 3) in mm.
 
     d: the sizes of section, wells and struts as they are printed. Struts open the bar's sides over their
@@ -126,7 +126,7 @@ def held(bar: Bar, nodes: Array, d: Dimensions) -> Held:
     leg = np.searchsorted(corners, (s[1:] + s[:-1]) / 2, side="right") - 1
     half = max(d.junction_diameter, d.waveguide_section) / 2
     total = float(corners[-1])
-    guided = Guided(
+    shape = WaveguideShape(
         d.waveguide_section,
         d.waveguide_section,
         tuple(_along(bar.points, corners, well.centre) for well in bar.wells),
@@ -134,7 +134,7 @@ def held(bar: Bar, nodes: Array, d: Dimensions) -> Held:
         d.well_depth,
         tuple((max(0.0, at - half), min(total, at + half)) for at in at_nodes.tolist()),
     )
-    return Held(guided, nodes, points, s, joint, bar.normals[leg])
+    return EmbeddedWaveguide(shape, nodes, points, s, joint, bar.normals[leg])
 
 
 def _lengths(points: Array) -> Array:

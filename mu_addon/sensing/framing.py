@@ -103,6 +103,6 @@ def info_of(payload: bytes) -> dict[str, Any] | None:
         return None
     try:
         info = json.loads(payload[1:])
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     return info if isinstance(info, dict) else None

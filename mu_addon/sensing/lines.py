@@ -7,8 +7,10 @@ everything else is a channel.
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Mapping
+from typing import Any
 
 # Seconds a tick, and the ticks after which such a clock begins again (Arduino's are 32 bit), or none.
 CLOCKS: Mapping[str, tuple[float, int | None]] = {
@@ -23,9 +25,13 @@ CLOCKS: Mapping[str, tuple[float, int | None]] = {
 }
 NUMBERS = ("sequence", "seq", "n")
 
+# Beyond these no float counts by one, and no clock ever ran (s; 300 years).
+_MOST_COUNT, _MOST_S = 2.0**53, 1e10
+
 _LABEL = r"[A-Za-z_][A-Za-z0-9_.%/()\- ]*"
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|nan|NaN"
-_PAIR = re.compile(rf"\s*({_LABEL}?)\s*[:=]\s*({_NUMBER})\s*(?:[,;\t ]|$)")
+# Possessive (++, *+): a line of noise costs time in proportion to its length.
+_NUMBER = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?|nan|NaN"
+_PAIR = re.compile(rf"\s*+({_LABEL}+)\s*+[:=]\s*+({_NUMBER})(?:\s*+[,;]|\s++|$)")
 _NAME = re.compile(rf"{_LABEL}\Z")
 _VALUE = re.compile(rf"(?:{_NUMBER})\Z")
 
@@ -33,16 +39,16 @@ Pairs = dict[str, float]
 
 
 def pairs_of(line: str) -> Pairs | None:
-    """Values by label of `light:512,ref:300`, or None if the whole line is not such pairs."""
+    """Values by label of `light:512,ref:300`, or None if the line is not such pairs, each label once."""
     found: Pairs = {}
     place = 0
     while place < len(line):
         match = _PAIR.match(line, place)
-        if match is None:
+        if match is None or match[1].strip() in found:
             return None
         found[match[1].strip()] = float(match[2])
         place = match.end()
-    return found or None
+    return _readable(found)
 
 
 def json_of(line: str) -> Pairs | None:
@@ -50,12 +56,35 @@ def json_of(line: str) -> Pairs | None:
     if not line.startswith("{"):
         return None
     try:
-        value = json.loads(line)
-    except ValueError:
+        value = json.loads(line, object_pairs_hook=_named_once)
+        found = {k: float(v) for k, v in value.items() if isinstance(v, int | float)}
+    # Numbers that no float holds, brackets without end.
+    except (ValueError, OverflowError, RecursionError):
         return None
-    if not isinstance(value, dict):
+    return _readable(found)
+
+
+def _named_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object of JSON; ValueError where a name comes twice, as where two lines ran into one."""
+    value = dict(pairs)
+    if len(value) < len(pairs):
+        raise ValueError("a name comes twice")
+    return value
+
+
+def _readable(found: Pairs) -> Pairs | None:
+    """`found`, or None: nothing in it, a number beyond any float, a clock or running number beyond sense."""
+    if not found or any(math.isinf(value) for value in found.values()):
         return None
-    return {str(k): float(v) for k, v in value.items() if isinstance(v, int | float)} or None
+    counts = [found[name] for name in NUMBERS if name in found]
+    times = [found[name] * tick_s for name, (tick_s, _) in CLOCKS.items() if name in found]
+    sensible = all(abs(n) < _MOST_COUNT for n in counts) and all(abs(t) < _MOST_S for t in times)
+    return found if sensible else None
+
+
+def pairs_of_row(columns: list[str], row: list[float]) -> Pairs | None:
+    """A CSV row by its columns' names, or None where a clock or running number is beyond sense."""
+    return _readable(dict(zip(columns, row, strict=True)))
 
 
 def header_of(line: str) -> list[str] | None:
@@ -66,9 +95,12 @@ def header_of(line: str) -> list[str] | None:
 
 
 def row_of(line: str) -> list[float] | None:
-    """Numbers of a CSV row, or None if any is none."""
+    """Numbers of a CSV row, or None if any is none, or beyond any float."""
     cells = _cells(line)
-    return [float(cell) for cell in cells] if cells and all(_VALUE.match(cell) for cell in cells) else None
+    if not cells or not all(_VALUE.match(cell) for cell in cells):
+        return None
+    row = [float(cell) for cell in cells]
+    return None if any(map(math.isinf, row)) else row
 
 
 def _cells(line: str) -> list[str]:

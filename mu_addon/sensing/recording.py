@@ -2,16 +2,18 @@
 
 A recording is a folder: recording-000.csv with the columns time_s, device_s, sequence and one a channel
 (another file begins when the device's channels change), and index.ndjson, which says what the files hold,
-with a line for every event (connected, lost, format, mark) and one a second with row, byte and counters. Rows
-reach the operating system with every batch, and the disk once a second: a killed process loses none of those,
-a power cut a second.
+with a line for every event (connected, lost, format, mark) and one a second with row, byte and counters. What
+came and gave no sample is in rejects.ndjson, a line each: time_s, why, and raw, its bytes as characters
+U+0000 to U+00FF (Latin-1). Rows reach the operating system with every batch, and the disk once a second: a
+killed process loses none of those, a power cut a second.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -20,20 +22,37 @@ import numpy as np
 
 from ..errors import InputError
 from ..files import make_folder, output_error, plain
-from .decoder import Samples
+from .decoder import Reject, Samples
 
 Array = np.ndarray[Any, Any]
 
 FIXED = ("time_s", "device_s", "sequence")
 INDEX = "index.ndjson"
+REJECTS = "rejects.ndjson"
 VERSION = 1
 _SYNC_S = 1.0
+# Of what cannot be read no more is kept than this; the counters go on.
+_MOST_REJECTS = 100_000_000
 
 
 def columns_of(samples: Samples) -> tuple[str, ...]:
-    """Columns that samples of this layout fill, units in the names."""
+    """Columns that samples of this layout fill, units in the names, each a name that CSV can hold."""
     unit = f"_{samples.layout.unit}" if samples.layout.unit else ""
-    return (*FIXED, *(f"{name.strip().replace(' ', '_')}{unit}" for name in samples.layout.channels))
+    columns = list(FIXED)
+    for channel in samples.layout.channels:
+        name = _column(f"{channel.strip()}{unit}")
+        again = 2
+        while name in columns:
+            name = f"{_column(channel.strip())}_{again}{_column(unit) if unit else ''}"
+            again += 1
+        columns.append(name)
+    return tuple(columns)
+
+
+def _column(name: str) -> str:
+    """A device's name for a channel without blanks, separators, quotes and what cannot be printed."""
+    shown = "".join(c if c.isprintable() else "_" for c in name)
+    return re.sub(r"[\s,;\"']", "_", shown)[:200] or "_"
 
 
 class Recorder:
@@ -52,6 +71,8 @@ class Recorder:
         self._columns: tuple[str, ...] = ()
         self._number = -1
         self._row = 0
+        self._rejects: IO[bytes] | None = None
+        self._rejects_left = _MOST_REJECTS
         self._synced = self._indexed = -np.inf
         try:
             self._index = (folder / INDEX).open("ab", buffering=0)
@@ -78,6 +99,25 @@ class Recorder:
         self._row += len(samples)
         self.rows += len(samples)
 
+    def reject(self, rejects: Iterable[Reject], time_s: float) -> None:
+        """Keep the bytes of what gave no sample, as they came, until there are too many of them."""
+        messages = [
+            {"time_s": round(time_s, 6), "why": why, "raw": raw.decode("latin-1")} for why, raw in rejects
+        ]
+        data = "".join(json.dumps(message) + "\n" for message in messages).encode()
+        if not data or self._rejects_left <= 0:
+            return
+        path = self.folder / REJECTS
+        try:
+            if self._rejects is None:
+                self._rejects = path.open("ab", buffering=0)
+            self._append(self._rejects, data)
+        except OSError as error:
+            raise output_error(error, path) from error
+        self._rejects_left -= len(data)
+        if self._rejects_left <= 0:
+            self.event("rejects_full", time_s, detail=f"{REJECTS} grows no more; bytes are still counted")
+
     def tick(self, time_s: float, counters: Mapping[str, int]) -> None:
         """Once a second of time_s: where the file is, into the index, and everything to the disk."""
         if time_s - self._indexed < _SYNC_S:
@@ -94,8 +134,9 @@ class Recorder:
     def close(self) -> None:
         """Everything to the disk, and the end."""
         self._sync()
-        if self._file is not None:
-            self._file.close()
+        for stream in (self._file, self._rejects):
+            if stream is not None:
+                stream.close()
         self._index.close()
 
     def _begin(self, columns: tuple[str, ...]) -> None:
@@ -115,11 +156,15 @@ class Recorder:
     def _write(self, data: bytes) -> None:
         assert self._file is not None
         try:
-            # An unbuffered file may take less than it is given.
-            while data:
-                data = data[self._file.write(data) or 0 :]
+            self._append(self._file, data)
         except OSError as error:
             raise output_error(error, Path(self._file.name)) from error
+
+    @staticmethod
+    def _append(stream: IO[bytes], data: bytes) -> None:
+        # An unbuffered file may take less than it is given.
+        while data:
+            data = data[stream.write(data) or 0 :]
 
     def _say(self, message: Mapping[str, Any]) -> None:
         try:
@@ -128,7 +173,7 @@ class Recorder:
             raise output_error(error, self.folder / INDEX) from error
 
     def _sync(self) -> None:
-        for stream in (self._file, self._index):
+        for stream in (self._file, self._rejects, self._index):
             if stream is not None:
                 try:
                     os.fsync(stream.fileno())

@@ -30,6 +30,19 @@ Tell = Callable[[str, dict[str, Any]], None]
 Derive = Callable[[tuple[str, ...], Array], tuple[tuple[str, ...], Array]]
 
 STATUS = "status.json"
+LOSSES = {
+    "lost": "lost",
+    "crc_errors": "wrong CRC",
+    "malformed": "unreadable",
+    "rejected_bytes": "bytes unreadable",
+    "repeated": "repeated",
+    "misnumbered": "numbered wrong",
+    "incomplete": "incomplete",
+    "overlong": "bytes without an end",
+    "restarts": "restarts",
+    "reconnects": "reconnects",
+}
+"""Counters of a session's status that tell of what did not come whole, and what they are called."""
 _STATUS_S = 0.2
 _BACK_OFF_S = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 
@@ -90,7 +103,7 @@ def run_session(
         reader.join(timeout=5.0)
         while not pieces.empty():
             _take(pieces, view, clock)
-        view.take(view.decoder.finish(clock.now()))
+        view.take(view.decoder.finish(clock.now()), clock.now())
         return view.end(clock.now())
     finally:
         control.stop.set()
@@ -166,7 +179,7 @@ def _take(pieces: queue.SimpleQueue[_Piece], view: _View, clock: _Clock) -> bool
             if piece.event == "ended":
                 return False
         if piece.data:
-            view.take(view.decoder.feed(piece.data, piece.at))
+            view.take(view.decoder.feed(piece.data, piece.at), piece.at)
         try:
             piece = pieces.get_nowait()
         except queue.Empty:
@@ -195,19 +208,29 @@ class _View:
         self._columns: tuple[str, ...] = ()
         self._latest: Array = np.empty(0)
         self._format: str | None = None
+        self._complaint: tuple[str, str] | None = None
         self._said = -np.inf
         self._rate: list[tuple[float, int]] = []
 
-    def take(self, groups: list[Samples]) -> None:
+    def take(self, groups: list[Samples], at: float) -> None:
+        """Record what was read of bytes that came at host time `at`, and keep what could not be."""
         if self.decoder.format != self._format:
             self._format = self.decoder.format
-            at = float(groups[0].host_s[0]) if groups else self.start
             self.event("format", at, detail=self._format)
         for samples in groups:
             if self.keep_time:
-                samples = attrs.evolve(samples, host_s=self.start + samples.device_s)
+                kept = np.where(np.isfinite(samples.device_s), self.start + samples.device_s, samples.host_s)
+                samples = attrs.evolve(samples, host_s=kept)
             self.recorder.write(samples, self.start)
             self._show(samples)
+        if self.decoder.rejects:
+            self.recorder.reject(self.decoder.rejects, at - self.start)
+            self.decoder.rejects.clear()
+        complaint = self.decoder.complaint
+        if complaint is not None and complaint != self._complaint:
+            what, remedy = complaint
+            self.event("unreadable", at, detail=what, what_to_do=remedy)
+        self._complaint = complaint
 
     def _show(self, samples: Samples) -> None:
         names = columns_of(samples)
@@ -262,6 +285,7 @@ class _View:
             "pid": os.getpid(),
             "reconnects": max(0, self.reconnects),
             "rows": self.recorder.rows,
+            "complaint": list(self.decoder.complaint or ()),
             **attrs.asdict(self.decoder.counters),
         }
 

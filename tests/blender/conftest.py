@@ -1,4 +1,4 @@
-"""Every session of these tests once more with each further bpy that MU_BPY names; see `session`."""
+"""Each test once more with each further bpy that MU_BPY names; see `session`."""
 
 import subprocess
 import sys
@@ -27,7 +27,6 @@ def _version(python):
     ids=["bpy", *map(_version, session.OTHERS)] if session.OTHERS else None,
 )
 def each_bpy(request):
-    """Sessions of a test run in one Python after another."""
-    before, session.python = session.python, getattr(request, "param", sys.executable)
-    yield
-    session.python = before
+    """The Python with bpy that this test runs in: one after another."""
+    session.python = getattr(request, "param", sys.executable)
+    return session.python

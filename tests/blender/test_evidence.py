@@ -23,7 +23,7 @@ PANELS = [evidence_panel.MU_PT_evidence]
 
 def diagnose(root):
     assert bpy.ops.mu.evidence_diagnose() == {"FINISHED"}
-    child = simulation.of(evidence.job(root))
+    child = evidence.DIAGNOSIS.child(root)
     watch(lambda: child.state != "running")
     assert child.state == "done", child.error
 
@@ -122,7 +122,7 @@ def test_a_diagnosis_that_fails_and_one_that_is_stopped(tmp_path):
 
         def fake(how):
             command = [sys.executable, sys.argv[1], how]
-            return simulation.launch(evidence.job(root), command, evidence.folder_of(root) / "blender")
+            return launch_as(evidence.DIAGNOSIS, root, command)
 
         for how, expected in {"told_error": "thicker wall", "crash": "SIGSEGV", "good": "see below"}.items():
             child = fake(how)
@@ -135,7 +135,7 @@ def test_a_diagnosis_that_fails_and_one_that_is_stopped(tmp_path):
         assert "0.50 Model A" in drawn() and "mu.evidence_cancel" in drawn()
         assert not bpy.ops.mu.evidence_diagnose.poll()
         # The unit's own simulation is another one.
-        assert simulation.of(root.mu_unit.uuid) is None and not bpy.ops.mu.cancel.poll()
+        assert SIMULATION.child(root) is None and not bpy.ops.mu.cancel.poll()
         assert bpy.ops.mu.evidence_cancel() == {"FINISHED"}
         watch(lambda: child.state != "running")
         assert "Cancelled" in drawn() and not bpy.ops.mu.evidence_cancel.poll()
@@ -170,7 +170,7 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
     session(
         """
         import json, pathlib, shutil
-        import mu_addon.blender.unit.panel as panels
+        import mu_addon.blender.simulate.panel as panels
         from mu_addon.blender.simulate import effects
         from mu_addon.blender.unit.properties import to_unit
         from mu_addon.evidence.extended import ExtendedModel, Fitted
@@ -193,28 +193,28 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
         assert to_unit(root.mu_unit).chambers == unit.chambers
         share = json.loads((folder / "study/evidence/verdict.json").read_text())
         share = share["causes"][0]["parameters"]["share_lost"]["value"]
-        (line,) = effects.said(root)
+        (line,) = effects.lines(root)
         assert line.startswith(f"clogged chamber, share lost: {share:.4g} (") and " to " in line
         said = drawn()
         assert "With what was found" in said and "clogged chamber, share lost: 0.5" in said, said
         assert "The unit has it: all moduli" in said and "the last chamber lacks" in said, said
         assert not bpy.ops.mu.evidence_apply.poll()
         # Pressure alone knows no direction.
-        assert not effects.weighs(root) and "--orientation" not in effects.arguments(root, folder)
+        assert not effects.has_gravity(root) and "--orientation" not in effects.arguments(root, folder)
 
         bpy.ops.ed.undo()
         root = unit_object.active_root(bpy.context)
-        assert effects.asked(root) == {} and bpy.ops.mu.evidence_apply.poll()
+        assert effects.inputs(root) == {} and bpy.ops.mu.evidence_apply.poll()
         bpy.ops.ed.redo()
         bpy.ops.wm.save_mainfile()
         bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
         (root,) = unit_object.roots()
         asked = {"effects": {"clogged_chamber": {"share_lost": share}}}
-        assert effects.asked(root) == asked and "The unit has it" in drawn()
+        assert effects.inputs(root) == asked and "The unit has it" in drawn()
 
         def simulated():
             assert bpy.ops.mu.simulate() == {"FINISHED"}
-            child = simulation.of(root.mu_unit.uuid)
+            child = SIMULATION.child(root)
             watch(lambda: child.state != "running")
             assert child.state == "done", child.error
             return studies.findings(root)
@@ -266,7 +266,7 @@ def test_measured_and_simulated_motion_on_the_timeline(tmp_path, clogged):
     session(
         MOTION
         + """
-assert "Named: clogged chamber" in drawn() and not evidence.said(root).stale
+assert "Named: clogged chamber" in drawn() and not evidence.diagnosis(root).stale
 assert bpy.ops.mu.evidence_motion(experiment=first.name) == {"FINISHED"}
 found = parts(root)
 assert {"measured|angle", "model|angle", "extended|angle", "|dial", "measured|marker 1"} <= set(found)

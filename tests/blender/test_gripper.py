@@ -18,7 +18,8 @@ pytestmark = needs_bpy
 
 HELD = """
 import numpy as np
-from mu_addon.blender.gripper import state as grasps, object as gripper_object, panel as gripper_panel
+from mu_addon.blender.gripper import state as grasps, motion as grasp_motion
+from mu_addon.blender.gripper import object as gripper_object, panel as gripper_panel
 from mu_addon.blender.results import motion as motion_parts
 PANELS = gripper_panel.CLASSES
 
@@ -125,15 +126,15 @@ def test_what_a_grasp_is_asked_and_how_it_ends(tmp_path):
         assert "there is no grasp" in refused(bpy.ops.mu.grasp_show)
 
         command = [sys.executable, sys.argv[1]]
-        child = simulation.launch(grasps.job(root), [*command, "hang"], grasps.folder_of(root) / "blender")
+        child = launch_as(grasps.GRASP, root, [*command, "hang"])
         watch(lambda: child.progress)
         assert "0.50 Model A" in drawn() and "mu.grasp_cancel" in drawn()
-        assert "at work" in refused(bpy.ops.mu.grasp)
+        assert "job of this gripper is running" in refused(bpy.ops.mu.grasp)
         assert bpy.ops.mu.grasp_cancel() == {"FINISHED"}
         watch(lambda: child.state != "running")
         assert "Cancelled" in drawn() and bpy.ops.mu.grasp_dismiss() == {"FINISHED"}
         assert "Cancelled" not in drawn()
-        child = simulation.launch(grasps.job(root), [*command, "crash"], grasps.folder_of(root) / "blender")
+        child = launch_as(grasps.GRASP, root, [*command, "crash"])
         watch(lambda: child.state != "running")
         assert "SIGSEGV" in drawn() and bpy.ops.mu.grasp_open(what="errors") == {"FINISHED"}
         """,
@@ -188,7 +189,7 @@ def test_a_grasp_plays_on_the_timeline(tmp_path):
         scene = bpy.context.scene
         scene.render.fps = 10
         assert bpy.ops.mu.grasp_show() == {"FINISHED"}
-        left, right, cube = gripper_object.moving(root)
+        left, right, cube = grasp_motion.parts(root)
         assert scene.frame_end == 21
         for frame, way, height, said in ((1, 0.0, 98.0, "i, opening: 0.00 N"), (6, 2.5, 88.0, "0.25 N"),
                                          (11, 5.0, 78.0, "ii, closing: 0.50 N"), (21, 0.0, 79.0, "v, rel")):
@@ -199,9 +200,9 @@ def test_a_grasp_plays_on_the_timeline(tmp_path):
             assert np.allclose(moved[1][:, 1].min(), 30 - way, atol=1e-3), frame
             assert abs(cube.matrix_world.translation.z - height) < 1e-3 and said in drawn(), drawn()
         assert gripper_object.part(root, "cube").hide_viewport and not cube.hide_viewport
-        assert bpy.ops.mu.grasp_show() == {"FINISHED"} and len(gripper_object.moving(root)) == 3
+        assert bpy.ops.mu.grasp_show() == {"FINISHED"} and len(grasp_motion.parts(root)) == 3
         bpy.ops.mu.grasp_show(on=False)
-        assert not gripper_object.moving(root) and not gripper_object.part(root, "cube").hide_viewport
+        assert not grasp_motion.parts(root) and not gripper_object.part(root, "cube").hide_viewport
         for name, value in (("friction", 0.4), ("density_g_per_ml", 1.0), ("path", "alpha3")):
             before = getattr(props, name)
             setattr(props, name, value)
@@ -227,13 +228,13 @@ def test_a_coarse_grasp_from_start_to_timeline(tmp_path):
         props = root.mu_gripper
         props.folder, props.cube_mm = sys.argv[2] + "/out", 25.0
         assert bpy.ops.mu.grasp() == {"FINISHED"}
-        child = simulation.of(grasps.job(root))
+        child = grasps.GRASP.child(root)
         watch(lambda: child.state != "running", 1500)
         assert child.state == "done", child.error
         found = grasps.of(root)
         assert not found.stale and found.figures["normal_at_hold_N"] > 0
         assert bpy.ops.mu.grasp_show() == {"FINISHED"}
-        left, right, cube = gripper_object.moving(root)
+        left, right, cube = grasp_motion.parts(root)
         hold = found.columns["time_s"][max(i for i, p in enumerate(found.phase) if p == "iii")]
         bpy.context.scene.frame_set(1 + round(24 * hold))
         graph = bpy.context.evaluated_depsgraph_get()

@@ -13,14 +13,14 @@ from .session import DRAWN, FAKE, PRELUDE, WATCHING, blender, needs_bpy
 pytestmark = needs_bpy
 
 SEEN = """
-from mu_addon.blender.printing import panel as print_panel, state as printing
+from mu_addon.blender.printing import markers, panel as print_panel, state as printing
 import pathlib
 import numpy as np
 
 PANELS = print_panel.CLASSES
 
 def done(root, *, state="done"):
-    child = simulation.of(printing.job(root))
+    child = printing.PRINTING.child(root)
     watch(lambda: child.state != "running")
     assert child.state == state, (child.state, child.error)
     return child
@@ -88,7 +88,7 @@ def test_a_check_from_start_to_markers(tmp_path):
         assert f"{best['islands']} islands" in said
 
         assert bpy.ops.mu.print_show(finding=0) == {"FINISHED"}
-        balls = [m for m in printing.marks(root) if m.data is not None]
+        balls = [m for m in markers.marks(root) if m.data is not None]
         assert len(balls) == sum(len(f["places"]) > 0 for f in faults)
         (chosen,) = bpy.context.selected_objects
         first = found.findings[0]
@@ -100,7 +100,7 @@ def test_a_check_from_start_to_markers(tmp_path):
         bpy.ops.wm.save_mainfile()
         bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
         (root,) = unit_object.roots()
-        assert printing.checked(root).stale == "" and len(printing.marks(root)) == len(balls) + 1
+        assert printing.checked(root).stale == "" and len(markers.marks(root)) == len(balls) + 1
         assert "place 1 of" in drawn()
         """,
         tmp_path,
@@ -147,7 +147,7 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
         assert "There are 4 findings" in refused(bpy.ops.mu.print_show, finding=9)
         assert "has 2 places" in refused(bpy.ops.mu.print_show, finding=0, place=2)
 
-        marks = {m.get("mu_check"): m for m in printing.marks(root)}
+        marks = {m.get("mu_check"): m for m in markers.marks(root)}
         assert set(marks) == {"0", "1", "up"}
         colours = [marks[k].data.materials[0].name for k in "01"]
         assert colours == ["MU Flaws", "MU Doubt"]
@@ -157,7 +157,7 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
         assert abs(width() - 2 * 0.8) < 0.05
         bpy.ops.mu.print_show(finding=0)
         bpy.context.view_layer.update()
-        assert abs(width() - 0.8 * (1 + printing.LARGER)) < 0.1  # the place that is looked at is larger
+        assert abs(width() - 0.8 * (1 + markers.LARGER)) < 0.1  # the place that is looked at is larger
         bpy.ops.mu.print_show(finding=1)
         root.mu_print.marker = 2.0
         bpy.context.view_layer.update()
@@ -165,18 +165,18 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
         up = marks["up"].rotation_quaternion @ Vector((0, 0, 1))
         assert (up - Vector((0, 0, 1))).length < 1e-5
 
-        while printing.marks(root):
+        while markers.marks(root):
             bpy.ops.ed.undo()
             (root,) = unit_object.roots()
         assert "No place is marked" in refused(bpy.ops.mu.print_clear)
         bpy.ops.mu.print_marks()
         root.mu_unit.chambers.wall_mm = 1.0  # a rebuild leaves them, and the panel says that they are old
-        assert len(printing.marks(root)) == 3 and "Stale: it is of the unit with other parameters" in drawn()
+        assert len(markers.marks(root)) == 3 and "Stale: it is of the unit with other parameters" in drawn()
         assert "The check is stale" in refused(bpy.ops.mu.print_marks)
         root.mu_unit.chambers.wall_mm = 0.9
         write_check(root, [finding("cup", "warning", [[0, 0, 0]])])
         assert "markers are of an earlier check" in drawn().replace("  ", " ")
-        assert bpy.ops.mu.print_clear() == {"FINISHED"} and not printing.marks(root)
+        assert bpy.ops.mu.print_clear() == {"FINISHED"} and not markers.marks(root)
 
         assert bpy.ops.mu.print_up(direction=(0.6, 0, 0.8)) == {"FINISHED"}
         assert "Stale: it is of another build direction" in drawn()
@@ -231,7 +231,7 @@ def test_an_export_as_chosen(tmp_path):
         from mu_addon.blender.printing.operators import MU_OT_print_export as operator
         context = MagicMock(wraps=bpy.context, window_manager=Manager(), object=root)
         assert operator.invoke(MagicMock(), context, None) == {"RUNNING_MODAL"}
-        assert "chamber wall" in asked["message"] and not simulation.running()
+        assert "chamber wall" in asked["message"] and not jobs.running()
 
         assert bpy.ops.mu.print_export() == {"FINISHED"}
         done(root)
@@ -265,7 +265,7 @@ def test_jobs_that_fail_and_one_that_is_stopped(tmp_path):
         def fake(how):
             command = [sys.executable, sys.argv[1], how]
             folder = printing.folder_of(root, "check") / "blender"
-            return simulation.launch(printing.job(root), command, folder)
+            return launch_as(printing.PRINTING, root, command, folder)
 
         for how, expected in {"told_error": "thicker wall", "crash": "SIGSEGV", "wordless": "without a word",
                               "good": "see Check"}.items():
@@ -281,7 +281,7 @@ def test_jobs_that_fail_and_one_that_is_stopped(tmp_path):
         child = fake("hang")
         watch(lambda: child.progress)
         # The unit's own simulation is another one.
-        assert simulation.of(root.mu_unit.uuid) is None and not bpy.ops.mu.cancel.poll()
+        assert SIMULATION.child(root) is None and not bpy.ops.mu.cancel.poll()
         assert bpy.ops.mu.print_cancel() == {"FINISHED"}
         watch(lambda: child.state != "running")
         assert "Cancelled" in drawn() and not bpy.ops.mu.print_cancel.poll()
@@ -328,7 +328,7 @@ def test_a_body_of_ones_own_is_checked_by_its_solid(tmp_path):
         bpy.context.view_layer.objects.active = root
         assert "only STL is written" in refused(bpy.ops.mu.print_export)
         assert bpy.ops.mu.print_check() == {"FINISHED"}
-        child = simulation.of(printing.job(root))
+        child = printing.PRINTING.child(root)
         watch(lambda: child.state != "running")
         found = printing.checked(root)
         assert found is not None and not found.stale, child.error

@@ -25,15 +25,17 @@ SENDER = Path(__file__).parents[1] / "sensing" / "sender.py"
 SEEN = """
 import pathlib, time
 from mu_addon.blender.results import motion as motion_parts
-from mu_addon.blender.sensor import state as sensor, panel as sensor_panel, twin
-from mu_addon.blender.simulate import state as simulation, study_folder as studies
+from mu_addon.blender.sensor import session, state as sensor, panel as sensor_panel, twin
+from mu_addon.blender.jobs import start_child as jobs
+from mu_addon.blender.simulate import study_folder as studies
+from mu_addon.blender.simulate.job import SIMULATION
 
 def watch(until, seconds=120):
     end = time.monotonic() + seconds
     while not until():
         assert time.monotonic() < end, drawn()
         sensor.poll()
-        simulation.poll()
+        jobs.poll()
         time.sleep(0.02)
 
 PANELS = [sensor_panel.MU_PT_sensor]
@@ -297,7 +299,7 @@ def test_a_guided_sweep_calibrates_and_a_zero_mends_weaker_light(tmp_path):
         found, _ = sensor.calibration(root)
         assert found.range_deg == (0.0, 45.0) and found.sweeps == 2 and found.dark == "dark"
         assert s.guide is None and "0 to 45" in drawn()
-        child = simulation.of(sensor.calibrating(root))
+        child = sensor.CALIBRATION.child(root)
         assert child.state == "done" and child.result, child.error
 
         bench["angle"] = 30.0
@@ -323,8 +325,8 @@ def test_a_guided_sweep_calibrates_and_a_zero_mends_weaker_light(tmp_path):
         watch(lambda: sensor.calibration(root)[0] is not None)
         assert sensor.calibration(root)[0].gain == 1.0
         assert bpy.ops.mu.sensor_calibrate(data=sys.argv[1]) == {"FINISHED"}
-        watch(lambda: simulation.of(sensor.calibrating(root)).state != "running")
-        assert simulation.of(sensor.calibrating(root)).state == "failed" and "experiments.toml" in drawn()
+        watch(lambda: sensor.CALIBRATION.child(root).state != "running")
+        assert sensor.CALIBRATION.child(root).state == "failed" and "experiments.toml" in drawn()
         assert sensor.calibration(root)[0] is not None, "the one that was there stays"
         """,
         tmp_path,
@@ -343,13 +345,13 @@ def test_the_twin_follows_the_simulated_sensor_and_never_beyond(tmp_path):
         assert bpy.ops.mu.sensor_twin() == {"FINISHED"}
         (membrane,) = (part for part in twin.parts(root) if part["mu_twin"] == "membrane")
         rest = motion_parts.vertices_of(membrane.data)
-        assert twin.said(root) == ("waiting", "no signal")
+        assert twin.status(root) == ("waiting", "no signal")
         assert membrane.data.materials[0].name == "MU Twin Waiting"
         s = connected(root)
         seen = []
         def look():
             r, tip = s.reading, motion_parts.vertices_of(membrane.data)
-            if r is not None and twin.said(root)[0] == "live":
+            if r is not None and twin.status(root)[0] == "live":
                 top = tip[rest[:, 2] > rest[:, 2].max() - 1e-6]
                 seen.append((r.angle_deg, np.degrees(np.arctan2(*(top - top.mean(axis=0))[
                     np.abs((top - top.mean(axis=0))[:, 1]).argmax()][[2, 1]]))))
@@ -360,7 +362,7 @@ def test_the_twin_follows_the_simulated_sensor_and_never_beyond(tmp_path):
         slope = np.minimum(np.abs(shown), 180.0 - np.abs(shown))
         assert np.abs(slope - asked).max() < 0.5, np.abs(slope - asked).max()
         assert membrane.data.materials[0].name == "MU Twin"
-        assert "Model A at" in twin.said(root)[1]
+        assert "Model A at" in twin.status(root)[1]
 
         class Reading:
             light_V, angle_deg, low_deg, high_deg, possible = 2.0, 30.0, 29.0, 31.0, True
@@ -368,24 +370,24 @@ def test_the_twin_follows_the_simulated_sensor_and_never_beyond(tmp_path):
             reading = Reading()
             for name, value in values.items():
                 setattr(reading, name, value)
-            twin.follow(root, reading, fresh)
+            twin.set_pose(root, reading, fresh)
             return motion_parts.vertices_of(membrane.data)
         at_30 = follow()
         for beyond in ({"angle_deg": 51.0}, {"angle_deg": -17.0}, {"possible": False}):
             assert np.array_equal(follow(**beyond), at_30), "it stays where it was"
-            state, words = twin.said(root)
+            state, words = twin.status(root)
             assert state == "outside" and membrane.data.materials[0].name == "MU Out of Range"
             assert ("calibration" in words) == ("possible" in beyond), words
             assert words in drawn().replace("  ", " ") or state == "outside"
-        assert np.array_equal(follow(fresh=False), at_30) and twin.said(root)[0] == "waiting"
-        assert not np.array_equal(follow(angle_deg=10.0), at_30) and twin.said(root)[0] == "live"
+        assert np.array_equal(follow(fresh=False), at_30) and twin.status(root)[0] == "waiting"
+        assert not np.array_equal(follow(angle_deg=10.0), at_30) and twin.status(root)[0] == "live"
         assert follow(angle_deg=float("nan")).shape == at_30.shape
-        assert twin.said(root) == ("waiting", "not calibrated")
+        assert twin.status(root) == ("waiting", "not calibrated")
 
         # Another motion than the one it was made from: cut open or not, for one.
         root.mu_motion.cut = not root.mu_motion.cut
         follow(angle_deg=10.0)
-        assert twin.said(root)[0] == "waiting" and "show the twin again" in drawn(), drawn()
+        assert twin.status(root)[0] == "waiting" and "show the twin again" in drawn(), drawn()
         root.mu_motion.cut = not root.mu_motion.cut
 
         # Undo takes the objects away and brings them back; the twin is found again.
@@ -395,7 +397,7 @@ def test_the_twin_follows_the_simulated_sensor_and_never_beyond(tmp_path):
         watch(lambda: True)
         bpy.ops.ed.undo()
         (root,) = unit_object.roots()
-        watch(lambda: twin.parts(root) and twin.said(root)[0] != "waiting")
+        watch(lambda: twin.parts(root) and twin.status(root)[0] != "waiting")
         bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1] + "/seat.blend")
         bpy.ops.mu.sensor_disconnect()
         ended(s)
@@ -476,7 +478,7 @@ def test_what_is_drawn_does_not_grow_with_the_rate_and_stays_in_its_axes(tmp_pat
         curves = plotted()
         assert len(curves) == 3, "light, dark and angle"
         for points in curves:
-            assert len(points) <= 2 * sensor.BINS and np.isfinite(points).all()
+            assert len(points) <= 2 * session.BINS and np.isfinite(points).all()
             assert points[:, 0].min() >= 99.0 and points[:, 0].max() <= 900.0
         heights = [np.ptp(points[:, 1]) for points in curves]
         assert max(heights[:2]) <= sensor_plot.HEIGHT and 20 < heights[2] <= sensor_plot.HEIGHT
@@ -517,7 +519,7 @@ def test_the_angles_of_a_sweep(tmp_path):
             (10.0, -10.0, 10.0, [10, 0, -10, 0] * 2 + [10]),
         ):
             settings.sweep_from, settings.sweep_to, settings.sweep_step = low, high, step
-            assert sensor.sweep(settings) == expected, sensor.sweep(settings)
+            assert sensor.sweep_angles(settings) == expected, sensor.sweep_angles(settings)
         connected(unit_object.roots()[0])
         settings.sweep_to, settings.sweep_step = 10.0, 0.5
         settings.sweep_to = 10.0

@@ -11,9 +11,13 @@ pytestmark = needs_bpy
 
 SEEN = """
 from mu_addon.blender.obstacles import panel as obstacle_panel
-from mu_addon.blender.unit import panel as panels
+from mu_addon.blender.unit import panel as unit_panel
+from mu_addon.blender.path import panel as path_panel
+from mu_addon.blender.simulate import panel as simulate_panel
+from mu_addon.blender.results import panel as results_panel
 from mu_addon.blender.printing import panel as print_panel
-PANELS = [*panels.CLASSES, obstacle_panel.MU_PT_obstacles, *print_panel.CLASSES]
+PANELS = [*unit_panel.CLASSES, *path_panel.CLASSES, *simulate_panel.CLASSES]
+PANELS += [results_panel.MU_PT_results, obstacle_panel.MU_PT_obstacles, *print_panel.CLASSES]
 PANELS += [bpy.types.MU_MT_presets, bpy.types.MU_MT_presets_remove]
 
 """
@@ -51,13 +55,13 @@ def test_panels_tell_what_a_child_says(tmp_path):
             watch(lambda: child.state != "running")
             assert expected in drawn(), (how, drawn())
         launch(root, "told_error")
-        watch(lambda: not simulation.running())
+        watch(lambda: not jobs.running())
         assert "thicker wall" in drawn() and "at 12 kPa" in drawn()
         assert bpy.ops.mu.open(what="errors") == {"FINISHED"}
         assert "there is no such file" in refused(bpy.ops.mu.open, what="report")
 
         root.mu_unit.chambers.wall_mm = 3.0
-        assert "too thick" in drawn() and "last design that was possible" in drawn()
+        assert "too thick" in drawn() and "last valid design" in drawn()
         bpy.context.scene.unit_settings.scale_length = 1.0
         assert "not in millimetres" in drawn()
         """,
@@ -73,7 +77,7 @@ def test_without_the_solver_geometry_works_and_the_panel_says_why(tmp_path):
         find = importlib.util.find_spec
         importlib.util.find_spec = lambda name, *a: None if name == "warp" else find(name, *a)
         root = add()
-        assert simulation.missing() == ["warp"]
+        assert jobs.missing() == ["warp"]
         assert "Cannot simulate: warp not found" in drawn()
         assert "Not in this Blender: warp" in refused(bpy.ops.mu.simulate)
         assert bpy.ops.mu.solid() == {"FINISHED"}
@@ -89,14 +93,14 @@ def test_a_worker_whose_solver_does_not_load_says_so(tmp_path):
         broken = pathlib.Path("broken/warp")
         broken.mkdir(parents=True)
         (broken / "__init__.py").write_text("raise ImportError('libwarp.so: not for this machine')")
-        real = simulation.environment
+        real = jobs.environment
         def environment():
             found = real()
             return {**found, "PYTHONPATH": str(broken.parent.resolve()) + ":" + found["PYTHONPATH"]}
-        simulation.environment = environment
+        jobs.environment = environment
         root = add()
         assert bpy.ops.mu.simulate() == {"FINISHED"}
-        child = simulation.of(root.mu_unit.uuid)
+        child = SIMULATION.child(root)
         watch(lambda: child.state != "running")
         assert child.state == "failed" and "libwarp.so: not for this machine" in child.error["what"]
         assert "design and export work without" in drawn()
@@ -112,11 +116,11 @@ def test_a_simulation_survives_loading_a_file_and_dies_with_the_session(tmp_path
         uuid = root.mu_unit.uuid
         child = launch(root, "hang")
         watch(lambda: child.progress)
-        assert bpy.app.timers.is_registered(simulation._poll)
+        assert bpy.app.timers.is_registered(jobs._poll)
         bpy.ops.wm.read_homefile(use_empty=True)
-        assert simulation.running() == [uuid] and bpy.app.timers.is_registered(simulation._poll)
+        assert jobs.running() == [f"{uuid}:simulate"] and bpy.app.timers.is_registered(jobs._poll)
         root = add()
-        assert "other simulation" in drawn()
+        assert "other job" in drawn()
         print("child", child._process.pid)
         """,
         tmp_path,
@@ -132,7 +136,7 @@ def test_unregister_ends_what_runs(tmp_path):
         child = launch(add(), "deaf")
         watch(lambda: child.progress)
         mu_addon.unregister()
-        assert child._process.returncode is not None and simulation.running() == []
+        assert child._process.returncode is not None and jobs.running() == []
         mu_addon.register()
         """,
         tmp_path,
@@ -150,7 +154,7 @@ def test_folders_of_studies(tmp_path):
         bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2] + "/seat.blend")
         here = pathlib.Path(sys.argv[2])
         assert studies.folder_of(root) == here / "seat.mu" / f"Grip-no.-1-{short}"
-        assert studies.settle(root) == studies.folder_of(root)
+        assert studies.assign_folder(root) == studies.folder_of(root)
         assert root.mu_unit.study.folder.startswith("//seat.mu")
         root.mu_unit.title = "renamed"  # the results stay where they are
         assert studies.folder_of(root) == here / "seat.mu" / f"Grip-no.-1-{short}"
@@ -164,11 +168,10 @@ def test_two_simulations_of_one_unit_are_refused(tmp_path):
     session(
         """
         from mu_addon.errors import InputError
-        from mu_addon.blender.unit.properties import to_unit
         root = add()
         launch(root, "hang")
         try:
-            simulation.start(root.mu_unit.uuid, to_unit(root.mu_unit), studies.folder_of(root), ["simulate"])
+            SIMULATION.start(root, ["simulate"], studies.folder_of(root))
         except InputError as error:
             assert "already" in str(error)
         else:
@@ -186,7 +189,7 @@ def test_a_quick_look_from_start_to_stale(tmp_path):
         root = add(preset="mu-0.75x")
         root.mu_unit.study.command, root.mu_unit.study.detail = "simulate", "quick"
         assert bpy.ops.mu.simulate() == {"FINISHED"}
-        child = simulation.of(root.mu_unit.uuid)
+        child = SIMULATION.child(root)
         fractions = []
         watch(lambda: fractions.append(child.progress.get("fraction")) or child.state != "running")
         assert child.state == "done", child.error

@@ -13,7 +13,7 @@ import meshio
 import numpy as np
 import pytest
 
-from mu_addon.design.anchors import anchors
+from mu_addon.design.anchors import anchor_points
 from mu_addon.design.parameters import load_preset, read_unit
 
 from ..report.browser import EXECUTABLE, Browser, complaints, requests
@@ -210,7 +210,7 @@ def test_a_window_of_anchors_is_one_of_the_lattices_paths(searched):
     with (folder / "anchors.txt").open() as file:
         assert file.read()
     every = {row["path"]: float(row["J_hat_mm"]) for row in rows(folder)}
-    points = anchors(load_preset("mu-1.0x"))
+    points = anchor_points(load_preset("mu-1.0x"))
     text = "; ".join(" ".join(f"{c:.6g}" for c in point) for point in points)
     assert float(solved[text]) == pytest.approx(every["alpha10"], rel=2e-3)
 

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from mu_addon.design.lattices import kind
 from mu_addon.design.strut_cell import Facets, StrutCell
 from mu_addon.errors import InputError, MeshingError
-from mu_addon.fem.laws import Cubic
 from mu_addon.fem.materials import Materials
 from mu_addon.homogenize.bounds import hashin_shtrikman
-from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, cell_mesh
+from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell
 from mu_addon.homogenize.elasticity import Elasticity, effective_tensor, young_modulus
 from tests.fem import bodies
+from tests.fem.cubic import Cubic
 
 from . import cells
 
@@ -129,7 +129,7 @@ def slender(kind_, radii, size, cache, per_diameter=1.0):
     found = []
     for r in radii:
         cell = StrutCell(kind_, size, r, r)
-        mesh = cell_mesh(cell, CellMeshSettings(per_diameter=per_diameter, facets=Facets(12, 12)), cache)
+        mesh = mesh_cell(cell, CellMeshSettings(per_diameter=per_diameter, facets=Facets(12, 12)), cache)
         found.append((cell, effective_tensor(mesh, cell_materials(cell, mesh, 1.0, 0.3), (size / 2,) * 3)))
     return found
 
@@ -178,7 +178,7 @@ def test_a_simple_cubic_lattice_stretches(tmp_path):
 @given(st.floats(0.1, 0.3), st.floats(0.7, 1.4), st.floats(0.1, 0.47))
 def test_a_lattice_stays_below_its_bounds(midspan, ratio, poisson):
     cell = StrutCell(kind("body-centred"), 1.0, midspan * ratio / 2, midspan / 2)
-    mesh = cell_mesh(cell, CellMeshSettings(per_diameter=1.0, facets=Facets(12, 4), tolerance=0.05))
+    mesh = mesh_cell(cell, CellMeshSettings(per_diameter=1.0, facets=Facets(12, 4), tolerance=0.05))
     found = effective_tensor(mesh, cell_materials(cell, mesh, 1.0, poisson), (0.5,) * 3)
     K, G = cells.bulk_and_shear(1.0, poisson)
     share = found.relative_density

@@ -33,7 +33,7 @@ def test_the_signal_of_states_of_a_mesh() -> None:
     mesh = body(UNIT)
     bent = bent_to_a_circle(mesh.nodes, np.radians(20) / 75, y=25.0) - mesh.nodes
     found = signal_of_states(UNIT, window(UNIT, "alpha4"), mesh, [0 * bent, bent], Optics(), LAW)
-    guide = of_window("alpha4").guided
+    guide = of_window("alpha4").shape
     # Bent toward +y the wells' face is the inner one.
     expected = -4.0 * len(guide.wells) * np.radians(20) / 75
     assert np.log(found.transmitted[1] / found.at_rest) == pytest.approx(-expected, rel=0.02)
@@ -65,7 +65,7 @@ def test_rays_in_place_of_the_law() -> None:
     inward, outward = traced_signal(bar, moved, Optics(), rays=30_000).delta
     assert inward < -0.08
     assert outward > 0.08
-    signed = [features(bar.guided, bar.legs(*state))[FEATURES.index("curvature_of_wells")] for state in moved]
+    signed = [features(bar.shape, bar.legs(*state))[FEATURES.index("curvature_of_wells")] for state in moved]
     assert signed == pytest.approx([-0.012 * 6, 0.012 * 6], rel=1e-2)
 
 

@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 from PIL import Image
 from scipy.spatial import KDTree
 
-from mu_addon.design.anchors import anchors, windows
+from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem.equilibrium import Equilibrium
@@ -22,7 +22,7 @@ from mu_addon.files import write_npz
 from mu_addon.meshing.mesh import mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.placement.candidates import Candidate, candidates, roi, with_sensor
+from mu_addon.placement.candidates import Candidate, candidate_paths, roi, with_sensor
 from mu_addon.placement.whole import whole_body
 from mu_addon.report.pc2 import read_pc2, write_pc2
 from mu_addon.run.cache import Cache
@@ -53,7 +53,7 @@ JOB = Job(
     stations=21,
     workers=1,
 )
-PATHS = candidates(anchors(UNIT), windows(6))[::4]
+PATHS = candidate_paths(anchor_points(UNIT), windows(6))[::4]
 JOBS = [(path, rule) for rule in ("intersect", "volume_fraction") for path in PATHS]
 
 
@@ -136,7 +136,7 @@ def test_a_whole_mesh_cannot_be_cut_open(study, tmp_path):
 def test_a_paths_motion_is_what_its_deviation_was_found_from(study, motion):
     _, mesh, trajectory, sweep, _ = study
     assert motion.paths == tuple(c.name for c, rule in JOBS if rule == "volume_fraction")
-    monitor = probe(mesh, anchors(UNIT))
+    monitor = probe(mesh, anchor_points(UNIT))
     name = motion.paths[-1]
     job = next(i for i, (c, rule) in enumerate(JOBS) if (c.name, rule) == (name, "volume_fraction"))
     moved = motion.displacement(name)
@@ -144,7 +144,7 @@ def test_a_paths_motion_is_what_its_deviation_was_found_from(study, motion):
         if round(state.pressure_MPa * 1e3, 9) not in np.round(sweep.solved_kPa, 9):
             continue
         kept = sweep._cache.get("sweep", sweep._name(state))["moved_mm"][job]
-        assert np.allclose(anchors(UNIT) + monitor.displacement(moved[number]), kept, atol=1e-5)
+        assert np.allclose(anchor_points(UNIT) + monitor.displacement(moved[number]), kept, atol=1e-5)
         apart = np.linalg.norm(moved[number] - motion.model_a[number], axis=1)
         assert apart.max() > 1e-3
     with pytest.raises(InputError, match="no motion of alpha99"):
@@ -182,7 +182,7 @@ def test_a_path_off_the_mirror_plane_moves_both_sides_apart(study, tmp_path):
     """Solved on the whole body, shown by its half and the half's image: both are where the whole body is."""
     _, mesh, trajectory, *_ = study
     whole, there = whole_body(mesh, trajectory)
-    aside = Candidate("aside", 0, anchors(UNIT)[:4] + np.array([0.9 * UNIT.dimensions.cell, 0.0, 0.0]))
+    aside = Candidate("aside", 0, anchor_points(UNIT)[:4] + np.array([0.9 * UNIT.dimensions.cell, 0.0, 0.0]))
     write_model_a(tmp_path, mesh, materials_of(UNIT, mesh), trajectory)
     sweep, _ = swept(tmp_path, mesh, whole, there, [(aside, "volume_fraction")])
     found = read_motion(tmp_path)

@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 import pytest
 
-from mu_addon.design.anchors import anchors, windows
+from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.parameters import Unit
 from mu_addon.errors import InputError
 from mu_addon.fem.equilibrium import Equilibrium
@@ -18,7 +18,7 @@ from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.mesh import LATTICE, TET_FACES
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.placement.candidates import candidates, evaluate
+from mu_addon.placement.candidates import candidate_paths, evaluate
 from mu_addon.placement.inclusion import RULES
 from mu_addon.run.pool import each
 from mu_addon.usecases.reproduce import open_study, scatter
@@ -312,7 +312,7 @@ def test_what_is_held_does_not_move_and_its_paths_disturb_nothing():
     free = motion(unit, mesh_unit(unit, COARSE), (40.0,), look_for_contact=False)
     assert 0 < moved.angle_at(40.0) < 0.7 * free.angle_at(40.0)
     J = paths(unit, mesh, moved, ("volume_fraction",), (40.0,)).J_hat(
-        "volume_fraction", anchors(unit), np.array([0.0, 40.0])
+        "volume_fraction", anchor_points(unit), np.array([0.0, 40.0])
     )
     # alpha1 ends at the third anchor, 31.25 mm above the base.
     assert J[0] < 0.05 * J[3]
@@ -323,9 +323,9 @@ def test_paths_side_by_side_are_each_path_alone():
     mesh = mesh_unit(unit, COARSE)
     pressures = (-20.0, 20.0, 40.0)
     moved = motion(unit, mesh, pressures)
-    points = anchors(unit)
+    points = anchor_points(unit)
     found = paths(unit, mesh, moved, ("volume_fraction",), pressures)
-    (path, *_) = candidates(points, windows(6))
+    (path, *_) = candidate_paths(points, windows(6))
     model, materials = Model(mesh, threads=1), materials_of(unit, mesh)
     baseline = simulate(Equilibrium(model, materials), np.arange(3.0), np.array(pressures))
     alone = evaluate(
@@ -345,7 +345,7 @@ def test_the_table_hardly_depends_on_the_pressures_that_are_left_out():
     moved = motion(unit, mesh, every)
     J = [
         paths(unit, mesh, moved, ("volume_fraction",), solved).J_hat(
-            "volume_fraction", anchors(unit), samples
+            "volume_fraction", anchor_points(unit), samples
         )
         for solved in ((-20.0, 20.0, 40.0), every)
     ]

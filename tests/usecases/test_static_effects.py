@@ -24,7 +24,7 @@ from mu_addon.fem.time_stepping import simulate_in_time
 from mu_addon.fem.trajectory import simulate
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.placement.candidates import candidates, evaluate
+from mu_addon.placement.candidates import candidate_paths, evaluate
 from mu_addon.run.context import run_to_end
 from mu_addon.run.folder import keep_inputs
 from mu_addon.run.progress import Progress
@@ -199,7 +199,7 @@ def test_sensor_paths_are_ranked_in_the_unit_that_has_the_effect(placed, name, m
     trajectory, _ = moved(job, mesh)
     monitored, d = (points, probe(mesh, points)), UNIT.dimensions
     sensor = UNIT.material.sensor_modulus_kPa / 1e3
-    for candidate in candidates(points, windows)[::4]:
+    for candidate in candidate_paths(points, windows)[::4]:
         alone = evaluate(
             job.model(mesh), job.materials(mesh), trajectory, monitored, candidate, "volume_fraction",
             d.inclusion_radius, sensor, JOB.stations,

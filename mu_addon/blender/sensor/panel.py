@@ -8,22 +8,13 @@ from math import isfinite
 import bpy
 
 from ...run.child import FAILED
-from ..simulate import state as simulation
+from ...sensing.session import LOSSES
+from ..jobs.panel import job_state
+from ..shared.panels import UnitPanel, large_button, wrapped
 from ..simulate import study_folder as studies
-from ..unit.panel import OfUnit, told, wrapped
 from . import state as sensor
 from . import twin
 
-LOSSES = {
-    "lost": "lost",
-    "crc_errors": "wrong CRC",
-    "malformed": "unreadable",
-    "repeated": "repeated",
-    "overlong": "bytes without an end",
-    "restarts": "restarts",
-    "reconnects": "reconnects",
-}
-"""Counters of a session's status, and what they are called."""
 STATES = {
     "starting": ("The reader starts", "TIME"),
     "searching": ("Looking for the sensor", "VIEWZOOM"),
@@ -35,7 +26,7 @@ STATES = {
 }
 
 
-class MU_PT_sensor(OfUnit, bpy.types.Panel):
+class MU_PT_sensor(UnitPanel, bpy.types.Panel):
     """The real sensor: connect, record, calibrate, and bend the twin by it"""
 
     bl_idname = "MU_PT_sensor"
@@ -74,9 +65,7 @@ def _source(layout, settings):
     elif settings.source == "replay":
         layout.prop(settings, "replay")
         layout.prop(settings, "speed")
-    row = layout.row()
-    row.scale_y = 1.4
-    row.operator("mu.sensor_connect", icon="LINKED")
+    large_button(layout, "mu.sensor_connect", "LINKED")
 
 
 def _session(layout, settings, session):
@@ -116,6 +105,8 @@ def _session(layout, settings, session):
     column.label(text=f"{status.get('rows', 0)} samples on disk in {status.get('duration_s', 0):.0f} s")
     losses = [f"{status[key]} {word}" for key, word in LOSSES.items() if status.get(key)]
     wrapped(column, ", ".join(losses) or "nothing lost", "ERROR" if losses else "CHECKMARK")
+    for words in status.get("complaint", ()):
+        wrapped(column, words, "INFO")
     for name, value in zip(session.channels, list(status.get("latest", ()))[3:], strict=False):
         row = column.row()
         row.label(text=name)
@@ -176,7 +167,7 @@ def _calibration(layout, root, session):
     body.prop(settings, "channel", placeholder=light)
     body.prop(settings, "dark", placeholder=str(dark))
     body.prop(settings, "calibration")
-    told(body, simulation.of(sensor.calibrating(root)), "it is applied", "sensor_")
+    job_state(body, sensor.CALIBRATION.child(root), "it is applied", "sensor_")
     guide = session.guide if session is not None and session.running else None
     if guide is None:
         column = body.column(align=True)
@@ -203,8 +194,8 @@ def _guide(layout, guide):
         wrapped(box, f"Bend to {angle:g}°, hold it there, then press", "FORWARD")
     row = box.row()
     row.scale_y = 1.6
-    said = f"It Is at {guide.angles[guide.held]:g}°" if guide.held < len(guide.angles) else "Done"
-    row.operator("mu.sensor_hold", text=said, icon="PINNED")
+    text = f"It Is at {guide.angles[guide.held]:g}°" if guide.held < len(guide.angles) else "Done"
+    row.operator("mu.sensor_hold", text=text, icon="PINNED")
     box.progress(factor=guide.held / len(guide.angles), text=f"{guide.held} of {len(guide.angles)}")
     box.operator("mu.sensor_sweep", text="Give Up", icon="CANCEL").on = False
 
@@ -219,7 +210,7 @@ def _twin(layout, root):
         "mu.sensor_twin", text="Hide Twin" if on else "Show Twin", icon="MOD_SIMPLEDEFORM", depress=on
     ).on = not on
     if on:
-        state, words = twin.said(root)
+        state, words = twin.status(root)
         if state == twin.OUTSIDE:
             body.alert = True
         wrapped(body, words, {twin.LIVE: "CHECKMARK", twin.OUTSIDE: "ERROR"}.get(state, "INFO"))
@@ -228,11 +219,7 @@ def _twin(layout, root):
             wrapped(body, "It moves as a unit of other parameters: simulate again", "ERROR")
 
 
-def register() -> None:
-    """The panel."""
-    bpy.utils.register_class(MU_PT_sensor)
+CLASSES = (MU_PT_sensor,)
 
 
-def unregister() -> None:
-    """The panel."""
-    bpy.utils.unregister_class(MU_PT_sensor)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

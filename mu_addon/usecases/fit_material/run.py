@@ -13,7 +13,7 @@ from ...errors import InputError
 from ...files import write_csv, write_text
 from ...materials.choice import Choice, choose, disagreement
 from ...materials.coupon import Coupon, response
-from ...materials.fit import POISSON, TOLERANCE, Fit, fit, leave_one_mode_out, ranges
+from ...materials.fit import POISSON, TOLERANCE, Fit, fit_coupons, leave_one_mode_out, ranges
 from ...materials.library import Material, write_material
 from ...measured import Measured
 from ...run.context import RunContext
@@ -36,7 +36,7 @@ def fit_material(job: Job, folder: Path, context: RunContext) -> Fitting:
     with progress.stage("fit", expected_s=2.0 * len(forms)):
         fits, unseen = [], {}
         for i, one in enumerate(forms):
-            fits.append(fit(one, fitted, held, weights, profile=True))
+            fits.append(fit_coupons(one, fitted, held, weights, profile=True))
             unseen[one.name] = _unseen(one, fitted, weights)
             progress.update((i + 1) / len(forms))
         choice = choose(fits)

@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.anchors import anchors, window
+from ...design.anchors import anchor_points, window
 from ...design.gripper import GripperSolid, build_gripper
 from ...design.surface import stl_bytes
 from ...design.threemf import Part, read_3mf, write_3mf
@@ -22,7 +22,7 @@ from ...meshing.unit import mesh_unit
 from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.progress import Progress
-from ...sensing.embedded_waveguide import Joints, held
+from ...sensing.embedded_waveguide import Joints, embed_waveguide
 from ...sensing.signal import Signal, traced_signal
 from .grasp import Cube, Grasp, Lift, grasp
 from .job import Job
@@ -159,8 +159,8 @@ class Gripping:
         unit, optics = self.job.gripper.unit, self.job.optics
         with self.progress.stage("light", 20.0):
             path = window(unit, self.job.gripper.path)
-            nodes = anchors(unit)[list(path.indices)]
-            bar = held(waveguide(unit, path), nodes, unit.printed)
+            nodes = anchor_points(unit)[list(path.indices)]
+            bar = embed_waveguide(waveguide(unit, path), nodes, unit.printed)
             joints = Joints.of(self.mesh, nodes, unit.dimensions.cell)
             for side, found in self.grasps.items():
                 moved = [joints.moved(u) for u in found.u]

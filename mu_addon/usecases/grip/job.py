@@ -53,6 +53,7 @@ class Job:
     optics: Optics = attrs.field(factory=Optics)
 
     def __attrs_post_init__(self) -> None:
+        self.gripper.unit.wall.require_without_memory("a grasp")
         sides = [cube.side_mm for cube in self.cubes]
         if len(set(sides)) < len(sides):
             raise InputError("two cubes have the same side", "--cube", "name each side once")

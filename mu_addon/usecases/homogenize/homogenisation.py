@@ -13,15 +13,15 @@ from ...design.surface import stl_bytes
 from ...errors import ConvergenceError, InputError, MuError
 from ...fem.materials import Materials
 from ...files import write_bytes, write_csv
-from ...homogenize.cell_mesh import cell_materials, cell_mesh
+from ...homogenize.cell_mesh import cell_materials, mesh_cell
 from ...homogenize.compression import Compressed, Compression, Friction, compress
 from ...homogenize.curve import Curve
 from ...homogenize.effective import Effective, effective, write_effective
 from ...homogenize.elasticity import Elasticity, effective_tensor
 from ...homogenize.foam_fit import FoamFit, fit_foam
 from ...homogenize.modulus import moduli
-from ...homogenize.specimen import Specimen, specimen
-from ...homogenize.stretch import Stretched, StretchSettings, stretch
+from ...homogenize.specimen import Specimen, block_specimen
+from ...homogenize.stretch import Stretched, StretchSettings, stretch_lattice
 from ...meshing.mesh import Mesh
 from ...report.vtk import write_mesh
 from ...run.cache import Cache, key
@@ -80,7 +80,7 @@ class Homogenisation:
         """Analysis mesh of the cell's octant."""
         job = self.job
         with self.progress.stage("mesh of the cell", 5.0):
-            self.mesh = cell_mesh(job.cell, job.mesh, self.cache.folder)
+            self.mesh = mesh_cell(job.cell, job.mesh, self.cache.folder)
             resin = job.resin
             self.materials = cell_materials(job.cell, self.mesh, resin.modulus_MPa, resin.poisson)
             modulus, _ = self.materials.small_strain(len(self.mesh.tets))
@@ -129,7 +129,7 @@ class Homogenisation:
                     done[0] += 1
                     self.progress.update(done[0] / len(STRETCHES))
 
-                found = stretch(self.mesh, self.materials, settings=settings, on_point=reached)
+                found = stretch_lattice(self.mesh, self.materials, settings=settings, on_point=reached)
                 arrays = attrs.asdict(found.curve) | {"stopped": np.array(found.stopped)}
                 self.cache.put("stretch", name, arrays)
         self.stretched = found
@@ -185,9 +185,9 @@ class Homogenisation:
     def specimen(self) -> Specimen:
         """An eighth of the block that is compressed."""
         cell, resin = self.job.cell, self.job.resin
-        mesh = cell_mesh(cell, self.job.block_mesh, self.cache.folder)
+        mesh = mesh_cell(cell, self.job.block_mesh, self.cache.folder)
         materials = cell_materials(cell, mesh, resin.modulus_MPa, resin.poisson)
-        return specimen(mesh, self.job.cells, materials)
+        return block_specimen(mesh, self.job.cells, materials)
 
     def compress(self, friction: Friction) -> None:
         """The block between two plates, to the strain that was asked for."""

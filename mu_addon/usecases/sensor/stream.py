@@ -14,9 +14,10 @@ from typing import Any, TextIO
 
 from ...errors import InputError
 from ...run.context import RunContext
-from ...run.progress import Sink
+from ...run.progress import Sink, printable
 from ...sensing.calibration import deriver, read_calibration
-from ...sensing.session import Control, run_session
+from ...sensing.recording import REJECTS
+from ...sensing.session import LOSSES, Control, run_session
 from ...sensing.sources import SerialLine, Simulated, Source, ports
 
 
@@ -83,6 +84,8 @@ def stream(
         if event in ("disconnected", "waiting"):
             words = "the sensor is unplugged" if event == "disconnected" else "the sensor is not there"
             progress.warning(f"{words}: {details.get('detail', '')}", "", "it is looked for until it comes")
+        elif event == "unreadable":
+            progress.warning(str(details["detail"]), "", str(details["what_to_do"]))
 
     with _ctrl_c_stops(control):
         status = run_session(
@@ -138,10 +141,11 @@ class Display:
         """Show a message of `stream`."""
         if message["event"] != "status":
             words = str(message.get("detail") or message.get("text") or "")
-            self._write(f"{message['event']}{': ' if words else ''}{words}\n")
+            self._write(printable(f"{message['event']}{': ' if words else ''}{words}\n", self.out))
         elif self.live or self.clock() - self._last >= 5.0:
             self._last = self.clock()
-            self._write(f"\r\x1b[K{said(message)}" if self.live else said(message) + "\n", self.live)
+            line = printable(said(message), self.out)
+            self._write(f"\r\x1b[K{line}" if self.live else line + "\n", self.live)
 
     def _write(self, text: str, stays_open: bool = False) -> None:
         self.out.write("\n" + text if self._open and not stays_open else text)
@@ -160,23 +164,19 @@ def said(status: Mapping[str, Any]) -> str:
 
 
 def _losses(status: Mapping[str, Any]) -> list[str]:
-    words = {
-        "lost": "lost",
-        "crc_errors": "wrong CRC",
-        "malformed": "unreadable",
-        "repeated": "repeated",
-        "overlong": "bytes without an end",
-        "restarts": "restarts",
-        "reconnects": "reconnects",
-    }
-    return [f"{status[key]} {word}" for key, word in words.items() if status[key]]
+    return [f"{status[key]} {word}" for key, word in LOSSES.items() if status.get(key)]
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
     """What a session recorded, in a few lines of text, of its `summary`."""
     rows, seconds = summary["rows"], summary["duration_s"]
-    losses = _losses(summary) or ["nothing lost"]
+    losses = _losses(summary) or ["nothing lost" if summary["bytes"] else "nothing came"]
+    if summary["cut_bytes"]:
+        losses.append(f"{summary['cut_bytes']} bytes cut at the start, the end or while unplugged")
+    kept = summary["rejected_bytes"] or summary["overlong"]
     return [
         f"{rows} samples in {seconds:.1f} s, format {summary['format'] or 'not found'}",
         ", ".join(losses),
+        *summary["complaint"],
+        *([f"what could not be read is in {REJECTS}"] if kept else []),
     ]

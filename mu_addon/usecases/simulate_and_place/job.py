@@ -98,6 +98,19 @@ class Job:
                 "obstacles, paths",
                 "leave one of them out",
             )
+        if self.unit.wall.has_memory and "place" in self.stages and self.paths == "graph":
+            raise InputError(
+                "the search of the whole lattice knows a unit whose wall remembers nothing",
+                "[wall], paths",
+                "rank the windows of anchors, or take an elastic law",
+            )
+        for name in ("anisotropy", "strain_stiffening"):
+            if self.unit.wall.names and name in self.effects.values:
+                raise InputError(
+                    f"{name} changes a neo-Hookean wall, and this unit's has a law of its own",
+                    f"[wall], {name}",
+                    "leave [wall] out, or the effect and give the wall layers_excess or c2_over_c1",
+                )
         if self.effects.clogged and "place" in self.stages and self.paths == "graph":
             raise InputError(
                 "the search of the whole lattice knows a unit whose chambers share one pressure",
@@ -175,7 +188,12 @@ class Job:
     @property
     def newton(self) -> NewtonSettings:
         """Settings of Newton's method for this unit."""
-        return CONTACT if self.obstacles else self.effects.newton
+        return CONTACT if self.in_time else self.effects.newton
+
+    @property
+    def in_time(self) -> bool:
+        """Whether motion is solved instant by instant, since contact or the wall's law remembers."""
+        return bool(self.obstacles) or self.unit.wall.has_memory
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; study.toml is the first."""

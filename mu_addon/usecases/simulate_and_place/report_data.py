@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from ...design.parameters import SECTIONS, assumed
-from ...design.quantity import describe
+from ...design.parameters import assumed, stated
 from ...evidence.unit_effects import EFFECTS
 from ...files import write_bytes
 from ...report.results import Gate, Parameter, Path, Picture, ReportData, RuleResult, SideView
@@ -94,8 +93,8 @@ def report_data(
     complete = all((w.name, rule) in study.evaluations for w in windows for rule in job.rules)
     time, pressure = job.samples
     states = study.trajectory.states if study.trajectory else tuple(study.states)
-    if not job.obstacles:
-        # One state a pressure; beside obstacles one an instant, in the order of time.
+    if not job.in_time:
+        # One state a pressure; where something remembers one an instant, in the order of time.
         states = tuple(sorted(states, key=lambda s: s.pressure_MPa))
     rules = {rule: _rule_result(study, rule) for rule in job.rules} if complete else {}
     return ReportData(
@@ -151,16 +150,12 @@ def _parameters(study: Study) -> list[Parameter]:
     unit = study.job.unit
     reasons = {a.path: a.reason for a in assumed(unit)}
     rows = [Parameter("scale", unit.scale, "", "paper")]
-    for section in SECTIONS:
-        # Each section class names its table; the unit holds its values under the same name.
-        values = getattr(unit, section.section)  # type: ignore[attr-defined]
-        for d in describe(section):
-            value = getattr(values, d.name)
-            path = f"{section.section}.{d.name}"  # type: ignore[attr-defined]
-            if study.job.lattice is not None and path in REPLACED:
-                rows.append(Parameter(path, value, d.unit, f"not used: {LATTICE_LAW} has the lattice's law"))
-                continue
-            rows.append(Parameter(path, value, d.unit, reasons.get(path, d.source), d.assumed))
+    for section, d, value in stated(unit):
+        path = f"{section}.{d.name}"
+        if study.job.lattice is not None and path in REPLACED:
+            rows.append(Parameter(path, value, d.unit, f"not used: {LATTICE_LAW} has the lattice's law"))
+            continue
+        rows.append(Parameter(path, value, d.unit, reasons.get(path, d.source), d.assumed))
     rows += _lattice_parameters(study.job.lattice)
     rows += _effects(study.job.effects)
     m, k, j = study.job.mesh, study.job.times, study.job.stations

@@ -39,9 +39,10 @@ def run_stages(study: Study) -> None:
         study.simulate(candidates_beside="place" in job.stages)
     if "place" in job.stages:
         chosen = study.place()
-        if job.obstacles:
+        if job.in_time:
+            where = "Beside obstacles" if job.obstacles else "With a wall that remembers"
             study.warn(
-                "Beside obstacles neither the map of what each element would disturb nor what light would "
+                f"{where} neither the map of what each element would disturb nor what light would "
                 "tell is known: both take a unit with one state a pressure."
             )
         else:

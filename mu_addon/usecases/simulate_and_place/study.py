@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
+from collections.abc import Callable
 from contextlib import closing
 from functools import cached_property
 from pathlib import Path
@@ -12,12 +13,13 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.anchors import Window, anchors, windows
+from ...design.anchors import Window, anchor_points, windows
 from ...design.export import write_nodes, write_stl
 from ...design.parameters import Material
 from ...design.quantity import in_kPa
 from ...design.solid import Solid, build_solid
 from ...design.strut_cell import strut_cell
+from ...design.wall import Wall
 from ...errors import ConvergenceError, MeshingError
 from ...fem.equilibrium import Equilibrium
 from ...fem.kinematics import TipSection
@@ -31,10 +33,10 @@ from ...fem.trajectory import Trajectory, simulate
 from ...files import write_csv, write_npz
 from ...homogenize.foam_response import ellipticity
 from ...meshing.mesh import LATTICE, Mesh
-from ...meshing.quality import Quality, quality
+from ...meshing.quality import Quality, mesh_quality
 from ...meshing.settings import MeshSettings
 from ...meshing.unit import MeshingWarning, mesh_unit
-from ...placement.candidates import Candidate, Evaluation, candidates
+from ...placement.candidates import Candidate, Evaluation, candidate_paths
 from ...placement.deviation import rank
 from ...report.results import CONTACT_COLUMNS, ContactHistory, LatticeSearch, Signals
 from ...report.vtk import write_mesh, write_trajectory
@@ -44,10 +46,10 @@ from ...run.folder import begin, keep_inputs, require_space
 from ...run.progress import Progress
 from ...run.versions import package_versions
 from .candidate_states import PATH_DIFFERENCE_MM, CandidateSolver
+from .candidates_in_time import evaluations
 from .contact_history import history
 from .job import Job
 from .motion import write_model_a
-from .obstacle_candidates import evaluations
 from .path_motion import keep_motion
 from .study_file import LAYOUT, NAME, STAGES
 
@@ -154,7 +156,7 @@ class Study:
     @property
     def anchors(self) -> Array:
         """P1..Pn in mm, (n, 3)."""
-        return anchors(self.job.unit)
+        return anchor_points(self.job.unit)
 
     @property
     def windows(self) -> list[Window]:
@@ -181,7 +183,7 @@ class Study:
         with self.progress.stage("mesh"):
             self.mesh = self._mesh(self.job.mesh)
             self._require_space(len(self.mesh.nodes))
-            self.quality = quality(self.mesh, self.job.unit, self.job.body)
+            self.quality = mesh_quality(self.mesh, self.job.unit, self.job.body)
             modulus, _ = self.job.materials(self.mesh).small_strain(len(self.mesh.tets))
             write_mesh(self.folder / "mesh.vtu", self.mesh, modulus)
         self.context.summary["mesh"] = {**attrs.asdict(self.quality), "hash": self.mesh.hash()}
@@ -190,7 +192,7 @@ class Study:
     def _mesh(self, settings: MeshSettings) -> Mesh:
         settings = self.job.mesh_settings(settings)
         # Only the shape: what it is made of, or called, leaves a mesh as it is.
-        shape = attrs.evolve(self.job.unit, name="shape", material=Material())
+        shape = attrs.evolve(self.job.unit, name="shape", material=Material(), wall=Wall())
         body = [] if self.job.body is None else [self.job.body.hash]
         name = key(shape.hash(), attrs.astuple(settings), self.job.mesher, *body)
         found = self.cache.get("mesh", name)
@@ -226,7 +228,7 @@ class Study:
         time, pressure = self.job.samples
         with self.progress.stage("Model A"):
             model = self.job.model(self.mesh)
-            if candidates_beside and self.job.workers > 1 and not self.job.obstacles:
+            if candidates_beside and self.job.workers > 1 and not self.job.in_time:
                 self._ahead = CandidateSolver(
                     self.job, self.cache, self.mesh, self._jobs(), pressure, self.job.headline_rule
                 )
@@ -239,7 +241,8 @@ class Study:
                 raise
             self._write_motion(self.trajectory.states)
             self._write_contact()
-            write_model_a(self.folder, self.mesh, self.job.materials(self.mesh), self.trajectory)
+            materials = self.job.materials(self.mesh)
+            write_model_a(self.folder, self.mesh, materials, self.trajectory, self._remembered(model))
             self._look_for_contact(self.trajectory.states)
             self._look_beyond_the_fit(self.trajectory.states)
         states = [s for s in self.trajectory.states if s.loaded]
@@ -261,8 +264,8 @@ class Study:
     def _model_a(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
         """Model A's trajectory on a model's mesh, load step by load step from the cache where it is there."""
         materials = self.job.materials(model.mesh)
-        if self.job.obstacles:
-            return self._touching(model, time, pressure, on_state)
+        if self.job.in_time:
+            return self._in_time(model, time, pressure, on_state)
         # A state's last digits depend on the pressures visited before it.
         visited = np.unique(pressure)
         name = key(model.mesh.hash(), materials.hash(), visited, self.job.newton, *self.job.effects.parts)
@@ -286,28 +289,19 @@ class Study:
             ),
         )
 
-    def _touching(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
-        """Model A beside obstacles: instant by instant, since friction remembers, from the cache likewise."""
+    def _in_time(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
+        """Model A instant by instant, since contact or the wall remembers, from the cache likewise."""
         job, materials = self.job, self.job.materials(model.mesh)
-        parts = [(o.depth_mm, o.stiffness, o.stick_stiffness, o.friction) for o in model.obstacles]
-        name = key(
-            model.mesh.hash(),
-            materials.hash(),
-            time,
-            pressure,
-            job.newton,
-            job.obstacles_text() or "",
-            parts,
-            *job.effects.parts,
-        )
+        name = self._in_time_key(model, time, pressure)
         found: list[list[Touch]] = []
 
         def keep(state: State) -> None:
             found.append([o.contact(state.u) for o in model.obstacles])
-            force = sum(float(np.linalg.norm(c.force_N)) for c in found[-1])
-            self.progress.update(
-                len(found) / len(time), f"{state.pressure_kPa:.4g} kPa, contact {force:.3g} N"
-            )
+            words = f"{state.pressure_kPa:.4g} kPa"
+            if job.obstacles:
+                force = sum(float(np.linalg.norm(c.force_N)) for c in found[-1])
+                words += f", contact {force:.3g} N"
+            self.progress.update(len(found) / len(time), words)
             on_state(state)
 
         motion = simulate_in_time(
@@ -318,9 +312,35 @@ class Study:
             load=lambda number: self._kept_instant(key(name, number), model),
             store=lambda number, instant: self._keep_instant(key(name, number), instant),
         )
-        if model.mesh is self.mesh:
+        if model.mesh is self.mesh and job.obstacles:
             self.contact = history(job.obstacles, model.mesh, time, pressure, found)
         return motion
+
+    def _in_time_key(self, model: Model, time: Array, pressure: Array) -> str:
+        job = self.job
+        parts = [(o.depth_mm, o.stiffness, o.stick_stiffness, o.friction) for o in model.obstacles]
+        return key(
+            model.mesh.hash(),
+            job.materials(model.mesh).hash(),
+            time,
+            pressure,
+            job.newton,
+            job.obstacles_text() or "",
+            parts,
+            *job.effects.parts,
+        )
+
+    def _remembered(self, model: Model) -> Callable[[int], tuple[Array, ...]]:
+        """What the wall remembers of an instant of the protocol, by its number; nothing of an elastic one."""
+        if not self.job.unit.wall.has_memory:
+            return lambda number: ()
+        name = self._in_time_key(model, *self.job.samples)
+
+        def remembered(number: int) -> tuple[Array, ...]:
+            kept = self._kept_instant(key(name, number), model)
+            return () if kept is None else kept.history
+
+        return remembered
 
     def _keep_instant(self, name: str, instant: Instant) -> None:
         arrays = attrs.asdict(instant.state, recurse=False) | {"time_s": instant.time_s}
@@ -328,6 +348,8 @@ class Study:
             arrays["rate"] = instant.rate
         for number, memory in enumerate(instant.contacts):
             arrays |= {f"{number} {part}": values for part, values in memory.items()}
+        for number, values in enumerate(instant.history):
+            arrays[f"history {number}"] = values
         self.cache.put("instant", name, arrays)
 
     def _kept_instant(self, name: str, model: Model) -> Instant | None:
@@ -338,7 +360,8 @@ class Study:
             {part.partition(" ")[2]: a for part, a in found.items() if part.startswith(f"{number} ")}
             for number in range(len(model.obstacles))
         ]
-        return Instant(float(found["time_s"]), _state(found), found.get("rate"), tuple(contacts))
+        memory = tuple(found[f"history {n}"] for n in range(len(found)) if f"history {n}" in found)
+        return Instant(float(found["time_s"]), _state(found), found.get("rate"), tuple(contacts), memory)
 
     def _stored(self, name: str, pressure_MPa: float, model: Model) -> State | None:
         found = self.cache.get("state", key(name, pressure_MPa))
@@ -348,7 +371,7 @@ class Study:
 
     def _write_motion(self, states: Any) -> None:
         assert self.mesh is not None
-        if self.job.obstacles:
+        if self.job.in_time:
             self._write_in_time(states)
             return
         ordered = sorted(states, key=lambda s: s.pressure_MPa)
@@ -366,7 +389,7 @@ class Study:
         write_trajectory(self.folder / "model_a.pvd", self.mesh, reached)
 
     def _write_in_time(self, states: Any) -> None:
-        """As `_write_motion`, of states an instant: what touches moves otherwise on the way back."""
+        """As `_write_motion`, of states an instant: with contact or memory the way back differs."""
         assert self.mesh is not None
         time, _ = self.job.samples
         reached = list(zip(time.tolist(), states, strict=False))
@@ -452,11 +475,11 @@ class Study:
     def _keep_partial_motion(self) -> None:
         """What was found before a failure is kept; summary.json says that it is partial."""
         if self.mesh is not None and self.states:
-            start = [] if self.job.obstacles or self.job.effects.has_gravity else [rest(self.mesh)]
+            start = [] if self.job.in_time or self.job.effects.has_gravity else [rest(self.mesh)]
             self._write_motion([*start, *self.states])
 
     def _jobs(self) -> list[tuple[Candidate, str]]:
-        return [(c, rule) for rule in self.job.rules for c in candidates(self.anchors, self.windows)]
+        return [(c, rule) for rule in self.job.rules for c in candidate_paths(self.anchors, self.windows)]
 
     def place(self) -> dict[str, str]:
         """Every candidate under every rule against Model A; returns the chosen path of each rule."""
@@ -466,7 +489,7 @@ class Study:
         with self.progress.stage("candidates"):
             found = self.sweep(self.mesh, self.trajectory, jobs, self._ahead, verify=True, to_look_at=True)
         self.evaluations = {(e.name, e.rule): e for e in found}
-        every = candidates(self.anchors, self.windows)
+        every = candidate_paths(self.anchors, self.windows)
         chosen = self._write_ranking(every)
         if self.job.mesh_check:
             try:
@@ -489,7 +512,7 @@ class Study:
 
         to_look_at: whether the paths' motion is kept, too; of the study's own mesh or the whole body's.
         """
-        if self.job.obstacles:
+        if self.job.in_time:
             self.context.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = {"along_paths": True}
             return evaluations(self.job, self.cache, mesh, trajectory, jobs, self.progress.update)
         whole = self.job.headline_rule if to_look_at else ""
@@ -523,9 +546,9 @@ class Study:
         chosen = extremes(pressure)
         instants = [int(np.flatnonzero(pressure == p)[0]) for p in chosen]
         time = np.arange(len(chosen), dtype=float)
-        if self.job.obstacles:
-            # What friction remembers is of the whole protocol.
-            time, chosen = self.job.samples
+        if self.job.in_time:
+            # What contact or wall remembers is of the whole protocol.
+            time, chosen = self.job.protocol.sample(self.job.times)
             instants = list(range(len(time)))
         with self.progress.stage("mesh check"):
             mesh = self._mesh(coarse)

@@ -1,4 +1,4 @@
-"""The process that simulates: `python worker.py place --unit unit.toml --out folder --json`, without bpy.
+"""What a child process runs, without bpy: `python child_main.py place --unit unit.toml --out folder --json`.
 
 It makes the package it lies in importable as `mu_addon`, whatever Blender calls it. The processes that it
 starts run these lines, too, and find the package the same way.
@@ -8,12 +8,15 @@ import ctypes.util
 import importlib
 import importlib.util
 import json
+import os
 import sys
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[2]
-WITHOUT_SOLVER = ("record", "replay", "calibrate", "check", "export", "specimens")
-"""Commands for the sensor on the bench and for the printer: they start at once, also without the solver."""
+WITHOUT_SOLVER = (
+    "presets", "design", "check", "export", "specimens", "ports", "stream", "record", "replay", "calibrate",
+)  # fmt: skip
+"""Commands for design, the printer and the sensor on the bench: they need no solver."""
 
 
 def _provide_package():
@@ -46,18 +49,25 @@ _provide_package()
 _provide_gmsh()
 
 
-def _trouble():
-    """Why nothing can be simulated here, as the words of an error message, or None."""
+def _trouble(solves):
+    """Why a command cannot run here, as an error message, or None. solves: whether it needs the solver."""
     try:
-        import scipy  # noqa: F401
-        import warp  # noqa: F401
+        import attrs  # noqa: F401
+
+        if solves:
+            import scipy  # noqa: F401
+            import warp  # noqa: F401
     except (ImportError, OSError, RuntimeError) as error:
+        missing = getattr(error, "name", None)
         return {
             "type": "error",
-            "what": f"the solver cannot load: {error}",
+            "what": f"the package {missing} is not installed"
+            if missing
+            else f"the solver cannot load: {error}",
             "where": f"Python {sys.version.split()[0]}, {sys.executable}",
-            "what_to_do": "install the extension built for this Blender and system; design and export work "
-            "without",
+            "what_to_do": "install the extension built for this Blender and system (blender --command "
+            "extension install-file -r user_default -e mu_addon-VERSION-SYSTEM.zip)"
+            + ("; design and export work without the solver" if solves else ""),
             "status": 1,
         }
     return None
@@ -65,14 +75,23 @@ def _trouble():
 
 def main(arguments):
     """Exit status of one command line of the core; `check` alone only tells whether the solver loads."""
-    solves = len(arguments) < 2 or arguments[0] not in WITHOUT_SOLVER
-    trouble = _trouble() if solves else None
+    helps = not arguments or "-h" in arguments or "--help" in arguments
+    solves = not helps and (len(arguments) < 2 or arguments[0] not in WITHOUT_SOLVER)
+    trouble = _trouble(solves)
     if trouble is not None:
-        sys.stdout.write(json.dumps(trouble) + "\n")
+        if "--json" in arguments or arguments == ["check"]:
+            sys.stdout.write(json.dumps(trouble) + "\n")
+        else:
+            sys.stderr.write(
+                f"error: {trouble['what']}\n  where: {trouble['where']}\n"
+                f"  what to do: {trouble['what_to_do']}\n"
+            )
         return 1
     if arguments == ["check"]:
         sys.stdout.write(json.dumps({"type": "result"}) + "\n")
         return 0
+    if os.environ.get("MU_ENDS_WITH_INPUT"):
+        importlib.import_module("mu_addon.run.processes").end_with_input()
     # By name: the package is the one provided above, and not one that happens to be on the path.
     return importlib.import_module("mu_addon.cli.main").main(arguments)
 

@@ -1,0 +1,49 @@
+"""The Python that runs a job in a process of its own, started from inside Blender.
+
+Blender has its own copies of libraries that the solver's wheels bring, too (CHOLMOD, BLAS): in one process
+the calls of the one may be bound to the other's code, of another version. So nothing is solved in Blender's
+process.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from ..errors import InputError
+
+_LIBRARY_FOLDERS = ("site-packages", "dist-packages")
+
+
+def interpreter(blender: str = "") -> list[str]:
+    """Command that runs a Python file: this Python, or where it has no file of its own, Blender's.
+
+    blender: path of Blender's program, if any. Raises InputError where there is neither.
+    """
+    python = Path(sys.executable)
+    if python.is_file() and "python" in python.name.lower():
+        # -P: the folder of the file is not searched for modules.
+        return [str(python), "-P"]
+    if blender:
+        return [blender, "--background", "--factory-startup", "--python-exit-code", "70", "--python"]
+    raise InputError(
+        "there is no Python to run the job with",
+        str(python),
+        "use Blender as its makers ship it, or run headless/run.py from a terminal",
+    )
+
+
+def worker_command(worker: Path, arguments: Sequence[str], blender: str = "") -> list[str]:
+    """Command that runs a line of the core's command line by the Python file `worker`; raises InputError."""
+    prefix = interpreter(blender)
+    separator = ["--"] if prefix[-1] == "--python" else []
+    return [*prefix, str(worker), *separator, *arguments]
+
+
+def environment(more: Iterable[Path] = ()) -> dict[str, str]:
+    """Environment of such a process: it finds the packages that this one finds, and those in `more`."""
+    found = [Path(p) for p in sys.path if Path(p).name in _LIBRARY_FOLDERS]
+    folders = dict.fromkeys(str(p) for p in [*more, *found])
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(folders), "PYTHONUNBUFFERED": "1"}

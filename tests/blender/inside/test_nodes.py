@@ -1,0 +1,217 @@
+"""Node groups: built in code, usable on anyone's geometry, renewed in place when they are old."""
+
+import bmesh
+import bpy
+import numpy as np
+
+from mu_addon.blender.assets import library
+from mu_addon.blender.body import state as bodies
+from mu_addon.blender.preview import nodes
+from mu_addon.blender.shared.compat import modifier_input, set_modifier_input
+from mu_addon.blender.unit import object as unit_object
+
+from .acting import add
+
+
+def edge(length, radius=None):
+    mesh = bpy.data.meshes.new("edge")
+    mesh.from_pydata([(0, 0, 0), (0, 0, length)], [(0, 1)], [])
+    if radius is not None:
+        mesh.attributes.new("radius", "FLOAT", "POINT").data.foreach_set("value", radius)
+    obj = bpy.data.objects.new("edge", mesh)
+    bpy.context.collection.objects.link(obj)
+    return obj
+
+
+def skinned(obj):
+    bpy.context.view_layer.update()
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    return np.array([v.co[:] for v in mesh.vertices])
+
+
+def test_tubes_take_their_radius_from_the_attribute_or_the_input():
+    tapered = edge(10.0, [1.0, 3.0])
+    nodes.skin(tapered, "MU Tubes")
+    points = skinned(tapered)
+    wide = np.hypot(points[:, 0], points[:, 1])
+    assert np.allclose(wide[points[:, 2] < 1], 1.0, atol=1e-5)
+    assert np.allclose(wide[points[:, 2] > 9], 3.0, atol=1e-5)
+
+    plain = edge(10.0)
+    modifier = nodes.skin(plain, "MU Tubes")
+    assert nodes.skin(plain, "MU Tubes") == modifier
+    assert len(plain.modifiers) == 1
+    set_modifier_input(modifier, "Radius", 2.0)
+    set_modifier_input(modifier, "Sides", 12)
+    assert modifier_input(modifier, "Sides") == 12
+    points = skinned(plain)
+    assert len(points) == 24
+    assert np.allclose(np.hypot(points[:, 0], points[:, 1]), 2.0, atol=1e-5)
+    try:
+        set_modifier_input(modifier, "no such input", 1)
+    except KeyError:
+        pass
+    else:
+        raise AssertionError
+
+
+def test_a_colour_field_scales_a_value():
+    obj = edge(10.0)
+    obj.data.attributes.new("stress_kPa", "FLOAT", "POINT").data.foreach_set("value", [5.0, 30.0])
+    modifier = nodes.skin(obj, "MU Colour Field")
+    for name, value in {"Attribute": "stress_kPa", "Low": 0.0, "High": 20.0}.items():
+        set_modifier_input(modifier, name, value)
+    bpy.context.view_layer.update()
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    colour = [a.value for a in mesh.attributes["mu_colour"].data]
+    assert np.allclose(colour, [0.25, 1.0])
+    assert [a.value for a in mesh.attributes["stress_kPa"].data] == [5.0, 30.0]
+
+
+def test_an_old_group_is_renewed_in_place():
+    obj = edge(10.0, [1.0, 1.0])
+    modifier = nodes.skin(obj, "MU Tubes")
+    tree = modifier.node_group
+    set_modifier_input(modifier, "Sides", 11)
+    before = skinned(obj)
+    tree["mu_version"] = 0
+    tree.nodes.clear()
+    assert nodes.group("MU Tubes") == tree == modifier.node_group
+    assert tree["mu_version"] == nodes.GROUPS["MU Tubes"].VERSION
+    assert modifier_input(modifier, "Sides") == 11
+    assert len(before) == 22
+    assert np.allclose(skinned(obj), before)
+    assert all(nodes.group(name).asset_data is not None for name in nodes.GROUPS)
+    assert len(bpy.data.node_groups) == len(nodes.GROUPS)
+
+
+def test_a_group_that_is_there_is_not_built_again():
+    first = nodes.group("MU Tubes")
+    first.nodes["Group Output"].location.x = 1234.0
+    assert nodes.group("MU Tubes").nodes["Group Output"].location.x == 1234.0
+
+
+def drawn(points, kind="POLY"):
+    curve = bpy.data.curves.new("own", "CURVE")
+    curve.dimensions = "3D"
+    spline = curve.splines.new(kind)
+    spline.points.add(len(points) - 1)
+    for point, at in zip(spline.points, points, strict=True):
+        point.co = (*at, 1.0)
+    obj = bpy.data.objects.new("own", curve)
+    bpy.context.collection.objects.link(obj)
+    return obj
+
+
+def closed_volume(obj):
+    bpy.context.view_layer.update()
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    solid = bmesh.new()
+    solid.from_mesh(mesh)
+    assert all(edge.is_manifold for edge in solid.edges)
+    return solid.calc_volume()
+
+
+def test_a_users_own_curve_gets_tubes():
+    obj = drawn([(0, 0, 0), (0, 0, 10), (0, 0, 40)])
+    bpy.context.view_layer.objects.active = obj
+    assert bpy.ops.mu.skin(group="MU Tubes") == {"FINISHED"}
+    points = skinned(obj)
+    assert len(points) == 24
+    assert np.allclose(np.hypot(points[:, 0], points[:, 1]), 1.0, atol=1e-5)
+    obj.data.splines[0].points[2].radius = 0.5  # alt S, in edit mode
+    set_modifier_input(obj.modifiers[0], "Radius", 3.0)
+    points = skinned(obj)
+    wide = np.hypot(points[:, 0], points[:, 1])
+    assert np.allclose(wide[points[:, 2] < 1], 3.0, atol=1e-5)
+    assert np.allclose(wide[points[:, 2] > 39], 1.5, atol=1e-5)
+
+
+def test_a_waveguide_on_a_curve_has_whole_wells_at_a_constant_pitch():
+    obj = drawn([(0, 0, 0), (0, 0, 40)])
+    modifier = nodes.skin(obj, "MU Waveguide")
+    bar = 1.5 * 1.5 * 40
+
+    def wells():
+        return (bar - closed_volume(obj)) / (1.5 * 0.65 * 1.0)
+
+    assert abs(wells() - 12) < 1e-3  # 11 pitches of 3.125 mm, and half a pitch or more at either end
+    set_modifier_input(modifier, "Pitch", 8.0)
+    assert abs(wells() - 5) < 1e-3
+    set_modifier_input(modifier, "Pitch", 50.0)
+    assert abs(wells() - 1) < 1e-3
+    set_modifier_input(modifier, "Pitch", 8.0)
+    set_modifier_input(modifier, "Cut", False)
+    points = skinned(obj)
+    assert len(points) == 8 + 5 * 8
+    boxes = points[(points[:, 2] > 0.01) & (points[:, 2] < 39.99)]  # the bar has its vertices at its ends
+    middles = boxes.reshape(5, 8, 3).mean(axis=1)
+    assert np.allclose(np.diff(middles[:, 2]), 8.0, atol=1e-4)
+    assert np.allclose(middles[:, 2].mean(), 20.0, atol=1e-4)
+    # In one face: all on one side of the axis, by half the section less half a well.
+    side = np.abs(middles[:, :2]).max(axis=1)
+    assert np.allclose(side, 0.75 - 0.325 + 0.03, atol=1e-4)
+    assert np.allclose(middles[:, :2], middles[0, :2], atol=1e-5)
+
+
+def test_a_group_of_an_older_version_in_a_file_is_upgraded(tmp_path):
+    # As version 1 was: a radius that replaced the attribute's, and edges only.
+    tree = bpy.data.node_groups.new("MU Tubes", "GeometryNodeTree")
+    tree.is_modifier = True
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Sides", in_out="INPUT", socket_type="NodeSocketInt")
+    tree["mu_version"] = 1
+    tree.asset_mark()
+    obj = drawn([(0, 0, 0), (0, 0, 40)])
+    modifier = obj.modifiers.new("MU Tubes", "NODES")
+    modifier.node_group = tree
+    set_modifier_input(modifier, "Sides", 5)
+    path = str(tmp_path / "older.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    obj = bpy.data.objects["own"]
+    assert bpy.data.node_groups["MU Tubes"]["mu_version"] == 1
+    add()  # whatever needs the group brings it up to date
+    tree = obj.modifiers[0].node_group
+    assert tree["mu_version"] == nodes.GROUPS["MU Tubes"].VERSION > 1
+    assert tree.asset_data.catalog_id == nodes.CATALOGUE
+    assert modifier_input(obj.modifiers[0], "Sides") == 5
+    assert len(skinned(obj)) == 10
+
+
+def test_the_groups_become_an_asset_library_of_the_users():
+
+    def names():
+        return {entry.name for entry in bpy.context.preferences.filepaths.asset_libraries}
+
+    assert bpy.ops.mu.assets() == {"FINISHED"}
+    assert bpy.ops.mu.assets() == {"FINISHED"}  # a second time adds no second entry
+    libraries = bpy.context.preferences.filepaths.asset_libraries
+    assert [entry.name for entry in libraries].count("Monolithic Units") == 1
+    assert len(bpy.data.node_groups) == 0, "groups that this file does not use were left in it"
+    folder = library.user_folder("assets")
+    assert nodes.CATALOGUE in (folder / "blender_assets.cats.txt").read_text()
+    assert sorted(p.name for p in folder.iterdir()) == ["blender_assets.cats.txt", "mu-nodes.blend"]
+    with bpy.data.libraries.load(str(folder / "mu-nodes.blend"), assets_only=True) as (there, here):
+        assert set(there.node_groups) == set(nodes.GROUPS)
+        here.node_groups = ["MU Tubes"]
+    tree = bpy.data.node_groups["MU Tubes"]
+    assert tree.asset_data.catalog_id == nodes.CATALOGUE
+    obj = drawn([(0, 0, 0), (0, 0, 40)])
+    assert nodes.skin(obj, "MU Tubes").node_group == tree
+    assert len(skinned(obj)) == 16
+    assert bpy.ops.mu.assets_remove() == {"FINISHED"}
+    assert "Monolithic Units" not in names()
+    assert list(folder.iterdir()) == []
+
+
+def test_the_sample_scene():
+
+    assert bpy.ops.mu.sample() == {"FINISHED"}
+    whole, opened, bodied = (bpy.data.objects[n] for n in ("Whole", "Cut Open", "In a Body of Its Own"))
+    assert {r.mu_unit.trouble for r in (whole, opened, bodied)} == {""}
+    assert opened.mu_unit.cut
+    assert opened.mu_unit.path == "alpha4"
+    assert unit_object.part(bodied, bodies.ENVELOPE) is not None
+    assert closed_volume(bpy.data.objects["Waveguide on a Curve"]) > 0

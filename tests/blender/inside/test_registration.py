@@ -1,0 +1,162 @@
+"""The extension comes and goes without residue, and shows every parameter that the core has.
+
+Imports stand in the tests: two of them need a process in which none has happened.
+"""
+
+from typing import ClassVar
+
+import bpy
+import pytest
+
+
+@pytest.mark.own_process
+def test_register_and_unregister_twice_leave_nothing():
+    import sys
+
+    import mu_addon
+
+    def ours():
+        classes = {name for name in dir(bpy.types) if name.startswith("MU_")}
+        lists = ("undo_post", "redo_post", "load_post")
+        handlers = sum(len(getattr(bpy.app.handlers, name)) for name in lists)
+        menu = len(getattr(bpy.types.VIEW3D_MT_mesh_add.draw, "_draw_funcs", ()))
+        return classes, handlers, menu, hasattr(bpy.types.Object, "mu_unit")
+
+    assert "bpy" in sys.modules
+    assert "mu_addon.blender" not in sys.modules
+    before = ours()
+    mu_addon.register()
+    mu_addon.register()
+    once = ours()
+    assert len(once[0]) > 20
+    assert once[1] > before[1]
+    assert once[3]
+    mu_addon.unregister()
+    mu_addon.unregister()
+    after = ours()
+    assert after[0] == before[0] == set()
+    assert after[1] == before[1]
+    assert after[2] == once[2] - 1
+    assert not after[3]
+    mu_addon.register()
+    assert ours() == once
+    mu_addon.unregister()
+
+
+@pytest.mark.own_process
+def test_a_failure_while_registering_leaves_nothing(monkeypatch):
+    import mu_addon
+    from mu_addon.blender.unit import panel as panels
+
+    def fails():
+        raise RuntimeError("no")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(panels, "register", fails)
+        patch.setattr(panels, "unregister", lambda: None)
+        with pytest.raises(RuntimeError, match="no"):
+            mu_addon.register()
+        assert not [name for name in dir(bpy.types) if name.startswith("MU_")]
+    mu_addon.register()
+    assert hasattr(bpy.types, "MU_PT_unit")
+
+
+def test_every_parameter_of_the_core_is_a_property():
+    from mu_addon.blender.unit.properties import GROUPS
+    from mu_addon.design.parameters import SECTIONS
+    from mu_addon.design.quantity import describe
+
+    for section in SECTIONS:
+        shown = GROUPS[section.section].bl_rna.properties
+        for d in describe(section):
+            p = shown[d.name]
+            assert d.text[1:] in p.description
+            assert f"Source: {d.source}" in p.description
+            assert not p.description.endswith(".") or d.source.endswith(".")
+            if d.choices:
+                assert [i.identifier for i in p.enum_items] == list(d.choices)
+                assert p.default == d.default
+            elif d.type is bool:
+                assert p.type == "BOOLEAN"
+            else:
+                assert abs(p.hard_min - d.low) < 1e-6
+                assert abs(p.hard_max - d.high) < 1e-3
+                assert abs(p.default - d.default) < 1e-4
+                assert (p.subtype == "DISTANCE") == (d.unit == "mm")
+                assert f"{d.low:g} to {d.high:g} {d.unit}".rstrip() in p.description
+                if d.unit and d.unit != "mm":
+                    assert p.name.endswith(f"({d.unit})")
+
+
+@pytest.mark.own_process
+def test_a_new_section_of_the_core_appears_by_itself():
+    import attrs
+
+    import mu_addon
+    from mu_addon.design import parameters
+    from mu_addon.design.quantity import choice, quantity
+
+    @attrs.frozen
+    class Novelty:
+        section: ClassVar[str] = "novelty"
+        depth_mm: float = quantity(0.7, "mm", 0.1, 2.0, "depth of the novelty", "assumed: a test")
+        way: str = choice("left", lambda: ("left", "right"), "way it turns", "paper")
+
+    parameters.SECTIONS += (Novelty,)
+    parameters.Unit.__annotations__["novelty"] = Novelty
+    mu_addon.register()
+    root = bpy.data.objects.new("x", None)
+    group = root.mu_unit.novelty
+    group.depth_mm, group.way = 1.25, "right"
+    from mu_addon.blender.shared.panels import parameters as draw
+    from mu_addon.blender.unit.properties import section_of
+
+    assert section_of(root.mu_unit, "novelty") == {"depth_mm": 1.25, "way": "right"}
+
+    class Layout:
+        shown: ClassVar[list[str]] = []
+
+        def column(self, align=False):
+            return self
+
+        def prop(self, group, name):
+            self.shown.append(name)
+
+    draw(Layout(), root.mu_unit, "design")
+    assert Layout.shown[-2:] == ["depth_mm", "way"]
+
+
+def test_values_survive_single_precision():
+    from mu_addon.blender.shared import updates
+    from mu_addon.blender.unit.properties import exact, from_unit, to_unit
+    from mu_addon.design.parameters import load_preset, preset_names
+
+    from .acting import add
+
+    assert exact(0.8999999761581421) == 0.9
+    assert exact(3.125) == 3.125
+    assert exact(1e6) == 1e6
+    root = add()
+    for name in preset_names():
+        with updates.paused():
+            from_unit(root.mu_unit, load_preset(name))
+        assert to_unit(root.mu_unit) == load_preset(name)
+        assert to_unit(root.mu_unit).hash() == load_preset(name).hash()
+
+
+def test_everything_a_designer_meets_says_what_it_is():
+    ours = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("MU_")]
+    silent = [cls.__name__ for cls in ours if not (cls.__doc__ or "").strip()]
+    from .acting import operators
+
+    groups = [cls for cls in bpy.types.PropertyGroup.__subclasses__() if cls.__name__.startswith("MU_")]
+    shown = [(cls.__name__, cls.bl_rna) for cls in groups]
+    shown += [(c.bl_idname, getattr(bpy.ops.mu, c.bl_idname[3:]).get_rna_type()) for c in operators()]
+    for name, kind in shown:
+        if name in {c.bl_idname for c in operators()} and not kind.description:
+            silent.append(name)
+        for p in kind.properties:
+            if p.identifier not in ("rna_type", "name") and not p.is_hidden and not p.description:
+                silent.append(f"{name}.{p.identifier}")
+    assert len(shown) > 40
+    assert not silent

@@ -1,0 +1,151 @@
+"""The stack of steps in a unit: run alone, muted, shown, and never made again for nothing."""
+
+import tempfile
+from collections import Counter
+
+import bpy
+import numpy as np
+
+from mu_addon.blender.steps import state as stack
+from mu_addon.blender.unit import object as unit_object
+from mu_addon.design.parameters import load_preset
+from mu_addon.design.steps import STEPS
+
+from .acting import add, refused
+
+
+def made(action):
+    before = Counter(stack.STACK.counts)
+    action()
+    return {name for name in STEPS if stack.STACK.counts[name] > before[name]}
+
+
+def shape(root, name):
+    return len(unit_object.part(root, name).data.vertices)
+
+
+def test_a_slider_makes_only_what_depends_on_it():
+    root = add()
+    bpy.ops.mu.path(name="alpha4")
+    props = root.mu_unit
+
+    def change(section, name, value):
+        return made(lambda: setattr(getattr(props, section), name, value))
+
+    assert [entry.name for entry in props.stack] == list(STEPS)
+    assert change("chambers", "wall_mm", 1.0) == {"chambers", "membranes", "wells"}
+    assert change("chambers", "wall_mm", 0.9) == set()
+    assert change("waveguide", "well_pitch_mm", 4.0) == {"wells"}
+    assert made(lambda: bpy.ops.mu.rebuild()) == set()
+    # Another unit of the same shape costs nothing.
+    assert made(lambda: add()) == set()
+
+
+def test_each_step_runs_alone_with_its_own_parameters():
+    root = add()
+    bpy.ops.mu.path(name="alpha4")
+    props = root.mu_unit
+    for step in STEPS.values():
+        if step.name in ("path", "solid"):
+            continue
+        operator = getattr(bpy.ops.mu, step.name)
+        own = {name for _, name in stack.own_parameters(step)}
+        shown = {p.identifier for p in operator.get_rna_type().properties} - {"rna_type"}
+        assert shown == own | ({"muted"} if step.muting else set()), (step.name, shown)
+        assert made(operator) == {step.name}
+        assert props.step == list(STEPS).index(step.name)
+    assert made(lambda: bpy.ops.mu.again(step="cells")) == {"cells"}
+    assert "no step 'polish'" in refused(bpy.ops.mu.again, step="polish")
+
+    assert made(lambda: bpy.ops.mu.chambers(wall_mm=1.1)) == {"chambers", "membranes", "wells"}
+    assert round(props.chambers.wall_mm, 4) == 1.1
+    assert round(props.chambers.tip_cap_mm, 4) == 5.0
+    assert "too thick" in refused(bpy.ops.mu.chambers, wall_mm=3.0)
+    assert round(props.chambers.wall_mm, 4) == 1.1
+    assert props.trouble == ""
+    bpy.ops.mu.wells(well_depth_mm=0.3)
+    assert round(props.waveguide.well_depth_mm, 4) == 0.3
+
+
+def test_muted_steps_are_left_out_and_not_printed(tmp_path):
+    root = add()
+    bpy.ops.mu.path(name="alpha4")
+    props = root.mu_unit
+    props.cut = True
+    with_wells = shape(root, "waveguide")
+    whole = shape(root, "actuator")
+    assert bpy.ops.mu.mute(step="wells") == {"FINISHED"}
+    assert 0 < shape(root, "waveguide") < with_wells
+    assert "without wells is not the unit" in refused(bpy.ops.mu.solid)
+    never = {"filepath": str(tmp_path / "never.stl"), "quality": "interactive"}
+    assert "unmute wells" in refused(bpy.ops.mu.export_stl, **never)
+    assert unit_object.part(root, "solid") is None
+    bpy.ops.mu.mute(step="wells", muted=False)
+    assert shape(root, "waveguide") == with_wells
+
+    bpy.ops.mu.chambers(muted=True)
+    assert shape(root, "actuator") < whole
+    bpy.ops.mu.chambers(muted=False)
+    assert shape(root, "actuator") == whole
+
+    tubes = unit_object.part(root, "lattice")
+    assert len(tubes.modifiers) == 1
+
+    def length(obj):
+        ends = np.array([[obj.data.vertices[v].co[:] for v in e.vertices] for e in obj.data.edges])
+        return np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum()
+
+    trimmed = length(tubes)
+    bpy.ops.mu.mute(step="trim")
+    assert length(tubes) > 1.1 * trimmed
+    bpy.ops.mu.mute(step="struts")
+    assert len(tubes.modifiers) == 0
+    assert "radius" not in tubes.data.attributes
+    bpy.ops.mu.mute(step="struts", muted=False)
+    assert len(tubes.modifiers) == 1
+    bpy.ops.mu.mute(step="trim", muted=False)
+    bpy.ops.mu.mute(step="cells")
+    assert unit_object.part(root, "lattice") is None
+    assert unit_object.part(root, "waveguide") is not None
+    bpy.ops.mu.mute(step="cells", muted=False)
+
+    bpy.ops.mu.mute(step="path")
+    assert unit_object.part(root, "waveguide") is None
+    assert props.path == "alpha4"
+
+
+def test_every_step_can_be_shown():
+    root = add()
+    bpy.ops.mu.path(name="alpha4")
+    props = root.mu_unit
+    assert {e.name for e in props.stack if e.shown} == {"membranes", "struts", "anchors", "wells"}
+    for entry in props.stack:
+        entry.shown = True
+    parts = {c["mu_part"] for c in root.children}
+    assert parts == {name for name, _ in unit_object.DRAWN.values()}
+    d = load_preset("mu-1.0x").dimensions
+    cells = unit_object.part(root, "cells").data
+    nx, ny, nz = d.cells_x, d.cells_y_minus + d.cells_y_plus + 1, d.count
+    assert len(cells.vertices) == (nx + 1) * (ny + 1) * (nz + 1)
+    assert len(cells.edges) == sum(
+        a * (b + 1) * (c + 1) for a, b, c in ((nx, ny, nz), (ny, nx, nz), (nz, nx, ny))
+    )
+    for entry in props.stack:
+        entry.shown = False
+    assert [c for c in root.children if c.get("mu_part")] == []
+
+
+def test_the_stack_is_saved_and_an_older_file_gets_one():
+    root = add()
+    bpy.ops.mu.mute(step="trim")
+    root.mu_unit.stack["profile"].shown = True
+    path = tempfile.mkdtemp() + "/steps.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    (root,) = unit_object.roots()
+    assert stack.muted(root.mu_unit) == {"trim"}
+    assert root.mu_unit.stack["profile"].shown
+    root.mu_unit.stack.clear()  # as a file of an earlier version has it
+    assert bpy.ops.mu.rebuild() == {"FINISHED"}
+    assert [e.name for e in root.mu_unit.stack] == list(STEPS)
+    assert unit_object.part(root, "lattice") is not None
