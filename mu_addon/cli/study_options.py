@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from .options import add_solver
+
 EXAMPLE = "example: run.py place --preset mu-1.0x --out out/mu-1.0x"
 
 
@@ -105,3 +107,4 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
         default="auto",
         help="Mesh generator (default: auto).",
     )
+    add_solver(command)

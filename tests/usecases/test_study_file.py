@@ -11,10 +11,11 @@ import pytest
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
+from mu_addon.fem.solver import SolverChoice
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import Limits
 from mu_addon.run.folder import keep_inputs
-from mu_addon.usecases.simulate_and_place.job import Job, read_job
+from mu_addon.usecases.simulate_and_place.job import Job, grasp, read_job
 from mu_addon.usecases.simulate_and_place.study_file import FORMAT, STAGES, compose, parse, read
 
 from ..homogenize.lattice_laws import body_centred
@@ -172,3 +173,15 @@ def test_what_is_composed_is_parsed(tmp_path):
     tables = JOB.tables()
     found, outdated = parse(compose(tables), tmp_path)
     assert (found, outdated) == (tables, False)
+
+
+def test_the_solver_is_no_part_of_a_studys_inputs():
+    plain = Job(unit=load_preset("mu-1.0x"), protocol=grasp())
+    chosen = attrs.evolve(plain, solver=SolverChoice("direct", "cpu"))
+    assert chosen.text() == plain.text()
+    with pytest.raises(InputError, match="one factor"):
+        attrs.evolve(plain, solver=SolverChoice("iterative"))
+    motion = attrs.evolve(plain, stages=("design", "simulate"))
+    assert attrs.evolve(motion, solver=SolverChoice("iterative")).text() == motion.text()
+    with pytest.raises(InputError, match="quadratic elements"):
+        attrs.evolve(motion, mesh=MeshSettings(order=1), solver=SolverChoice("iterative"))

@@ -52,6 +52,9 @@ class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
             arguments += ["--paths", settings.paths]
         if settings.detail == "quick":
             arguments += QUICK + (QUICK_PLACE if settings.command == "place" else [])
+        for name in ("solver", "device"):
+            if getattr(settings, name) != "auto":
+                arguments += [f"--{name}", getattr(settings, name)]
         if settings.protocol:
             arguments += ["--protocol", bpy.path.abspath(settings.protocol)]
         folder = studies.assign_folder(root)

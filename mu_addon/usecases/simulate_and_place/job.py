@@ -19,6 +19,7 @@ from ...design.solid import QUALITY
 from ...errors import InputError
 from ...fem.obstacle import CONTACT
 from ...fem.protocol import Protocol, read_protocol
+from ...fem.solver import SolverChoice
 from ...fem.unit import materials_of
 from ...homogenize.effective import Effective, read_effective
 from ...meshing.settings import MeshSettings
@@ -86,6 +87,8 @@ class Job:
     obstacles: tuple[RigidBody, ...] = attrs.field(default=(), converter=tuple)
     # What measured data named beside what the unit has parameters for, and the direction of gravity.
     effects: StaticEffects = attrs.field(factory=StaticEffects)
+    # How linear systems are solved: within their tolerance it decides nothing.
+    solver: SolverChoice = attrs.field(factory=SolverChoice)
     # What is run of it: the first, the first two or all.
     stages: tuple[str, ...] = STAGES
     # Name of a path along which the unit with a waveguide is built, too; decides no figure.
@@ -117,6 +120,20 @@ class Job:
                 "clogged_chamber, paths",
                 "leave one of them out",
             )
+        if (
+            self.solver.method == "iterative"
+            and "place" in self.stages
+            and self.solver.device in ("auto", "cpu")
+        ):
+            raise InputError(
+                "on the CPU all paths are solved with one factor, which two levels do not make",
+                "--solver",
+                "give --solver direct or auto, or a CUDA device with --device",
+            )
+        if self.solver.method == "iterative" and self.mesh.order == 1 and "simulate" in self.stages:
+            raise InputError(
+                "two levels need quadratic elements", "--solver, --order", "give --order 2 or --solver direct"
+            )
         _, pressure = self.samples
         if not pressure.any():
             raise InputError(
@@ -133,7 +150,7 @@ class Job:
     def tables(self) -> Tables:
         """Everything that decides the results, a table a stage, as study.toml has it.
 
-        Not `workers`, which decides nothing.
+        Not `workers` and `solver`, which decide nothing.
         """
         mesh = attrs.asdict(self.mesh)
         tables: Tables = {
@@ -165,7 +182,8 @@ class Job:
         return compose(self.tables(), self._run)
 
     @property
-    def _run(self) -> dict[str, str]:
+    def _run(self) -> dict[str, Any]:
+        """The table [run] of study.toml: what decides no figure."""
         return {"path": self.path} if self.path else {}
 
     @property
@@ -180,7 +198,9 @@ class Job:
 
     def model(self, mesh: Mesh, threads: int = 2) -> Model:
         """Model of the unit's mesh: pressure, what weighs, what it may touch. Raises InputError."""
-        model = self.effects.model(self.unit, mesh, threads)
+        device, solver = self.solver.resolved(mesh, needs_factor="place" in self.stages)
+        model = self.effects.model(self.unit, mesh, threads, device)
+        model.solver = solver
         if self.obstacles:
             model.obstacles = obstacles_of(self.obstacles, self.unit, mesh)
         return model

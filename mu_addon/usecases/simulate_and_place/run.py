@@ -75,8 +75,9 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     if isinstance(search, dict):
         best = search["best"]
         lines.append(
-            f"whole lattice, {search['rule']}: {best['name']}, J_hat {best['J_hat_mm']:.4f} mm, "
-            f"{best['length_mm']:.1f} mm long; {search['checked']} of {search['paths']} paths were solved"
+            f"whole-lattice search, {search['rule']}: {best['name']}, J_hat {best['J_hat_mm']:.4f} mm, "
+            f"{best['length_mm']:.1f} mm long; {search['checked']} of {search['paths']} paths solved by the "
+            "full model"
         )
     return lines
 

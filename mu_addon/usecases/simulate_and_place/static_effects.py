@@ -141,9 +141,9 @@ class StaticEffects:
                 base = change(base, mesh, sizes[name])
         return base
 
-    def model(self, unit: Unit, mesh: Mesh, threads: int = 2) -> Model:
+    def model(self, unit: Unit, mesh: Mesh, threads: int = 2, device: str = "cpu") -> Model:
         """Model of a unit's mesh with these effects. Raises InputError where one does not fit the unit."""
-        body = Body(unit, orientation_deg=self.orientation_deg)
+        body = Body(unit, orientation_deg=self.orientation_deg, device=device)
         sizes = self.sizes
         # One at most has a model of its own.
         found = next((make(body, mesh, s) for n, s in sizes.items() if (make := EFFECTS[n].model)), None)

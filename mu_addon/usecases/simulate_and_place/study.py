@@ -247,6 +247,8 @@ class Study:
             self._look_beyond_the_fit(self.trajectory.states)
         states = [s for s in self.trajectory.states if s.loaded]
         self.solver = {
+            "method": model.solver,
+            "device": model.device,
             "unknowns": len(model.free),
             "states": len(states),
             "newton_iterations": sum(s.iterations for s in states),
