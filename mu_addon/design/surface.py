@@ -44,7 +44,10 @@ def bad_edges(triangles: Triangles) -> int:
 
 
 def volume(vertices: Vertices, triangles: Triangles) -> float:
-    """Volume (mm3) enclosed by an outward oriented surface, by the divergence theorem."""
+    """Volume in mm3 enclosed by triangles (m, 3) between vertices (n, 3) in mm that face outward.
+
+    By the divergence theorem; a surface that is not closed has no volume, and is not recognised here.
+    """
     p, q, r = vertices[triangles.T]
     return float(np.einsum("ij,ij->", p, np.cross(q, r)) / 6.0)
 

@@ -74,7 +74,7 @@ class Part:
 
 
 def write_3mf(parts: Sequence[Part], printed: Sequence[int], title: str) -> bytes:
-    """A 3MF package of objects numbered from 1; those `printed` are one item of the build."""
+    """A 3MF package (bytes of a zip file) of objects numbered from 1; those `printed` are one build item."""
     extension = f' xmlns:b="{BEAMS}" requiredextensions="b"' if any(p.beams for p in parts) else ""
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',

@@ -41,11 +41,11 @@ LIBRARY = {
 
 @attrs.frozen
 class Parameter:
-    """A number with unit, bounds, the `null` at which it changes nothing, `starts` for a fit, its source.
+    """A number that a model can be fitted by: unit, bounds, source, and the `null` where it changes nothing.
 
-    linear: the prediction is affine in it, with one slope whatever the other values are. spread: standard
-    deviation of what is known of it before any data; inf where nothing is. experiment: the only one whose
-    prediction heeds it, by name; any may where it is empty.
+    starts: values from which a fit begins. linear: the prediction is affine in it, with one slope whatever
+    the other values are. spread: standard deviation of what is known before any data; inf where nothing is.
+    experiment: name of the only experiment whose prediction depends on it; empty where any may.
     """
 
     name: str

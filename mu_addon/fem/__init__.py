@@ -7,7 +7,7 @@ mm, N, MPa, s; kPa and degrees only where the name says so.
 
     >>> from mu_addon.fem import NeoHooke
     >>> NeoHooke.parameter_names
-    ('mu', 'kappa')
+    ('mu_MPa', 'kappa_MPa')
 """
 
 from typing import TYPE_CHECKING

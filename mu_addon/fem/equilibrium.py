@@ -29,9 +29,15 @@ WEIGHT_STEPS = (1, 4, 16)
 
 
 class Equilibrium:
-    """Finds equilibria of one body with one set of materials.
+    """Finds equilibria of one body with one set of materials, by Newton's method with line search.
 
-    explains: whether a failure names the limit point that caused it, which takes some twenty factorisations.
+    `at_zero_pressure` is the state without pressure, `newton` one at a pressure from a nearby start,
+    `reach` one from states before it with adaptive load steps, `path` several in order. No state is
+    returned that did not converge or is unstable: ConvergenceError says at what pressure, where and why.
+
+    explains: whether a failure also looks for the limit point that caused it, at some twenty
+    factorisations. settings: tolerances, by default a residual of 1e-9 of the root sum of squares of all
+    element forces.
     """
 
     def __init__(

@@ -34,7 +34,12 @@ def _unit(vector: Any) -> Array:
 
 @attrs.frozen(eq=False)
 class Plane:
-    """A half-space through `point` (3,) in mm; `normal` (3,) points out of it, to the free side."""
+    """A half-space: `point` (3,) in mm on its surface, `normal` (3,) out of it, of any length.
+
+    >>> import numpy as np
+    >>> Plane((0, 0, 0), (0, 0, 1)).distance(np.array([[5.0, 0.0, 2.0]]))[0].tolist()
+    [2.0]
+    """
 
     point: Array = attrs.field(converter=_float64)
     normal: Array = attrs.field(converter=_unit)

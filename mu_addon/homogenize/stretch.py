@@ -78,12 +78,12 @@ def stretch_lattice(
     settings: StretchSettings | None = None,
     on_point: Callable[[Point], None] | None = None,
 ) -> Stretched:
-    """Uniaxial test of the periodic body of which a mesh is one eighth, [0, box] mm; see octant.Octant.
+    """Uniaxial tension and compression of a periodic lattice at finite strain, by one eighth of its cell.
 
-    The sides of every eighth stay plane, as the lattice's mirrors demand; a lattice that would buckle away
-    from them is found out with `settings.buckling` only. The curve ends where no stable equilibrium is
-    found or where walls meet, and `stopped` says so. Raises MeshingError where the undeformed cell is
-    unstable.
+    mesh: the eighth, [0, box] mm; its sides stay plane, as the lattice's mirror planes demand. A lattice
+    that would buckle away from them is detected with `settings.buckling` only. The curve ends where no
+    stable equilibrium is found or where walls meet, and `stopped` says so. on_point: called with each
+    `Point`. Raises MeshingError where the undeformed cell is unstable.
     """
     return Stretching(mesh, materials, box, settings).run(on_point)
 

@@ -76,11 +76,11 @@ def search_paths(
     settings: SearchSettings | None = None,
     on_check: Callable[[int, float], None] = lambda checked, risk: None,
 ) -> Search:
-    """Check paths in the order of their prediction until no other is likely to beat the best.
+    """Solve paths in the order of their predicted deviation until no other is likely to beat the best.
 
-    predicted_mm (n,): positive J_hat; check: numbers (k,) of paths -> their exact J_hat (k,) in mm.
-    on_check is told how many were checked and the risk left. Raises InputError where a prediction is not
-    positive, and whatever `check` raises.
+    predicted_mm (n,): positive predictions of J_hat. check: maps numbers (k,) of paths to their exact J_hat
+    (k,) in mm. on_check: called with how many were checked and the risk left. Raises InputError where a
+    prediction is not positive, and whatever `check` raises.
     """
     s = settings or SearchSettings()
     predicted_mm = np.asarray(predicted_mm, float)

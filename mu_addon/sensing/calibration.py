@@ -133,10 +133,12 @@ def _interval(volts: Array, angles: Array, at: Array) -> tuple[Array, Array]:
 
 
 def calibrate(sweeps: Sequence[Sweep], channel: str, dark: str | float = 0.0) -> Calibration:
-    """Fit a map to two sweeps or more; raises InputError if there is too little to fit, or no signal.
+    """Fit a monotone map from voltage to bending angle, with a 95 % band, to two sweeps or more.
 
-    The number of the spline's intervals is what predicts left-out sweeps best; a drift is taken out if that
-    quarters their squared error. The map is that of the sweeps' middle time.
+    channel: column of the recording that is calibrated; dark: the column of the dark level, or its value in
+    V. The number of spline intervals is the one that predicts left-out sweeps best; a drift of the light is
+    taken out if that quarters their squared error. Raises InputError where there is too little to fit, or
+    no signal.
     """
     _require(sweeps)
     middle = float(np.mean(np.concatenate([s.time_s for s in sweeps])))

@@ -69,7 +69,10 @@ def signal_of_states(
 
 
 def signal_of_nodes(law: Law, guide: EmbeddedWaveguide, moved: Sequence[tuple[Array, Array]]) -> Signal:
-    """The signal of a held bar in states of its nodes: positions (h, 3) in mm and rotations (h, 3, 3)."""
+    """The light of an embedded waveguide in states of its nodes, by a fitted law.
+
+    moved: for each of k states positions (h, 3) in mm and rotations (h, 3, 3). See `Signal`.
+    """
     rest = features(guide.shape, guide.at_rest)
     found = [features(guide.shape, guide.legs(*state)) for state in moved]
     return Signal(

@@ -193,6 +193,6 @@ def test_reading_takes_no_time_worth_an_attack(tmp_path):
     """A thousand members of a kilobyte, each claiming a gigabyte."""
     claim = npy("{'descr': '<f8', 'fortran_order': False, 'shape': (125000000,), }", b"\0" * 64)
     path = archive(tmp_path / "a.npz", **{f"u{i}": claim for i in range(1000)})
-    start = time.monotonic()
+    start = time.process_time()
     assert read_npz(path) is None
-    assert time.monotonic() - start < 5
+    assert time.process_time() - start < 5
