@@ -72,10 +72,8 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--protocol",
         metavar="CSV",
-        help=(
-            "Pressure protocol, CSV with the columns time_s,pressure_kPa (default: the shipped grasp "
-            "protocol)."
-        ),
+        help="Pressure protocol, CSV with the columns time_s,pressure_kPa (default: the shipped grasp "
+        "protocol).",
     )
     command.add_argument(
         "--order", type=int, choices=(1, 2), default=2, help="Order of the finite elements (default: 2)."

@@ -104,9 +104,9 @@ def build_solid(
     if body is not None:
         if offset is not None:
             raise InputError(
-                "the printer's offsets are not taken off a body of your own",
+                "the print offset is not compensated on a user-defined body",
                 "body",
-                "draw it smaller yourself",
+                "reduce the body by the print offset in its file",
             )
         holder = holder ^ body.manifold
     filled = Manifold.batch_boolean([holder, *actuator], OpType.Add)
@@ -139,7 +139,7 @@ def _drawn_offset(d: Dimensions, take_off: tuple[float, float]) -> NDArray[np.fl
         raise InputError(
             f"offsets of {xy:g} mm in the plane and {z:g} mm along z have opposite signs",
             "printer's offsets",
-            "no body grows and shrinks at once: measure again, or take the smaller one as 0",
+            "a part cannot grow and shrink at once: measure again, or set the smaller one to 0",
         )
     check_printed(d, -xy, -z)
     return -np.array([xy, xy, z])

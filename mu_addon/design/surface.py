@@ -80,7 +80,7 @@ def stl_surface(content: bytes) -> tuple[Vertices, Triangles]:
     """Surface in a binary STL, equal corners merged; InputError if the length does not fit the count."""
     count = int.from_bytes(content[80:84], "little")
     if len(content) != 84 + count * _STL.itemsize:
-        raise InputError("this is not a whole binary STL", "STL", "write the file again")
+        raise InputError("the binary STL is truncated or malformed", "STL", "write the file again")
     corners = np.frombuffer(content, _STL, offset=84)["corners"].reshape(-1, 3)
     vertices, index = _unique_rows(corners.astype(float))
     return vertices, index.reshape(-1, 3)

@@ -106,7 +106,7 @@ def load_model(path: Path) -> ExtendedModel:
         document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(
-            f"cannot read {path}: {error.strerror}", str(path), "diagnose a folder first"
+            f"cannot read {path}: {error.strerror}", str(path), "run `diagnose` on a folder first"
         ) from error
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"this is not TOML: {error}", str(path), "correct that line") from error

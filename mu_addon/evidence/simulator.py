@@ -106,9 +106,9 @@ class Composite:
     def _of(self, experiment: Experiment) -> Simulator:
         if experiment.kind not in self._simulators:
             raise InputError(
-                f"nothing predicts {experiment.kind}",
+                f"there is no model for {experiment.kind}",
                 experiment.name,
-                f"there are simulators of {', '.join(self._simulators)}",
+                f"models exist for {', '.join(self._simulators)}",
             )
         return self._simulators[experiment.kind]
 
@@ -129,5 +129,5 @@ def effect_named(effects: Sequence[Effect], name: str) -> Effect:
         if e.name == name:
             return e
     raise InputError(
-        f"no simulator knows {name!r}", "effects", f"known: {', '.join(e.name for e in effects)}"
+        f"unknown effect or parameter {name!r}", "effects", f"known: {', '.join(e.name for e in effects)}"
     )

@@ -195,12 +195,12 @@ def _identifiability(seen: Sequence[Sensitivity], chosen: Selection) -> dict[str
             most = max((p.low, p.high), key=lambda bound: abs(bound - p.null))
             size, unit = p.name.replace("_", " "), f" {p.unit}" * bool(p.unit)
             found[name] = (
-                f"its bound, {size} {most:g}{unit}, is too small to be seen here, where "
-                f"{s.limit:.2g}{unit} would be; what would show it: {s.effect.reveals}"
+                f"its bound, {size} {most:g}{unit}, is too small to be detected here, where "
+                f"{s.limit:.2g}{unit} would be; experiment that shows it: {s.effect.reveals}"
             )
         elif s.absorbed_by and s.unabsorbed > 0:
             by = " and ".join(n.replace("_", " ") for n in s.absorbed_by)
-            found[name] = f"absorbed by {by}; what would show it: {s.effect.reveals}"
+            found[name] = f"absorbed by {by}; experiment that shows it: {s.effect.reveals}"
         else:
-            found[name] = f"nothing here depends on it; what would show it: {s.effect.reveals}"
+            found[name] = f"no measured quantity depends on it; experiment that shows it: {s.effect.reveals}"
     return found

@@ -95,9 +95,9 @@ class Equilibrium:
             finally:
                 model.load = load
         raise ConvergenceError(
-            f"no equilibrium under the weight alone: {failed.what if failed else 'none was sought'}",
+            f"no equilibrium under gravity alone: {failed.what if failed else 'not computed'}",
             "0 kPa",
-            "stiffen the material, or hang the unit with its tip down",
+            "stiffen the material, or orient the unit with its tip down",
         )
 
     def newton(self, u: Array, pressure: float, reach_mm: float = np.inf) -> State:
@@ -119,7 +119,9 @@ class Equilibrium:
                 return state
             for obstacle in obstacles:
                 obstacle.update_lag(state.u)
-        raise ConvergenceError(f"friction does not settle: it still changes by {lag_change:.1e} of its bound")
+        raise ConvergenceError(
+            f"friction does not converge: it still changes by {lag_change:.1e} of its bound"
+        )
 
     def _descend(self, start: State, factored: bool) -> State:
         """The equilibrium from a start, friction's bound held; its cost is added to the start's.

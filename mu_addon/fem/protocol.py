@@ -70,7 +70,7 @@ def read_protocol(path: Path) -> Protocol:
         if not np.isfinite(row).all():
             raise InputError("a value is not finite", where, "give finite numbers only")
         if values and row[0] <= values[-1][0]:
-            raise InputError("time does not increase", where, "sort the rows and drop repeated times")
+            raise InputError("time does not increase", where, "sort the rows and remove repeated times")
         values.append(row)
     if len(values) < 2:
         raise InputError(

@@ -70,7 +70,7 @@ def simulate(
     """
     if equilibrium.model.has_friction or equilibrium.parameters.has_history:
         raise InputError(
-            "a body with friction or memory has no one state a pressure",
+            "the state of a body with friction or memory depends on its history",
             "trajectory.simulate",
             "use time_stepping.simulate_in_time",
         )

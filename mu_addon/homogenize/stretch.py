@@ -327,7 +327,7 @@ class Stretching:
                 low, high = (low, middle) if self._meeting(*state) else (middle, high)
             state = [a + high * (b - a) for a, b in ((before.stretch, after.stretch), (before.u, after.u))]
             strain = before.strain + high * (after.strain - before.strain)
-            return f"walls meet at a strain of {strain:.3f}: {self._meeting(*state)}"
+            return f"walls touch at a strain of {strain:.3f}: {self._meeting(*state)}"
         return ""
 
     def _meeting(self, stretch: Array, u: Array) -> str:
@@ -341,6 +341,6 @@ class Stretching:
         node, axis = np.unravel_index(beyond.argmax(), beyond.shape)
         if beyond[node, axis] > _TOUCH * octant.box[axis]:
             place = ", ".join(f"{c:.2f}" for c in octant.mesh.nodes[node])
-            return f"the wall that was at ({place}) mm reaches its mirror image across {AXES[axis]}"
+            return f"the wall that was at ({place}) mm touches its mirror image across {AXES[axis]}"
         found = crossings(octant.mesh, u)
         return str(found[0]) if found else ""

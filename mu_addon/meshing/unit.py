@@ -90,8 +90,8 @@ def mesh_unit(
             if mesher == "gmsh":
                 raise
             warnings.warn(
-                f"{error.what}. pytetwild meshes the unit instead: slower, with more elements and a less "
-                f"exact wall. To have gmsh: {error.remedy}",
+                f"{error.what}. pytetwild meshes the unit instead: slower, with more elements and a "
+                f"less accurate wall. To install gmsh: {error.remedy}",
                 MeshingWarning,
                 stacklevel=2,
             )
@@ -203,7 +203,7 @@ def _within(
     """Mesh of a unit with a body for its envelope."""
     if mesher == "gmsh" or settings.fraction == "quarter":
         raise InputError(
-            "a body of one's own is meshed by pytetwild, as a half or whole",
+            "a user-defined body is meshed by pytetwild, as a half or a whole",
             "mesher, fraction",
             'choose mesher "auto" or "pytetwild" and fraction "half" or "full"',
         )

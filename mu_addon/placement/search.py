@@ -85,7 +85,7 @@ def search_paths(
     s = settings or SearchSettings()
     predicted_mm = np.asarray(predicted_mm, float)
     if not len(predicted_mm) or not (predicted_mm > 0).all():
-        raise InputError("there is no path, or one that is predicted to deviate by nothing", "search")
+        raise InputError("there is no path, or one with a predicted deviation of zero", "search")
     order = np.argsort(predicted_mm, kind="stable")
     across = np.linspace(0, len(order) - 1, s.spread + 2).astype(int)[1:-1]
     # Two at least, or there is no error to speak of.
@@ -103,7 +103,7 @@ def search_paths(
 
 
 def front(length: Array, deviation_mm: Array) -> Array:
-    """Numbers of the paths that no other beats in both length and deviation, shortest first (Pareto).
+    """Numbers of the paths that are Pareto-optimal in length and deviation, shortest first (Pareto).
 
     Longer is better, for a longer path senses more of the unit; NaN deviations are left out.
     """

@@ -97,7 +97,7 @@ def traced_signal(
         raise InputError(
             "rays are followed through straight waveguides only",
             "path",
-            "choose a path without a bend, or take the law's signal",
+            "choose a path without a bend, or use the signal of the fitted law",
         )
     every = [guide.at_rest, *(guide.legs(*state) for state in moved)]
     lights = [traced(guide.shape, leg, optics, rays, seed) for (leg,) in every]
@@ -137,7 +137,9 @@ def response(angle_deg: Array, share: Array, rest_deg: float = 0.0) -> Response:
     angle, light = angle[keep], light[keep]
     if len(angle) < 2 or not angle[0] <= rest_deg <= angle[-1]:
         raise InputError(
-            "the unit does not bend, or was not seen at rest", "angle_deg", "a protocol that bends it"
+            "the unit does not bend, or its state at rest is missing",
+            "angle_deg",
+            "give a protocol that bends it",
         )
     delta = 1 - light / np.interp(rest_deg, angle, light)
     slope = np.diff(delta) / np.diff(angle)

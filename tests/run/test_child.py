@@ -61,7 +61,7 @@ def test_a_crash_is_told_with_signal_and_last_words(start):
     child = start("crash")
     watch(child)
     assert child.state == FAILED
-    assert "without a word" in child.error["what"]
+    assert "without a message" in child.error["what"]
     assert "SIGSEGV" in child.error["what"]
     assert "out of luck" in child.error["what"]
     assert child.error["what_to_do"]

@@ -157,7 +157,7 @@ def test_a_link_under_a_name_of_ours_is_refused(tmp_path, name):
     (folder / name).symlink_to(victim)
     context, told = started(folder)
     assert context.status == 2
-    assert f"{name} in the folder is a link to elsewhere" in told[-1]["what"]
+    assert f"{name} in the folder is a link to another location" in told[-1]["what"]
     assert victim.read_text() == "precious"
 
 

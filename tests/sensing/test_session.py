@@ -217,7 +217,7 @@ def test_a_recording_plays_again_to_the_digit(tmp_path: Path) -> None:
 
 def test_a_recording_is_never_overwritten(tmp_path: Path) -> None:
     (tmp_path / "index.ndjson").write_text("{}\n")
-    with pytest.raises(InputError, match="holds a recording"):
+    with pytest.raises(InputError, match="contains a recording"):
         run_session(Replay(_small(tmp_path / "r")), tmp_path, about={})
 
 
@@ -237,7 +237,7 @@ def test_a_cut_line_is_left_out_and_a_bad_one_named(tmp_path: Path) -> None:
         stream.write("\n0.4,nan,2,1.7\n")
     with pytest.raises(InputError, match="row 4 of"):
         read_recording(folder)
-    with pytest.raises(InputError, match="no recording"):
+    with pytest.raises(InputError, match="the recording is invalid"):
         read_recording(tmp_path / "nowhere")
 
 
@@ -334,5 +334,5 @@ def test_a_ring_overwrites_its_oldest(tmp_path: Path) -> None:
     ring.append(np.zeros((200, 2)))
     assert other.written == 500
     (tmp_path / "not").write_bytes(b"nothing")
-    with pytest.raises(InputError, match="not the live data"):
+    with pytest.raises(InputError, match="does not contain live data"):
         Ring.attach(tmp_path / "not")

@@ -159,7 +159,7 @@ def task(how, **limits):
     ("how", "limits", "words"),
     [
         ("crash", {}, "SIGSEGV"),
-        ("wordless", {}, "without a word"),
+        ("wordless", {}, "without a message"),
         ("told_error", {}, "no equilibrium"),
         ("hang", {"minutes": 0.01}, "longer than the 0.01 minutes"),
         ("hungry", {"memory_MB": 200}, "more than the 200 MB"),
@@ -234,7 +234,7 @@ def test_child_runs_of_the_command_line_end_with_their_parent_and_tell_their_err
         assert time.monotonic() < end
         child.poll()
         time.sleep(0.05)
-    assert "no study in this folder" in child.error["what"]
+    assert "this folder contains no study" in child.error["what"]
     assert child.error["status"] == 2
 
 

@@ -32,7 +32,7 @@ def _current(context):
 
 
 class MU_OT_evidence_diagnose(ValidUnitOperator, bpy.types.Operator):
-    """Ask the measured data what is wrong with the simulation, why, and what mending it gains"""
+    """Ask the measured data what is wrong with the simulation, why, and how much the error drops"""
 
     bl_idname = "mu.evidence_diagnose"
     bl_label = "Diagnose"

@@ -20,7 +20,7 @@ ICONS |= {"unidentifiable": "QUESTION", "unexplained": "ERROR"}
 
 
 class MU_PT_evidence(UnitPanel, bpy.types.Panel):
-    """Measured data against the simulation: what is wrong, why, and what mending it gains"""
+    """Measured data against the simulation: what is wrong, why, and how much the error drops"""
 
     bl_idname = "MU_PT_evidence"
     bl_label = "Evidence"

@@ -48,7 +48,7 @@ class _Job(ValidUnitOperator):
 
 
 class MU_OT_print_check(_Job, bpy.types.Operator):
-    """Look for what the printer would stumble over, and for the best way up, in a process of its own"""
+    """Check the printability and find the best build direction, in a process of its own"""
 
     bl_idname = "mu.print_check"
     bl_label = "Check Print"

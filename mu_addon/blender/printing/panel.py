@@ -1,4 +1,4 @@
-"""The panel Print of the sidebar tab MU: the solid, what a printer would stumble over, and the files."""
+"""The panel Print of the sidebar tab MU: the solid, the printability check, and the files."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class _OfPrint(UnitPanel):
 
 
 class MU_PT_print_check(_OfPrint, bpy.types.Panel):
-    """What the printer would stumble over, where, and the best way up"""
+    """Findings of the printability check, their locations, and the best build direction"""
 
     bl_idname = "MU_PT_print_check"
     bl_label = "Check"

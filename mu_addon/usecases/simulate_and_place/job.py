@@ -97,7 +97,7 @@ class Job:
     def __attrs_post_init__(self) -> None:
         if self.obstacles and "place" in self.stages and self.paths == "graph":
             raise InputError(
-                "the search of the whole lattice knows a unit that touches nothing",
+                "the search of the whole lattice does not support obstacles",
                 "obstacles, paths",
                 "leave one of them out",
             )
@@ -116,7 +116,7 @@ class Job:
                 )
         if self.effects.clogged and "place" in self.stages and self.paths == "graph":
             raise InputError(
-                "the search of the whole lattice knows a unit whose chambers share one pressure",
+                "the search of the whole lattice does not support a clogged chamber",
                 "clogged_chamber, paths",
                 "leave one of them out",
             )
@@ -137,7 +137,7 @@ class Job:
         _, pressure = self.samples
         if not pressure.any():
             raise InputError(
-                f"none of the {self.times} samples of the protocol has any pressure",
+                f"none of the {self.times} samples of the protocol has a pressure other than 0",
                 "times",
                 "give more samples, or a protocol that leaves 0 kPa",
             )
@@ -291,12 +291,12 @@ def read_job(folder: Path) -> Job:
     where = str(folder / NAME)
     tables = read_tables(folder)
     if tables is None:
-        raise InputError("there is no study in this folder", where, "give a folder that holds study.toml")
+        raise InputError("this folder contains no study", where, "give a folder that holds study.toml")
     if holds(folder, tables) is None:
         raise InputError(
-            "a file of inputs is not the one that this study was made with",
+            "an input file has changed since this study was made",
             str(folder),
-            "put it back, or start a new study with it: --unit, --protocol, --lattice, --obstacle",
+            "restore it, or start a new study with it: --unit, --protocol, --lattice, --obstacle",
         )
     return job_of(tables, folder)
 
@@ -363,7 +363,7 @@ def _built(kind: Any, values: dict[str, Any], where: str) -> Any:
     try:
         return kind(**values)
     except TypeError as error:
-        raise InputError(f"this is no study: {error}", where, "correct that key") from error
+        raise InputError(f"study.toml is invalid: {error}", where, "correct that key") from error
     except ValueError as error:
         raise InputError(f"a value is not offered: {error.args[0]}", where, "correct that key") from error
 

@@ -125,7 +125,7 @@ def test_flaws_are_told_and_marked():
     one = ball((0, 33, 60))
     choose(root, one)
     assert bpy.ops.mu.obstacle() == {"FINISHED"}
-    assert obstacles.placed(root, one).flaws[0].what.startswith("it stands in the unit, up to 6.")
+    assert obstacles.placed(root, one).flaws[0].what.startswith("it overlaps the unit by up to 6.")
     assert bpy.ops.mu.obstacle_check() == {"FINISHED"}
     at = np.array([v.co for v in unit_object.part(root, bodies.FLAWS).data.vertices])
     assert len(at) == 1, at
