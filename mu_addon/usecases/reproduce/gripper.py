@@ -18,8 +18,8 @@ from ...run.cache import Cache, key
 from ..grip.grasp import Cube
 from ..grip.job import CUBES
 from ..grip.run import gripper_column
-from .open_values import RULE, with_values
 from .published import GRIPPER
+from .values import RULE, with_values
 
 Array = np.ndarray[Any, Any]
 
