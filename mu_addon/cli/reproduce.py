@@ -1,4 +1,4 @@
-"""`reproduce`: the paper's table, its bending ranges, and what stands between them and ours."""
+"""`reproduce`: the paper's table and bending ranges beside this simulation's."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a column of ours agrees with the paper's, and which of the paper's statements hold in a table."""
+"""Agreement of a column with the paper's, and which of the paper's statements a table supports."""
 
 from __future__ import annotations
 

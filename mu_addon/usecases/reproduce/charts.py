@@ -1,4 +1,4 @@
-"""The pictures of a reproduction: the paper's own form, and beside it what the paper prints."""
+"""The charts of a reproduction, in the form of the paper's figures."""
 
 from __future__ import annotations
 

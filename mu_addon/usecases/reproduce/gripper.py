@@ -1,4 +1,4 @@
-"""The paper's fourth column: a finger of the gripper, closing on nothing and on each of the cubes.
+"""The paper's fourth column: a finger of the gripper, closing freely and on each of the cubes.
 
 The paper does not say on what its simulated finger closes.
 """

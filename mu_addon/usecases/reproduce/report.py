@@ -1,4 +1,4 @@
-"""report.html of a reproduction: the table beside the paper's, and what stands between them."""
+"""The report of a reproduction: the table beside the paper's, and the differences."""
 
 from __future__ import annotations
 
