@@ -249,7 +249,7 @@ def test_paths_that_cannot_be_are_refused(points, words):
 def test_an_end_without_room_is_refused_and_goes_without_a_seat():
     unit = load_preset("mu-1.0x")
     wide = attrs.evolve(unit, waveguide=attrs.evolve(unit.waveguide, part_width_mm=10.0, part_length_mm=10.0))
-    with pytest.raises(InputError, match="has no room for a seat: a strut is in the way"):
+    with pytest.raises(InputError, match="has no space for a seat: a strut is in the way"):
         waveguide(wide, window(wide, "alpha4"))
     bare = attrs.evolve(wide, waveguide=attrs.evolve(wide.waveguide, seats=False))
     bar = waveguide(bare, window(bare, "alpha4"))

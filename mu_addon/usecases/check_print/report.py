@@ -1,4 +1,4 @@
-"""The report of a print check: the verdict, where every fault is, and which way up to print."""
+"""The report of a printability check: verdict, location of each finding, build directions."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from ...report.render import Floats, Part, fit, png, render
 from ...report.results import Picture
 from ...report.shapes import ball, tube
 from ...run.progress import Progress
-from ..simulate_and_place.report_data import package_versions
-from .run import Job
+from ...run.versions import package_versions
+from .job import Job
 
 FILES = {
     "check.toml": "inputs of this check",

@@ -1,4 +1,4 @@
-"""Charts of a diagnosis: measured beside predicted, what is residual, and what explains it."""
+"""Charts of a diagnosis: measurement beside prediction, the residual, and the effects that explain it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import numpy as np
 from ...evidence.gain import Errors
 from ...evidence.residuals import Dependence
 from ...report.charts import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas, signed
-from .run import Curve, readable
+from .diagnosis import Curve
+from .words import readable
 
 Array = np.ndarray[Any, Any]
 

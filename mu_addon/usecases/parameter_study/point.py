@@ -1,4 +1,4 @@
-"""One point of a sweep: its study in a process of its own, within the memory and time that it may take.
+"""One point of a parameter study: its study in a child process, within limits of memory and time.
 
 A worker on any machine runs this: what it needs comes with the task, and what it found goes back as a row.
 """
@@ -20,7 +20,7 @@ from ...files import plain
 from ...run.cache import REVISION, key
 from ...run.child import RUNNING, Child
 from ...run.folder import keep_inputs
-from ..simulate_and_place.report_data import package_versions
+from ...run.versions import package_versions
 
 # Seconds between two looks at a study's memory.
 LOOK_S = 0.05

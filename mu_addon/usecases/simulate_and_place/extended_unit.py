@@ -1,4 +1,4 @@
-"""A unit as an extended model has it: what model.toml says is wrong, put into parameters and mechanics."""
+"""A unit with the effects of an extended model (model.toml) in its parameters and mechanics."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ...evidence.lattice_fem import printed
 from ...evidence.prediction.lattice import SLENDER, ComputedCell
 from ...evidence.unit_effects import EFFECTS, Body
 from ...homogenize.effective import Effective
-from ..diagnose.run import readable
+from ..diagnose.words import readable
 from .static_effects import NAMES, StaticEffects
 
 Values = Mapping[str, Fitted]
