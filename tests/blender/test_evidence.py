@@ -90,7 +90,7 @@ def test_from_data_to_a_unit_that_has_what_was_found(tmp_path):
         bpy.ops.ed.undo_push(message="applied")
         printed = to_unit(root.mu_unit).print
         assert abs(printed.offset_xy_mm - offset) < 1e-6 and not unit_object.behind(root)
-        assert "The unit has it: every printed surface moves outward" in drawn().replace("  ", " ")
+        assert "Applied to the unit: every printed surface moves outward" in drawn().replace("  ", " ")
         assert not bpy.ops.mu.evidence_apply.poll(), "given twice it would count twice"
         bpy.ops.ed.undo()
         root = unit_object.active_root(bpy.context)
@@ -105,8 +105,9 @@ def test_from_data_to_a_unit_that_has_what_was_found(tmp_path):
         assert "Named: overcure" in drawn() and not bpy.ops.mu.evidence_apply.poll()
         table = folder / "data" / "block_1.csv"
         table.write_text(table.read_text().replace("0.1,", "0.11,"))
-        assert "Stale: it is of other measured data" in drawn()
-        assert "The diagnosis is stale: it is of other measured data" in refused(bpy.ops.mu.evidence_apply)
+        assert "Stale: it belongs to other measured data" in drawn()
+        told = refused(bpy.ops.mu.evidence_apply)
+        assert "The diagnosis is stale: it belongs to other measured data" in told
         """,
         tmp_path,
         tmp_path,
@@ -185,7 +186,7 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
         study = root.mu_unit.study
         study.command, study.detail = "simulate", "quick"
         unit = to_unit(root.mu_unit)
-        assert effects.arguments(root, folder) == [] and "With what was found" not in drawn()
+        assert effects.arguments(root, folder) == [] and "With named effects" not in drawn()
         assert "no effects beside" in refused(bpy.ops.mu.evidence_remove)
         bpy.ops.ed.undo_push(message="diagnosed")
         assert bpy.ops.mu.evidence_apply() == {"FINISHED"}
@@ -196,8 +197,8 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
         (line,) = effects.lines(root)
         assert line.startswith(f"clogged chamber, share lost: {share:.4g} (") and " to " in line
         said = drawn()
-        assert "With what was found" in said and "clogged chamber, share lost: 0.5" in said, said
-        assert "The unit has it: all moduli" in said and "the last chamber lacks" in said, said
+        assert "With named effects" in said and "clogged chamber, share lost: 0.5" in said, said
+        assert "Applied to the unit: all moduli" in said and "the last chamber lacks" in said, said
         assert not bpy.ops.mu.evidence_apply.poll()
         # Pressure alone knows no direction.
         assert not effects.has_gravity(root) and "--orientation" not in effects.arguments(root, folder)
@@ -210,7 +211,7 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
         bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
         (root,) = unit_object.roots()
         asked = {"effects": {"clogged_chamber": {"share_lost": share}}}
-        assert effects.inputs(root) == asked and "The unit has it" in drawn()
+        assert effects.inputs(root) == asked and "Applied to the unit" in drawn()
 
         def simulated():
             assert bpy.ops.mu.simulate() == {"FINISHED"}
@@ -236,7 +237,7 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
         root.mu_unit.study.orientation_deg = -90.0
         assert studies.findings(root).stale
         assert bpy.ops.mu.evidence_remove() == {"FINISHED"}
-        assert studies.findings(root).stale and "With what was found" not in drawn()
+        assert studies.findings(root).stale and "With named effects" not in drawn()
         assert effects.arguments(root, folder) == []
         """,
         tmp_path,
@@ -331,7 +332,7 @@ bpy.context.scene.frame_set(20)
 assert "measured" in evidence_motion.reading(root, bpy.context.scene)[1]
 # Other parameters: what was predicted for the unit as it was is not shown any more.
 root.mu_unit.chambers.wall_mm = 1.0
-assert "Stale: it is of the unit with other parameters" in drawn()
+assert "Stale: it belongs to other parameters" in drawn()
 assert bpy.ops.mu.evidence_motion(experiment=first.name) == {"FINISHED"}
 assert {mark.partition("|")[0] for mark in parts(root)} == {"", "measured"}
 assert bpy.ops.mu.evidence_motion(experiment="") == {"FINISHED"}

@@ -185,7 +185,7 @@ def test_a_grasp_plays_on_the_timeline(tmp_path):
         props.cube_mm = 20.0
         found = grasps.of(root)
         assert not found.stale and "12.3 deg, 0.45 N" in drawn()
-        assert "Held: 4 times its weight" in drawn()
+        assert "Held: friction carries 4 times the weight" in drawn()
         scene = bpy.context.scene
         scene.render.fps = 10
         assert bpy.ops.mu.grasp_show() == {"FINISHED"}

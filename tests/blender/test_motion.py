@@ -15,7 +15,7 @@ GRAPH = ["--paths", "graph", "--longest-cells", "2.5", "--checks", "2"]
 
 SEEN = """
 import numpy as np
-from mu_addon.blender.results import fields, motion as motion_parts
+from mu_addon.blender.results import field_colours as fields, motion as motion_parts
 from mu_addon.blender.simulate import study_folder as studies
 PANELS = []
 
@@ -337,7 +337,7 @@ def test_panels_show_the_motion(tmp_path, study):
         show(name="alpha4")
         root.mu_motion.field = "dJ_by_modulus_mm_per_MPa"
         said = drawn()
-        assert "Play" in said and "Not known of alpha4" in said
+        assert "Play" in said and "without this field: alpha4" in said
         """,
         tmp_path,
         study,

@@ -171,7 +171,7 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
         assert "No place is marked" in refused(bpy.ops.mu.print_clear)
         bpy.ops.mu.print_marks()
         root.mu_unit.chambers.wall_mm = 1.0  # a rebuild leaves them, and the panel says that they are old
-        assert len(markers.marks(root)) == 3 and "Stale: it is of the unit with other parameters" in drawn()
+        assert len(markers.marks(root)) == 3 and "Stale: it belongs to other parameters" in drawn()
         assert "The check is stale" in refused(bpy.ops.mu.print_marks)
         root.mu_unit.chambers.wall_mm = 0.9
         write_check(root, [finding("cup", "warning", [[0, 0, 0]])])
@@ -179,17 +179,17 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
         assert bpy.ops.mu.print_clear() == {"FINISHED"} and not markers.marks(root)
 
         assert bpy.ops.mu.print_up(direction=(0.6, 0, 0.8)) == {"FINISHED"}
-        assert "Stale: it is of another build direction" in drawn()
+        assert "Stale: it belongs to another build direction" in drawn()
         bpy.ops.mu.print_up()
         assert "Stale" not in drawn()
         bpy.ops.mu.path(name="alpha4")
-        assert "Stale: it is of the unit with other parameters" in drawn()
+        assert "Stale: it belongs to other parameters" in drawn()
         bpy.ops.mu.path(name="none")
         own = pathlib.Path(sys.argv[2]) / "mine.toml"
         text = (printing.folder_of(root, "check") / "printer.toml").read_text()
         own.write_text(text.replace("value = 0.6", "value = 0.8"))
         root.mu_print.printer, root.mu_print.printer_file = "own", str(own)
-        assert "Stale: it is for another printer" in drawn() and bpy.ops.mu.print_check.poll()
+        assert "Stale: it belongs to another printer" in drawn() and bpy.ops.mu.print_check.poll()
         own.write_text(text.replace("value = 0.6", "value = -1"))
         assert "is not a number above zero" in refused(bpy.ops.mu.print_check)
 
@@ -215,7 +215,7 @@ def test_an_export_as_chosen(tmp_path):
         settings.compensate = "gauge"
         assert "Choose the gauge's sheet" in refused(bpy.ops.mu.print_export)
         settings.compensate = "unit"
-        assert "set them under How It Prints" in refused(bpy.ops.mu.print_export)
+        assert "set them under Print Offsets" in refused(bpy.ops.mu.print_export)
         root.mu_unit.print.offset_xy_mm = 0.1
         bpy.ops.mu.mute(step="trim")
         assert "is not the unit" in refused(bpy.ops.mu.print_export)
@@ -277,7 +277,7 @@ def test_jobs_that_fail_and_one_that_is_stopped(tmp_path):
         child = fake("told_error")
         watch(lambda: child.state != "running")
         child.error["status"] = print_panel.NOT_PRINTABLE
-        assert "Checked: do not print it" in drawn() and "thicker wall" not in drawn()
+        assert "Checked: not printable" in drawn() and "thicker wall" not in drawn()
         child = fake("hang")
         watch(lambda: child.progress)
         # The unit's own simulation is another one.
@@ -309,7 +309,7 @@ def test_a_unit_that_must_not_be_printed(tmp_path):
         assert [f["check"] for f in found.errors] == ["chamber wall"] and not found.stale
         assert abs(found.errors[0]["value"] - 0.54) < 0.02
         said = drawn()
-        assert "Checked: do not print it" in said and "export asks first" in said
+        assert "Checked: not printable" in said and "export asks first" in said
         assert bpy.ops.mu.print_show(finding=0) == {"FINISHED"}
         """,
         tmp_path,
@@ -334,7 +334,7 @@ def test_a_body_of_ones_own_is_checked_by_its_solid(tmp_path):
         assert found is not None and not found.stale, child.error
         assert abs(found.found["figures"]["x_mm"] - 40.0) < 0.1
         bpy.ops.mu.body_remove()
-        assert "Stale: it is of the unit with other parameters" in drawn()
+        assert "Stale: it belongs to other parameters" in drawn()
         """,
         tmp_path,
     )
