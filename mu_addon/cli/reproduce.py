@@ -10,7 +10,6 @@ from .options import add_results, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from .options import Commands
 
 
@@ -71,10 +70,10 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Do the paper's table again."""
     from ..meshing.settings import MeshSettings
-    from ..usecases.reproduce.run import reproduce
+    from ..usecases.reproduce.run import USE_CASE
     from ..usecases.reproduce.settings import Settings, read_set
 
     require_out(options)
@@ -88,11 +87,4 @@ def run(options: argparse.Namespace, progress: Progress, context: RunContext) ->
         gripper=options.gripper and not coarse,
         workers=options.workers,
     )
-    reproduce(settings, Path(options.out), progress, context)
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was found, in a few lines."""
-    from ..usecases.reproduce.run import console_summary
-
-    return console_summary(summary)
+    USE_CASE.start(settings, Path(options.out), context)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mu_addon.design.surface import bad_edges, stl_surface
-from mu_addon.usecases.export.run import FORMATS, MANIFEST
+from mu_addon.usecases.export.job import FORMATS, MANIFEST
 
 from .session import DRAWN, FAKE, PRELUDE, WATCHING, blender, needs_bpy
 

@@ -13,14 +13,15 @@ from ...files import write_text
 from ...placement.inclusion import RULES
 from ...report.charts import label, signed
 from ...report.html import cards, facts_table, figure, note, page, table
-from ..simulate_and_place.report_data import package_versions
+from ...run.progress import Progress
+from ...run.versions import package_versions
 from . import charts, gripper
 from .agreement import CANNOT_TELL, HELD, Agreement, agreement
 from .columns import BENDING_KPA
+from .found import Found
 from .open_study import OpenPoint, best, distance, effects
 from .open_values import MOTION_KPA, OPEN, RULE
 from .published import GRIPPER, name_of
-from .run import Found
 from .scatter import Scatter
 
 Array = np.ndarray[Any, Any]
@@ -37,9 +38,10 @@ _PREDICTED = 0.5
 GOALS = {"0.75x": 0.9, "1.0x": 0.9, "1.5x": 0.8, GRIPPER: 0.9}
 
 
-def write_report(found: Found, path: Path) -> None:
+def write_report(found: Found, path: Path, progress: Progress) -> None:
     """Write report.html; raises OutputError."""
-    write_text(path, report(found))
+    with progress.stage("report", expected_s=10.0):
+        write_text(path, report(found))
 
 
 def report(found: Found) -> str:

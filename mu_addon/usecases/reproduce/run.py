@@ -18,103 +18,43 @@ from ...meshing.settings import MeshSettings
 from ...placement.inclusion import RULES
 from ...run.cache import Cache
 from ...run.context import RunContext
-from ...run.folder import begin
 from ...run.pool import each
 from ...run.progress import Progress
+from ...run.usecase import UseCase
+from ...run.versions import package_versions
 from ..simulate_and_place.job import grasp
-from ..simulate_and_place.report_data import package_versions
 from . import gripper, open_study, scatter
-from .agreement import Agreement, Statement, agreement, statements
 from .columns import BENDING_KPA, Solved, TableColumn, solved, tasks
+from .found import Found, OtherColumn
 from .open_study import OpenPoint, point
 from .open_values import BESIDE, RULE, Beside, PointResult, column_unit, design, kept
 from .published import Published, name_of, published
-from .settings import FOLDER, HEADER, Settings
+from .report import write_report
+from .settings import (
+    AGREEMENT,
+    BENDING,
+    FOLDER,
+    LAYOUT,
+    MESHES,
+    OPEN_TABLE,
+    REPORT,
+    STATEMENTS,
+    TABLE,
+    Settings,
+    read_settings,
+)
 
 Array = np.ndarray[Any, Any]
 
-INPUTS = "reproduce.toml"
-TABLE, AGREEMENT, STATEMENTS, BENDING = "table.csv", "agreement.csv", "statements.csv", "bending.csv"
-MESHES, OPEN_TABLE, REPORT = "meshes.csv", "open.csv", "report.html"
-RESULTS = (TABLE, AGREEMENT, STATEMENTS, BENDING, MESHES, OPEN_TABLE, REPORT)
 # Samples of the grasp protocol, as in `place`.
 TIMES = 13
 # Mesh of the points of the open values.
 OPEN_MESH = MeshSettings(refine=0.5)
 
 
-@attrs.frozen(eq=False)
-class OtherColumn:
-    """A column beside the three units: J_hat (paths,) in mm by rule, and on a coarser mesh where known."""
-
-    J_hat: Mapping[str, Array]
-    coarser: Mapping[str, Array] = attrs.field(factory=dict)
-    remark: str = ""
-
-
-@attrs.frozen(eq=False)
-class Found:
-    """All that a reproduction found. drawn and points may be those that come with the package: see `origin`.
-
-    samples: pressure in kPa at the protocol's instants (k,).
-    """
-
-    settings: Settings
-    paper: Published
-    columns: tuple[TableColumn, ...]
-    others: Mapping[str, OtherColumn]
-    drawn: tuple[scatter.Drawn, ...]
-    points: tuple[OpenPoint, ...]
-    samples_kPa: Array
-    origin: Mapping[str, str]
-
-    def table(self, rule: str) -> dict[str, Array]:
-        """J_hat (paths,) in mm by column."""
-        own = {c.name: c.fine.J_hat(rule) for c in self.columns}
-        return own | {name: o.J_hat[rule] for name, o in self.others.items() if rule in o.J_hat}
-
-    def coarser(self, rule: str) -> dict[str, Array]:
-        """J_hat (paths,) in mm on a coarser mesh, by column, as far as known."""
-        own = {c.name: c.coarse.J_hat(rule) for c in self.columns}
-        return own | {name: o.coarser[rule] for name, o in self.others.items() if rule in o.coarser}
-
-    def uncertainty_mm(self, rule: str) -> dict[str, float]:
-        """By column, how far the coarser mesh moves the J_hat that it moves most; nan where not known."""
-        coarser = self.coarser(rule)
-        return {
-            name: float(np.abs(J - coarser[name]).max()) if name in coarser else float("nan")
-            for name, J in self.table(rule).items()
-        }
-
-    def agreements(self, rule: str) -> dict[str, Agreement]:
-        """Each column against the paper's."""
-        coarser = self.coarser(rule)
-        return {
-            name: agreement(J, self.paper.like(name), self.paper.paths, coarser.get(name))
-            for name, J in self.table(rule).items()
-        }
-
-    def statements(self, rule: str) -> list[Statement]:
-        """The paper's statements, judged in those of our columns whose doubt by the mesh is known."""
-        coarser = self.coarser(rule)
-        known = {name: J for name, J in self.table(rule).items() if name in coarser}
-        return statements(known, coarser, self.paper.paths)
-
-    def scatters(self) -> dict[tuple[str, str, float], scatter.Scatter]:
-        """What many meshes say, by family, rule and scale."""
-        return scatter.scatters(self.drawn, {s: self.paper.column(s) for s in self.paper.scales})
-
-
-def reproduce(
-    settings: Settings,
-    folder: Path,
-    progress: Progress,
-    context: RunContext,
-) -> Found:
-    """Make a folder with table, figures and report. Raises InputError, MeshingError and ConvergenceError."""
-    from .report import write_report
-
-    begin(context, folder, HEADER, {INPUTS: settings.text()}, RESULTS)
+def reproduce(settings: Settings, folder: Path, context: RunContext) -> Found:
+    """Make the paper's table again, with figures. Raises InputError, MeshingError and ConvergenceError."""
+    progress = context.progress
     paper, unit = published(), settings.unit
     _, samples = grasp().sample(TIMES)
     units = [column_unit(unit, scale, modulus) for scale, modulus in paper.modulus_kPa.items()]
@@ -137,8 +77,7 @@ def reproduce(
     found = Found(settings, paper, columns, others, tuple(drawn), tuple(points), samples, origin)
     write_tables(found, folder)
     context.summary |= summary(found)
-    with progress.stage("report", expected_s=10.0):
-        write_report(found, folder / REPORT)
+    context.report = lambda _: write_report(found, folder / REPORT, progress)
     return found
 
 
@@ -310,7 +249,7 @@ def summary(found: Found) -> dict[str, Any]:
     }
 
 
-def console_summary(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What a reproduction came to, in a few lines of text."""
     lines = []
     for rule, by_column in summary.get("agreement", {}).items():
@@ -325,3 +264,6 @@ def console_summary(summary: Mapping[str, Any]) -> list[str]:
     if held:
         lines.append("statements: " + ", ".join(f"{count} {verdict}" for verdict, count in held.items()))
     return lines
+
+
+USE_CASE = UseCase("reproduce", LAYOUT, read_settings, reproduce, console_summary)

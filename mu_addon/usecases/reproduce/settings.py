@@ -13,9 +13,18 @@ from ...design.assets import asset_root
 from ...design.parameters import Unit, load_preset
 from ...errors import InputError
 from ...meshing.settings import MeshSettings
+from ...run.folder import FolderLayout
+from ...run.inputs import FORMAT, read_inputs, structured
+from ...toml_writer import toml_text
 from .open_values import with_values
 
-HEADER = "# The inputs of a reproduction of the paper's table."
+TABLE, AGREEMENT, STATEMENTS, BENDING = "table.csv", "agreement.csv", "statements.csv", "bending.csv"
+MESHES, OPEN_TABLE, REPORT = "meshes.csv", "open.csv", "report.html"
+LAYOUT = FolderLayout(
+    "reproduce.toml",
+    "# The inputs of a reproduction of the paper's table.",
+    results=(TABLE, AGREEMENT, STATEMENTS, BENDING, MESHES, OPEN_TABLE, REPORT),
+)
 DEFAULT = "default"
 FOLDER = "reproduce"
 
@@ -52,23 +61,29 @@ class Settings:
         """The unit at 1.0x with the set's values. Raises InputError where it breaks a rule."""
         return with_values(load_preset("mu-1.0x"), self.values)
 
-    def text(self) -> str:
-        """reproduce.toml: all that decides the results."""
-        lines = [HEADER, "format = 1", f'set = "{self.values_name}"', f"meshes = {self.meshes}"]
-        lines += [
-            f"held_cells = {self.held_cells:g}",
-            f"points = {self.points}",
-            f"gripper = {str(self.gripper).lower()}",
-            "",
-            "[values]",
-        ]
-        lines += [f'"{name}" = {_toml(value)}' for name, value in sorted(self.values.items())]
-        lines += ["", "[mesh]", *(f"{k} = {_toml(v)}" for k, v in attrs.asdict(self.mesh).items())]
-        return "\n".join(lines) + "\n"
+    def texts(self) -> dict[str, str]:
+        """Text of the file of inputs, by name: all that decides the results."""
+        values = {
+            "format": FORMAT,
+            "set": self.values_name,
+            "meshes": self.meshes,
+            "held_cells": self.held_cells,
+            "points": self.points,
+            "gripper": self.gripper,
+            "values": dict(sorted(self.values.items())),
+            "mesh": attrs.asdict(self.mesh),
+        }
+        return {LAYOUT.inputs: toml_text(values, LAYOUT.header)}
 
 
-def _toml(value: Any) -> str:
-    return f'"{value}"' if isinstance(value, str) else str(value).lower()
+def read_settings(folder: Path) -> Settings:
+    """The settings that a folder of `reproduce` describes; raises InputError."""
+    path = folder / LAYOUT.inputs
+    values, _ = read_inputs(path)
+    name, given = values.pop("set", DEFAULT), values.pop("values", {})
+    if not isinstance(name, str) or not isinstance(given, dict):
+        raise InputError("set is no name, or values is no table", str(path), "correct that key")
+    return structured(Settings, values, str(path), values_name=name, values=given)
 
 
 def read_set(name: str) -> dict[str, Any]:
