@@ -24,11 +24,7 @@ from ...design.steps import require_whole
 from ...design.surface import stl_bytes
 from ...errors import InputError, MuError
 from ...files import write_bytes, write_json
-from ...run.folder import write_run
-from ...usecases.check_print import job as check_job
-from ...usecases.export import job as export_job
-from ...usecases.export import specimens
-from ...usecases.export.print_offsets import taken_off
+from ...run.folder import FolderLayout, write_run
 from ..body import state as bodies
 from ..jobs.start_child import OWN_FOLDER, JobKind, missing
 from ..shared.file_cache import FileCache
@@ -149,40 +145,48 @@ def own_body(root: Any) -> bool:
 def write_inputs(root: Any, command: str, folder: Path) -> None:
     """Write what a job for the printer is asked to do into its folder; raises MuError."""
     unit = to_unit(root.mu_unit)
-    if command == CHECK:
-        layout, job = check_job.LAYOUT, _check(root, unit, folder)
-    elif command == EXPORT:
-        layout, job = export_job.LAYOUT, _export(root, unit)
-    else:
-        layout, job = specimens.LAYOUT, specimens.Job(unit, export_job.resin_of(None))
+    layout, job = {CHECK: _check, EXPORT: _export, SPECIMENS: _specimens}[command](root, unit, folder)
     write_run(folder, layout, job.texts())
 
 
-def _check(root: Any, unit: Unit, folder: Path) -> check_job.Job:
+# The core's jobs only where they are made: they bring in packages that a Blender may lack.
+
+
+def _check(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
     """A check of the unit; one in a body of the user's own is checked by its STL, which is built first."""
+    from ...usecases.check_print.job import LAYOUT, Job
+
     up = tuple(exact(x) for x in root.mu_print.up)
     if own_body(root):
         stl = _own_stl(root, unit, folder / OWN_FOLDER)
-        return check_job.Job(printer_of(root), stl=stl.read_bytes(), stl_file=stl, direction=up)
+        return LAYOUT, Job(printer_of(root), stl=stl.read_bytes(), stl_file=stl, direction=up)
     path = path_of(root, unit)
-    return check_job.Job(printer_of(root), unit, window(unit, path) if path else None, direction=up)
+    return LAYOUT, Job(printer_of(root), unit, window(unit, path) if path else None, direction=up)
 
 
-def _export(root: Any, unit: Unit) -> export_job.Job:
-    settings = root.mu_print
-    path, name = export_job.path_of(unit, path_of(root, unit) or None)
+def _export(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
+    from ...usecases.export.job import LAYOUT, Job, resin_of
+
+    settings, path = root.mu_print, path_of(root, unit)
     source = {"none": None, "unit": "unit", "gauge": bpy.path.abspath(settings.gauge)}[settings.compensate]
     offsets, origin = taken_off(unit, source)
-    return export_job.Job(
+    return LAYOUT, Job(
         unit=unit,
-        resin=export_job.resin_of(None),
-        path=path,
-        path_name=name,
+        resin=resin_of(None),
+        path=window(unit, path) if path else None,
+        path_name=path,
         formats=tuple(name for name, _, _ in FORMATS if name in settings.formats),
         quality=settings.quality,
         take_off=offsets,
         offset_source=origin,
     )
+
+
+def _specimens(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
+    from ...usecases.export.job import resin_of
+    from ...usecases.export.specimens import LAYOUT, Job
+
+    return LAYOUT, Job(unit, resin_of(None))
 
 
 def _own_stl(root: Any, unit: Unit, folder: Path) -> Path:

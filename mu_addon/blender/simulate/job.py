@@ -26,7 +26,7 @@ def job_of(root: Any) -> Job:
     # Only now: they bring in the solver's packages, which a Blender may lack.
     try:
         from ...meshing.settings import MeshSettings
-        from ...usecases.simulate_and_place.job import Job, protocol_of, require_body_fits
+        from ...usecases.simulate_and_place.job import Job, protocol_of, require_paths_inside
     except (ImportError, OSError, RuntimeError) as error:
         raise InputError(
             f"the solver cannot load: {error}", "", "install the extension built for this Blender and system"
@@ -44,7 +44,7 @@ def job_of(root: Any) -> Job:
             extra |= {"rules": ("volume_fraction",), "mesh_check": False}
     body = bodies.envelope_in(root, unit)
     if body is not None:
-        require_body_fits(unit, body, stages, settings.paths)
+        require_paths_inside(unit, body, stages, settings.paths)
     return Job(
         unit=unit,
         protocol=protocol_of(bpy.path.abspath(settings.protocol) if settings.protocol else None),
