@@ -166,6 +166,7 @@ def _check(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
 
 def _export(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
     from ...usecases.export.job import LAYOUT, Job, resin_of
+    from ...usecases.export.print_offsets import taken_off
 
     settings, path = root.mu_print, path_of(root, unit)
     source = {"none": None, "unit": "unit", "gauge": bpy.path.abspath(settings.gauge)}[settings.compensate]
