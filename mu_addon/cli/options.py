@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ..design.parameters import Unit
+    from ..fem.solver import SolverChoice
     from ..run.context import RunContext
     from ..usecases.simulate_and_place.extended_unit import Extended
     from ..usecases.simulate_and_place.static_effects import StaticEffects
@@ -65,6 +66,33 @@ def add_resin(command: argparse.ArgumentParser) -> None:
         "`fit-material`. Its moduli, law and memory replace those of the unit's [material] and [wall] "
         "(default: those of the unit).",
     )
+
+
+def add_solver(command: argparse.ArgumentParser) -> None:
+    """--solver and --device."""
+    command.add_argument(
+        "--solver",
+        choices=("auto", "direct", "iterative"),
+        default="auto",
+        help="Solver of linear systems: a factorisation, or conjugate gradients on two levels of elements. "
+        "auto: direct, unless the factor does not fit into memory (default: auto).",
+    )
+    command.add_argument(
+        "--device",
+        default="auto",
+        metavar="auto|cpu|cuda:0",
+        help="Device for the finite elements. auto: a CUDA device if there is one and the mesh has 200 000 "
+        "unknowns or more, otherwise the CPU (default: auto).",
+    )
+
+
+def solver_of(options: argparse.Namespace) -> SolverChoice:
+    """The choice of --solver and --device; raises InputError, also for a device that is not there."""
+    from ..fem.solver import SolverChoice
+
+    found = SolverChoice(options.solver, options.device)
+    found.require_device()
+    return found
 
 
 def add_measured_folder(command: argparse.ArgumentParser, help_: str = "") -> None:

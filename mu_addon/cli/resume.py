@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import require_out
+from .options import add_solver, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -31,12 +31,18 @@ def add(commands: Commands[Any]) -> None:
         action="store_false",
         help="Compute the numbers only: no pictures, no report.html.",
     )
+    add_solver(command)
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
     """Run what the folder's inputs say; what is finished is taken from the cache."""
+    from ..fem.solver import SolverChoice
     from ..usecases.resume import resume
+    from .options import solver_of
 
     require_out(options)
     context.wants_report = options.report
-    resume(Path(options.out), context, options.workers)
+    solver = solver_of(options)
+    # The folder's own say, where the command says nothing else.
+    given = {"workers": options.workers, "solver": None if solver == SolverChoice() else solver}
+    resume(Path(options.out), context, {name: value for name, value in given.items() if value is not None})

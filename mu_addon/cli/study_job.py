@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import modelled, unit_of
+from .options import modelled, solver_of, unit_of
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -38,6 +38,7 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
             "mesh": MeshSettings(order=options.order, refine=options.refine),
             "times": options.times,
             "mesher": options.mesher,
+            "solver": solver_of(options),
             "lattice": None if options.lattice is None else read_effective(options.lattice),
         }
     if "place" in options.stages:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from .options import add_solver
+
 EXAMPLE = "example: run.py place --preset mu-1.0x --out out/mu-1.0x"
 
 
@@ -70,10 +72,8 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--protocol",
         metavar="CSV",
-        help=(
-            "Pressure protocol, CSV with the columns time_s,pressure_kPa (default: the shipped grasp "
-            "protocol)."
-        ),
+        help="Pressure protocol, CSV with the columns time_s,pressure_kPa (default: the shipped grasp "
+        "protocol).",
     )
     command.add_argument(
         "--order", type=int, choices=(1, 2), default=2, help="Order of the finite elements (default: 2)."
@@ -105,3 +105,4 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
         default="auto",
         help="Mesh generator (default: auto).",
     )
+    add_solver(command)

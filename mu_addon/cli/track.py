@@ -20,10 +20,8 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `track`."""
     command = commands.add_parser(
         "track",
-        help=(
-            "Track markers in a video of the bench with Blender's tracker and write measured data in mm "
-            "and degrees."
-        ),
+        help="Track markers in a video of the bench with Blender's tracker and write measured data in mm "
+        "and degrees.",
         epilog="example: run.py track bench.mp4 --markers bench.toml --pressure ladder.csv --out measured",
     )
     command.add_argument(

@@ -15,7 +15,7 @@ from .surface import stl_bytes
 
 
 def write_stl(solid: Solid, path: str | Path) -> None:
-    """Write the solid as binary STL in mm, whole or not at all; equal solids give equal files."""
+    """Write the solid as binary STL in mm; equal solids give equal files. Raises OutputError."""
     write_bytes(Path(path), stl_bytes(solid.vertices, solid.triangles))
 
 

@@ -373,7 +373,18 @@ def _printable(unit: Any, field: Any, value: Any) -> None:
 
 @attrs.frozen
 class Unit:
-    """All parameters of one Monolithic Unit; InputError names the co-design rule that a unit breaks."""
+    """All parameters of one Monolithic Unit, at scale 1; `dimensions` are the lengths at its scale.
+
+    Each section is an attrs class whose fields carry unit, bounds, meaning and source
+    (`quantity.describe`). A value out of bounds, or one that breaks a co-design rule (`rules`), raises
+    InputError with what would fit. Units are immutable: `attrs.evolve` makes another.
+
+    >>> import attrs
+    >>> unit = Unit(scale=0.75)
+    >>> thicker = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, wall_mm=1.2))
+    >>> round(thicker.dimensions.wall, 3)
+    0.9
+    """
 
     section: ClassVar[str] = ""
 
@@ -455,7 +466,11 @@ class Assumption(NamedTuple):
 
 
 def assumed(unit: Unit) -> list[Assumption]:
-    """Every value of the unit that is not the paper's: path `section.name`, value, unit, reason."""
+    """Every value of the unit that the source paper does not print: path `section.name`, value, unit, reason.
+
+    >>> assumed(Unit())[0].path
+    'chambers.neck_diameter_mm'
+    """
     found = []
     for section, d, value in stated(unit):
         if d.assumed:
@@ -480,7 +495,11 @@ def stated(unit: Unit) -> Iterator[tuple[str, Description, Any]]:
 
 
 def to_toml(unit: Unit, comments: bool = True) -> str:
-    """The unit as TOML, in one canonical order; with comments that give unit, meaning and source."""
+    """The unit as TOML text in one canonical order, by default with unit, meaning and source as comments.
+
+    >>> from_toml(to_toml(Unit(scale=1.5))).scale
+    1.5
+    """
     tables: dict[str, list[tuple[Description, Any]]] = {}
     for section, d, value in stated(unit):
         tables.setdefault(section, []).append((d, value))
@@ -489,7 +508,11 @@ def to_toml(unit: Unit, comments: bool = True) -> str:
 
 
 def from_toml(text: str, origin: str = "") -> Unit:
-    """Unit read from TOML; keys left out keep their defaults, InputError gives file and line."""
+    """The unit in TOML text; keys left out keep their defaults. Raises InputError with `origin` and line.
+
+    >>> from_toml('format = 1').chambers.count
+    6
+    """
     head = {"format": int, "name": str, **{d.name: d.type for d in describe(Unit)}}
     keys = {"": list(head)} | {_attribute(s): [d.name for d in describe(s)] for s in SECTIONS}
     document = toml_text.parse(text, keys, origin)
@@ -507,7 +530,7 @@ def from_toml(text: str, origin: str = "") -> Unit:
 
 
 def read_unit(path: str | Path) -> Unit:
-    """Unit in a TOML file; InputError gives file, line and remedy."""
+    """The unit in a TOML file. Raises InputError with file, line and what to do."""
     path = Path(path)
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -523,17 +546,25 @@ def read_unit(path: str | Path) -> Unit:
 
 
 def write_unit(unit: Unit, path: str | Path) -> None:
-    """Write the unit as commented TOML, whole or not at all."""
+    """Write the unit as commented TOML; the file is replaced only once it is complete. Raises OutputError."""
     write_bytes(Path(path), to_toml(unit).encode())
 
 
 def preset_names() -> list[str]:
-    """Names of the shipped presets, sorted."""
+    """Names of the shipped presets, sorted.
+
+    >>> preset_names()
+    ['mu-0.75x', 'mu-1.0x', 'mu-1.5x']
+    """
     return asset_names("presets")
 
 
 def load_preset(name: str) -> Unit:
-    """The shipped unit of that name; InputError lists the names there are."""
+    """The shipped unit of that name. Raises InputError, which lists the names there are.
+
+    >>> load_preset("mu-0.75x").scale
+    0.75
+    """
     return read_unit(asset_file("presets", "preset", name))
 
 

@@ -141,7 +141,7 @@ def block_of(experiment: Experiment, unit: Unit) -> Block | None:
         raise InputError(
             f"a block of {experiment.cells} cells is no cube",
             experiment.name,
-            "compress cubes, or leave out cells: its struts are then taken for slender ones",
+            "compress cubes, or omit cells: the specimen is then modelled as slender struts",
         )
     cell = strut_cell(attrs.evolve(unit, scale=1.0, print=Printing()))
     return Block(cell, experiment.cells[0], experiment.plates or HELD, unit.material.membrane_poisson)
@@ -161,9 +161,9 @@ def scalings(
     blocks = {e.name: block_of(e, unit) for e in experiments if e.kind == KIND}
     distinct = list(dict.fromkeys(b for b in blocks.values() if b is not None))
     found = {b: response(b, cache, say) for b in distinct}
-    told = [f"lattice specimens are taken for {b}, as computed from their struts" for b in distinct]
+    told = [f"lattice specimens are modelled as {b}, computed from their struts" for b in distinct]
     if None in blocks.values():
-        told.append("lattice specimens without a count of cells are taken for slender struts that bend")
+        told.append("lattice specimens without a number of cells are modelled as slender bending struts")
     first = found[distinct[0]] if distinct else None
     return {
         n: ComputedCell(found[b], first, *printed(unit.print)) for n, b in blocks.items() if b is not None

@@ -55,7 +55,8 @@ class Body:
 
     finer: the mesh that mesh_error compares with. distal: how many chambers, from the tip, a clog cuts off.
     lattice: a law for the lattice in place of the unit's moduli. drawn: the unit whose mesh is moved to this
-    one's dimensions, since another mesh would bring noise as large as a small effect.
+    one's dimensions, since another mesh would bring noise as large as a small effect. device: Warp's, of a
+    model.
     """
 
     unit: Unit
@@ -65,6 +66,7 @@ class Body:
     lattice: LatticeLaw | None = None
     orientation_deg: float = 0.0
     drawn: Unit | None = None
+    device: str = "cpu"
 
     def meshed(self, cache: Path | None = None) -> Mesh:
         """The unit's mesh; raises InputError and MeshingError. cache: see `mesh_unit`."""
@@ -83,7 +85,7 @@ class Body:
 
     def model(self, mesh: Mesh) -> Model:
         """The base model, under pressure alone."""
-        return Model(mesh, threads=1)
+        return Model(mesh, device=self.device, threads=1)
 
 
 @attrs.frozen
@@ -124,7 +126,11 @@ class UnitEffect:
 
 
 def down(orientation_deg: float) -> Array:
-    """Unit vector (3,) along which things fall: z turned about x, so that at 0 the tip hangs down."""
+    """Unit vector (3,) along which things fall, for an orientation in degrees about x: 0 hangs, tip down.
+
+    >>> down(0.0).round(9).tolist()[2]
+    1.0
+    """
     a = math.radians(orientation_deg)
     return np.array([0.0, -math.sin(a), math.cos(a)])
 
@@ -140,7 +146,7 @@ def _clogged(body: Body, mesh: Mesh, share_lost: float) -> Model:
         raise InputError(
             f"{body.distal} of {d.count} chambers cannot be cut off", "clogged_chamber", "give 1 or more"
         )
-    return CloggedModel(mesh, (d.count - body.distal) * d.cell, share_lost, threads=1)
+    return CloggedModel(mesh, (d.count - body.distal) * d.cell, share_lost, device=body.device, threads=1)
 
 
 def walled(body: Body, mesh: Mesh, gap_mm: float) -> Model:

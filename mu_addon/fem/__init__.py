@@ -7,7 +7,7 @@ mm, N, MPa, s; kPa and degrees only where the name says so.
 
     >>> from mu_addon.fem import NeoHooke
     >>> NeoHooke.parameter_names
-    ('mu', 'kappa')
+    ('mu_MPa', 'kappa_MPa')
 """
 
 from typing import TYPE_CHECKING
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from .kinematics import probe as probe
     from .lattice_law import LatticeLaw as LatticeLaw
     from .laws import Foam as Foam
+    from .laws import Friction as Friction
     from .laws import Law as Law
     from .laws import Layered as Layered
     from .laws import MooneyRivlin as MooneyRivlin
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
     from .rigid import Sphere as Sphere
     from .self_intersection import crossings as crossings
     from .self_intersection import first_self_intersection as first_self_intersection
+    from .solver import SolverChoice as SolverChoice
     from .state import State as State
     from .state import rest as rest
     from .stress import cauchy as cauchy
@@ -74,7 +76,7 @@ else:
             "equilibrium": "Equilibrium",
             "kinematics": "Probe TipSection bending_angle_deg probe",
             "lattice_law": "LatticeLaw",
-            "laws": "Foam Law Layered MooneyRivlin NeoHooke Ogden OgdenRoxburgh Prony Yeoh",
+            "laws": "Foam Friction Law Layered MooneyRivlin NeoHooke Ogden OgdenRoxburgh Prony Yeoh",
             "loads": "gravity traction",
             "materials": "Layer Materials",
             "model": "Model",
@@ -83,6 +85,7 @@ else:
             "protocol": "Protocol read_protocol",
             "rigid": "Box Plane Pose Sphere",
             "self_intersection": "crossings first_self_intersection",
+            "solver": "SolverChoice",
             "state": "State rest",
             "stress": "cauchy von_mises",
             "time_stepping": "Instant simulate_in_time",

@@ -48,7 +48,12 @@ def cauchy(mesh: Mesh, u: Array, materials: Materials, history: Sequence[Array] 
 
 
 def von_mises(sigma: Array) -> Array:
-    """Von Mises stress (...) of stress tensors (..., 3, 3), in their unit: sqrt(3/2 s:s), s the deviator."""
+    """Von Mises stress (...) of stress tensors (..., 3, 3), in their unit: sqrt(3/2 s:s), s the deviator.
+
+    >>> import numpy as np
+    >>> round(float(von_mises(np.diag([3.0, 0.0, 0.0]))), 9)
+    3.0
+    """
     mean = np.trace(sigma, axis1=-2, axis2=-1)[..., None, None] / 3.0
     deviator = sigma - mean * np.eye(3)
     return np.asarray(np.sqrt(1.5 * np.einsum("...ij,...ij->...", deviator, deviator)))

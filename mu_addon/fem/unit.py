@@ -22,10 +22,11 @@ Array = np.ndarray[Any, Any]
 
 
 def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> Materials:
-    """Materials of a unit's mesh: neo-Hookean membrane and lattice, or the law of the unit's [wall].
+    """Materials of a unit's mesh: neo-Hookean membrane and lattice, or the law that the unit's [wall] names.
 
-    lattice: the law of the lattice in place of neo-Hooke's. A skin of other cure is spread over the wall, see
-    `skin_stiffening`: right where the wall stretches, too soft where it bends.
+    lattice: a homogenised lattice law in place of the neo-Hookean one. A skin of other cure is spread
+    evenly over the wall's thickness (`skin_stiffening`): exact where the wall stretches, too soft where it
+    bends.
     """
     m, p = unit.material, unit.print
     stiffer = skin_stiffening(unit.printed.wall, p.skin_depth_mm, p.skin_factor)

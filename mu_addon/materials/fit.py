@@ -129,7 +129,7 @@ def fit_coupons(
     the law itself is wrong no interval is honest, and a long memory says so. Raises InputError.
     """
     if weights not in WEIGHTS:
-        raise InputError(f"there are no {weights!r} weights", "fit", f"choose from {', '.join(WEIGHTS)}")
+        raise InputError(f"unknown weights {weights!r}", "fit", f"choose from {', '.join(WEIGHTS)}")
     n = sum(len(c.stretch) for c in coupons)
     if n <= form.count:
         raise InputError(

@@ -53,9 +53,10 @@ class Quality:
 
 
 def mesh_quality(mesh: Mesh, unit: Unit, body: Body | None = None) -> Quality:
-    """Measure a mesh of a unit, half and quarter meshes as the whole body they stand for.
+    """Counts, angles, Jacobians and volumes of a unit's mesh, beside the exact volumes of the design.
 
-    body: what took the place of the envelope's box in it, if anything did.
+    Half and quarter meshes count as the whole body they stand for. body: the closed surface that took the
+    place of the envelope's box, if one did. See `Quality` for units.
     """
     d = unit.printed
     (x0, x1), (y0, y1), (z0, z1) = d.bounds

@@ -21,9 +21,10 @@ Array = np.ndarray[Any, Any]
 
 
 class CandidateBatch:
-    """Many sensors in one unit: where each moves the monitored points at a state of Model A.
+    """Many candidate sensors in one unit, solved together: how each moves the monitored points in a state.
 
-    shares: the part (m,) of every element that each sensor fills (see inclusion.sensor_share).
+    At every state of Model A (the unit without a sensor) all candidates share one factorisation (batched
+    Newton). shares: for each sensor the share (m,) of every element that it fills (`sensor_share`).
     monitored: points (p, 3) in mm of the backbone and their probe. settings: of Newton's method.
     """
 

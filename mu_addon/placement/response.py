@@ -131,9 +131,12 @@ def reduced_response(
     pressures_MPa: Array | None = None,
     sides: list[Parity] | None = None,
 ) -> Response:
-    """Reduced response about Model A's states, by default those at `telling_pressures`.
+    """Linear response of a unit to any chain of steps of its lattice graph, by a few strain patterns a step.
 
-    Raises InputError where a step meets no element, IndefiniteError at an unstable state.
+    model, materials, trajectory: Model A. sensor_MPa, rule, radius_mm: of the sensor, as in `evaluate`.
+    monitor: probe of the backbone's points. pressures_MPa: the states, by default those of
+    `telling_pressures`. Raises InputError where a step meets no element, IndefiniteError at an unstable
+    state.
     """
     mesh = model.mesh
     sides = parities(model) if sides is None else sides

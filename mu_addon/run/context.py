@@ -71,9 +71,9 @@ class RunContext:
         self._lock = FolderLock(folder)
         if not self._lock.held:
             self.progress.warning(
-                "this disk offers no locks: nothing keeps a second run out of the folder",
+                "this disk does not support file locks, so a second run in the same folder is not prevented",
                 str(folder),
-                "start no other run with the same folder",
+                "do not start another run with the same folder",
             )
 
     def unlock(self) -> None:
@@ -118,17 +118,12 @@ def run_to_end(progress: Progress) -> Iterator[RunContext]:
             what = f"the package {error.name} is not installed"
             _stop(context, MuError(what, sys.executable, "install the packages that README.md names"))
         except MemoryError:
-            what = "there was not enough memory"
-            _stop(
-                context,
-                MuError(
-                    what, _where_results_are(context), "take a coarser mesh, fewer workers or more memory"
-                ),
-            )
+            remedy = "use a coarser mesh, fewer workers or a machine with more memory"
+            _stop(context, MuError("out of memory", _where_results_are(context), remedy))
         except Exception as error:  # noqa: BLE001 - the last resort: told, logged and turned into exit status 70
             _log_traceback(context, error)
             fault = _Unexpected(
-                f"this program failed: {type(error).__name__}: {error}",
+                f"internal error: {type(error).__name__}: {error}",
                 remedy="report it with log.ndjson, which holds the details"
                 if context.folder
                 else "report it",
@@ -139,7 +134,7 @@ def run_to_end(progress: Progress) -> Iterator[RunContext]:
 
 
 def _where_results_are(context: RunContext) -> str:
-    return f"what was finished is in {context.folder}" if context.folder else ""
+    return f"finished results are in {context.folder}" if context.folder else ""
 
 
 def _stop(context: RunContext, error: MuError) -> None:

@@ -74,7 +74,7 @@ def claim(folder: Path, layout: FolderLayout, inputs: Mapping[str, str]) -> None
         foreign = [name for name in (*may, *layout.results) if (folder / name).exists() and name not in kept]
         if foreign:
             raise InputError(
-                f"the folder holds a file of another kind of run, or somebody else's: {foreign[0]}",
+                f"the folder contains a file of another kind of run, or an unknown file: {foreign[0]}",
                 str(folder),
                 "choose a new or empty folder for the results",
             )
@@ -133,7 +133,8 @@ def require_space(folder: Path, needed: int) -> None:
         return
     if free < needed:
         raise OutputError(
-            f"the disk has too little room: the run writes up to {_size(needed)}, and {_size(free)} are free",
+            f"the disk has too little free space: the run writes up to {_size(needed)}, and "
+            f"{_size(free)} are free",
             str(folder),
             "free some space on that disk, or choose another folder",
         )
@@ -149,7 +150,7 @@ def _refuse_links(folder: Path, patterns: Iterable[str]) -> None:
         for path in [folder / pattern, *folder.glob(pattern)]:
             if path.is_symlink() or (hasattr(os.path, "isjunction") and os.path.isjunction(path)):
                 raise InputError(
-                    f"{path.name} in the folder is a link to elsewhere",
+                    f"{path.name} in the folder is a link to another location",
                     str(path),
                     "remove the link, or choose another folder for the results",
                 )

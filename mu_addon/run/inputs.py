@@ -35,7 +35,7 @@ def read_toml(path: Path, what: str = "inputs", remedy: str = "choose another fo
     except OSError as error:
         raise InputError(f"cannot read the {what}: {error.strerror or error}", where, remedy) from error
     except UnicodeDecodeError as error:
-        raise InputError("this is not UTF-8 text", where, remedy) from error
+        raise InputError("the file is not UTF-8 text", where, "save it as UTF-8") from error
     if len(text) > _LONGEST:
         raise InputError(f"more than {_LONGEST} characters are no {what}", where, remedy)
     return parse_toml(text, where)

@@ -28,9 +28,10 @@ _STRAIGHT = 1e-6
 
 @attrs.frozen(eq=False)
 class WaveguideShape:
-    """A waveguide's fixed part: section and wells in mm, lengths of wells' centres and of open junctions.
+    """A waveguide as light sees it: section, wells and junctions, in mm.
 
-    Lengths count from the entry's end face along the axis at rest.
+    wells: lengths of their centres, junctions: intervals of length that open into struts; lengths count
+    from the entry's end face along the axis at rest.
     """
 
     width: float
@@ -43,11 +44,11 @@ class WaveguideShape:
 
 @attrs.frozen(eq=False)
 class EmbeddedWaveguide:
-    """A printed bar's axis at rest, by the lattice's nodes that hold it.
+    """A printed waveguide at rest, and which lattice nodes carry it.
 
-    nodes (h, 3) in mm; points (m, 3): the nodes, and before and after them the end faces; s (m,): lengths
-    along the axis; joint (m,): number of the node that holds each point; normals (m - 1, 3): of the face with
-    the wells, a piece.
+    shape: its section and wells. nodes (h, 3) in mm: the lattice's. points (m, 3): the nodes, and before
+    and after them the end faces; s (m,): lengths in mm along the axis; joint (m,): number of the node that
+    carries each point; normals (m - 1, 3): of the face with the wells, a piece of the axis.
     """
 
     shape: WaveguideShape
@@ -109,10 +110,10 @@ def _joined(pieces: Sequence[tuple[Array, Array, Array]]) -> Centreline:
 
 
 def embed_waveguide(bar: Bar, nodes: Array, d: Dimensions) -> EmbeddedWaveguide:
-    """A printed bar with its own wells, held by its path's lattice nodes (h, 3) in mm.
+    """A printed waveguide with its wells, carried by the lattice nodes (h, 3) in mm of its path.
 
-    d: the sizes of section, wells and struts as they are printed. Struts open the bar's sides over their
-    diameter at every node.
+    bar: from `design.waveguide`. d: sizes of section, wells and struts as they are printed. At every node
+    struts open the waveguide's sides over their diameter.
     """
     corners = _lengths(bar.points)
     first = float(np.linalg.norm(nodes[0] - bar.points[0]))
@@ -156,7 +157,7 @@ def _along(points: Array, corners: Array, centre: Array) -> float:
 
 @attrs.frozen(eq=False)
 class Joints:
-    """Nodes (n, 3) of a lattice in a mesh that stands for it: each moves and turns as the body around it."""
+    """Lattice nodes (n, 3) in mm in a homogenised mesh: each moves and rotates as the body around it does."""
 
     nodes: Array
     reach: float

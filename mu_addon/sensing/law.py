@@ -128,7 +128,7 @@ def straight_guide(d: Dimensions, length: float) -> WaveguideShape:
     clear = wells[(away > half + room) & (wells > room) & (wells < total - room)]
     if not len(clear):
         raise InputError(
-            f"a waveguide of {length:g} mm has no room for a well", "path", "choose a longer one"
+            f"a waveguide of {length:g} mm is too short for a well", "path", "choose a longer one"
         )
     spans = tuple((max(0.0, at - half), min(total, at + half)) for at in nodes.tolist())
     section = d.waveguide_section
@@ -143,7 +143,11 @@ def fit_law(
     seed: int = 0,
     on_trace: Callable[[float], None] = lambda fraction: None,
 ) -> Law:
-    """Trace rays through guides of many lengths and bends, and fit the law; the rms is by leave-one-out."""
+    """A law of transmitted light for a unit's waveguides, fitted to traces of many lengths and bends.
+
+    d: printed dimensions of the unit; rays: a trace; traces: how many guides; on_trace: called with the
+    share done. Its rms error is found by leaving each trace out. Takes some seconds.
+    """
     random = np.random.default_rng(seed)
     rows, logs, spread = [], [], []
     for k in range(traces):
@@ -159,9 +163,9 @@ def fit_law(
         on_trace((k + 1) / traces)
     if len(rows) < 3 * len(FEATURES):
         raise InputError(
-            "hardly any light arrives in the waveguides of this unit",
+            "almost no light reaches the detector in the waveguides of this unit",
             "optics",
-            "a clearer resin or less loss",
+            "use a clearer resin or smaller losses",
         )
     weight = 1 / np.array(spread)
     A, y = np.array(rows) * weight[:, None], np.array(logs) * weight

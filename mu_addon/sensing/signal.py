@@ -69,7 +69,10 @@ def signal_of_states(
 
 
 def signal_of_nodes(law: Law, guide: EmbeddedWaveguide, moved: Sequence[tuple[Array, Array]]) -> Signal:
-    """The signal of a held bar in states of its nodes: positions (h, 3) in mm and rotations (h, 3, 3)."""
+    """The light of an embedded waveguide in states of its nodes, by a fitted law.
+
+    moved: for each of k states positions (h, 3) in mm and rotations (h, 3, 3). See `Signal`.
+    """
     rest = features(guide.shape, guide.at_rest)
     found = [features(guide.shape, guide.legs(*state)) for state in moved]
     return Signal(
@@ -94,7 +97,7 @@ def traced_signal(
         raise InputError(
             "rays are followed through straight waveguides only",
             "path",
-            "choose a path without a bend, or take the law's signal",
+            "choose a path without a bend, or use the signal of the fitted law",
         )
     every = [guide.at_rest, *(guide.legs(*state) for state in moved)]
     lights = [traced(guide.shape, leg, optics, rays, seed) for (leg,) in every]
@@ -134,7 +137,9 @@ def response(angle_deg: Array, share: Array, rest_deg: float = 0.0) -> Response:
     angle, light = angle[keep], light[keep]
     if len(angle) < 2 or not angle[0] <= rest_deg <= angle[-1]:
         raise InputError(
-            "the unit does not bend, or was not seen at rest", "angle_deg", "a protocol that bends it"
+            "the unit does not bend, or its state at rest is missing",
+            "angle_deg",
+            "give a protocol that bends it",
         )
     delta = 1 - light / np.interp(rest_deg, angle, light)
     slope = np.diff(delta) / np.diff(angle)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import attrs
@@ -43,14 +45,15 @@ def use_case_of(folder: Path) -> UseCase[Any]:
     )
 
 
-def resume(folder: Path, context: RunContext, workers: int | None = None) -> Any:
+def resume(folder: Path, context: RunContext, given: Mapping[str, Any] = MappingProxyType({})) -> Any:
     """Run what a folder's inputs say, taking from its cache what is finished; returns what was found.
 
-    workers: processes, where the job has them. Raises InputError where the inputs cannot be used or a file
-    is missing that they name, and what the run itself raises.
+    given: fields of the job that take the place of the folder's, `workers` say, where its job has them.
+    Raises InputError where the inputs cannot be used or a file is missing that they name, and what the run
+    itself raises.
     """
     use_case = use_case_of(folder)
     job = use_case.read(folder)
-    if workers is not None and any(field.name == "workers" for field in attrs.fields(type(job))):
-        job = attrs.evolve(job, workers=workers)
+    fields = {field.name for field in attrs.fields(type(job))}
+    job = attrs.evolve(job, **{name: value for name, value in given.items() if name in fields})
     return use_case.start(job, folder, context)

@@ -235,9 +235,9 @@ def test_a_well_through_the_bar_is_caught():
 @pytest.mark.parametrize(
     ("points", "words"),
     [
-        ([[0, 25, 6.25], [1, 25, 18.75]], "is no node of the lattice"),
+        ([[0, 25, 6.25], [1, 25, 18.75]], "is not a node of the lattice"),
         ([[0, 0, 6.25], [0, 0, 18.75]], "runs through the cavity"),
-        ([[0, 25, 6.25]], "needs two nodes"),
+        ([[0, 25, 6.25]], "needs two different nodes"),
         ([[0, 25, 18.75], [6.25, 18.75, 25], [0, 25, 18.75]], "bends by 180 degrees"),
     ],
 )

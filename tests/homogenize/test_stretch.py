@@ -114,7 +114,7 @@ def test_walls_that_meet_end_the_curve():
     materials = Materials.neo_hooke(np.where(foot, 1.0, 1e4), np.full(len(mesh.tets), 0.3))
     strains = (-0.01, -0.02, -0.03, -0.04, -0.06, -0.08, 0.02)
     found = stretch_lattice(mesh, materials, (1.0, 1.0, 1.0), StretchSettings(strains=strains))
-    assert "walls meet at a strain of -0.050" in found.stopped
+    assert "walls touch at a strain of -0.050" in found.stopped
     assert "across z" in found.stopped
     assert found.curve.strain[0] == pytest.approx(-0.04)
     assert found.curve.strain[-1] == pytest.approx(0.02)

@@ -135,7 +135,7 @@ def test_equivalent_stretches(mode):
 
 
 def test_what_has_no_answer_is_refused():
-    with pytest.raises(InputError, match="no mode 'planar'"):
+    with pytest.raises(InputError, match="unknown mode 'planar'"):
         incompressible(NeoHooke, ROWS[NeoHooke], "planar", [1.1])
     with pytest.raises(InputError, match="not positive"):
         response(NeoHooke, ROWS[NeoHooke], "uniaxial", [1.1, 0.0])

@@ -78,7 +78,7 @@ def test_a_response_is_told_about_rest_wherever_that_is() -> None:
     assert hung.monotonic_deg == (25.0, 65.0)
     assert hung.span == drawn.span
     np.testing.assert_array_equal(hung.delta, drawn.delta)
-    with pytest.raises(InputError, match="not seen at rest"):
+    with pytest.raises(InputError, match="state at rest is missing"):
         response(angle + 45.0, light)
 
 
@@ -90,7 +90,7 @@ def test_figures_of_a_response() -> None:
     assert found.span == pytest.approx(0.6)
     folded = response(angle, np.array([0.8, 0.7, 0.9, 1.0, 1.1, 1.2, 1.1]))
     assert folded.monotonic_deg == (-20, 20)
-    with pytest.raises(InputError, match="not seen at rest"):
+    with pytest.raises(InputError, match="state at rest is missing"):
         response(angle[:3], np.ones(3))
     with pytest.raises(InputError, match="does not bend"):
         response(np.zeros(3), np.ones(3))

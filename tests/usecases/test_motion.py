@@ -237,7 +237,7 @@ def test_a_map_of_elements_becomes_one_of_nodes(motion):
 
 
 def test_what_is_missing_is_said(study, tmp_path):
-    with pytest.raises(InputError, match="holds no motion"):
+    with pytest.raises(InputError, match="contains no motion"):
         read_motion(tmp_path)
     (tmp_path / "motion").mkdir()
     for name in ("mesh.npz", "model_a.npz"):
@@ -250,14 +250,14 @@ def test_what_is_missing_is_said(study, tmp_path):
         ("state", stored["state"] + 9),
     ):
         write_npz(tmp_path / "motion" / "model_a.npz", stored | {name: wrong})
-        with pytest.raises(InputError, match="do not fit together"):
+        with pytest.raises(InputError, match="are inconsistent"):
             read_motion(tmp_path)
     write_npz(tmp_path / "motion" / "model_a.npz", {n: a for n, a in stored.items() if n != "state_kPa"})
     with pytest.raises(InputError, match="lacks 'state_kPa'"):
         read_motion(tmp_path)
     damaged = (tmp_path / "motion" / "model_a.npz").read_bytes()
     (tmp_path / "motion" / "model_a.npz").write_bytes(damaged[: len(damaged) // 2])
-    with pytest.raises(InputError, match="holds no motion"):
+    with pytest.raises(InputError, match="contains no motion"):
         read_motion(tmp_path)
 
 
@@ -269,7 +269,7 @@ def test_point_caches_come_back(tmp_path_factory, positions):
     assert np.array_equal(found, positions)
     assert (start, step) == (0.5, 0.25)
     path.write_bytes(path.read_bytes()[:-4])
-    with pytest.raises(InputError, match="not a whole point cache"):
+    with pytest.raises(InputError, match="not a complete point cache"):
         read_pc2(path)
 
 

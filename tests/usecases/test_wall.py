@@ -206,7 +206,7 @@ def test_jobs_that_know_no_such_wall_refuse_it(mesh):
     gripper = attrs.evolve(gripper, unit=attrs.evolve(gripper.unit, wall=unit.wall))
     with pytest.raises(InputError, match="a grasp knows no wall that remembers"):
         GripJob(gripper)
-    with pytest.raises(InputError, match="no one state a pressure"):
+    with pytest.raises(InputError, match="depends on its history"):
         simulate(Equilibrium(Model(mesh), materials_of(unit, mesh)), np.arange(2.0), np.array([0.0, 5.0]))
     with pytest.raises(InputError, match="remembers nothing"):
         attrs.evolve(job_of(unit, [0, 1], [0, 5]), stages=("design", "simulate", "place"), paths="graph")

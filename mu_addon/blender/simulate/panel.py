@@ -44,6 +44,8 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
         header.label(text="Material")
         if body:
             parameters(body, root.mu_unit, "simulate")
+            body.prop(study, "solver")
+            body.prop(study, "device")
             body.prop(study, "folder")
 
 

@@ -133,6 +133,26 @@ class MU_PG_study(bpy.types.PropertyGroup):
         ],
         default="full",
     )
+    solver: EnumProperty(
+        name="Solver",
+        description="What solves the linear systems; answers agree within its tolerance",
+        items=[
+            ("auto", "Automatic", "Factorisation, unless a motion's factor does not fit into memory"),
+            ("direct", "Factorisation", "The fastest as long as it fits into memory"),
+            ("iterative", "Iterative", "Little memory, slow: for the motion of very fine meshes"),
+        ],
+        default="auto",
+    )
+    device: EnumProperty(
+        name="Device",
+        description="What computes the finite elements",
+        items=[
+            ("auto", "Automatic", "A CUDA device from 200 000 unknowns on, where there is one"),
+            ("cpu", "CPU", "The processor"),
+            ("cuda:0", "CUDA", "The first CUDA device"),
+        ],
+        default="auto",
+    )
     protocol: StringProperty(
         name="Protocol",
         description="CSV file of time_s,pressure_kPa. Empty: the grasp that comes with the extension",

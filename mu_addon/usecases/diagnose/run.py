@@ -60,7 +60,7 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | No
     for remark in measured.remarks:
         progress.warning(remark.what, remark.where, remark.remedy)
     if "verdict" in context.summary:
-        with progress.stage("verdict of the same data, kept"):
+        with progress.stage("verdict of the same data, from the cache"):
             return None
     simulators, told = simulators_of(measured.experiments, unit, folder / "cache", progress, job.settings)
     simulator = Composite(simulators)
@@ -74,7 +74,7 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | No
     told += _noisy_gauges(measured, verdict)
     remarks = [*(f"{r.what} ({_place(r.where)})" for r in measured.remarks), *told]
     unknown = dict.fromkeys(e.kind for e in measured.experiments if not simulator.knows(e))
-    remarks += [f"nothing predicts {kind}: its experiments were left out" for kind in unknown]
+    remarks += [f"there is no model for {kind}: its experiments were left out" for kind in unknown]
     found = Diagnosis(measured, simulator, verdict, model, unit, tuple(remarks))
     write_json(folder / "verdict.json", verdict.as_json())
     found.model.save(folder / "model.toml")
@@ -99,8 +99,8 @@ def _resin(model: ExtendedModel, unit: Unit | None) -> list[str]:
         return []
     drawn = float(model.lattice.modulus_MPa(1.0, 0.0, 1.0))
     return [
-        f"the lattice's modulus as drawn, {fitted.value:.3g} kPa, is that of a resin of "
-        f"{fitted.value / 1e3 / drawn:.3g} MPa; the unit's walls have "
+        f"the lattice's modulus as drawn, {fitted.value:.3g} kPa, corresponds to a resin of "
+        f"{fitted.value / 1e3 / drawn:.3g} MPa, but the modulus of the unit's walls is "
         f"{unit.material.membrane_modulus_MPa:.3g} MPa"
     ]
 
@@ -113,8 +113,8 @@ def _noisy_gauges(measured: Measured, verdict: Verdict) -> list[str]:
             if not np.array_equal(values, e.columns[column], equal_nan=True):
                 noise[column] = max(noise.get(column, 0.0), reading_noise(e.columns[column]))
     return [
-        f"{column} was read with white noise of up to {sd:.2g}; where it runs straight this was averaged "
-        "away, and no effect is named for what is left of it"
+        f"{column} was read with white noise of up to {sd:.2g}; this noise was removed by averaging "
+        "over straight stretches, and no effect is named for its remainder"
         for column, sd in noise.items()
     ]
 
@@ -123,7 +123,7 @@ def _bounds_met(verdict: Verdict, simulator: Composite) -> list[str]:
     """Which fitted values of the base model ended at a bound, in words."""
     values = verdict.selection.base.values
     return [
-        f"fitted without any effect, {readable(p.name)} ends at its bound, {values[p.name]:.3g} ({p.source})"
+        f"in the fit without effects, {readable(p.name)} is at its bound, {values[p.name]:.3g} ({p.source})"
         for p in simulator.nuisances
         if any(math.isclose(values.get(p.name, p.null), end, rel_tol=1e-6) for end in (p.low, p.high))
     ]
@@ -190,7 +190,7 @@ def summary(found: Diagnosis) -> dict[str, Any]:
 def console_summary(summary: dict[str, Any]) -> list[str]:
     """What a diagnosis found, in a few lines of text, of its `summary`."""
     lines = [f"verdict: {summary['verdict']}: {summary['headline']}", summary["sentence"]]
-    for name, words in (("fit", "data that were fitted"), ("held_out", "data held out")):
+    for name, words in (("fit", "fitted data"), ("held_out", "held-out data")):
         errors = summary["gain"][name]
         if errors and summary["causes"]:
             before, after = errors["rmse_before"], errors["rmse_after"]

@@ -65,32 +65,34 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
         said = [f"{readable(c.effect.name)} has {sized(verdict, c)}" for c in found.causes]
         return (
             " and ".join(choices),
-            "Something is wrong, and these data cannot tell which of these it is: each explains them. "
-            f"Fitted, {'; '.join(said)}.",
+            "The model is wrong. Each of these effects explains the data, and these data do not "
+            f"distinguish them. Fitted values: {'; '.join(said)}.",
         )
     if verdict.kind == "none":
         return (
-            "nothing wrong",
-            "What the model leaves of these data looks like the noise of the instruments. An effect larger "
-            "than its limit in the table below would have been seen.",
+            "no model error detected",
+            "The residual is consistent with instrument noise. An effect larger than its limit in the "
+            "table below would have been detected.",
         )
     if verdict.kind == "unidentifiable":
         return (
-            "cannot be told",
-            "The model follows the data only with a fitted value far from what is known of it. Whatever is "
-            "behind that, these data could not show it, however many of their kind there were.",
+            "not identifiable",
+            "The model fits the data only with a parameter far from its known value. More data of "
+            "this kind cannot identify the cause.",
         )
     where = [readable(n) for n in found.left if n != SPREAD]
-    tried = "What it leaves is more than the spread that the data give. " if SPREAD in found.left else ""
-    tried += f"What it leaves depends on {listed(where)}. " if where else ""
+    tried = (
+        "The residual exceeds the standard deviation given with the data. " if SPREAD in found.left else ""
+    )
+    tried += f"The residual depends on {listed(where)}. " if where else ""
     if found.doubted:
         tried += f"{_upper(readable(found.doubted))}. "
     if found.chosen.effects:
         names = listed([readable(n) for n in found.chosen.names])
-        tried += f"The best attempt, {names}, is not named, since it leaves structure behind."
+        tried += f"The best fit, {names}, is not named because its residual has structure."
     return (
-        "something no known effect explains",
-        f"The model is wrong, but the cause is not known here. {tried}".strip(),
+        "unexplained by any known effect",
+        f"The model is wrong, and no effect of the library explains it. {tried}".strip(),
     )
 
 
@@ -98,23 +100,23 @@ def advice(verdict: Verdict) -> str:
     """What to measure next, in words."""
     if verdict.proposal is not None:
         told = listed([readable(n) for n in verdict.proposal.separates])
-        return f"{_upper(verdict.proposal.what)}. It tells {told} apart."
+        return f"{_upper(verdict.proposal.what)}. It distinguishes {told}."
     found = verdict.selection
     if verdict.kind == "named":
-        return f"To confirm it on fresh data: {'; '.join(c.effect.reveals for c in found.causes)}."
+        return f"To confirm it on new data: {'; '.join(c.effect.reveals for c in found.causes)}."
     if verdict.kind == "unexplained":
         places = [d for d in found.table if d.against in found.left and d.where and d.against != SPREAD]
         places.sort(key=lambda d: d.p_value)
-        at = f" It is strongest at: {places[0].where}." if places else ""
-        return f"Repeat an experiment and change nothing: what does not come back is not the model's.{at}"
+        at = f" The deviation is largest at: {places[0].where}." if places else ""
+        return f"Repeat an experiment unchanged: what does not recur is not a model error.{at}"
     hidden = [s for s in best_seen(verdict.seen).values() if not s.identifiable]
     if not hidden:
         return ""
     shown = dict.fromkeys(s.effect.reveals for s in hidden)
     some = list(shown)[:3]
     return (
-        f"These data could not show {listed([readable(s.effect.name) for s in hidden])}. "
-        f"To see more: {'; or '.join(some)}."
+        f"These data cannot identify {listed([readable(s.effect.name) for s in hidden])}. To identify "
+        f"more: {'; or '.join(some)}."
     )
 
 

@@ -39,7 +39,7 @@ class Job:
     def __attrs_post_init__(self) -> None:
         if self.weights not in WEIGHTS:
             raise InputError(
-                f"there are no {self.weights!r} weights", "--weights", f"choose from {', '.join(WEIGHTS)}"
+                f"unknown weights {self.weights!r}", "--weights", f"choose from {', '.join(WEIGHTS)}"
             )
         for name in self.laws:
             form(name)
@@ -80,7 +80,7 @@ def _coupons(
     if not experiments:
         kinds = ", ".join(dict.fromkeys(e.kind for e in measured.experiments))
         raise InputError(
-            f"there is no coupon among the experiments ({kinds})",
+            f"the folder contains no coupon test ({kinds})",
             str(measured.folder),
             'laws are fitted to experiments of kind = "coupon"',
         )
@@ -88,7 +88,7 @@ def _coupons(
     for mode in held_out_modes:
         if mode not in modes:
             raise InputError(
-                f"no coupon of mode {mode!r} is there to hold out",
+                f"there is no coupon of mode {mode!r} to hold out",
                 "--hold-out",
                 f"modes: {', '.join(sorted(modes))}",
             )

@@ -96,8 +96,8 @@ def _material(measured: Measured, fitted: Sequence[Coupon], choice: Choice) -> M
         law=chosen.form.law,
         parameters=chosen.parameters,
         law_confidence="fitted",
-        law_source=f"{chosen.form.title}, fitted to {names} ({chosen.n} values, {chosen.weights} weights); "
-        f"kappa is not measured but of Poisson's ratio {POISSON:g}",
+        law_source=f"{chosen.form.title}, fitted to {names} ({chosen.n} values, {chosen.weights} "
+        f"weights); kappa is not measured but follows from Poisson's ratio {POISSON:g}",
         ranges=ranges(fitted),
         fails=chosen.fails,
         low95={p.name: p.low95 for p in known},
@@ -174,11 +174,11 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     law = summary["laws"][chosen]
     values = ", ".join(f"{name} {p['value']:.4g}" for name, p in law["parameters"].items())
     errors = ", ".join(f"{e['share']:.1%} in {e['coupon']}" for e in law["errors"])
-    lines = [f"law: {chosen}, {values}", f"off by {errors}"]
+    lines = [f"law: {chosen}, {values}", f"error {errors}"]
     if summary["tied"]:
-        lines.append(f"as good: {', '.join(summary['tied'])}")
+        lines.append(f"equivalent: {', '.join(summary['tied'])}")
     if law["fails"]:
-        lines.append(f"misses {', '.join(law['fails'])} by more than {summary['tolerance']:.0%}")
+        lines.append(f"error on {', '.join(law['fails'])} exceeds {summary['tolerance']:.0%}")
     if summary["untested"]:
         lines.append(f"not tested: {', '.join(summary['untested'])}")
     return lines

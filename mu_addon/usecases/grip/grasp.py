@@ -58,7 +58,7 @@ class Cube:
     lighter.
     """
 
-    side_mm: float = attrs.field(validator=_above(0.0, 200.0, "a cube with a side", "give mm"))
+    side_mm: float = attrs.field(validator=_above(0.0, 200.0, "a cube with a side length", "give mm"))
     density_g_per_ml: float = attrs.field(default=1.24, validator=_above(0.0, 25.0, "a density", "give g/ml"))
 
     @property

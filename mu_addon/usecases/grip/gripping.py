@@ -94,7 +94,9 @@ class Gripping:
             packed = write_3mf([Part(name, found.vertices, found.triangles)], [1], name)
             back = read_3mf(packed)[0][1]
             if len(back.triangles) != len(found.triangles):
-                raise OutputError("the 3MF file does not hold the part that was written", "gripper.3mf")
+                raise OutputError(
+                    "the 3MF file, read back, does not contain the part that was written", "gripper.3mf"
+                )
             write_bytes(self.folder / "gripper.3mf", packed)
         self.context.summary["gates"] = attrs.asdict(found.gates)
         x, y = self.job.gripper.size_mm
@@ -149,8 +151,8 @@ class Gripping:
         self.context.summary.setdefault("grasps", {})[f"{cube.side_mm:g}"] = grasp_figures(found)
         if not found.lift.held:
             self.warn(
-                f"The cube of {cube.side_mm:g} mm ({cube.mass_g:.3g} g) is not lifted: friction carries at "
-                f"most {found.lift.capacity_N:.3g} N of its {cube.weight_N:.3g} N."
+                f"The cube of {cube.side_mm:g} mm ({cube.mass_g:.3g} g) is not lifted: friction can carry "
+                f"at most {found.lift.capacity_N:.3g} N of its {cube.weight_N:.3g} N."
             )
 
     def follow_light(self) -> None:

@@ -145,7 +145,7 @@ class Homogenisation:
             "stopped": found.stopped,
         }
         if found.stopped:
-            self.warn(f"The endless lattice's curve ends early: {found.stopped}.")
+            self.warn(f"The curve of the periodic lattice ends early: {found.stopped}.")
 
     def fit_law(self) -> None:
         """The law that the analysis mesh takes, in effective.toml."""

@@ -75,7 +75,7 @@ class Job:
 
     def __attrs_post_init__(self) -> None:
         if not 1 <= self.cells <= 12:
-            raise InputError(f"a specimen of {self.cells} cells a side", "--cells", "give 1 to 12")
+            raise InputError(f"a specimen of {self.cells} cells per side", "--cells", "give 1 to 12")
         if not 0.01 <= self.strain <= 0.8:
             raise InputError(f"a compression to {self.strain:g}", "--strain", "give a share from 0.01 to 0.8")
         if not 0.3 <= self.refine <= 4.0:

@@ -51,9 +51,7 @@ class Job:
 
     def __attrs_post_init__(self) -> None:
         if self.add and self.plan.method == "grid":
-            raise InputError(
-                "a grid has its levels' points", "--add", "give more steps in sweep.toml instead"
-            )
+            raise InputError("points cannot be added to a grid", "--add", "give more steps in sweep.toml")
         _density(self.plan)
 
     def texts(self) -> dict[str, str]:

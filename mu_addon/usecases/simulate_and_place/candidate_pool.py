@@ -126,9 +126,9 @@ def _worker_errors() -> Iterator[None]:
         yield
     except BrokenProcessPool:
         raise MuError(
-            "a worker process ended before its time",
+            "a worker process ended unexpectedly",
             "candidates",
-            "run again, it resumes; if memory is short give --workers 1",
+            "run the command again, it resumes; if memory is short, use --workers 1",
         ) from None
 
 

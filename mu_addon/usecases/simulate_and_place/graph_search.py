@@ -72,9 +72,9 @@ def chains_within(job: Job) -> tuple[Graph, list[tuple[int, ...]]]:
     options = "--shortest-cells, --longest-cells, --bend-deg"
     if not chains:
         raise InputError(
-            "no path of the lattice is within the limits",
+            "no path of the lattice satisfies the limits",
             options,
-            "admit shorter or longer paths, or sharper bends",
+            "allow shorter or longer paths, or sharper bends",
         )
     if len(chains) > MOST_PATHS:
         raise InputError(
@@ -108,8 +108,8 @@ def search_graph(study: Study) -> LatticeSearch:
         outcome = search_paths(predicted, check, SearchSettings(most=job.most_checks))
     if not outcome.complete:
         study.warn(
-            f"After {job.most_checks} checks an unchecked path may still be better than the best one, with a "
-            f"probability of up to {outcome.risk:.0%}: give more checks (--checks)."
+            f"After {job.most_checks} full solutions, the probability that an unsolved path is better than "
+            f"the best one is up to {outcome.risk:.0%}: increase --checks."
         )
     best = set(front(lengths, outcome.exact_mm).tolist())
     known = np.isfinite(outcome.exact_mm)

@@ -20,6 +20,7 @@ from ...design.solid import QUALITY
 from ...errors import InputError
 from ...fem.obstacle import CONTACT
 from ...fem.protocol import Protocol, read_protocol
+from ...fem.solver import SolverChoice
 from ...fem.unit import materials_of
 from ...homogenize.effective import Effective, read_effective
 from ...meshing.settings import MeshSettings
@@ -89,6 +90,8 @@ class Job:
     obstacles: tuple[RigidBody, ...] = attrs.field(default=(), converter=tuple)
     # What measured data named beside what the unit has parameters for, and the direction of gravity.
     effects: StaticEffects = attrs.field(factory=StaticEffects)
+    # How linear systems are solved: within their tolerance it decides nothing.
+    solver: SolverChoice = attrs.field(factory=SolverChoice)
     # What is run of it: the first, the first two or all.
     stages: tuple[str, ...] = STAGES
     # Name of a path along which the unit with a waveguide is built, too; decides no figure.
@@ -97,7 +100,7 @@ class Job:
     def __attrs_post_init__(self) -> None:
         if self.obstacles and "place" in self.stages and self.paths == "graph":
             raise InputError(
-                "the search of the whole lattice knows a unit that touches nothing",
+                "the search of the whole lattice does not support obstacles",
                 "obstacles, paths",
                 "leave one of them out",
             )
@@ -116,14 +119,28 @@ class Job:
                 )
         if self.effects.clogged and "place" in self.stages and self.paths == "graph":
             raise InputError(
-                "the search of the whole lattice knows a unit whose chambers share one pressure",
+                "the search of the whole lattice does not support a clogged chamber",
                 "clogged_chamber, paths",
                 "leave one of them out",
+            )
+        if (
+            self.solver.method == "iterative"
+            and "place" in self.stages
+            and self.solver.device in ("auto", "cpu")
+        ):
+            raise InputError(
+                "on the CPU all paths are solved with one factor, which two levels do not make",
+                "--solver",
+                "give --solver direct or auto, or a CUDA device with --device",
+            )
+        if self.solver.method == "iterative" and self.mesh.order == 1 and "simulate" in self.stages:
+            raise InputError(
+                "two levels need quadratic elements", "--solver, --order", "give --order 2 or --solver direct"
             )
         _, pressure = self.samples
         if not pressure.any():
             raise InputError(
-                f"none of the {self.times} samples of the protocol has any pressure",
+                f"none of the {self.times} samples of the protocol has a pressure other than 0",
                 "times",
                 "give more samples, or a protocol that leaves 0 kPa",
             )
@@ -136,7 +153,7 @@ class Job:
     def tables(self) -> Tables:
         """Everything that decides the results, a table a stage, as study.toml has it.
 
-        Not `workers`, which decides nothing.
+        Not `workers` and `solver`, which decide nothing.
         """
         mesh = attrs.asdict(self.mesh)
         tables: Tables = {
@@ -168,7 +185,8 @@ class Job:
         return compose(self.tables(), self._run)
 
     @property
-    def _run(self) -> dict[str, str]:
+    def _run(self) -> dict[str, Any]:
+        """The table [run] of study.toml: what decides no figure."""
         return {"path": self.path} if self.path else {}
 
     @property
@@ -183,7 +201,9 @@ class Job:
 
     def model(self, mesh: Mesh, threads: int = 2) -> Model:
         """Model of the unit's mesh: pressure, what weighs, what it may touch. Raises InputError."""
-        model = self.effects.model(self.unit, mesh, threads)
+        device, solver = self.solver.resolved(mesh, needs_factor="place" in self.stages)
+        model = self.effects.model(self.unit, mesh, threads, device)
+        model.solver = solver
         if self.obstacles:
             model.obstacles = obstacles_of(self.obstacles, self.unit, mesh)
         return model
@@ -277,12 +297,12 @@ def read_job(folder: Path) -> Job:
     where = str(folder / NAME)
     tables = read_tables(folder)
     if tables is None:
-        raise InputError("there is no study in this folder", where, "give a folder that holds study.toml")
+        raise InputError("this folder contains no study", where, "give a folder that holds study.toml")
     if holds(folder, tables) is None:
         raise InputError(
-            "a file of inputs is not the one that this study was made with",
+            "an input file has changed since this study was made",
             str(folder),
-            "put it back, or start a new study with it: --unit, --protocol, --lattice, --obstacle",
+            "restore it, or start a new study with it: --unit, --protocol, --lattice, --obstacle",
         )
     asked = read_run(folder).get("stages", list(tables))
     return job_of({stage: table for stage, table in tables.items() if stage in asked}, folder)
@@ -366,7 +386,7 @@ def _built(kind: Any, values: dict[str, Any], where: str) -> Any:
     try:
         return kind(**values)
     except TypeError as error:
-        raise InputError(f"this is no study: {error}", where, "correct that key") from error
+        raise InputError(f"study.toml is invalid: {error}", where, "correct that key") from error
     except ValueError as error:
         raise InputError(f"a value is not offered: {error.args[0]}", where, "correct that key") from error
 

@@ -39,7 +39,7 @@ def signals(study: Study, optics: Optics) -> Signals | None:
     try:
         return _signals(study, optics)
     except InputError as error:
-        study.warn(f"What the light would tell is not known: {error.what} ({error.where}).")
+        study.warn(f"The light signal is not available: {error.what} ({error.where}).")
         return None
 
 
@@ -105,7 +105,7 @@ def _bars(study: Study) -> dict[str, tuple[list[int], EmbeddedWaveguide]]:
             bar = waveguide(unit, window)
         except InputError as error:
             why = error
-            study.warn(f"What light along {window.name} would tell is not known: {error.what}.")
+            study.warn(f"The light signal along {window.name} is not available: {error.what}.")
             continue
         found[window.name] = numbers, embed_waveguide(bar, study.anchors[numbers], unit.printed)
     if why is not None and not found:

@@ -305,16 +305,16 @@ def read_motion(folder: Path) -> Motion:
     """The motion in a study's folder. Raises InputError where there is none that can be read whole."""
     place = folder / FOLDER
     mesh, model = read_npz(place / "mesh.npz"), read_npz(place / f"{MODEL_A}.npz")
-    remedy = "simulate again: what is finished is not repeated"
+    remedy = "simulate again: finished stages are not repeated"
     if mesh is None or model is None:
-        raise InputError("this study holds no motion to show", str(place), remedy)
+        raise InputError("this study contains no motion", str(place), remedy)
     sensitivity = read_npz(place / "sensitivity.npz") or {}
     try:
         found = _motion(place, mesh, model, sensitivity)
     except KeyError as missing:
         raise InputError(f"the motion lacks {missing}", str(place), remedy) from None
     if not _fits(found):
-        raise InputError("the motion's files do not fit together", str(place), remedy)
+        raise InputError("the files of the motion are inconsistent", str(place), remedy)
     return found
 
 

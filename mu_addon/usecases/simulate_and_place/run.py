@@ -40,16 +40,14 @@ def run_stages(study: Study) -> None:
     if "place" in job.stages:
         chosen = study.place()
         if job.in_time:
-            where = "Beside obstacles" if job.obstacles else "With a wall that remembers"
+            where = "With obstacles" if job.obstacles else "With a wall whose state depends on its history"
             study.warn(
-                f"{where} neither the map of what each element would disturb nor what light would "
-                "tell is known: both take a unit with one state a pressure."
+                f"{where} neither the sensitivity map nor the light signal is computed: both need a unit "
+                "whose state depends on pressure only."
             )
         else:
             if job.effects.clogged:
-                study.warn(
-                    "What each element alone would disturb is not known for a unit with a clogged neck."
-                )
+                study.warn("The sensitivity map is not computed for a unit with a clogged neck.")
             else:
                 sensitivity_map(study)
             signals(study, job.optics)
@@ -75,8 +73,9 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     if isinstance(search, dict):
         best = search["best"]
         lines.append(
-            f"whole lattice, {search['rule']}: {best['name']}, J_hat {best['J_hat_mm']:.4f} mm, "
-            f"{best['length_mm']:.1f} mm long; {search['checked']} of {search['paths']} paths were solved"
+            f"whole-lattice search, {search['rule']}: {best['name']}, J_hat {best['J_hat_mm']:.4f} mm, "
+            f"{best['length_mm']:.1f} mm long; {search['checked']} of {search['paths']} paths solved by the "
+            "full model"
         )
     return lines
 

@@ -125,7 +125,7 @@ class Study:
             summary["study"] |= job.effects.tables
         self._warn_of_missed_corners()
         if job.mesh.order == 1:
-            self.warn("Linear elements lock in thin walls: these answers are for a quick look only.")
+            self.warn("Linear elements lock in thin walls: these results are for a quick look only.")
 
     @cached_property
     def _tip(self) -> TipSection:
@@ -247,6 +247,8 @@ class Study:
             self._look_beyond_the_fit(self.trajectory.states)
         states = [s for s in self.trajectory.states if s.loaded]
         self.solver = {
+            "method": model.solver,
+            "device": model.device,
             "unknowns": len(model.free),
             "states": len(states),
             "newton_iterations": sum(s.iterations for s in states),
@@ -426,9 +428,9 @@ class Study:
             pressure = f"{in_kPa(contact.pressure_MPa):.4g}"
             found[pressure] = [str(c) for c in contact.crossings]
             self.warn(
-                f"From {pressure} kPa on, walls pass through each other: {contact.crossings[0]}. Nothing "
-                "here resists contact, and the states beyond are wrong. Thicken the wall, or keep the "
-                "protocol short of this pressure."
+                f"From {pressure} kPa on, walls intersect: {contact.crossings[0]}. Self-contact is not "
+                "modelled, so states beyond this pressure are invalid. Use a thicker wall or a smaller "
+                "pressure."
             )
         self.context.summary["walls_cross_at_kPa"] = found
 
@@ -462,13 +464,13 @@ class Study:
             self.warn(
                 f"The lattice is strained to stretches from {least:.2f} to {largest:.2f}, but its law was "
                 f"fitted from {low:g} to {high:g}: at {pressure} kPa {worst['share_beyond_fit']:.1%} of the "
-                "lattice's volume is beyond, and answers by extrapolation."
+                "lattice volume is outside that range, where the law is extrapolated."
             )
         pressure, worst = max(found.items(), key=lambda item: item[1]["share_not_elliptic"])
         if worst["share_not_elliptic"]:
             self.warn(
-                f"At {pressure} kPa the law is not elliptic any more in {worst['share_not_elliptic']:.1%} of "
-                "the lattice's volume: struts buckle there, in patterns that depend on the mesh. Compare two "
+                f"At {pressure} kPa the law is no longer elliptic in {worst['share_not_elliptic']:.1%} of "
+                "the lattice volume: struts buckle there, and the result depends on the mesh. Compare two "
                 "meshes (--refine)."
             )
 
@@ -495,7 +497,7 @@ class Study:
             try:
                 self._compare_meshes(jobs)
             except (ConvergenceError, MeshingError) as error:
-                self.warn(f"The mesh's uncertainty is not known: on a coarser mesh, {error.what}.")
+                self.warn(f"The mesh uncertainty is not known: on the coarser mesh, {error.what}.")
             chosen = self._write_ranking(every)
         return chosen
 
@@ -524,8 +526,9 @@ class Study:
                 keep_motion(self.job, self.folder, self.mesh, mesh, trajectory, sweep, jobs)
         if sweep.path_difference_mm > PATH_DIFFERENCE_MM:
             self.warn(
-                "A candidate started from Model A's states was not where its own path from rest leads "
-                f"({sweep.path_difference_mm:.2g} mm apart), so every candidate was solved along its path."
+                "A candidate started from Model A's states does not lie on its own equilibrium path from "
+                f"rest (difference {sweep.path_difference_mm:.2g} mm), so every candidate was solved from "
+                "rest."
             )
         self.context.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = {
             "pressures_solved_kPa": sweep.solved_kPa,
@@ -610,7 +613,7 @@ class Study:
             if value != mine and (words or not np.isclose(value, mine, rtol=1e-6)):
                 other.append(f"{name} {value} (unit: {mine})")
         if other:
-            self.warn(f"The lattice's law is that of another cell than the unit's: {', '.join(other)}.")
+            self.warn(f"The lattice law was computed for another cell than the unit's: {', '.join(other)}.")
 
     def _warn_of_missed_corners(self) -> None:
         """Say where uniform samples miss the protocol's extremes."""
@@ -619,8 +622,8 @@ class Study:
         for extreme, met in ((corners.min(), samples.min()), (corners.max(), samples.max())):
             if abs(extreme - met) > 1e-6:
                 self.warn(
-                    f"The protocol goes to {extreme:g} kPa, but its {self.job.times} samples only to "
-                    f"{met:g} kPa: give a number of samples that meets its corners."
+                    f"The protocol goes to {extreme:g} kPa, but its {self.job.times} samples reach only "
+                    f"{met:g} kPa: choose a number of samples that includes its extremes."
                 )
 
     def warn(self, text: str) -> None:
