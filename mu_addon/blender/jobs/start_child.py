@@ -68,12 +68,17 @@ class JobKind:
         """Whether the job runs."""
         return self.key(root) in running()
 
-    def start(self, root: Any, folder: Path, write_inputs: Callable[[Path], None]) -> Child:
-        """Write the inputs of the object's job into a folder, and run it by `resume`; raises MuError."""
+    def start(
+        self, root: Any, folder: Path, write_inputs: Callable[[Path], None], options: Sequence[str] = ()
+    ) -> Child:
+        """Write the inputs of the object's job into a folder, and run it by `resume`; raises MuError.
+
+        options: of `resume`, which decide no result.
+        """
         if self.is_running(root):
             raise InputError("this job is running already", str(folder), "wait for it or cancel it")
         write_inputs(folder)
-        return watch(self.key(root), start(["resume", str(folder), "--json"], folder))
+        return watch(self.key(root), start(["resume", str(folder), "--json", *options], folder))
 
     def dismiss(self, root: Any) -> None:
         """Forget an ended job, so that no panel shows it."""

@@ -25,6 +25,7 @@ def job_of(root: Any) -> Job:
     """The study that a unit's properties ask for; raises InputError."""
     # Only now: they bring in the solver's packages, which a Blender may lack.
     try:
+        from ...fem.solver import SolverChoice
         from ...meshing.settings import MeshSettings
         from ...usecases.simulate_and_place.job import Job, protocol_of, require_paths_inside
     except (ImportError, OSError, RuntimeError) as error:
@@ -52,6 +53,7 @@ def job_of(root: Any) -> Job:
         obstacles=obstacles.rigid_bodies(root, unit),
         effects=effects.static_effects(root),
         stages=stages,
+        solver=SolverChoice(settings.solver, settings.device),
         **extra,
     )
 

@@ -37,7 +37,13 @@ class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
     @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
-        SIMULATION.start(root, studies.assign_folder(root), lambda folder: write_inputs(root, folder))
+        study = root.mu_unit.study
+        SIMULATION.start(
+            root,
+            studies.assign_folder(root),
+            lambda folder: write_inputs(root, folder),
+            ["--solver", study.solver, "--device", study.device],
+        )
         viewports.redraw()
         return {"FINISHED"}
 

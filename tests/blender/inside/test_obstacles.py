@@ -128,7 +128,7 @@ def test_flaws_are_told_and_marked():
     at = np.array([v.co for v in unit_object.part(root, bodies.FLAWS).data.vertices])
     assert len(at) == 1, at
     assert abs(at[0] - [0, 28.1, 60]).max() < 1.0, at
-    assert "stands in the unit" in refused(bpy.ops.mu.simulate)
+    assert "overlaps the unit" in refused(bpy.ops.mu.simulate)
     one.location.y = 45.0
     bpy.context.view_layer.update()
     assert obstacles.placed(root, one).flaws is None, "looked at where it stands now"

@@ -203,7 +203,7 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
     assert "The check is stale" in refused(bpy.ops.mu.print_marks)
     root.mu_unit.chambers.wall_mm = 0.9
     write_check(root, [finding("cup", "warning", [[0, 0, 0]])])
-    assert "markers are of an earlier check" in drawn().replace("  ", " ")
+    assert "markers belong to an earlier check" in drawn().replace("  ", " ")
     assert bpy.ops.mu.print_clear() == {"FINISHED"}
     assert not markers.marks(root)
 
@@ -269,7 +269,7 @@ def test_an_export_as_chosen(tmp_path):
     assert "unit.3mf" not in said
     assert "Done in" in said
     root.mu_unit.chambers.wall_mm = 1.0
-    assert "Stale: they are of the unit" in drawn()
+    assert "Stale: they belong to other parameters" in drawn()
     manifest = printing.exported(root).folder / "manifest.json"
     whole = manifest.read_text()
     manifest.write_text("{}")
@@ -294,7 +294,7 @@ def test_jobs_that_fail_and_one_that_is_stopped():
     for how, expected in {
         "told_error": "thicker wall",
         "crash": "SIGSEGV",
-        "wordless": "without a word",
+        "wordless": "without a message",
         "good": "see Check",
     }.items():
         child = start(how)

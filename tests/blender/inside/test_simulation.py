@@ -54,7 +54,7 @@ def test_panels_tell_what_a_child_says():
         "good": "Done in",
         "told_error": "no equilibrium",
         "crash": "SIGSEGV",
-        "wordless": "without a word",
+        "wordless": "without a message",
         "garbage": "Done in",
     }.items():
         child = launch(root, how)
