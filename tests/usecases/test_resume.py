@@ -90,8 +90,6 @@ def jobs(folder):
         values={"chambers.wall_mm": 0.95},
         values_name="mine",
         held_cells=1 / 3,
-        meshes=0,
-        points=3,
         gripper=False,
     )
 

@@ -8,10 +8,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from . import scatter
 from .agreement import Agreement, Statement, agreement, statements
 from .columns import TableColumn
-from .open_study import OpenPoint
 from .published import Published
 from .settings import Settings
 
@@ -29,19 +27,13 @@ class OtherColumn:
 
 @attrs.frozen(eq=False)
 class Found:
-    """All that a reproduction found. drawn and points may be those that come with the package: see `origin`.
-
-    samples: pressure in kPa at the protocol's instants (k,).
-    """
+    """All that a reproduction found. samples: pressure in kPa at the protocol's instants (k,)."""
 
     settings: Settings
     paper: Published
     columns: tuple[TableColumn, ...]
     others: Mapping[str, OtherColumn]
-    drawn: tuple[scatter.Drawn, ...]
-    points: tuple[OpenPoint, ...]
     samples_kPa: Array
-    origin: Mapping[str, str]
 
     def table(self, rule: str) -> dict[str, Array]:
         """J_hat (paths,) in mm by column."""
@@ -74,7 +66,3 @@ class Found:
         coarser = self.coarser(rule)
         known = {name: J for name, J in self.table(rule).items() if name in coarser}
         return statements(known, coarser, self.paper.paths)
-
-    def scatters(self) -> dict[tuple[str, str, float], scatter.Scatter]:
-        """What many meshes say, by family, rule and scale."""
-        return scatter.scatters(self.drawn, {s: self.paper.column(s) for s in self.paper.scales})

@@ -16,20 +16,22 @@ from ...meshing.settings import MeshSettings
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...toml_writer import toml_text
-from .open_values import with_values
+from .values import with_values
 
 TABLE, AGREEMENT, STATEMENTS, BENDING = "table.csv", "agreement.csv", "statements.csv", "bending.csv"
-MESHES, OPEN_TABLE, REPORT = "meshes.csv", "open.csv", "report.html"
+REPORT = "report.html"
 LAYOUT = FolderLayout(
     "reproduce.toml",
     "# The inputs of a reproduction of the paper's table.",
-    results=(TABLE, AGREEMENT, STATEMENTS, BENDING, MESHES, OPEN_TABLE, REPORT),
+    results=(TABLE, AGREEMENT, STATEMENTS, BENDING, REPORT),
 )
 DEFAULT = "default"
 FOLDER = "reproduce"
 
 
-def _between(low: int, high: int) -> Any:
+def between(low: int, high: int) -> Any:
+    """An attrs validator of a number's bounds; InputError names the option."""
+
     def check(_: object, field: attrs.Attribute[Any], value: float) -> None:
         if not low <= value <= high:
             raise InputError(f"{value:g} is out of bounds", f"--{field.name}", f"give {low} to {high}")
@@ -42,47 +44,51 @@ class Settings:
     """What decides a reproduction. Raises InputError.
 
     values: of the set that all columns share, beside the preset's own. held_cells: the height from the base,
-    in cells, up to which the three units are held fast. mesh: of the table. meshes: random ones a family,
-    points: sets of open values; where 0, those that come with the package are shown.
+    in cells, up to which the three units are held fast. mesh: of the table.
     """
 
     values: Mapping[str, Any] = attrs.field(factory=dict)
     values_name: str = DEFAULT
-    held_cells: float = attrs.field(default=0.0, validator=_between(0, 5))
+    held_cells: float = attrs.field(default=0.0, validator=between(0, 5))
     mesh: MeshSettings = attrs.field(factory=MeshSettings)
-    meshes: int = attrs.field(default=12, validator=_between(0, 1000))
-    points: int = attrs.field(default=0, validator=_between(0, 4096))
     # Whether the paper's fourth column is found, too.
     gripper: bool = True
-    workers: int = attrs.field(default=2, validator=_between(1, 256))
+    workers: int = attrs.field(default=2, validator=between(1, 256))
 
     @property
     def unit(self) -> Unit:
         """The unit at 1.0x with the set's values. Raises InputError where it breaks a rule."""
         return with_values(load_preset("mu-1.0x"), self.values)
 
-    def texts(self) -> dict[str, str]:
-        """Text of the file of inputs, by name: all that decides the results."""
-        values = {
+    def inputs(self) -> dict[str, Any]:
+        """What reproduce.toml says: all that decides the results."""
+        return {
             "format": FORMAT,
             "set": self.values_name,
-            "meshes": self.meshes,
             "held_cells": self.held_cells,
-            "points": self.points,
             "gripper": self.gripper,
             "values": dict(sorted(self.values.items())),
             "mesh": attrs.asdict(self.mesh),
         }
-        return {LAYOUT.inputs: toml_text(values, LAYOUT.header)}
+
+    def texts(self) -> dict[str, str]:
+        """Text of the file of inputs, by name."""
+        return {LAYOUT.inputs: toml_text(self.inputs(), LAYOUT.header)}
 
 
 def read_settings(folder: Path) -> Settings:
     """The settings that a folder of `reproduce` describes; raises InputError."""
     path = folder / LAYOUT.inputs
     values, _ = read_inputs(path)
+    if any(key in values for key in ("long", "meshes", "points")):
+        raise InputError(
+            "the folder belongs to the long studies of random meshes and open values",
+            str(path),
+            "run `python -m benchmarks.reproduce` with this folder as --out, or `reproduce` in a new one",
+        )
     name, given = values.pop("set", DEFAULT), values.pop("values", {})
     if not isinstance(name, str) or not isinstance(given, dict):
-        raise InputError("set is no name, or values is no table", str(path), "correct that key")
+        raise InputError("set is not a name, or values is not a table", str(path), "correct that key")
     return structured(Settings, values, str(path), values_name=name, values=given)
 
 
