@@ -12,7 +12,8 @@ import numpy as np
 from ...evidence.gain import Errors
 from ...evidence.residuals import Dependence
 from ...report.charts import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas, signed
-from .run import Curve, readable
+from .diagnosis import Curve
+from .words import readable
 
 Array = np.ndarray[Any, Any]
 
@@ -240,7 +241,7 @@ def gain_chart(errors: Errors) -> str:
     bars = [
         ("base model", errors.before, BASE),
         ("extended model", errors.after, CHOSEN),
-        ("effect on permuted experiments", errors.permuted, "#B9C3CF"),
+        ("permuted effect", errors.permuted, "#B9C3CF"),
         ("black-box model", errors.black_box, "#B9C3CF"),
     ]
     bars = [bar for bar in bars if math.isfinite(bar[1])]
