@@ -278,15 +278,6 @@ def _counted_alike(responses: Sequence[UnitResponse]) -> list[UnitResponse]:
     ]
 
 
-def unit_markers(
-    unit: Unit, experiments: Sequence[Experiment], settings: UnitSettings | None = None
-) -> dict[float, tuple[Marker, ...]]:
-    """Where the markers of unit_pressure experiments sit on the unit, by scale; see `attached`."""
-    settings = settings or UnitSettings()
-    chosen = [e for e in experiments if e.kind == KIND]
-    return {s: _Plan.of(unit, chosen, s, settings, None).markers for s in sorted({e.scale for e in chosen})}
-
-
 def similar(unit: Unit) -> Unit:
     """The unit at 1.0x that moves as this one does, all lengths alike; this one where it cannot be drawn.
 
