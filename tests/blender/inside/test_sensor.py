@@ -153,7 +153,7 @@ def test_a_killed_reader_and_a_folder_that_is_gone(tmp_path, monkeypatch):
     root.mu_sensor.replay = str(tmp_path / "study" / "none")
     assert bpy.ops.mu.sensor_connect() == {"FINISHED"}
     assert ended(sensor.of(root)) == "failed"
-    assert "no recording" in drawn(), drawn()
+    assert "the recording is invalid" in drawn(), drawn()
 
 
 @pytest.mark.slow
@@ -389,7 +389,7 @@ def test_a_calibration_of_other_channels_or_a_broken_one_is_told_of(tmp_path):
     path = tmp_path / "other.toml"
     path.write_text("version = 1\n")
     watch(lambda: not s.trouble)
-    assert "no calibration" in drawn()
+    assert "the calibration is invalid" in drawn()
     assert s.running
     path.unlink()
     assert "There is no" in drawn()
