@@ -1,4 +1,4 @@
-"""Every candidate on one mesh at once: Model A's states, all sensors of one state solved together."""
+"""Every candidate on one mesh at once: at each state of Model A, all sensors by a batched Newton method."""
 
 from __future__ import annotations
 
