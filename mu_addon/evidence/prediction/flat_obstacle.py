@@ -24,7 +24,7 @@ def _float64(values: Any) -> Array:
 
 
 @attrs.frozen(eq=False)
-class Side:
+class ObstacleResponse:
     """The unit's response to a flat wall on one side of it, along its axis.
 
     pressures_kPa (k,): of the free unit, from 0 on to its last one on this side, up or down; outward_mm (k,):
@@ -93,7 +93,7 @@ class Side:
 _EVEN = np.linspace(0.0, 1.0, 101)
 
 
-def effect(sides: Sequence[tuple[int, Side]], kind: str) -> Effect:
+def contact_effect(sides: Sequence[tuple[int, ObstacleResponse]], kind: str) -> Effect:
     """Contact with a wall, its size in mm: above 0 on the side +y, below 0 on the other."""
     farthest = {s: max((side.farthest_mm for t, side in sides if t == s), default=0.0) for s in (1, -1)}
     # Nearer walls than were computed are not guessed.
