@@ -60,6 +60,7 @@ def run(options: argparse.Namespace, progress: Progress, context: RunContext) ->
     from ..design.anchors import window
     from ..design.printing.printer import load_printer
     from ..errors import InputError
+    from ..reading import file_bytes
     from ..usecases.check_print.run import Job, check_print
 
     unit = unit_if_named(options)
@@ -72,7 +73,7 @@ def run(options: argparse.Namespace, progress: Progress, context: RunContext) ->
     content = None
     if options.stl is not None:
         try:
-            content = Path(options.stl).read_bytes()
+            content = file_bytes(options.stl, 1 << 31)
         except OSError as error:
             raise InputError(
                 f"cannot read the file: {error.strerror or error}", options.stl, "check its name"

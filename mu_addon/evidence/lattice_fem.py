@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from ..homogenize.modulus import modulus
 from ..homogenize.offset_response import OffsetResponse
 from ..homogenize.specimen import specimen
 from ..measured import Experiment
+from ..reading import file_text, parse_toml
 from .prediction.lattice import KIND, ComputedCell, Scaling
 
 # Told of a block and the share that is done.
@@ -72,7 +72,7 @@ def response(block: Block, cache: Path | None = None, say: Progress = _silent) -
     """
     key = block.key()
     for name in asset_names(SHIPPED):
-        kept = tomllib.loads(asset_file(SHIPPED, "response", name).read_text(encoding="utf-8"))
+        kept = parse_toml(file_text(asset_file(SHIPPED, "response", name)), name)
         if kept["key"] == key:
             return OffsetResponse(kept["offset_mm"], kept["modulus"], kept["density"])
     path = cache / f"lattice-{key}.npz" if cache else None

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError, OutputError
 from ..files import make_folder, output_error, write_text
+from ..reading import file_bytes
 from .lock import LOCK
 
 if TYPE_CHECKING:
@@ -95,6 +96,12 @@ def _refuse_links(folder: Path, patterns: Iterable[str]) -> None:
     """A link under a name that a run writes would send its words into a file elsewhere."""
     for pattern in patterns:
         for path in [folder / pattern, *folder.glob(pattern)]:
+            if path.exists() and not path.is_file() and not path.is_dir():
+                raise InputError(
+                    f"{path.name} in the folder is a pipe or a device",
+                    str(path),
+                    "remove it, or choose another folder for the results",
+                )
             if path.is_symlink() or (hasattr(os.path, "isjunction") and os.path.isjunction(path)):
                 raise InputError(
                     f"{path.name} in the folder is a link to elsewhere",
@@ -105,7 +112,7 @@ def _refuse_links(folder: Path, patterns: Iterable[str]) -> None:
 
 def _read(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return file_bytes(path).decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except (OSError, UnicodeDecodeError):
         return ""
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 import itertools
 import json
 import math
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from scipy.special import stdtrit
 
 from ..errors import InputError
 from ..files import write_text
+from ..reading import file_text, is_number, parse_toml
 
 Array = np.ndarray[Any, Any]
 
@@ -354,7 +354,11 @@ def write_calibration(path: Path, calibration: Calibration, about: str = "") -> 
 def read_calibration(path: Path) -> Calibration:
     """Read what `write_calibration` wrote; raises InputError with what is wrong."""
     try:
-        table = tomllib.loads(Path(path).read_text())
+        table = parse_toml(file_text(path), str(path))
+        numbers = [*table["knots_deg"], *table["coefficients_V"]]
+        numbers += [table[n] for n in ("version", "band_V", "drift_per_h", "gain", "error_deg", "sweeps")]
+        if not all(map(is_number, [*numbers, 0 if isinstance(table["dark"], str) else table["dark"]])):
+            raise TypeError("true, false or words where numbers should be")
         if table["version"] != VERSION:
             raise InputError(f"version {table['version']} is not known", str(path), "calibrate again")
         result = Calibration(
@@ -368,11 +372,11 @@ def read_calibration(path: Path) -> Calibration:
             float(table["error_deg"]),
             int(table["sweeps"]),
         )
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             f"cannot read the calibration: {error}", str(path), "name a calibration.toml"
         ) from None
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(f"no calibration: {error!r}", str(path), "calibrate again") from None
     steps = np.diff(result.coefficients)
     sound = (

@@ -30,6 +30,7 @@ from ...evidence.verdict import Verdict, diagnose
 from ...files import write_csv, write_json
 from ...measured import Experiment, Measured, read_folder
 from ...measured.folder import FILE
+from ...reading import file_bytes, file_text, parse_json
 from ...run.context import RunContext
 from ...run.folder import begin
 from ...run.progress import Progress
@@ -164,11 +165,16 @@ def _program() -> str:
 def _kept(out: Path, inputs: Mapping[str, str]) -> dict[str, Any]:
     """The summary of a verdict on the same inputs that a folder holds whole; empty where it does not."""
     try:
-        same = all((out / name).read_text(encoding="utf-8") == text for name, text in inputs.items())
-        found = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        same = all(file_text(out / name) == text for name, text in inputs.items())
+        found = parse_json(file_bytes(out / "summary.json"), "summary.json")
+    except (OSError, UnicodeDecodeError, InputError):
         return {}
-    if not (same and found.get("status") == "complete" and all((out / n).is_file() for n in RESULTS)):
+    if not (
+        same
+        and isinstance(found, dict)
+        and found.get("status") == "complete"
+        and all((out / n).is_file() for n in RESULTS)
+    ):
         return {}
     return {k: v for k, v in found.items() if k != "status"}
 

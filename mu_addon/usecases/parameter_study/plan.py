@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from ...design.parameters import Unit, load_preset, read_unit, to_toml
 from ...design.toml_text import nearest
 from ...errors import InputError, MuError
 from ...fem.protocol import Protocol
+from ...reading import file_text, parse_toml
 from ..simulate_and_place.job import OF_FILES, Job, job_with, protocol_of, protocol_text
 from ..simulate_and_place.study_file import FILES, STAGES, table_lines, toml_value
 from .sampling import METHODS, sample
@@ -128,7 +128,7 @@ def read_plan(path: Path) -> Plan:
     """The sweep of a TOML file; raises InputError."""
     where = str(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = file_text(path)
     except OSError as error:
         raise InputError(
             f"cannot read the sweep: {error.strerror}", where, "give the path of a TOML file"
@@ -140,11 +140,7 @@ def read_plan(path: Path) -> Plan:
 
 def parse_plan(text: str, folder: Path, where: str = "sweep.toml") -> Plan:
     """The sweep of TOML text; folder: where the files lie that it names. Raises InputError."""
-    try:
-        document = tomllib.loads(text)
-    # Thousands of nested brackets exhaust the parser's stack.
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"this is not TOML: {error}", where, "correct that line") from error
+    document = parse_toml(text, where)
     for key in document:
         if key not in _KEYS:
             raise InputError(f"unknown key {key!r}{nearest(key, _KEYS)}", where, f"known: {', '.join(_KEYS)}")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
 from ...files import write_text
+from ...reading import file_bytes, parse_toml
 
 NAME = "study.toml"
 # The first line, by which a study's folder is known.
@@ -105,11 +105,7 @@ def parse(text: str, folder: Path) -> tuple[Tables, bool]:
     folder: where the files lie that it names; a format without their digests is given them.
     """
     where = str(folder / NAME)
-    try:
-        document = tomllib.loads(text)
-    # Thousands of nested brackets exhaust the parser's stack.
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"this is not TOML: {error}", where, "choose another folder") from error
+    document = parse_toml(text, where, "choose another folder")
     found = document.pop("format", None)
     if found == 1 and not isinstance(found, bool):
         return _from_format_1(document, folder), True
@@ -146,7 +142,7 @@ def _from_format_1(document: dict[str, Any], folder: Path) -> Tables:
 
     def with_digest(key: str) -> dict[str, Any]:
         try:
-            text = (folder / FILES[key]).read_bytes().decode("utf-8")
+            text = file_bytes(folder / FILES[key]).decode("utf-8")
         except (OSError, UnicodeDecodeError):
             text = ""
         return {key: FILES[key], f"{key}_sha256": digest(text)}
@@ -168,7 +164,7 @@ def holds(folder: Path, tables: Mapping[str, Mapping[str, Any]]) -> dict[str, st
         for key in _FILES_OF[stage]:
             if key in values:
                 try:
-                    texts[FILES[key]] = (folder / FILES[key]).read_bytes().decode("utf-8")
+                    texts[FILES[key]] = file_bytes(folder / FILES[key]).decode("utf-8")
                 except (OSError, UnicodeDecodeError):
                     return None
                 if digest(texts[FILES[key]]) != values.get(f"{key}_sha256"):
