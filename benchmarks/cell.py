@@ -18,9 +18,9 @@ import numpy as np
 from mu_addon.design.lattices import BODY_CENTRED, STRAIGHT
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.strut_cell import relative_density, strut_cell
-from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, cell_mesh
+from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell
 from mu_addon.homogenize.elasticity import Elasticity, effective_tensor
-from mu_addon.homogenize.stretch import StretchSettings, stretch
+from mu_addon.homogenize.stretch import StretchSettings, stretch_lattice
 from tests.homogenize.cells import body_centred_by_beams
 
 
@@ -42,7 +42,7 @@ def levels(cell, modulus, poisson, sizes):
     counts, found = [], []
     for size in sizes:
         start = time.perf_counter()
-        mesh = cell_mesh(cell, CellMeshSettings(per_diameter=size))
+        mesh = mesh_cell(cell, CellMeshSettings(per_diameter=size))
         meshed = time.perf_counter()
         e = effective_tensor(mesh, cell_materials(cell, mesh, modulus, poisson), (cell.half_mm,) * 3)
         done = time.perf_counter()
@@ -65,11 +65,11 @@ def levels(cell, modulus, poisson, sizes):
 
 def large(cell, modulus, poisson):
     start = time.perf_counter()
-    mesh = cell_mesh(cell)
+    mesh = mesh_cell(cell)
     materials = cell_materials(cell, mesh, modulus, poisson)
     meshed = time.perf_counter()
     tests = [StretchSettings(strains=tuple(np.linspace(-0.4, 0.4, 17)), confined=c) for c in (False, True)]
-    found = [stretch(mesh, materials, (cell.half_mm,) * 3, t) for t in tests]
+    found = [stretch_lattice(mesh, materials, (cell.half_mm,) * 3, t) for t in tests]
     print(
         f"\nfinite strain on {len(mesh.tets)} elements: {(time.perf_counter() - meshed) / 2:.0f} s a test of "
         f"16 points, {meshed - start:.0f} s for the mesh\n"

@@ -17,7 +17,7 @@ import numpy as np
 import warp as wp
 from circumstances import circumstances
 
-from mu_addon.design.anchors import anchors, windows
+from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg, probe
@@ -28,7 +28,7 @@ from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.batch import CandidateBatch
-from mu_addon.placement.candidates import candidates, roi
+from mu_addon.placement.candidates import candidate_paths, roi
 from mu_addon.placement.inclusion import sensor_share
 
 STEP_KPA = 5.0
@@ -89,9 +89,9 @@ def run(unit, mesh, device, pressure_kPa, quiet=False):
     states = Equilibrium(model, materials, SETTINGS).path(pressures, rest(mesh))
     factors = sum(s.factorisations for s in states)
     clock.tell(f"Model A, {steps} pressures, {factors} tangents")
-    ten = candidates(anchors(unit), windows(6))
+    ten = candidate_paths(anchor_points(unit), windows(6))
     shares = [sensor_share("volume_fraction", roi(mesh, one, 1.0)) for one in ten]
-    points = anchors(unit)
+    points = anchor_points(unit)
     sweep = CandidateBatch(model, materials, (points, probe(mesh, points)), shares, SENSOR_MPA)
     clock.tell(f"{len(ten)} candidates: inclusions")
     for state in states:

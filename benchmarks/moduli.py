@@ -21,12 +21,12 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.design.strut_cell import mass_g, relative_density, strut_cell
 from mu_addon.errors import InputError
 from mu_addon.files import write_json, write_text
-from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, cell_mesh
+from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell
 from mu_addon.homogenize.compression import compress
 from mu_addon.homogenize.elasticity import effective_tensor
 from mu_addon.homogenize.modulus import modulus
 from mu_addon.homogenize.offset_response import OffsetResponse, fit_offset
-from mu_addon.homogenize.specimen import specimen
+from mu_addon.homogenize.specimen import block_specimen
 from mu_addon.materials.library import load_material
 from mu_addon.report.charts import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas
 
@@ -52,12 +52,12 @@ CELLS = 3
 
 def moduli_of(cell, cache):
     """Initial modulus in MPa of a printed cell's endless lattice along an axis, and of blocks."""
-    mesh = cell_mesh(cell, MESH, cache)
+    mesh = mesh_cell(cell, MESH, cache)
     materials = cell_materials(cell, mesh, RESIN_MPa, POISSON)
     found = {"periodic": effective_tensor(mesh, materials).E100}
     for name in list(TESTS)[1:]:
         friction, cells = name.split()
-        test = compress(specimen(mesh, int(cells), materials), (0.005,), friction)
+        test = compress(block_specimen(mesh, int(cells), materials), (0.005,), friction)
         found[name] = modulus(test.curve, "initial tangent")
     return found
 

@@ -18,11 +18,11 @@ from circumstances import circumstances
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.strut_cell import strut_cell
-from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, cell_mesh
+from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell
 from mu_addon.homogenize.compression import STRAINS, compress
 from mu_addon.homogenize.elasticity import effective_tensor
 from mu_addon.homogenize.modulus import PROCEDURES, moduli, modulus
-from mu_addon.homogenize.specimen import specimen
+from mu_addon.homogenize.specimen import block_specimen
 
 FRICTIONS = ("slide", "stick")
 MODULUS_MPa = 2.5
@@ -45,13 +45,13 @@ class Cell:
         cell = strut_cell(load_preset(options.preset))
         per_diameter = per_diameter or options.per_diameter
         settings = CellMeshSettings(per_diameter=per_diameter, order=options.order)
-        self.mesh = cell_mesh(cell, settings, options.cache)
+        self.mesh = mesh_cell(cell, settings, options.cache)
         self.materials = cell_materials(cell, self.mesh, MODULUS_MPa, poisson or options.poisson[0])
         self.periodic_kPa = 1e3 * effective_tensor(self.mesh, self.materials).E100
 
     def pressed(self, cells, friction, strains, **how):
         start = time.perf_counter()
-        found = compress(specimen(self.mesh, cells, self.materials), strains, friction, **how)
+        found = compress(block_specimen(self.mesh, cells, self.materials), strains, friction, **how)
         return found, time.perf_counter() - start
 
 

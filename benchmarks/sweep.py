@@ -17,7 +17,7 @@ from contextlib import closing
 import numpy as np
 from circumstances import circumstances
 
-from mu_addon.design.anchors import anchors, windows
+from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.assets import asset_root
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.equilibrium import Equilibrium
@@ -28,9 +28,9 @@ from mu_addon.fem.trajectory import simulate
 from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.placement.candidates import Candidate, candidates, moved_points, roi, with_sensor
+from mu_addon.placement.candidates import Candidate, candidate_paths, moved_points, roi, with_sensor
 from mu_addon.placement.inclusion import sensor_share
-from mu_addon.placement.influence import influence, telling_pressures
+from mu_addon.placement.influence import influence_map, telling_pressures
 from mu_addon.placement.sampling import rounds
 from mu_addon.usecases.simulate_and_place.candidate_pool import CandidatePool, CandidateProblem
 
@@ -72,7 +72,7 @@ def main():
     unit = load_preset("mu-1.0x")
     mesh = mesh_unit(unit, MeshSettings(refine=given.refine))
     materials = materials_of(unit, mesh)
-    points = anchors(unit)
+    points = anchor_points(unit)
     monitored = points, probe(mesh, points)
     times, pressure = read_protocol(asset_root() / "protocols" / "grasp.csv").sample(13)
     model = Model(mesh)
@@ -94,7 +94,7 @@ def main():
     distinct = np.array([s.pressure_MPa for s in baseline.states])
     few = [baseline.states[i] for pair in rounds(distinct)[:2] for i in pair]
     wanted = {s.pressure_MPa for s in few}
-    for name, every in (("ten", candidates(points, windows(6))), ("a hundred", hundred(points))):
+    for name, every in (("ten", candidate_paths(points, windows(6))), ("a hundred", hundred(points))):
         jobs = tuple((c, RULE) for c in every)
         setting = CandidateProblem(mesh, materials, points, jobs, RADIUS_MM, SENSOR_MPA)
         with closing(CandidatePool(setting, given.workers)) as sweeper:
@@ -105,10 +105,10 @@ def main():
         row(f"{name} paths at every pressure, after Model A, the processes' start included", took)
         swept[name] = found
     took, _ = seconds(
-        lambda: influence(model, materials, baseline, monitored[1], telling_pressures(baseline))
+        lambda: influence_map(model, materials, baseline, monitored[1], telling_pressures(baseline))
     )
     row("map of every element, in three of its states", took)
-    for candidate in candidates(points, windows(6))[: given.alone]:
+    for candidate in candidate_paths(points, windows(6))[: given.alone]:
         share = sensor_share(RULE, roi(mesh, candidate, RADIUS_MM))
         stiff = with_sensor(materials, share, SENSOR_MPA)
         took, alone = seconds(lambda b=stiff: simulate(Equilibrium(model, b), times, pressure))

@@ -17,7 +17,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 ROOT = Path(__file__).resolve().parent.parent
-WORKER = ROOT / "mu_addon" / "blender" / "simulate" / "worker.py"
+CHILD_MAIN = ROOT / "mu_addon" / "blender" / "jobs" / "child_main.py"
 
 
 def arguments() -> list[str]:
@@ -52,7 +52,7 @@ def in_own_process(line: list[str]) -> int:
     from mu_addon.run.interpreter import environment, worker_command
 
     try:
-        command = worker_command(WORKER, line, bpy.app.binary_path)
+        command = worker_command(CHILD_MAIN, line, bpy.app.binary_path)
     except InputError as error:
         sys.stderr.write(f"error: {error}\n")
         return error.status

@@ -37,10 +37,8 @@ def add(commands: Commands[Any]) -> None:
     command.add_argument(
         "--angles",
         metavar="CSV",
-        help=(
-            "Reference angles, CSV with the columns time_s,angle_deg, for a recording without marks "
-            'such as "angle 30".'
-        ),
+        help="Reference angles, CSV with the columns time_s,angle_deg, for a recording without marks "
+        'such as "angle 30".',
     )
 
 

@@ -1,4 +1,4 @@
-"""`check`: what a printer would stumble over."""
+"""`check`: the printability of a part."""
 
 from __future__ import annotations
 
@@ -19,30 +19,24 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `check`."""
     command = commands.add_parser(
         "check",
-        help=(
-            "Check the printability of a unit or an STL file and find the best build direction. Exit "
-            "status 6 means not printable."
-        ),
+        help="Check the printability of a unit or an STL file and find the best build direction. Exit "
+        "status 6 means not printable.",
         epilog="example: run.py check --preset mu-1.0x --path alpha4 --out out/check",
     )
     add_unit(command, required=False)
     command.add_argument(
         "--stl",
         metavar="FILE",
-        help=(
-            "STL file to check; if a unit is given too, the file is compared with the unit's nominal "
-            "geometry."
-        ),
+        help="STL file to check; if a unit is given too, the file is compared with the unit's nominal "
+        "geometry.",
     )
     command.add_argument("--path", metavar="NAME", help="Path of the unit's waveguide: alpha1, alpha2, ...")
     command.add_argument(
         "--printer",
         default="form-4-elastic-50a",
         metavar="NAME|FILE",
-        help=(
-            "Limits of the printer and its resin: a shipped name or a TOML file (default: "
-            "form-4-elastic-50a)."
-        ),
+        help="Limits of the printer and its resin: a shipped name or a TOML file (default: "
+        "form-4-elastic-50a).",
     )
     command.add_argument(
         "--up",

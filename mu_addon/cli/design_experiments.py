@@ -18,18 +18,14 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `design-experiments`."""
     command = commands.add_parser(
         "design-experiments",
-        help=(
-            "Design experiments before measuring: compute which effects planned experiments can detect, "
-            "and the smallest detectable size of each."
-        ),
+        help="Design experiments before measuring: compute which effects planned experiments can detect, "
+        "and the smallest detectable size of each.",
         epilog="example: run.py design-experiments my-protocols --noise angle=0.5 --out out/plan",
     )
     add_measured_folder(
         command,
-        (
-            "Folder of planned experiments, in the format of `diagnose`; the measured columns may hold any "
-            "numbers."
-        ),
+        "Folder of planned experiments, in the format of `diagnose`; the measured columns may hold any "
+        "numbers.",
     )
     add_unit(command, required=False)
     command.add_argument(

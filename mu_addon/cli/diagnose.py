@@ -18,10 +18,8 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `diagnose`."""
     command = commands.add_parser(
         "diagnose",
-        help=(
-            "Diagnose model error from measured data: name the physical effects missing from the model, "
-            "and compute by how much the error drops with them."
-        ),
+        help="Diagnose model error from measured data: name the physical effects missing from the model, "
+        "and compute by how much the error drops with them.",
         epilog="example: run.py diagnose assets/examples/paper-moduli --out out/diagnosis",
     )
     add_measured_folder(command)

@@ -20,10 +20,8 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `export`."""
     command = commands.add_parser(
         "export",
-        help=(
-            "Export a unit as STL, 3MF, STEP and node list. Each file is read back and verified; a "
-            "manifest lists them."
-        ),
+        help="Export a unit as STL, 3MF, STEP and node list. Each file is read back and verified; a "
+        "manifest lists them.",
         epilog="example: run.py export --preset mu-1.0x --path alpha4 --out out/print",
     )
     add_unit(command)
@@ -31,10 +29,8 @@ def add(commands: Commands[Any]) -> None:
     command.add_argument(
         "--path",
         metavar="NAME|CSV",
-        help=(
-            "Path of the waveguide: alpha1, alpha2, ..., or a paths.csv of `place --paths graph`, whose "
-            "best path is taken."
-        ),
+        help="Path of the waveguide: alpha1, alpha2, ..., or a paths.csv of `place --paths graph`, whose "
+        "best path is taken.",
     )
     command.add_argument(
         "--path-row", metavar="NAME", help="Take this path of the paths.csv instead of the best one."

@@ -35,19 +35,15 @@ def add(commands: Commands[Any]) -> None:
         nargs="+",
         default=(),
         metavar="MODE",
-        help=(
-            "Test modes held out of the fit for validation: uniaxial, equibiaxial, pure_shear (default: "
-            "none)."
-        ),
+        help="Test modes held out of the fit for validation: uniaxial, equibiaxial, pure_shear (default: "
+        "none).",
     )
     command.add_argument(
         "--weights",
         choices=("absolute", "relative"),
         default="absolute",
-        help=(
-            "Weights of the residuals: absolute divides them by the test's largest stress, relative by the "
-            "stress itself (default: absolute)."
-        ),
+        help="Weights of the residuals: absolute divides them by the test's largest stress, relative by the "
+        "stress itself (default: absolute).",
     )
 
 

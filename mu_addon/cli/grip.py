@@ -20,10 +20,8 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `grip`."""
     command = commands.add_parser(
         "grip",
-        help=(
-            "Design a gripper of two units and simulate its grasp of cubes with friction: printable part, "
-            "forces, light signal, sensor paths."
-        ),
+        help="Design a gripper of two units and simulate its grasp of cubes with friction: printable part, "
+        "forces, light signal, sensor paths.",
         epilog="example: run.py grip --preset gripper --out out/gripper",
     )
     which = command.add_mutually_exclusive_group(required=True)
@@ -36,10 +34,8 @@ def add(commands: Commands[Any]) -> None:
         type=float,
         default=(12.5, 25.0),
         metavar="MM",
-        help=(
-            "Side lengths of the cubes to grasp, in mm; the sensor paths are ranked with the last one "
-            "(default: 12.5 25)."
-        ),
+        help="Side lengths of the cubes to grasp, in mm; the sensor paths are ranked with the last one "
+        "(default: 12.5 25).",
     )
     command.add_argument(
         "--density",

@@ -18,10 +18,8 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `homogenize`."""
     command = commands.add_parser(
         "homogenize",
-        help=(
-            "Homogenize the lattice: compute effective moduli from struts and resin, run virtual "
-            "compression tests, and fit the lattice law for `place`."
-        ),
+        help="Homogenize the lattice: compute effective moduli from struts and resin, run virtual "
+        "compression tests, and fit the lattice law for `place`.",
         epilog="example: run.py homogenize --preset mu-1.0x --out out/lattice",
     )
     add_unit(command)
@@ -44,10 +42,8 @@ def add(commands: Commands[Any]) -> None:
         "--friction",
         choices=("both", "slide", "stick"),
         default="both",
-        help=(
-            "Contact of the specimen with the plates: frictionless (slide), bonded (stick) or both "
-            "(default: both)."
-        ),
+        help="Contact of the specimen with the plates: frictionless (slide), bonded (stick) or both "
+        "(default: both).",
     )
     command.add_argument(
         "--strain",

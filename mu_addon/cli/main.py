@@ -36,10 +36,8 @@ def parser() -> argparse.ArgumentParser:
     """The parser of the whole command line."""
     top = _Parser(
         "run.py",
-        description=(
-            "Design, simulate and sensorise Monolithic Units, soft pneumatic actuators with a lattice "
-            "and an optical waveguide."
-        ),
+        description="Design, simulate and sensorise Monolithic Units, soft pneumatic actuators with a "
+        "lattice and an optical waveguide.",
         epilog=STATUSES,
     )
     commands = top.add_subparsers(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ..design.parameters import Unit
+    from ..fem.solver import SolverChoice
     from ..run.context import RunContext
     from ..run.progress import Progress
     from ..usecases.simulate_and_place.extended_unit import Extended
@@ -56,6 +57,45 @@ def add_orientation(command: argparse.ArgumentParser) -> None:
     )
 
 
+def add_resin(command: argparse.ArgumentParser) -> None:
+    """--resin, what the wall is made of."""
+    command.add_argument(
+        "--resin",
+        dest="wall_resin",
+        metavar="NAME|FILE",
+        help="Material of the wall: a name of the library or a material file, such as the material.toml of "
+        "`fit-material`. Its moduli, law and memory replace those of the unit's [material] and [wall] "
+        "(default: those of the unit).",
+    )
+
+
+def add_solver(command: argparse.ArgumentParser) -> None:
+    """--solver and --device."""
+    command.add_argument(
+        "--solver",
+        choices=("auto", "direct", "iterative"),
+        default="auto",
+        help="Solver of linear systems: a factorisation, or conjugate gradients on two levels of elements. "
+        "auto: direct, unless the factor does not fit into memory (default: auto).",
+    )
+    command.add_argument(
+        "--device",
+        default="auto",
+        metavar="auto|cpu|cuda:0",
+        help="Device for the finite elements. auto: a CUDA device if there is one and the mesh has 200 000 "
+        "unknowns or more, otherwise the CPU (default: auto).",
+    )
+
+
+def solver_of(options: argparse.Namespace) -> SolverChoice:
+    """The choice of --solver and --device; raises InputError, also for a device that is not there."""
+    from ..fem.solver import SolverChoice
+
+    found = SolverChoice(options.solver, options.device)
+    found.require_device()
+    return found
+
+
 def add_measured_folder(command: argparse.ArgumentParser, help_: str = "") -> None:
     """FOLDER, a folder of measured data."""
     words = help_ or "Folder of measured data: experiments.toml and its CSV files."
@@ -73,11 +113,17 @@ def require_out(options: argparse.Namespace) -> None:
 
 
 def unit_of(options: argparse.Namespace) -> Unit:
-    """The unit that --preset or --unit names; raises InputError."""
+    """The unit that --preset or --unit names, with the wall of --resin; raises InputError."""
     from ..design.parameters import load_preset, read_unit
 
     require_out(options)
-    return load_preset(options.preset) if options.preset is not None else read_unit(options.unit)
+    unit = load_preset(options.preset) if options.preset is not None else read_unit(options.unit)
+    resin = getattr(options, "wall_resin", None)
+    if resin is None:
+        return unit
+    from ..materials.library import load_material, read_material
+
+    return (read_material(resin) if resin.endswith(".toml") else load_material(resin)).in_unit(unit)
 
 
 def unit_if_named(options: argparse.Namespace) -> Unit | None:

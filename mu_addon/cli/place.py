@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .options import add_model, add_orientation, add_unit
+from .options import add_model, add_orientation, add_resin, add_unit
 from .study_options import EXAMPLE, add_body, add_obstacles, add_simulation, add_solid, console_summary, run
 
 if TYPE_CHECKING:
@@ -17,15 +17,14 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `place`."""
     command = commands.add_parser(
         "place",
-        help=(
-            "Run `design` and `simulate`, then rank the sensor paths by how much each disturbs the "
-            "motion (the main job)."
-        ),
+        help="Run `design` and `simulate`, then rank the sensor paths by how much each disturbs the "
+        "motion (the main job).",
         epilog=EXAMPLE,
     )
     add_unit(command)
     add_model(command)
     add_orientation(command)
+    add_resin(command)
     add_solid(command)
     add_body(command)
     add_obstacles(command)
@@ -56,20 +55,16 @@ def add(commands: Commands[Any]) -> None:
         "--paths",
         choices=("windows", "graph"),
         default="windows",
-        help=(
-            "Candidate paths: windows of consecutive anchors, or graph, every path through the lattice, "
-            "bent ones included (default: windows)."
-        ),
+        help="Candidate paths: windows of consecutive anchors, or graph, every path through the lattice, "
+        "bent ones included (default: windows).",
     )
     command.add_argument(
         "--light",
         nargs="+",
         default=(),
         metavar="NAME=VALUE",
-        help=(
-            "Optical constants of the resin: index, attenuation_per_mm, roughness (default: 1.5, 0.01, "
-            "0.02, assumed)."
-        ),
+        help="Optical constants of the resin: index, attenuation_per_mm, roughness (default: 1.5, 0.01, "
+        "0.02, assumed).",
     )
     search = command.add_argument_group("limits of --paths graph")
     search.add_argument(

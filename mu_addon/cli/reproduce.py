@@ -18,10 +18,8 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `reproduce`."""
     command = commands.add_parser(
         "reproduce",
-        help=(
-            "Reproduce the paper: compare its Table I and bending angles at three scales with this "
-            "simulation."
-        ),
+        help="Reproduce the paper: compare its Table I and bending angles at three scales with this "
+        "simulation.",
         epilog="example: run.py reproduce --out out/reproduce",
     )
     add_results(command)

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .options import add_solver
 from .study_options import console_summary
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ def add(commands: Commands[Any]) -> None:
         action="store_false",
         help="Compute the numbers only: no pictures, no report.html.",
     )
+    add_solver(command)
 
 
 def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
@@ -44,11 +46,11 @@ def run(options: argparse.Namespace, progress: Progress, context: RunContext) ->
     from ..usecases.simulate_and_place.report_data import write_report
     from ..usecases.simulate_and_place.run import run_stages
     from ..usecases.simulate_and_place.study import Study
-    from .options import require_out
+    from .options import require_out, solver_of
 
     require_out(options)
     folder = Path(options.out)
-    study = Study.open(read_job(folder, options.workers), folder, progress, context)
+    study = Study.open(read_job(folder, options.workers, solver_of(options)), folder, progress, context)
     if options.report:
         context.on_stop = lambda reason: write_report(study, reason["what"])
     run_stages(study)

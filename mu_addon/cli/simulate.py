@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .options import add_model, add_orientation, add_unit
+from .options import add_model, add_orientation, add_resin, add_unit
 from .study_options import EXAMPLE, add_body, add_obstacles, add_simulation, add_solid, console_summary, run
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ def add(commands: Commands[Any]) -> None:
     add_unit(command)
     add_model(command)
     add_orientation(command)
+    add_resin(command)
     add_solid(command)
     add_body(command)
     add_obstacles(command)

@@ -18,10 +18,8 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `specimens`."""
     command = commands.add_parser(
         "specimens",
-        help=(
-            "Write test specimens as STL: lattice cubes, coupons and a gauge for the printer, with data "
-            "sheets for the measurements."
-        ),
+        help="Write test specimens as STL: lattice cubes, coupons and a gauge for the printer, with data "
+        "sheets for the measurements.",
         epilog="example: run.py specimens --out out/specimens",
     )
     add_unit(command, required=False)

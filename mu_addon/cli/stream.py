@@ -33,10 +33,8 @@ def add_source(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--port",
         metavar="NAME",
-        help=(
-            "Serial port: a device name, or usb:VID:PID[:SERIAL], which identifies the board at any USB "
-            "socket (default: the only USB serial port)."
-        ),
+        help="Serial port: a device name, or usb:VID:PID[:SERIAL], which identifies the board at any USB "
+        "socket (default: the only USB serial port).",
     )
     command.add_argument(
         "--baud",
@@ -57,10 +55,8 @@ def add_source(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--controlled",
         action="store_true",
-        help=(
-            "Accept the commands pause, resume, mark WORDS and stop on standard input, and end when it "
-            "closes."
-        ),
+        help="Accept the commands pause, resume, mark WORDS and stop on standard input, and end when it "
+        "closes.",
     )
 
 

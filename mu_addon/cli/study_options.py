@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import modelled, unit_of
+from .options import add_solver, modelled, solver_of, unit_of
 
 if TYPE_CHECKING:
     from ..design.body import Body
@@ -81,10 +81,8 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--protocol",
         metavar="CSV",
-        help=(
-            "Pressure protocol, CSV with the columns time_s,pressure_kPa (default: the shipped grasp "
-            "protocol)."
-        ),
+        help="Pressure protocol, CSV with the columns time_s,pressure_kPa (default: the shipped grasp "
+        "protocol).",
     )
     command.add_argument(
         "--order", type=int, choices=(1, 2), default=2, help="Order of the finite elements (default: 2)."
@@ -116,6 +114,7 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
         default="auto",
         help="Mesh generator (default: auto).",
     )
+    add_solver(command)
 
 
 def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
@@ -145,6 +144,7 @@ def _open(options: argparse.Namespace, progress: Progress, context: RunContext) 
             "mesh": MeshSettings(order=options.order, refine=options.refine),
             "times": options.times,
             "mesher": options.mesher,
+            "solver": solver_of(options),
             "lattice": None if options.lattice is None else read_effective(options.lattice),
         }
     if "place" in options.stages:

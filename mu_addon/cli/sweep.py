@@ -18,10 +18,8 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `sweep`."""
     command = commands.add_parser(
         "sweep",
-        help=(
-            "Run a parameter study: many studies over ranges of inputs, with one table, main effects and "
-            "the Pareto front."
-        ),
+        help="Run a parameter study: many studies over ranges of inputs, with one table, main effects and "
+        "the Pareto front.",
         epilog="example: run.py sweep assets/examples/sweep/sweep.toml --out out/sweep",
     )
     command.add_argument(

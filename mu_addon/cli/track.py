@@ -21,10 +21,8 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `track`."""
     command = commands.add_parser(
         "track",
-        help=(
-            "Track markers in a video of the bench with Blender's tracker and write measured data in mm "
-            "and degrees."
-        ),
+        help="Track markers in a video of the bench with Blender's tracker and write measured data in mm "
+        "and degrees.",
         epilog="example: run.py track bench.mp4 --markers bench.toml --pressure ladder.csv --out measured",
     )
     command.add_argument(
@@ -85,7 +83,7 @@ def _tracker() -> Tracker:
                 "give a CSV of pixel positions from another tracker",
             )
         # By name: the command line knows the core, and Blender's side only where it is asked for.
-        return import_module("...blender.tracking", __package__).follow(clip, marks)
+        return import_module("..blender.track.state", __package__).track_markers(clip, marks)
 
     return follow
 

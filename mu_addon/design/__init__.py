@@ -1,1 +1,71 @@
-"""The rules of a Monolithic Unit: parameters to exact geometry, anchors, the printable solid and files."""
+"""Design: the parameters of a Monolithic Unit, and the exact geometry that follows from them.
+
+Start with `load_preset` or `read_unit`, which give a `Unit`: every parameter with its unit, bounds and
+source. `Unit.dimensions` are its true lengths in mm. `build_solid` makes the printable surface, `write_stl`
+its file; `anchor_points` and `windows` are the nodes and paths that a waveguide can follow.
+
+    >>> from mu_addon.design import load_preset, windows
+    >>> unit = load_preset("mu-1.0x")
+    >>> unit.dimensions.height, len(windows(6))
+    (75.0, 10)
+"""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import public_face
+
+if TYPE_CHECKING:
+    from .anchors import Window as Window
+    from .anchors import anchor_points as anchor_points
+    from .anchors import window as window
+    from .anchors import windows as windows
+    from .body import Body as Body
+    from .body import read_body as read_body
+    from .dimensions import Dimensions as Dimensions
+    from .export import write_nodes as write_nodes
+    from .export import write_stl as write_stl
+    from .gates import GateError as GateError
+    from .gripper import Gripper as Gripper
+    from .gripper import build_gripper as build_gripper
+    from .gripper import load_gripper as load_gripper
+    from .gripper import read_gripper as read_gripper
+    from .lattices import LatticeKind as LatticeKind
+    from .parameters import Unit as Unit
+    from .parameters import assumed as assumed
+    from .parameters import from_toml as from_toml
+    from .parameters import load_preset as load_preset
+    from .parameters import preset_names as preset_names
+    from .parameters import read_unit as read_unit
+    from .parameters import to_toml as to_toml
+    from .parameters import write_unit as write_unit
+    from .profile import cavity_radius as cavity_radius
+    from .profile import cavity_volume as cavity_volume
+    from .profile import membrane_volume as membrane_volume
+    from .profile import outer_radius as outer_radius
+    from .quantity import in_kPa as in_kPa
+    from .quantity import in_MPa as in_MPa
+    from .rigid_body import RigidBody as RigidBody
+    from .solid import Solid as Solid
+    from .solid import build_solid as build_solid
+    from .strut_cell import StrutCell as StrutCell
+    from .threemf import write_3mf as write_3mf
+else:
+    __getattr__, __dir__, __all__ = public_face(
+        __name__,
+        {
+            "anchors": "Window anchor_points window windows",
+            "body": "Body read_body",
+            "dimensions": "Dimensions",
+            "export": "write_nodes write_stl",
+            "gates": "GateError",
+            "gripper": "Gripper build_gripper load_gripper read_gripper",
+            "lattices": "LatticeKind",
+            "parameters": "Unit assumed from_toml load_preset preset_names read_unit to_toml write_unit",
+            "profile": "cavity_radius cavity_volume membrane_volume outer_radius",
+            "quantity": "in_MPa in_kPa",
+            "rigid_body": "RigidBody",
+            "solid": "Solid build_solid",
+            "strut_cell": "StrutCell",
+            "threemf": "write_3mf",
+        },
+    )

@@ -15,7 +15,10 @@ SHORTEST = 3
 
 
 class Window(NamedTuple):
-    """A path through `length` contiguous anchors P_start .. P_(start + length - 1), counted from 1."""
+    """A path through `length` contiguous anchors P_start .. P_(start + length - 1), counted from 1.
+
+    name: alpha1, alpha2, ... in the order of `windows`.
+    """
 
     name: str
     start: int
@@ -27,21 +30,37 @@ class Window(NamedTuple):
         return range(self.start - 1, self.start - 1 + self.length)
 
 
-def anchors(unit: Unit) -> NDArray[np.float64]:
-    """Anchors P1..Pn (n, 3) in mm, from the inlet: the cell centres of column x = 0 in the anchor row."""
+def anchor_points(unit: Unit) -> NDArray[np.float64]:
+    """Anchors P1..Pn of a unit, (n, 3) in mm at its scale, in order from the inlet.
+
+    They are the centres of the cells in the column x = 0 of the anchor row, one a chamber.
+
+    >>> from mu_addon.design import load_preset
+    >>> anchor_points(load_preset("mu-1.0x"))[:2].tolist()
+    [[0.0, 25.0, 6.25], [0.0, 25.0, 18.75]]
+    """
     d = unit.dimensions
     z = (np.arange(d.count) + 0.5) * d.cell
     return np.stack([np.zeros_like(z), np.full_like(z, d.row * d.cell), z], axis=1)
 
 
 def windows(n: int) -> list[Window]:
-    """All (n - 2)(n - 1)/2 windows of n anchors, by length then start, named alpha1, alpha2, ..."""
+    """All (n - 2)(n - 1)/2 windows of 3 or more of n anchors, by length then start: alpha1, alpha2, ...
+
+    >>> [(w.name, w.start, w.length) for w in windows(4)]
+    [('alpha1', 1, 3), ('alpha2', 2, 3), ('alpha3', 1, 4)]
+    """
     found = [(start, length) for length in range(SHORTEST, n + 1) for start in range(1, n - length + 2)]
     return [Window(f"alpha{number}", start, length) for number, (start, length) in enumerate(found, 1)]
 
 
 def window(unit: Unit, name: str) -> Window:
-    """The unit's window of that name; InputError lists the names there are."""
+    """The unit's window of that name. Raises InputError, which lists the names there are.
+
+    >>> from mu_addon.design import load_preset
+    >>> window(load_preset("mu-1.0x"), "alpha5").length
+    4
+    """
     every = windows(unit.dimensions.count)
     for candidate in every:
         if candidate.name == name:

@@ -35,7 +35,9 @@ def asset_file(folder: str, what: str, name: str, kind: str = "") -> Path:
     if name in names:
         return files[name]
     if name in files:
-        what_it_is = f"{name!r} is a {_kind(files[name])}" if _kind(files[name]) else f"{name!r} is no {what}"
+        what_it_is = (
+            f"{name!r} is a {_kind(files[name])}" if _kind(files[name]) else f"{name!r} is not a {what}"
+        )
         raise InputError(what_it_is, what, f"choose one of {', '.join(names)}")
     raise InputError(
         f"there is no {what} {name!r}{nearest(name, names)}",

@@ -56,7 +56,7 @@ class Body:
     def __attrs_post_init__(self) -> None:
         if not (len(self.triangles) and np.isfinite(self.vertices).all()):
             raise InputError(
-                "there is no surface in it, or a coordinate is no number",
+                "the file contains no surface, or a coordinate is not a number",
                 self.name,
                 "give a closed mesh of triangles",
             )
@@ -111,11 +111,13 @@ def read_body(path: str | Path) -> Body:
     readers = {".stl": stl.read, ".obj": obj.read, ".ply": ply.read}
     remedy = "give a closed surface as STL, OBJ or PLY, in mm"
     if path.suffix.lower() not in readers:
-        raise InputError(f"a body is not read from {path.suffix or 'such a file'}", str(path), remedy)
+        raise InputError(
+            f"the file type {path.suffix or '(none)'} is not supported for a body", str(path), remedy
+        )
     try:
         mesh = readers[path.suffix.lower()](path)
     except (OSError, ValueError, LookupError, TypeError, AssertionError, ReadError) as error:
-        why = getattr(error, "strerror", None) or "it is damaged or of another kind"
+        why = getattr(error, "strerror", None) or "the file is damaged or of another type"
         raise InputError(f"no body can be read from it: {why}", str(path), remedy) from error
     found = [np.empty((0, 3), np.int64)]
     for block in mesh.cells:
@@ -138,7 +140,7 @@ def flaws(body: Body) -> list[Flaw]:
     if len(open_):
         found.append(
             Flaw(
-                f"{len(open_)} edges are open or have neighbours facing the other way",
+                f"{len(open_)} edges are open or have inconsistently oriented neighbours",
                 "fill the holes and make all faces look outward",
                 v[open_].mean(axis=1),
             )
@@ -155,7 +157,7 @@ def flaws(body: Body) -> list[Flaw]:
     if len(crossing):
         found.append(
             Flaw(
-                f"the surface cuts itself, in {len(crossing)} places",
+                f"the surface intersects itself in {len(crossing)} places",
                 "unite the parts, or move them apart",
                 crossing,
             )
@@ -167,7 +169,7 @@ def flaws(body: Body) -> list[Flaw]:
         places = np.array([_middle(s) for s in shells])
         found.append(Flaw(f"there are {len(shells)} separate bodies", "unite them, or give one", places))
     elif body.manifold.volume() <= 0.0:
-        found.append(Flaw("it encloses nothing", "make its faces look outward"))
+        found.append(Flaw("the surface encloses no volume", "make its faces look outward"))
     return found
 
 
@@ -201,7 +203,7 @@ def misfits(body: Body, d: Dimensions) -> list[Flaw]:
     if pieces and not found:
         found.append(
             Flaw(
-                f"the chambers come out of it in {len(pieces)} places",
+                f"the chambers protrude from it in {len(pieces)} places",
                 f"widen it: the chambers are {2.0 * d.R:.4g} mm wide around the z axis",
                 np.array([_vertex(piece) for piece in pieces]),
             )
@@ -222,8 +224,8 @@ def overlaps(body: Body, d: Dimensions, own: Body | None = None) -> list[Flaw]:
     deep = max(float(np.ptp(np.reshape(p.bounding_box(), (2, 3)), axis=0).min()) for p in pieces)
     return [
         Flaw(
-            f"it stands in the unit, up to {deep:.2g} mm deep",
-            "move it away until they do not touch",
+            f"it overlaps the unit by up to {deep:.2g} mm deep",
+            "move it away from the unit",
             np.array([_middle(piece) for piece in pieces]),
         )
     ]
@@ -252,7 +254,7 @@ def require_path_inside(body: Body, unit: Unit, window: Window) -> None:
     bar = waveguide(unit, window, covering(unit.dimensions, body)).solid()
     if (bar - body.manifold).volume() > 1e-6 * bar.volume():
         raise InputError(
-            f"the waveguide along {window.name} comes out of the body",
+            f"the waveguide along {window.name} leaves the body",
             f"{body.name}; [waveguide] row",
             "choose a row nearer to the axis, or a wider body",
         )

@@ -9,7 +9,18 @@ from . import lattices
 
 @attrs.frozen
 class Dimensions:
-    """Lengths in mm at scale: U = `cell`, apex and neck radii R and r, arc half-lengths a and b."""
+    """Lengths of a unit in mm at its scale, as geometry and meshes take them.
+
+    cell: the lattice cell U, which is also the pitch of the chambers; count: of chambers. R and r: outer
+    radii of the profile at a bladder's apex and at a neck; a and b: half-lengths of their parabola arcs, a
+    + b = U/2. wall: along the surface normal. Counts of cells and `row` are whole numbers, see
+    `parameters.Envelope`.
+
+    >>> from mu_addon.design import load_preset
+    >>> d = load_preset("mu-1.5x").dimensions
+    >>> d.cell, d.R, d.height
+    (18.75, 18.75, 112.5)
+    """
 
     scale: float
     cell: float

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..files import write_bytes
-from .anchors import anchors
+from .anchors import anchor_points
 from .lattice import lattice_of
 from .parameters import Unit
 from .solid import Solid
@@ -15,7 +15,7 @@ from .surface import stl_bytes
 
 
 def write_stl(solid: Solid, path: str | Path) -> None:
-    """Write the solid as binary STL in mm, whole or not at all; equal solids give equal files."""
+    """Write the solid as binary STL in mm; equal solids give equal files. Raises OutputError."""
     write_bytes(Path(path), stl_bytes(solid.vertices, solid.triangles))
 
 
@@ -27,7 +27,7 @@ def write_nodes(unit: Unit, path: str | Path) -> None:
     """
     lattice = lattice_of(unit.dimensions)
     kinds = np.select([lattice.is_centre, lattice.is_corner], ["centre", "corner"], "node").tolist()
-    for number, anchor in enumerate(anchors(unit), 1):
+    for number, anchor in enumerate(anchor_points(unit), 1):
         gap = abs(lattice.nodes - anchor).sum(axis=1)
         if gap.min() < 1e-6 * lattice.cell:
             kinds[int(gap.argmin())] = f"P{number}"

@@ -83,7 +83,7 @@ def check_solid(
 
     solid = manifold3d.Manifold(manifold3d.Mesh64(vertices, triangles.astype("uint64")))
     if solid.status() != manifold3d.Error.NoError:
-        _fail("closed surface", f"the surface is no manifold: {solid.status().name}")
+        _fail("closed surface", f"the surface is not a manifold: {solid.status().name}")
     inner = [shell.volume() for shell in (solid + plug).decompose() if shell.volume() < 0.0]
     reread = stl_surface(stl_bytes(vertices, triangles))[1]
     gates = Gates(

@@ -297,9 +297,9 @@ def from_toml(text: str, origin: str = "", beside: Path | None = None) -> Grippe
     with toml_text.located(text, origin):
         if (document.get("format"), document.get("kind")) != (FORMAT, KIND) or document["format"] is True:
             raise InputError(
-                f"this is no gripper of format {FORMAT}",
+                f"the file is not a gripper of format {FORMAT}",
                 "kind",
-                f'write format = {FORMAT} and kind = "{KIND}", or give a gripper and not a unit',
+                f'write format = {FORMAT} and kind = "{KIND}", or give a gripper file instead of a unit file',
             )
         named = document.get("unit")
         if not isinstance(named, str) or not named:

@@ -71,16 +71,18 @@ class LatticeKind:
             raise self._refused("has a node outside its cell", "give coordinates from 0 to 1")
         if np.abs(self.grid / self.divisions - self.nodes).max(initial=0.0) > 1e-9:
             raise self._refused(
-                "has a node off every simple fraction of the cell",
+                "has a node that is not at a simple fraction of the cell",
                 f"use coordinates of a denominator up to {_FINEST}, so that shared nodes are found exactly",
             )
         if len(np.unique(self.grid, axis=0)) < n:
-            raise self._refused("has two nodes in one place", "list each node once")
+            raise self._refused("has two nodes at the same position", "list each node once")
         if not len(self.struts) or self.struts.min() < 0 or self.struts.max() >= n:
-            raise self._refused("has no struts, or one to a node that is not there", "count nodes from 0")
+            raise self._refused(
+                "has no struts, or a strut to a node that does not exist", "count nodes from 0"
+            )
         ends = np.sort(self.struts, axis=1)
         if (ends[:, 0] == ends[:, 1]).any() or len(np.unique(ends, axis=0)) < len(ends):
-            raise self._refused("has a strut twice or without length", "list each strut once")
+            raise self._refused("has a duplicate strut or one of zero length", "list each strut once")
         if self.opening < 1e-9:
             raise self._refused("has struts that cross where there is no node", "split them at a node")
         if one.shape != t.shape or not np.allclose(one, one[::-1]) or not (one > 0).all():
@@ -189,7 +191,7 @@ KINDS: dict[str, LatticeKind] = {}
 def register(kind: LatticeKind) -> LatticeKind:
     """Make a kind known by its name; InputError where another has it."""
     if KINDS.get(kind.name, kind) != kind:
-        raise InputError(f"there is a lattice {kind.name!r} already", "lattice kind", "choose another name")
+        raise InputError(f"a lattice {kind.name!r} already exists", "lattice kind", "choose another name")
     KINDS[kind.name] = kind
     return kind
 
@@ -209,7 +211,7 @@ def names() -> tuple[str, ...]:
 
 
 BODY_CENTRED = register(LatticeKind("body-centred", _CENTRE_AND_CORNERS, _HALF_DIAGONALS, sin_squared))
-"""Eight half-diagonals from the centre, tapered: the source paper's."""
+"""Eight tapered half diagonals from the centre: the lattice of the source paper."""
 
 STRAIGHT = register(LatticeKind("body-centred-straight", _CENTRE_AND_CORNERS, _HALF_DIAGONALS, constant))
-"""The same without taper."""
+"""As body-centred, without taper."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -16,7 +17,8 @@ from . import lattices, rules, toml_text
 from .assets import asset_file, asset_names
 from .dimensions import Dimensions
 from .printed import as_printed
-from .quantity import PAPER, choice, describe, in_MPa, quantity
+from .quantity import PAPER, Description, choice, describe, in_MPa, quantity
+from .wall import Wall, require_used
 
 FORMAT = 1
 
@@ -372,7 +374,18 @@ def _printable(unit: Any, field: Any, value: Any) -> None:
 
 @attrs.frozen
 class Unit:
-    """All parameters of one Monolithic Unit; InputError names the co-design rule that a unit breaks."""
+    """All parameters of one Monolithic Unit, at scale 1; `dimensions` are the lengths at its scale.
+
+    Each section is an attrs class whose fields carry unit, bounds, meaning and source
+    (`quantity.describe`). A value out of bounds, or one that breaks a co-design rule (`rules`), raises
+    InputError with what would fit. Units are immutable: `attrs.evolve` makes another.
+
+    >>> import attrs
+    >>> unit = Unit(scale=0.75)
+    >>> thicker = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, wall_mm=1.2))
+    >>> round(thicker.dimensions.wall, 3)
+    0.9
+    """
 
     section: ClassVar[str] = ""
 
@@ -383,6 +396,7 @@ class Unit:
     waveguide: Waveguide = Waveguide()
     print: Printing = Printing()
     material: Material = Material()
+    wall: Wall = attrs.field(factory=Wall)
 
     def __attrs_post_init__(self) -> None:
         rules.check(self.dimensions, self.lattice.allow_symmetric)
@@ -440,7 +454,7 @@ class Unit:
         return hashlib.sha256(to_toml(self, comments=False).encode()).hexdigest()
 
 
-SECTIONS: tuple[type, ...] = (Chambers, Envelope, Waveguide, Printing, Material)
+SECTIONS: tuple[type, ...] = (Chambers, Envelope, Waveguide, Printing, Material, Wall)
 
 
 class Assumption(NamedTuple):
@@ -453,32 +467,53 @@ class Assumption(NamedTuple):
 
 
 def assumed(unit: Unit) -> list[Assumption]:
-    """Every value of the unit that is not the paper's: path `section.name`, value, unit, reason."""
+    """Every value of the unit that the source paper does not print: path `section.name`, value, unit, reason.
+
+    >>> assumed(Unit())[0].path
+    'chambers.neck_diameter_mm'
+    """
     found = []
-    for section in SECTIONS:
-        values = getattr(unit, _attribute(section))
-        for d in describe(section):
-            value = getattr(values, d.name)
-            if d.assumed:
-                reason = d.source.removeprefix("assumed: ")
-                if value != d.default:
-                    reason = f"chosen by the user (default {d.default!r}: {reason})"
-                found.append(Assumption(f"{_attribute(section)}.{d.name}", value, d.unit, reason))
+    for section, d, value in stated(unit):
+        if d.assumed:
+            reason = d.source.removeprefix("assumed: ")
+            if value != d.default:
+                reason = f"chosen by the user (default {d.default!r}: {reason})"
+            found.append(Assumption(f"{section}.{d.name}", value, d.unit, reason))
     return found
 
 
+def stated(unit: Unit) -> Iterator[tuple[str, Description, Any]]:
+    """Section, description and value of every parameter that counts, in the order of the unit's file.
+
+    Those of a wall's law are left out where its law has none of that name.
+    """
+    for section in SECTIONS:
+        values = getattr(unit, _attribute(section))
+        names = getattr(values, "names", None)
+        for d in describe(section):
+            if names is None or d.name in names:
+                yield _attribute(section), d, getattr(values, d.name)
+
+
 def to_toml(unit: Unit, comments: bool = True) -> str:
-    """The unit as TOML, in one canonical order; with comments that give unit, meaning and source."""
-    tables = {
-        _attribute(s): [(d, getattr(getattr(unit, _attribute(s)), d.name)) for d in describe(s)]
-        for s in SECTIONS
-    }
+    """The unit as TOML text in one canonical order, by default with unit, meaning and source as comments.
+
+    >>> from_toml(to_toml(Unit(scale=1.5))).scale
+    1.5
+    """
+    tables: dict[str, list[tuple[Description, Any]]] = {}
+    for section, d, value in stated(unit):
+        tables.setdefault(section, []).append((d, value))
     head = {"format": FORMAT, "name": unit.name, "scale": unit.scale}
     return toml_text.compose(head, tables, comments)
 
 
 def from_toml(text: str, origin: str = "") -> Unit:
-    """Unit read from TOML; keys left out keep their defaults, InputError gives file and line."""
+    """The unit in TOML text; keys left out keep their defaults. Raises InputError with `origin` and line.
+
+    >>> from_toml('format = 1').chambers.count
+    6
+    """
     head = {"format": int, "name": str, **{d.name: d.type for d in describe(Unit)}}
     keys = {"": list(head)} | {_attribute(s): [d.name for d in describe(s)] for s in SECTIONS}
     document = toml_text.parse(text, keys, origin)
@@ -490,12 +525,13 @@ def from_toml(text: str, origin: str = "") -> Unit:
                 f"write format = {FORMAT}, the only one so far",
             )
         sections = {_attribute(s): s(**document.get(_attribute(s), {})) for s in SECTIONS}
+        require_used(sections["wall"], document.get("wall", {}))
         rest = {key: document[key] for key in ("name", "scale") if key in document}
         return Unit(**rest, **sections)
 
 
 def read_unit(path: str | Path) -> Unit:
-    """Unit in a TOML file; InputError gives file, line and remedy."""
+    """The unit in a TOML file. Raises InputError with file, line and what to do."""
     path = Path(path)
     try:
         text = file_text(path)
@@ -511,17 +547,25 @@ def read_unit(path: str | Path) -> Unit:
 
 
 def write_unit(unit: Unit, path: str | Path) -> None:
-    """Write the unit as commented TOML, whole or not at all."""
+    """Write the unit as commented TOML; the file is replaced only once it is complete. Raises OutputError."""
     write_bytes(Path(path), to_toml(unit).encode())
 
 
 def preset_names() -> list[str]:
-    """Names of the shipped presets, sorted."""
+    """Names of the shipped presets, sorted.
+
+    >>> preset_names()
+    ['mu-0.75x', 'mu-1.0x', 'mu-1.5x']
+    """
     return asset_names("presets")
 
 
 def load_preset(name: str) -> Unit:
-    """The shipped unit of that name; InputError lists the names there are."""
+    """The shipped unit of that name. Raises InputError, which lists the names there are.
+
+    >>> load_preset("mu-0.75x").scale
+    0.75
+    """
     return read_unit(asset_file("presets", "preset", name))
 
 

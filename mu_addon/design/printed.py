@@ -78,10 +78,14 @@ def _over_the_profile(d: Dimensions, offset: Array) -> float:
 
 
 def skin_stiffening(wall: float, depth: float, factor: float) -> float:
-    """Modulus of a wall with a skin on both faces over its core's: Voigt's mean over the thickness.
+    """Modulus of a wall with a stiffer skin on both faces over its core's: Voigt's mean over the thickness.
 
-    The skin's share is min(1, 2 depth/wall), lengths in mm. Exact for stretch along the wall; in bending,
-    where the faces count most, a stiffer skin is underestimated.
+    wall, depth: thickness of the wall and of one skin, in mm; factor: modulus of skin over core. The skin's
+    share is min(1, 2 depth/wall). Exact for stretch along the wall; in bending, where the faces count most,
+    a stiffer skin is underestimated.
+
+    >>> skin_stiffening(wall=1.0, depth=0.1, factor=2.0)
+    1.2
     """
     share = min(1.0, 2.0 * depth / wall)
     return 1.0 + share * (factor - 1.0)

@@ -21,7 +21,14 @@ OFFSET_TOLERANCE = 5e-4
 
 
 def outer_radius(d: Dimensions, z: ArrayLike) -> Array:
-    """Radius (mm) of the outer profile at heights z (mm, any shape)."""
+    """Radius in mm of the actuator's outer profile at heights z in mm (any shape).
+
+    Parabola arcs: R at a bladder's apex, r at a neck, equal slopes where they meet.
+
+    >>> from mu_addon.design import load_preset
+    >>> outer_radius(load_preset("mu-1.0x").dimensions, [0.0, 6.25]).tolist()
+    [6.25, 12.5]
+    """
     return _outer(d, np.asarray(z, dtype=float))[0]
 
 
@@ -31,7 +38,14 @@ def outer_slope(d: Dimensions, z: ArrayLike) -> Array:
 
 
 def cavity_radius(d: Dimensions, z: ArrayLike) -> Array:
-    """Radius (mm) of the cavity at heights z (mm, any shape) between the end caps, without the caps' cut."""
+    """Radius in mm of the cavity at heights z in mm (any shape), the end caps not yet cut.
+
+    The cavity is the outer profile offset inward by the wall along its normal.
+
+    >>> from mu_addon.design import load_preset
+    >>> cavity_radius(load_preset("mu-1.0x").dimensions, 6.25).round(6).tolist()
+    11.6
+    """
     return _inner(d, _foot(d, np.asarray(z, dtype=float)))[0]
 
 
@@ -98,13 +112,22 @@ def cavity_polygon(d: Dimensions, per_arc: int, offset: Array | None = None) -> 
 
 
 def revolved_volume(polygon: Array) -> float:
-    """Volume (mm3) of a half section (n, 2) of (radius, z), counter-clockwise, turned once around z."""
+    """Volume in mm3 of a half section (n, 2) of (radius, z) in mm, counter-clockwise, turned once around z.
+
+    >>> round(revolved_volume(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [0.0, 2.0]])) / np.pi, 9)
+    2.0
+    """
     (r, z), (q, y) = polygon.T, np.roll(polygon, -1, axis=0).T
     return float(np.pi / 3.0 * np.sum((y - z) * (r * r + r * q + q * q)))
 
 
 def cavity_volume(d: Dimensions) -> float:
-    """Volume (mm3) of the cavity between the end caps: Gauss quadrature of the exact offset, to 1e-10."""
+    """Volume in mm3 of the cavity between the end caps, by Gauss quadrature of the exact offset, to 1e-10.
+
+    >>> from mu_addon.design import load_preset
+    >>> round(cavity_volume(load_preset("mu-1.0x").dimensions))
+    16183
+    """
     ends = _foot(d, np.array([d.base_cap, d.height - d.tip_cap]))
     knots = np.unique(np.clip(_knots(d), ends[0], ends[1]))
     x, weight = np.polynomial.legendre.leggauss(32)

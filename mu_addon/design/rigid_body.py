@@ -71,7 +71,7 @@ def to_obj(bodies: Sequence[RigidBody]) -> str:
 
 def read_rigid_bodies(path: Path, friction: Any) -> tuple[RigidBody, ...]:
     """The bodies of a file by `to_obj`, with the coefficient of each; raises InputError."""
-    remedy = "leave the file as the study wrote it"
+    remedy = "restore the file that the study wrote"
     found: list[tuple[str, list[list[float]], list[list[int]]]] = []
     before = 0
     try:
@@ -91,5 +91,5 @@ def read_rigid_bodies(path: Path, friction: Any) -> tuple[RigidBody, ...]:
     except (OSError, ValueError, IndexError):
         raise InputError("the obstacles cannot be read", str(path), remedy) from None
     if not isinstance(friction, list) or len(friction) != len(surfaces):
-        raise InputError(f"friction = {friction!r} is not a coefficient an obstacle", str(path), remedy)
+        raise InputError(f"friction = {friction!r} is not one coefficient per obstacle", str(path), remedy)
     return tuple(RigidBody(Body(*s), float(mu)) for s, mu in zip(surfaces, friction, strict=True))

@@ -45,7 +45,7 @@ def _printed_breach(d: Dimensions, offset_xy: float, offset_z: float) -> tuple[s
     least, most = min(offset_xy, offset_z), max(offset_xy, offset_z)
     thinnest = min(d.junction_diameter, d.midspan_diameter)
     if thinnest + 2.0 * least <= 0.0:
-        return "struts left when printed", f"leave nothing of struts of {thinnest:.4g} mm"
+        return "struts left when printed", f"leave no material of struts of {thinnest:.4g} mm"
     for part, thickness in {
         "walls": d.wall,
         "end caps": min(d.base_cap, d.tip_cap),
@@ -53,7 +53,7 @@ def _printed_breach(d: Dimensions, offset_xy: float, offset_z: float) -> tuple[s
         "the waveguide": d.waveguide_section - d.well_depth,
     }.items():
         if thickness + 2.0 * least <= 0.0:
-            return "walls left when printed", f"leave nothing of {part} of {thickness:.4g} mm"
+            return "walls left when printed", f"leave no material of {part} of {thickness:.4g} mm"
     opening = d.kind.opening * d.cell
     if d.midspan_diameter + 2.0 * most >= opening:
         return (

@@ -40,10 +40,11 @@ QUALITY = {"interactive": Facets(64, 6, 12, 4), "export": Facets(192, 16, 32, 10
 
 @attrs.frozen(eq=False)
 class Solid:
-    """Outward oriented surface: vertices (n, 3) in mm, triangles (m, 3), and the gates it passed.
+    """A printable surface: vertices (n, 3) in mm, triangles (m, 3) facing outward, and the gates it passed.
 
-    window: of its waveguide, None without one and along another path; bar: its waveguide; taken_off: what
-    the drawing leaves out for the printer to add, in the plane and along z, in mm.
+    window: of its waveguide, None without one and along another path; bar: its waveguide. taken_off: by how
+    much in mm, in the plane and along z, every surface was drawn inward to make up for the printer's
+    offset.
     """
 
     vertices: Vertices
@@ -62,12 +63,16 @@ def build_solid(
     body: Body | None = None,
     take_off: tuple[float, float] = (0.0, 0.0),
 ) -> Solid:
-    """Printable solid, with the waveguide along a window or along lattice nodes (n, 3) if a path is given.
+    """The printable solid of a unit: actuator, lattice, inlet and, if a path is given, the waveguide.
 
-    body: what the lattice is cut to in place of its box, itself cut by `envelope`; ends of struts that
-    nothing holds any more are left out. take_off: how far in mm, in the plane and along z, a printer moves
-    every surface outward: the drawing is smaller by it (Minkowski), so that the print has the unit's nominal
-    size. Raises GateError if a gate fails, InputError for a path or an offset that does not fit.
+    path: a `Window` of anchors, or lattice nodes (n, 3) in mm. quality: "interactive" or "export", the
+    number of facets. body: a closed surface that the lattice is cut to in place of its box; ends of struts
+    that nothing holds any more are left out. take_off: how far in mm, in the plane and along z, the printer
+    moves every surface outward: the drawing is made smaller by that (Minkowski), so that the print has the
+    nominal size.
+
+    Takes some seconds. Raises GateError where a check of the solid fails (genus, components,
+    watertightness), and InputError for a path or an offset that does not fit.
     """
     from manifold3d import Manifold, OpType
 
@@ -99,9 +104,9 @@ def build_solid(
     if body is not None:
         if offset is not None:
             raise InputError(
-                "the printer's offsets are not taken off a body of your own",
+                "the print offset is not compensated on a user-defined body",
                 "body",
-                "draw it smaller yourself",
+                "reduce the body by the print offset in its file",
             )
         holder = holder ^ body.manifold
     filled = Manifold.batch_boolean([holder, *actuator], OpType.Add)
@@ -134,7 +139,7 @@ def _drawn_offset(d: Dimensions, take_off: tuple[float, float]) -> NDArray[np.fl
         raise InputError(
             f"offsets of {xy:g} mm in the plane and {z:g} mm along z have opposite signs",
             "printer's offsets",
-            "no body grows and shrinks at once: measure again, or take the smaller one as 0",
+            "a part cannot grow and shrink at once: measure again, or set the smaller one to 0",
         )
     check_printed(d, -xy, -z)
     return -np.array([xy, xy, z])

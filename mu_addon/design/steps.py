@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .anchors import SHORTEST, Window, anchors, window
+from .anchors import SHORTEST, Window, anchor_points, window
 from .body import Body, covering, inside
 from .lattice import Graph, Lattice, graph_of, thickened
 from .parameters import Chambers, Envelope, Unit, Waveguide
@@ -62,7 +62,7 @@ class Given:
                 raise _unknown(name)
             if not STEPS[name].muting:
                 raise InputError(
-                    f"the step {name} cannot be muted", name, "everything else is made from it: leave it on"
+                    f"the step {name} cannot be muted", name, "all other steps need it: do not mute it"
                 )
 
 
@@ -276,7 +276,7 @@ def _lines(given: Given, trimmed: Trimmed | None) -> Struts | None:
 
 
 def _anchors(given: Given, graph: Graph | None) -> Array:
-    return anchors(given.unit)
+    return anchor_points(given.unit)
 
 
 def _path(given: Given, points: Array | None) -> Path | None:
@@ -367,7 +367,7 @@ STEPS: dict[str, Step] = {
         ),
         Step(
             "trim",
-            "struts cut where they enter the actuator or leave a body of one's own",
+            "struts trimmed where they enter the actuator or leave a user-defined body",
             _trim,
             ("profile", "cells"),
             reads=_PROFILE,
@@ -410,7 +410,7 @@ STEPS: dict[str, Step] = {
             ("path",),
             _WELLS,
             (*_PROFILE, *_STRUTS, "chambers.wall_mm"),
-            muting="a bar without wells does not feel which way it bends",
+            muting="a bar without wells is not sensitive to the bending direction",
             mute=_without_wells,
         ),
         Step(

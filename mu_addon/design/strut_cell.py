@@ -95,8 +95,8 @@ class StrutCell:
         thinnest = float(radii.min()) + min(self.offset_xy_mm, self.offset_z_mm)
         if thinnest <= 0.0:
             raise InputError(
-                f"offsets of {self.offset_xy_mm:g} mm in the plane and {self.offset_z_mm:g} mm along z leave "
-                f"nothing of struts of {2.0 * radii.min():g} mm",
+                f"offsets of {self.offset_xy_mm:g} mm in the plane and {self.offset_z_mm:g} mm along "
+                f"z leave no material of struts of {2.0 * radii.min():g} mm",
                 "[print] offset_xy_mm, offset_z_mm",
                 f"choose offsets above {-radii.min():g} mm",
             )
@@ -352,13 +352,13 @@ def _check_paths(cell: StrutCell) -> None:
     for k, axis in enumerate("xyz"):
         if not any(box[0, k] < 1e-9 and box[1, k] > 1.0 - 1e-9 for box in boxes):
             raise InputError(
-                f"struts of lattice {cell.kind.name!r} miss each other: no load path along {axis}",
+                f"struts of lattice {cell.kind.name!r} are not connected: no load path along {axis}",
                 "lattice kind",
                 remedy,
             )
     if len(boxes) != 1:
         raise InputError(
-            f"struts of lattice {cell.kind.name!r} miss each other: it falls into {len(boxes)} pieces",
+            f"struts of lattice {cell.kind.name!r} are not connected: it falls into {len(boxes)} pieces",
             "lattice kind",
             remedy,
         )

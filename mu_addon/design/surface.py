@@ -44,7 +44,10 @@ def bad_edges(triangles: Triangles) -> int:
 
 
 def volume(vertices: Vertices, triangles: Triangles) -> float:
-    """Volume (mm3) enclosed by an outward oriented surface, by the divergence theorem."""
+    """Volume in mm3 enclosed by triangles (m, 3) between vertices (n, 3) in mm that face outward.
+
+    By the divergence theorem; a surface that is not closed has no volume, and is not recognised here.
+    """
     p, q, r = vertices[triangles.T]
     return float(np.einsum("ij,ij->", p, np.cross(q, r)) / 6.0)
 
@@ -77,7 +80,7 @@ def stl_surface(content: bytes) -> tuple[Vertices, Triangles]:
     """Surface in a binary STL, equal corners merged; InputError if the length does not fit the count."""
     count = int.from_bytes(content[80:84], "little")
     if len(content) != 84 + count * _STL.itemsize:
-        raise InputError("this is not a whole binary STL", "STL", "write the file again")
+        raise InputError("the binary STL is truncated or malformed", "STL", "write the file again")
     corners = np.frombuffer(content, _STL, offset=84)["corners"].reshape(-1, 3)
     vertices, index = _unique_rows(corners.astype(float))
     return vertices, index.reshape(-1, 3)

@@ -74,7 +74,7 @@ class Part:
 
 
 def write_3mf(parts: Sequence[Part], printed: Sequence[int], title: str) -> bytes:
-    """A 3MF package of objects numbered from 1; those `printed` are one item of the build."""
+    """A 3MF package (bytes of a zip file) of objects numbered from 1; those `printed` are one build item."""
     extension = f' xmlns:b="{BEAMS}" requiredextensions="b"' if any(p.beams for p in parts) else ""
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
@@ -146,7 +146,7 @@ def read_3mf(content: bytes) -> tuple[dict[int, Part], list[int]]:
             _require(target in package.namelist(), f"its model {target!r} is missing")
             root = ElementTree.fromstring(package.read(target))
     except (zipfile.BadZipFile, KeyError, ElementTree.ParseError) as error:
-        raise InputError(f"this is no 3MF package: {error}", "3MF", "write the file again") from error
+        raise InputError(f"the file is not a 3MF package: {error}", "3MF", "write the file again") from error
     suffix = target.rpartition(".")[2]
     typed = {e.get("Extension"): e.get("ContentType") for e in ElementTree.fromstring(types)}
     _require(typed.get(suffix) == MODEL_TYPE, "its model has no content type")
@@ -162,7 +162,10 @@ def read_3mf(content: bytes) -> tuple[dict[int, Part], list[int]]:
         mesh = element.find(f"{{{CORE}}}mesh")
         if mesh is not None:
             part = _part(element.get("name", ""), mesh)
-            _require(part.clipped_to is None or part.clipped_to in objects, "a clipping mesh comes too late")
+            _require(
+                part.clipped_to is None or part.clipped_to in objects,
+                "a clipping mesh is defined after its use",
+            )
             objects[number] = part
         else:
             used = [int(c.get("objectid", "0")) for c in element.iter(f"{{{CORE}}}component")]
@@ -173,7 +176,9 @@ def read_3mf(content: bytes) -> tuple[dict[int, Part], list[int]]:
     if any(part.beams is not None for part in objects.values()):
         _require(bool(root.get("requiredextensions")), "the beam lattice is not marked as required")
     printed = [int(item.get("objectid", "0")) for item in root.iterfind(f"{{{CORE}}}build/{{{CORE}}}item")]
-    _require(bool(printed) and all(n in objects or n in assembled for n in printed), "nothing is to be built")
+    _require(
+        bool(printed) and all(n in objects or n in assembled for n in printed), "the build list is empty"
+    )
     return objects, [inner for number in printed for inner in assembled.get(number, [number])]
 
 
@@ -194,7 +199,7 @@ def _part(name: str, mesh: ElementTree.Element) -> Part:
     _require(len(triangles) >= 4 or lattice is not None, "a mesh has fewer than four triangles")
     if len(triangles):
         _require(triangles.min() >= 0 and triangles.max() < len(vertices), "a triangle's vertex is missing")
-        _require(bool((triangles != np.roll(triangles, 1, axis=1)).all()), "a triangle has a vertex twice")
+        _require(bool((triangles != np.roll(triangles, 1, axis=1)).all()), "a triangle has a repeated vertex")
     if lattice is None:
         return Part(name, vertices, triangles)
     own = f"{{{BEAMS}}}beams/{{{BEAMS}}}beam"
@@ -219,4 +224,4 @@ def _target(relationships: bytes) -> str:
 
 def _require(holds: bool, what: str) -> None:
     if not holds:
-        raise InputError(f"this is no sound 3MF package: {what}", "3MF", "write the file again")
+        raise InputError(f"the 3MF package is invalid: {what}", "3MF", "write the file again")

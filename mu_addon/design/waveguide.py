@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from .anchors import Window, anchors
+from .anchors import Window, anchor_points
 from .block import Block, face_moves
 from .dimensions import Dimensions
 from .lattice import Lattice, lattice_of
@@ -149,7 +149,7 @@ def waveguide(unit: Unit, path: Window | ArrayLike, within: Dimensions | None = 
     """
     d = unit.dimensions if within is None else within
     lattice = lattice_of(d)
-    nodes = anchors(unit)[list(path.indices)] if isinstance(path, Window) else np.asarray(path, float)
+    nodes = anchor_points(unit)[list(path.indices)] if isinstance(path, Window) else np.asarray(path, float)
     numbers = _numbers(lattice, nodes, isinstance(path, Window))
     _check_path(d, nodes)
     met = np.isin(lattice.struts, numbers)
@@ -263,7 +263,7 @@ def _numbers(lattice: Lattice, nodes: Array, is_window: bool) -> list[int]:
                 )
             x, y, z = (float(c) for c in point)
             raise InputError(
-                f"({x:.4g}, {y:.4g}, {z:.4g}) mm is no node of the lattice",
+                f"({x:.4g}, {y:.4g}, {z:.4g}) mm is not a node of the lattice",
                 "path",
                 "take a path of this unit: of paths.csv of `place --paths graph` at the same scale",
             )
@@ -274,7 +274,7 @@ def _numbers(lattice: Lattice, nodes: Array, is_window: bool) -> list[int]:
 def _check_path(d: Dimensions, nodes: Array) -> None:
     """Raise InputError for a path of one point, through the actuator, or too sharp a bend."""
     if len(nodes) < 2 or (np.linalg.norm(np.diff(nodes, axis=0), axis=1) < 1e-9).any():
-        raise InputError("a path needs two nodes that differ", "path", "choose another path")
+        raise InputError("a path needs two different nodes", "path", "choose another path")
     t = np.linspace(0.0, 1.0, 25)[:, None]
     for start, end in pairwise(nodes):
         at = start + t * (end - start)
@@ -371,9 +371,9 @@ def _end(d: Dimensions, struts: _Struts, node: Array, onward: Array, name: str) 
                 why = why or found
     x, y, z = (float(c) for c in node)
     raise InputError(
-        f"the {name} end of the path, at ({x:.4g}, {y:.4g}, {z:.4g}) mm, has no room for a seat: {why}",
+        f"the {name} end of the path, at ({x:.4g}, {y:.4g}, {z:.4g}) mm, has no space for a seat: {why}",
         "[waveguide] seats",
-        "choose another path or a thinner seat_wall_mm, or set seats = false and hold the parts yourself",
+        "choose another path or a thinner seat_wall_mm, or set seats = false and mount the parts separately",
     )
 
 

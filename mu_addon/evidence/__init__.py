@@ -1,1 +1,49 @@
-"""Measured data against the model: what is wrong, why, and what mending it gains."""
+"""Evidence: measured data against the model: what is wrong, how sure, and what correcting it gains.
+
+`diagnose` takes experiments and a `Simulator` of them and returns a `Verdict`: the effects that explain the
+misfit, those that cannot be told apart, the gain on data held out, and the experiment to make next. An
+`Effect` is a mechanism with parameters that leave the model as it is at their null.
+"""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import public_face
+
+if TYPE_CHECKING:
+    from .effect import Effect as Effect
+    from .effect import Parameter as Parameter
+    from .extended import ExtendedModel as ExtendedModel
+    from .extended import extended_model as extended_model
+    from .extended import load_model as load_model
+    from .fit import Fit as Fit
+    from .fit import Fitter as Fitter
+    from .next_experiment import Proposal as Proposal
+    from .next_experiment import propose_experiment as propose_experiment
+    from .noise import Source as Source
+    from .noise import Whitening as Whitening
+    from .prediction.bench import bench_simulators as bench_simulators
+    from .prediction.unit import UnitPressure as UnitPressure
+    from .record import Record as Record
+    from .simulator import Composite as Composite
+    from .simulator import Simulator as Simulator
+    from .unit_fem import UnitSettings as UnitSettings
+    from .unit_fem import unit_responses as unit_responses
+    from .verdict import Verdict as Verdict
+    from .verdict import diagnose as diagnose
+else:
+    __getattr__, __dir__, __all__ = public_face(
+        __name__,
+        {
+            "effect": "Effect Parameter",
+            "extended": "ExtendedModel extended_model load_model",
+            "fit": "Fit Fitter",
+            "next_experiment": "Proposal propose_experiment",
+            "noise": "Source Whitening",
+            "record": "Record",
+            "simulator": "Composite Simulator",
+            "unit_fem": "UnitSettings unit_responses",
+            "verdict": "Verdict diagnose",
+            "prediction.bench": "bench_simulators",
+            "prediction.unit": "UnitPressure",
+        },
+    )

@@ -34,7 +34,12 @@ FEWEST = 9
 
 
 def reading_noise(values: Array) -> float:
-    """Standard deviation of white noise in readings (n,), by the median of their higher differences."""
+    """Standard deviation of white noise in readings (n,), in their unit, by the median of higher differences.
+
+    >>> rng = np.random.default_rng(0)
+    >>> round(float(reading_noise(np.linspace(0, 50, 400) + rng.normal(0, 0.2, 400))), 2)
+    0.2
+    """
     found = []
     for order in ORDERS:
         if len(values) < 4 * order:

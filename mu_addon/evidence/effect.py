@@ -10,42 +10,63 @@ from ..errors import InputError
 
 # What each effect is, and the experiment that shows it best.
 LIBRARY = {
-    "viscoelasticity": ("all moduli relax with time", "holds, and one protocol at rates a decade apart"),
+    "viscoelasticity": (
+        "all moduli relax with time",
+        "pressure holds, and one protocol at two rates a decade apart",
+    ),
     "rate_independent_hysteresis": ("friction inside the material resists every reversal", "slow loops"),
     "strain_stiffening": ("the material stiffens at large stretch", "an amplitude ladder to full pressure"),
-    "mullins_softening": ("the first loading softens whatever follows below its peak", "a virgin ladder"),
-    "tension_compression_asymmetry": ("tension and compression differ", "pressure and vacuum"),
+    "mullins_softening": ("the first loading softens all later loading below its peak", "a virgin ladder"),
+    "tension_compression_asymmetry": (
+        "the stiffness differs between tension and compression",
+        "pressure and vacuum",
+    ),
     "anisotropy": ("layers make the modulus depend on direction", "specimens printed along x, y and z"),
     "fatigue_drift": ("the modulus falls with the number of cycles", "the first protocol again at the end"),
     "temperature_drift": ("the modulus depends on temperature", "one protocol at two temperatures"),
-    "overcure": ("light cures resin beyond the drawn surface: every part is thicker", "weighed specimens"),
-    "skin_cure": ("the surface cured more than the core and is stiffer", "coupons of several thicknesses"),
-    "wall_thickness": ("the chamber's wall is thicker or thinner than drawn", "a section, or the mass"),
-    "pressure_offset": ("the gauge does not read zero at rest", "a record at rest; pressure and vacuum"),
-    "pressure_gain": ("the gauge reads a constant share too much", "a dead load, or a second gauge"),
-    "line_lag": ("the line's resistance delays the chamber behind the gauge", "steps and fast cycles"),
-    "leak": ("air that leaks flows through the line, so the chamber is below the gauge", "a closed valve"),
-    "clogged_chamber": ("one chamber gets less pressure than the others", "markers along the unit"),
+    "overcure": (
+        "light cures resin beyond the nominal surface, so every part is thicker",
+        "weighed specimens",
+    ),
+    "skin_cure": ("the surface is cured more than the core and is stiffer", "coupons of several thicknesses"),
+    "wall_thickness": ("the chamber wall is thicker or thinner than nominal", "a section, or the mass"),
+    "pressure_offset": (
+        "the pressure gauge does not read zero at rest",
+        "a record at rest; pressure and vacuum",
+    ),
+    "pressure_gain": ("the pressure gauge has a gain error", "a dead load, or a second gauge"),
+    "line_lag": (
+        "the resistance of the air line delays the chamber pressure behind the gauge",
+        "steps and fast cycles",
+    ),
+    "leak": (
+        "leaking air flows through the line, so the chamber pressure is below the gauge",
+        "a closed valve",
+    ),
+    "clogged_chamber": ("one chamber receives less pressure than the others", "markers along the unit"),
     "gravity": ("weight bends the unit", "one protocol in three orientations, or an added mass"),
-    "contact": ("the unit touches something", "the same protocol away from every obstacle"),
-    "angle_offset": ("the camera's zero of angle is not the unit's", "a record at rest"),
-    "clock_offset": ("camera and gauge do not share their clock", "steps and fast cycles"),
-    "seating": ("faces of the specimen close gaps before it bears load", "a preload; two specimen lengths"),
-    "frame_compliance": ("the testing machine gives way", "a rigid block in the specimen's place"),
+    "contact": ("the unit touches an obstacle", "the same protocol away from every obstacle"),
+    "angle_offset": ("the camera's zero angle differs from the unit's", "a record at rest"),
+    "clock_offset": ("the clocks of camera and gauge differ", "steps and fast cycles"),
+    "seating": (
+        "gaps at the specimen's faces close before it carries load",
+        "a preload; two specimen lengths",
+    ),
+    "frame_compliance": ("the testing machine deforms", "a rigid block in the specimen's place"),
     "led_drift": ("the light source fades", "a straight waveguide over the same time"),
-    "ambient_light": ("light from outside adds to the signal", "the light source switched off"),
-    "optical_nonlinearity": ("light lost is not proportional to curvature", "an amplitude ladder"),
-    "mesh_error": ("the model's mesh is too coarse", "the same simulation on a finer mesh"),
+    "ambient_light": ("ambient light adds to the signal", "the light source switched off"),
+    "optical_nonlinearity": ("the light loss is not proportional to curvature", "an amplitude ladder"),
+    "mesh_error": ("the mesh of the model is too coarse", "the same simulation on a finer mesh"),
 }
 
 
 @attrs.frozen
 class Parameter:
-    """A number with unit, bounds, the `null` at which it changes nothing, `starts` for a fit, its source.
+    """A number that a model can be fitted by: unit, bounds, source, and the `null` where it changes nothing.
 
-    linear: the prediction is affine in it, with one slope whatever the other values are. spread: standard
-    deviation of what is known of it before any data; inf where nothing is. experiment: the only one whose
-    prediction heeds it, by name; any may where it is empty.
+    starts: values from which a fit begins. linear: the prediction is affine in it, with one slope whatever
+    the other values are. spread: standard deviation of what is known before any data; inf where nothing is.
+    experiment: name of the only experiment whose prediction depends on it; empty where any may.
     """
 
     name: str

@@ -32,10 +32,10 @@ class Fitted:
 
 @attrs.frozen
 class ExtendedModel:
-    """Fitted parameters by effect and name, and nuisances by name; verdict: how sure the effects are.
+    """What a verdict found, for simulations: fitted parameters by effect and name, and nuisances by name.
 
-    lattice: how the block whose modulus was fitted answers to a print offset; None where slender struts stood
-    for it.
+    verdict: how sure the effects are. lattice: response of the printed lattice, from virtual tests, to a
+    print offset; None where a power law of slender struts was used.
     """
 
     verdict: str
@@ -81,7 +81,7 @@ def _lines(f: Fitted) -> list[str]:
 
 
 def extended_model(verdict: Verdict, units: Mapping[str, str] = MappingProxyType({})) -> ExtendedModel:
-    """The model that a verdict leaves: the base with its nuisances fitted where no effect was named.
+    """The model that a verdict leaves: the base with the named effects, else with its nuisances fitted.
 
     units: of the nuisances, by name.
     """
@@ -106,7 +106,7 @@ def load_model(path: Path) -> ExtendedModel:
         text = file_text(path)
     except OSError as error:
         raise InputError(
-            f"cannot read {path}: {error.strerror}", str(path), "diagnose a folder first"
+            f"cannot read {path}: {error.strerror}", str(path), "run `diagnose` on a folder first"
         ) from error
     except UnicodeDecodeError as error:
         raise InputError("the model is not UTF-8 text", str(path), "give a model.toml") from error

@@ -14,11 +14,11 @@ from ..design.parameters import Printing, Unit
 from ..design.strut_cell import StrutCell, relative_density, strut_cell
 from ..errors import InputError
 from ..files import read_npz, write_npz, write_text
-from ..homogenize.cell_mesh import CellMeshSettings, cell_materials, cell_mesh
+from ..homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell
 from ..homogenize.compression import Friction, compress
 from ..homogenize.modulus import modulus
 from ..homogenize.offset_response import OffsetResponse
-from ..homogenize.specimen import specimen
+from ..homogenize.specimen import block_specimen
 from ..measured import Experiment
 from ..reading import file_text, parse_toml
 from .prediction.lattice import KIND, ComputedCell, Scaling
@@ -98,10 +98,10 @@ def at_offset(block: Block, offset_mm: float, cache: Path | None = None) -> tupl
         offset_xy_mm=block.cell.offset_xy_mm + offset_mm,
         offset_z_mm=block.cell.offset_z_mm + offset_mm,
     )
-    mesh = cell_mesh(cell, MESH, cache)
+    mesh = mesh_cell(cell, MESH, cache)
     materials = cell_materials(cell, mesh, RESIN_MPa, block.poisson)
     test = compress(
-        specimen(mesh, block.cells, materials), (STRAIN,), FRICTION[block.plates], stability=False
+        block_specimen(mesh, block.cells, materials), (STRAIN,), FRICTION[block.plates], stability=False
     )
     return modulus(test.curve, "initial tangent") / RESIN_MPa, relative_density(cell)
 
@@ -141,7 +141,7 @@ def block_of(experiment: Experiment, unit: Unit) -> Block | None:
         raise InputError(
             f"a block of {experiment.cells} cells is no cube",
             experiment.name,
-            "compress cubes, or leave out cells: its struts are then taken for slender ones",
+            "compress cubes, or omit cells: the specimen is then modelled as slender struts",
         )
     cell = strut_cell(attrs.evolve(unit, scale=1.0, print=Printing()))
     return Block(cell, experiment.cells[0], experiment.plates or HELD, unit.material.membrane_poisson)
@@ -161,9 +161,9 @@ def scalings(
     blocks = {e.name: block_of(e, unit) for e in experiments if e.kind == KIND}
     distinct = list(dict.fromkeys(b for b in blocks.values() if b is not None))
     found = {b: response(b, cache, say) for b in distinct}
-    told = [f"lattice specimens are taken for {b}, as computed from their struts" for b in distinct]
+    told = [f"lattice specimens are modelled as {b}, computed from their struts" for b in distinct]
     if None in blocks.values():
-        told.append("lattice specimens without a count of cells are taken for slender struts that bend")
+        told.append("lattice specimens without a number of cells are modelled as slender bending struts")
     first = found[distinct[0]] if distinct else None
     return {
         n: ComputedCell(found[b], first, *printed(unit.print)) for n, b in blocks.items() if b is not None

@@ -28,12 +28,14 @@ class Proposal:
     expected: float
 
 
-def next_experiment(
+def propose_experiment(
     fitter: Fitter, found: Selection, seen: Sequence[Sensitivity], feasible: Sequence[Experiment] = ()
 ) -> Proposal | None:
-    """The best of `feasible` experiments, else of variations of those made; None where nothing is in doubt.
+    """The experiment that best separates the effects that are still in doubt; None where nothing is in doubt.
 
-    feasible: their columns hold what drives them; what would be measured may hold anything but nan.
+    feasible: experiments that the bench can make, with the columns that drive them; what would be measured
+    may hold anything but nan. Without any, variations of those already made are tried. Best means the
+    largest expected difference in chi squared between the rival fits.
     """
     rivals = [c for c in found.causes if c.rivals]
     if not rivals:

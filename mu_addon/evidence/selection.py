@@ -103,7 +103,7 @@ def select(
         if p >= FALSE_ALARM_RATE:
             break
         if _loss(fitter, chosen, pool[0]) <= 0.0:
-            doubted = f"{pool[0].names[-1]} fits, yet does not predict experiments left out"
+            doubted = f"{pool[0].names[-1]} fits, but its leave-one-out prediction fails"
             break
         chosen = pool[0]
         ps.append(p)
@@ -131,7 +131,9 @@ def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) ->
         )
         ps.append(p)
         if p >= FALSE_ALARM_RATE:
-            doubted = doubted or f"{e.name} gains no more than chance under the noise that the causes leave"
+            doubted = (
+                doubted or f"{e.name} gives no significant gain at the noise that remains with the causes"
+            )
     table_base = tuple(dependence_table(fitter, base))
     doubted = doubted or _sudden(table_base, base, chosen)
     effects = [f.effects[0] for f in singles]
@@ -184,7 +186,7 @@ def _sudden(table: Sequence[Dependence], base: Fit, chosen: Fit) -> str:
     for d in table:
         gain = {"break": d.statistic, "jump": d.statistic**2}.get(d.against, 0.0)
         if gain - 2.0 * (d.dof + 1) > named:
-            return f"a sudden change explains more than {' and '.join(chosen.names)}: {d.where}"
+            return f"a step change explains more than {' and '.join(chosen.names)}: {d.where}"
     return ""
 
 

@@ -17,9 +17,10 @@ Array = np.ndarray[Any, Any]
 
 
 class Simulator(Protocol):
-    """Predicts what an experiment's instruments read.
+    """Predicts what the instruments of an experiment read; one class for each kind of experiment.
 
-    nuisances: what must be fitted whatever the cause; effects: what the base model may lack.
+    nuisances: parameters that are fitted whatever the cause; effects: mechanisms that the base model may
+    lack.
     """
 
     @property
@@ -42,11 +43,10 @@ class Simulator(Protocol):
 
 
 class Composite:
-    """Simulators of several kinds as one, that share parameters by name; it remembers predictions.
+    """Simulators of several kinds of experiment as one; they share parameters by name, and cache predictions.
 
-    An effect whose parameters differ from kind to kind is several effects of one name.
-
-    calls: predictions that were computed; remembered: predictions kept, the oldest are dropped.
+    An effect whose parameters differ from kind to kind counts as several effects of one name. calls:
+    predictions that were computed; remembered: predictions kept, the oldest are dropped.
     """
 
     def __init__(self, simulators: Mapping[str, Simulator], remembered: int = 1024) -> None:
@@ -106,9 +106,9 @@ class Composite:
     def _of(self, experiment: Experiment) -> Simulator:
         if experiment.kind not in self._simulators:
             raise InputError(
-                f"nothing predicts {experiment.kind}",
+                f"there is no model for {experiment.kind}",
                 experiment.name,
-                f"there are simulators of {', '.join(self._simulators)}",
+                f"models exist for {', '.join(self._simulators)}",
             )
         return self._simulators[experiment.kind]
 
@@ -129,5 +129,5 @@ def effect_named(effects: Sequence[Effect], name: str) -> Effect:
         if e.name == name:
             return e
     raise InputError(
-        f"no simulator knows {name!r}", "effects", f"known: {', '.join(e.name for e in effects)}"
+        f"unknown effect or parameter {name!r}", "effects", f"known: {', '.join(e.name for e in effects)}"
     )

@@ -23,6 +23,7 @@ from ..fem.newton_settings import NewtonSettings
 from ..fem.obstacle import CONTACT, Obstacle
 from ..fem.rigid import Plane
 from ..fem.unit import materials_of
+from ..fem.wall_law import LAYER_NORMAL, layer_stiffness
 from ..meshing.mesh import LATTICE, MEMBRANE, Mesh
 from ..meshing.morph import morphed
 from ..meshing.settings import CELL_MM, MeshSettings
@@ -54,7 +55,8 @@ class Body:
 
     finer: the mesh that mesh_error compares with. distal: how many chambers, from the tip, a clog cuts off.
     lattice: a law for the lattice in place of the unit's moduli. drawn: the unit whose mesh is moved to this
-    one's dimensions, since another mesh would bring noise as large as a small effect.
+    one's dimensions, since another mesh would bring noise as large as a small effect. device: Warp's, of a
+    model.
     """
 
     unit: Unit
@@ -64,6 +66,7 @@ class Body:
     lattice: LatticeLaw | None = None
     orientation_deg: float = 0.0
     drawn: Unit | None = None
+    device: str = "cpu"
 
     def meshed(self, cache: Path | None = None) -> Mesh:
         """The unit's mesh; raises InputError and MeshingError. cache: see `mesh_unit`."""
@@ -71,12 +74,18 @@ class Body:
         return morphed(mesh, self.drawn, self.unit, self.mesh) if self.drawn else mesh
 
     def materials(self, mesh: Mesh) -> Materials:
-        """The base model's materials."""
+        """The base model's materials; raises InputError where the unit's wall has a law of its own."""
+        if self.unit.wall.names:
+            raise InputError(
+                "evidence takes a neo-Hookean wall: what a wall does beyond that is what it looks for",
+                "[wall]",
+                "leave [wall] out of the unit",
+            )
         return materials_of(self.unit, mesh, self.lattice)
 
     def model(self, mesh: Mesh) -> Model:
         """The base model, under pressure alone."""
-        return Model(mesh, threads=1)
+        return Model(mesh, device=self.device, threads=1)
 
 
 @attrs.frozen
@@ -117,7 +126,11 @@ class UnitEffect:
 
 
 def down(orientation_deg: float) -> Array:
-    """Unit vector (3,) along which things fall: z turned about x, so that at 0 the tip hangs down."""
+    """Unit vector (3,) along which things fall, for an orientation in degrees about x: 0 hangs, tip down.
+
+    >>> down(0.0).round(9).tolist()[2]
+    1.0
+    """
     a = math.radians(orientation_deg)
     return np.array([0.0, -math.sin(a), math.cos(a)])
 
@@ -133,7 +146,7 @@ def _clogged(body: Body, mesh: Mesh, share_lost: float) -> Model:
         raise InputError(
             f"{body.distal} of {d.count} chambers cannot be cut off", "clogged_chamber", "give 1 or more"
         )
-    return CloggedModel(mesh, (d.count - body.distal) * d.cell, share_lost, threads=1)
+    return CloggedModel(mesh, (d.count - body.distal) * d.cell, share_lost, device=body.device, threads=1)
 
 
 def walled(body: Body, mesh: Mesh, gap_mm: float) -> Model:
@@ -227,31 +240,6 @@ def _asymmetric(materials: Materials, mesh: Mesh, excess: float) -> Materials:
     return Materials((*rest, *_shares(lattice_, min(1.0, 1.0 + excess)), foam))
 
 
-def layer_stiffness(ratio: float, shear_MPa: float, bulk_MPa: float) -> tuple[float, float]:
-    """What `Layered` adds along the layers in MPa, and the share of all, that make a wall's layers differ.
-
-    Beside an isotropic law of these moduli the modulus along the layers is then `ratio` times that across,
-    which stays what it was. Below 0: as much across them, with as much less of the isotropic law's shear,
-    which is the same at small strain.
-    """
-    from scipy.optimize import brentq
-
-    lame = bulk_MPa - 2 * shear_MPa / 3
-
-    def moduli(added: float) -> tuple[float, float]:
-        """Young's moduli along and across the layers."""
-        stiffness = np.full((3, 3), lame) + np.diag(2 * shear_MPa + added * np.array([1.0, 1.0, 0.0]))
-        compliance = np.linalg.inv(stiffness)
-        return 1 / compliance[0, 0], 1 / compliance[2, 2]
-
-    def off(added: float) -> float:
-        along, across = moduli(added)
-        return along / across - ratio
-
-    added = float(brentq(off, -1.999 * shear_MPa, 1e4 * shear_MPa, xtol=1e-12 * shear_MPa))
-    return added, moduli(0.0)[1] / moduli(added)[1]
-
-
 def _layered(materials: Materials, mesh: Mesh, in_plane: float) -> Materials:
     """The wall stiffer along the print's layers, which lie across the axis; the lattice as it is.
 
@@ -265,7 +253,7 @@ def _layered(materials: Materials, mesh: Mesh, in_plane: float) -> Materials:
         added, share = layer_stiffness(1 + in_plane, float(shear), float(bulk))
         less = min(added, 0.0)
         base = layer.parameters + np.array([less / 2, less / 3])
-        more = Layered.parameters(max(added, 0.0), -less, (0.0, 0.0, 1.0))
+        more = Layered.parameters(max(added, 0.0), -less, LAYER_NORMAL)
         more = np.tile(more, (len(layer.elements), 1))
         layered += _shares((attrs.evolve(layer, parameters=base),), share)
         layered.append(Layer(Layered, layer.elements, more, share * layer.weight))

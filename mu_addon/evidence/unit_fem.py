@@ -83,7 +83,7 @@ class UnitSettings:
         for name in self.effects:
             if name not in KNOWN:
                 raise InputError(
-                    f"the unit's model has no effect {name!r}",
+                    f"the model of the unit has no effect {name!r}",
                     "unit settings",
                     f"known: {', '.join(KNOWN)}",
                 )
@@ -214,7 +214,7 @@ def pressures(readings_kPa: Array, count: int, margin: float) -> tuple[float, ..
     """About `count` pressures in kPa, ascending, from a little below the readings to above, 0 among them."""
     low, high = min(0.0, float(np.min(readings_kPa))), max(0.0, float(np.max(readings_kPa)))
     if low == high:
-        raise InputError("the pressure is 0 throughout", "unit_pressure", "add an experiment under pressure")
+        raise InputError("the pressure is always 0", "unit_pressure", "add an experiment under pressure")
     beyond = margin * (high - low)
     # Two digits, so that a longer record of the same protocol finds the same runs.
     low, high = (float(f"{end:.2g}") for end in (low - beyond, high + beyond))
@@ -243,7 +243,7 @@ def unit_responses(
     chosen = [e for e in experiments if e.kind == KIND]
     for e in chosen:
         if e.added_mass_g:
-            raise InputError("the unit's model has no added mass", e.name, "leave the experiment out")
+            raise InputError("the model of the unit has no added mass", e.name, "leave the experiment out")
     plans = [_Plan.of(unit, chosen, scale, settings, cache) for scale in sorted({e.scale for e in chosen})]
     for plan in plans:
         for m in plan.markers:
@@ -431,7 +431,8 @@ class _Plan:
         reached = np.isfinite(base.values[0])
         if np.count_nonzero(reached) < FEWEST:
             raise ConvergenceError(
-                f"the unit at {self.scale:g}x reaches too few of the measured pressures: {base.why}",
+                f"the unit at {self.scale:g}x has an equilibrium at too few of the measured "
+                f"pressures: {base.why}",
                 "unit_pressure",
                 "check the unit's moduli and wall against the specimen's",
             )
@@ -515,9 +516,9 @@ def _solved(missing: dict[str, Run], workers: int, cache: Path | None) -> Iterat
                 yield waiting[done], done.result()
         except BrokenProcessPool:
             raise MuError(
-                "a process that simulated the unit ended before its time",
+                "a process that simulated the unit ended unexpectedly",
                 "unit_pressure",
-                "run again, it resumes; if memory is short give 1 worker",
+                "run the command again, it resumes; if memory is short, use 1 worker",
             ) from None
         finally:
             pool.shutdown(wait=False, cancel_futures=True)

@@ -13,7 +13,7 @@ from ..measured import Experiment
 from .drive import without_noise
 from .fit import Fitter
 from .gain import Gain, gain
-from .next_experiment import Proposal, next_experiment
+from .next_experiment import Proposal, propose_experiment
 from .noise import Source, estimate, span
 from .record import Record, record
 from .selection import Selection, interval, one_more, reselected, select
@@ -31,9 +31,10 @@ RENEWED = 1.5
 
 @attrs.frozen(eq=False)
 class Verdict:
-    """What the data say of the model; kind is one of `KINDS`. See `as_json` for the file.
+    """What the data say of the model: the causes named, their rivals, the gain, and what to measure next.
 
-    experiments: all of them, their drives freed of the noise of gauges, see `drive.without_noise`.
+    kind: one of `KINDS` (none, named, ambiguous, unidentifiable, unexplained). experiments: all of them,
+    their drives freed of gauge noise (`drive.without_noise`). `as_json` is the content of verdict.json.
     """
 
     kind: str
@@ -122,9 +123,13 @@ def _rough(measured: Record, group: str) -> Source:
 def diagnose(
     experiments: Sequence[Experiment], simulator: Composite, progress: Callable[[str], None] = lambda _: None
 ) -> Verdict:
-    """Judge the simulator by experiments; those held out are used for the gain alone.
+    """Judge a model by measured experiments: which effects explain the misfit, and how surely.
 
-    progress: called with what is being done. Raises InputError where no experiment can be predicted.
+    experiments: from `measured.read_folder`; those with the role "held_out" are used for the gain alone.
+    simulator: of their kinds. progress: called with what is being done. Noise is estimated first and the
+    residuals whitened; every effect of the library is then fitted as a rival, and one is named only where
+    it is significant, predicts left-out experiments better and leaves no structure. Raises InputError where
+    no experiment can be predicted.
     """
     experiments, again = without_noise(experiments, simulator)
     measured = record([e for e in experiments if e.role == "fit"], simulator)
@@ -152,7 +157,7 @@ def diagnose(
     kind = _kind(fitter, chosen)
     progress("gain")
     gained = gain(fitter, chosen.base, chosen.chosen, [e for e in experiments if e.role == "held_out"])
-    proposal = next_experiment(fitter, chosen, seen)
+    proposal = propose_experiment(fitter, chosen, seen)
     known = chosen.chosen if chosen.causes else chosen.base
     bounds = {k: interval(fitter, known, k) for k in known.keys}
     told = _identifiability(seen, chosen)
@@ -190,12 +195,12 @@ def _identifiability(seen: Sequence[Sensitivity], chosen: Selection) -> dict[str
             most = max((p.low, p.high), key=lambda bound: abs(bound - p.null))
             size, unit = p.name.replace("_", " "), f" {p.unit}" * bool(p.unit)
             found[name] = (
-                f"its bound, {size} {most:g}{unit}, is too small to be seen here, where "
-                f"{s.limit:.2g}{unit} would be; what would show it: {s.effect.reveals}"
+                f"its bound, {size} {most:g}{unit}, is too small to be detected here, where "
+                f"{s.limit:.2g}{unit} would be; experiment that shows it: {s.effect.reveals}"
             )
         elif s.absorbed_by and s.unabsorbed > 0:
             by = " and ".join(n.replace("_", " ") for n in s.absorbed_by)
-            found[name] = f"absorbed by {by}; what would show it: {s.effect.reveals}"
+            found[name] = f"absorbed by {by}; experiment that shows it: {s.effect.reveals}"
         else:
-            found[name] = f"nothing here depends on it; what would show it: {s.effect.reveals}"
+            found[name] = f"no measured quantity depends on it; experiment that shows it: {s.effect.reveals}"
     return found

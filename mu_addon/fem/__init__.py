@@ -1,1 +1,95 @@
-"""Quasi-static finite elements: tetrahedra, materials and follower pressure to an equilibrium path."""
+"""Finite elements: quasi-static equilibria of soft bodies under pressure, weight and contact.
+
+A `Model` is a discretised body, `Materials` what fills it, and `Equilibrium` finds its states by Newton's
+method: `simulate` along a pressure protocol, `simulate_in_time` where a law or friction remembers,
+`trace_branch` through limit points. `bending_angle_deg` and `probe` read results off a deformed mesh. Units:
+mm, N, MPa, s; kPa and degrees only where the name says so.
+
+    >>> from mu_addon.fem import NeoHooke
+    >>> NeoHooke.parameter_names
+    ('mu_MPa', 'kappa_MPa')
+"""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import public_face
+
+if TYPE_CHECKING:
+    from .arc import ContinuationSettings as ContinuationSettings
+    from .batched_newton import BatchedNewton as BatchedNewton
+    from .batched_newton import Variant as Variant
+    from .continuation import Branch as Branch
+    from .continuation import limit_pressure as limit_pressure
+    from .continuation import trace_branch as trace_branch
+    from .embedding import Embedding as Embedding
+    from .embedding import embed as embed
+    from .equilibrium import Equilibrium as Equilibrium
+    from .kinematics import Probe as Probe
+    from .kinematics import TipSection as TipSection
+    from .kinematics import bending_angle_deg as bending_angle_deg
+    from .kinematics import probe as probe
+    from .lattice_law import LatticeLaw as LatticeLaw
+    from .laws import Foam as Foam
+    from .laws import Friction as Friction
+    from .laws import Law as Law
+    from .laws import Layered as Layered
+    from .laws import MooneyRivlin as MooneyRivlin
+    from .laws import NeoHooke as NeoHooke
+    from .laws import Ogden as Ogden
+    from .laws import OgdenRoxburgh as OgdenRoxburgh
+    from .laws import Prony as Prony
+    from .laws import Yeoh as Yeoh
+    from .loads import gravity as gravity
+    from .loads import traction as traction
+    from .materials import Layer as Layer
+    from .materials import Materials as Materials
+    from .model import Model as Model
+    from .newton_settings import NewtonSettings as NewtonSettings
+    from .obstacle import Contact as Contact
+    from .obstacle import Obstacle as Obstacle
+    from .protocol import Protocol as Protocol
+    from .protocol import read_protocol as read_protocol
+    from .rigid import Box as Box
+    from .rigid import Plane as Plane
+    from .rigid import Pose as Pose
+    from .rigid import Sphere as Sphere
+    from .self_intersection import crossings as crossings
+    from .self_intersection import first_self_intersection as first_self_intersection
+    from .solver import SolverChoice as SolverChoice
+    from .state import State as State
+    from .state import rest as rest
+    from .stress import cauchy as cauchy
+    from .stress import von_mises as von_mises
+    from .time_stepping import Instant as Instant
+    from .time_stepping import simulate_in_time as simulate_in_time
+    from .trajectory import Trajectory as Trajectory
+    from .trajectory import simulate as simulate
+    from .unit import materials_of as materials_of
+else:
+    __getattr__, __dir__, __all__ = public_face(
+        __name__,
+        {
+            "arc": "ContinuationSettings",
+            "batched_newton": "BatchedNewton Variant",
+            "continuation": "Branch limit_pressure trace_branch",
+            "embedding": "Embedding embed",
+            "equilibrium": "Equilibrium",
+            "kinematics": "Probe TipSection bending_angle_deg probe",
+            "lattice_law": "LatticeLaw",
+            "laws": "Foam Friction Law Layered MooneyRivlin NeoHooke Ogden OgdenRoxburgh Prony Yeoh",
+            "loads": "gravity traction",
+            "materials": "Layer Materials",
+            "model": "Model",
+            "newton_settings": "NewtonSettings",
+            "obstacle": "Contact Obstacle",
+            "protocol": "Protocol read_protocol",
+            "rigid": "Box Plane Pose Sphere",
+            "self_intersection": "crossings first_self_intersection",
+            "solver": "SolverChoice",
+            "state": "State rest",
+            "stress": "cauchy von_mises",
+            "time_stepping": "Instant simulate_in_time",
+            "trajectory": "Trajectory simulate",
+            "unit": "materials_of",
+        },
+    )

@@ -26,7 +26,7 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen
 class ContinuationSettings:
-    """How long the steps along a branch are, and how exactly its critical points are found."""
+    """Step lengths of arc-length continuation, and how accurately critical points are located."""
 
     first_step_MPa: float = 0.002
     max_points: int = 100

@@ -40,7 +40,7 @@ class Critical:
 
 @attrs.frozen(eq=False)
 class Branch:
-    """Points in order from the start, the critical points passed, and why the branch ends."""
+    """Points of a branch in order from its start, the critical points passed, and why it ends."""
 
     points: tuple[Point, ...]
     criticals: tuple[Critical, ...]
@@ -73,11 +73,15 @@ def trace_branch(
     settings: ContinuationSettings | None = None,
     on_point: Callable[[Point], None] | None = None,
 ) -> Branch:
-    """The branch from a converged state to where it first reaches a pressure in MPa or a volume in mm3.
+    """The branch of equilibria from a converged state, through limit points, by arc-length continuation.
 
-    It sets out toward that pressure or volume, else to higher (toward > 0) or lower pressure. Mirror
-    planes hide bifurcations into shapes that lack their symmetry. Raises ConvergenceError where the
-    smallest step fails.
+    It ends where it first reaches the pressure until_MPa or the cavity volume until_mm3, at the first
+    critical point (stop_at_critical), or after settings.max_points. It sets out toward the target, else to
+    higher (toward > 0) or lower pressure. body: an `Equilibrium`. on_point: called with each `Point`.
+
+    Mirror planes of the mesh hide bifurcations into shapes that lack their symmetry. Raises
+    ConvergenceError where the smallest step fails. Sources: Keller (1977); Riks, J. Appl. Mech. 39 (1972)
+    1060.
     """
     s = settings or ContinuationSettings()
     arc = Arc(body, start, s)
@@ -116,10 +120,10 @@ def trace_branch(
 
 
 def limit_pressure(body: Body, last: State, toward: float) -> Critical | None:
-    """What stops load stepping on the way from a converged state to a pressure `toward` in MPa.
+    """The first critical point on the way from a converged state to a pressure `toward` in MPa, or None.
 
-    The first critical point of the branch, or None where it goes on to that pressure without one, or
-    for many points. Raises ConvergenceError where the branch cannot be followed.
+    None means that the branch reaches that pressure without one, or that none was found among 30 points.
+    Raises ConvergenceError where the branch cannot be traced.
     """
     # Load stepping gives up within its smallest step of what stops it.
     settings = ContinuationSettings(first_step_MPa=body.settings.min_step_MPa, max_points=30)

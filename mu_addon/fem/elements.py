@@ -15,9 +15,13 @@ Array = np.ndarray[Any, Any]
 
 
 def tet_quadrature(order: int) -> tuple[Array, Array]:
-    """Barycentric points (q, 4) and weights (q,), summing to 1/6: degree 1 for order 1, 2 for order 2.
+    """Quadrature of a tetrahedron: barycentric points (q, 4) and weights (q,) that sum to 1/6.
 
-    Four points integrate the stiffness of a straight-sided quadratic tetrahedron exactly.
+    Exact to degree 1 for elements of order 1, to degree 2 for order 2.
+
+    >>> points, weights = tet_quadrature(2)
+    >>> points.shape, round(float(weights.sum()) * 6, 12)
+    ((4, 4), 1.0)
     """
     if order == 1:
         return np.full((1, 4), 0.25), np.array([1 / 6])
@@ -80,7 +84,11 @@ def reference_gradients(nodes: Array, tets: Array) -> ReferenceGradients:
 
 
 def shape_functions(barycentric: Array, order: int) -> Array:
-    """Shape functions of a tetrahedron, (q, n), at barycentric points (q, 4)."""
+    """Shape functions (q, n) of a tetrahedron of order 1 or 2 at barycentric points (q, 4); n is 4 or 10.
+
+    >>> shape_functions(np.array([[1.0, 0.0, 0.0, 0.0]]), 1).tolist()
+    [[1.0, 0.0, 0.0, 0.0]]
+    """
     return shapes(barycentric, TET_EDGES, order)[0]
 
 

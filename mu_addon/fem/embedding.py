@@ -23,9 +23,10 @@ _NEIGHBOURS = 16
 
 @attrs.frozen(eq=False)
 class Embedding(Probe):
-    """Points (p, 3) fixed in a mesh's material; outside_mm (p,) says how far each lies outside it, or 0.
+    """Points (p, 3) in mm that move with a mesh; made by `embed`.
 
-    mirrored (p,): whether a point lies on the other side of the mirror plane x = 0 of a half mesh.
+    outside_mm (p,): distance of each point from the mesh, 0 inside. mirrored (p,): whether a point lies on
+    the other side of the mirror plane x = 0 of a half mesh.
     """
 
     outside_mm: Array
@@ -39,10 +40,11 @@ class Embedding(Probe):
 
 
 def embed(mesh: Mesh, points: Array) -> Embedding:
-    """Embed points (p, 3), in mm, in a mesh.
+    """Embed points (p, 3) in mm in a mesh, so that they move with its deformation.
 
-    Inside, the shape functions at the point carry it. Outside, the displacement of the nearest point of the
-    surface goes on linearly, with its gradient there; points beyond the held base stand still as it does.
+    Inside the mesh a point moves by the shape functions of its element. Outside, the displacement of the
+    nearest surface point is continued linearly with its gradient; points beyond the fixed base stand still
+    as it does.
     """
     points = np.asarray(points, float)
     mirrored = np.zeros(len(points), bool)

@@ -29,9 +29,15 @@ WEIGHT_STEPS = (1, 4, 16)
 
 
 class Equilibrium:
-    """Finds equilibria of one body with one set of materials.
+    """Finds equilibria of one body with one set of materials, by Newton's method with line search.
 
-    explains: whether a failure names the limit point that caused it, which takes some twenty factorisations.
+    `at_zero_pressure` is the state without pressure, `newton` one at a pressure from a nearby start,
+    `reach` one from states before it with adaptive load steps, `path` several in order. No state is
+    returned that did not converge or is unstable: ConvergenceError says at what pressure, where and why.
+
+    explains: whether a failure also looks for the limit point that caused it, at some twenty
+    factorisations. settings: tolerances, by default a residual of 1e-9 of the root sum of squares of all
+    element forces.
     """
 
     def __init__(
@@ -89,9 +95,9 @@ class Equilibrium:
             finally:
                 model.load = load
         raise ConvergenceError(
-            f"no equilibrium under the weight alone: {failed.what if failed else 'none was sought'}",
+            f"no equilibrium under gravity alone: {failed.what if failed else 'not computed'}",
             "0 kPa",
-            "stiffen the material, or hang the unit with its tip down",
+            "stiffen the material, or orient the unit with its tip down",
         )
 
     def newton(self, u: Array, pressure: float, reach_mm: float = np.inf) -> State:
@@ -113,7 +119,9 @@ class Equilibrium:
                 return state
             for obstacle in obstacles:
                 obstacle.update_lag(state.u)
-        raise ConvergenceError(f"friction does not settle: it still changes by {lag_change:.1e} of its bound")
+        raise ConvergenceError(
+            f"friction does not converge: it still changes by {lag_change:.1e} of its bound"
+        )
 
     def _descend(self, start: State, factored: bool) -> State:
         """The equilibrium from a start, friction's bound held; its cost is added to the start's.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ..errors import InputError
+from ..errors import ConvergenceError, InputError
 from ..meshing.mesh import Mesh, edges_of
 from .factor import Cholesky, IndefiniteError, SuperLU, make_factor, nested_dissection
 
@@ -211,10 +211,10 @@ class TwoLevel:
                 raise IndefiniteError("a direction has negative curvature")
             x += slope / curvature * direction
             r -= slope / curvature * product
-        raise ArithmeticError(f"no convergence in {self.max_iterations} iterations")
+        raise ConvergenceError(f"conjugate gradients stopped after {self.max_iterations} iterations")
 
     def solve(self, b: Array) -> Array:
-        """Solve for one (n,) or several (n, k) right-hand sides. Raises IndefiniteError, ArithmeticError."""
+        """Solve for one (n,) or several (n, k) right-hand sides. Raises IndefiniteError, ConvergenceError."""
         if b.ndim == 1:
             return self._conjugate_gradients(b, self.tolerance)
         return np.stack([self._conjugate_gradients(c, self.tolerance) for c in b.T], axis=1)

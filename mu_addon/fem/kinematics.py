@@ -16,7 +16,10 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen(eq=False)
 class Probe:
-    """Points fixed in the material: their element's nodes (p, n) and shape functions (p, n)."""
+    """Points of a mesh, read in any of its states: nodes (p, n) of their elements, shape functions (p, n).
+
+    `displacement(u)` gives (p, 3) in mm from nodal displacements (n, 3).
+    """
 
     nodes: Array
     weights: Array
@@ -27,9 +30,10 @@ class Probe:
 
 
 def probe(mesh: Mesh, points: Array, tolerance: float = 1e-6) -> Probe:
-    """Locate points (p, 3), in mm, in a mesh; curved elements are inverted by Newton's method.
+    """Locate points (p, 3) in mm in a mesh; curved elements are inverted by Newton's method.
 
-    Raises InputError for a point that lies in no element.
+    tolerance in mm: of the boxes searched. Raises InputError, with its place, for a point that lies in no
+    element.
     """
     corners = mesh.nodes[mesh.corners]
     low, high = mesh.nodes[mesh.tets].min(axis=1), mesh.nodes[mesh.tets].max(axis=1)

@@ -24,10 +24,11 @@ def _rows(values: Any) -> Array:
 
 @attrs.frozen(eq=False)
 class Layer:
-    """One law in some elements: elements (k,), parameters (k, count) as the law names them.
+    """One material law in some elements: elements (k,), parameters (k, count) in the law's own order.
 
-    weight, a number or (k,): the share of an element's volume that this law fills; laws that share an
-    element act in parallel, under the same strain (Voigt).
+    weight, a number or (k,): share of an element's volume that this law fills; laws that share an element
+    act in parallel, under the same strain (Voigt). Raises InputError where the law does not admit its
+    parameters.
     """
 
     law: Any
@@ -56,7 +57,17 @@ class Layer:
 
 @attrs.frozen(eq=False)
 class Materials:
-    """The layers that fill a body."""
+    """What fills a body: layers of laws over elements, in parallel where they share one.
+
+    Every element needs at least one layer. `neo_hooke` covers all elements by Young's modulus in MPa and
+    Poisson's ratio.
+
+    >>> import numpy as np
+    >>> from mu_addon.fem import Layer, Yeoh
+    >>> rows = np.tile([0.2, -0.01, 0.001, 20.0], (8, 1))
+    >>> Materials((Layer(Yeoh, np.arange(8), rows),)).layers[0].law.name
+    'Yeoh'
+    """
 
     layers: tuple[Layer, ...]
 

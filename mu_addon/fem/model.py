@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -59,6 +60,21 @@ class MaterialData:
     layers: tuple[LayerData, ...]
     least_force_N: float = 0.0
     dt_s: float = 0.0
+
+    @property
+    def has_history(self) -> bool:
+        """Whether a law remembers, so that a state depends on those before it."""
+        return any(layer.history.shape[2] for layer in self.layers)
+
+    def kept(self) -> tuple[Array, ...]:
+        """A copy of what each law with history remembers, (k, q, h) each, for `restore`."""
+        return tuple(layer.history.numpy().copy() for layer in self.layers if layer.history.shape[2])
+
+    def restore(self, kept: Sequence[Array]) -> None:
+        """Take the laws back to what `kept` gave."""
+        remembering = [layer.history for layer in self.layers if layer.history.shape[2]]
+        for history, values in zip(remembering, kept, strict=True):
+            history.assign(np.ascontiguousarray(values))
 
     def forget(self) -> None:
         """Take the materials back to the start, without history."""

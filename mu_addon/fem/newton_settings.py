@@ -7,7 +7,11 @@ import attrs
 
 @attrs.frozen
 class NewtonSettings:
-    """When a state counts as converged, and how far the solver goes to get there."""
+    """Tolerances and limits of Newton's method; a state converges where the residual is below `tolerance`.
+
+    Residuals are relative to the root sum of squares of all element forces. Load steps in MPa lie between
+    min_step_MPa and max_step_MPa.
+    """
 
     tolerance: float = 1e-9  # residual over the root sum of squares of all element forces
     max_iterations: int = 60

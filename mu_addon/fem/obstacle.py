@@ -91,7 +91,7 @@ class Obstacle:
             raise InputError(
                 f"a contact of {pressure_MPa:g} MPa at {depth_mm:g} mm of depth",
                 "obstacle",
-                "give both above 0: the contact pressure to expect, and how deep it may press in there",
+                "give both above 0: the expected contact pressure and the penetration allowed at it",
             )
         if not (0 <= friction < np.inf and stick_mm > 0):
             raise InputError(

@@ -19,7 +19,13 @@ COLUMNS = ("time_s", "pressure_kPa")
 
 @attrs.frozen(eq=False)
 class Protocol:
-    """Corner points of a piecewise linear pressure: time in s, pressure in kPa, (c,) each."""
+    """A piecewise linear gauge pressure over time: corner points in s and in kPa, (c,) each.
+
+    >>> import numpy as np
+    >>> time_s, pressure_kPa = Protocol(np.array([0.0, 2.0]), np.array([0.0, 40.0])).sample(5)
+    >>> pressure_kPa.tolist()
+    [0.0, 10.0, 20.0, 30.0, 40.0]
+    """
 
     time_s: Array
     pressure_kPa: Array
@@ -65,7 +71,7 @@ def read_protocol(path: Path) -> Protocol:
         if not np.isfinite(row).all():
             raise InputError("a value is not finite", where, "give finite numbers only")
         if values and row[0] <= values[-1][0]:
-            raise InputError("time does not increase", where, "sort the rows and drop repeated times")
+            raise InputError("time does not increase", where, "sort the rows and remove repeated times")
         values.append(row)
     if len(values) < 2:
         raise InputError(

@@ -28,13 +28,20 @@ def _unit(vector: Any) -> Array:
     v = _float64(vector)
     length = float(np.linalg.norm(v))
     if v.shape != (3,) or not length > 0:
-        raise InputError(f"{vector!r} is no direction", "obstacle", "give three numbers, not all of them 0")
+        raise InputError(
+            f"{vector!r} is not a direction", "obstacle", "give three numbers, not all of them 0"
+        )
     return v / length
 
 
 @attrs.frozen(eq=False)
 class Plane:
-    """A half-space through `point` (3,) in mm; `normal` (3,) points out of it, to the free side."""
+    """A half-space: `point` (3,) in mm on its surface, `normal` (3,) out of it, of any length.
+
+    >>> import numpy as np
+    >>> Plane((0, 0, 0), (0, 0, 1)).distance(np.array([[5.0, 0.0, 2.0]]))[0].tolist()
+    [2.0]
+    """
 
     point: Array = attrs.field(converter=_float64)
     normal: Array = attrs.field(converter=_unit)
@@ -110,4 +117,6 @@ class Pose:
     def __attrs_post_init__(self) -> None:
         r = self.rotation
         if r.shape != (3, 3) or not np.allclose(r @ r.T, np.eye(3), atol=1e-9) or np.linalg.det(r) < 0:
-            raise InputError("the matrix of a pose is no rotation", "obstacle", "give one of determinant 1")
+            raise InputError(
+                "the matrix of a pose is not a rotation", "obstacle", "give one of determinant 1"
+            )

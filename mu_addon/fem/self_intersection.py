@@ -63,7 +63,11 @@ class FirstSelfIntersection:
 
 
 def first_self_intersection(mesh: Mesh, states: Sequence[State]) -> FirstSelfIntersection | None:
-    """The first contact of walls along a path of states, or None. The first state must be free of it."""
+    """The first pressure in MPa at which walls of a body meet, along a path of states, or None.
+
+    The first state must be free of self-intersections. Between states the body is taken to move along a
+    straight line; the pressure is found to a thousandth of a step.
+    """
     surface = _Boundary(mesh)
     for before, after in itertools.pairwise(states):
         found = surface.crossings(after.u)
@@ -83,10 +87,10 @@ def first_self_intersection(mesh: Mesh, states: Sequence[State]) -> FirstSelfInt
 
 
 def crossings(mesh: Mesh, u: Array) -> tuple[Crossing, ...]:
-    """Pieces of the surface, cavity and outside, of a mesh displaced by u (n, 3) in mm that cut each other.
+    """Where the surface of a mesh cuts itself when displaced by u (n, 3) in mm, cavity and outside together.
 
-    Mirror images count. The deepest cut, that of most facets, comes first. Facets that share a node are
-    not tested against each other.
+    Mirror images of half and quarter meshes count. The cut of most facets comes first. Facets that share a
+    node are not tested against each other.
     """
     return _Boundary(mesh).crossings(u)
 

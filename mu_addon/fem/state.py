@@ -16,7 +16,12 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen(eq=False)
 class State:
-    """A converged equilibrium: pressure in MPa, displacement (n, 3) in mm, relative residual, cost."""
+    """A converged equilibrium: pressure in MPa, displacement u (n, 3) in mm, relative residual, and its cost.
+
+    >>> import numpy as np
+    >>> State(0.02, np.zeros((4, 3))).pressure_kPa
+    20.0
+    """
 
     pressure_MPa: float
     u: Array
@@ -36,7 +41,13 @@ class State:
 
 
 def extrapolate(points: Sequence[State], pressure: float) -> Array:
-    """Displacement (n, 3) at another pressure of the polynomial through some states."""
+    """Displacement (n, 3) in mm at a pressure in MPa, by Lagrange's polynomial through some states.
+
+    >>> import numpy as np
+    >>> states = [State(p, np.full((1, 3), p**2)) for p in (0.0, 1.0, 2.0)]
+    >>> extrapolate(states, 3.0).tolist()
+    [[9.0, 9.0, 9.0]]
+    """
     u = np.zeros_like(points[-1].u)
     for a in points:
         weight = 1.0
@@ -48,6 +59,8 @@ def extrapolate(points: Sequence[State], pressure: float) -> Array:
 
 
 def rest(mesh: Mesh) -> State:
-    """The undeformed, unloaded state of a mesh; where something has weight ask
-    `Equilibrium.at_zero_pressure`."""
+    """The undeformed, unloaded state of a mesh: zero displacement at zero pressure.
+
+    A body with weight has none such; its state without pressure is `Equilibrium.at_zero_pressure`.
+    """
     return State(0.0, np.zeros_like(mesh.nodes))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,29 +20,40 @@ if TYPE_CHECKING:
 Array = np.ndarray[Any, Any]
 
 
-def cauchy(mesh: Mesh, u: Array, materials: Materials) -> tuple[Array, Array]:
+def cauchy(mesh: Mesh, u: Array, materials: Materials, history: Sequence[Array] = ()) -> tuple[Array, Array]:
     """Cauchy stress (m, q, 3, 3) in MPa and deformation gradients (m, q, 3, 3) at the quadrature points.
 
     u: displacements (n, 3) in mm. sigma = P F^T / det F, the laws of an element added by their weights.
-    Raises InputError for a law with history, whose stress is not that of the state alone.
+    history: what each law with one remembers of this state, as `MaterialData.kept` gives it. Raises
+    InputError where it is missing: such a law's stress is not that of the state alone.
     """
     F, _ = deformation_gradients(mesh, u, np.arange(len(mesh.tets)))
     P = np.zeros_like(F)
     points = F.shape[1]
+    remembered = iter(history)
     for layer in materials.layers:
-        if layer.law.history:
-            raise InputError(
-                f"{layer.law.name}: its stress depends on how the state was reached",
-                remedy="ask for the stress of a body of elastic laws",
-            )
         rows = np.repeat(layer.parameters, points, axis=0)
+        if layer.law.history:
+            own = next(remembered, None)
+            if own is None:
+                raise InputError(
+                    f"{layer.law.name}: its stress depends on how the state was reached",
+                    remedy="give what the materials remember of it",
+                )
+            # A step of no time from a state that is remembered already leaves it and its stress as they are.
+            rows = np.hstack([rows, own.reshape(len(rows), -1), np.zeros((len(rows), 1))])
         found = stress(layer.law, F[layer.elements].reshape(-1, 3, 3), rows).reshape(-1, points, 3, 3)
         P[layer.elements] += layer.weight[:, None, None, None] * found
     return P @ np.swapaxes(F, -1, -2) / np.linalg.det(F)[..., None, None], F
 
 
 def von_mises(sigma: Array) -> Array:
-    """Von Mises stress (...) of stress tensors (..., 3, 3), in their unit: sqrt(3/2 s:s), s the deviator."""
+    """Von Mises stress (...) of stress tensors (..., 3, 3), in their unit: sqrt(3/2 s:s), s the deviator.
+
+    >>> import numpy as np
+    >>> round(float(von_mises(np.diag([3.0, 0.0, 0.0]))), 9)
+    3.0
+    """
     mean = np.trace(sigma, axis1=-2, axis2=-1)[..., None, None] / 3.0
     deviator = sigma - mean * np.eye(3)
     return np.asarray(np.sqrt(1.5 * np.einsum("...ij,...ij->...", deviator, deviator)))

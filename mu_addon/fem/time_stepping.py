@@ -28,13 +28,15 @@ SMALLEST = 1e-4
 class Instant:
     """A converged state, when it holds in s, and the rate in mm/s at which it was reached, if any.
 
-    contacts: what each of the model's obstacles remembers of it, see `Obstacle.kept`; filled in to be stored.
+    contacts: what each of the model's obstacles remembers of it, see `Obstacle.kept`; history: what each law
+    with one does, see `MaterialData.kept`. Both are filled in to be stored.
     """
 
     time_s: float
     state: State
     rate: Array | None = None
     contacts: tuple[dict[str, Array], ...] = ()
+    history: tuple[Array, ...] = ()
 
 
 def simulate_in_time(
@@ -53,8 +55,7 @@ def simulate_in_time(
     linear between instants, in steps of at most `max_step_s` and the settings' largest pressure step, halved
     where they do not converge; obstacles with a path are where they are at each step's time. `on_state` is
     called when its instant is the last that materials and contacts remember. `load` gives an instant of an
-    earlier run by its number, if it kept one with `store`; for bodies whose materials have no history, which
-    is not kept. Raises ConvergenceError naming instant and cause.
+    earlier run by its number, if it kept one with `store`. Raises ConvergenceError naming instant and cause.
     """
     time, pressure = np.asarray(time_s, float), in_MPa(np.asarray(pressure_kPa, float))
     if (np.diff(time) < 0).any():
@@ -69,12 +70,14 @@ def simulate_in_time(
         kept = load(number)
         if kept is None:
             last = _interval(equilibrium, last or _start(equilibrium, time[0]), t, p, max_step_s)
-            store(number, attrs.evolve(last, contacts=tuple(o.kept() for o in obstacles)))
+            memory = equilibrium.parameters.kept()
+            store(number, attrs.evolve(last, contacts=tuple(o.kept() for o in obstacles), history=memory))
         else:
             last = kept
             equilibrium.model.move_obstacles(t)
-            for obstacle, memory in zip(obstacles, kept.contacts, strict=True):
-                obstacle.restore(kept.state.u, memory)
+            equilibrium.parameters.restore(kept.history)
+            for obstacle, contact in zip(obstacles, kept.contacts, strict=True):
+                obstacle.restore(kept.state.u, contact)
         states.append(last.state)
         if on_state:
             on_state(last.state)

@@ -19,7 +19,10 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen(eq=False)
 class Trajectory:
-    """States (s,) of distinct pressures and, for each of k instants, which of them holds."""
+    """Motion through a pressure protocol: states (s,) of distinct pressures, and which holds at each instant.
+
+    time_s and pressure_kPa (k,); index (k,): number of the state that holds.
+    """
 
     time_s: Array
     pressure_kPa: Array
@@ -32,10 +35,15 @@ class Trajectory:
 
 
 def branches(pressure_kPa: Array) -> tuple[Array, list[Array]]:
-    """Distinct pressures ascending, and the order to visit them: outward from 0 to either side.
+    """Distinct pressures ascending, and the order in which to visit them: outward from 0 to either side.
 
-    An elastic body under pressure alone has no memory: as long as its path is stable, the state
-    depends on the pressure only, so that a pressure met twice is solved once.
+    An elastic body under pressure alone has no memory: as long as its path is stable, the state depends on
+    the pressure only, so that a pressure met twice is solved once.
+
+    >>> import numpy as np
+    >>> distinct, sides = branches(np.array([0.0, 20.0, -10.0, 10.0, 20.0]))
+    >>> distinct.tolist(), [side.tolist() for side in sides]
+    ([-10.0, 0.0, 10.0, 20.0], [[-10.0], [10.0, 20.0]])
     """
     distinct = np.unique(pressure_kPa)
     sides = [distinct[distinct < 0][::-1], distinct[distinct > 0]]
@@ -50,17 +58,21 @@ def simulate(
     load: Callable[[float], State | None] = lambda pressure_MPa: None,
     store: Callable[[State], None] = lambda state: None,
 ) -> Trajectory:
-    """Equilibria of a protocol sampled at k instants, time in s and pressure in kPa.
+    """Quasi-static motion of an elastic body: equilibria at times in s and pressures in kPa, (k,) each.
 
-    `load` gives a state of an earlier run at a pressure in MPa, if it kept one with `store`; a resumed
-    run finds the same states to the last digit, since each starts from those before it alone. The state
-    without pressure is one of them where the model has a load, else it is as drawn and not solved for. Raises
-    ConvergenceError where a pressure cannot be reached; `on_state` has then seen all before it, and
-    InputError for a body with friction.
+    Every distinct pressure is solved once, outward from 0. on_state: called with each state as it is found.
+    load and store: a cache of states by pressure in MPa; a resumed run finds the same states to the last
+    digit, since each starts from those before it alone. The state without pressure is solved for only where
+    the model has a load.
+
+    Raises ConvergenceError where a pressure cannot be reached (on_state has then seen all before it), and
+    InputError for a body with friction or a law with history, which `simulate_in_time` solves.
     """
-    if equilibrium.model.has_friction:
+    if equilibrium.model.has_friction or equilibrium.parameters.has_history:
         raise InputError(
-            "a body with friction remembers", "trajectory.simulate", "use time_stepping.simulate_in_time"
+            "the state of a body with friction or memory depends on its history",
+            "trajectory.simulate",
+            "use time_stepping.simulate_in_time",
         )
 
     def state_at(pressure_MPa: float, solve: Callable[[], State]) -> State:

@@ -1,1 +1,54 @@
-"""From struts to moduli: effective elasticity, virtual compression tests and a law for the analysis mesh."""
+"""Homogenisation: what a lattice of struts is as a continuum.
+
+`mesh_cell` meshes an eighth of a printed cell, `effective_tensor` gives its elasticity at small strain,
+`stretch_lattice` its response at finite strain, `compress` a finite block between plates, and `fit_foam` a
+law for the analysis mesh that follows all of these.
+
+    >>> from mu_addon.homogenize import hashin_shtrikman
+    >>> low, high = hashin_shtrikman([0.5, 0.5], bulk=[2.0, 0.0], shear=[1.0, 0.0])
+    >>> low.bulk, round(high.bulk, 3)
+    (0.0, 0.571)
+"""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import public_face
+
+if TYPE_CHECKING:
+    from .bounds import hashin_shtrikman as hashin_shtrikman
+    from .cell_mesh import CellMeshSettings as CellMeshSettings
+    from .cell_mesh import cell_materials as cell_materials
+    from .cell_mesh import mesh_cell as mesh_cell
+    from .compression import Compression as Compression
+    from .compression import compress as compress
+    from .curve import Curve as Curve
+    from .effective import Effective as Effective
+    from .effective import read_effective as read_effective
+    from .effective import write_effective as write_effective
+    from .elasticity import Elasticity as Elasticity
+    from .elasticity import effective_tensor as effective_tensor
+    from .elasticity import young_modulus as young_modulus
+    from .foam_fit import FoamFit as FoamFit
+    from .foam_fit import fit_foam as fit_foam
+    from .foam_fit import lattice_law as lattice_law
+    from .modulus import moduli as moduli
+    from .specimen import Specimen as Specimen
+    from .specimen import block_specimen as block_specimen
+    from .stretch import StretchSettings as StretchSettings
+    from .stretch import stretch_lattice as stretch_lattice
+else:
+    __getattr__, __dir__, __all__ = public_face(
+        __name__,
+        {
+            "bounds": "hashin_shtrikman",
+            "cell_mesh": "CellMeshSettings cell_materials mesh_cell",
+            "compression": "Compression compress",
+            "curve": "Curve",
+            "effective": "Effective read_effective write_effective",
+            "elasticity": "Elasticity effective_tensor young_modulus",
+            "foam_fit": "FoamFit fit_foam lattice_law",
+            "modulus": "moduli",
+            "specimen": "Specimen block_specimen",
+            "stretch": "StretchSettings stretch_lattice",
+        },
+    )

@@ -15,7 +15,11 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen
 class Moduli:
-    """Bulk and shear modulus in MPa of an isotropic material."""
+    """Bulk and shear modulus in MPa of an isotropic material.
+
+    >>> round(Moduli(bulk=1.0, shear=0.6).young, 6)
+    1.5
+    """
 
     bulk: float
     shear: float
@@ -39,12 +43,18 @@ def reuss(shares: ArrayLike, bulk: ArrayLike, shear: ArrayLike) -> Moduli:
 
 
 def hashin_shtrikman(shares: ArrayLike, bulk: ArrayLike, shear: ArrayLike) -> tuple[Moduli, Moduli]:
-    """Lower and upper bound of an isotropic mixture of isotropic phases (k,), moduli in MPa.
+    """Lower and upper bound of an isotropic mixture of isotropic phases.
 
-    A void has both moduli 0. The means over all directions (Voigt's) of an anisotropic mixture obey the
-    upper bound too: turned every way it is one of the mixtures Willis's bound, concave in the
-    arrangement, holds for. Sources: Hashin and Shtrikman, J. Mech. Phys. Solids 11 (1963) 127, as written
-    for several phases by Walpole, ibid. 14 (1966) 151; Willis, ibid. 25 (1977) 185.
+    shares (k,) of the volume, summing to 1; bulk and shear moduli (k,) in MPa, both 0 for a void. The means
+    over all directions (Voigt's) of an anisotropic mixture obey the upper bound too. Raises InputError for
+    shares that do not sum to 1 or negative moduli.
+
+    >>> low, high = hashin_shtrikman([0.5, 0.5], bulk=[2.0, 0.0], shear=[1.0, 0.0])
+    >>> low.bulk, round(high.bulk, 3)
+    (0.0, 0.571)
+
+    Sources: Hashin and Shtrikman, J. Mech. Phys. Solids 11 (1963) 127, as written for several phases by
+    Walpole, ibid. 14 (1966) 151; for anisotropic mixtures Willis, ibid. 25 (1977) 185.
     """
     f, K, G = _phases(shares, bulk, shear)
     return _bound(f, K, G, K.min(), G.min()), _bound(f, K, G, K.max(), G.max())

@@ -49,11 +49,11 @@ class CellMeshSettings:
             raise InputError(f"tolerance = {self.tolerance:g} is out of bounds", "cell mesh", "1e-4 to 0.2")
 
 
-def cell_mesh(cell: StrutCell, settings: CellMeshSettings | None = None, cache: Path | None = None) -> Mesh:
-    """Tetrahedra of the printed lattice within [0, size/2]^3 mm, nothing clamped.
+def mesh_cell(cell: StrutCell, settings: CellMeshSettings | None = None, cache: Path | None = None) -> Mesh:
+    """Tetrahedra of one eighth of a printed cell, [0, size/2]^3 mm; nothing is clamped.
 
     Nodes of its flat sides lie exactly on the six planes. Cells that differ in size only have the same
-    mesh, enlarged, and with a cache folder it is made once. Raises InputError and MeshingError.
+    mesh, scaled, and with a folder `cache` it is made once. Raises InputError and MeshingError.
     """
     s = settings or CellMeshSettings()
     half = cell.half_mm
@@ -81,7 +81,7 @@ def cell_mesh(cell: StrutCell, settings: CellMeshSettings | None = None, cache: 
 
 
 def cell_materials(cell: StrutCell, mesh: Mesh, modulus_MPa: float, poisson: float) -> Materials:
-    """Neo-Hookean resin of a core modulus in MPa, with the cell's stiffer skin, in its mesh."""
+    """Neo-Hookean resin of Young's modulus modulus_MPa and Poisson's ratio, stiffer in the cell's skin."""
     count = len(mesh.tets)
     core = Materials.neo_hooke(np.full(count, modulus_MPa), np.full(count, poisson))
     if cell.skin_depth_mm == 0.0 or cell.skin_factor == 1.0:

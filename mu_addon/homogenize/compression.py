@@ -93,11 +93,11 @@ class Compression:
         if self.loss:
             reasons.append(str(self.loss))
         if self.touch:
-            reasons.append(f"at {100 * self.touch.strain:.3g} % {self.touch}, and nothing resists that here")
+            reasons.append(f"at {100 * self.touch.strain:.3g} % {self.touch}; self-contact is not modelled")
         if self.ended:
             reasons.append(self.ended)
         if not reasons:
-            reasons.append("there it ends; no struts meet each other or a plate")
+            reasons.append("the curve ends there; no struts touch each other or a plate")
         return f"valid to {100 * self.valid_to_strain:.3g} % nominal strain: {'; '.join(reasons)}"
 
 
@@ -164,7 +164,7 @@ class Plates:
         self, specimen: Specimen, friction: Friction, threads: int = 2, mean_dilatation: bool = False
     ) -> None:
         if friction not in ("slide", "stick"):
-            raise InputError(f"no friction {friction!r}", "compression test", "choose slide or stick")
+            raise InputError(f"unknown friction {friction!r}", "compression test", "choose slide or stick")
         mesh = specimen.mesh
         self.specimen = specimen
         self.held = np.zeros(mesh.nodes.shape, bool)

@@ -23,7 +23,9 @@ from .foam_fit import NAME, FoamFit, Misfit, lattice_law, require_stable, stable
 Array = np.ndarray[Any, Any]
 
 FORMAT = 1
-_HEAD = "# What a lattice amounts to, and its law for the analysis mesh; `place --lattice` takes this file."
+_HEAD = (
+    "# Effective moduli of a lattice and its law for the analysis mesh; `place --lattice` takes this file."
+)
 # Every key that is read, by its table; those of [cell], [resin] and [provenance] are whatever was written.
 _KEYS = {
     "moduli": ("relative_density", "C11_kPa", "C12_kPa", "C44_kPa"),
@@ -69,7 +71,7 @@ class Effective:
         low, high = self.stretch
         if not 0 < low < 1 < high:
             raise InputError(
-                f"a law fitted from stretch {low:g} to {high:g} says nothing about rest",
+                f"a law fitted from stretch {low:g} to {high:g} does not include the undeformed state",
                 "[fit] stretch_low, stretch_high",
                 "give a range around 1",
             )
@@ -125,7 +127,7 @@ class Effective:
         }
         tables: dict[str, tuple[str, Mapping[str, Any]]] = {
             "cell": ("The lattice's cell; lengths in mm.", self.cell),
-            "resin": ("The solid that its struts are made of.", self.resin),
+            "resin": ("Solid material of the struts.", self.resin),
             "moduli": (
                 "Stiffness of cubic symmetry at small strain.",
                 dict(zip(_KEYS["moduli"], (self.relative_density, *self._moduli), strict=True)),
@@ -138,8 +140,8 @@ class Effective:
                 "Range of stretch of the fit; misfits: root mean square over the largest value on that side.",
                 dict(zip(_KEYS["fit"], (*self.stretch, *misfit), strict=True)),
             ),
-            _DERIVED: ("Follows from the tables above; for the reader, not read back.", derived),
-            "provenance": ("What made this file, and from what.", self.provenance),
+            _DERIVED: ("Derived from the tables above for the reader; not read back.", derived),
+            "provenance": ("Program and inputs that made this file.", self.provenance),
         }
         lines = [_HEAD, f"format = {FORMAT}"]
         for name, (comment, rows) in tables.items():
@@ -202,7 +204,7 @@ def read_effective(path: str | Path) -> Effective:
             f"cannot read the lattice's law: {error.strerror}", str(path), "give an effective.toml"
         ) from None
     except UnicodeDecodeError:
-        raise InputError("the lattice's law is no text file", str(path), "give an effective.toml") from None
+        raise InputError("the lattice law is not a text file", str(path), "give an effective.toml") from None
     return parse_effective(text, str(path))
 
 
@@ -263,7 +265,7 @@ def _table(document: dict[str, Any], name: str, keys: tuple[str, ...], origin: s
                 raise InputError(f"there is no law {value!r} for a lattice", where, f'write "{NAME}"')
             continue
         if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-            raise InputError(f"{key} = {value!r} is no finite number", where, "give a number")
+            raise InputError(f"{key} = {value!r} is not a finite number", where, "give a number")
         found[key] = float(value)
     return found
 
@@ -281,7 +283,9 @@ def _require_moduli(found: Effective) -> None:
     for name, value in (("C11 - C12", C11 - C12), ("C11 + 2 C12", C11 + 2 * C12), ("C44", C44)):
         if not value > 0:
             raise InputError(
-                f"{name} = {value:.6g} kPa must be positive", "[moduli]", "no elastic lattice has such moduli"
+                f"{name} = {value:.6g} kPa must be positive",
+                "[moduli]",
+                "the moduli are not those of an elastic lattice",
             )
     if not 0 < found.relative_density <= 1:
         raise InputError(

@@ -118,7 +118,15 @@ class Elasticity:
 
 
 def young_modulus(C: Array, directions: ArrayLike) -> Array:
-    """Young's modulus (k,) in MPa of a tensor (6, 6) in MPa along directions (k, 3) of any length."""
+    """Young's modulus (k,) in MPa of an elasticity tensor along directions (k, 3) of any length.
+
+    C: (6, 6) in MPa, in Voigt's order xx, yy, zz, yz, xz, xy with engineering shears. E(n) = 1 / (n n : S :
+    n n).
+
+    >>> C = np.diag([2.0, 2.0, 2.0, 1.0, 1.0, 1.0])
+    >>> young_modulus(C, [[0, 0, 1]]).tolist()
+    [2.0]
+    """
     n = np.atleast_2d(np.asarray(directions, float))
     n = n / np.linalg.norm(n, axis=1, keepdims=True)
     pairs = np.stack([n[:, a] * n[:, b] for a, b in SHEARS], axis=1)
@@ -128,11 +136,12 @@ def young_modulus(C: Array, directions: ArrayLike) -> Array:
 
 
 def effective_tensor(mesh: Mesh, materials: Materials, box: Sequence[float] | None = None) -> Elasticity:
-    """Effective elasticity of the periodic body of which a mesh is one eighth, [0, box] mm; see Octant.
+    """Effective elasticity, at small strain, of the periodic body of which a mesh is one eighth, [0, box] mm.
 
-    Its mirror images in the six sides must make up the body. Energies of the exact small-strain solutions
-    on the mesh, so never below the true ones of the meshed shape. Raises MeshingError where a piece hangs
-    loose, or where the result is indefinite or above a bound, which no right mesh can give.
+    The mesh's mirror images in its six sides must make up the body (`octant.Octant`). box (3,) in mm: by
+    default the mesh's own. Energies are those of exact small-strain solutions on the mesh, so never below
+    the true ones of the meshed shape. Raises MeshingError where a piece hangs loose, or where the result is
+    indefinite or above the Hashin-Shtrikman bound, which no right mesh can give.
     """
     octant = Octant(mesh, materials, box)
     values, K = octant.tangent(np.zeros_like(mesh.nodes))

@@ -80,7 +80,7 @@ class Octant:
             )
         if (mesh.nodes < 0).any() or (mesh.nodes > self.box).any():
             raise InputError(
-                "a mesh leaves its cell", f"box {tuple(self.box)} mm", "give half the cell's size"
+                "the mesh extends beyond its cell", f"box {tuple(self.box)} mm", "give half the cell's size"
             )
         self.sides = np.stack([mesh.nodes == 0.0, mesh.nodes == self.box])
         bare = [AXES[k] for k in range(3) if not self.sides[:, :, k].any(axis=1).all()]
@@ -96,7 +96,7 @@ class Octant:
         if not held.all():
             place = tuple(float(c) for c in mesh.nodes[held[label].argmin()].round(2))
             raise MeshingError(
-                "a piece of a cell's mesh hangs on nothing",
+                "a piece of a cell's mesh is not connected",
                 f"near {place} mm",
                 "let its struts meet, or refine it",
             )

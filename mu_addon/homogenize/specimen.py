@@ -29,12 +29,13 @@ class Specimen:
     materials: Materials
 
 
-def specimen(octant: Mesh, cells: int, materials: Materials, axis: str = "z") -> Specimen:
-    """A block of cells^3 cells, of the octant [0, U/2]^3 of one with a corner at the origin.
+def block_specimen(octant: Mesh, cells: int, materials: Materials, axis: str = "z") -> Specimen:
+    """One eighth of a block of cells^3 cells, for `compress`, made of copies of an eighth of one cell.
 
-    The block's outer faces are faces of cells, cut flat. materials: of the octant. axis: that of the cell
-    which the plates compress; the specimen is turned so that it becomes z. Laws must be isotropic: copies
-    are mirror images. Raises InputError.
+    octant: mesh of [0, U/2]^3 mm with a corner of the cell at the origin, and materials its own. The
+    block's outer faces are faces of cells, cut flat. axis: that of the cell which the plates compress; the
+    specimen is turned so that it becomes z. Laws must be isotropic, since copies are mirror images. Raises
+    InputError.
     """
     if cells < 1 or cells != int(cells):
         raise InputError(f"a specimen of {cells} cells", "compression test", "ask for 1 cell or more")

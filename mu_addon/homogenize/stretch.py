@@ -71,25 +71,25 @@ class Stretched:
     stopped: str = ""
 
 
-def stretch(
+def stretch_lattice(
     mesh: Mesh,
     materials: Materials,
     box: Sequence[float] | None = None,
     settings: StretchSettings | None = None,
     on_point: Callable[[Point], None] | None = None,
 ) -> Stretched:
-    """Uniaxial test of the periodic body of which a mesh is one eighth, [0, box] mm; see octant.Octant.
+    """Uniaxial tension and compression of a periodic lattice at finite strain, by one eighth of its cell.
 
-    The sides of every eighth stay plane, as the lattice's mirrors demand; a lattice that would buckle away
-    from them is found out with `settings.buckling` only. The curve ends where no stable equilibrium is
-    found or where walls meet, and `stopped` says so. Raises MeshingError where the undeformed cell is
-    unstable.
+    mesh: the eighth, [0, box] mm; its sides stay plane, as the lattice's mirror planes demand. A lattice
+    that would buckle away from them is detected with `settings.buckling` only. The curve ends where no
+    stable equilibrium is found or where walls meet, and `stopped` says so. on_point: called with each
+    `Point`. Raises MeshingError where the undeformed cell is unstable.
     """
     return Stretching(mesh, materials, box, settings).run(on_point)
 
 
 class Stretching:
-    """A periodic lattice under prescribed stretch along one axis; see `stretch`."""
+    """A periodic lattice under prescribed stretch along one axis; see `stretch_lattice`."""
 
     def __init__(
         self,
@@ -327,7 +327,7 @@ class Stretching:
                 low, high = (low, middle) if self._meeting(*state) else (middle, high)
             state = [a + high * (b - a) for a, b in ((before.stretch, after.stretch), (before.u, after.u))]
             strain = before.strain + high * (after.strain - before.strain)
-            return f"walls meet at a strain of {strain:.3f}: {self._meeting(*state)}"
+            return f"walls touch at a strain of {strain:.3f}: {self._meeting(*state)}"
         return ""
 
     def _meeting(self, stretch: Array, u: Array) -> str:
@@ -341,6 +341,6 @@ class Stretching:
         node, axis = np.unravel_index(beyond.argmax(), beyond.shape)
         if beyond[node, axis] > _TOUCH * octant.box[axis]:
             place = ", ".join(f"{c:.2f}" for c in octant.mesh.nodes[node])
-            return f"the wall that was at ({place}) mm reaches its mirror image across {AXES[axis]}"
+            return f"the wall that was at ({place}) mm touches its mirror image across {AXES[axis]}"
         found = crossings(octant.mesh, u)
         return str(found[0]) if found else ""

@@ -1,23 +1,38 @@
-"""Materials: a library with sources, coupons, and laws fitted to them."""
+"""Materials: a library of resins with sources, tension tests of coupons, and laws fitted to them.
 
-from .coupon import MODES, Coupon, Response, incompressible, response
-from .fit import Fit, fit
-from .library import Material, load_material, material_names, read_material, write_material
-from .stability import Stability, stability
+>>> from mu_addon.materials import load_material, material_names
+>>> len(material_names()) > 0
+True
+"""
 
-__all__ = [
-    "MODES",
-    "Coupon",
-    "Fit",
-    "Material",
-    "Response",
-    "Stability",
-    "fit",
-    "incompressible",
-    "load_material",
-    "material_names",
-    "read_material",
-    "response",
-    "stability",
-    "write_material",
-]
+from typing import TYPE_CHECKING
+
+from ..lazy import public_face
+
+if TYPE_CHECKING:
+    from .choice import choose as choose
+    from .coupon import MODES as MODES
+    from .coupon import Coupon as Coupon
+    from .coupon import Response as Response
+    from .coupon import incompressible as incompressible
+    from .coupon import response as response
+    from .fit import Fit as Fit
+    from .fit import fit_coupons as fit_coupons
+    from .library import Material as Material
+    from .library import load_material as load_material
+    from .library import material_names as material_names
+    from .library import read_material as read_material
+    from .library import write_material as write_material
+    from .stability import Stability as Stability
+    from .stability import check_stability as check_stability
+else:
+    __getattr__, __dir__, __all__ = public_face(
+        __name__,
+        {
+            "choice": "choose",
+            "coupon": "MODES Coupon Response incompressible response",
+            "fit": "Fit fit_coupons",
+            "library": "Material load_material material_names read_material write_material",
+            "stability": "Stability check_stability",
+        },
+    )

@@ -158,9 +158,9 @@ _STRAIN = {"uniaxial": 1.0, "equibiaxial": 2.0, "pure_shear": 2 / np.sqrt(3)}
 
 def _checked(law: Any, mode: str, stretch: Array) -> Array:
     if mode not in MODES:
-        raise InputError(f"there is no mode {mode!r}", "coupon", f"choose one of {', '.join(MODES)}")
+        raise InputError(f"unknown mode {mode!r}", "coupon", f"choose one of {', '.join(MODES)}")
     if law.history:
-        raise InputError(f"{law.name} has a history", mode, "its stress needs a path in time")
+        raise InputError(f"{law.name} depends on its history", mode, "its stress needs a path in time")
     stretch = np.atleast_1d(np.asarray(stretch, float))
     if not (np.isfinite(stretch) & (stretch > 0)).all():
         raise InputError("a stretch is not positive", mode, "stretch is length over initial length")
@@ -191,5 +191,5 @@ def _check_axes(law: Any, stress: Array, modulus: float) -> None:
         raise InputError(
             f"{law.name}: stretching along the coupon's axes makes a shear stress of {shear:.3g} MPa",
             "coupon",
-            "turn the law's axes into the coupon's",
+            "rotate the law's axes to the coupon's",
         )

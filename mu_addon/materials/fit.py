@@ -13,7 +13,7 @@ from .coupon import Array, Coupon, binned, incompressible
 from .forms import Form
 from .intervals import Parameter, intervals
 from .regression import Problem, best_exponents
-from .stability import Stability, stability, whole_ranges
+from .stability import Stability, check_stability, whole_ranges
 
 # Coupons do not see the bulk modulus; this ratio is what a nearly incompressible law is given.
 POISSON = 0.499
@@ -111,7 +111,7 @@ class Fit:
         return incompressible(self.form.law, self.parameters, mode, stretch)
 
 
-def fit(
+def fit_coupons(
     form: Form,
     coupons: Sequence[Coupon],
     held_out: Sequence[Coupon] = (),
@@ -129,7 +129,7 @@ def fit(
     the law itself is wrong no interval is honest, and a long memory says so. Raises InputError.
     """
     if weights not in WEIGHTS:
-        raise InputError(f"there are no {weights!r} weights", "fit", f"choose from {', '.join(WEIGHTS)}")
+        raise InputError(f"unknown weights {weights!r}", "fit", f"choose from {', '.join(WEIGHTS)}")
     n = sum(len(c.stretch) for c in coupons)
     if n <= form.count:
         raise InputError(
@@ -168,7 +168,7 @@ def leave_one_mode_out(form: Form, coupons: Sequence[Coupon], weights: str = "ab
     for mode in modes if len(modes) > 1 else ():
         rest = [c for c in coupons if c.mode != mode]
         out = [c for c in coupons if c.mode == mode]
-        found[mode] = fit(form, rest, out, weights).held_out()
+        found[mode] = fit_coupons(form, rest, out, weights).held_out()
     return found
 
 
@@ -231,7 +231,7 @@ def _stability(form: Form, row: Array, coupons: Sequence[Coupon]) -> tuple[Stabi
     if _invalid(form, row):
         return ()
     return tuple(
-        stability(form.law, row, mode, low, high)
+        check_stability(form.law, row, mode, low, high)
         for mode, (low, high) in whole_ranges(ranges(coupons)).items()
     )
 

@@ -96,5 +96,5 @@ FORMS = {
 def form(name: str) -> Form:
     """The form of that name; InputError lists those there are."""
     if name not in FORMS:
-        raise InputError(f"there is no law {name!r} to fit", "laws", f"choose from {', '.join(FORMS)}")
+        raise InputError(f"unknown law {name!r}", "laws", f"choose from {', '.join(FORMS)}")
     return FORMS[name]

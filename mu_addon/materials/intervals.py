@@ -45,7 +45,9 @@ def intervals(
     J = problem.jacobian(row)
     # A term may be so small that its exponent changes nothing.
     silent = free & (np.linalg.norm(J, axis=0) == 0)
-    notes = ["the data ask for no such term" if s else note for s, note in zip(silent, notes, strict=True)]
+    notes = [
+        "the data do not support this term" if s else note for s, note in zip(silent, notes, strict=True)
+    ]
     free &= ~silent
     J = J[:, free]
     n, p = len(residual), int(np.sum(free))
@@ -61,7 +63,7 @@ def intervals(
         if s[-1] > 1e-7 * s[0]:
             half[free] = np.sqrt(margin * ((V.T / s) ** 2).sum(axis=1)) / size
         else:
-            notes = [note or "not determined: another parameter makes up for it" for note in notes]
+            notes = [note or "not determined: another parameter compensates for it" for note in notes]
     else:
         notes = [note or "too few independent values" for note in notes]
     found = []
@@ -81,7 +83,7 @@ def _free(form: Form, row: Array) -> tuple[Array, list[str]]:
         for p in range(form.exponents):
             if row[2 * p] == 0:
                 free[2 * p : 2 * p + 2] = False
-                notes[2 * p : 2 * p + 2] = ["the data ask for no such term"] * 2
+                notes[2 * p : 2 * p + 2] = ["the data do not support this term"] * 2
             elif not EXPONENTS[0] + 1e-6 < row[2 * p + 1] < EXPONENTS[1] - 1e-6:
                 free[2 * p + 1] = False
                 notes[2 * p + 1] = "at the bound of the search"

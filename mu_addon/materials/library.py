@@ -6,20 +6,25 @@ import json
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
 from ..design.assets import asset_file, asset_names
+from ..design.quantity import in_kPa
 from ..design.toml_text import nearest, parse, place
+from ..design.wall import Wall, require_used
 from ..errors import InputError
 from ..fem import laws
 from ..fem.materials import Layer, Materials
 from ..files import write_text
 from ..reading import file_text
 from .coupon import MODES, Array
-from .stability import Stability, stability, whole_ranges
+from .stability import Stability, check_stability, whole_ranges
+
+if TYPE_CHECKING:
+    from ..design.parameters import Unit
 
 FORMAT = 1
 CONFIDENCE = ("datasheet", "measured", "fitted", "second hand", "derived", "assumed")
@@ -43,6 +48,9 @@ _POINT = ("mode", "strain", "stress_MPa", "confidence", "source")
 _LAW = ("name", "parameters", "low95", "high95", "confidence", "source", "ranges", "fails")
 _KEYS: dict[str, Sequence[str]] = {"": ("format", "name", "about", "point"), "law": _LAW}
 _KEYS |= dict.fromkeys(QUANTITIES, _VALUE)
+# Of a unit's [wall] what no elastic law has; that law's shape is [law]'s.
+_WALL = tuple(f.name for f in attrs.fields(Wall) if f.name not in ("c2_over_c1", "c3_over_c1"))
+_KEYS["wall"] = (*_WALL, "confidence", "source")
 
 
 @attrs.frozen
@@ -74,7 +82,8 @@ class Material:
     """A material: figures by name, points of its stress-strain curve, a law with one row of parameters.
 
     ranges: lowest and highest stretch of every mode that the law rests on; fails: modes it is known to
-    miss; low95, high95: intervals of parameters that were fitted.
+    miss; low95, high95: intervals of parameters that were fitted. wall: what a unit's wall of it does beyond
+    its elastic law.
     """
 
     name: str
@@ -89,6 +98,9 @@ class Material:
     fails: tuple[str, ...] = ()
     low95: Mapping[str, float] = attrs.field(factory=dict)
     high95: Mapping[str, float] = attrs.field(factory=dict)
+    wall: Wall = attrs.field(factory=Wall)
+    wall_confidence: str = ""
+    wall_source: str = ""
 
     @property
     def density_g_per_ml(self) -> float:
@@ -115,7 +127,9 @@ class Material:
     def stability(self) -> tuple[Stability, ...]:
         """The law's stability over its range, in every mode."""
         checked = whole_ranges(self.ranges)
-        return tuple(stability(self.law, self.parameters, mode, *span) for mode, span in checked.items())
+        return tuple(
+            check_stability(self.law, self.parameters, mode, *span) for mode, span in checked.items()
+        )
 
     def require_stable(self) -> None:
         """Raise InputError where the law is unstable within its range."""
@@ -124,7 +138,7 @@ class Material:
                 raise InputError(
                     f"{self.name}: the {self.law.name} law is unstable {s.where()}",
                     "[law]",
-                    "take another law, or narrow its range to what will be reached",
+                    "take another law, or restrict its range to the strains that occur",
                 )
 
     def rows(self, count: int, factor: Any = 1.0) -> Array:
@@ -137,6 +151,28 @@ class Material:
         moduli = [name.endswith("_MPa") for name in self.law.parameter_names]
         rows[:, moduli] *= np.broadcast_to(np.asarray(factor, float), count)[:, None]
         return rows
+
+    def in_unit(self, unit: Unit) -> Unit:
+        """The unit with a wall of this material, its moduli, law and memory; raises InputError.
+
+        A unit's wall knows neo-Hooke's and Yeoh's law; sensor and lattice stay what they are.
+        """
+        if self.law not in (laws.NeoHooke, laws.Yeoh):
+            raise InputError(
+                f"a unit's wall cannot have the {self.law.name} law of {self.name}",
+                "[law]",
+                "fit Yeoh's law: fit-material --laws yeoh",
+            )
+        self.require_stable()
+        wall = self.wall
+        if self.law is laws.Yeoh:
+            c1, c2, c3, _ = self.parameters.tolist()
+            law = "yeoh" if wall.law == "neo-hooke" else wall.law
+            wall = attrs.evolve(wall, law=law, c2_over_c1=c2 / c1, c3_over_c1=c3 / c1)
+        material = attrs.evolve(
+            unit.material, membrane_modulus_kPa=in_kPa(self.modulus_MPa), membrane_poisson=self.poisson
+        )
+        return attrs.evolve(unit, material=material, wall=wall)
 
     def materials(self, count: int, factor: Any = 1.0) -> Materials:
         """A body of so many elements of this material, every modulus times `factor` as `rows` has it."""
@@ -194,6 +230,7 @@ def parse_material(text: str, origin: str = "") -> Material:
         values=values,
         points=tuple(reader.point(i, point) for i, point in enumerate(points, 1)),
         **reader.law(document["law"], values),
+        **(reader.wall(document["wall"]) if "wall" in document else {}),
     )
 
 
@@ -312,6 +349,20 @@ class _Reader:
             "high95": self._interval(law, found, "high95"),
         }
 
+    def wall(self, found: Mapping[str, Any]) -> dict[str, Any]:
+        given = {name: value for name, value in found.items() if name in _WALL}
+        try:
+            wall = Wall(**given)
+            require_used(wall, given)
+        except InputError as error:
+            key = error.where.rpartition(" ")[2]
+            raise InputError(error.what, self.at("wall", key), error.remedy) from error
+        return {
+            "wall": wall,
+            "wall_confidence": self.choice("wall", found, "confidence", CONFIDENCE),
+            "wall_source": self.word("wall", found, "source"),
+        }
+
     def _row(self, law: Any, found: Any) -> Array:
         where = self.at("law", "parameters")
         if not isinstance(found, dict):
@@ -394,6 +445,14 @@ def material_text(material: Material, head: str = "") -> str:
     lines += [f"ranges = {{ {spans} }}"]
     if material.fails:
         lines += [f"fails = {json.dumps(list(material.fails))}"]
+    wall = [name for name in material.wall.names if name in _WALL]
+    if wall:
+        lines += ["", "[wall]"]
+        for name in wall:
+            value = getattr(material.wall, name)
+            lines.append(f"{name} = {_quoted(value) if isinstance(value, str) else repr(value)}")
+        lines += [f"confidence = {_quoted(material.wall_confidence)}"]
+        lines += [f"source = {_quoted(material.wall_source)}"]
     return "\n".join(lines) + "\n"
 
 

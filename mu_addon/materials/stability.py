@@ -53,7 +53,7 @@ def whole_ranges(reached: Mapping[str, tuple[float, float]]) -> dict[str, tuple[
     return {mode: reached.get(mode, (1.0, float(stretch_of_equivalent(mode, far)))) for mode in MODES}
 
 
-def stability(law: Any, parameters: Array, mode: str, low: float, high: float) -> Stability:
+def check_stability(law: Any, parameters: Array, mode: str, low: float, high: float) -> Stability:
     """Check a law of one row of parameters (count,) along a mode, from stretch `low` to `high`.
 
     Drucker's postulate in Hill's form: d(tau):d(e) > 0 for every increment de of the logarithmic strain,

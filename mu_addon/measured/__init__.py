@@ -1,7 +1,24 @@
-"""Measured data: a folder of experiments, read and checked."""
+"""Measured data: a folder of experiments (`experiments.toml` and CSV files), read and checked.
 
-from .experiment import Experiment
-from .folder import Measured, read_folder
-from .table import Remark
+`read_folder` gives a `Measured` with its experiments in the order in which they were made; every fault of a
+file is an InputError with file, row and what to do.
+"""
 
-__all__ = ["Experiment", "Measured", "Remark", "read_folder"]
+from typing import TYPE_CHECKING
+
+from ..lazy import public_face
+
+if TYPE_CHECKING:
+    from .experiment import Experiment as Experiment
+    from .folder import Measured as Measured
+    from .folder import read_folder as read_folder
+    from .table import Remark as Remark
+else:
+    __getattr__, __dir__, __all__ = public_face(
+        __name__,
+        {
+            "experiment": "Experiment",
+            "folder": "Measured read_folder",
+            "table": "Remark",
+        },
+    )

@@ -52,10 +52,10 @@ def read_folder(folder: Path) -> Measured:
         raise InputError(
             f"unknown key {key!r}{_nearest(key, ['experiment'])}",
             _place(path, text, 0, key),
-            "describe every experiment under [[experiment]]",
+            "define every experiment under [[experiment]]",
         )
     if not isinstance(entries, list) or not entries:
-        raise InputError("no experiment is described", str(path), "begin each with a line [[experiment]]")
+        raise InputError("no experiment is defined", str(path), "begin each with a line [[experiment]]")
     experiments: list[Experiment] = []
     remarks: list[Remark] = []
     for number, entry in enumerate(entries, 1):
@@ -175,7 +175,7 @@ def _cells(value: Any, at: _Place) -> tuple[int, int, int]:
     whole = all(isinstance(c, int) and not isinstance(c, bool) and 1 <= c <= 1000 for c in cells)
     if len(cells) != 3 or not whole:
         raise InputError(
-            f"cells = {value!r} is no count of cells",
+            f"cells = {value!r} is not a number of cells",
             at("cells"),
             "give one whole number, or three along x, y, z",
         )
@@ -196,7 +196,7 @@ def _strained(
             )
         if fields.get(key) is None:
             raise InputError(
-                f"{column} cannot be had from {source}: {key} is not given",
+                f"{column} cannot be computed from {source}: {key} is not given",
                 f"{path}, experiment {fields['name']!r}",
                 f"add {key} to the experiment in {FILE}, or a column {column}",
             )
@@ -209,7 +209,7 @@ def _strained(
                     f"the displacement begins at {columns['displacement_mm'][0]:g} mm, which is read as a "
                     f"strain of {first:.3g}",
                     str(path),
-                    "subtract it where it is only the grips' place",
+                    "subtract it if it is only the position of the grips",
                 )
             )
     elif "displacement_mm" in columns and fields.get("length_mm") is not None:
@@ -238,7 +238,7 @@ def _check_strain(strain: Array, rows: Array, kind: Kind, path: Path, remarks: l
         row = int(rows[np.argmax(gone)])
         value = strain[np.argmax(gone)]
         raise InputError(
-            f"a strain of {value:g} leaves nothing of the specimen",
+            f"a strain of {value:g} is a compression of 100 % or more",
             f"{path}, row {row}, column strain",
             "give strain as a bare number, not in percent, and positive in "
             + ("compression" if kind.name == "lattice_compression" else "tension"),
@@ -288,9 +288,9 @@ def _check_apart(found: Experiment, before: Sequence[Experiment], at: _Place) ->
             )
         if other.sha256 == found.sha256 and other.role != found.role:
             raise InputError(
-                f"{found.name!r} and {other.name!r} hold the same data, and one of them is held out",
+                f"{found.name!r} and {other.name!r} contain the same data, and one of them is held out",
                 at("file"),
-                "hold out data that nothing was fitted to",
+                "hold out data that are not used in any fit",
             )
 
 

@@ -46,8 +46,8 @@ def at_rest(experiments: Sequence[Experiment]) -> dict[int, tuple[str, Array, st
                 missed.setdefault(number, e.name)
     for number in missed.keys() - found.keys():
         raise InputError(
-            f"marker {number} is never seen at rest",
+            f"marker {number} is never visible at rest",
             missed[number],
-            "record it at no pressure before the run",
+            "record it at zero pressure before the run",
         )
     return dict(sorted(found.items()))

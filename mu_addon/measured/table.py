@@ -83,7 +83,7 @@ def _lines(text: str, path: Path) -> tuple[list[str], list[tuple[int, list[str]]
         if line.strip() and not line.lstrip().startswith("#"):
             found.append((number, [cell.strip() for cell in next(csv.reader(io.StringIO(line)))]))
     if not found:
-        raise InputError("the file holds no table", _at(path), "begin it with the columns' names")
+        raise InputError("the file contains no table", _at(path), "the first line must hold the column names")
     row, header = found[0]
     if len(header) == 1 and (";" in header[0] or "\t" in header[0]):
         raise InputError(
@@ -99,9 +99,7 @@ def _lines(text: str, path: Path) -> tuple[list[str], list[tuple[int, list[str]]
         )
     for name in header:
         if header.count(name) > 1:
-            raise InputError(
-                f"column {name!r} is there {header.count(name)} times", _at(path, row), "keep one"
-            )
+            raise InputError(f"column {name!r} occurs {header.count(name)} times", _at(path, row), "keep one")
     return header, found[1:]
 
 
@@ -140,7 +138,7 @@ def _header(
     for name in names:
         if names.count(name) > 1:
             twice = " and ".join(header[i] for i, (other, _) in kept.items() if other == name)
-            raise InputError(f"{twice} are one column in two units", _at(path), "keep one")
+            raise InputError(f"{twice} are the same column in two units", _at(path), "keep one")
     if kind.timed and "time_s" not in names:
         raise InputError("column time_s is missing", _at(path), f"{kind.name} needs the time of every row")
     for number, axes in markers(names).items():
@@ -211,7 +209,7 @@ def _without_repeats(
         Remark(
             f"{same.sum()} rows repeat the row before and were left out",
             _at(path, int(first)),
-            "see whether the logger stuttered",
+            "check the data logger",
         )
     )
     keep = np.concatenate([[True], ~same])
@@ -243,7 +241,7 @@ def _check_time(time: Array, rows: Array, path: Path, remarks: list[Remark]) -> 
                 f"{len(gaps)} gap{'s' if len(gaps) > 1 else ''} in time; the longest lasts {step[i]:.4g} s, "
                 f"where {usual:.4g} s is usual",
                 _at(path, int(rows[i + 1])),
-                "rates and lags across it are not seen",
+                "rates and lags across the gap are not evaluated",
             )
         )
 
@@ -258,7 +256,7 @@ def _check_missing(name: str, values: Array, rows: Array, path: Path, remarks: l
         Remark(
             f"{len(bad)} of {len(values)} values of {name} are missing",
             _at(path, int(rows[bad[0]]), name),
-            "these rows are not used for it",
+            "these rows are not used for this column",
         )
     )
 
@@ -289,11 +287,11 @@ def _check_spikes(
     found = [k for k in found if np.abs(d[k]) >= np.abs(d[k - 1 : k + 2]).max()]
     if found:
         worst = max(found, key=lambda k: abs(d[k]))
-        stand = "1 value stands" if len(found) == 1 else f"{len(found)} values stand"
+        stand = "1 value lies" if len(found) == 1 else f"{len(found)} values lie"
         remarks.append(
             Remark(
                 f"{stand} apart from both neighbours, the worst ({x[worst]:.6g}) by {abs(d[worst]):.4g}",
                 _at(path, int(rows[seen[worst]]), name),
-                "look at it: an outlier that is no reading should be left out",
+                "check it: an outlier that is not a reading should be removed",
             )
         )

@@ -48,7 +48,7 @@ class Tracks:
         """Pixels (n, 2) of one marker; raises InputError where it was not followed."""
         if name not in self.names:
             raise InputError(
-                f"no marker {name!r} was followed", "", f"followed were: {', '.join(self.names) or 'none'}"
+                f"marker {name!r} was not tracked", "", f"tracked markers: {', '.join(self.names) or 'none'}"
             )
         return np.asarray(self.pixels[self.names.index(name)])
 
@@ -118,7 +118,7 @@ def motion(tracks: Tracks, view: View, rest: Array, time_s: Array, where: str = 
         tip = _direction(np.stack([q[name] for name in view.tip])) / turn
         if not np.isfinite(tip[rest]).any():
             raise InputError(
-                "tip and base are never seen together at rest", where, "begin the clip before the pressure"
+                "tip and base are never visible together at rest", where, "begin the clip before the pressure"
             )
         # A right-hand turn about x takes y to z; the angle is positive the other way, toward +y.
         angle = -np.degrees(np.angle(tip / _mean_direction(tip[rest])))
@@ -141,7 +141,7 @@ def _seen(pixels: Array, camera: str) -> Array:
 
 def _check(tracks: Tracks, view: View, where: str) -> None:
     if view.camera not in CAMERAS:
-        raise InputError(f"a camera at {view.camera!r} is not known", where, "say +x or -x")
+        raise InputError(f"a camera at {view.camera!r} is not known", where, "give +x or -x")
     roles = {"base": view.base, "tip": view.tip, "ruler": view.ruler}
     for role, pair in roles.items():
         if pair is None:
@@ -150,14 +150,16 @@ def _check(tracks: Tracks, view: View, where: str) -> None:
             raise InputError(f"the {role} is marker {pair[0]!r} twice", where, "name two markers")
         if not np.isfinite(tracks.of(pair[0]) + tracks.of(pair[1])).any():
             raise InputError(
-                f"the markers of the {role}, {pair[0]!r} and {pair[1]!r}, are never seen together",
+                f"the markers of the {role}, {pair[0]!r} and {pair[1]!r}, are never visible together",
                 where,
                 "track them again, or take other markers",
             )
     if math.dist(*view.places_mm) == 0:
-        raise InputError("both markers of the base have one place", where, "give y and z of each in mm")
+        raise InputError(
+            "both markers of the base have the same position", where, "give y and z of each in mm"
+        )
     if view.ruler is not None and not view.ruler_mm:
-        raise InputError("the ruler has no length", where, "give ruler_mm, the distance of its two markers")
+        raise InputError("ruler_mm is missing or 0", where, "give ruler_mm, the distance of its two markers")
     for name, value in (("ruler_mm", view.ruler_mm), ("mm_per_pixel", view.mm_per_pixel)):
         if value is not None and not (math.isfinite(value) and value > 0):
             raise InputError(f"{name} = {value:g} is no length", where, "give a number above 0")
@@ -176,9 +178,10 @@ def _scale(q: Mapping[str, Array], view: View, known: Array, told: list[Remark],
         if abs(value / chosen - 1) > DISAGREE:
             told.append(
                 Remark(
-                    f"by {first} a pixel is {chosen:.5g} mm, by {name} {value:.5g} mm; the former is used",
+                    f"by {first} one pixel is {chosen:.5g} mm, by {name} {value:.5g} mm; the first "
+                    "value is used",
                     where,
-                    "see whether both lie as far from the camera as the markers, and were measured right",
+                    "check that both lie in the plane of the markers and were measured correctly",
                 )
             )
     return chosen
@@ -234,7 +237,7 @@ def _rigid(
                 f"the {part}'s two markers, {usual:.4g} pixels apart, are {apart[worst]:.4g} apart at "
                 f"{time_s[worst]:.4g} s",
                 where,
-                "one of them slipped, was confused with something else or left the plane: look at that frame",
+                "one of them slipped, was confused with another feature or left the plane: check that frame",
             )
         )
     # From frame to frame: a slow drift of the distance is perspective, not noise.
@@ -251,7 +254,7 @@ def _tell_moved(middle: Array, turn: Array, apart: Array, told: list[Remark], wh
     if most > MOVED:
         told.append(
             Remark(
-                f"the base's markers move by up to {most:.3g} pixels, and the base is taken to stand still",
+                f"the base's markers move by up to {most:.3g} pixels, but the base is assumed fixed",
                 where,
                 "the camera or the clamp moved: set follow_base",
             )

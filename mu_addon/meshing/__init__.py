@@ -1,22 +1,41 @@
-"""Geometry to labelled tetrahedra."""
+"""Meshing: labelled tetrahedra of a unit, or of any closed surface.
 
-from .mesh import LATTICE, MEMBRANE, Mesh, mirror
-from .quality import Quality, quality
-from .settings import MeshSettings
-from .surface import VOID, Surface, mesh_surface
-from .unit import MeshingWarning, mesh_unit
+`mesh_unit` gives the analysis mesh of a unit, half of it by default: deterministic, with conforming
+interfaces between membrane and lattice (gmsh). `mesh_surface` fills any closed surface (pytetwild). A `Mesh`
+is plain arrays: nodes, tetrahedra of order 1 or 2, the region of each, and the surfaces that loads act on.
 
-__all__ = [
-    "LATTICE",
-    "MEMBRANE",
-    "VOID",
-    "Mesh",
-    "MeshSettings",
-    "MeshingWarning",
-    "Quality",
-    "Surface",
-    "mesh_surface",
-    "mesh_unit",
-    "mirror",
-    "quality",
-]
+    >>> from mu_addon.meshing import MeshSettings
+    >>> MeshSettings(order=1, refine=0.5).order
+    1
+"""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import public_face
+
+if TYPE_CHECKING:
+    from .lattice import GmshUnavailable as GmshUnavailable
+    from .mesh import LATTICE as LATTICE
+    from .mesh import MEMBRANE as MEMBRANE
+    from .mesh import Mesh as Mesh
+    from .mesh import mirror as mirror
+    from .quality import Quality as Quality
+    from .quality import mesh_quality as mesh_quality
+    from .settings import MeshSettings as MeshSettings
+    from .surface import VOID as VOID
+    from .surface import Surface as Surface
+    from .surface import mesh_surface as mesh_surface
+    from .unit import MeshingWarning as MeshingWarning
+    from .unit import mesh_unit as mesh_unit
+else:
+    __getattr__, __dir__, __all__ = public_face(
+        __name__,
+        {
+            "lattice": "GmshUnavailable",
+            "mesh": "LATTICE MEMBRANE Mesh mirror",
+            "quality": "Quality mesh_quality",
+            "settings": "MeshSettings",
+            "surface": "VOID Surface mesh_surface",
+            "unit": "MeshingWarning mesh_unit",
+        },
+    )

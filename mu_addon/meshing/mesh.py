@@ -88,10 +88,10 @@ class Mesh:
 
 
 def mirror(mesh: Mesh, axis: str) -> Mesh:
-    """The whole body from the part on one side of its mirror plane `axis` = 0.
+    """The whole body from the part on one side of its mirror plane `axis` = 0 ("x", "y" or "z").
 
-    Nodes on the plane are shared, every other node gains an exact image. Raises MeshingError where
-    the plane is not a mirror of the mesh.
+    Nodes on the plane are shared, every other node gains an exact image: n nodes become up to 2 n. Raises
+    MeshingError where the plane is not a mirror plane of the mesh.
     """
     column = AXES.index(axis)
     on_plane = np.zeros(len(mesh.nodes), bool)

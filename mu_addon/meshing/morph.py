@@ -30,7 +30,7 @@ def morphed(mesh: Mesh, drawn: Unit, other: Unit, settings: MeshSettings) -> Mes
     count = len(before.nodes)
     close = 1e-6 * a.cell
     if len(mesh.nodes) < count or np.abs(mesh.nodes[:count] - before.nodes).max() > close:
-        raise _failed("its mesh is not gmsh's, or one of other settings")
+        raise _failed("its mesh is not by gmsh, or has other settings")
     corner = np.zeros(len(mesh.nodes), bool)
     corner[mesh.corners] = True
     known = np.zeros(len(mesh.nodes), bool)
@@ -60,12 +60,12 @@ def _membranes(a: Dimensions, b: Dimensions, settings: MeshSettings) -> tuple[Me
     quarters = 1 if settings.fraction == "quarter" else 2
     first, second = Meridian.of(a), Meridian.of(b)
     if (a.height, a.count, a.bounds) != (b.height, b.count, b.bounds):
-        raise _failed("its envelope is another")
+        raise _failed("its envelope differs")
     breaks = [_breaks(m) for m in (first, second)]
     order = np.argsort(breaks[0])
     from_, to = (x[order] for x in breaks)
     if not (np.diff(to) > 0).all():
-        raise _failed("its profile is another")
+        raise _failed("its profile differs")
     p = stations(first, settings.meridian_mm * size)
     turn, edge = quarters * math.pi / 2, settings.hoop_mm * size
     sectors, rings = quarters * division(a.R * math.pi / 2, edge), division(a.r, edge)
@@ -114,4 +114,4 @@ def _followed(nodes: Array, tets: Array, moved: Array, held: Array) -> Array:
 
 
 def _failed(why: str) -> MeshingError:
-    return MeshingError(f"the mesh of a unit cannot be moved: {why}", "unit", "mesh the other unit instead")
+    return MeshingError(f"the mesh of a unit cannot be moved: {why}", "unit", "mesh the other unit anew")

@@ -26,7 +26,7 @@ _DUNAVANT_WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3) / 2
 
 @attrs.frozen
 class Quality:
-    """What `quality` measured; volumes in mm3 are those of the whole body, errors relative to the design.
+    """What `mesh_quality` measures; volumes in mm3 are the whole body's, errors relative to the design.
 
     min_scaled_jacobian is the least ratio, in one element, of the smallest to the largest det J at its four
     Gauss points: 1 where edges are straight, 0 where it folds; inverted counts elements that do.
@@ -52,10 +52,11 @@ class Quality:
     cavity_volume_error: float
 
 
-def quality(mesh: Mesh, unit: Unit, body: Body | None = None) -> Quality:
-    """Measure a mesh of a unit, half and quarter meshes as the whole body they stand for.
+def mesh_quality(mesh: Mesh, unit: Unit, body: Body | None = None) -> Quality:
+    """Counts, angles, Jacobians and volumes of a unit's mesh, beside the exact volumes of the design.
 
-    body: what took the place of the envelope's box in it, if anything did.
+    Half and quarter meshes count as the whole body they stand for. body: the closed surface that took the
+    place of the envelope's box, if one did. See `Quality` for units.
     """
     d = unit.printed
     (x0, x1), (y0, y1), (z0, z1) = d.bounds

@@ -34,12 +34,15 @@ def _between(low: float, high: float) -> Any:
 
 @attrs.frozen
 class MeshSettings:
-    """Order, mirror fraction and element sizes; raises InputError.
+    """Element order, mirror fraction and element sizes of an analysis mesh.
 
-    fraction: "half" (x >= 0), "quarter" (also y >= 0) or "full" (the half and its mirror image).
-    refine divides every size and multiplies through_wall. Sizes in mm: along the meridian of the membrane
-    and around its apex, at the anchors' column and at the envelope of the lattice. through_wall: elements
-    across the membrane.
+    fraction: "half" (x >= 0), "quarter" (also y >= 0) or "full" (the half and its mirror image). order: 1
+    or 2; linear elements lock in thin walls. refine: divides every size and multiplies through_wall. Sizes
+    in mm for a cell of 12.5 mm: along the membrane's meridian and around its apex, at the line of anchors
+    and at the lattice's envelope. through_wall: elements across the membrane. Raises InputError.
+
+    >>> MeshSettings().order, MeshSettings(refine=0.5).fraction
+    (2, 'half')
     """
 
     order: int = attrs.field(default=2, validator=_one_of(1, 2))

@@ -196,7 +196,7 @@ def _envelope(occ: Any, d: Dimensions) -> None:
 
 def _waveguide(occ: Any, bar: Bar | None) -> None:
     if bar is None:
-        raise InputError("there is no waveguide without a path", "waveguide", "name a path")
+        raise InputError("a waveguide needs a path", "waveguide", "name a path")
     legs = [_hexahedron(occ, corners) for corners in bar.legs]
     parts = [*legs, *(_hull(occ, seat.solid()) for seat in bar.seats)]
     whole = parts[:1]

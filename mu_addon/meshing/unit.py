@@ -53,14 +53,17 @@ def mesh_unit(
     cache: Path | None = None,
     body: Body | None = None,
 ) -> Mesh:
-    """The analysis mesh of a unit as it is printed; `progress` is told a stage and the share done.
+    """The analysis mesh of a unit as it is printed: labelled tetrahedra of membrane and lattice region.
 
-    The membrane is a revolved grid; gmsh fills the lattice region around it. mesher "pytetwild" meshes
-    the whole from surfaces instead, straight-sided, coarser in shape and slower, and keeps it in the
-    folder `cache`; "auto" does so, with a MeshingWarning, only where gmsh cannot be loaded. The inlet
-    is left out: the base is clamped. A sound `body` takes the place of the envelope's box, see
-    `design.body.envelope`: pytetwild meshes it, its half where it is its own mirror image across x, else the
-    whole. Raises InputError and MeshingError.
+    The membrane is a structured grid revolved about z; gmsh fills the lattice region around it. The base is
+    clamped, the inlet is left out. settings: sizes and order. mesher: "gmsh", "pytetwild" (meshes all from
+    surfaces instead, straight-sided, coarser in shape and slower, and cached in the folder `cache`), or
+    "auto": pytetwild, with a MeshingWarning, only where gmsh cannot be loaded. body: a closed surface in
+    place of the envelope's box (`design.body.envelope`), which pytetwild meshes: half of it where it is its
+    own mirror image across x = 0. progress: called with a stage and the share done.
+
+    Raises InputError and MeshingError. A coarse mesh takes about a second:
+    `mesh_unit(load_preset("mu-1.0x"), MeshSettings(order=1, refine=0.5))`.
     """
     settings = settings or MeshSettings()
     say = progress or (lambda stage, share: None)
@@ -87,8 +90,8 @@ def mesh_unit(
             if mesher == "gmsh":
                 raise
             warnings.warn(
-                f"{error.what}. pytetwild meshes the unit instead: slower, with more elements and a less "
-                f"exact wall. To have gmsh: {error.remedy}",
+                f"{error.what}. pytetwild meshes the unit instead: slower, with more elements and a "
+                f"less accurate wall. To install gmsh: {error.remedy}",
                 MeshingWarning,
                 stacklevel=2,
             )
@@ -200,7 +203,7 @@ def _within(
     """Mesh of a unit with a body for its envelope."""
     if mesher == "gmsh" or settings.fraction == "quarter":
         raise InputError(
-            "a body of one's own is meshed by pytetwild, as a half or whole",
+            "a user-defined body is meshed by pytetwild, as a half or a whole",
             "mesher, fraction",
             'choose mesher "auto" or "pytetwild" and fraction "half" or "full"',
         )

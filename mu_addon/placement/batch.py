@@ -21,9 +21,10 @@ Array = np.ndarray[Any, Any]
 
 
 class CandidateBatch:
-    """Many sensors in one unit: where each moves the monitored points at a state of Model A.
+    """Many candidate sensors in one unit, solved together: how each moves the monitored points in a state.
 
-    shares: the part (m,) of every element that each sensor fills (see inclusion.sensor_share).
+    At every state of Model A (the unit without a sensor) all candidates share one factorisation (batched
+    Newton). shares: for each sensor the share (m,) of every element that it fills (`sensor_share`).
     monitored: points (p, 3) in mm of the backbone and their probe. settings: of Newton's method.
     """
 
@@ -52,9 +53,9 @@ class CandidateBatch:
         return self.points(equilibrium.path(pressures_MPa, equilibrium.at_zero_pressure()))
 
     def simulated_in_time(self, number: int, time_s: Array, pressure_kPa: Array) -> Array:
-        """Monitored points (k, p, 3) in mm of one sensor's unit at k instants, beside the model's obstacles.
+        """Monitored points (k, p, 3) in mm of one sensor's unit at k instants, in the order of time.
 
-        Its whole motion is solved in the order of time, as friction remembers. Raises ConvergenceError.
+        For what remembers: friction on the model's obstacles, or a law with history. Raises ConvergenceError.
         """
         equilibrium = self._batched_newton.alone(number)
         equilibrium.settings = CONTACT

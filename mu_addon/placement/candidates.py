@@ -15,7 +15,7 @@ from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.trajectory import Trajectory, simulate
 from ..meshing.mesh import LATTICE, Mesh
-from .deviation import Deviation, centreline, deviation
+from .deviation import Deviation, centreline, centreline_deviation
 from .inclusion import Inclusion, sensor_share, stiffened_volume_mm3
 from .polyline import polyline_inclusion
 
@@ -24,7 +24,10 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen(eq=False)
 class Candidate:
-    """A path through `points` (h, 3) in mm; `start` is the number of its first anchor, 0 for other nodes."""
+    """A path of the waveguide: a name and `points` (h, 3) in mm.
+
+    start: number of its first anchor, counted from 1; 0 for a path through other nodes.
+    """
 
     name: str
     start: int
@@ -36,8 +39,14 @@ class Candidate:
         return len(self.points)
 
 
-def candidates(anchors: Array, windows: Any) -> list[Candidate]:
-    """Candidates of windows (name, start, length) over anchors (n, 3) in mm."""
+def candidate_paths(anchors: Array, windows: Any) -> list[Candidate]:
+    """Candidates of windows (name, start, length) over anchors (n, 3) in mm.
+
+    >>> from mu_addon.design import anchor_points, load_preset, windows
+    >>> paths = candidate_paths(anchor_points(load_preset("mu-1.0x")), windows(6))
+    >>> paths[0].name, paths[0].points.shape
+    ('alpha1', (3, 3))
+    """
     return [Candidate(w.name, w.start, anchors[w.start - 1 : w.start - 1 + w.length]) for w in windows]
 
 
@@ -48,7 +57,7 @@ def roi(mesh: Mesh, candidate: Candidate, radius_mm: float) -> Inclusion:
 
 
 def with_sensor(materials: Materials, share: Array, sensor_MPa: float) -> Materials:
-    """Materials with a neo-Hookean sensor in a share (m,) of every element.
+    """Materials with a neo-Hookean sensor of Young's modulus sensor_MPa in a share (m,) of every element.
 
     Poisson's ratio stays the element's own, so that only Young's modulus differs.
     """
@@ -90,7 +99,7 @@ def evaluation(
     return Evaluation(
         candidate.name,
         rule,
-        deviation(centreline(moved, stations), centreline(baseline, stations)),
+        centreline_deviation(centreline(moved, stations), centreline(baseline, stations)),
         whole * stiffened_volume_mm3(rule, found, volumes),
         found.cylinder_volume_mm3,
     )
@@ -107,10 +116,12 @@ def evaluate(
     sensor_MPa: float,
     stations: int,
 ) -> Evaluation:
-    """Model alpha of one candidate against Model A, alone and along its whole path from rest.
+    """Deviation of one candidate from Model A, solved along its whole path (the paper's Algorithm 1).
 
-    This is what `sweep` must agree with, at the cost of one Model A a candidate. monitored: the points
-    (p, 3) in mm of the backbone and their probe. Raises ConvergenceError.
+    The reference for `CandidateBatch`, at the cost of one simulation a candidate. model and materials: of
+    the unit without a sensor, and baseline its trajectory. monitored: points (p, 3) in mm of the backbone
+    and their probe. rule: "intersect" or "volume_fraction". radius_mm: of the inclusion; sensor_MPa: its
+    Young's modulus; stations: uniform arc lengths compared. Raises ConvergenceError.
     """
     found = roi(model.mesh, candidate, radius_mm)
     stiff = with_sensor(materials, sensor_share(rule, found), sensor_MPa)

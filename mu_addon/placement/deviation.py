@@ -11,10 +11,14 @@ Array = np.ndarray[Any, Any]
 
 
 def centreline(points: Array, stations: int) -> Array:
-    """Positions (k, j, 3) at j uniform normalised arc lengths of polylines (k, N, 3) in mm.
+    """Positions (k, j, 3) in mm at j uniform normalised arc lengths of polylines (k, N, 3) in mm.
 
-    Cubic splines (not-a-knot) through the monitored nodes, by chord length normalised to [0, 1],
-    which is the usual stand-in for arc length before the curve is known.
+    Cubic splines (not-a-knot) through the monitored nodes, by chord length normalised to [0, 1], the usual
+    stand-in for arc length before the curve is known.
+
+    >>> line = np.array([[[0.0, 0.0, z] for z in (0.0, 1.0, 2.0, 4.0)]])
+    >>> centreline(line, 3)[0, :, 2].round(9).tolist()
+    [0.0, 2.0, 4.0]
     """
     from scipy.interpolate import CubicSpline
 
@@ -38,10 +42,11 @@ def _arc_length_parameters(spline: Any, at: Array) -> Array:
 
 @attrs.frozen(eq=False)
 class Deviation:
-    """Delta (k, j) in mm at k times and j stations, with its marginal means and objectives in mm.
+    """Distance Delta (k, j) in mm between two centrelines at k times and j stations, and its means in mm.
 
-    Delta is the paper's eq. for ||r_alpha - r_A||; over_time (k,) its mean over length, over_length
-    (j,) its mean over time, J_hat its mean, J_cont the root mean square by trapezoidal integration.
+    over_time (k,): mean over length; over_length (j,): mean over time; J_hat: mean of all; J_cont: root
+    mean square by trapezoidal integration. Source: the paper's ||r_alpha - r_A|| and its discrete and
+    continuous objectives.
     """
 
     delta: Array
@@ -51,8 +56,13 @@ class Deviation:
     J_cont: float
 
 
-def deviation(candidate: Array, baseline: Array) -> Deviation:
-    """Compare two centrelines (k, j, 3) in mm on the same times and stations."""
+def centreline_deviation(candidate: Array, baseline: Array) -> Deviation:
+    """Deviation of a candidate's centreline from the baseline's, (k, j, 3) in mm each.
+
+    >>> apart = centreline_deviation(np.full((2, 3, 3), 1.0), np.zeros((2, 3, 3)))
+    >>> round(apart.J_hat, 6)
+    1.732051
+    """
     return deviation_of(np.linalg.norm(candidate - baseline, axis=2))
 
 
@@ -72,7 +82,11 @@ def deviation_of(delta: Array) -> Deviation:
 
 
 def rank(J_hat: Array) -> Array:
-    """Rank (n,) of each candidate, 1 for the smallest J_hat; equal values keep their order."""
+    """Rank (n,) of each candidate by J_hat (n,), 1 for the smallest; equal values keep their order.
+
+    >>> rank(np.array([0.3, 0.1, 0.2])).tolist()
+    [3, 1, 2]
+    """
     order = np.argsort(J_hat, kind="stable")
     ranks = np.empty(len(J_hat), dtype=int)
     ranks[order] = np.arange(1, len(J_hat) + 1)

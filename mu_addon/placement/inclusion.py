@@ -110,7 +110,7 @@ def cylinder_overlap(corners: Array, start: Array, end: Array, radius: float) ->
 
 @attrs.frozen(eq=False)
 class Inclusion:
-    """A candidate's region of interest: share (m,) of each element's volume inside the cylinder."""
+    """Region of interest of a path: share (m,) of each element's volume inside the waveguide's cylinder."""
 
     share: Array
     radius_mm: float
@@ -127,7 +127,7 @@ class Inclusion:
         return float(np.pi * self.radius_mm**2 * self.length_mm)
 
 
-def inclusion(
+def straight_inclusion(
     corners: Array, lattice: Array, start: Array, end: Array, radius: float, minimum_share: float = 1e-9
 ) -> Inclusion:
     """Inclusion of one straight path in the lattice elements of a mesh.
@@ -146,8 +146,13 @@ def inclusion(
 def sensor_share(rule: str, found: Inclusion) -> Array:
     """Share (m,) of every element that becomes the sensor's material under an inclusion rule.
 
-    `intersect` (the paper's): the whole of every touched element. `volume_fraction`: what lies inside
-    the cylinder, beside the lattice's own (Voigt's upper bound).
+    "intersect" (the paper's): the whole of every touched element, so that J depends on the mesh.
+    "volume_fraction": the share inside the cylinder, in parallel with the lattice's own (Voigt's upper
+    bound); it converges.
+
+    >>> found = Inclusion(np.array([0.0, 0.25, 1.0]), radius_mm=1.0, length_mm=25.0)
+    >>> sensor_share("intersect", found).tolist(), sensor_share("volume_fraction", found).tolist()
+    ([0.0, 1.0, 1.0], [0.0, 0.25, 1.0])
     """
     if rule == "intersect":
         return found.touched.astype(float)

@@ -89,10 +89,10 @@ def telling_pressures(trajectory: Trajectory) -> Array:
 
 @attrs.frozen(eq=False)
 class Influence:
-    """The map: displacement (s, p, 3, m) in mm of p points in s states by each element's stiffening.
+    """Displacement (s, p, 3, m) in mm of p points in s states by each element's stiffening, to first order.
 
-    Values are first-order, for one element of the whole body made stiffer by the factor 1 + e, divided
-    by e; one of a half mesh stands for itself without its mirror image.
+    Values are for one element of the whole body made stiffer by the factor 1 + e, divided by e; an element
+    of a half mesh stands for itself without its mirror image.
     """
 
     pressure_MPa: Array
@@ -108,7 +108,7 @@ class Influence:
         return self.displacement / modulus_MPa
 
 
-def influence(
+def influence_map(
     model: Model,
     materials: Materials,
     trajectory: Trajectory,
@@ -116,12 +116,12 @@ def influence(
     pressures_MPa: Array | None = None,
     sides: list[Parity] | None = None,
 ) -> Influence:
-    """Adjoint map of every element over a whole trajectory of Model A.
+    """First-order displacement of every monitored point by the stiffening of every element (adjoint method).
 
-    In each state K lambda = probe for every monitored point and component; an element's force f then
-    moves the point by - lambda f, since the state stays in equilibrium. Linear in the weights of the
-    element's laws, whatever those are. pressures_MPa: the states to take, by default all under pressure.
-    Raises IndefiniteError at an unstable state.
+    In each state K lambda = probe is solved for every monitored point and component; stiffening an element
+    whose internal force is f then moves the point by -lambda f. Linear in the weights of the element's
+    laws, whatever they are. trajectory: of Model A; monitor: probe of p points; pressures_MPa: the states
+    to take, by default all under pressure. Raises IndefiniteError at an unstable state.
     """
     mesh = model.mesh
     sides = parities(model) if sides is None else sides

@@ -62,7 +62,7 @@ def polyline_overlap(corners: Array, points: Array, radius: float) -> Array:
 def polyline_inclusion(
     corners: Array, lattice: Array, points: Array, radius: float, minimum_share: float = 1e-9
 ) -> Inclusion:
-    """Inclusion of a path (n, 3) in the lattice elements of a mesh; see `inclusion.inclusion`."""
+    """Inclusion of a path (n, 3) in the lattice elements of a mesh; see `inclusion.straight_inclusion`."""
     a, b, c, d = np.moveaxis(corners, 1, 0)
     volume = np.abs(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a)) / 6
     share = np.zeros(len(corners))

@@ -28,7 +28,7 @@ from ..fem.trajectory import Trajectory
 from ..fem.triangular import Triangular
 from ..meshing.mesh import LATTICE, Mesh
 from .graph import Graph
-from .inclusion import Inclusion, inclusion, sensor_share
+from .inclusion import Inclusion, sensor_share, straight_inclusion
 from .influence import Parity, loaded, parities, probe_loads, telling_pressures
 from .sampling import polynomials
 
@@ -119,7 +119,7 @@ class Response:
         return found
 
 
-def response(
+def reduced_response(
     model: Model,
     materials: Materials,
     sensor_MPa: float,
@@ -131,9 +131,12 @@ def response(
     pressures_MPa: Array | None = None,
     sides: list[Parity] | None = None,
 ) -> Response:
-    """Reduced response about Model A's states, by default those at `telling_pressures`.
+    """Linear response of a unit to any chain of steps of its lattice graph, by a few strain patterns a step.
 
-    Raises InputError where a step meets no element, IndefiniteError at an unstable state.
+    model, materials, trajectory: Model A. sensor_MPa, rule, radius_mm: of the sensor, as in `evaluate`.
+    monitor: probe of the backbone's points. pressures_MPa: the states, by default those of
+    `telling_pressures`. Raises InputError where a step meets no element, IndefiniteError at an unstable
+    state.
     """
     mesh = model.mesh
     sides = parities(model) if sides is None else sides
@@ -219,7 +222,7 @@ def _patterns(
     number[model.free] = np.arange(len(model.free))
 
     def share(start: Array, end: Array) -> Array:
-        return inclusion(corners, lattice, start, end, radius_mm).share
+        return straight_inclusion(corners, lattice, start, end, radius_mm).share
 
     bars = []
     for start, end in graph.nodes[graph.steps[steps]]:

@@ -70,22 +70,22 @@ def chance_of_better(predicted_mm: Array, exact_mm: Array) -> float:
     return float(min(t.cdf(needed / spread, n - 1).sum(), 1.0))
 
 
-def search(
+def search_paths(
     predicted_mm: Array,
     check: Callable[[Array], Array],
     settings: SearchSettings | None = None,
     on_check: Callable[[int, float], None] = lambda checked, risk: None,
 ) -> Search:
-    """Check paths in the order of their prediction until no other is likely to beat the best.
+    """Solve paths in the order of their predicted deviation until no other is likely to beat the best.
 
-    predicted_mm (n,): positive J_hat; check: numbers (k,) of paths -> their exact J_hat (k,) in mm.
-    on_check is told how many were checked and the risk left. Raises InputError where a prediction is not
-    positive, and whatever `check` raises.
+    predicted_mm (n,): positive predictions of J_hat. check: maps numbers (k,) of paths to their exact J_hat
+    (k,) in mm. on_check: called with how many were checked and the risk left. Raises InputError where a
+    prediction is not positive, and whatever `check` raises.
     """
     s = settings or SearchSettings()
     predicted_mm = np.asarray(predicted_mm, float)
     if not len(predicted_mm) or not (predicted_mm > 0).all():
-        raise InputError("there is no path, or one that is predicted to deviate by nothing", "search")
+        raise InputError("there is no path, or one with a predicted deviation of zero", "search")
     order = np.argsort(predicted_mm, kind="stable")
     across = np.linspace(0, len(order) - 1, s.spread + 2).astype(int)[1:-1]
     # Two at least, or there is no error to speak of.
@@ -103,7 +103,7 @@ def search(
 
 
 def front(length: Array, deviation_mm: Array) -> Array:
-    """Numbers of the paths that no other beats in both length and deviation, shortest first (Pareto).
+    """Numbers of the paths that are Pareto-optimal in length and deviation, shortest first (Pareto).
 
     Longer is better, for a longer path senses more of the unit; NaN deviations are left out.
     """

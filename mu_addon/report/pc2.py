@@ -36,6 +36,6 @@ def read_pc2(path: Path) -> tuple[Array, float, float]:
         raise InputError(f"cannot read the point cache: {error}", str(path)) from None
     size = struct.calcsize(_HEADER)
     if magic != _MAGIC or version != 1 or len(data) != size + 12 * points * samples:
-        raise InputError("not a whole point cache of version 1", str(path), "write it again")
+        raise InputError("not a complete point cache of version 1", str(path), "write it again")
     positions = np.frombuffer(data, "<f4", offset=size).reshape(samples, points, 3)
     return positions, start, step

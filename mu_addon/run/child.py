@@ -167,10 +167,10 @@ class Child:
     def _wordless(self, status: int) -> dict[str, Any]:
         tail = " / ".join(_last_lines(self.folder / ERRORS, 3)) or "it left no message"
         return {
-            "what": f"the process ended without a word ({_context(status)}): {tail}",
+            "what": f"the process ended without a message ({_context(status)}): {tail}",
             "where": str(self.folder / ERRORS),
-            "what_to_do": "open the log; run again, it resumes where it stopped. If memory was short, close "
-            "other programs first",
+            "what_to_do": "open the log; run the command again, it resumes where it stopped. If memory was "
+            "short, close other programs first",
             "status": status,
         }
 

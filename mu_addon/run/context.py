@@ -60,9 +60,9 @@ class RunContext:
         self._lock = FolderLock(folder)
         if not self._lock.held:
             self.progress.warning(
-                "this disk offers no locks: nothing keeps a second run out of the folder",
+                "this disk does not support file locks, so a second run in the same folder is not prevented",
                 str(folder),
-                "start no other run with the same folder",
+                "do not start another run with the same folder",
             )
 
     def unlock(self) -> None:
@@ -107,12 +107,17 @@ def run_to_end(progress: Progress) -> Iterator[RunContext]:
             what = f"the package {error.name} is not installed"
             _stop(context, MuError(what, sys.executable, "install the packages that README.md names"))
         except MemoryError:
-            what = "there was not enough memory"
-            _stop(context, MuError(what, _kept(context), "take a coarser mesh, fewer workers or more memory"))
+            what = "out of memory"
+            _stop(
+                context,
+                MuError(
+                    what, _kept(context), "use a coarser mesh, fewer workers or a machine with more memory"
+                ),
+            )
         except Exception as error:  # noqa: BLE001 - the last resort: told, logged and turned into exit status 70
             _log_traceback(context, error)
             fault = _Unexpected(
-                f"this program failed: {type(error).__name__}: {error}",
+                f"internal error: {type(error).__name__}: {error}",
                 remedy="report it with log.ndjson, which holds the details"
                 if context.folder
                 else "report it",
@@ -123,7 +128,7 @@ def run_to_end(progress: Progress) -> Iterator[RunContext]:
 
 
 def _kept(context: RunContext) -> str:
-    return f"what was finished is in {context.folder}" if context.folder else ""
+    return f"finished results are in {context.folder}" if context.folder else ""
 
 
 def _stop(context: RunContext, error: MuError) -> None:

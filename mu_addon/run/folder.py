@@ -59,7 +59,7 @@ def claim(
         foreign = [name for name in (*may, *results) if (folder / name).exists() and name not in kept]
         if foreign:
             raise InputError(
-                f"the folder holds a file of another kind of run, or somebody else's: {foreign[0]}",
+                f"the folder contains a file of another kind of run, or an unknown file: {foreign[0]}",
                 str(folder),
                 "choose a new or empty folder for the results",
             )
@@ -82,7 +82,8 @@ def require_space(folder: Path, needed: int) -> None:
         return
     if free < needed:
         raise OutputError(
-            f"the disk has too little room: the run writes up to {_size(needed)}, and {_size(free)} are free",
+            f"the disk has too little free space: the run writes up to {_size(needed)}, and "
+            f"{_size(free)} are free",
             str(folder),
             "free some space on that disk, or choose another folder",
         )
@@ -104,7 +105,7 @@ def _refuse_links(folder: Path, patterns: Iterable[str]) -> None:
                 )
             if path.is_symlink() or (hasattr(os.path, "isjunction") and os.path.isjunction(path)):
                 raise InputError(
-                    f"{path.name} in the folder is a link to elsewhere",
+                    f"{path.name} in the folder is a link to another location",
                     str(path),
                     "remove the link, or choose another folder for the results",
                 )

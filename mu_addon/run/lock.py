@@ -47,7 +47,7 @@ class FolderLock:
             os.close(self._handle)
             self._handle = -1
             raise InUseError(
-                f"another run works in this folder: {owner}",
+                f"another run uses this folder: {owner}",
                 str(folder),
                 "wait for it, stop it, or choose another folder",
             ) from None
@@ -87,7 +87,7 @@ def _owner(handle: int) -> str:
         return f"process {signed['process']:d} on {signed['machine']!s:.80}, since {signed['since']!s:.80}"
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         # It has the lock and has not signed yet.
-        return "it has just begun"
+        return "it has just started"
 
 
 if sys.platform == "win32":

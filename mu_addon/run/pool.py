@@ -34,9 +34,9 @@ def each(work: Callable[[Task], Found], tasks: Sequence[Task], workers: int) -> 
                 yield numbers[done], done.result()
         except BrokenProcessPool:
             raise MuError(
-                "a worker process ended before its time",
+                "a worker process ended unexpectedly",
                 work.__name__,
-                "run again, it resumes; if memory is short give --workers 1",
+                "run the command again, it resumes; if memory is short, use --workers 1",
             ) from None
         finally:
             processes = list((pool._processes or {}).values())

@@ -1,1 +1,69 @@
-"""The real sensor: its optics, its calibration, and the serial line that it speaks on."""
+"""Sensing: the optical waveguide, its calibration, and the serial line that it speaks on.
+
+`Decoder` turns bytes of a serial line into samples, `run_session` records them, `calibrate` maps voltage to
+bending angle with a 95 % band. `fit_law` and `signal_of_nodes` predict the light of a waveguide in a unit
+that bends.
+
+    >>> from mu_addon.sensing import cobs_encoded
+    >>> cobs_encoded(bytes([1, 0, 2])).hex()
+    '02010202'
+"""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import public_face
+
+if TYPE_CHECKING:
+    from .calibration import Calibration as Calibration
+    from .calibration import Sweep as Sweep
+    from .calibration import calibrate as calibrate
+    from .calibration import read_calibration as read_calibration
+    from .calibration import write_calibration as write_calibration
+    from .decoder import Decoder as Decoder
+    from .decoder import Layout as Layout
+    from .decoder import Samples as Samples
+    from .embedded_waveguide import EmbeddedWaveguide as EmbeddedWaveguide
+    from .embedded_waveguide import Joints as Joints
+    from .embedded_waveguide import WaveguideShape as WaveguideShape
+    from .embedded_waveguide import embed_waveguide as embed_waveguide
+    from .framing import cobs_decoded as cobs_decoded
+    from .framing import cobs_encoded as cobs_encoded
+    from .framing import crc16 as crc16
+    from .guide import Centreline as Centreline
+    from .guide import Guide as Guide
+    from .law import Law as Law
+    from .law import fit_law as fit_law
+    from .optics import Optics as Optics
+    from .recording import Recorder as Recorder
+    from .recording import Recording as Recording
+    from .recording import read_recording as read_recording
+    from .session import Control as Control
+    from .session import run_session as run_session
+    from .signal import Response as Response
+    from .signal import Signal as Signal
+    from .signal import signal_of_nodes as signal_of_nodes
+    from .signal import signal_of_states as signal_of_states
+    from .sources import Replay as Replay
+    from .sources import SerialLine as SerialLine
+    from .sources import Simulated as Simulated
+    from .sources import ports as ports
+    from .tracing import Light as Light
+    from .tracing import trace as trace
+else:
+    __getattr__, __dir__, __all__ = public_face(
+        __name__,
+        {
+            "calibration": "Calibration Sweep calibrate read_calibration write_calibration",
+            "decoder": "Decoder Layout Samples",
+            "embedded_waveguide": "EmbeddedWaveguide Joints WaveguideShape embed_waveguide",
+            "framing": "cobs_decoded cobs_encoded crc16",
+            "guide": "Centreline Guide",
+            "law": "Law fit_law",
+            "optics": "Optics",
+            "recording": "Recorder Recording read_recording",
+            "session": "Control run_session",
+            "signal": "Response Signal signal_of_nodes signal_of_states",
+            "sources": "Replay SerialLine Simulated ports",
+            "tracing": "Light trace",
+        },
+    )

@@ -133,10 +133,12 @@ def _interval(volts: Array, angles: Array, at: Array) -> tuple[Array, Array]:
 
 
 def calibrate(sweeps: Sequence[Sweep], channel: str, dark: str | float = 0.0) -> Calibration:
-    """Fit a map to two sweeps or more; raises InputError if there is too little to fit, or no signal.
+    """Fit a monotone map from voltage to bending angle, with a 95 % band, to two sweeps or more.
 
-    The number of the spline's intervals is what predicts left-out sweeps best; a drift is taken out if that
-    quarters their squared error. The map is that of the sweeps' middle time.
+    channel: column of the recording that is calibrated; dark: the column of the dark level, or its value in
+    V. The number of spline intervals is the one that predicts left-out sweeps best; a drift of the light is
+    taken out if that quarters their squared error. Raises InputError where there is too little to fit, or
+    no signal.
     """
     _require(sweeps)
     middle = float(np.mean(np.concatenate([s.time_s for s in sweeps])))
@@ -190,7 +192,7 @@ def _require(sweeps: Sequence[Sweep]) -> None:
         raise InputError(
             f"{len(sweeps)} sweep",
             "calibration",
-            "record two or more: one alone cannot show how well it repeats",
+            "record two or more: repeatability cannot be estimated from one sweep",
         )
     for number, sweep in enumerate(sweeps, 1):
         if len(sweep.angle_deg) < _FEWEST or np.ptp(sweep.angle_deg) <= 0:
@@ -201,7 +203,7 @@ def _require(sweeps: Sequence[Sweep]) -> None:
             )
         if not np.isfinite(sweep.voltage_V).all():
             raise InputError(
-                f"sweep {number} has readings that are no numbers", "calibration", "leave them out"
+                f"sweep {number} has readings that are not numbers", "calibration", "leave them out"
             )
 
 
@@ -322,7 +324,9 @@ def sweeps_of(time_s: Array, angle_deg: Array, voltage_V: Array, fewest: int = 2
     result = [Sweep(time_s[a:b], angle_deg[a:b], voltage_V[a:b]) for a, b in itertools.pairwise(cuts)]
     if len(result) < fewest:
         raise InputError(
-            f"{len(result)} sweep in that record", "angle_deg", "bend to and fro at least twice in one record"
+            f"{len(result)} sweep in that record",
+            "angle_deg",
+            "bend back and forth at least twice in one record",
         )
     return result
 
@@ -346,7 +350,7 @@ def write_calibration(path: Path, calibration: Calibration, about: str = "") -> 
         f"drift_per_h = {c.drift_per_h!r}",
         f"gain = {c.gain!r}",
         f"sweeps = {c.sweeps}",
-        f"error_deg = {c.error_deg!r}  # root mean square, in sweeps left out",
+        f"error_deg = {c.error_deg!r}  # leave-one-out, root mean square",
     ]
     write_text(path, "\n".join(lines) + "\n")
 
@@ -377,7 +381,7 @@ def read_calibration(path: Path) -> Calibration:
             f"cannot read the calibration: {error}", str(path), "name a calibration.toml"
         ) from None
     except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"no calibration: {error!r}", str(path), "calibrate again") from None
+        raise InputError(f"the calibration is invalid: {error!r}", str(path), "calibrate again") from None
     steps = np.diff(result.coefficients)
     sound = (
         len(result.knots) == len(result.coefficients) + _DEGREE + 1 >= 2 * (_DEGREE + 1)
@@ -389,7 +393,9 @@ def read_calibration(path: Path) -> Calibration:
         and result.gain > 0
     )
     if not sound:
-        raise InputError("its map is not monotone, or its numbers make none", str(path), "calibrate again")
+        raise InputError(
+            "its map is not monotonic, or its numbers are inconsistent", str(path), "calibrate again"
+        )
     return result
 
 

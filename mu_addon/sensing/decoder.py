@@ -113,7 +113,11 @@ class Samples:
 
 
 class Decoder:
-    """Feed it bytes as they come; it keeps at most a few kilobytes of them."""
+    """Turns the bytes of a serial line into samples; knows binary frames, label:value pairs, CSV and JSON.
+
+    `feed` takes bytes as they come and returns the samples that are complete. Lost and damaged samples are
+    counted. It keeps at most a few kilobytes of input.
+    """
 
     def __init__(self) -> None:
         self.counters = Counters()

@@ -27,10 +27,11 @@ _STRAIGHT = 1e-6
 
 
 @attrs.frozen(eq=False)
-class Guided:
-    """A waveguide's fixed part: section and wells in mm, lengths of wells' centres and of open junctions.
+class WaveguideShape:
+    """A waveguide as light sees it: section, wells and junctions, in mm.
 
-    Lengths count from the entry's end face along the axis at rest.
+    wells: lengths of their centres, junctions: intervals of length that open into struts; lengths count
+    from the entry's end face along the axis at rest.
     """
 
     width: float
@@ -42,15 +43,15 @@ class Guided:
 
 
 @attrs.frozen(eq=False)
-class Held:
-    """A printed bar's axis at rest, by the lattice's nodes that hold it.
+class EmbeddedWaveguide:
+    """A printed waveguide at rest, and which lattice nodes carry it.
 
-    nodes (h, 3) in mm; points (m, 3): the nodes, and before and after them the end faces; s (m,): lengths
-    along the axis; joint (m,): number of the node that holds each point; normals (m - 1, 3): of the face with
-    the wells, a piece.
+    shape: its section and wells. nodes (h, 3) in mm: the lattice's. points (m, 3): the nodes, and before
+    and after them the end faces; s (m,): lengths in mm along the axis; joint (m,): number of the node that
+    carries each point; normals (m - 1, 3): of the face with the wells, a piece of the axis.
     """
 
-    guided: Guided
+    shape: WaveguideShape
     nodes: Array
     points: Array
     s: Array
@@ -108,11 +109,11 @@ def _joined(pieces: Sequence[tuple[Array, Array, Array]]) -> Centreline:
     return Centreline(*(np.concatenate(values) for values in zip(first, *rest, strict=True)))
 
 
-def held(bar: Bar, nodes: Array, d: Dimensions) -> Held:
-    """A printed bar with its own wells, held by its path's lattice nodes (h, 3) in mm.
+def embed_waveguide(bar: Bar, nodes: Array, d: Dimensions) -> EmbeddedWaveguide:
+    """A printed waveguide with its wells, carried by the lattice nodes (h, 3) in mm of its path.
 
-    d: the sizes of section, wells and struts as they are printed. Struts open the bar's sides over their
-    diameter at every node.
+    bar: from `design.waveguide`. d: sizes of section, wells and struts as they are printed. At every node
+    struts open the waveguide's sides over their diameter.
     """
     corners = _lengths(bar.points)
     first = float(np.linalg.norm(nodes[0] - bar.points[0]))
@@ -126,7 +127,7 @@ def held(bar: Bar, nodes: Array, d: Dimensions) -> Held:
     leg = np.searchsorted(corners, (s[1:] + s[:-1]) / 2, side="right") - 1
     half = max(d.junction_diameter, d.waveguide_section) / 2
     total = float(corners[-1])
-    guided = Guided(
+    shape = WaveguideShape(
         d.waveguide_section,
         d.waveguide_section,
         tuple(_along(bar.points, corners, well.centre) for well in bar.wells),
@@ -134,7 +135,7 @@ def held(bar: Bar, nodes: Array, d: Dimensions) -> Held:
         d.well_depth,
         tuple((max(0.0, at - half), min(total, at + half)) for at in at_nodes.tolist()),
     )
-    return Held(guided, nodes, points, s, joint, bar.normals[leg])
+    return EmbeddedWaveguide(shape, nodes, points, s, joint, bar.normals[leg])
 
 
 def _lengths(points: Array) -> Array:
@@ -156,7 +157,7 @@ def _along(points: Array, corners: Array, centre: Array) -> float:
 
 @attrs.frozen(eq=False)
 class Joints:
-    """Nodes (n, 3) of a lattice in a mesh that stands for it: each moves and turns as the body around it."""
+    """Lattice nodes (n, 3) in mm in a homogenised mesh: each moves and rotates as the body around it does."""
 
     nodes: Array
     reach: float

@@ -27,12 +27,23 @@ _COUNTS = [struct.Struct(f"<{n}H") for n in range(65)]
 
 
 def crc16(data: bytes) -> int:
-    """CRC-16/IBM-3740 of some bytes; 0x29B1 for b"123456789"."""
+    """CRC-16/IBM-3740 of some bytes.
+
+    >>> hex(crc16(b"123456789"))
+    '0x29b1'
+    """
     return binascii.crc_hqx(data, 0xFFFF)
 
 
 def cobs_encoded(data: bytes) -> bytes:
-    """COBS: the same bytes without a zero among them, longer by one in 254 and one more at most."""
+    r"""Bytes without a zero among them, by consistent overhead byte stuffing (COBS).
+
+    Longer by one byte in 254, and one more at most. Source: Cheshire and Baker, IEEE/ACM Trans. Networking
+    7 (1999) 159.
+
+    >>> cobs_decoded(cobs_encoded(b"a\x00b"))
+    b'a\x00b'
+    """
     out = bytearray()
     parts = data.split(END)
     for number, part in enumerate(parts):
@@ -47,7 +58,7 @@ def cobs_encoded(data: bytes) -> bytes:
 
 
 def cobs_decoded(data: bytes) -> bytes | None:
-    """What COBS made these bytes from, or None if it cannot have made them."""
+    """What COBS made these bytes from, or None where they cannot be COBS-encoded."""
     out = bytearray()
     place, length = 0, len(data)
     while place < length:

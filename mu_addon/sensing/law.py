@@ -17,7 +17,7 @@ import numpy as np
 from ..design.dimensions import Dimensions
 from ..design.waveguide import STRUT_GAP
 from ..errors import InputError
-from .embedded_waveguide import Guided
+from .embedded_waveguide import WaveguideShape
 from .guide import Centreline, swept
 from .notched import kinks, notched
 from .optics import Optics
@@ -43,39 +43,39 @@ CHANGE_MISFIT = 0.45
 """What it misses of a change of log(light), as a share: three paths of mu-1.0x, five states, 100 000 rays."""
 
 
-def traced(guided: Guided, line: Centreline, optics: Optics, rays: int = RAYS, seed: int = 0) -> Light:
+def traced(shape: WaveguideShape, line: Centreline, optics: Optics, rays: int = RAYS, seed: int = 0) -> Light:
     """Where a diffuse source's light ends in the bent guide, by traced rays.
 
     line: of the bar as if it had no wells, straight or with one leg at rest; see `notched`.
     """
     guide = swept(
-        notched(guided, line),
-        guided.width,
-        guided.height,
-        guided.wells,
-        guided.well_width,
-        guided.well_depth,
-        guided.junctions,
+        notched(shape, line),
+        shape.width,
+        shape.height,
+        shape.wells,
+        shape.well_width,
+        shape.well_depth,
+        shape.junctions,
         edge=_EDGE,
     )
     return trace(guide, optics, lambertian(guide, rays, seed), seed)
 
 
-def features(guided: Guided, legs: Sequence[Centreline]) -> Array:
+def features(shape: WaveguideShape, legs: Sequence[Centreline]) -> Array:
     """What the law is linear in, (8,), see FEATURES, of a guide whose axis consists of legs.
 
     A bar's bends at rest, between two legs, are in none of them: what they cost is there at rest as well.
     """
-    wells = np.asarray(guided.wells)
+    wells = np.asarray(shape.wells)
     stretched, kinked, signed, bent = 0.0, 0.0, 0.0, 0.0
     for k, leg in enumerate(legs):
         curvature = leg.curvature
         here = wells[(wells >= leg.s[0]) & ((wells < leg.s[-1]) | (k == len(legs) - 1))]
         stretched += _area(leg.stretch - 1, leg.s)
-        kinked += float((np.hypot(kinks(guided, leg), _SMALLEST_KINK) - _SMALLEST_KINK).sum())
+        kinked += float((np.hypot(kinks(shape, leg), _SMALLEST_KINK) - _SMALLEST_KINK).sum())
         signed += float(np.interp(here, leg.s, curvature).sum())
         bent += _area(curvature**2, leg.s)
-    length, junctions = float(legs[-1].s[-1]), len(guided.junctions)
+    length, junctions = float(legs[-1].s[-1]), len(shape.junctions)
     return np.array([1.0, length, np.log1p(len(wells)), junctions, stretched, kinked, signed, bent])
 
 
@@ -101,9 +101,9 @@ class Law:
     covariance: Array
     rms: float
 
-    def transmitted(self, guided: Guided, legs: Sequence[Centreline]) -> float:
+    def transmitted(self, shape: WaveguideShape, legs: Sequence[Centreline]) -> float:
         """Share of the light that arrives."""
-        return float(np.exp(-self.coefficients @ features(guided, legs)))
+        return float(np.exp(-self.coefficients @ features(shape, legs)))
 
     def error(self, change: Array) -> float:
         """Standard error of log(light)'s change by a change of features (8,), the law's misfit included."""
@@ -113,7 +113,7 @@ class Law:
         return float(np.sqrt(change @ self.covariance @ change + missed))
 
 
-def straight_guide(d: Dimensions, length: float) -> Guided:
+def straight_guide(d: Dimensions, length: float) -> WaveguideShape:
     """A guide as printed straight along a column of cells, `length` mm from its first node to its last.
 
     Wells lie at whole pitches from the first node but for those in a strut, which is as wide as the bar at
@@ -128,11 +128,11 @@ def straight_guide(d: Dimensions, length: float) -> Guided:
     clear = wells[(away > half + room) & (wells > room) & (wells < total - room)]
     if not len(clear):
         raise InputError(
-            f"a waveguide of {length:g} mm has no room for a well", "path", "choose a longer one"
+            f"a waveguide of {length:g} mm is too short for a well", "path", "choose a longer one"
         )
     spans = tuple((max(0.0, at - half), min(total, at + half)) for at in nodes.tolist())
     section = d.waveguide_section
-    return Guided(section, section, tuple(clear.tolist()), d.well_width, d.well_depth, spans)
+    return WaveguideShape(section, section, tuple(clear.tolist()), d.well_width, d.well_depth, spans)
 
 
 def fit_law(
@@ -143,25 +143,29 @@ def fit_law(
     seed: int = 0,
     on_trace: Callable[[float], None] = lambda fraction: None,
 ) -> Law:
-    """Trace rays through guides of many lengths and bends, and fit the law; the rms is by leave-one-out."""
+    """A law of transmitted light for a unit's waveguides, fitted to traces of many lengths and bends.
+
+    d: printed dimensions of the unit; rays: a trace; traces: how many guides; on_trace: called with the
+    share done. Its rms error is found by leaving each trace out. Takes some seconds.
+    """
     random = np.random.default_rng(seed)
     rows, logs, spread = [], [], []
     for k in range(traces):
         between = float(random.uniform(*_CELLS)) * d.cell
-        guided = straight_guide(d, between)
+        shape = straight_guide(d, between)
         curvature = random.uniform(-_MOST_CURVATURE, _MOST_CURVATURE, 2)
         line = _bent(between + 2 * d.waveguide_end, d.waveguide_end, curvature, random.uniform(*_STRETCH))
-        light = traced(guided, line, optics, rays, seed + k)
+        light = traced(shape, line, optics, rays, seed + k)
         if light.detected > 0:
-            rows.append(features(guided, [line]))
+            rows.append(features(shape, [line]))
             logs.append(-np.log(light.detected))
             spread.append(np.hypot(light.error / light.detected, MISFIT))
         on_trace((k + 1) / traces)
     if len(rows) < 3 * len(FEATURES):
         raise InputError(
-            "hardly any light arrives in the waveguides of this unit",
+            "almost no light reaches the detector in the waveguides of this unit",
             "optics",
-            "a clearer resin or less loss",
+            "use a clearer resin or smaller losses",
         )
     weight = 1 / np.array(spread)
     A, y = np.array(rows) * weight[:, None], np.array(logs) * weight

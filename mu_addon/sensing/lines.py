@@ -39,7 +39,11 @@ Pairs = dict[str, float]
 
 
 def pairs_of(line: str) -> Pairs | None:
-    """Values by label of `light:512,ref:300`, or None if the line is not such pairs, each label once."""
+    """Values by label of a text line `light:512,ref:300`, or None where the line is not such pairs.
+
+    >>> pairs_of("light:512,ref:300")
+    {'light': 512.0, 'ref': 300.0}
+    """
     found: Pairs = {}
     place = 0
     while place < len(line):
@@ -95,7 +99,11 @@ def header_of(line: str) -> list[str] | None:
 
 
 def row_of(line: str) -> list[float] | None:
-    """Numbers of a CSV row, or None if any is none, or beyond any float."""
+    """Numbers of a CSV row, or None where any field is no number.
+
+    >>> row_of("1.5,2"), row_of("time,light")
+    ([1.5, 2.0], None)
+    """
     cells = _cells(line)
     if not cells or not all(_VALUE.match(cell) for cell in cells):
         return None

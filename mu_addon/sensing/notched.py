@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .embedded_waveguide import Guided
+from .embedded_waveguide import WaveguideShape
 from .guide import Centreline
 
 Array = np.ndarray[Any, Any]
@@ -20,13 +20,13 @@ Array = np.ndarray[Any, Any]
 _STEPS_A_MM = 8
 
 
-def notched(guided: Guided, line: Centreline) -> Centreline:
+def notched(shape: WaveguideShape, line: Centreline) -> Centreline:
     """The axis of a bar with wells whose mean curvature and stretch are those of `line`.
 
     The mean is over what struts hold, from the line's first junction to its last; beyond them it is as it
     was. The far end face is elsewhere than the line's by a little, which light does not see.
     """
-    s, strain, curvature, before = _given_way(guided, line)
+    s, strain, curvature, before = _given_way(shape, line)
     step = np.diff(s)
     turn = np.concatenate([[0.0], np.cumsum((curvature - before) * step)])
     tangent, normals = _frame(line, s)
@@ -37,11 +37,11 @@ def notched(guided: Guided, line: Centreline) -> Centreline:
     return Centreline(s, line.points[0] + np.vstack([np.zeros(3), np.cumsum(way, axis=0)]), normals)
 
 
-def kinks(guided: Guided, line: Centreline) -> Array:
+def kinks(shape: WaveguideShape, line: Centreline) -> Array:
     """By how much each well (n,) on the line bends the bar beyond the line's own curvature, in radians."""
-    s, _, curvature, before = _given_way(guided, line)
-    return guided.well_width * np.interp(
-        _on(line, np.asarray(guided.wells)), (s[1:] + s[:-1]) / 2, curvature - before
+    s, _, curvature, before = _given_way(shape, line)
+    return shape.well_width * np.interp(
+        _on(line, np.asarray(shape.wells)), (s[1:] + s[:-1]) / 2, curvature - before
     )
 
 
@@ -49,19 +49,19 @@ def _on(line: Centreline, s: Array) -> Array:
     return s[(s >= line.s[0] - 1e-6) & (s <= line.s[-1] + 1e-6)]
 
 
-def _given_way(guided: Guided, line: Centreline) -> tuple[Array, Array, Array, Array]:
+def _given_way(shape: WaveguideShape, line: Centreline) -> tuple[Array, Array, Array, Array]:
     """Lengths (n,) along a bar, and between them its strain and curvature, and the line's, (n - 1,)."""
     s = np.linspace(line.s[0], line.s[-1], max(2, int(_STEPS_A_MM * (line.s[-1] - line.s[0]))) + 1)
     middle = (s[1:] + s[:-1]) / 2
     smooth = np.stack([np.interp(middle, line.s, v) for v in (line.stretch - 1, line.curvature)])
-    wells = _on(line, np.asarray(guided.wells))
-    cut = (np.abs(middle - wells[:, None]) < guided.well_width / 2).any(axis=0)
+    wells = _on(line, np.asarray(shape.wells))
+    cut = (np.abs(middle - wells[:, None]) < shape.well_width / 2).any(axis=0)
     flexibility = np.where(
         cut[:, None, None],
-        np.linalg.inv(_stiffness(guided.width, guided.height, guided.well_depth)),
-        np.linalg.inv(_stiffness(guided.width, guided.height, 0.0)),
+        np.linalg.inv(_stiffness(shape.width, shape.height, shape.well_depth)),
+        np.linalg.inv(_stiffness(shape.width, shape.height, 0.0)),
     )
-    nodes = _on(line, np.array([(a + b) / 2 for a, b in guided.junctions]))
+    nodes = _on(line, np.array([(a + b) / 2 for a, b in shape.junctions]))
     between = np.ones(len(middle), bool)
     if len(nodes) > 1:
         between = (middle > nodes[0]) & (middle < nodes[-1])

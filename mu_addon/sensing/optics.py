@@ -23,4 +23,8 @@ class Optics:
 
     def __attrs_post_init__(self) -> None:
         if not (self.around >= 1 and 1 <= self.index <= 4 and self.attenuation_per_mm >= 0 <= self.roughness):
-            raise InputError(f"no resin is like {self}", "optics", "index 1 to 4, no negative losses")
+            raise InputError(
+                f"the optical constants are not physical: {self}",
+                "optics",
+                "index 1 to 4, no negative losses",
+            )

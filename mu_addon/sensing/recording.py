@@ -63,9 +63,9 @@ class Recorder:
         self.folder = make_folder(folder)
         if (folder / INDEX).exists():
             raise InputError(
-                "that folder holds a recording already",
+                "the folder already contains a recording",
                 str(folder),
-                "choose another folder: none is overwritten",
+                "choose another folder; recordings are never overwritten",
             )
         self.rows = 0
         self._file: IO[bytes] | None = None
@@ -203,7 +203,7 @@ def read_recording(folder: Path) -> list[Recording]:
         lines = file_bytes(folder / INDEX, 1 << 32).split(b"\n")
     except OSError as error:
         raise InputError(
-            f"no recording: {error.strerror}", str(folder), f"name a folder with {INDEX}"
+            f"the recording is invalid: {error.strerror}", str(folder), f"name a folder with {INDEX}"
         ) from None
     for line in lines:
         try:
@@ -232,7 +232,9 @@ def _read_file(path: Path, messages: tuple[dict[str, Any], ...]) -> Recording | 
     except ValueError:
         bad = next(k for k, row in enumerate(rows) if len(row) != len(names) or not _numbers(row))
         raise InputError(
-            f"row {bad + 2} of {path.name} is not {len(names)} numbers", str(path), "remove or mend that row"
+            f"row {bad + 2} of {path.name} is not {len(names)} numbers",
+            str(path),
+            "remove or correct that row",
         ) from None
     return Recording(dict(zip(names, table.T, strict=True)), messages)
 

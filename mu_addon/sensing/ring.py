@@ -52,7 +52,9 @@ class Ring:
         except (OSError, ValueError, struct.error):
             magic, columns, capacity = b"", 0, 0
         if magic != _MAGIC or len(mapped) < _START + 8 * columns * capacity:
-            raise InputError("not the live data of a stream", str(path), "start the stream again")
+            raise InputError(
+                "the file does not contain live data of a stream", str(path), "start the stream again"
+            )
         return cls(_rows(mapped, columns, capacity), mapped)
 
     @property

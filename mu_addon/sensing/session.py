@@ -38,7 +38,7 @@ LOSSES = {
     "repeated": "repeated",
     "misnumbered": "numbered wrong",
     "incomplete": "incomplete",
-    "overlong": "bytes without an end",
+    "overlong": "bytes without a line end",
     "restarts": "restarts",
     "reconnects": "reconnects",
 }

@@ -13,12 +13,12 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..design.anchors import Window, anchors
+from ..design.anchors import Window, anchor_points
 from ..design.parameters import Unit
 from ..design.waveguide import waveguide
 from ..errors import InputError
 from ..meshing.mesh import Mesh
-from .embedded_waveguide import Held, Joints, held
+from .embedded_waveguide import EmbeddedWaveguide, Joints, embed_waveguide
 from .law import Law, features, fit_law, traced
 from .optics import Optics
 
@@ -59,19 +59,22 @@ def signal_of_states(
     bar in place of the law, see `traced_signal`. Raises InputError for a path that no waveguide can follow.
     """
     optics = Optics() if optics is None else optics
-    nodes = anchors(unit)[list(path.indices)] if isinstance(path, Window) else np.asarray(path, float)
+    nodes = anchor_points(unit)[list(path.indices)] if isinstance(path, Window) else np.asarray(path, float)
     joints = Joints.of(mesh, nodes, unit.dimensions.cell)
-    guide = held(waveguide(unit, path), nodes, unit.printed)
+    guide = embed_waveguide(waveguide(unit, path), nodes, unit.printed)
     moved = [joints.moved(u) for u in displacements]
     if rays is not None:
         return traced_signal(guide, moved, optics, rays)
     return signal_of_nodes(fit_law(unit.printed, optics) if law is None else law, guide, moved)
 
 
-def signal_of_nodes(law: Law, guide: Held, moved: Sequence[tuple[Array, Array]]) -> Signal:
-    """The signal of a held bar in states of its nodes: positions (h, 3) in mm and rotations (h, 3, 3)."""
-    rest = features(guide.guided, guide.at_rest)
-    found = [features(guide.guided, guide.legs(*state)) for state in moved]
+def signal_of_nodes(law: Law, guide: EmbeddedWaveguide, moved: Sequence[tuple[Array, Array]]) -> Signal:
+    """The light of an embedded waveguide in states of its nodes, by a fitted law.
+
+    moved: for each of k states positions (h, 3) in mm and rotations (h, 3, 3). See `Signal`.
+    """
+    rest = features(guide.shape, guide.at_rest)
+    found = [features(guide.shape, guide.legs(*state)) for state in moved]
     return Signal(
         np.array([np.exp(-law.coefficients @ row) for row in found]),
         float(np.exp(-law.coefficients @ rest)),
@@ -80,7 +83,11 @@ def signal_of_nodes(law: Law, guide: Held, moved: Sequence[tuple[Array, Array]])
 
 
 def traced_signal(
-    guide: Held, moved: Sequence[tuple[Array, Array]], optics: Optics, rays: int = 60_000, seed: int = 0
+    guide: EmbeddedWaveguide,
+    moved: Sequence[tuple[Array, Array]],
+    optics: Optics,
+    rays: int = 60_000,
+    seed: int = 0,
 ) -> Signal:
     """The same as `signal_of_nodes`, by rays through the bent bar itself instead of the law.
 
@@ -90,10 +97,10 @@ def traced_signal(
         raise InputError(
             "rays are followed through straight waveguides only",
             "path",
-            "choose a path without a bend, or take the law's signal",
+            "choose a path without a bend, or use the signal of the fitted law",
         )
     every = [guide.at_rest, *(guide.legs(*state) for state in moved)]
-    lights = [traced(guide.guided, leg, optics, rays, seed) for (leg,) in every]
+    lights = [traced(guide.shape, leg, optics, rays, seed) for (leg,) in every]
     share = np.array([light.detected for light in lights])
     error = np.array([light.error for light in lights]) / np.maximum(share, 1e-12)
     return Signal(share[1:], float(share[0]), np.hypot(error[1:], error[0]))
@@ -130,7 +137,9 @@ def response(angle_deg: Array, share: Array, rest_deg: float = 0.0) -> Response:
     angle, light = angle[keep], light[keep]
     if len(angle) < 2 or not angle[0] <= rest_deg <= angle[-1]:
         raise InputError(
-            "the unit does not bend, or was not seen at rest", "angle_deg", "a protocol that bends it"
+            "the unit does not bend, or its state at rest is missing",
+            "angle_deg",
+            "give a protocol that bends it",
         )
     delta = 1 - light / np.interp(rest_deg, angle, light)
     slope = np.diff(delta) / np.diff(angle)

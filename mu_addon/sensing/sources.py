@@ -138,7 +138,7 @@ class Replay:
         self.folder, self.speed = Path(folder), speed
         recordings = read_recording(self.folder)
         if not recordings:
-            raise InputError("that recording holds no samples", str(folder), "choose another one")
+            raise InputError("the recording contains no samples", str(folder), "choose another recording")
         self._lines = _lines(recordings)
         self._ahead: tuple[float, bytes] | None = None
         self._start = 0.0

@@ -55,7 +55,11 @@ def beam(guide: Guide, rays: int, angle_deg: float = 0.0, seed: int = 0) -> tupl
 
 
 def trace(guide: Guide, optics: Optics, rays: tuple[Array, Array], seed: int = 0) -> Light:
-    """Follow rays (starts, directions), each (n, 3), through a guide to where they end."""
+    """Trace rays through a guide by Monte Carlo until they are detected, lost or absorbed.
+
+    rays: starts in mm and directions, (n, 3) each, from `lambertian` or `beam`. seed: of the random
+    numbers, so that equal calls give equal results.
+    """
     starts, directions = rays
     n = len(starts)
     mesh = wp.Mesh(

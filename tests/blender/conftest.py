@@ -21,12 +21,10 @@ def _version(python):
 
 
 @pytest.fixture(
-    autouse=True,
     scope="module",
     params=[sys.executable, *session.OTHERS] if session.OTHERS else None,
     ids=["bpy", *map(_version, session.OTHERS)] if session.OTHERS else None,
 )
 def each_bpy(request):
     """The Python with bpy that this test runs in: one after another."""
-    session.python = getattr(request, "param", sys.executable)
-    return session.python
+    return getattr(request, "param", sys.executable)

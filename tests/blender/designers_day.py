@@ -16,18 +16,19 @@ def module(name):
     return importlib.import_module(f"{package}.{name}")
 
 
-unit_object, simulation = module("blender.unit_object"), module("blender.simulation")
-studies, child_module = module("blender.studies"), module("study.client")
+unit_object, jobs = module("blender.unit.object"), module("blender.jobs.start_child")
+studies, child_module = module("blender.simulate.study_folder"), module("run.child")
+SIMULATION = module("blender.simulate.job").SIMULATION
 
 assert "mu_addon" not in sys.modules, "the core was imported under a second name"
 assert bpy.ops.mu.add(preset="mu-0.75x") == {"FINISHED"}
 root = unit_object.active_root(bpy.context)
 taken = []
 for step in range(10):
-    before = time.perf_counter()
+    before = time.process_time()
     root.mu_unit.chambers.wall_mm = 0.85 + 0.01 * step
     bpy.context.view_layer.update()
-    taken.append(time.perf_counter() - before)
+    taken.append(time.process_time() - before)
 assert min(taken) < 0.1, taken
 print("preview", round(1000 * min(taken)), "ms")
 root.mu_unit.chambers.wall_mm = 0.9
@@ -39,41 +40,41 @@ bpy.ops.wm.save_as_mainfile(filepath=str(folder / "day.blend"))
 
 def watch(child):
     # Timers never fire in background.
-    end = time.monotonic() + 600
+    end = time.monotonic() + 3600
     while child.state == child_module.RUNNING:
         assert time.monotonic() < end
-        simulation.poll()
+        jobs.poll()
         time.sleep(0.1)
 
 
-printing = module("blender.printing")
+printing = module("blender.printing.state")
 assert bpy.ops.mu.print_check() == {"FINISHED"}
-child = simulation.of(printing.job(root))
+child = printing.PRINTING.child(root)
 watch(child)
 assert child.state == child_module.DONE, child.error
 assert printing.checked(root).stale == ""
 assert bpy.ops.mu.print_show(finding=0) == {"FINISHED"}
 root.mu_print.formats, root.mu_print.quality = {name for name, *_ in printing.FORMATS}, "interactive"
 assert bpy.ops.mu.print_export() == {"FINISHED"}
-child = simulation.of(printing.job(root))
+child = printing.PRINTING.child(root)
 watch(child)
 assert child.state == child_module.DONE, child.error
 names = {entry["file"] for entry in printing.exported(root).manifest["files"]}
 assert {"unit.stl", "unit.3mf", "unit-beams.3mf", "waveguide.step", "nodes.txt"} <= names, names
 
-assert simulation.missing() == []
+assert jobs.missing() == []
 root.mu_unit.study.detail = "quick"
 assert bpy.ops.mu.simulate() == {"FINISHED"}
-child = simulation.of(root.mu_unit.uuid)
+child = SIMULATION.child(root)
 while not child.progress:
-    simulation.poll()
+    jobs.poll()
     time.sleep(0.1)
 assert bpy.ops.mu.cancel() == {"FINISHED"}
 watch(child)
 assert child.state == child_module.CANCELLED, child.error
 
 assert bpy.ops.mu.simulate() == {"FINISHED"}
-child = simulation.of(root.mu_unit.uuid)
+child = SIMULATION.child(root)
 watch(child)
 assert child.state == child_module.DONE, child.error
 assert not any("gmsh" in warning for warning in child.warnings), child.warnings
@@ -83,7 +84,7 @@ assert len(found.ranking(found.rule)) == 10
 for whose, what in (("model_a", "mesh"), ("alpha4", "mesh"), ("model_a", "print")):
     assert bpy.ops.mu.motion(name=whose, what=what) == {"FINISHED"}
 bpy.context.scene.frame_set(193)
-assert len(module("blender.motion_parts").parts(root)) == 5
+assert len(module("blender.results.motion").parts(root)) == 5
 bpy.ops.wm.save_mainfile()
 bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
 (root,) = unit_object.roots()
@@ -96,18 +97,18 @@ stopped.mu_unit.study.command, stopped.mu_unit.study.detail = "simulate", "quick
 assert bpy.ops.mu.obstacle_box(size=(20, 12, 12), gap=0.6) == {"FINISHED"}
 bpy.context.view_layer.update()
 assert bpy.ops.mu.simulate() == {"FINISHED"}
-child = simulation.of(stopped.mu_unit.uuid)
+child = SIMULATION.child(stopped)
 watch(child)
 assert child.state == child_module.DONE, child.error
-(touch,) = studies.touches(stopped)
+(touch,) = studies.contact_forces(stopped)
 assert touch.force_N.max() > 0
 assert not studies.findings(stopped).stale
-grasps = module("blender.grasps")
+grasps = module("blender.gripper.state")
 assert bpy.ops.mu.gripper_add() == {"FINISHED"}
-gripper = module("blender.gripper_object").active(bpy.context)
+gripper = module("blender.gripper.object").active(bpy.context)
 gripper.mu_gripper.detail = "part"
 assert bpy.ops.mu.grasp() == {"FINISHED"}
-child = simulation.of(grasps.job(gripper))
+child = grasps.GRASP.child(gripper)
 watch(child)
 assert child.state == child_module.DONE, child.error
 assert (grasps.folder_of(gripper) / "gripper.3mf").is_file()

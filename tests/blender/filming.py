@@ -10,6 +10,9 @@ MM_PER_PIXEL = 0.3
 FINE = 6
 """Samples along each side of a pixel."""
 REACH = 16
+TURN = np.linspace(0.0, 2 * np.pi, 38)
+# Three frames of rest, then a swing to either side, by up to 8 degrees a frame.
+ANGLES = np.concatenate([[0.0, 0.0], 40.0 * np.sin(TURN) - 10.0 * (1.0 - np.cos(TURN))])
 
 
 def film(folder, angles_deg, marks="crosses", noise=0.012, seed=1, hidden=()):

@@ -8,7 +8,7 @@ import bpy
 sys.path.insert(0, str(Path(__file__).parent))
 from simulated import event, key, module, move, parts, place, run
 
-unit_object = module("blender.unit_object")
+unit_object = module("blender.unit.object")
 
 
 def settled():

@@ -8,7 +8,7 @@ import bpy
 sys.path.insert(0, str(Path(__file__).parent))
 from simulated import called, event, key, module, move, parts, place, run
 
-unit_object, stack = module("blender.unit_object"), module("blender.stack")
+unit_object, stack = module("blender.unit.object"), module("blender.steps.state")
 
 
 def unit():

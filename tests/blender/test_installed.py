@@ -44,7 +44,7 @@ def call(home, *arguments, command=BLENDER):
         text=True,
         check=False,
         env={**os.environ, "BLENDER_USER_RESOURCES": str(home), "OPENBLAS_NUM_THREADS": "1"},
-        timeout=900,
+        timeout=3600,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout

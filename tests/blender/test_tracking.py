@@ -1,4 +1,4 @@
-"""Blender's tracker on pictures of a known motion, by its editor's operators and from the command line."""
+"""Blender's tracker on pictures of a known motion, from the command line."""
 
 import json
 
@@ -9,14 +9,10 @@ from mu_addon.measured import read_folder
 from mu_addon.usecases.track_video.run import read_pixels
 from tests.headless.processes import assert_clear_failure, run
 
-from .filming import MM_PER_PIXEL, described, film, pressures
-from .session import blender, needs_bpy
+from .filming import ANGLES, MM_PER_PIXEL, described, film, pressures
+from .session import Blender, needs_bpy
 
 pytestmark = needs_bpy
-
-TURN = np.linspace(0.0, 2 * np.pi, 38)
-# Three frames of rest, then a swing to either side, by up to 8 degrees a frame.
-ANGLES = np.concatenate([[0.0, 0.0], 40.0 * np.sin(TURN) - 10.0 * (1.0 - np.cos(TURN))])
 
 
 def tracked(folder, truth, marks, *more):
@@ -81,32 +77,19 @@ def test_clips_that_cannot_be_used(tmp_path):
     )
 
 
-MOVIE = """
-import os
-scene = bpy.context.scene
-shots = sorted(name for name in os.listdir(sys.argv[1]) if name.endswith(".png"))
-editor = scene.sequence_editor_create()
-strips = editor.strips if hasattr(editor, "strips") else editor.sequences
-strip = strips.new_image("bench", os.path.join(sys.argv[1], shots[0]), 1, 1)
-for name in shots[1:]:
-    strip.elements.append(name)
-scene.frame_end, scene.render.fps, scene.view_settings.view_transform = len(shots), 25, "Standard"
-scene.render.resolution_x, scene.render.resolution_y = 360, 340
-settings = scene.render.image_settings
-if hasattr(settings, "media_type"):
-    settings.media_type = "VIDEO"
-settings.file_format, scene.render.filepath = "FFMPEG", sys.argv[2]
-scene.render.ffmpeg.format, scene.render.ffmpeg.codec = "MPEG4", "H264"
-scene.render.ffmpeg.constant_rate_factor = "HIGH"
-bpy.ops.render.render(animation=True)
-"""
-
-
 @pytest.mark.slow
-def test_a_compressed_movie_brings_its_own_clock(tmp_path):
+def test_a_compressed_movie_brings_its_own_clock(each_bpy, tmp_path):
     """H.264, as cameras write it: its frame rate is read from it, and compression costs little."""
     truth = film(tmp_path, ANGLES)
-    blender(MOVIE, tmp_path, tmp_path, tmp_path / "bench.mp4")
+    blender = Blender(each_bpy, tmp_path)
+    blender.call(
+        "tests.blender.inside.movies",
+        "write_movie",
+        folder=tmp_path,
+        shots=tmp_path,
+        movie=tmp_path / "bench.mp4",
+    )
+    blender.close()
     described(tmp_path, truth)
     text = (tmp_path / "bench.toml").read_text()
     (tmp_path / "bench.toml").write_text(text.replace("fps = 10", ""))
@@ -117,68 +100,3 @@ def test_a_compressed_movie_brings_its_own_clock(tmp_path):
     (e,) = read_folder(tmp_path / "out").experiments
     np.testing.assert_allclose(e["time_s"], np.arange(40) / 25, atol=1e-6)
     assert np.sqrt(np.mean((e["angle_deg"] - ANGLES) ** 2)) < 0.05
-
-
-EDITOR = """
-def editor(clip):
-    window = bpy.context.window_manager.windows[0]
-    area = window.screen.areas[0]
-    area.ui_type = "CLIP_EDITOR"
-    area.spaces.active.clip = clip
-    region = next(r for r in area.regions if r.type == "WINDOW")
-    return bpy.context.temp_override(window=window, area=area, region=region)
-
-from mu_addon.blender.track import properties as bench, state as tracking
-from mu_addon.usecases.track_video.run import Marks
-"""
-
-
-def test_the_clip_editors_operators(tmp_path):
-    """Markers as the user places them, roles chosen in the sidebar, saved and loaded, written twice."""
-    truth = film(tmp_path / "clip", ANGLES)
-    pressures(tmp_path, ANGLES)
-    at = {name: (float(x), float(y)) for name, (x, y) in zip("abcd", truth[:, 0], strict=True)}
-    blender(
-        EDITOR
-        + f"""
-at = {at!r}
-folder = {str(tmp_path)!r}
-root = add()
-clip = bpy.data.movieclips.load(folder + "/clip/shot0001.png")
-with editor(clip):
-    assert not bpy.ops.mu.track.poll() and not bpy.ops.mu.track_write.poll()
-    assert "Place markers first" in bench.missing(clip)
-    for name, pixel in at.items():
-        tracking._place(clip, name, pixel, Marks({{}}), "")
-    assert bpy.ops.mu.track() == {{"FINISHED"}}
-settings = clip.mu_bench
-settings.base_1 = "a"
-assert "Base: choose two" in bench.missing(clip)
-settings.base_2, settings.tip_1, settings.tip_2 = "b", "c", "d"
-assert "Give the places" in bench.missing(clip)
-settings.base_1_mm, settings.base_2_mm = (-15, 0), (15, 0)
-assert "frames a second" in bench.missing(clip)
-settings.fps = 10
-assert "pressure" in bench.missing(clip)
-settings.pressure = folder + "/pressure.csv"
-bpy.ops.wm.save_as_mainfile(filepath=folder + "/bench.blend")
-assert "folder to write into" in bench.missing(clip)
-settings.folder = "//measured"
-settings.title, settings.role, settings.specimen = "by hand", "held_out", "B"
-bpy.ops.wm.save_mainfile()
-bpy.ops.wm.open_mainfile(filepath=folder + "/bench.blend")
-(clip,) = bpy.data.movieclips
-assert clip.mu_bench.tip_2 == "d" and not bench.missing(clip)
-with editor(clip):
-    assert bpy.ops.mu.track_write() == {{"FINISHED"}}
-assert unit_object.active_root(bpy.context).mu_evidence.folder == "//measured"
-assert bpy.ops.mu.track_write(clip=clip.name) == {{"FINISHED"}}
-clip.mu_bench.tip_2 = "c"
-assert "Tip: choose two" in refused(bpy.ops.mu.track_write, clip=clip.name)
-assert "There is no clip" in refused(bpy.ops.mu.track_write, clip="none")
-""",
-        tmp_path,
-    )
-    (e,) = read_folder(tmp_path / "measured").experiments
-    assert (e.name, e.role, e.specimen) == ("by hand", "held_out", "B")
-    assert np.abs(e["angle_deg"] - ANGLES).max() < 0.1

@@ -48,9 +48,9 @@ def test_units_and_grippers_are_not_taken_for_each_other():
     assert "gripper" not in preset_names()
     with pytest.raises(InputError, match="'gripper' is a gripper"):
         load_preset("gripper")
-    with pytest.raises(InputError, match=r"'mu-1.0x' is no gripper"):
+    with pytest.raises(InputError, match=r"'mu-1.0x' is not a gripper"):
         load_gripper("mu-1.0x")
-    with pytest.raises(InputError, match=r"unknown key|no gripper"):
+    with pytest.raises(InputError, match=r"unknown key|not a gripper"):
         read_gripper(asset_file("presets", "preset", "mu-1.0x"))
 
 
@@ -67,7 +67,7 @@ def test_a_gripper_survives_its_file(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('kind = "gripper"', 'kind = "hand"', "no gripper of format 1"),
+        ('kind = "gripper"', 'kind = "hand"', "not a gripper of format 1"),
         ('unit = "mu-1.0x"', "", "unit is missing"),
         ('unit = "mu-1.0x"', 'unit = "mu-2.0x"', "no preset 'mu-2.0x'"),
         ('path = "alpha4"', 'path = "alpha11"', "no path 'alpha11'"),

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mu_addon.design.anchors import SHORTEST, anchors, window, windows
+from mu_addon.design.anchors import SHORTEST, anchor_points, window, windows
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import Envelope, Unit, Waveguide, load_preset
 from mu_addon.errors import InputError
@@ -84,7 +84,7 @@ def test_the_papers_ten_windows():
 @given(units())
 @settings(max_examples=40)
 def test_anchors_are_lattice_centres_in_the_bending_plane(unit):
-    d, points = unit.dimensions, anchors(unit)
+    d, points = unit.dimensions, anchor_points(unit)
     assert points.shape == (d.count, 3)
     lattice = lattice_of(d)
     for point in points:

@@ -88,12 +88,12 @@ def test_struts_closer_than_an_opening_close_it():
 BAD = {
     "outside": ({"nodes": [(0, 0, 0), (1.5, 0, 0)], "struts": [(0, 1)]}, "a node outside its cell"),
     "no number": ({"nodes": [(0, 0, 0), (np.nan, 0, 0)], "struts": [(0, 1)]}, "a node outside its cell"),
-    "fraction": ({"nodes": [(0, 0, 0), (1 / np.pi, 0, 0)], "struts": [(0, 1)]}, "off every simple fraction"),
-    "twice": ({"nodes": [(0, 0, 0), (0, 0, 0)], "struts": [(0, 1)]}, "two nodes in one place"),
+    "fraction": ({"nodes": [(0, 0, 0), (1 / np.pi, 0, 0)], "struts": [(0, 1)]}, "not at a simple fraction"),
+    "twice": ({"nodes": [(0, 0, 0), (0, 0, 0)], "struts": [(0, 1)]}, "two nodes at the same position"),
     "none": ({"nodes": CORNERS, "struts": []}, "no struts"),
-    "nowhere": ({"nodes": CORNERS, "struts": [(0, 8)]}, "a node that is not there"),
-    "point": ({"nodes": CORNERS, "struts": [(3, 3)]}, "without length"),
-    "double": ({"nodes": CORNERS, "struts": [(0, 1), (1, 0)]}, "a strut twice"),
+    "nowhere": ({"nodes": CORNERS, "struts": [(0, 8)]}, "a node that does not exist"),
+    "point": ({"nodes": CORNERS, "struts": [(3, 3)]}, "zero length"),
+    "double": ({"nodes": CORNERS, "struts": [(0, 1), (1, 0)]}, "duplicate strut"),
     "crossing": ({"nodes": CORNERS, "struts": [(0, 7), (1, 6)]}, "cross where there is no node"),
     "one way": (
         {"nodes": CORNERS, "struts": [(0, 1)], "radius": lambda t, a, b: a + t * (b - a)},

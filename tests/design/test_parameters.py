@@ -124,7 +124,7 @@ def test_every_parameter_is_described():
             assert d.text
             assert d.source.startswith(("paper", "assumed: ", "measured: "))
             assert d.default in d.choices if d.choices else d.low <= d.default <= d.high
-            assert d.name.endswith(("_mm", "_kPa")) == bool(d.unit)
+            assert d.name.endswith(("_mm", "_kPa", "_s")) == bool(d.unit)
         assert [d.name for d in quantity.describe(section)] == [f.name for f in attrs.fields(section)]
 
 

@@ -103,9 +103,13 @@ def test_unequal_offsets_move_what_faces_them():
 
 
 REFUSED = {
-    "struts": ({"lattice": Envelope(junction_diameter_mm=0.5)}, (-0.25, -0.25), "leave nothing of struts"),
-    "walls": ({"chambers": Chambers(wall_mm=0.4)}, (-0.2, -0.2), "leave nothing of walls of 0.4 mm"),
-    "one way": ({"chambers": Chambers(wall_mm=0.4)}, (0.0, -0.2), "leave nothing of walls of 0.4 mm"),
+    "struts": (
+        {"lattice": Envelope(junction_diameter_mm=0.5)},
+        (-0.25, -0.25),
+        "leave no material of struts",
+    ),
+    "walls": ({"chambers": Chambers(wall_mm=0.4)}, (-0.2, -0.2), "leave no material of walls of 0.4 mm"),
+    "one way": ({"chambers": Chambers(wall_mm=0.4)}, (0.0, -0.2), "leave no material of walls of 0.4 mm"),
     "cells": ({"lattice": Envelope(midspan_diameter_mm=8.0)}, (0.45, 0.45), "fill the cell: struts of 8 mm"),
     "inlet": ({"chambers": Chambers(inlet_diameter_mm=0.8)}, (0.4, 0.0), "close the inlet of 0.8 mm"),
     "wells": ({"waveguide": Waveguide(well_width_mm=0.8)}, (0.0, 0.45), "close wells of 0.8 mm"),

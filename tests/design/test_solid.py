@@ -235,9 +235,9 @@ def test_node_file_lists_every_node_and_marks_the_anchors(tmp_path):
     lattice = lattice_of(unit.dimensions)
     assert [int(row[0]) for row in rows] == list(range(len(lattice.nodes)))
     assert np.array([row[2:] for row in rows], float) == pytest.approx(lattice.nodes, abs=1e-6)
-    from mu_addon.design.anchors import anchors
+    from mu_addon.design.anchors import anchor_points
 
     marked = {row[1]: [float(x) for x in row[2:]] for row in rows if row[1].startswith("P")}
     assert list(marked) == ["P1", "P2", "P3", "P4", "P5", "P6"]
-    assert np.array(list(marked.values())) == pytest.approx(anchors(unit))
+    assert np.array(list(marked.values())) == pytest.approx(anchor_points(unit))
     assert sum(row[1] == "corner" for row in rows) == 4 * 5 * 7

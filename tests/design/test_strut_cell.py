@@ -272,8 +272,8 @@ def test_struts_that_miss_each_other_are_named(case):
 
 
 REFUSED = {
-    "erased": ({"offset_xy_mm": -0.75}, "leave nothing of struts of 1.5 mm"),
-    "erased upright": ({"offset_z_mm": -0.8}, "leave nothing of struts"),
+    "erased": ({"offset_xy_mm": -0.75}, "leave no material of struts of 1.5 mm"),
+    "erased upright": ({"offset_z_mm": -0.8}, "leave no material of struts"),
     "filled": (
         {"offset_xy_mm": 3.5, "offset_z_mm": 3.5},
         "struts printed 9 mm wide fill the cell of 12.5 mm",

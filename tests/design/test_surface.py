@@ -45,7 +45,7 @@ def test_stl_survives_reading_back():
     assert surface.volume(vertices, triangles) == pytest.approx(24.0)
     normals = np.frombuffer(content, surface._STL, offset=84)["normal"]
     assert np.linalg.norm(normals, axis=1) == pytest.approx(1.0)
-    with pytest.raises(InputError, match="whole binary STL"):
+    with pytest.raises(InputError, match="binary STL is truncated"):
         surface.stl_surface(content[:-1])
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from mu_addon.design import gates, lattices, shapes
 from mu_addon.design import solid as solids
-from mu_addon.design.anchors import anchors, window, windows
+from mu_addon.design.anchors import anchor_points, window, windows
 from mu_addon.design.block import Block
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.lattices import LatticeKind, constant
@@ -65,10 +65,10 @@ def test_number_of_wells_follows_the_length(name, per_span):
 def test_wells_keep_their_pitch_and_clear_of_the_junctions(unit):
     d, w = unit.dimensions, windows(unit.dimensions.count)[-1]
     bar = waveguide(unit, w)
-    at = np.array([well.centre[2] for well in bar.wells]) - anchors(unit)[0, 2]
+    at = np.array([well.centre[2] for well in bar.wells]) - anchor_points(unit)[0, 2]
     steps = np.diff(at) / d.well_pitch
     assert steps == pytest.approx(np.rint(steps), abs=1e-6)
-    nodes = anchors(unit)[:, 2] - anchors(unit)[0, 2]
+    nodes = anchor_points(unit)[:, 2] - anchor_points(unit)[0, 2]
     if len(at):
         assert np.abs(at[:, None] - nodes).min() > d.well_width / 2 + d.waveguide_section / 2
     low, high = np.array(d.bounds).T
@@ -211,7 +211,7 @@ def test_a_well_in_a_strut_is_caught():
     d, facets = unit.dimensions, solids.QUALITY["interactive"]
     lattice = lattice_of(d)
     bar = waveguide(unit, windows(3)[0])
-    stray = Block(anchors(unit)[1] + [1.5, 1.5, 1.5], np.eye(3), np.array([0.4, 0.4, 0.4]))
+    stray = Block(anchor_points(unit)[1] + [1.5, 1.5, 1.5], np.eye(3), np.array([0.4, 0.4, 0.4]))
     bare = solids.lattice_solid(d, lattice, facets)
     holder = solids.with_waveguide(d, lattice, facets, bar, bare)
     with pytest.raises(gates.GateError, match="gate: cuts clear of struts"):
@@ -235,9 +235,9 @@ def test_a_well_through_the_bar_is_caught():
 @pytest.mark.parametrize(
     ("points", "words"),
     [
-        ([[0, 25, 6.25], [1, 25, 18.75]], "is no node of the lattice"),
+        ([[0, 25, 6.25], [1, 25, 18.75]], "is not a node of the lattice"),
         ([[0, 0, 6.25], [0, 0, 18.75]], "runs through the cavity"),
-        ([[0, 25, 6.25]], "needs two nodes"),
+        ([[0, 25, 6.25]], "needs two different nodes"),
         ([[0, 25, 18.75], [6.25, 18.75, 25], [0, 25, 18.75]], "bends by 180 degrees"),
     ],
 )
@@ -267,7 +267,7 @@ def test_a_lattice_with_upright_struts_has_no_seats_but_wells(monkeypatch):
         lattice=Envelope(kind="cross", junction_diameter_mm=1.0, midspan_diameter_mm=1.4),
         waveguide=Waveguide(seats=False),
     )
-    p = anchors(unit)
+    p = anchor_points(unit)
     path = np.array([p[0], (p[0] + p[1]) / 2, p[1], (p[1] + p[2]) / 2, p[2]])
     bar = waveguide(unit, path)
     assert bar.followed.sum() == 4

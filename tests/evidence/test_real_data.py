@@ -248,5 +248,5 @@ def test_the_verdict_on_the_foam_finds_direction_and_seating():
     assert sorted(chosen) == ["anisotropy", "seating"]
     assert found.gain.held_out.after < 0.06
     # A third effect would gain on what was fitted and lose on what was left out.
-    assert "does not predict" in found.selection.doubted
+    assert "leave-one-out prediction fails" in found.selection.doubted
     assert {c["effect"] for c in found.as_json()["partly_explained_by"]} == {"anisotropy", "seating"}

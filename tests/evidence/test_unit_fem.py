@@ -338,7 +338,7 @@ def test_rest_is_looked_for_where_there_is_no_pressure():
         name="pressed",
         columns={c: v[20:] + (np.arange(10) if "p" in c else 0.0) for c, v in e.columns.items()},
     )
-    with pytest.raises(InputError, match="marker 1 is never seen at rest"):
+    with pytest.raises(InputError, match="marker 1 is never visible at rest"):
         at_rest([pressed])
     assert at_rest([pressed, e])[1][2] == e.name
 

@@ -10,11 +10,11 @@ import numpy as np
 from mu_addon.errors import ConvergenceError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.factor import IndefiniteError
-from mu_addon.fem.laws import Guccione
 from mu_addon.fem.model import Model
 from mu_addon.fem.state import rest
 
 from . import bodies
+from .guccione import Guccione
 from .thick import STIFF
 
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from mu_addon.design.anchors import anchors, windows
+from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg, probe
 from mu_addon.fem.lattice_law import LatticeLaw, deformation_gradients, stretches
-from mu_addon.fem.laws import Cubic, CubicShear, DiagonalStretch, Foam, NeoHooke
+from mu_addon.fem.laws import CubicShear, DiagonalStretch, Foam, NeoHooke
 from mu_addon.fem.model import Model
 from mu_addon.fem.state import rest
 from mu_addon.fem.trajectory import simulate
@@ -18,9 +18,11 @@ from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.batch import CandidateBatch
-from mu_addon.placement.candidates import candidates, roi, with_sensor
+from mu_addon.placement.candidates import candidate_paths, roi, with_sensor
 from mu_addon.placement.inclusion import sensor_share
-from mu_addon.placement.influence import influence, loaded
+from mu_addon.placement.influence import influence_map, loaded
+
+from .cubic import Cubic
 
 UNIT = load_preset("mu-1.0x")
 FOAM = np.array([0.006, 5.0, 0.006, 4.0, 0.01, -2.0])
@@ -79,7 +81,7 @@ def test_foam_and_struts_side_by_side_are_at_small_strain_a_cubic_body(mesh):
 
 def test_a_sensor_takes_its_share_of_every_layer(mesh):
     materials = materials_of(UNIT, mesh, LAW)
-    every = {c.name: c for c in candidates(anchors(UNIT), windows(6))}
+    every = {c.name: c for c in candidate_paths(anchor_points(UNIT), windows(6))}
     share = sensor_share("volume_fraction", roi(mesh, every["alpha2"], 1.0))
     stiff = with_sensor(materials, share, 2.5)
     total = np.zeros(len(mesh.tets))
@@ -95,8 +97,8 @@ def test_a_sensor_takes_its_share_of_every_layer(mesh):
 
 def test_sensors_in_lockstep_find_what_each_finds_alone(mesh, baseline):
     materials = materials_of(UNIT, mesh, LAW)
-    points = anchors(UNIT)
-    every = {c.name: c for c in candidates(points, windows(6))}
+    points = anchor_points(UNIT)
+    every = {c.name: c for c in candidate_paths(points, windows(6))}
     shares = [sensor_share("intersect", roi(mesh, every[n], 1.0)) for n in ("alpha2", "alpha10")]
     sweep = CandidateBatch(Model(mesh), materials, (points, probe(mesh, points)), shares, 2.5)
     together = sweep.at(baseline.states[-1])
@@ -108,10 +110,10 @@ def test_sensors_in_lockstep_find_what_each_finds_alone(mesh, baseline):
 
 def test_the_map_is_the_derivative_by_all_layers_of_an_element(mesh, baseline):
     """The first-order map against Model A with every layer of one lattice element a little heavier."""
-    points = anchors(UNIT)
+    points = anchor_points(UNIT)
     monitor = probe(mesh, points)
     materials = materials_of(UNIT, mesh, LAW)
-    found = influence(Model(mesh), materials, baseline, monitor).displacement[0]
+    found = influence_map(Model(mesh), materials, baseline, monitor).displacement[0]
     centre = mesh.nodes[mesh.corners].mean(axis=1)
     near = np.linalg.norm(centre - [1.0, 22.0, 40.0], axis=1)
     element = int(np.argmin(np.where(mesh.region == LATTICE, near, np.inf)))

@@ -7,25 +7,24 @@ from hypothesis import strategies as st
 
 from mu_addon.errors import InputError
 from mu_addon.fem.laws import (
-    Cubic,
     CubicShear,
     DiagonalStretch,
     Foam,
     Friction,
-    Guccione,
     Layered,
     MooneyRivlin,
     NeoHooke,
     Ogden,
     OgdenRoxburgh,
     Prony,
-    TransverselyIsotropic,
     Yeoh,
 )
 from mu_addon.fem.materials import Layer, Materials
 from mu_addon.fem.model import Model
 
 from . import bodies
+from .cubic import Cubic
+from .guccione import Guccione
 from .points import difference, evaluate
 
 FIBRE = [1.0, 2.0, -1.0]
@@ -36,7 +35,6 @@ ROWS = {
     Ogden: np.array([0.6, 1.3, 0.02, 5.0, -0.1, -2.0, 7.0]),
     Foam: np.array([0.4, 3.0, 0.25, 12.0, 0.3, 2.0]),
     Guccione: Guccione.parameters(2.0, 8.0, 2.0, 4.0, 100.0, FIBRE)[0],
-    TransverselyIsotropic: TransverselyIsotropic.parameters(20.0, 2.0, 0.3, 0.4, 1.5, FIBRE)[0],
     Cubic: Cubic.parameters(3.0, 0.25, 0.4, FIBRE, [0, 1, 1])[0],
     CubicShear: np.array([0.7]),
     DiagonalStretch: np.array([0.5]),
@@ -45,7 +43,7 @@ ROWS = {
     OgdenRoxburgh: np.array([0.3, -0.02, 0.004, 5.0, 1.5, 0.05, 0.1]),
     Friction: np.array([0.4, 0.1]),
 }
-ANISOTROPIC = [Guccione, TransverselyIsotropic, Cubic, CubicShear, Layered]
+ANISOTROPIC = [Guccione, Cubic, CubicShear, Layered]
 ISOTROPIC = [law for law in ROWS if law not in ANISOTROPIC]
 LAWS = pytest.mark.parametrize("law", ROWS, ids=lambda law: law.__name__)
 rotations = st.integers(0, 2**32 - 1).map(
@@ -159,19 +157,6 @@ def compliance_in_frame(law, row, frame):
     factor = np.array([1, 1, 1, 2, 2, 2]) ** 0.5
     mandel = np.array([[C[(*a, *b)] for b in pairs] for a in pairs]) * np.outer(factor, factor)
     return np.linalg.inv(mandel)
-
-
-def test_transverse_isotropy_has_the_engineering_constants_asked_for():
-    f = np.array(FIBRE) / np.linalg.norm(FIBRE)
-    across = np.cross(f, [1.0, 0, 0])
-    across /= np.linalg.norm(across)
-    S = compliance_in_frame(
-        TransverselyIsotropic, ROWS[TransverselyIsotropic], np.stack([f, across, np.cross(f, across)], axis=1)
-    )
-    assert (1 / S[0, 0], 1 / S[1, 1], 1 / S[2, 2]) == pytest.approx((20.0, 2.0, 2.0))
-    assert (-S[1, 0] / S[0, 0], -S[2, 1] / S[1, 1]) == pytest.approx((0.3, 0.4))
-    assert (1 / (2 * S[4, 4]), 1 / (2 * S[5, 5])) == pytest.approx((1.5, 1.5))
-    assert 1 / (2 * S[3, 3]) == pytest.approx(2.0 / (2 * 1.4))
 
 
 def test_cubic_symmetry_has_the_engineering_constants_asked_for():
@@ -319,7 +304,6 @@ def test_a_foam_in_parallel_with_cubic_shear_has_their_shear_moduli_added():
         (Foam, 4, -1.0, "lambda_MPa"),
         (Foam, 1, 0.0, "alpha_tension"),
         (Guccione, 5, 3.0, "fibre"),
-        (TransverselyIsotropic, 2, -60.0, "stiffness"),
         (Cubic, 1, 9.0, "C11 - C12"),
         (Cubic, 6, 0.9, "length"),
         (CubicShear, 0, -0.1, "G_MPa"),

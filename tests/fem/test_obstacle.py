@@ -171,7 +171,7 @@ def test_hertz_elastic_ball_on_a_plane():
 
 
 def test_a_pose_that_is_no_rotation_and_a_contact_without_depth_are_refused():
-    with pytest.raises(InputError, match="no rotation"):
+    with pytest.raises(InputError, match="not a rotation"):
         Pose(np.diag([1.0, 1.0, -1.0]))
     with pytest.raises(InputError, match="MPa at 0 mm"):
         Obstacle(box(), RIGID[0], 0.5, 0.0)

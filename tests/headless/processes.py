@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+# No measure of speed: what hangs must end some time.
+PATIENCE_S = 3600.0
 RUN = ROOT / "headless" / "run.py"
 # The main job, small: coarse elements, seven instants, two processes.
 COARSE = ("--refine", "0.5", "--times", "7", "--stations", "11")
@@ -20,7 +22,12 @@ def command(*arguments):
 def run(*arguments, **options):
     """Run to the end; output as text."""
     return subprocess.run(
-        command(*arguments), capture_output=True, text=True, timeout=600, stdin=subprocess.DEVNULL, **options
+        command(*arguments),
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        stdin=subprocess.DEVNULL,
+        **options,
     )
 
 

@@ -88,6 +88,6 @@ def test_design_experiments_says_what_would_be_seen(tmp_path):
     folder = weighed_blocks(tmp_path / "data", 0.0)
     done = run("design-experiments", folder, "--noise", "stress=0.2", "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
-    assert "overcure: visible from offset 0.0" in done.stdout
+    assert "overcure: detectable from offset 0.0" in done.stdout
     done = run("design-experiments", folder, "--noise", "stress=little", "--out", tmp_path / "other")
     assert_clear_failure(done, 2, "stress=little", "--noise")

@@ -13,11 +13,11 @@ import meshio
 import numpy as np
 import pytest
 
-from mu_addon.design.anchors import anchors
+from mu_addon.design.anchors import anchor_points
 from mu_addon.design.parameters import load_preset, read_unit
 
 from ..report.browser import EXECUTABLE, Browser, complaints, requests
-from .processes import COARSE, ROOT, RUN, command, run
+from .processes import COARSE, PATIENCE_S, ROOT, RUN, command, run
 
 
 @pytest.fixture(scope="module")
@@ -210,7 +210,7 @@ def test_a_window_of_anchors_is_one_of_the_lattices_paths(searched):
     with (folder / "anchors.txt").open() as file:
         assert file.read()
     every = {row["path"]: float(row["J_hat_mm"]) for row in rows(folder)}
-    points = anchors(load_preset("mu-1.0x"))
+    points = anchor_points(load_preset("mu-1.0x"))
     text = "; ".join(" ".join(f"{c:.6g}" for c in point) for point in points)
     assert float(solved[text]) == pytest.approx(every["alpha10"], rel=2e-3)
 
@@ -230,7 +230,7 @@ def started(out):
 
 
 def wait_for_a_state_swept(process, out):
-    deadline = time.monotonic() + 300
+    deadline = time.monotonic() + PATIENCE_S
     while not list((out / "cache").glob("sweep-*")) and time.monotonic() < deadline:
         assert process.poll() is None, "it ended before it could be stopped"
         time.sleep(0.05)
@@ -250,8 +250,8 @@ def test_killed_it_leaves_no_process_behind_and_does_not_pass_for_complete(tmp_p
     process = started(out)
     wait_for_a_state_swept(process, out)
     process.kill()
-    process.communicate(timeout=60)
-    deadline = time.monotonic() + 60
+    process.communicate(timeout=PATIENCE_S)
+    deadline = time.monotonic() + PATIENCE_S
     while alive(process.pid) and time.monotonic() < deadline:
         time.sleep(0.1)
     assert not alive(process.pid)
@@ -265,7 +265,7 @@ def test_interrupted_it_keeps_what_it_has_and_resumes_to_the_same_digits(finishe
     wait_for_a_state_swept(process, out)
     # As a terminal does it: to every process of the group.
     os.killpg(process.pid, signal.SIGINT)
-    output, errors = process.communicate(timeout=120)
+    output, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130, errors
     assert "Traceback" not in output + errors
     summary = json.loads((out / "summary.json").read_text())
@@ -294,7 +294,7 @@ sys.argv += {list(COARSE)!r}
 runpy.run_path({str(RUN)!r}, run_name="__main__")
 """
     done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=600, cwd=ROOT.parent
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=PATIENCE_S, cwd=ROOT.parent
     )
     assert done.returncode == 0, done.stderr
     assert same_delta(out, folder)

@@ -1,6 +1,7 @@
 """`resume`: a folder is enough to go on with a study, after kill -9 too; one process has it at a time."""
 
 import json
+import signal
 import subprocess
 import time
 
@@ -69,13 +70,14 @@ def test_a_second_run_in_the_folder_is_refused_and_names_the_first(tmp_path):
     while not list(tmp_path.glob("cache/mesh-*")):
         assert first.poll() is None
         time.sleep(0.01)
+    first.send_signal(signal.SIGSTOP)  # it holds its lock however long the second takes to start
     second = run("design", "--preset", "mu-0.75x", "--out", tmp_path)
     assert first.poll() is None
-    assert_clear_failure(second, 2, "another run works in this folder", f"process {first.pid} ", "what to do")
+    assert_clear_failure(second, 2, "another run uses this folder", f"process {first.pid} ", "what to do")
     assert not (tmp_path / "stale").exists()
     first.kill()
     first.wait()
 
 
 def test_a_folder_without_a_study_is_told(tmp_path):
-    assert_clear_failure(run("resume", tmp_path), 2, "no study in this folder", "study.toml")
+    assert_clear_failure(run("resume", tmp_path), 2, "this folder contains no study", "study.toml")

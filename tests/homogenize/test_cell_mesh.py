@@ -13,7 +13,7 @@ from mu_addon.design.strut_cell import Facets, StrutCell, octant_surface, relati
 from mu_addon.design.surface import volume
 from mu_addon.errors import InputError, MeshingError
 from mu_addon.homogenize import cell_mesh as module
-from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, cell_mesh, skin_share
+from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell, skin_share
 from mu_addon.homogenize.elasticity import effective_tensor
 from mu_addon.meshing.mesh import TET_EDGES, Mesh
 from mu_addon.meshing.quality import element_volumes
@@ -37,7 +37,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("order", [1, 2])
 def test_its_sides_lie_on_the_planes_and_its_volume_is_the_surfaces(cache: Path, order: int) -> None:
     cell = paper_cell()
-    mesh = cell_mesh(cell, CellMeshSettings(order, 1.5, Facets(12, 8)), cache)
+    mesh = mesh_cell(cell, CellMeshSettings(order, 1.5, Facets(12, 8)), cache)
     half = cell.half_mm
     assert mesh.order == order
     assert len(mesh.base) == len(mesh.tip) == len(mesh.cavity) == 0
@@ -61,13 +61,13 @@ def area(mesh: Mesh, faces: np.ndarray) -> float:
 
 
 def test_straight_edges_have_their_middles_on_them(cache: Path) -> None:
-    mesh = cell_mesh(paper_cell(), COARSE, cache)
+    mesh = mesh_cell(paper_cell(), COARSE, cache)
     ends = mesh.nodes[mesh.corners][:, TET_EDGES]
     assert mesh.nodes[mesh.tets[:, 4:]] == pytest.approx(ends.mean(axis=2), abs=1e-12)
 
 
 def test_scales_share_one_mesh_and_one_tensor(cache: Path) -> None:
-    one, other = (cell_mesh(paper_cell(s), COARSE, cache) for s in (1.0, 1.5))
+    one, other = (mesh_cell(paper_cell(s), COARSE, cache) for s in (1.0, 1.5))
     assert np.array_equal(one.tets, other.tets)
     assert other.nodes == pytest.approx(1.5 * one.nodes, rel=1e-12)
     tensors = [
@@ -80,7 +80,7 @@ def test_scales_share_one_mesh_and_one_tensor(cache: Path) -> None:
 
 def test_a_printed_offset_makes_another_mesh(cache: Path) -> None:
     thick = paper_cell(offset_xy_mm=0.15, offset_z_mm=0.15)
-    mesh = cell_mesh(thick, COARSE, cache)
+    mesh = mesh_cell(thick, COARSE, cache)
     found = effective_tensor(mesh, cell_materials(thick, mesh, 2.5, 0.45), (6.25,) * 3)
     assert found.relative_density == pytest.approx(relative_density(thick, COARSE.facets), rel=0.01)
     assert found.relative_density > 1.2 * relative_density(paper_cell())
@@ -88,7 +88,7 @@ def test_a_printed_offset_makes_another_mesh(cache: Path) -> None:
 
 def test_a_skin_is_as_deep_as_it_says(cache: Path) -> None:
     cell = StrutCell(cells.SIMPLE_CUBIC, 10.0, 1.0, 1.0, skin_depth_mm=0.3, skin_factor=2.0)
-    mesh = cell_mesh(cell, CellMeshSettings(per_diameter=4.0, facets=Facets(16, 8), tolerance=0.005), cache)
+    mesh = mesh_cell(cell, CellMeshSettings(per_diameter=4.0, facets=Facets(16, 8), tolerance=0.005), cache)
     share, volumes = skin_share(cell, mesh), element_volumes(mesh)
     # Away from the joints a strut along an axis has a core of radius 0.7. All three of them, since an element
     # is core or skin as a whole, and meshes without a seed scatter by 2 % over a single one.
@@ -121,12 +121,12 @@ def test_a_mesh_turned_over_is_made_anew(monkeypatch: pytest.MonkeyPatch, cache:
         return mesh_surface(*arguments, **names)
 
     monkeypatch.setattr(module, "mesh_surface", fail)
-    assert len(cell_mesh(paper_cell(), COARSE, cache).tets)
+    assert len(mesh_cell(paper_cell(), COARSE, cache).tets)
     assert len(set(asked)) == len(asked) == 3
     asked.clear()
     monkeypatch.setattr(module, "_TRIES", (1.0, 0.8))
     with pytest.raises(MeshingError, match="inverted"):
-        cell_mesh(paper_cell(), COARSE, cache)
+        mesh_cell(paper_cell(), COARSE, cache)
 
 
 @pytest.mark.parametrize(

@@ -12,12 +12,12 @@ from mu_addon.design.strut_cell import StrutCell
 from mu_addon.errors import ConvergenceError, InputError
 from mu_addon.fem.laws import NeoHooke
 from mu_addon.fem.materials import Materials
-from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_mesh
+from mu_addon.homogenize.cell_mesh import CellMeshSettings, mesh_cell
 from mu_addon.homogenize.compression import STRAINS, compress
 from mu_addon.homogenize.curve import Curve
 from mu_addon.homogenize.elasticity import effective_tensor
 from mu_addon.homogenize.modulus import PROCEDURES, moduli, modulus
-from mu_addon.homogenize.specimen import Specimen, specimen
+from mu_addon.homogenize.specimen import Specimen, block_specimen
 from mu_addon.meshing.mesh import AXES
 from mu_addon.meshing.quality import element_volumes
 from tests.fem import bodies
@@ -47,7 +47,7 @@ def resin(mesh, poisson=NU):
 
 
 def block(octant, cells, axis="z", poisson=NU):
-    return specimen(octant, cells, resin(octant, poisson), axis)
+    return block_specimen(octant, cells, resin(octant, poisson), axis)
 
 
 def initial(octant, cells, friction, **how):
@@ -137,7 +137,7 @@ def test_large_blocks_approach_the_periodic_cell():
 def test_blocks_of_the_papers_lattice_approach_its_periodic_cell(tmp_path):
     """Its bending struts are far softer along an edge than in shear: plates that hold it count for more."""
     cell = StrutCell(kind("body-centred"), U, 0.75, 1.0)
-    octant = cell_mesh(cell, CellMeshSettings(per_diameter=1.0), tmp_path)
+    octant = mesh_cell(cell, CellMeshSettings(per_diameter=1.0), tmp_path)
     periodic = effective_tensor(octant, resin(octant)).E100
     one, two = (initial(octant, n, "slide") for n in (1, 2))
     assert one < two < periodic
@@ -189,7 +189,7 @@ def test_compression_along_another_axis_is_that_of_the_turned_cell(axis):
 def test_materials_go_with_their_elements():
     octant = walls()
     moduli_MPa = np.linspace(1.0, 2.0, len(octant.tets))
-    body = specimen(octant, 3, Materials.neo_hooke(moduli_MPa, np.full(len(moduli_MPa), NU)))
+    body = block_specimen(octant, 3, Materials.neo_hooke(moduli_MPa, np.full(len(moduli_MPa), NU)))
     young, _ = body.materials.small_strain(len(body.mesh.tets))
     # Every copy is of its own octant: the same place in the cell has the same modulus.
     place = np.mod(3 * U / 2 - body.mesh.nodes[body.mesh.corners].mean(axis=1), U)

@@ -6,7 +6,7 @@ import pytest
 from scipy.optimize import brentq
 
 from mu_addon.errors import InputError
-from mu_addon.fem.laws import Cubic, Foam
+from mu_addon.fem.laws import Foam
 from mu_addon.fem.point import evaluate
 from mu_addon.homogenize.curve import Curve
 from mu_addon.homogenize.foam_fit import (
@@ -17,6 +17,7 @@ from mu_addon.homogenize.foam_fit import (
     stable_shear,
 )
 from mu_addon.homogenize.foam_response import directions, ellipticity, small_strain, uniaxial
+from tests.fem.cubic import Cubic
 
 STRETCH = np.linspace(0.6, 1.4, 17)
 FOAMS = {

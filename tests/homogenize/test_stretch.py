@@ -12,10 +12,10 @@ from mu_addon.design.strut_cell import Facets, StrutCell
 from mu_addon.errors import InputError
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, cell_mesh
+from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell
 from mu_addon.homogenize.elasticity import effective_tensor
 from mu_addon.homogenize.specimen import repeated
-from mu_addon.homogenize.stretch import Stretching, StretchSettings, stretch
+from mu_addon.homogenize.stretch import Stretching, StretchSettings, stretch_lattice
 from mu_addon.meshing.tiling import tiled, tiled_displacement
 from tests.fem import bodies
 
@@ -34,7 +34,7 @@ def nominal(along, across, mu, kappa):
 def lattice():
     """A coarse octant of the paper's cell, with its materials and box."""
     cell = StrutCell(kind("body-centred"), 12.5, 0.75, 1.0)
-    mesh = cell_mesh(cell, CellMeshSettings(per_diameter=1.0, facets=Facets(12, 6), tolerance=0.05))
+    mesh = mesh_cell(cell, CellMeshSettings(per_diameter=1.0, facets=Facets(12, 6), tolerance=0.05))
     return mesh, cell_materials(cell, mesh, 2.5, 0.45), (6.25,) * 3
 
 
@@ -45,7 +45,7 @@ def test_a_homogeneous_cell_returns_its_own_law(axis, confined):
     mesh = bodies.box((2, 2, 2), size, 2, jiggle=0.2)
     K, G = cells.bulk_and_shear(2.5, 0.45)
     test = StretchSettings(axis=axis, strains=STRAINS, confined=confined)
-    found = stretch(mesh, bodies.uniform(mesh, 2.5, 0.45), size, test)
+    found = stretch_lattice(mesh, bodies.uniform(mesh, 2.5, 0.45), size, test)
     assert found.stopped == ""
     assert found.curve.strain == pytest.approx(sorted((*STRAINS, 0.0)), abs=1e-15)
     for along, stress, lateral in zip(
@@ -60,7 +60,7 @@ def test_it_starts_as_the_tensor_says_and_the_search_ends_quadratically(lattice)
     mesh, materials, box = lattice
     small = effective_tensor(mesh, materials, box)
     compliance = np.linalg.inv(small.C)
-    found = stretch(mesh, materials, box, StretchSettings(strains=(-1e-4, 1e-4)))
+    found = stretch_lattice(mesh, materials, box, StretchSettings(strains=(-1e-4, 1e-4)))
     slope = np.diff(found.curve.stress_MPa[[0, 2]])[0] / 2e-4
     assert slope == pytest.approx(1 / compliance[2, 2], rel=1e-6)
     ratio = -np.diff(found.curve.lateral[[0, 2]], axis=0)[0] / 2e-4
@@ -89,7 +89,7 @@ def test_stress_is_the_slope_of_the_energy(lattice):
 def test_its_images_are_in_equilibrium_as_a_periodic_body(lattice):
     mesh, materials, box = lattice
     box = np.array(box)
-    point = stretch(mesh, materials, box, StretchSettings(strains=(-0.2,))).points[0]
+    point = stretch_lattice(mesh, materials, box, StretchSettings(strains=(-0.2,))).points[0]
     whole = tiled(mesh, (2, 2, 2), box)
     whole = attrs.evolve(whole, base=whole.base[:0])
     u = tiled_displacement(mesh, point.u, (2, 2, 2), box, box * point.stretch)
@@ -113,8 +113,8 @@ def test_walls_that_meet_end_the_curve():
     foot = soft & (mesh.nodes[mesh.corners].mean(axis=1)[:, 0] < 0.5)
     materials = Materials.neo_hooke(np.where(foot, 1.0, 1e4), np.full(len(mesh.tets), 0.3))
     strains = (-0.01, -0.02, -0.03, -0.04, -0.06, -0.08, 0.02)
-    found = stretch(mesh, materials, (1.0, 1.0, 1.0), StretchSettings(strains=strains))
-    assert "walls meet at a strain of -0.050" in found.stopped
+    found = stretch_lattice(mesh, materials, (1.0, 1.0, 1.0), StretchSettings(strains=strains))
+    assert "walls touch at a strain of -0.050" in found.stopped
     assert "across z" in found.stopped
     assert found.curve.strain[0] == pytest.approx(-0.04)
     assert found.curve.strain[-1] == pytest.approx(0.02)
@@ -129,7 +129,7 @@ def test_a_strut_that_buckles_ends_the_curve():
     plate = mesh.nodes[mesh.corners].mean(axis=1)[:, 2] > 0.8
     materials = Materials.neo_hooke(np.where(plate, 1e3, 1.0), np.zeros(len(mesh.tets)))
     strains = tuple(-np.arange(0.005, 0.1, 0.005))
-    found = stretch(mesh, materials, (1.0, 1.0, 1.0), StretchSettings(strains=strains))
+    found = stretch_lattice(mesh, materials, (1.0, 1.0, 1.0), StretchSettings(strains=strains))
     assert "no equilibrium beyond a strain of -0.0" in found.stopped
     assert "buckl" in found.stopped
     # Euler's strain of a clamped strut 1.6 long and 0.2 thick, times its share of the height.
@@ -143,9 +143,9 @@ def test_walls_that_sway_are_found_by_asking():
     mesh = cells.carved((2, 4, 10), box, lambda c: (c[:, 1] < 0.125) | (c[:, 2] > 1.8))
     materials = Materials.neo_hooke(*np.broadcast_arrays([1.0], np.zeros(len(mesh.tets))))
     strains = tuple(-np.arange(0.0005, 0.008, 0.0005))
-    unasked = stretch(mesh, materials, box, StretchSettings(strains=strains))
+    unasked = stretch_lattice(mesh, materials, box, StretchSettings(strains=strains))
     assert unasked.stopped == ""
-    asked = stretch(mesh, materials, box, StretchSettings(strains=strains, buckling=True))
+    asked = stretch_lattice(mesh, materials, box, StretchSettings(strains=strains, buckling=True))
     assert "buckles before a strain of -0.00" in asked.stopped
     assert "repeats after two cells along z" in asked.stopped
     # Euler's strain of a wall 0.25 thick and 3.6 high, both ends kept upright, times its share of the height.
@@ -157,7 +157,7 @@ def test_walls_that_sway_are_found_by_asking():
 def test_a_cell_that_cannot_be_crushed_further_says_so():
     mesh = bodies.box((1, 1, 2), (1.0, 1.0, 1.0), 2)
     test = StretchSettings(strains=(-0.2, -0.9999))
-    found = stretch(mesh, bodies.uniform(mesh, 1.0, 0.3), (1.0, 1.0, 1.0), test)
+    found = stretch_lattice(mesh, bodies.uniform(mesh, 1.0, 0.3), (1.0, 1.0, 1.0), test)
     assert "no equilibrium beyond a strain of -0." in found.stopped
     assert found.curve.strain == pytest.approx([-0.2, 0])
 

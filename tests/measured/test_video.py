@@ -85,7 +85,7 @@ def test_scale_from_a_ruler_from_a_number_and_what_disagrees():
     wrong = motion(filmed, attrs.evolve(ruler, ruler_mm=55.0), REST, TIME)
     assert wrong.mm_per_pixel == pytest.approx(0.275)
     (told,) = wrong.remarks
-    assert "by the ruler a pixel is 0.275 mm, by the places of the base 0.25 mm" in told.what
+    assert "by the ruler one pixel is 0.275 mm, by the places of the base 0.25 mm" in told.what
     number = motion(filmed, attrs.evolve(VIEW, mm_per_pixel=0.25), REST, TIME)
     assert number.mm_per_pixel == 0.25
     assert number.remarks == ()
@@ -144,12 +144,12 @@ def test_noise_is_found_and_the_angle_is_as_uncertain_as_geometry_says():
     [
         ({"camera": "left"}, "a camera at 'left'"),
         ({"tip": ("c", "c")}, "the tip is marker 'c' twice"),
-        ({"tip": ("c", "x")}, "no marker 'x' was followed"),
-        ({"places_mm": ((1.0, 2.0), (1.0, 2.0))}, "have one place"),
-        ({"ruler": ("c", "d")}, "the ruler has no length"),
+        ({"tip": ("c", "x")}, "marker 'x' was not tracked"),
+        ({"places_mm": ((1.0, 2.0), (1.0, 2.0))}, "have the same position"),
+        ({"ruler": ("c", "d")}, "ruler_mm is missing or 0"),
         ({"mm_per_pixel": -1.0}, "mm_per_pixel = -1"),
         ({"mm_per_pixel": float("nan")}, "mm_per_pixel = nan"),
-        ({"base": ("a", "gone")}, "never seen together"),
+        ({"base": ("a", "gone")}, "never visible together"),
     ],
 )
 def test_views_that_do_not_fit(change, what):

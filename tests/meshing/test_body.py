@@ -16,7 +16,7 @@ from mu_addon.fem.kinematics import bending_angle_deg
 from mu_addon.fem.model import Model
 from mu_addon.fem.trajectory import simulate
 from mu_addon.fem.unit import materials_of
-from mu_addon.meshing import MeshSettings, mesh_unit, quality
+from mu_addon.meshing import MeshSettings, mesh_quality, mesh_unit
 from mu_addon.meshing.mesh import boundary_faces
 from mu_addon.meshing.revolved import unit_surfaces
 
@@ -45,7 +45,7 @@ def test_a_body_that_is_no_mirror_image_is_meshed_whole(tmp_path):
     body = envelope(drawn, d)
     mesh = mesh_unit(SHORT, COARSE, cache=tmp_path, body=body)
     assert mesh.symmetry == ()
-    found = quality(mesh, SHORT, body)
+    found = mesh_quality(mesh, SHORT, body)
     assert found.inverted == 0
     assert abs(found.lattice_volume_error) < 0.02
     assert abs(found.cavity_volume_error) < 0.03  # a wall meshed to within a fifth of its thickness

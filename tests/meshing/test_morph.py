@@ -76,5 +76,5 @@ def test_another_units_mesh_is_refused(drawn):
     longer = attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=7))
     with pytest.raises(MeshingError, match="cannot be moved"):
         morphed(mesh, UNIT, longer, settings)
-    with pytest.raises(MeshingError, match="not gmsh's, or one of other settings"):
+    with pytest.raises(MeshingError, match="not by gmsh, or has other settings"):
         morphed(mesh, UNIT, thicker(1.1), attrs.evolve(settings, meridian_mm=1.2))

@@ -21,9 +21,9 @@ from mu_addon.meshing import (
     Mesh,
     MeshingWarning,
     MeshSettings,
+    mesh_quality,
     mesh_unit,
     mirror,
-    quality,
 )
 from mu_addon.meshing.lattice import GmshUnavailable
 from mu_addon.meshing.mesh import FLIPPED_TET, TET_EDGES, TET_FACES, TRIANGLE_EDGES, boundary_faces, edges_of
@@ -60,7 +60,7 @@ def at_cavity_wall(unit: Unit, points: np.ndarray, tolerance: float) -> np.ndarr
 
 
 def test_default_mesh_is_small_and_sound(unit: Unit, half: Mesh) -> None:
-    report = quality(half, unit)
+    report = mesh_quality(half, unit)
     assert half.order == 2
     assert half.symmetry == ("x",)
     assert 10_000 <= report.nodes <= 25_000
@@ -75,7 +75,7 @@ def test_default_mesh_is_small_and_sound(unit: Unit, half: Mesh) -> None:
 @pytest.mark.parametrize("preset", PRESETS)
 def test_volumes_match_the_design(preset: str) -> None:
     unit = load_preset(preset)
-    report = quality(mesh_unit(unit), unit)
+    report = mesh_quality(mesh_unit(unit), unit)
     assert abs(report.membrane_volume_error) < 2e-4
     assert abs(report.lattice_volume_error) < 1e-4
     assert abs(report.cavity_volume_error) < 1e-4
@@ -84,7 +84,7 @@ def test_volumes_match_the_design(preset: str) -> None:
 def test_refinement_converges_on_the_volumes(unit: Unit, half: Mesh) -> None:
     errors = []
     for mesh in (mesh_unit(unit, MeshSettings(refine=0.5)), half):
-        report = quality(mesh, unit)
+        report = mesh_quality(mesh, unit)
         errors.append([report.membrane_volume_error, report.cavity_volume_error])
     rough, fine = np.abs(errors)
     assert np.all(fine < rough / 4)
@@ -155,7 +155,7 @@ def test_the_printed_unit_is_meshed(offsets: tuple[float, float]) -> None:
     """Walls of the smallest unit as they are printed, and no others."""
     unit = attrs.evolve(load_preset("mu-0.75x"), print=Printing(*offsets))
     mesh, p = mesh_unit(unit), unit.printed
-    report = quality(mesh, unit)
+    report = mesh_quality(mesh, unit)
     assert report.inverted == 0
     assert report.min_corner_jacobian > 0.05
     assert abs(report.membrane_volume_error) < 1e-3
@@ -202,7 +202,7 @@ def test_mirrored_mesh_is_exactly_symmetric(half: Mesh, unit: Unit) -> None:
     reflected = full.nodes * [-1.0, 1.0, 1.0] + 0.0
     assert np.array_equal(np.unique(full.nodes + 0.0, axis=0), np.unique(reflected, axis=0))
     assert len(full.nodes) == 2 * len(half.nodes) - len(half.symmetry_nodes("x"))
-    report, before = quality(full, unit), quality(half, unit)
+    report, before = mesh_quality(full, unit), mesh_quality(half, unit)
     assert report.inverted == 0
     assert report.membrane_volume_mm3 == pytest.approx(before.membrane_volume_mm3, rel=1e-12)
     assert report.cavity_volume_mm3 == pytest.approx(before.cavity_volume_mm3, rel=1e-12)
@@ -225,12 +225,12 @@ def test_quarter_of_a_symmetric_unit(unit: Unit) -> None:
     quarter = mesh_unit(symmetric, MeshSettings(fraction="quarter", refine=0.75))
     assert quarter.symmetry == ("x", "y")
     assert quarter.nodes[:, :2].min() == 0
-    report = quality(quarter, symmetric)
+    report = mesh_quality(quarter, symmetric)
     assert abs(report.membrane_volume_error) < 2e-3
     assert abs(report.lattice_volume_error) < 1e-3
     half = mirror(quarter, "y")
     assert half.symmetry == ("x",)
-    assert quality(half, symmetric).inverted == 0
+    assert mesh_quality(half, symmetric).inverted == 0
 
 
 def test_a_quarter_needs_symmetry(unit: Unit) -> None:
@@ -294,7 +294,7 @@ def test_any_printable_unit_is_meshed_without_inversion(values: dict[str, float]
     except InputError:
         return
     mesh = mesh_unit(unit)
-    report = quality(mesh, unit)
+    report = mesh_quality(mesh, unit)
     assert report.inverted == 0
     assert abs(report.membrane_volume_error) < 5e-3
     assert abs(report.cavity_volume_error) < 5e-3
@@ -347,7 +347,7 @@ def test_pytetwild_meshes_a_unit_instead() -> None:
     small = attrs.evolve(Unit(), chambers=attrs.evolve(Unit().chambers, count=3, wall_mm=1.5))
     with pytest.warns(MeshingWarning):
         mesh = mesh_unit(small, MeshSettings(refine=0.5))
-    report = quality(mesh, small)
+    report = mesh_quality(mesh, small)
     assert report.inverted == 0
     assert abs(report.membrane_volume_error) < 0.05
     assert abs(report.lattice_volume_error) < 0.01

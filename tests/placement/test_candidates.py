@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from mu_addon.design.anchors import anchors, windows
+from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg, probe
@@ -17,7 +17,7 @@ from mu_addon.meshing.mesh import mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.batch import CandidateBatch
-from mu_addon.placement.candidates import candidates, evaluate, evaluation, moved_points, roi
+from mu_addon.placement.candidates import candidate_paths, evaluate, evaluation, moved_points, roi
 from mu_addon.placement.inclusion import RULES, sensor_share
 
 UNIT = load_preset("mu-1.0x")
@@ -39,7 +39,7 @@ def half():
 
 @pytest.fixture(scope="module")
 def monitored(half):
-    points = anchors(UNIT)
+    points = anchor_points(UNIT)
     return points, probe(half[0], points)
 
 
@@ -47,7 +47,7 @@ JOBS = [(name, rule) for rule in RULES for name in ("alpha1", "alpha2", "alpha4"
 
 
 def sensors(mesh, jobs):
-    every = {c.name: c for c in candidates(anchors(UNIT), windows(6))}
+    every = {c.name: c for c in candidate_paths(anchor_points(UNIT), windows(6))}
     return [sensor_share(rule, roi(mesh, every[name], 1.0)) for name, rule in jobs]
 
 
@@ -58,7 +58,7 @@ def swept(half, monitored):
     sweep = CandidateBatch(model, materials(mesh), monitored, sensors(mesh, JOBS), 2.5)
     moved = baseline.of_time(np.array([sweep.at(s) for s in baseline.states]))
     still = moved_points(monitored, baseline)
-    every = {c.name: c for c in candidates(anchors(UNIT), windows(6))}
+    every = {c.name: c for c in candidate_paths(anchor_points(UNIT), windows(6))}
     return {
         (name, rule): evaluation(mesh, every[name], rule, 1.0, moved[:, i], still, 21)
         for i, (name, rule) in enumerate(JOBS)
@@ -97,7 +97,7 @@ def test_nothing_deviates_without_pressure(swept):
 def test_lockstep_finds_what_each_finds_alone_along_its_whole_path(half, monitored, swept, rule):
     """The guard of path independence: cold, step by step from rest, against the jump that all share."""
     mesh, model, baseline = half
-    every = {c.name: c for c in candidates(anchors(UNIT), windows(6))}
+    every = {c.name: c for c in candidate_paths(anchor_points(UNIT), windows(6))}
     alone = evaluate(model, materials(mesh), baseline, monitored, every["alpha10"], rule, 1.0, 2.5, 21)
     together = swept["alpha10", rule]
     assert np.abs(alone.deviation.delta - together.deviation.delta).max() < 1e-6
@@ -127,8 +127,8 @@ from tests.placement.test_candidates import *
 mesh = mesh_unit(UNIT, COARSE)
 model = Model(mesh)
 baseline = simulate(Equilibrium(model, materials(mesh)), np.arange(2.0), PRESSURES[2:])
-points = anchors(UNIT)
-every = candidates(points, windows(6))
+points = anchor_points(UNIT)
+every = candidate_paths(points, windows(6))
 sweep = Sweep(model, materials(mesh), (points, probe(mesh, points)), sensors(mesh, JOBS[2:4]), 2.5)
 moved = sweep.at(baseline.states[-1])
 sys.stdout.write(mesh.hash() + " " + moved.tobytes().hex())

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mu_addon.design.anchors import anchors, windows
+from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg
@@ -13,7 +13,7 @@ from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.quality import element_volumes
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.placement.candidates import candidates, roi
+from mu_addon.placement.candidates import candidate_paths, roi
 from mu_addon.placement.inclusion import stiffened_volume_mm3
 
 UNIT = load_preset("mu-1.0x")
@@ -45,7 +45,7 @@ def test_one_rule_keeps_the_sensors_volume_on_any_mesh(meshes):
     ratios = {"intersect": [], "volume_fraction": []}
     for mesh in meshes:
         volumes = element_volumes(mesh)
-        found = [roi(mesh, candidate, 1.0) for candidate in candidates(anchors(UNIT), windows(6))]
+        found = [roi(mesh, candidate, 1.0) for candidate in candidate_paths(anchor_points(UNIT), windows(6))]
         for rule, values in ratios.items():
             stiffened = [2 * stiffened_volume_mm3(rule, f, volumes) / f.cylinder_volume_mm3 for f in found]
             values.append(np.mean(stiffened))

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mu_addon.placement.deviation import centreline, deviation, rank
+from mu_addon.placement.deviation import centreline, centreline_deviation, rank
 
 
 def arc(angle, n=6, length=60.0):
@@ -32,18 +32,18 @@ def test_deviation_of_a_shift_and_of_a_shear():
     k, j = 5, 11
     base = np.zeros((k, j, 3))
     shifted = base + np.array([0.0, 0.3, 0.4])
-    found = deviation(shifted, base)
+    found = centreline_deviation(shifted, base)
     assert found.J_hat == pytest.approx(0.5)
     assert found.J_cont == pytest.approx(0.5)
     growing = base.copy()
     growing[:, :, 1] = np.linspace(0, 1, k)[:, None] * np.linspace(0, 2, j)
-    found = deviation(growing, base)
+    found = centreline_deviation(growing, base)
     np.testing.assert_allclose(found.over_time, np.linspace(0, 1, k))
     np.testing.assert_allclose(found.over_length, 0.5 * np.linspace(0, 2, j))
     assert found.J_hat == pytest.approx(0.5)
     # Root mean square of 2 t l over the unit square is 2/3; the trapezoid's error is second order.
     fine = np.linspace(0, 1, 400)[:, None, None] * np.linspace(0, 2, 400)[None, :, None] * [0, 1, 0]
-    assert deviation(fine, np.zeros_like(fine)).J_cont == pytest.approx(2 / 3, rel=1e-5)
+    assert centreline_deviation(fine, np.zeros_like(fine)).J_cont == pytest.approx(2 / 3, rel=1e-5)
 
 
 @given(st.lists(st.floats(0, 10), min_size=1, max_size=12))

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mu_addon.design.anchors import anchors, windows
+from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.profile import outer_radius
 from mu_addon.errors import InputError
@@ -55,7 +55,7 @@ def test_more_clearance_leaves_fewer_steps_and_too_much_none():
 
 
 def test_the_windows_of_anchors_are_among_the_chains():
-    points = anchors(UNIT)
+    points = anchor_points(UNIT)
     found = {tuple(map(tuple, GRAPH.nodes[list(c)].round(9))) for c in GRAPH.chains(Limits())}
     for w in windows(len(points)):
         assert tuple(map(tuple, points[list(w.indices)].round(9))) in found

@@ -5,7 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mu_addon.placement.inclusion import cylinder_overlap, inclusion, sensor_share, stiffened_volume_mm3
+from mu_addon.placement.inclusion import (
+    cylinder_overlap,
+    sensor_share,
+    stiffened_volume_mm3,
+    straight_inclusion,
+)
 
 from ..fem import bodies
 
@@ -65,7 +70,7 @@ def test_an_overlap_is_never_negative_nor_more_than_the_element_and_ignores_numb
 
 def test_the_two_rules():
     lattice = CORNERS.mean(axis=1)[:, 0] > 1.0
-    found = inclusion(CORNERS, lattice, [2.5, 2.5, 1.0], [2.5, 2.5, 5.0], 0.3)
+    found = straight_inclusion(CORNERS, lattice, [2.5, 2.5, 1.0], [2.5, 2.5, 5.0], 0.3)
     assert not found.touched[~lattice].any()
     np.testing.assert_array_equal(sensor_share("intersect", found), found.touched)
     blended = sensor_share("volume_fraction", found)

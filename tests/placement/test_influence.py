@@ -4,7 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
-from mu_addon.design.anchors import anchors
+from mu_addon.design.anchors import anchor_points
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MeshingError
 from mu_addon.fem.equilibrium import Equilibrium
@@ -16,12 +16,12 @@ from mu_addon.fem.trajectory import simulate
 from mu_addon.meshing.mesh import LATTICE, mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.placement.deviation import centreline, deviation
+from mu_addon.placement.deviation import centreline, centreline_deviation
 from mu_addon.placement.influence import (
     centreline_gradient,
     deviation_map,
     gradients_of,
-    influence,
+    influence_map,
     loaded,
     mean_deviation,
     parities,
@@ -31,7 +31,7 @@ from mu_addon.placement.influence import (
 from mu_addon.placement.whole import whole_body
 
 UNIT = load_preset("mu-1.0x")
-POINTS = anchors(UNIT)
+POINTS = anchor_points(UNIT)
 TIGHT = NewtonSettings(tolerance=1e-12)
 PRESSURES = np.array([0.0, -10.0, 20.0, 20.0])
 
@@ -61,7 +61,7 @@ def half():
 @pytest.fixture(scope="module")
 def found(half):
     mesh, model, baseline = half
-    return influence(model, Materials.neo_hooke(*moduli(mesh)), baseline, probe(mesh, POINTS))
+    return influence_map(model, Materials.neo_hooke(*moduli(mesh)), baseline, probe(mesh, POINTS))
 
 
 def moved(mesh, trajectory):
@@ -105,7 +105,7 @@ def test_a_whole_mesh_gives_the_map_of_its_half(half, found):
     whole = mirror(mesh, "x")
     model = Model(whole)
     baseline = solve(whole, model)
-    same = influence(model, Materials.neo_hooke(*moduli(whole)), baseline, probe(whole, POINTS))
+    same = influence_map(model, Materials.neo_hooke(*moduli(whole)), baseline, probe(whole, POINTS))
     m = len(mesh.tets)
     scale = np.abs(found.displacement).max()
     np.testing.assert_allclose(same.displacement[..., :m], found.displacement, atol=1e-6 * scale)
@@ -142,7 +142,7 @@ def test_the_deviation_of_a_slightly_stiffer_element_is_the_map_times_its_stiffe
             t.of_time(centreline(np.array([POINTS + monitor.displacement(s.u) for s in t.states]), 21))
             for t in (stiffer, baseline)
         ]
-        J = deviation(*curves).J_hat
+        J = centreline_deviation(*curves).J_hat
         both = attrs.evolve(found, displacement=2 * found.displacement * np.array([0.0, 1, 1])[:, None])
         slope = deviation_map(both, gradients, shares_of_time(baseline))[element]
         assert J / step == pytest.approx(slope, rel=5e-3)
@@ -190,8 +190,8 @@ def test_telling_pressures_stand_for_all(half):
     baseline = simulate(Equilibrium(model, made), np.arange(6.0), pressure)
     assert telling_pressures(baseline).tolist() == [-0.02, 0.01, 0.03]
     monitor = probe(mesh, POINTS)
-    every = influence(model, made, baseline, monitor)
-    few = influence(model, made, baseline, monitor, telling_pressures(baseline)).at(every.pressure_MPa)
+    every = influence_map(model, made, baseline, monitor)
+    few = influence_map(model, made, baseline, monitor, telling_pressures(baseline)).at(every.pressure_MPa)
     gradients, weights = gradients_of(baseline, POINTS, monitor, 21), shares_of_time(baseline)
     one, other = (deviation_map(found, gradients, weights) for found in (every, few))
     assert np.abs(one - other).max() < 0.02 * one.max()

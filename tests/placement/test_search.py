@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from mu_addon.design.anchors import anchors
+from mu_addon.design.anchors import anchor_points
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem.equilibrium import Equilibrium
@@ -17,17 +17,17 @@ from mu_addon.meshing.mesh import LATTICE, mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.batch import CandidateBatch
-from mu_addon.placement.deviation import centreline, deviation
+from mu_addon.placement.deviation import centreline, centreline_deviation
 from mu_addon.placement.graph import Limits, lattice_graph
 from mu_addon.placement.inclusion import sensor_share
 from mu_addon.placement.influence import gradients_of, loaded, mean_deviation, shares_of_time
 from mu_addon.placement.polyline import polyline_inclusion
-from mu_addon.placement.response import response
-from mu_addon.placement.search import SearchSettings, chance_of_better, front, search
+from mu_addon.placement.response import reduced_response
+from mu_addon.placement.search import SearchSettings, chance_of_better, front, search_paths
 
 UNIT = load_preset("mu-1.0x")
 D = UNIT.dimensions
-POINTS = anchors(UNIT)
+POINTS = anchor_points(UNIT)
 PRESSURES = np.array([0.0, -10.0, 20.0])
 SENSOR_MPA = 2.5
 WHOLE = lattice_graph(D)
@@ -67,14 +67,14 @@ def exact(half_mesh, rule, chains):
     moved = np.stack([sweep.at(state) for state in baseline.states], axis=1)
     still = centreline(np.array([POINTS + monitor.displacement(s.u) for s in baseline.states]), 21)
     curves = (baseline.of_time(centreline(points, 21)) for points in moved)
-    return np.array([deviation(curve, baseline.of_time(still)).J_hat for curve in curves])
+    return np.array([centreline_deviation(curve, baseline.of_time(still)).J_hat for curve in curves])
 
 
 def predicted(half, rule, chains, model=None, baseline=None):
     _, half_model, half_baseline = half
     model, baseline = model or half_model, baseline or half_baseline
     monitor = probe(model.mesh, POINTS)
-    found = response(
+    found = reduced_response(
         model, materials(model.mesh), SENSOR_MPA, baseline, monitor, GRAPH, rule, D.inclusion_radius
     )
     moved = found.displacements(chains, np.array([s.pressure_MPa for s in loaded(baseline)]))
@@ -101,7 +101,7 @@ def test_the_search_finds_the_best_of_all_and_checks_only_some(both):
         asked.extend(numbers.tolist())
         return solved[numbers]
 
-    outcome = search(found, check)
+    outcome = search_paths(found, check)
     assert outcome.complete
     assert outcome.risk <= 0.05
     assert outcome.best == int(np.argmin(solved))
@@ -135,7 +135,7 @@ def test_a_path_and_its_mirror_image_are_predicted_alike(half):
 
 def test_a_perfect_prediction_needs_only_the_first_checks():
     J = np.linspace(1.0, 2.0, 200)
-    outcome = search(J, lambda numbers: J[numbers] * 1.3)
+    outcome = search_paths(J, lambda numbers: J[numbers] * 1.3)
     assert outcome.best == 0
     assert outcome.complete
     assert len(outcome.checked) == SearchSettings().first
@@ -144,7 +144,7 @@ def test_a_perfect_prediction_needs_only_the_first_checks():
 def test_a_useless_prediction_is_admitted():
     rng = np.random.default_rng(0)
     J = rng.uniform(1.0, 2.0, 300)
-    outcome = search(np.ones(300), lambda numbers: J[numbers], SearchSettings(most=40))
+    outcome = search_paths(np.ones(300), lambda numbers: J[numbers], SearchSettings(most=40))
     assert not outcome.complete
     assert outcome.risk > 0.05
     assert len(outcome.checked) == 40
@@ -157,7 +157,7 @@ def test_the_risk_holds_over_many_searches():
         rng = np.random.default_rng(seed)
         predicted_mm = np.exp(rng.normal(0, 0.5, 300))
         J = predicted_mm * np.exp(rng.normal(0.1, 0.08, 300))
-        missed += search(predicted_mm, lambda numbers, J=J: J[numbers]).best != np.argmin(J)
+        missed += search_paths(predicted_mm, lambda numbers, J=J: J[numbers]).best != np.argmin(J)
     # The bound is on each search, and a miss also needs the better path to be left unchecked.
     assert missed <= 200 * 0.05
 
@@ -165,7 +165,7 @@ def test_the_risk_holds_over_many_searches():
 def test_everything_checked_leaves_no_risk():
     J = np.array([0.3, 0.1, 0.2])
     assert chance_of_better(np.ones(3), J) == 0.0
-    outcome = search(np.ones(3), lambda numbers: J[numbers], SearchSettings(risk=0.0))
+    outcome = search_paths(np.ones(3), lambda numbers: J[numbers], SearchSettings(risk=0.0))
     assert outcome.complete
     assert outcome.best == 1
 
@@ -173,7 +173,7 @@ def test_everything_checked_leaves_no_risk():
 @pytest.mark.parametrize("wrong", [np.array([]), np.array([1.0, 0.0])])
 def test_predictions_that_cannot_be_compared_are_refused(wrong):
     with pytest.raises(InputError, match="no path"):
-        search(wrong, lambda numbers: np.ones(len(numbers)))
+        search_paths(wrong, lambda numbers: np.ones(len(numbers)))
 
 
 def test_the_front_holds_what_is_neither_shorter_nor_worse_than_another():

@@ -69,7 +69,7 @@ class Browser:
         assert "error" not in answer, (method, answer["error"])
         return answer["result"]
 
-    def _read(self, done, what, seconds=40):
+    def _read(self, done, what, seconds=1800):
         deadline = time.monotonic() + seconds
         while not done():
             ready, _, _ = select.select([self.from_child], [], [], max(deadline - time.monotonic(), 0))

@@ -63,13 +63,13 @@ def page(html):
 def test_sections_in_the_order_a_designer_reads(page):
     assert page.headings == [
         "Ranking of the paths",
-        "How the unit moves",
-        "Where and when each path disturbs the motion",
-        "Along the unit, and over time",
+        "Motion of the unit",
+        "Deviation of each path over length and time",
+        "Mean deviation along the unit and over time",
         "Solid, mesh and solver",
-        "What was assumed",
+        "Assumptions",
         "All parameters",
-        "How long each stage took",
+        "Computing time of each stage",
         "Files of this run",
         "Versions",
     ]
@@ -78,16 +78,16 @@ def test_sections_in_the_order_a_designer_reads(page):
 def test_the_answer_comes_first(page):
     answer = page.words.index("Put the sensor along α₄, anchors P4 to P6")
     assert answer < page.words.index("Ranking of the paths")
-    assert "of 10 candidates it disturbs the motion least, by 0.048" in page.words
+    assert "of 10 candidates it has the smallest mean deviation, 0.048" in page.words
     assert "tied with α₁" in page.words
-    assert "by “intersect” the same path is best" in page.words
+    assert "for “intersect” the same path is best" in page.words
 
 
 def test_disagreement_of_the_rules_is_told():
     data = results()
     other = attrs.evolve(data.rules["intersect"], chosen="alpha2")
     words = Page(report_html(attrs.evolve(data, rules={**data.rules, "intersect": other}))).words
-    assert "by “intersect” α₂ would be best" in words
+    assert "for “intersect” α₂ would be best" in words
 
 
 def test_the_headline_rule_comes_first():
@@ -124,7 +124,7 @@ def test_every_path_and_rule_is_in_the_table(page):
 
 
 def test_assumptions_are_told_with_their_reason(page):
-    told = page.words[page.words.index("The source paper does not print these") :]
+    told = page.words[page.words.index("The paper does not print these values") :]
     assert "chambers.wall_mm0.8mmthe thinnest wall that this printer holds" in told
 
 
@@ -137,12 +137,12 @@ def test_partial_says_so_at_the_top(page):
 
 def test_a_run_that_stopped_early_shows_what_it_has():
     page = Page(report_html(ReportData("t", "u", status="partial", seconds={"solid": 1.0})))
-    assert page.headings == ["How long each stage took"]
+    assert page.headings == ["Computing time of each stage"]
     page = Page(report_html(results(status="partial", rules={})))
     assert len(page.all("img")) == 1 + 4 + 2 + 1
     assert "Put the sensor" not in page.words
     assert "Ranking of the paths" not in page.headings
-    assert "How the unit moves" in page.headings
+    assert "Motion of the unit" in page.headings
 
 
 def test_text_cannot_become_markup():

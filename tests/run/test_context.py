@@ -52,7 +52,7 @@ def start(how, folder):
 
 
 def finish(process, folder):
-    _, said = process.communicate(timeout=30)
+    _, said = process.communicate(timeout=1800)
     assert "Traceback" not in said
     summary = folder / "summary.json"
     log = folder / "log.ndjson"

@@ -157,7 +157,7 @@ def test_a_link_under_a_name_of_ours_is_refused(tmp_path, name):
     (folder / name).symlink_to(victim)
     context, told = started(folder)
     assert context.status == 2
-    assert f"{name} in the folder is a link to elsewhere" in told[-1]["what"]
+    assert f"{name} in the folder is a link to another location" in told[-1]["what"]
     assert victim.read_text() == "precious"
 
 
@@ -193,6 +193,6 @@ def test_reading_takes_no_time_worth_an_attack(tmp_path):
     """A thousand members of a kilobyte, each claiming a gigabyte."""
     claim = npy("{'descr': '<f8', 'fortran_order': False, 'shape': (125000000,), }", b"\0" * 64)
     path = archive(tmp_path / "a.npz", **{f"u{i}": claim for i in range(1000)})
-    start = time.monotonic()
+    start = time.process_time()
     assert read_npz(path) is None
-    assert time.monotonic() - start < 5
+    assert time.process_time() - start < 5

@@ -54,7 +54,7 @@ def test_whatever_the_file_says_only_the_system_decides(tmp_path, holder):
     with pytest.raises(InUseError, match="process 1 on elsewhere, since 2199"):
         FolderLock(tmp_path)
     (tmp_path / LOCK).write_bytes(b"\xff{not ours")
-    with pytest.raises(InUseError, match="it has just begun"):
+    with pytest.raises(InUseError, match="it has just started"):
         FolderLock(tmp_path)
     holder.communicate("")
     (tmp_path / LOCK).write_text(f'{{"process": {os.getpid()}, "machine": "here", "since": "now"}}')
@@ -87,7 +87,7 @@ def test_a_run_in_a_folder_in_use_ends_and_touches_nothing(tmp_path, holder):
     with run_to_end(Progress([told.append])) as context:
         begin(context, tmp_path, "# mine", {"a.toml": "# mine\n"}, ())
     assert context.status == 2
-    assert "another run works in this folder" in told[-1]["what"]
+    assert "another run uses this folder" in told[-1]["what"]
     assert sorted(path.name for path in tmp_path.iterdir()) == before
 
 
@@ -111,4 +111,4 @@ def test_a_disk_without_locks_is_warned_of(tmp_path, monkeypatch):
     with run_to_end(Progress([told.append])) as context:
         begin(context, tmp_path, "# mine", {"a.toml": "# mine\n"}, ())
     assert context.status == 0
-    assert any(m["type"] == "warning" and "no locks" in m["what"] for m in told)
+    assert any(m["type"] == "warning" and "does not support file locks" in m["what"] for m in told)

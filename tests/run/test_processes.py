@@ -10,7 +10,7 @@ import pytest
 
 from mu_addon.run.processes import ctrl_c_ignored
 
-WORK = "import sys, time; print('ready', flush=True); time.sleep(30)"
+WORK = "import sys, time; print('ready', flush=True); time.sleep(3600)"
 
 
 def child():
@@ -29,7 +29,7 @@ def test_a_child_born_inside_outlives_ctrl_c_and_one_born_outside_does_not():
     try:
         for process in (inside, outside):
             process.send_signal(signal.SIGINT)
-        outside.wait(10)
+        outside.wait(1800)
         with pytest.raises(subprocess.TimeoutExpired):
             inside.wait(1)
     finally:

@@ -5,19 +5,19 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
-from mu_addon.design.anchors import anchors, window
+from mu_addon.design.anchors import anchor_points, window
 from mu_addon.design.parameters import Unit, load_preset
 from mu_addon.design.waveguide import waveguide
 from mu_addon.meshing.mesh import Mesh
-from mu_addon.sensing.embedded_waveguide import Held, held
+from mu_addon.sensing.embedded_waveguide import EmbeddedWaveguide, embed_waveguide
 from tests.fem.bodies import box
 
 
-def of_window(name: str, preset: str = "mu-1.0x") -> Held:
+def of_window(name: str, preset: str = "mu-1.0x") -> EmbeddedWaveguide:
     """The printed bar along a window of a preset."""
     unit = load_preset(preset)
     path = window(unit, name)
-    return held(waveguide(unit, path), anchors(unit)[path.indices], unit.printed)
+    return embed_waveguide(waveguide(unit, path), anchor_points(unit)[path.indices], unit.printed)
 
 
 def bent_to_a_circle(points: np.ndarray, curvature: float, y: float) -> np.ndarray:

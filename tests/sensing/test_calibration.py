@@ -183,9 +183,9 @@ def test_there_and_back_through_a_file(tmp_path: Path) -> None:
     [
         ("version = 1", "version = 9", "version 9"),
         ("channel", "chanel", "channel"),
-        ("coefficients_V = [", "coefficients_V = [9.0, -9.0, ", "monotone"),
+        ("coefficients_V = [", "coefficients_V = [9.0, -9.0, ", "monotonic"),
         ("band_V = ", "band_V = x", "cannot read"),
-        ("gain = 1.0", "gain = -1.0", "numbers make none"),
+        ("gain = 1.0", "gain = -1.0", "numbers are inconsistent"),
     ],
 )
 def test_a_damaged_file_is_named(tmp_path: Path, old: str, new: str, words: str) -> None:

@@ -11,7 +11,7 @@ from mu_addon.design.anchors import window
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.waveguide import waveguide
 from mu_addon.placement.graph import Limits, lattice_graph
-from mu_addon.sensing.embedded_waveguide import Guided, Joints, held
+from mu_addon.sensing.embedded_waveguide import Joints, WaveguideShape, embed_waveguide
 from mu_addon.sensing.guide import Centreline
 from mu_addon.sensing.law import straight_guide
 from mu_addon.sensing.notched import kinks, notched
@@ -27,13 +27,13 @@ def test_the_printed_bars_own_wells(preset: str) -> None:
     bar = waveguide(unit, window(unit, "alpha6"))
     guide = of_window("alpha6", preset)
     z = [well.centre[2] for well in bar.wells]
-    np.testing.assert_allclose(guide.guided.wells, z - bar.points[0, 2], atol=1e-9)
-    assert len(guide.guided.junctions) == 4
+    np.testing.assert_allclose(guide.shape.wells, z - bar.points[0, 2], atol=1e-9)
+    assert len(guide.shape.junctions) == 4
     assert guide.s[-1] == pytest.approx(np.linalg.norm(bar.points[-1] - bar.points[0]))
     # What the law is fitted to has the same wells, from the first node on.
     d = unit.printed
     like = np.asarray(straight_guide(d, 3 * d.cell).wells) - d.waveguide_end
-    np.testing.assert_allclose(like, np.asarray(guide.guided.wells) - guide.s[1], atol=1e-9)
+    np.testing.assert_allclose(like, np.asarray(guide.shape.wells) - guide.s[1], atol=1e-9)
 
 
 def test_a_bent_path_keeps_its_bends_out_of_its_curvature() -> None:
@@ -43,10 +43,10 @@ def test_a_bent_path_keeps_its_bends_out_of_its_curvature() -> None:
     chain = next(c for k, c in enumerate(graph.chains(Limits())) if k == 1379)
     nodes = graph.nodes[list(chain)]
     bar = waveguide(unit, nodes)
-    guide = held(bar, nodes, unit.printed)
+    guide = embed_waveguide(bar, nodes, unit.printed)
     legs = guide.at_rest
     assert len(legs) == len(bar.points) - 1 > 1
-    assert len(guide.guided.wells) == len(bar.wells)
+    assert len(guide.shape.wells) == len(bar.wells)
     turn = np.array([[1, 0, 0], [0, 0.8, -0.6], [0, 0.6, 0.8]])
     for turned in (legs, guide.legs(nodes @ turn.T, np.tile(turn, (len(nodes), 1, 1)))):
         for leg in turned:
@@ -79,18 +79,18 @@ def test_joints_turn_by_the_bodys_rotation_alone() -> None:
 
 def test_a_bar_gives_way_at_its_wells() -> None:
     """Ends that are pulled and do not turn, and ends that turn: the same on average, more in the wells."""
-    guided = of_window("alpha4").guided
+    shape = of_window("alpha4").shape
     s = np.linspace(0, 30, 1201)
     between = (s > 2.5) & (s < 27.5)
     along = np.where(between, 0.02, 0.0)
     pulled = Centreline(
         s, np.column_stack([0 * s, 0 * s, s + np.cumsum(along) * s[1]]), np.tile([0, 1.0, 0], (1201, 1))
     )
-    assert (kinks(guided, pulled) > 0.02).all()
-    found = notched(guided, pulled)
+    assert (kinks(shape, pulled) > 0.02).all()
+    found = notched(shape, pulled)
     assert found.points[-1, 2] == pytest.approx(pulled.points[-1, 2], abs=0.02)
     np.testing.assert_allclose(found.normals[-1], [0, 1, 0], atol=0.01)
-    bare = Guided(1.5, 1.5, (), 1.0, 0.65, guided.junctions)
+    bare = WaveguideShape(1.5, 1.5, (), 1.0, 0.65, shape.junctions)
     np.testing.assert_allclose(notched(bare, pulled).curvature, 0, atol=1e-9)
 
 
@@ -100,15 +100,15 @@ def test_how_far_wells_open_against_plane_elasticity(pull: float, turn: float) -
 
     Beam theory leaves out that force lines crowd at a well's corners.
     """
-    wells = of_window("alpha4").guided.wells
+    wells = of_window("alpha4").shape.wells
     exact = _openings(25.0, [w - 2.5 for w in wells], pull, turn)
     s = np.linspace(0, 30, 1201)
     steps = (1 + np.where((s > 2.5) & (s < 27.5), pull / 25, 0.0)) * s[1]
     angle = np.clip((s - 2.5) / 25, 0, 1) * -turn
     points = np.column_stack([0 * s, -np.cumsum(np.sin(angle) * steps), np.cumsum(np.cos(angle) * steps)])
     line = Centreline(s, points, np.column_stack([0 * s, np.cos(angle), np.sin(angle)]))
-    guided = of_window("alpha4").guided
-    found = notched(guided, line)
+    shape = of_window("alpha4").shape
+    found = notched(shape, line)
     told = np.interp(wells, found.s, found.stretch - 1) + 0.75 * np.interp(wells, found.s, found.curvature)
     np.testing.assert_allclose(told / exact, 0.84, atol=0.07)
     # Sections that stay as they are along the bar would open them by a third of that or less.

@@ -33,7 +33,7 @@ def test_the_signal_of_states_of_a_mesh() -> None:
     mesh = body(UNIT)
     bent = bent_to_a_circle(mesh.nodes, np.radians(20) / 75, y=25.0) - mesh.nodes
     found = signal_of_states(UNIT, window(UNIT, "alpha4"), mesh, [0 * bent, bent], Optics(), LAW)
-    guide = of_window("alpha4").guided
+    guide = of_window("alpha4").shape
     # Bent toward +y the wells' face is the inner one.
     expected = -4.0 * len(guide.wells) * np.radians(20) / 75
     assert np.log(found.transmitted[1] / found.at_rest) == pytest.approx(-expected, rel=0.02)
@@ -65,7 +65,7 @@ def test_rays_in_place_of_the_law() -> None:
     inward, outward = traced_signal(bar, moved, Optics(), rays=30_000).delta
     assert inward < -0.08
     assert outward > 0.08
-    signed = [features(bar.guided, bar.legs(*state))[FEATURES.index("curvature_of_wells")] for state in moved]
+    signed = [features(bar.shape, bar.legs(*state))[FEATURES.index("curvature_of_wells")] for state in moved]
     assert signed == pytest.approx([-0.012 * 6, 0.012 * 6], rel=1e-2)
 
 
@@ -78,7 +78,7 @@ def test_a_response_is_told_about_rest_wherever_that_is() -> None:
     assert hung.monotonic_deg == (25.0, 65.0)
     assert hung.span == drawn.span
     np.testing.assert_array_equal(hung.delta, drawn.delta)
-    with pytest.raises(InputError, match="not seen at rest"):
+    with pytest.raises(InputError, match="state at rest is missing"):
         response(angle + 45.0, light)
 
 
@@ -90,7 +90,7 @@ def test_figures_of_a_response() -> None:
     assert found.span == pytest.approx(0.6)
     folded = response(angle, np.array([0.8, 0.7, 0.9, 1.0, 1.1, 1.2, 1.1]))
     assert folded.monotonic_deg == (-20, 20)
-    with pytest.raises(InputError, match="not seen at rest"):
+    with pytest.raises(InputError, match="state at rest is missing"):
         response(angle[:3], np.ones(3))
     with pytest.raises(InputError, match="does not bend"):
         response(np.zeros(3), np.ones(3))

@@ -126,5 +126,5 @@ def test_bad_input_is_named() -> None:
         swept(arc(20, 0), 1.5, 1.5, wells=[5, 5.5])
     with pytest.raises(InputError, match="wells overlap"):
         swept(arc(20, 0), 1.5, 1.5, wells=[0.2])
-    with pytest.raises(InputError, match="no resin"):
+    with pytest.raises(InputError, match="not physical"):
         Optics(index=0.5)

@@ -56,7 +56,7 @@ def test_design_in_a_body(files, capsys):
     ("words", "said"),
     [
         (["--body", "none.stl"], "no body can be read from it"),
-        (["--body", "unit.toml"], "a body is not read from .toml"),
+        (["--body", "unit.toml"], "the file type .toml is not supported for a body"),
     ],
 )
 def test_files_without_a_body_end_with_what_to_do(files, words, said, capsys):

@@ -86,7 +86,7 @@ def test_measured_data_with_a_sweep_held_out(tmp_path: Path, capsys: pytest.Capt
         )
     (tmp_path / "experiments.toml").write_text("\n".join(blocks))
     assert run("calibrate", tmp_path, "--out", tmp_path / "out") == 0
-    assert "sweep 4, never fitted" in capsys.readouterr().out
+    assert "sweep 4, held out" in capsys.readouterr().out
     (check,) = json.loads((tmp_path / "out" / "summary.json").read_text())["held_out"]
     assert check["rms_deg"] < 1.5
     assert 0.9 < check["within"] <= 1.0
@@ -95,10 +95,10 @@ def test_measured_data_with_a_sweep_held_out(tmp_path: Path, capsys: pytest.Capt
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ([], "2 channels are there"),
-        (["--channel", "lihgt_V"], "no channel lihgt_V"),
-        (["--channel", "light_V", "--dark", "drak_V"], "no channel drak_V"),
-        (["--channel", "light_V"], "nothing says at which angle"),
+        ([], "2 channels are available"),
+        (["--channel", "lihgt_V"], "unknown channel lihgt_V"),
+        (["--channel", "light_V", "--dark", "drak_V"], "unknown channel drak_V"),
+        (["--channel", "light_V"], "has no reference angles"),
         (["--channel", "light_V", "--angles", "nowhere.csv"], "cannot read nowhere.csv"),
     ],
 )

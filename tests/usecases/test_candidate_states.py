@@ -4,7 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
-from mu_addon.design.anchors import anchors, windows
+from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
@@ -13,7 +13,7 @@ from mu_addon.fem.trajectory import simulate
 from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.placement.candidates import candidates
+from mu_addon.placement.candidates import candidate_paths
 from mu_addon.run.cache import Cache
 from mu_addon.usecases.simulate_and_place.candidate_states import CandidateSolver
 from mu_addon.usecases.simulate_and_place.job import Job
@@ -28,7 +28,7 @@ JOB = Job(
     stations=21,
     workers=1,
 )
-JOBS = [(c, "volume_fraction") for c in candidates(anchors(UNIT), windows(6))[::3]]
+JOBS = [(c, "volume_fraction") for c in candidate_paths(anchor_points(UNIT), windows(6))[::3]]
 
 
 @pytest.fixture(scope="module")

@@ -43,7 +43,7 @@ def test_a_part_that_can_be_printed(tmp_path, capsys):
     assert ways[0, 0, -1]["cup_ml"] == pytest.approx(1.0, rel=0.1)
     assert found["orientation"][0]["cup_ml"] < 0.25
     report = (out / "report.html").read_text()
-    assert "It can be printed" in report
+    assert "<strong>Printable" in report
     assert json.loads((out / "summary.json").read_text())["status"] == "complete"
     assert '"type": "result"' in capsys.readouterr().out.splitlines()[-1].replace('"type":"', '"type": "')
 
@@ -56,7 +56,7 @@ def test_a_part_that_must_not_be_printed_ends_with_status_6(tmp_path):
     assert summary["verdict"] == "error"
     assert "open edges" in summary["reason"]["what"]
     # What was found is told all the same.
-    assert "Do not print it" in (out / "report.html").read_text()
+    assert "Not printable" in (out / "report.html").read_text()
 
 
 @pytest.mark.parametrize(

@@ -78,7 +78,7 @@ def test_it_leaves_a_table_and_a_report(tmp_path):
     # Weighed, the two are no longer one.
     assert not {"overcure", "skin_cure"} <= {n for pair in context.summary["alike"] for n in pair[:2]}
     assert any(
-        line.startswith("overcure: visible from offset 0.0") for line in console_summary(context.summary)
+        line.startswith("overcure: detectable from offset 0.0") for line in console_summary(context.summary)
     )
     assert (tmp_path / "out" / "limits.csv").read_text().startswith("effect,parameter,unit,visible_from")
     assert "would show" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
@@ -86,5 +86,5 @@ def test_it_leaves_a_table_and_a_report(tmp_path):
 
 @pytest.mark.parametrize("word", ["angle", "angle=", "angle=-1", "loudness=3", "angle=nan"])
 def test_noise_that_is_none_is_refused(word):
-    with pytest.raises(InputError, match="is no noise"):
+    with pytest.raises(InputError, match="is not a noise level"):
         noise_of([word])

@@ -79,9 +79,9 @@ def test_the_model_predicts_what_was_measured_and_the_table_holds_both(overcured
 def test_the_report_says_it_in_a_sentence_and_needs_no_server(overcured):
     html = (overcured[1] / "report.html").read_text(encoding="utf-8")
     assert "Verdict: <strong>overcure</strong>" in html
-    assert "Light cures resin beyond the drawn surface: every part is thicker; offset 0.0" in html
-    assert "What to measure next." in html
-    for title in ("Measured and predicted", "Other explanations", "What mending it gains", "Noise"):
+    assert "Light cures resin beyond the nominal surface, so every part is thicker; offset 0.0" in html
+    assert "Next measurement." in html
+    for title in ("Measured and predicted", "Rival explanations", "Error reduction", "Noise"):
         assert f">{title}</h2>" in html
     # A panel a channel of three blocks, rivals, gain, dependence, and what is left against two conditions.
     assert html.count("<figure") >= 6 + 3
@@ -120,7 +120,7 @@ def test_the_same_data_are_not_judged_twice(overcured, tmp_path, monkeypatch):
     assert console_summary(context.summary) == console_summary(summary)
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["status"] == "complete"
     assert [m["stage"] for m in told if m["type"] == "progress" and m["state"] == "end"] == [
-        "verdict of the same data, kept"
+        "verdict of the same data, from the cache"
     ]
     # A result that is gone is made again.
     (tmp_path / "out" / "report.html").unlink()
@@ -142,8 +142,8 @@ def test_nothing_is_named_where_nothing_is_wrong(tmp_path):
     assert context.summary["verdict"] == "none"
     assert load_model(tmp_path / "out" / "model.toml").effects == {}
     html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "Verdict: <strong>nothing wrong</strong>" in html
-    assert ">What mending it gains</h2>" not in html
+    assert "Verdict: <strong>no model error detected</strong>" in html
+    assert ">Error reduction</h2>" not in html
 
 
 def test_three_moduli_of_the_paper_are_not_enough_to_tell(tmp_path):

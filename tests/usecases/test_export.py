@@ -176,10 +176,10 @@ def test_a_package_comes_back_as_it_was_written():
     [
         ('unit="millimeter"', 'unit="inch"', "its unit is inch"),
         ('v3="2"', 'v3="99"', "vertex is missing"),
-        ('v1="0" v2="1" v3="3"', 'v1="1" v2="1" v3="3"', "a vertex twice"),
+        ('v1="0" v2="1" v3="3"', 'v1="1" v2="1" v3="3"', "a repeated vertex"),
         ("/core/2015/02", "/core/1999/02", "another namespace"),
-        ('<item objectid="1"/>', "", "nothing is to be built"),
-        ("</model>", "", "no 3MF package"),
+        ('<item objectid="1"/>', "", "the build list is empty"),
+        ("</model>", "", "not a 3MF package"),
     ],
 )
 def test_a_package_that_breaks_a_rule_is_refused(old, new, words):

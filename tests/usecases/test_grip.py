@@ -160,7 +160,7 @@ def test_the_printable_part_from_the_command_line(tmp_path, capsys):
     ("options", "words"),
     [
         (["--preset", "gripper", "--cube", "40"], "does not fit"),
-        (["--preset", "mu-1.0x"], "no gripper"),
+        (["--preset", "mu-1.0x"], "not a gripper"),
         (["--preset", "gripper", "--friction", "-1"], "friction coefficient of -1"),
         (["--preset", "gripper", "--cube", "25", "25"], "same side"),
     ],

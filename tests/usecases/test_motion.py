@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 from PIL import Image
 from scipy.spatial import KDTree
 
-from mu_addon.design.anchors import anchors, windows
+from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem.equilibrium import Equilibrium
@@ -24,7 +24,7 @@ from mu_addon.files import write_npz
 from mu_addon.meshing.mesh import mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.placement.candidates import Candidate, candidates, roi, with_sensor
+from mu_addon.placement.candidates import Candidate, candidate_paths, roi, with_sensor
 from mu_addon.placement.whole import whole_body
 from mu_addon.report.pc2 import read_pc2, write_pc2
 from mu_addon.run.cache import Cache
@@ -55,7 +55,7 @@ JOB = Job(
     stations=21,
     workers=1,
 )
-PATHS = candidates(anchors(UNIT), windows(6))[::4]
+PATHS = candidate_paths(anchor_points(UNIT), windows(6))[::4]
 JOBS = [(path, rule) for rule in ("intersect", "volume_fraction") for path in PATHS]
 
 
@@ -139,7 +139,7 @@ def test_a_whole_mesh_cannot_be_cut_open(study, tmp_path):
 def test_a_paths_motion_is_what_its_deviation_was_found_from(study, motion):
     _, mesh, trajectory, sweep, _ = study
     assert motion.paths == tuple(c.name for c, rule in JOBS if rule == "volume_fraction")
-    monitor = probe(mesh, anchors(UNIT))
+    monitor = probe(mesh, anchor_points(UNIT))
     name = motion.paths[-1]
     job = next(i for i, (c, rule) in enumerate(JOBS) if (c.name, rule) == (name, "volume_fraction"))
     moved = motion.displacement(name)
@@ -147,7 +147,7 @@ def test_a_paths_motion_is_what_its_deviation_was_found_from(study, motion):
         if round(state.pressure_MPa * 1e3, 9) not in np.round(sweep.solved_kPa, 9):
             continue
         kept = sweep._cache.get("sweep", sweep._name(state))["moved_mm"][job]
-        assert np.allclose(anchors(UNIT) + monitor.displacement(moved[number]), kept, atol=1e-5)
+        assert np.allclose(anchor_points(UNIT) + monitor.displacement(moved[number]), kept, atol=1e-5)
         apart = np.linalg.norm(moved[number] - motion.model_a[number], axis=1)
         assert apart.max() > 1e-3
     with pytest.raises(InputError, match="no motion of alpha99"):
@@ -185,7 +185,7 @@ def test_a_path_off_the_mirror_plane_moves_both_sides_apart(study, tmp_path):
     """Solved on the whole body, shown by its half and the half's image: both are where the whole body is."""
     _, mesh, trajectory, *_ = study
     whole, there = whole_body(mesh, trajectory)
-    aside = Candidate("aside", 0, anchors(UNIT)[:4] + np.array([0.9 * UNIT.dimensions.cell, 0.0, 0.0]))
+    aside = Candidate("aside", 0, anchor_points(UNIT)[:4] + np.array([0.9 * UNIT.dimensions.cell, 0.0, 0.0]))
     write_model_a(tmp_path, mesh, materials_of(UNIT, mesh), trajectory)
     sweep, _ = swept(tmp_path, mesh, whole, there, [(aside, "volume_fraction")])
     found = read_motion(tmp_path)
@@ -240,7 +240,7 @@ def test_a_map_of_elements_becomes_one_of_nodes(motion):
 
 
 def test_what_is_missing_is_said(study, tmp_path):
-    with pytest.raises(InputError, match="holds no motion"):
+    with pytest.raises(InputError, match="contains no motion"):
         read_motion(tmp_path)
     (tmp_path / "motion").mkdir()
     for name in ("mesh.npz", "model_a.npz"):
@@ -253,14 +253,14 @@ def test_what_is_missing_is_said(study, tmp_path):
         ("state", stored["state"] + 9),
     ):
         write_npz(tmp_path / "motion" / "model_a.npz", stored | {name: wrong})
-        with pytest.raises(InputError, match="do not fit together"):
+        with pytest.raises(InputError, match="are inconsistent"):
             read_motion(tmp_path)
     write_npz(tmp_path / "motion" / "model_a.npz", {n: a for n, a in stored.items() if n != "state_kPa"})
     with pytest.raises(InputError, match="lacks 'state_kPa'"):
         read_motion(tmp_path)
     damaged = (tmp_path / "motion" / "model_a.npz").read_bytes()
     (tmp_path / "motion" / "model_a.npz").write_bytes(damaged[: len(damaged) // 2])
-    with pytest.raises(InputError, match="holds no motion"):
+    with pytest.raises(InputError, match="contains no motion"):
         read_motion(tmp_path)
 
 
@@ -272,7 +272,7 @@ def test_point_caches_come_back(tmp_path_factory, positions):
     assert np.array_equal(found, positions)
     assert (start, step) == (0.5, 0.25)
     path.write_bytes(path.read_bytes()[:-4])
-    with pytest.raises(InputError, match="not a whole point cache"):
+    with pytest.raises(InputError, match="not a complete point cache"):
         read_pc2(path)
 
 

@@ -52,7 +52,7 @@ def test_bodies_survive_their_file(tmp_path):
     assert [f.body.hash for f in found] == [g.body.hash for g in given]
     assert mirrored(given[:1])
     assert not mirrored(given)
-    with pytest.raises(InputError, match="not a coefficient an obstacle"):
+    with pytest.raises(InputError, match="not one coefficient per obstacle"):
         read_rigid_bodies(tmp_path / "o.obj", [0.25])
     (tmp_path / "o.obj").write_text("o 1 x\nv 0 0 zero\n")
     with pytest.raises(InputError, match="cannot be read"):
@@ -68,7 +68,7 @@ def test_one_off_the_middle_plane_asks_for_the_whole_unit():
     assert beside.mesh_settings(attrs.evolve(job.mesh, fraction="quarter")).fraction == "half"
     off = attrs.evolve(job, obstacles=[RigidBody(block((1, 40, 0), (20, 50, 30)))])
     assert off.mesh_settings(job.mesh).fraction == "full"
-    with pytest.raises(InputError, match="touches nothing"):
+    with pytest.raises(InputError, match="does not support obstacles"):
         attrs.evolve(beside, stages=("design", "simulate", "place"), paths="graph")
 
 
@@ -123,7 +123,7 @@ def test_a_unit_that_meets_a_wall(files, capsys):
     summary = json.loads((out / "summary.json").read_text())
     assert summary["contact"]["1 wall.stl"]["friction"] == 0.3
     assert summary["contact"]["1 wall.stl"]["at_kPa"] == 40
-    assert "What the unit touches" in (out / "report.html").read_text()
+    assert "Contact with obstacles" in (out / "report.html").read_text()
 
     # Again from the cache: the same to the last digit, also where the last instant is missing.
     before = (out / "contact.csv").read_text()
@@ -137,7 +137,7 @@ def test_a_unit_that_meets_a_wall(files, capsys):
     ("words", "said"),
     [
         (["--obstacle", "none.stl"], "no body can be read from it"),
-        (["--obstacle", "inside.stl"], "it stands in the unit, up to"),
+        (["--obstacle", "inside.stl"], "it overlaps the unit by up to"),
         (["--obstacle", "wall.stl", "--friction", "-1"], "a friction coefficient of -1"),
     ],
 )

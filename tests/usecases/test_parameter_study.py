@@ -27,7 +27,9 @@ from mu_addon.usecases.parameter_study.run import sweep
 pytest.importorskip("distributed", reason="sweeps are an extra")
 
 ROOT = Path(__file__).resolve().parents[2]
-FAKE = str(Path(__file__).with_name("fake_worker.py"))
+FAKE = str(Path(__file__).resolve().parents[1] / "run" / "fake_worker.py")
+# No measure of speed: what hangs must end some time.
+PATIENCE_S = 1800.0
 TEXT = """
 format = 1
 preset = "mu-1.0x"
@@ -157,7 +159,7 @@ def task(how, **limits):
     ("how", "limits", "words"),
     [
         ("crash", {}, "SIGSEGV"),
-        ("wordless", {}, "without a word"),
+        ("wordless", {}, "without a message"),
         ("told_error", {}, "no equilibrium"),
         ("hang", {"minutes": 0.01}, "longer than the 0.01 minutes"),
         ("hungry", {"memory_MB": 200}, "more than the 200 MB"),
@@ -194,6 +196,7 @@ from mu_addon.run.child import Child
 child = Child([sys.executable, {FAKE!r}, "orphan"], Path(sys.argv[1]), os.environ, ends_with_parent=True)
 while not child.progress:
     child.poll()
+    assert child.state == "running", child.error
     time.sleep(0.02)
 print(child.progress["stage"], flush=True)
 time.sleep(600)
@@ -207,7 +210,7 @@ time.sleep(600)
     study = int(worker.stdout.readline())
     worker.kill()
     worker.wait()
-    end = time.monotonic() + 20
+    end = time.monotonic() + PATIENCE_S
     while _alive(study):
         assert time.monotonic() < end
         time.sleep(0.05)
@@ -226,12 +229,12 @@ def test_child_runs_of_the_command_line_end_with_their_parent_and_tell_their_err
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-m", "mu_addon.cli", "resume", str(tmp_path), "--json", "--no-report"]
     child = Child(command, tmp_path / "words", environment, ends_with_parent=True)
-    end = time.monotonic() + 60
+    end = time.monotonic() + PATIENCE_S
     while child.state == RUNNING:
         assert time.monotonic() < end
         child.poll()
         time.sleep(0.05)
-    assert "no study in this folder" in child.error["what"]
+    assert "this folder contains no study" in child.error["what"]
     assert child.error["status"] == 2
 
 
@@ -285,7 +288,7 @@ class Farm:
             "--host",
             "127.0.0.1",
             "--death-timeout",
-            "60",
+            "3600",
         )
         return self._start("worker", self.address, *words)
 

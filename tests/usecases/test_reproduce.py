@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 import pytest
 
-from mu_addon.design.anchors import anchors, windows
+from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.parameters import Unit
 from mu_addon.errors import InputError
 from mu_addon.fem.equilibrium import Equilibrium
@@ -18,7 +18,7 @@ from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.mesh import LATTICE, TET_FACES
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.placement.candidates import candidates, evaluate
+from mu_addon.placement.candidates import candidate_paths, evaluate
 from mu_addon.placement.inclusion import RULES
 from mu_addon.run.pool import each
 from mu_addon.usecases.reproduce import open_study, scatter
@@ -65,18 +65,21 @@ def test_the_papers_own_figures():
 
 def test_the_papers_statements_in_its_own_table():
     found = verdicts({name: J for name, J in PAPER.J_hat.items() if name != GRIPPER})
-    distal, longer = "of one length, the distal path disturbs least", "a longer path disturbs more"
+    distal, longer = (
+        "of paths of equal length, the distal one deviates least",
+        "a path deviates more than any path contained in it",
+    )
     assert found[f"0.75x: {distal}"] == found[f"1.0x: {distal}"] == HELD
     assert found[f"1.5x: {distal}"] == NOT_HELD  # alpha2 is its optimum
     assert all(v == HELD for text, v in found.items() if longer in text)
-    assert found["1.5x disturbs less than 0.75x"] == found["1.5x disturbs less than 1.0x"] == HELD
+    assert found["1.5x deviates less than 0.75x"] == found["1.5x deviates less than 1.0x"] == HELD
 
 
 def test_a_difference_that_the_mesh_turns_round_cannot_be_told():
     fine, coarse = PAPER.column(1.0).copy(), PAPER.column(1.0).copy()
     coarse[3] = coarse[2] + 0.01  # alpha4 above alpha3 on the other mesh
     found = verdicts({"1.0x": fine}, {"1.0x": coarse})
-    assert found["1.0x: of one length, the distal path disturbs least"] == CANNOT_TELL
+    assert found["1.0x: of paths of equal length, the distal one deviates least"] == CANNOT_TELL
     assert agreement(fine, fine, PAPER.paths, coarse).tied == ("alpha1", "alpha3")
     # A mesh that makes all larger alike changes no order.
     assert agreement(fine, fine, PAPER.paths, 1.5 * fine).tied == ()
@@ -312,7 +315,7 @@ def test_what_is_held_does_not_move_and_its_paths_disturb_nothing():
     free = motion(unit, mesh_unit(unit, COARSE), (40.0,), look_for_contact=False)
     assert 0 < moved.angle_at(40.0) < 0.7 * free.angle_at(40.0)
     J = paths(unit, mesh, moved, ("volume_fraction",), (40.0,)).J_hat(
-        "volume_fraction", anchors(unit), np.array([0.0, 40.0])
+        "volume_fraction", anchor_points(unit), np.array([0.0, 40.0])
     )
     # alpha1 ends at the third anchor, 31.25 mm above the base.
     assert J[0] < 0.05 * J[3]
@@ -323,9 +326,9 @@ def test_paths_side_by_side_are_each_path_alone():
     mesh = mesh_unit(unit, COARSE)
     pressures = (-20.0, 20.0, 40.0)
     moved = motion(unit, mesh, pressures)
-    points = anchors(unit)
+    points = anchor_points(unit)
     found = paths(unit, mesh, moved, ("volume_fraction",), pressures)
-    (path, *_) = candidates(points, windows(6))
+    (path, *_) = candidate_paths(points, windows(6))
     model, materials = Model(mesh, threads=1), materials_of(unit, mesh)
     baseline = simulate(Equilibrium(model, materials), np.arange(3.0), np.array(pressures))
     alone = evaluate(
@@ -345,7 +348,7 @@ def test_the_table_hardly_depends_on_the_pressures_that_are_left_out():
     moved = motion(unit, mesh, every)
     J = [
         paths(unit, mesh, moved, ("volume_fraction",), solved).J_hat(
-            "volume_fraction", anchors(unit), samples
+            "volume_fraction", anchor_points(unit), samples
         )
         for solved in ((-20.0, 20.0, 40.0), every)
     ]
@@ -383,7 +386,7 @@ def test_the_page_of_the_papers_own_table_agrees_with_it():
     page = report(found)
     for part in ("table", "deviation", "statements", "bending", "meshes", "open", "sampling", "versions"):
         assert f'<section id="{part}"' in page
-    assert page.count("1.00 (wanted") == 4
+    assert page.count("1.00 (goal") == 4
     assert "4 of 4" in page  # chosen paths
     words = re.sub(r'src="[^"]*"', "", page)
     assert "nan" not in re.sub(r"<style>.*</style>", "", words, flags=re.DOTALL)
@@ -400,7 +403,7 @@ def test_the_page_says_what_is_missing_and_what_is_wrong():
         first.fine, angle_deg=angle, crossing_kPa=np.array([-15.2, np.nan]), stopped="limit point at 47 kPa"
     )
     page = report(shown(columns=(attrs.evolve(first, fine=bad), *others), others={}, drawn=(), points=()))
-    assert "from -15.2 kPa on walls pass through each other" in page
+    assert "from -15.2 kPa on, walls intersect" in page
     assert "the range of bending was not reached: limit point at 47 kPa" in page
     assert "gripper&#x27;s column is not part" in page
     assert '<section id="meshes"' not in page

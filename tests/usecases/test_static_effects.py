@@ -24,7 +24,7 @@ from mu_addon.fem.time_stepping import simulate_in_time
 from mu_addon.fem.trajectory import simulate
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
-from mu_addon.placement.candidates import candidates, evaluate
+from mu_addon.placement.candidates import candidate_paths, evaluate
 from mu_addon.run.context import run_to_end
 from mu_addon.run.folder import keep_inputs
 from mu_addon.run.progress import Progress
@@ -199,7 +199,7 @@ def test_sensor_paths_are_ranked_in_the_unit_that_has_the_effect(placed, name, m
     trajectory, _ = moved(job, mesh)
     monitored, d = (points, probe(mesh, points)), UNIT.dimensions
     sensor = UNIT.material.sensor_modulus_kPa / 1e3
-    for candidate in candidates(points, windows)[::4]:
+    for candidate in candidate_paths(points, windows)[::4]:
         alone = evaluate(
             job.model(mesh), job.materials(mesh), trajectory, monitored, candidate, "volume_fraction",
             d.inclusion_radius, sensor, JOB.stations,
@@ -271,7 +271,12 @@ GRAVITY = "[simulate.effects.gravity]\ndensity_kg_m3 = 1300.0\n"
     [
         ("gravity", "magnetism", "no effect 'magnetism' is known", "known: gravity, strain"),
         ("gravity", "gravitty", "did you mean 'gravity'", "known: gravity"),
-        ("gravity", "viscoelasticity", "not one that a simulation of the unit can have", "known: gravity"),
+        (
+            "gravity",
+            "viscoelasticity",
+            "not an effect that a simulation of the unit can contain",
+            "known: gravity",
+        ),
         ("density", "mass", "gravity has density_kg_m3, not mass_kg_m3", "write density_kg_m3"),
         ("1300.0", "-5.0", "density_kg_m3 = -5.0 is out of bounds", "give 0 to 4000 kg/m3"),
         ("1300.0", "inf", "out of bounds", "give 0 to 4000"),
@@ -294,7 +299,7 @@ def test_effects_that_are_none_are_refused_with_place_and_remedy(tmp_path, old, 
 
 @pytest.mark.parametrize("turn", ["sideways", True, float("nan"), 400.0])
 def test_a_direction_that_is_none_is_refused(turn):
-    with pytest.raises(InputError, match="no direction of gravity"):
+    with pytest.raises(InputError, match="not a valid orientation"):
         StaticEffects(named(gravity=1000.0), turn)
 
 
@@ -347,7 +352,7 @@ def test_homogenize_says_that_it_knows_no_whole_unit(tmp_path):
     path = model_file(tmp_path / "model.toml", gravity=1300.0)
     unit, summary, (warned,) = given(modelled_unit, "homogenize", "--model", path)
     assert unit == UNIT
-    assert "1300 kg/m³: only `simulate` and `place` know the unit as a whole" in warned
+    assert "1300 kg/m³: only `simulate` and `place` simulate the whole unit" in warned
     assert summary["model"]["applied"] == ()
 
 
@@ -361,10 +366,10 @@ def test_what_has_no_place_in_a_static_simulation_is_left_out_and_says_why():
     found = extend(UNIT, ExtendedModel("ambiguous", effects, {}))
     assert found.unit == UNIT
     assert found.effects.sizes == {"gravity": 1100.0}
-    assert found.applied == ("solid parts weigh 1100 kg/m³",)
+    assert found.applied == ("solid parts have a density of 1100 kg/m³",)
     ambiguous, leak, contact, finer = found.left_out
     assert "ambiguous" in ambiguous
-    assert "time, gauge or bench" in leak
+    assert "time, gauge or test bench" in leak
     assert "--obstacle" in contact
     assert "--refine" in finer
     # What a file keeps of it says as much of gravity, and nothing of the rest.

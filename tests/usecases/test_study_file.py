@@ -11,10 +11,11 @@ import pytest
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
+from mu_addon.fem.solver import SolverChoice
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import Limits
 from mu_addon.run.folder import keep_inputs
-from mu_addon.usecases.simulate_and_place.job import Job, read_job
+from mu_addon.usecases.simulate_and_place.job import Job, grasp, read_job
 from mu_addon.usecases.simulate_and_place.study_file import FORMAT, STAGES, compose, parse, read
 
 from ..homogenize.lattice_laws import body_centred
@@ -66,7 +67,7 @@ def test_a_study_of_format_1_is_understood_and_brought_up_to_date(tmp_path):
     assert same(read_job(folder), job)
     # Its protocol is known by its digest from now on.
     (folder / "protocol.csv").write_text("time_s,pressure_kPa\n0,0\n1,5\n")
-    with pytest.raises(InputError, match="not the one that this study was made with"):
+    with pytest.raises(InputError, match="has changed since this study was made"):
         read_job(folder)
 
 
@@ -127,18 +128,18 @@ GOOD = compose(JOB.tables())
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("a = " + "[" * 100_000, "no study|not TOML"),
+        ("a = " + "[" * 100_000, "too long for a study|not TOML"),
         ("a = " + "[" * 50_000, "not TOML"),
         ("# x\n" * 100_000, "100000 characters"),
         ("format = 3\n[design]\n", "format 3"),
         ("format = true\n[design]\n", "format True"),
-        ("format = 2\n", "are no study"),
-        ("format = 2\n[simulate]\n", "are no study"),
+        ("format = 2\n", "are not those of a study"),
+        ("format = 2\n[simulate]\n", "are not those of a study"),
         ("format = 2\ndesign = 3\n", "not a table"),
         ('format = 2\n[design]\nunit = "../../unit.toml"\n', "not in the folder"),
         (GOOD.replace('"unit.toml"', '"/etc/passwd"'), "not in the folder"),
         (GOOD.replace('"effective.toml"', '"effective.toml\\u0000"'), "not in the folder"),
-        (GOOD.replace("times = 3", 'times = "__import__(\\"os\\")"'), "no study"),
+        (GOOD.replace("times = 3", 'times = "__import__(\\"os\\")"'), "study.toml is invalid"),
         (GOOD.replace("times = 3", "times = 3\nhook = 1"), "unknown key 'hook'"),
         (GOOD.replace("times = 3", "times = 1000000000"), "1000000000"),
         (GOOD.replace('"gmsh"', '"sh -c true"'), "not offered"),
@@ -146,7 +147,7 @@ GOOD = compose(JOB.tables())
         (GOOD.replace('["intersect"]', "[{}]"), "rules"),
         (GOOD.replace("refine = 0.4", "refine = nan"), "refine"),
         (GOOD.replace("refine = 0.4", "refine = 0.4\nhook = 1"), "hook"),
-        (GOOD.replace("mesh_check = false", "mesh_check = []"), "no study"),
+        (GOOD.replace("mesh_check = false", "mesh_check = []"), "study.toml is invalid"),
     ],
 )  # fmt: skip
 def test_a_hostile_study_is_refused_in_words(tmp_path, text, words):
@@ -164,7 +165,7 @@ def test_bytes_that_are_no_text_are_refused(tmp_path):
 
 def test_a_folder_without_a_study_is_none(tmp_path):
     assert read(tmp_path) is None
-    with pytest.raises(InputError, match="no study in this folder"):
+    with pytest.raises(InputError, match="this folder contains no study"):
         read_job(tmp_path)
 
 
@@ -172,3 +173,15 @@ def test_what_is_composed_is_parsed(tmp_path):
     tables = JOB.tables()
     found, outdated = parse(compose(tables), tmp_path)
     assert (found, outdated) == (tables, False)
+
+
+def test_the_solver_is_no_part_of_a_studys_inputs():
+    plain = Job(unit=load_preset("mu-1.0x"), protocol=grasp())
+    chosen = attrs.evolve(plain, solver=SolverChoice("direct", "cpu"))
+    assert chosen.text() == plain.text()
+    with pytest.raises(InputError, match="one factor"):
+        attrs.evolve(plain, solver=SolverChoice("iterative"))
+    motion = attrs.evolve(plain, stages=("design", "simulate"))
+    assert attrs.evolve(motion, solver=SolverChoice("iterative")).text() == motion.text()
+    with pytest.raises(InputError, match="quadratic elements"):
+        attrs.evolve(motion, mesh=MeshSettings(order=1), solver=SolverChoice("iterative"))

@@ -73,10 +73,15 @@ def test_a_description_is_read(tmp_path):
         ('camera = "-x"', 'camera = "-x', "not TOML", "line 2"),
         ("fps = 25", "fsp = 25", "did you mean 'fps'", "line 7"),
         ("fps = 25", 'fps = "fast"', "fps = 'fast' is not a number", "line 7"),
-        ('tip = ["left", "right"]', 'tip = "left"', "tip = 'left' is not two names", "line 4"),
+        ('tip = ["left", "right"]', 'tip = "left"', "tip = 'left' is not a pair of names", "line 4"),
         ('base = ["low", "high"]', "", "the base is not named", "bench.toml"),
         ("place_mm = [15, 0.0]", "", "marker 'high' of the base has no place_mm", "bench.toml"),
-        ("pixel = [1, 2]", "pixel = [1]", r"pixel = \[1\] of marker 'left' is not two numbers", "bench.toml"),
+        (
+            "pixel = [1, 2]",
+            "pixel = [1]",
+            r"pixel = \[1\] of marker 'left' is not a pair of numbers",
+            "bench.toml",
+        ),
         ("pixel = [1, 2]", "colour = 3", "unknown key 'colour'", "bench.toml"),
         ('name = "left"', 'name = "low"', "a marker is named 'low'", "bench.toml"),
         ('marks = "dots"', 'marks = "stars"', "marks = 'stars' is not known", "line 9"),
@@ -125,14 +130,14 @@ def test_lost_markers_leave_empty_rows_that_diagnose_may_read(tmp_path):
 
 def test_never_at_rest_is_told():
     found = filmed(clip(20, 2.0), Bench(VIEW, Marks({}), starts_s=2.0), PRESSURE)
-    assert "no frame shows the unit at rest; the angle counts from 20 kPa at 2 s" in found.remarks[0].what
+    assert "no frame shows the unit at rest; the angle is relative to 20 kPa at 2 s" in found.remarks[0].what
     assert found.motion.angle_deg[0] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_clip_without_a_clock_and_one_at_another_time():
-    with pytest.raises(InputError, match="does not say how many frames"):
+    with pytest.raises(InputError, match="has no frame rate"):
         filmed(attrs.evolve(clip(), fps=0.0), Bench(VIEW, Marks({})), PRESSURE)
-    with pytest.raises(InputError, match=r"from 100 to 104\.9 s, the pressure's record from 0 to 5 s"):
+    with pytest.raises(InputError, match=r"from 100 to 104\.9 s, the pressure record from 0 to 5 s"):
         filmed(clip(), Bench(VIEW, Marks({}), starts_s=100.0), PRESSURE)
 
 
@@ -147,7 +152,7 @@ def test_clips_share_a_folder_and_a_name_is_taken_once(tmp_path):
     write_experiment(later, bench, "one", tmp_path)  # made anew
     assert (tmp_path / "experiments.toml").read_text() == text
     assert {e.name: len(e) for e in read_folder(tmp_path).experiments} == {"one": 40, "two": 40}
-    with pytest.raises(InputError, match=r"an experiment named 'one', in one\.csv, is there already"):
+    with pytest.raises(InputError, match=r"an experiment named 'one', in one\.csv, already exists"):
         write_experiment(found, attrs.evolve(bench, experiment={"scale": 1.5}), "one", tmp_path)
     with pytest.raises(InputError, match="scale"):
         write_experiment(found, attrs.evolve(bench, experiment={"scale": -1}), "three", tmp_path)
@@ -208,7 +213,7 @@ def test_the_command_line_from_followed_pixels(tmp_path, capsys):
     assert main([*line[:2], *line[2:-1], str(tmp_path / "out2"), "--fps", "0"]) == 2
     assert "give fps" in capsys.readouterr().err
     assert main(["track", str(tmp_path / "none.mp4"), *line[2:]]) == 2
-    assert "there is no such clip" in capsys.readouterr().err
+    assert "the clip does not exist" in capsys.readouterr().err
 
 
 def test_without_blender_a_movie_is_refused_with_what_to_do(tmp_path, capsys, monkeypatch):

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import EnumProperty
 
 from ..preview import nodes
-from ..shared.acting import telling
+from ..shared.operators import reports_errors
 from . import library, sample
 
 
@@ -17,7 +17,7 @@ class MU_OT_assets(bpy.types.Operator):
     bl_label = "Add to Asset Browser"
     bl_options = {"REGISTER"}
 
-    @telling
+    @reports_errors
     def execute(self, context):
         folder = library.add()
         self.report({"INFO"}, f"{len(nodes.GROUPS)} node groups are in the library {library.NAME}: {folder}")
@@ -68,7 +68,7 @@ class MU_OT_sample(bpy.types.Operator):
     bl_label = "Sample Scene"
     bl_options = {"REGISTER", "UNDO"}
 
-    @telling
+    @reports_errors
     def execute(self, context):
         sample.build(context)
         return {"FINISHED"}

@@ -6,7 +6,8 @@ import bpy
 
 from ...design.body import require_sound
 from ...errors import InputError
-from ..shared.acting import OnUnit, telling
+from ..shared.operators import UnitOperator, reports_errors
+from ..shared.texts import sentence
 from ..unit import object as unit_object
 from ..unit.properties import to_unit
 from . import state as bodies
@@ -30,39 +31,39 @@ def selected_mesh(context):
     return found[0]
 
 
-def tell_flaws(operator, root, found, sound):
-    """Mark the places of a body's flaws, and tell what they are; `sound` where there are none."""
+def report_flaws(operator, root, found, sound):
+    """Mark the places of a body's flaws and report what they are; the text `sound` where there are none."""
     unit_object.mark(root, [place for flaw in found for place in flaw.places])
     if not found:
         operator.report({"INFO"}, sound)
     for flaw in found:
-        operator.report({"WARNING"}, f"{flaw.what[:1].upper()}{flaw.what[1:]}: {flaw.remedy}")
+        operator.report({"WARNING"}, f"{sentence(flaw.what)}: {flaw.remedy}")
 
 
-class MU_OT_body_check(OnUnit, bpy.types.Operator):
+class MU_OT_body_check(UnitOperator, bpy.types.Operator):
     """Examine the selected mesh: open edges, faces that cut each other, size, fit; mark the places"""
 
     bl_idname = "mu.body_check"
     bl_label = "Check Body"
     bl_options = {"REGISTER", "UNDO"}
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         body = bodies.of_object(selected_mesh(context), root)
         found = bodies.examined(body, to_unit(root.mu_unit).dimensions)
-        tell_flaws(self, root, found, f"{body.name} can be an envelope: {len(body.triangles)} triangles")
+        report_flaws(self, root, found, f"{body.name} can be an envelope: {len(body.triangles)} triangles")
         return {"FINISHED"}
 
 
-class MU_OT_body(OnUnit, bpy.types.Operator):
+class MU_OT_body(UnitOperator, bpy.types.Operator):
     """Make a copy of the selected mesh the unit's envelope, which the lattice then fills"""
 
     bl_idname = "mu.body"
     bl_label = "Use as Envelope"
     bl_options = {"REGISTER", "UNDO"}
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         obj = selected_mesh(context)
@@ -75,7 +76,7 @@ class MU_OT_body(OnUnit, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_body_remove(OnUnit, bpy.types.Operator):
+class MU_OT_body_remove(UnitOperator, bpy.types.Operator):
     """Take the body of your own out of the unit: the lattice fills its box again"""
 
     bl_idname = "mu.body_remove"

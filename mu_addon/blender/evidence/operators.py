@@ -3,13 +3,15 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import EnumProperty, StringProperty
+from bpy.props import StringProperty
 
-from ..shared.acting import RUN_FILES, CancelsJob, DismissesJob, OnSoundUnit, OnUnit, OpensRun, telling
+from ...design.parameters import write_unit
+from ..jobs import start_child
+from ..jobs.operators import job_operators
+from ..shared import updates, viewports
+from ..shared.operators import UnitOperator, ValidUnitOperator, reports_errors
 from ..simulate import effects
-from ..simulate import state as simulation
 from ..simulate import study_folder as studies
-from ..unit import live_update as live
 from ..unit import object as unit_object
 from ..unit.properties import from_unit, to_unit
 from . import motion as evidence_motion
@@ -21,7 +23,7 @@ NO_DATA = "Choose a folder of measured data first"
 def _current(context):
     """The unit's root and what was diagnosed of it, or None and why there is nothing to use."""
     root = unit_object.active_root(context)
-    found = evidence.said(root)
+    found = evidence.diagnosis(root)
     if found is None or not found.name:
         return root, None, "Diagnose the measured data first"
     if found.stale:
@@ -29,8 +31,8 @@ def _current(context):
     return root, found, ""
 
 
-class MU_OT_evidence_diagnose(OnSoundUnit, bpy.types.Operator):
-    """Ask the measured data what is wrong with the simulation, why, and what mending it gains"""
+class MU_OT_evidence_diagnose(ValidUnitOperator, bpy.types.Operator):
+    """Ask the measured data what is wrong with the simulation, why, and how much the error drops"""
 
     bl_idname = "mu.evidence_diagnose"
     bl_label = "Diagnose"
@@ -41,61 +43,33 @@ class MU_OT_evidence_diagnose(OnSoundUnit, bpy.types.Operator):
         if not super().poll(context):
             return False
         root = unit_object.active_root(context)
-        found = evidence.checked(root)
+        found = evidence.measured_data(root)
         trouble = ""
         if found is None or found.measured is None:
-            trouble = found.trouble[0] if found else NO_DATA
-        elif evidence.job(root) in simulation.running():
-            trouble = "It is being diagnosed"
-        elif simulation.missing():
-            trouble = f"Not in this Blender: {', '.join(simulation.missing())}"
+            trouble = found.trouble.partition("\n")[0] if found else NO_DATA
+        elif evidence.DIAGNOSIS.is_running(root):
+            trouble = "A diagnosis is running"
+        elif start_child.missing():
+            trouble = f"Not in this Blender: {', '.join(start_child.missing())}"
         if trouble:
             cls.poll_message_set(trouble)
         return not trouble
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
-        studies.settle(root)
+        studies.assign_folder(root)
+        folder = evidence.folder_of(root)
+        unit = folder / "blender" / "unit.toml"
+        write_unit(to_unit(root.mu_unit), unit)
         data = bpy.path.abspath(root.mu_evidence.folder)
-        words = ["diagnose", data]
-        simulation.start(evidence.job(root), to_unit(root.mu_unit), evidence.folder_of(root), words)
-        live.redraw()
+        line = ["diagnose", data, "--unit", str(unit), "--out", str(folder), "--json"]
+        evidence.DIAGNOSIS.start(root, line, folder)
+        viewports.redraw()
         return {"FINISHED"}
 
 
-class MU_OT_evidence_cancel(CancelsJob, bpy.types.Operator):
-    """Stop the diagnosis; the simulations it has finished are kept, and the next one goes on from there"""
-
-    bl_idname = "mu.evidence_cancel"
-    bl_label = "Cancel"
-    bl_options = {"REGISTER"}
-    idle = "Nothing is being diagnosed"
-    job_of = staticmethod(evidence.job)
-
-
-class MU_OT_evidence_dismiss(DismissesJob, bpy.types.Operator):
-    """Take the message of an ended diagnosis off the panel"""
-
-    bl_idname = "mu.evidence_dismiss"
-    bl_label = "Dismiss"
-    bl_options = {"REGISTER"}
-    job_of = staticmethod(evidence.job)
-
-
-class MU_OT_evidence_open(OpensRun, bpy.types.Operator):
-    """Open a file of the unit's diagnosis"""
-
-    bl_idname = "mu.evidence_open"
-    bl_label = "Open"
-    bl_options = {"REGISTER"}
-    first = "diagnose first"
-    folder_of = staticmethod(evidence.folder_of)
-
-    what: EnumProperty(name="What", description="File or folder of the diagnosis to open", items=RUN_FILES)
-
-
-class MU_OT_evidence_apply(OnSoundUnit, bpy.types.Operator):
+class MU_OT_evidence_apply(ValidUnitOperator, bpy.types.Operator):
     """Give the unit what was found, so that the next simulation has it: undo takes it back"""
 
     bl_idname = "mu.evidence_apply"
@@ -111,13 +85,13 @@ class MU_OT_evidence_apply(OnSoundUnit, bpy.types.Operator):
             trouble = "No effect was named that could be applied"
         if not trouble and evidence.applied(unit_object.active_root(context)):
             trouble = "The unit has this model: undo takes it back"
-        if not trouble and simulation.missing():
-            trouble = f"Not in this Blender: {', '.join(simulation.missing())}"
+        if not trouble and start_child.missing():
+            trouble = f"Not in this Blender: {', '.join(start_child.missing())}"
         if trouble:
             cls.poll_message_set(trouble)
         return not trouble
 
-    @telling
+    @reports_errors
     def execute(self, context):
         # Only now: it brings in the simulator's packages, which a Blender may lack.
         from ...usecases.simulate_and_place.extended_unit import read_extended
@@ -132,7 +106,7 @@ class MU_OT_evidence_apply(OnSoundUnit, bpy.types.Operator):
         beside = extended.effects.words()
         own = [words for words in extended.applied if words not in beside]
         evidence.mark_applied(root, "; ".join(own), "; ".join(beside))
-        with live.held():
+        with updates.paused():
             from_unit(root.mu_unit, extended.unit)
         # The diagnosis knew nothing of effects that the simulation had before: its own take their place.
         effects.keep(root, extended.kept.text() if extended.effects else "")
@@ -141,7 +115,7 @@ class MU_OT_evidence_apply(OnSoundUnit, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_evidence_remove(OnUnit, bpy.types.Operator):
+class MU_OT_evidence_remove(UnitOperator, bpy.types.Operator):
     """Take from the unit's simulation what was found beside its parameters: undo brings it back"""
 
     bl_idname = "mu.evidence_remove"
@@ -152,19 +126,19 @@ class MU_OT_evidence_remove(OnUnit, bpy.types.Operator):
     def poll(cls, context):
         if not super().poll(context):
             return False
-        if not effects.asked(unit_object.active_root(context)):
+        if not effects.inputs(unit_object.active_root(context)):
             cls.poll_message_set("The unit's simulation has no effects beside its parameters")
             return False
         return True
 
-    @telling
+    @reports_errors
     def execute(self, context):
         effects.keep(unit_object.active_root(context), "")
-        live.redraw()
+        viewports.redraw()
         return {"FINISHED"}
 
 
-class MU_OT_evidence_motion(OnUnit, bpy.types.Operator):
+class MU_OT_evidence_motion(UnitOperator, bpy.types.Operator):
     """Show an experiment on the timeline beside the unit, measured and simulated; once more takes it off"""
 
     bl_idname = "mu.evidence_motion"
@@ -175,7 +149,7 @@ class MU_OT_evidence_motion(OnUnit, bpy.types.Operator):
         name="Experiment", description="Name of an experiment of a unit under pressure; nothing takes it off"
     )
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         if not self.experiment:
@@ -189,7 +163,7 @@ class MU_OT_evidence_motion(OnUnit, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_evidence_protocol(OnUnit, bpy.types.Operator):
+class MU_OT_evidence_protocol(UnitOperator, bpy.types.Operator):
     """Let the unit's next simulation follow an experiment's pressures, so that both play in the same time"""
 
     bl_idname = "mu.evidence_protocol"
@@ -200,14 +174,14 @@ class MU_OT_evidence_protocol(OnUnit, bpy.types.Operator):
         name="Experiment", description="Name of an experiment of a unit under pressure"
     )
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         course = evidence.course(root, self.experiment)
         if course is None:
             self.report({"ERROR"}, f"No unit under pressure was measured as {self.experiment!r}")
             return {"CANCELLED"}
-        path = evidence.write_protocol(course, studies.settle(root) / evidence.PROTOCOL)
+        path = evidence.write_protocol(course, studies.assign_folder(root) / evidence.PROTOCOL)
         root.mu_unit.study.protocol = str(path)
         return {"FINISHED"}
 
@@ -215,9 +189,13 @@ class MU_OT_evidence_protocol(OnUnit, bpy.types.Operator):
 CLASSES = (
     MU_OT_evidence_protocol,
     MU_OT_evidence_diagnose,
-    MU_OT_evidence_cancel,
-    MU_OT_evidence_dismiss,
-    MU_OT_evidence_open,
+    *job_operators(
+        evidence.DIAGNOSIS,
+        "evidence_",
+        "diagnosis",
+        kept="finished simulations are kept, and the next run continues from there",
+        first="diagnose first",
+    ),
     MU_OT_evidence_apply,
     MU_OT_evidence_remove,
     MU_OT_evidence_motion,

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import bpy
 
-from ..simulate import state as simulation
-from ..unit.panel import OfUnit, start, told, wrapped
+from ..jobs.panel import job_state, start_button
+from ..shared.panels import UnitPanel, alert, wrapped
+from ..shared.texts import readable
 from . import motion as evidence_motion
 from . import state as evidence
 
@@ -18,20 +19,15 @@ ICONS = {"none": "CHECKMARK", "named": "LIGHT", "ambiguous": "QUESTION"}
 ICONS |= {"unidentifiable": "QUESTION", "unexplained": "ERROR"}
 
 
-def readable(name: str) -> str:
-    """An effect's or quantity's name as it is said."""
-    return name.replace("_", " ")
-
-
-class MU_PT_evidence(OfUnit, bpy.types.Panel):
-    """Measured data against the simulation: what is wrong, why, and what mending it gains"""
+class MU_PT_evidence(UnitPanel, bpy.types.Panel):
+    """Measured data against the simulation: what is wrong, why, and how much the error drops"""
 
     bl_idname = "MU_PT_evidence"
     bl_label = "Evidence"
 
     def show(self, layout, context, root):
         layout.prop(root.mu_evidence, "folder")
-        found = evidence.checked(root)
+        found = evidence.measured_data(root)
         if found is None:
             wrapped(layout, "Choose a folder with experiments.toml and its CSV files", "INFO")
             wrapped(
@@ -39,15 +35,13 @@ class MU_PT_evidence(OfUnit, bpy.types.Panel):
             )
             return
         if found.measured is None:
-            box = layout.box()
-            box.alert = True
-            wrapped(box, "\n".join(found.trouble), "ERROR")
+            alert(layout, found.trouble)
             return
         _experiments(layout, context, root, found.measured)
-        child = simulation.of(evidence.job(root))
-        start(layout, child, "mu.evidence_diagnose", "VIEWZOOM")
-        told(layout, child, "see below", JOB)
-        judged = evidence.said(root)
+        child = evidence.DIAGNOSIS.child(root)
+        start_button(layout, child, "mu.evidence_diagnose", "VIEWZOOM")
+        job_state(layout, child, "see below", JOB)
+        judged = evidence.diagnosis(root)
         if judged is None or not judged.name:
             wrapped(
                 layout, "Not diagnosed yet" if judged is None else "The diagnosis is not finished", "INFO"
@@ -62,9 +56,9 @@ def _experiments(layout, context, root, measured):
     column = layout.column(align=True)
     for e in measured.experiments:
         row = column.row(align=True)
-        held = e.role != "fit"
-        said = f"{e.name}, held out" if held else f"{e.name}: {len(e)} rows"
-        row.label(text=said, icon="HIDE_ON" if held else "CHECKBOX_HLT")
+        held_out = e.role != "fit"
+        text = f"{e.name}, held out" if held_out else f"{e.name}: {len(e)} rows"
+        row.label(text=text, icon="HIDE_ON" if held_out else "CHECKBOX_HLT")
         button = row.row(align=True)
         button.enabled = e.kind == "unit_pressure"
         on = e.name == shown
@@ -73,8 +67,9 @@ def _experiments(layout, context, root, measured):
         )
     if shown:
         time, angles = evidence_motion.reading(root, context.scene)
-        said = [f"{evidence_motion.LOOKS[s][0].lower()} {angle:+.1f}" for s, angle in angles.items()]
-        wrapped(layout, f"at {time:.2f} s: {', '.join(said)} deg" if said else f"at {time:.2f} s", "TIME")
+        values = [f"{evidence_motion.LOOKS[s][0].lower()} {angle:+.1f}" for s, angle in angles.items()]
+        text = f"at {time:.2f} s: {', '.join(values)} deg" if values else f"at {time:.2f} s"
+        wrapped(layout, text, "TIME")
         layout.operator("mu.evidence_protocol", icon="GRAPH").experiment = shown
     if measured.remarks:
         header, body = layout.panel("MU_remarks", default_closed=True)
@@ -141,11 +136,7 @@ def _dependence(layout, judged):
             body.label(text=f"{len(rows) - ROWS} more in the report")
 
 
-def register() -> None:
-    """The panel."""
-    bpy.utils.register_class(MU_PT_evidence)
+CLASSES = (MU_PT_evidence,)
 
 
-def unregister() -> None:
-    """The panel."""
-    bpy.utils.unregister_class(MU_PT_evidence)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -12,13 +12,17 @@ from typing import Any
 import attrs
 import bpy
 import numpy as np
-from bpy.props import PointerProperty, StringProperty
+from bpy.props import StringProperty
 
 from ...design.parameters import read_unit
 from ...errors import InputError, MuError
 from ...files import write_csv
 from ...measured import Measured, read_folder
 from ...measured.folder import FILE
+from ..jobs.start_child import JobKind
+from ..shared.file_cache import FileCache
+from ..shared.registration import property_group_factory
+from ..shared.texts import error_text
 from ..simulate import effects
 from ..simulate import study_folder as studies
 from ..unit.properties import BESIDE_BLEND_FILE, to_unit
@@ -49,16 +53,16 @@ class MU_PG_evidence(bpy.types.PropertyGroup):
 
 
 @attrs.frozen(eq=False)
-class Checked:
-    """A folder of measured data, or why it cannot be used: the lines of an error, what, where and remedy."""
+class MeasuredFolder:
+    """A folder of measured data, or why it cannot be used: an error's text, what, where and remedy."""
 
     measured: Measured | None
-    trouble: tuple[str, ...] = ()
+    trouble: str = ""
     digest: dict[str, Any] = attrs.field(factory=dict)
 
 
 @attrs.frozen(eq=False)
-class Said:
+class Diagnosis:
     """What a diagnosis found: verdict.json and summary.json; stale: why it is not of the unit now."""
 
     folder: Path
@@ -80,60 +84,51 @@ class Said:
         return sorted(found, key=lambda row: row[1])
 
 
-def job(root: Any) -> str:
-    """Name under which the unit's diagnosis runs beside its simulation."""
-    return f"{root.mu_unit.uuid}:{FOLDER}"
-
-
 def folder_of(root: Any) -> Path:
     """Folder of the unit's diagnosis."""
     return studies.folder_of(root) / FOLDER
 
 
-_checked: dict[Path, tuple[Any, Checked]] = {}
+DIAGNOSIS = JobKind(FOLDER, lambda root: root.mu_unit.uuid, folder_of)
+
+_data: FileCache[MeasuredFolder] = FileCache()
+_runs: FileCache[tuple[dict[str, Any], dict[str, Any], dict[str, Any], str]] = FileCache()
 
 
-def checked(root: Any) -> Checked | None:
+def measured_data(root: Any) -> MeasuredFolder | None:
     """The unit's measured data, or None where no folder was chosen."""
     if not root.mu_evidence.folder:
         return None
     folder = Path(bpy.path.abspath(root.mu_evidence.folder))
-    state = _state([folder / FILE, *sorted(folder.glob("*.csv"))])
-    kept = _checked.get(folder)
-    if kept is None or kept[0] != state:
-        kept = _checked[folder] = state, _check(folder)
-    return kept[1]
+    # Without its first file there is nothing to keep: the error says what is missing.
+    files = [folder / FILE, *sorted(folder.glob("*.csv"))]
+    return _data.read(files, lambda: _read_data(folder)) or _read_data(folder)
 
 
-def _check(folder: Path) -> Checked:
+def _read_data(folder: Path) -> MeasuredFolder:
     try:
         measured = read_folder(folder)
         described = hashlib.sha256((folder / FILE).read_bytes()).hexdigest()
     except MuError as error:
-        return Checked(None, tuple(text for text in (error.what, error.where, error.remedy) if text))
+        return MeasuredFolder(None, error_text(error))
     except OSError as error:
-        return Checked(None, (str(error),))
+        return MeasuredFolder(None, str(error))
     data = {e.name: [e.kind, e.role, e.sha256] for e in measured.experiments}
-    return Checked(measured, digest={"experiments_sha256": described, "data": data})
+    return MeasuredFolder(measured, digest={"experiments_sha256": described, "data": data})
 
 
-_said: dict[Path, tuple[Any, tuple[dict[str, Any], dict[str, Any], dict[str, Any], str]]] = {}
-
-
-def said(root: Any) -> Said | None:
+def diagnosis(root: Any) -> Diagnosis | None:
     """What the diagnosis in the unit's folder found, or None where there is none."""
     folder = folder_of(root)
     files = [folder / name for name in ("summary.json", "verdict.json", "diagnose.toml", "unit.toml")]
-    if not files[0].is_file():
+    known = _runs.read(files, lambda: _read_run(*files))
+    if known is None:
         return None
-    state, kept = _state(files), _said.get(folder)
-    if kept is None or kept[0] != state:
-        kept = _said[folder] = state, _read(*files)
-    summary, verdict, inputs, unit = kept[1]
-    return Said(folder, str(summary.get("status", "")), _stale(root, inputs, unit), verdict, summary)
+    summary, verdict, inputs, unit = known
+    return Diagnosis(folder, str(summary.get("status", "")), _stale(root, inputs, unit), verdict, summary)
 
 
-def _read(
+def _read_run(
     summary: Path, verdict: Path, inputs: Path, unit: Path
 ) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any], str]:
     try:
@@ -156,7 +151,7 @@ def _json(path: Path) -> dict[str, Any]:
 
 
 def _stale(root: Any, inputs: dict[str, Any], unit: str) -> str:
-    found = checked(root)
+    found = measured_data(root)
     if found is None or found.measured is None:
         return "the measured data it is of are not here"
     if any(inputs.get(key) != value for key, value in found.digest.items()):
@@ -167,18 +162,6 @@ def _stale(root: Any, inputs: dict[str, Any], unit: str) -> str:
         now = ""
     # Without a unit's own file the verdict does not rest on the unit.
     return "it is of the unit with other parameters" if unit and now != unit else ""
-
-
-def _state(files: list[Path]) -> tuple[Any, ...]:
-    """Times and sizes of files; of one that is not there, nothing."""
-    found: list[Any] = []
-    for path in files:
-        try:
-            stat = path.stat()
-            found.append((path.name, stat.st_mtime_ns, stat.st_size))
-        except OSError:
-            found.append((path.name,))
-    return tuple(found)
 
 
 def mark_applied(root: Any, to_unit_: str, to_simulation: str) -> None:
@@ -199,7 +182,7 @@ def applied(root: Any) -> str:
     if not model or model != _model(root) or now == before:
         return ""
     # What the simulation was given may have been taken from it again.
-    return "; ".join(words for words in (to_unit_, effects.asked(root) and to_simulation) if words)
+    return "; ".join(words for words in (to_unit_, effects.inputs(root) and to_simulation) if words)
 
 
 def _having(root: Any) -> str:
@@ -217,7 +200,7 @@ def _model(root: Any) -> str:
 
 @attrs.frozen(eq=False)
 class Course:
-    """One experiment over time: time_s (n,), pressure_kPa (n,) and series by who tells.
+    """One experiment over time: time_s (n,), pressure_kPa (n,) and series by source.
 
     series: `measured`, and `model` and `extended` where a diagnosis predicted them; of each the channels by
     name, (n,) with nan where there is nothing.
@@ -233,7 +216,7 @@ SERIES = {"base_model": "model", "extended_model": "extended"}
 
 def course(root: Any, name: str) -> Course | None:
     """A unit_pressure experiment with what the diagnosis predicted of it, or None where there is no such."""
-    found, judged = checked(root), said(root)
+    found, judged = measured_data(root), diagnosis(root)
     every = found.measured.of("unit_pressure") if found and found.measured else ()
     e = next((e for e in every if e.name == name), None)
     if e is None:
@@ -282,13 +265,4 @@ def write_protocol(course: Course, path: Path) -> Path:
     return path
 
 
-def register() -> None:
-    """The property group and the one property on objects that holds it."""
-    bpy.utils.register_class(MU_PG_evidence)
-    bpy.types.Object.mu_evidence = PointerProperty(type=MU_PG_evidence)
-
-
-def unregister() -> None:
-    """Take them out again; values stay in the file."""
-    del bpy.types.Object.mu_evidence
-    bpy.utils.unregister_class(MU_PG_evidence)
+register, unregister = property_group_factory(bpy.types.Object, "mu_evidence", (MU_PG_evidence,))

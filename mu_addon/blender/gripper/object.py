@@ -1,4 +1,4 @@
-"""A gripper in the scene: a root object with its parameters, two fingers, plate and cube, and their grasp.
+"""A gripper in the scene: a root object with its parameters, two fingers, plate and cube.
 
 Its parts are children, known by the custom property `mu_grip`; frame and places are the core's.
 """
@@ -14,18 +14,15 @@ from mathutils import Matrix
 
 from ...design.gripper import Gripper
 from ...design.steps import Given
-from ...errors import InputError, MuError
-from ...files import read_npz
+from ...errors import MuError
 from ..preview import arrays as preview
 from ..preview import colours as materials
-from ..results import motion as motion_parts
-from ..shared.compat import set_curve
+from ..shared import updates
+from ..shared.texts import error_text
 from ..steps import state as stack
 from ..unit import object as unit_object
-from ..unit.live_update import held
 from ..unit.properties import exact
-from . import state as grasps
-from .properties import from_gripper, to_gripper
+from .properties import PARAMETERS_CHANGED, from_gripper, to_gripper
 
 PART = "mu_grip"
 """Marks the parts: `finger:SIDE`, `finger:SIDE:NAME`, `plate`, `cube`, `moving:SIDE`, `moving:cube`."""
@@ -35,7 +32,6 @@ SHOWN = ("membranes", "struts", "wells")
 BEYOND_MM = 3.0
 """The cube's middle beyond the tips where it is put first, as the core's `Grip` has it; that cannot be asked
 without the solver."""
-MOVING = "moving:"
 
 
 def roots() -> list[Any]:
@@ -64,7 +60,7 @@ def part(root: Any, name: str) -> Any | None:
 def create(context: Any, gripper: Gripper) -> Any:
     """A new gripper at the 3D cursor of the scene, with its preview, selected and active."""
     root = unit_object.new_root(context, "Monolithic Gripper", gripper.unit.dimensions.cell)
-    with held():
+    with updates.paused():
         root.mu_gripper.uuid = uuid.uuid4().hex
         from_gripper(root.mu_gripper, gripper)
     rebuild(root)
@@ -86,7 +82,7 @@ def rebuild(root: Any) -> bool:
         _draw(root, to_gripper(props))
         trouble = ""
     except MuError as error:
-        trouble = "\n".join(text for text in (error.what, error.where, error.remedy) if text)
+        trouble = error_text(error)
     if props.trouble != trouble:
         props.trouble = trouble
     return not trouble
@@ -99,7 +95,7 @@ def _draw(root: Any, gripper: Gripper) -> None:
         name, draw = unit_object.DRAWN[step]
         drawn[name] = draw(stack.STACK.value(step, given), given, root.mu_gripper.cut)
     for side, (rotation, shift) in zip(SIDES, gripper.placements, strict=True):
-        finger = part(root, f"finger:{side}") or _new(root, root, f"finger:{side}", None)
+        finger = part(root, f"finger:{side}") or new_part(root, root, f"finger:{side}", None)
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = rotation, shift
         finger.matrix_local = Matrix(matrix.tolist())
@@ -107,13 +103,13 @@ def _draw(root: Any, gripper: Gripper) -> None:
             mark = f"finger:{side}:{name}"
             if skeleton is None:
                 continue
-            obj = part(root, mark) or _new(root, finger, mark, bpy.data.meshes.new(name.capitalize()))
+            obj = part(root, mark) or new_part(root, finger, mark, bpy.data.meshes.new(name.capitalize()))
             unit_object.draw_part(obj, name, skeleton)
     x, y = (extent / 2.0 for extent in gripper.size_mm)
-    _box(root, "plate", (-x, -y, -gripper.plate.thickness_mm), (x, y, 0.0), "MU Plate")
+    put_box(root, "plate", (-x, -y, -gripper.plate.thickness_mm), (x, y, 0.0), "MU Plate")
     first = part(root, "cube") is None
     half = np.full(3, root.mu_gripper.cube_mm / 2.0)
-    cube = _box(root, "cube", -half, half, "MU Obstacle")
+    cube = put_box(root, "cube", -half, half, "MU Obstacle")
     if first:
         cube.location.z = gripper.unit.dimensions.height + BEYOND_MM
         # Fingers and cube are solved as mirror images: it may be moved between them, along them alone.
@@ -129,14 +125,16 @@ def beyond_mm(root: Any) -> float:
     return round(exact(cube.location.z) - to_gripper(root.mu_gripper).unit.dimensions.height, 6)
 
 
-def _box(root: Any, name: str, low: Any, high: Any, material: str) -> Any:
-    obj = part(root, name) or _new(root, root, name, bpy.data.meshes.new(name.capitalize()))
+def put_box(root: Any, name: str, low: Any, high: Any, material: str) -> Any:
+    """The part of that name as a box between two corners (3,) in mm."""
+    obj = part(root, name) or new_part(root, root, name, bpy.data.meshes.new(name.capitalize()))
     preview.write(obj.data, preview.box(low, high), smooth=False)
     materials.assign(obj.data, material)
     return obj
 
 
-def _new(root: Any, parent: Any, name: str, data: Any) -> Any:
+def new_part(root: Any, parent: Any, name: str, data: Any) -> Any:
+    """A new part of the gripper, a child of `parent`, locked in its place."""
     words = name.replace(":", " ").capitalize()
     obj = bpy.data.objects.new(words, data)
     obj[PART] = name
@@ -150,48 +148,16 @@ def _new(root: Any, parent: Any, name: str, data: Any) -> Any:
     return obj
 
 
-def moving(root: Any) -> list[Any]:
-    """Parts that play the grasp: left finger, right finger, cube."""
-    found = (part(root, MOVING + name) for name in (*SIDES, "cube"))
-    return [obj for obj in found if obj is not None]
+def _parameters_changed(root: Any) -> None:
+    if not updates.are_paused() and root.mu_gripper.uuid:
+        rebuild(root)
 
 
-def show_grasp(root: Any, scene: Any) -> None:
-    """Play the latest grasp on the timeline: both fingers and the cube; raises InputError."""
-    found = grasps.of(root)
-    data = None if found is None else read_npz(found.folder / "gripper.npz")
-    if found is None or data is None:
-        raise InputError(
-            "there is no grasp of this cube yet", str(grasps.folder_of(root)), "press Grasp first"
-        )
-    hide_grasp(root)
-    rate = scene.render.fps / scene.render.fps_base
-    time = data["time_s"]
-    for side, rest in zip(SIDES, data["rest_mm"], strict=True):
-        obj = _new(root, root, MOVING + side, bpy.data.meshes.new(f"{side.capitalize()} Finger"))
-        slots = np.where(data["membrane"], 0, 1)
-        skeleton = preview.Skeleton(rest.astype(float), faces=(data["triangles"],), slots=slots)
-        preview.write(obj.data, skeleton)
-        materials.assign(obj.data, "MU Membrane", "MU Lattice")
-        file = found.folder / f"{side}.pc2"
-        motion_parts.play(obj, file, motion_parts.step_of(file))
-    half = np.full(3, float(data["cube_side_mm"]) / 2.0)
-    cube = _box(root, MOVING + "cube", -half, half, "MU Obstacle")
-    frames = scene.frame_start + (time - time[0]) * rate
-    for axis in range(3):
-        set_curve(cube, "location", axis, frames, data["cube_mm"][:, axis])
-    scene.frame_end = int(np.ceil(frames[-1]))
-    _hide_still(root, True)
+def register() -> None:
+    """Rebuild a gripper when its parameters change."""
+    PARAMETERS_CHANGED.connect(_parameters_changed)
 
 
-def hide_grasp(root: Any) -> None:
-    """Take the grasp out of the scene; its files stay."""
-    for obj in moving(root):
-        unit_object.remove_part(obj)
-    _hide_still(root, False)
-
-
-def _hide_still(root: Any, hidden: bool) -> None:
-    for child in root.children_recursive:
-        if child.get(PART, "").startswith(("finger:", "cube")):
-            child.hide_viewport = child.hide_render = hidden
+def unregister() -> None:
+    """Rebuild it no more."""
+    PARAMETERS_CHANGED.disconnect(_parameters_changed)

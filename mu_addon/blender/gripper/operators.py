@@ -7,14 +7,15 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty
 
 from ...design.gripper import gripper_names, load_gripper
-from ...run.child import RUNNING
-from ..shared.acting import RUN_FILES, CancelsJob, DismissesJob, OnUnit, OpensRun, telling
-from ..simulate import state as simulation
+from ..jobs import start_child
+from ..jobs.operators import job_operators
+from ..shared import viewports
+from ..shared.operators import UnitOperator, reports_errors
 from ..simulate import study_folder as studies
-from ..unit import live_update as live
 from ..unit.object import active_root
 from ..unit.operators import use_millimetres
 from ..unit.properties import to_unit
+from . import motion
 from . import object as gripper_object
 from . import state as grasps
 
@@ -45,7 +46,7 @@ class MU_OT_gripper_add(bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    @telling
+    @reports_errors
     def execute(self, context):
         found = load_gripper(self.preset)
         unit = active_root(context) if self.of_unit else None
@@ -63,16 +64,14 @@ class MU_OT_gripper_add(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class OnGripper(OnUnit):
-    """An operator on the active gripper and its grasp."""
+class GripperOperator(UnitOperator):
+    """An operator on the active gripper."""
 
-    seek = staticmethod(gripper_object.active)
-    lacking = NO_GRIPPER
-    job_of = staticmethod(grasps.job)
-    folder_of = staticmethod(grasps.folder_of)
+    find_root = staticmethod(gripper_object.active)
+    no_root = NO_GRIPPER
 
 
-class MU_OT_gripper_delete(OnGripper, bpy.types.Operator):
+class MU_OT_gripper_delete(GripperOperator, bpy.types.Operator):
     """Delete the gripper with all its parts; its folder stays"""
 
     bl_idname = "mu.gripper_delete"
@@ -84,7 +83,7 @@ class MU_OT_gripper_delete(OnGripper, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_grasp(OnGripper, bpy.types.Operator):
+class MU_OT_grasp(GripperOperator, bpy.types.Operator):
     """Do the chosen job in a process of its own; Blender stays free, and finished work is not repeated"""
 
     bl_idname = "mu.grasp"
@@ -95,58 +94,28 @@ class MU_OT_grasp(OnGripper, bpy.types.Operator):
     def poll(cls, context):
         if not super().poll(context):
             return False
-        root, missing = gripper_object.active(context), simulation.missing()
-        child = simulation.of(grasps.job(root))
+        root, missing = gripper_object.active(context), start_child.missing()
         trouble = root.mu_gripper.trouble.partition("\n")[0]
-        if child is not None and child.state == RUNNING:
-            trouble = "This gripper is at work"
+        if grasps.GRASP.is_running(root):
+            trouble = "A job of this gripper is running"
         elif missing:
             trouble = f"Not in this Blender: {', '.join(missing)}"
         if trouble:
             cls.poll_message_set(trouble)
         return not trouble
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = gripper_object.active(context)
         folder = grasps.folder_of(root)
         if not root.mu_gripper.folder:
             root.mu_gripper.folder = studies.relative(folder)
-        line = grasps.arguments(root)
-        simulation.launch(grasps.job(root), simulation.of_worker(line), folder / "blender")
-        live.redraw()
+        grasps.GRASP.start(root, grasps.arguments(root), folder)
+        viewports.redraw()
         return {"FINISHED"}
 
 
-class MU_OT_grasp_cancel(OnGripper, CancelsJob, bpy.types.Operator):
-    """Stop the grasp; what it has finished is kept, and the next one goes on from there"""
-
-    bl_idname = "mu.grasp_cancel"
-    bl_label = "Cancel"
-    bl_options = {"REGISTER"}
-    idle = "This gripper is not at work"
-
-
-class MU_OT_grasp_dismiss(OnGripper, DismissesJob, bpy.types.Operator):
-    """Take the message of an ended grasp off the panel"""
-
-    bl_idname = "mu.grasp_dismiss"
-    bl_label = "Dismiss"
-    bl_options = {"REGISTER"}
-
-
-class MU_OT_grasp_open(OnGripper, OpensRun, bpy.types.Operator):
-    """Open a file of the gripper's results"""
-
-    bl_idname = "mu.grasp_open"
-    bl_label = "Open"
-    bl_options = {"REGISTER"}
-    first = "press Grasp first"
-
-    what: EnumProperty(name="What", description="File or folder of the grasp to open", items=RUN_FILES)
-
-
-class MU_OT_grasp_show(OnGripper, bpy.types.Operator):
+class MU_OT_grasp_show(GripperOperator, bpy.types.Operator):
     """Play the grasp on the timeline, both fingers and the cube, or take it away"""
 
     bl_idname = "mu.grasp_show"
@@ -155,13 +124,13 @@ class MU_OT_grasp_show(OnGripper, bpy.types.Operator):
 
     on: BoolProperty(name="Show", description="Show it, or take it away", default=True)
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = gripper_object.active(context)
         if self.on:
-            gripper_object.show_grasp(root, context.scene)
+            motion.show(root, context.scene)
         else:
-            gripper_object.hide_grasp(root)
+            motion.hide(root)
         return {"FINISHED"}
 
 
@@ -169,9 +138,14 @@ CLASSES = (
     MU_OT_gripper_add,
     MU_OT_gripper_delete,
     MU_OT_grasp,
-    MU_OT_grasp_cancel,
-    MU_OT_grasp_dismiss,
-    MU_OT_grasp_open,
+    *job_operators(
+        grasps.GRASP,
+        "grasp_",
+        "grasp",
+        kept="finished stages are kept, and the next run continues from there",
+        first="press Grasp first",
+        base=GripperOperator,
+    ),
     MU_OT_grasp_show,
 )
 

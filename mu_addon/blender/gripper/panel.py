@@ -6,23 +6,24 @@ import bpy
 
 from ...design.gripper import SECTIONS
 from ...design.quantity import describe
-from ..simulate import state as simulation
-from ..unit.panel import OfOne, start, told, wrapped
+from ..jobs.panel import job_state, start_button
+from ..shared.panels import RootPanel, alert, wrapped
+from . import motion
 from . import object as gripper_object
 from . import state as grasps
 
 JOB = "grasp_"
 PHASES = {"i": "opening", "ii": "closing", "iii": "holding", "iv": "lifting", "v": "releasing"}
-"""Phases of a grasp as they are said; the core's `grip.phases.MEANING` has them in full."""
+"""Phases of a grasp in a word; the core's `grip.phases.MEANING` has them in full."""
 
 
-class OfGripper(OfOne):
+class GripperPanel(RootPanel):
     """A panel of the active gripper."""
 
-    seek = staticmethod(gripper_object.active)
+    find_root = staticmethod(gripper_object.active)
 
 
-class MU_PT_gripper(OfGripper, bpy.types.Panel):
+class MU_PT_gripper(GripperPanel, bpy.types.Panel):
     """The gripper that is worked on"""
 
     bl_idname = "MU_PT_gripper"
@@ -41,12 +42,10 @@ class MU_PT_gripper(OfGripper, bpy.types.Panel):
         row.use_property_split = False
         row.prop(props, "cut", icon="MOD_BOOLEAN", toggle=True)
         if props.trouble:
-            box = layout.box()
-            box.alert = True
-            wrapped(box, props.trouble, "ERROR")
+            alert(layout, props.trouble)
 
 
-class MU_PT_grasp(OfGripper, bpy.types.Panel):
+class MU_PT_grasp(GripperPanel, bpy.types.Panel):
     """A cube between the fingers: closed on, held, lifted, let go"""
 
     bl_idname = "MU_PT_grasp"
@@ -64,9 +63,9 @@ class MU_PT_grasp(OfGripper, bpy.types.Panel):
                 column.prop(cube, "location", index=2, text="Its Height")
             column.prop(props, "density_g_per_ml")
             column.prop(props, "friction")
-        child = simulation.of(grasps.job(root))
-        start(layout, child, "mu.grasp", "PLAY")
-        told(layout, child, "see below", JOB)
+        child = grasps.GRASP.child(root)
+        start_button(layout, child, "mu.grasp", "PLAY")
+        job_state(layout, child, "see below", JOB)
         found = grasps.of(root)
         if found is None:
             wrapped(layout, "This cube was not grasped yet", "INFO")
@@ -91,7 +90,7 @@ def _found(layout, scene, root, found):
         held, icon = ("Held", "CHECKMARK") if f["held"] else ("It slips", "ERROR")
         column.label(text=f"{held}: {f['margin']:.2g} times its weight", icon=icon)
         column.label(text=f"Gap error {f['gap_error_mm']:.3f} mm")
-    on = bool(gripper_object.moving(root))
+    on = bool(motion.parts(root))
     row = box.row(align=True)
     text = "Hide Grasp" if on else "Show Grasp"
     row.operator("mu.grasp_show", text=text, icon="MOD_SIMPLEDEFORM", depress=on).on = not on

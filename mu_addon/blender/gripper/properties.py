@@ -9,15 +9,16 @@ from ...design import parameters
 from ...design.gripper import SECTIONS, Gripper
 from ...design.quantity import describe
 from ...design.rigid_body import FRICTION
-from ..unit import live_update as live
+from ..shared.registration import property_group_factory
+from ..shared.updates import Signal
 from ..unit.properties import BESIDE_BLEND_FILE, blender_property, exact
+
+PARAMETERS_CHANGED = Signal()
+"""Sent with the root of the gripper whose parameters changed."""
 
 
 def _changed(group, context):
-    from . import object as gripper_object
-
-    if not live.holds() and group.id_data.mu_gripper.uuid:
-        gripper_object.rebuild(group.id_data)
+    PARAMETERS_CHANGED.send(group.id_data)
 
 
 def _generated(section: type):
@@ -125,7 +126,7 @@ def to_gripper(props) -> Gripper:
 
 
 def from_gripper(props, gripper: Gripper) -> None:
-    """Set the properties to a gripper; each still calls its update, see `live.held`."""
+    """Set the properties to a gripper; each still calls its update, see `updates.paused`."""
     props.finger = parameters.to_toml(gripper.unit, comments=False)
     props.title, props.path = gripper.name, gripper.path
     for section in SECTIONS:
@@ -134,15 +135,4 @@ def from_gripper(props, gripper: Gripper) -> None:
             setattr(group, d.name, getattr(values, d.name))
 
 
-def register() -> None:
-    """Classes and the one property on objects that holds a gripper."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-    bpy.types.Object.mu_gripper = PointerProperty(type=MU_PG_gripper)
-
-
-def unregister() -> None:
-    """Take them out again; values stay in the file."""
-    del bpy.types.Object.mu_gripper
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = property_group_factory(bpy.types.Object, "mu_gripper", CLASSES)

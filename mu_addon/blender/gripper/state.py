@@ -15,21 +15,21 @@ from ...design import gripper as core
 from ...design.parameters import to_toml
 from ...errors import MuError
 from ...files import write_text
+from ..jobs.start_child import JobKind
+from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
 from ..unit.properties import exact
 from . import object as gripper_object
 from .properties import to_gripper
 
 
-def job(root: Any) -> str:
-    """Name under which the gripper's grasp runs."""
-    return f"{root.mu_gripper.uuid}:grip"
-
-
 def folder_of(root: Any) -> Path:
     """Folder of the gripper's results: the one it names, else beside the .blend file, else the user's own."""
     props = root.mu_gripper
-    return studies.place_of(props.folder, props.title, props.uuid)
+    return studies.default_folder(props.folder, props.title, props.uuid)
+
+
+GRASP = JobKind("grip", lambda root: root.mu_gripper.uuid, folder_of)
 
 
 def arguments(root: Any) -> list[str]:
@@ -70,28 +70,25 @@ class Grasped:
     columns: dict[str, Any]
 
 
-_read: dict[Path, tuple[float, Any]] = {}
+_runs: FileCache[Any] = FileCache()
 
 
 def of(root: Any) -> Grasped | None:
     """The latest grasp of the cube that is chosen, or None; read again only when its files change."""
     folder, props = folder_of(root), root.mu_gripper
     side = f"{_side(props):g}"
+    known = _runs.read([folder / "summary.json"], lambda: _read_folder(folder))
+    if known is None or side not in known[3]:
+        return None
+    figures, asked, texts, tables = known
     try:
-        time = (folder / "summary.json").stat().st_mtime
-        kept = _read.get(folder)
-        if kept is None or kept[0] != time:
-            kept = _read[folder] = time, _read_folder(folder)
-        figures, asked, texts, tables = kept[1]
-        if side not in tables:
-            return None
         gripper = to_gripper(props)
         now = core.to_toml(gripper, "unit.toml"), to_toml(gripper.unit)
         densities = {c["side_mm"]: c["density_g_per_ml"] for c in asked["cubes"]}
         own = densities.get(_side(props)), asked["grip"]["friction"], asked["grip"]["beyond_mm"]
         set_now = exact(props.density_g_per_ml), exact(props.friction), gripper_object.beyond_mm(root)
         stale = now != texts or own != set_now
-    except (OSError, ValueError, KeyError, MuError):
+    except (KeyError, MuError):
         return None
     return Grasped(folder / f"cube-{side}", stale, figures.get(side, {}), *tables[side])
 

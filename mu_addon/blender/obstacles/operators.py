@@ -10,10 +10,10 @@ from mathutils import Vector
 from ...design.body import require_sound
 from ...design.rigid_body import FRICTION
 from ...errors import InputError
-from ..body.operators import selected_meshes, tell_flaws
+from ..body.operators import report_flaws, selected_meshes
 from ..preview import arrays as preview
 from ..preview import colours as materials
-from ..shared.acting import OnSoundUnit, OnUnit, telling
+from ..shared.operators import UnitOperator, ValidUnitOperator, reports_errors
 from ..unit import object as unit_object
 from ..unit.properties import exact, to_unit
 from . import state as obstacles
@@ -21,7 +21,7 @@ from . import state as obstacles
 NO_OBSTACLE = "No obstacle yet: select a closed mesh and use it as one"
 
 
-class OnObstacles(OnUnit):
+class ObstacleOperator(UnitOperator):
     """An operator on the obstacles of the active unit; greyed, with the reason, where it has none."""
 
     name: StringProperty(
@@ -49,7 +49,7 @@ class OnObstacles(OnUnit):
         return chosen
 
 
-class MU_OT_obstacle(OnSoundUnit, bpy.types.Operator):
+class MU_OT_obstacle(ValidUnitOperator, bpy.types.Operator):
     """Make the selected closed meshes obstacles of the unit: rigid, in place, with friction"""
 
     bl_idname = "mu.obstacle"
@@ -60,7 +60,7 @@ class MU_OT_obstacle(OnSoundUnit, bpy.types.Operator):
         name="Friction", description="Coefficient of Coulomb friction", default=FRICTION, min=0.0, max=5.0
     )
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         core, chosen = to_unit(root.mu_unit), selected_meshes(context)
@@ -75,7 +75,7 @@ class MU_OT_obstacle(OnSoundUnit, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_obstacle_box(OnSoundUnit, bpy.types.Operator):
+class MU_OT_obstacle_box(ValidUnitOperator, bpy.types.Operator):
     """Add a box as an obstacle, in front of the tip on the side that the unit bends to"""
 
     bl_idname = "mu.obstacle_box"
@@ -97,7 +97,7 @@ class MU_OT_obstacle_box(OnSoundUnit, bpy.types.Operator):
         name="Friction", description="Coefficient of Coulomb friction", default=FRICTION, min=0.0, max=5.0
     )
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         d = to_unit(root.mu_unit).dimensions
@@ -114,30 +114,30 @@ class MU_OT_obstacle_box(OnSoundUnit, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_obstacle_check(OnObstacles, bpy.types.Operator):
+class MU_OT_obstacle_check(ObstacleOperator, bpy.types.Operator):
     """Examine obstacles: open edges, faces that cut each other, size, overlap; mark the places"""
 
     bl_idname = "mu.obstacle_check"
     bl_label = "Check Obstacles"
     bl_options = {"REGISTER", "UNDO"}
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         core, chosen = to_unit(root.mu_unit), self.chosen(root)
         found = [flaw for obj in chosen for flaw in obstacles.examined(root, obj, core)]
-        tell_flaws(self, root, found, f"{len(chosen)} obstacle(s), sound and off the unit")
+        report_flaws(self, root, found, f"{len(chosen)} obstacle(s), sound and off the unit")
         return {"FINISHED"}
 
 
-class MU_OT_obstacle_remove(OnObstacles, bpy.types.Operator):
+class MU_OT_obstacle_remove(ObstacleOperator, bpy.types.Operator):
     """Let an object be no obstacle any more; the object stays"""
 
     bl_idname = "mu.obstacle_remove"
     bl_label = "Remove Obstacle"
     bl_options = {"REGISTER", "UNDO"}
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         for obj in self.chosen(root):
@@ -145,14 +145,14 @@ class MU_OT_obstacle_remove(OnObstacles, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_obstacle_select(OnObstacles, bpy.types.Operator):
+class MU_OT_obstacle_select(ObstacleOperator, bpy.types.Operator):
     """Select an obstacle, to move it"""
 
     bl_idname = "mu.obstacle_select"
     bl_label = "Select Obstacle"
     bl_options = {"REGISTER", "UNDO"}
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         for other in context.selected_objects:

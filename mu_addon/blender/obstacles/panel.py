@@ -5,11 +5,12 @@ from __future__ import annotations
 import bpy
 
 from ...errors import InputError
-from ..unit.panel import OfUnit, wrapped
+from ..shared.panels import UnitPanel, wrapped
+from ..shared.texts import sentence
 from . import state as obstacles
 
 
-class MU_PT_obstacles(OfUnit, bpy.types.Panel):
+class MU_PT_obstacles(UnitPanel, bpy.types.Panel):
     """Rigid things that the unit meets while it moves"""
 
     bl_idname = "MU_PT_obstacles"
@@ -43,14 +44,10 @@ def _troubles(root, obj):
         known = obstacles.placed(root, obj).flaws or []
     except InputError as error:
         return [f"{error.what}: {error.remedy}"]
-    return [f"{flaw.what[:1].upper()}{flaw.what[1:]}: {flaw.remedy}" for flaw in known]
+    return [f"{sentence(flaw.what)}: {flaw.remedy}" for flaw in known]
 
 
-def register() -> None:
-    """The panel."""
-    bpy.utils.register_class(MU_PT_obstacles)
+CLASSES = (MU_PT_obstacles,)
 
 
-def unregister() -> None:
-    """The panel."""
-    bpy.utils.unregister_class(MU_PT_obstacles)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -13,14 +13,14 @@ from typing import Any
 import attrs
 import bpy
 from bpy.app.handlers import persistent
-from bpy.props import FloatProperty, PointerProperty, StringProperty
+from bpy.props import FloatProperty, StringProperty
 
 from ...design.body import Body, Flaw, flaws, overlaps, require_sound
 from ...design.parameters import Unit
 from ...design.rigid_body import FRICTION
 from ...files import write_text
 from ..body import state as bodies
-from ..shared import handlers
+from ..shared.registration import property_group_factory
 from ..unit.properties import exact
 
 ODD_SIZE_MM = (0.1, 2000.0)
@@ -96,7 +96,7 @@ def unsound(body: Body) -> list[Flaw]:
     ]
 
 
-def given(root: Any) -> list[tuple[str, float]]:
+def inputs(root: Any) -> list[tuple[str, float]]:
     """Hash of the surface and friction of every obstacle, sorted; InputError for what is no surface."""
     return sorted((placed(root, o).body.hash, exact(o.mu_obstacle.friction)) for o in of_unit(root))
 
@@ -140,16 +140,15 @@ def _loaded(*_):
 _HANDLERS = {"depsgraph_update_post": _edited, "load_post": _loaded}
 
 
+_register, _unregister = property_group_factory(bpy.types.Object, "mu_obstacle", (MU_PG_obstacle,), _HANDLERS)
+
+
 def register() -> None:
     """The property on objects, and handlers that notice edits."""
-    bpy.utils.register_class(MU_PG_obstacle)
-    bpy.types.Object.mu_obstacle = PointerProperty(type=MU_PG_obstacle)
-    handlers.add(_HANDLERS)
+    _register()
 
 
 def unregister() -> None:
     """Take them out; what is an obstacle stays so in the file."""
-    handlers.remove(_HANDLERS)
-    del bpy.types.Object.mu_obstacle
-    bpy.utils.unregister_class(MU_PG_obstacle)
+    _unregister()
     _placed.clear()

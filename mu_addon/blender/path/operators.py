@@ -6,13 +6,13 @@ import bpy
 from bpy.props import StringProperty
 
 from ...design.anchors import window
-from ..shared.acting import OnUnit, telling
+from ..shared import updates
+from ..shared.operators import UnitOperator, reports_errors
 from ..unit import object as unit_object
-from ..unit.live_update import held
 from ..unit.properties import to_unit
 
 
-class MU_OT_path(OnUnit, bpy.types.Operator):
+class MU_OT_path(UnitOperator, bpy.types.Operator):
     """Lay the waveguide along this path; without a name, along the candidate selected in the viewport"""
 
     bl_idname = "mu.path"
@@ -21,13 +21,13 @@ class MU_OT_path(OnUnit, bpy.types.Operator):
 
     name: StringProperty(name="Path", description="Name of a path, alpha1 ..; `none` takes the waveguide out")
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         name = self.name or selected_candidate(context)
         if name and name != "none":
             name = window(to_unit(root.mu_unit), name).name
-        with held():
+        with updates.paused():
             root.mu_unit.path = "" if name == "none" else name
         unit_object.rebuild(root)
         return {"FINISHED"}

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..results import fields
 from ..shared.compat import set_modifier_input
+from ..shared.texts import path_symbol
 from ..simulate import study_folder as studies
 
 
@@ -40,7 +41,7 @@ def dress(root: Any, candidates: dict[str, Any]) -> None:
         j, rank = known[name]
         modifier = tube.modifiers[0]
         # Below the name: side by side the tubes have no room for more.
-        label = f"{name.replace('alpha', 'α')}\n#{rank}"
+        label = f"{path_symbol(name)}\n#{rank}"
         set_modifier_input(modifier, "Label", label)
         if name != root.mu_unit.path:
             share = ((j - low) / (high - low)) ** 0.5 if high > low else 0.0

@@ -11,12 +11,13 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...design.anchors import anchors, windows
+from ...design.anchors import anchor_points, windows
 from ...design.block import FACES
 from ...design.lattice import Graph
 from ...design.parameters import Unit
 from ...design.steps import Path, Section, Struts, Trimmed, along
 from ...design.waveguide import Bar
+from ..shared.texts import path_symbol
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -103,7 +104,7 @@ def lattice(struts: Struts | None, cut: bool) -> Skeleton | None:
     return Skeleton(along(ends, t).reshape(-1, 3), edges, attributes=radius)
 
 
-def anchor_points(points: Floats | None, struts: Struts | None) -> Skeleton | None:
+def anchor_skeleton(points: Floats | None, struts: Struts | None) -> Skeleton | None:
     """Anchors as points, a little wider than the junctions they are in."""
     if points is None:
         return None
@@ -132,7 +133,7 @@ def bar(found: Bar | None) -> Skeleton | None:
 def candidates(unit: Unit) -> dict[str, Skeleton]:
     """Every candidate path by name, side by side outside the lattice: in place they cover each other."""
     d = unit.dimensions
-    at, side = anchors(unit), float(np.sign(d.row)) or 1.0
+    at, side = anchor_points(unit), float(np.sign(d.row)) or 1.0
     edge = d.bounds[1][1] if side > 0 else d.bounds[1][0]
     found = {}
     for number, window in enumerate(windows(len(at)), 1):
@@ -140,7 +141,7 @@ def candidates(unit: Unit) -> dict[str, Skeleton]:
         points[:, 1] = edge + side * LADDER_STEP * d.cell * (number + 0.5)
         radius = np.full(len(points), 0.06 * d.cell)
         name = {
-            "Label": window.name.replace("alpha", "α"),
+            "Label": path_symbol(window.name),
             "At": (0.1 * d.cell, float(points[0, 1]) - 0.1 * d.cell, float(points[0, 2]) - 0.4 * d.cell),
             "Size": 0.3 * d.cell,
         }

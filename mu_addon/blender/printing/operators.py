@@ -3,34 +3,22 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatVectorProperty, IntProperty
+from bpy.props import BoolProperty, FloatVectorProperty, IntProperty
 
 from ...design.parameters import write_unit
-from ...run.child import RUNNING
-from ..shared.acting import RUN_FILES, CancelsJob, DismissesJob, OnSoundUnit, OnUnit, OpensFile, telling
-from ..simulate import state as simulation
+from ..jobs.operators import FILES, RUN_FILES, job_operators
+from ..shared import viewports
+from ..shared.operators import UnitOperator, ValidUnitOperator, reports_errors
 from ..simulate import study_folder as studies
-from ..unit import live_update as live
 from ..unit import object as unit_object
 from ..unit.properties import to_unit
+from . import markers
 from . import state as printing
 
 NOT_CHECKED = "Check the print first"
 
 
-def _start(context, command):
-    root = unit_object.active_root(context)
-    studies.settle(root)
-    unit = to_unit(root.mu_unit)
-    own = printing.folder_of(root, command) / "blender"
-    write_unit(unit, own / "unit.toml")
-    line = [*printing.words(root, unit, command), "--out", str(own.parent), "--json"]
-    simulation.launch(printing.job(root), simulation.of_worker(line), own)
-    live.redraw()
-    return {"FINISHED"}
-
-
-class _Job(OnSoundUnit):
+class _Job(ValidUnitOperator):
     """An operator that starts one of the jobs for the printer; greyed, with the reason, where it cannot."""
 
     job = ""
@@ -40,20 +28,27 @@ class _Job(OnSoundUnit):
         if not super().poll(context):
             return False
         root = unit_object.active_root(context)
-        child = simulation.of(printing.job(root))
-        running = child is not None and child.state == RUNNING
+        running = printing.PRINTING.is_running(root)
         trouble = "A job for the printer is running" if running else printing.trouble(root, cls.job)
         if trouble:
             cls.poll_message_set(trouble)
         return not trouble
 
-    @telling
+    @reports_errors
     def execute(self, context):
-        return _start(context, self.job)
+        root = unit_object.active_root(context)
+        studies.assign_folder(root)
+        unit = to_unit(root.mu_unit)
+        folder = printing.folder_of(root, self.job)
+        write_unit(unit, folder / "blender" / "unit.toml")
+        line = [*printing.arguments(root, unit, self.job), "--out", str(folder), "--json"]
+        printing.PRINTING.start(root, line, folder)
+        viewports.redraw()
+        return {"FINISHED"}
 
 
 class MU_OT_print_check(_Job, bpy.types.Operator):
-    """Look for what the printer would stumble over, and for the best way up, in a process of its own"""
+    """Check the printability and find the best build direction, in a process of its own"""
 
     bl_idname = "mu.print_check"
     bl_label = "Check Print"
@@ -93,55 +88,15 @@ class MU_OT_print_specimens(_Job, bpy.types.Operator):
     job = printing.SPECIMENS
 
 
-class MU_OT_print_cancel(CancelsJob, bpy.types.Operator):
-    """Stop the check or the export; files that were whole stay"""
-
-    bl_idname = "mu.print_cancel"
-    bl_label = "Cancel"
-    bl_options = {"REGISTER"}
-    idle = "Nothing for the printer runs"
-    job_of = staticmethod(printing.job)
+def _path_of(root, what):
+    """The file or folder that `what` stands for; log and errors are of the latest job."""
+    if what in (printing.EXPORT, printing.SPECIMENS):
+        return printing.folder_of(root, what)
+    folder = printing.folder_of(root, printing.CHECK) if what == "report" else printing.latest_folder(root)
+    return folder / FILES[what]
 
 
-class MU_OT_print_dismiss(DismissesJob, bpy.types.Operator):
-    """Take the message of an ended check or export off the panel"""
-
-    bl_idname = "mu.print_dismiss"
-    bl_label = "Dismiss"
-    bl_options = {"REGISTER"}
-    job_of = staticmethod(printing.job)
-
-
-class MU_OT_print_open(OpensFile, bpy.types.Operator):
-    """Open what a check or an export has left"""
-
-    bl_idname = "mu.print_open"
-    bl_label = "Open"
-    bl_options = {"REGISTER"}
-    first = "check or export first"
-
-    what: EnumProperty(
-        name="What",
-        description="Which file or folder",
-        items=[
-            ("report", "Report", "Every finding with pictures, and the build directions, in the browser"),
-            ("export", "Files", "Folder of the exported files"),
-            ("specimens", "Specimens", "Folder of the specimens, their sheet and the folder for the data"),
-            *RUN_FILES[1:3],
-        ],
-    )
-
-    def path_of(self, root):
-        """The file or folder that `what` stands for; log and errors are the latest job's."""
-        if self.what in (printing.EXPORT, printing.SPECIMENS):
-            return printing.folder_of(root, self.what)
-        child = simulation.of(printing.job(root))
-        checks = printing.folder_of(root, printing.CHECK)
-        folder = checks if self.what == "report" or child is None else child.folder.parent
-        return folder / studies.FILES[self.what]
-
-
-class _OfCheck(OnUnit):
+class _OfCheck(UnitOperator):
     """An operator on what a check found; greyed where there is none of the unit as it is."""
 
     @classmethod
@@ -164,11 +119,11 @@ class MU_OT_print_marks(_OfCheck, bpy.types.Operator):
 
     def execute(self, context):
         root = unit_object.active_root(context)
-        printing.mark(root, printing.checked(root))
+        markers.mark(root, printing.checked(root))
         return {"FINISHED"}
 
 
-class MU_OT_print_clear(OnUnit, bpy.types.Operator):
+class MU_OT_print_clear(UnitOperator, bpy.types.Operator):
     """Take the markers of the check out of the scene"""
 
     bl_idname = "mu.print_clear"
@@ -179,13 +134,13 @@ class MU_OT_print_clear(OnUnit, bpy.types.Operator):
     def poll(cls, context):
         if not super().poll(context):
             return False
-        if not printing.marks(unit_object.active_root(context)):
+        if not markers.marks(unit_object.active_root(context)):
             cls.poll_message_set("No place is marked")
             return False
         return True
 
     def execute(self, context):
-        printing.clear(unit_object.active_root(context))
+        markers.clear(unit_object.active_root(context))
         return {"FINISHED"}
 
 
@@ -211,7 +166,7 @@ class MU_OT_print_show(_OfCheck, bpy.types.Operator):
         name="Turn the View", description="Turn the 3D views to it", default=True, options={"SKIP_SAVE"}
     )
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         found, settings = printing.checked(root), root.mu_print
@@ -224,24 +179,24 @@ class MU_OT_print_show(_OfCheck, bpy.types.Operator):
             self.report({"ERROR"}, f"{chosen['check']}: it has {len(places)} places")
             return {"CANCELLED"}
         next_one = settings.place + 1 if settings.finding == self.finding else 0
-        if printing.marked(root) != found.digest:
-            printing.mark(root, found)
+        if markers.marked(root) != found.digest:
+            markers.mark(root, found)
         settings.finding = self.finding
         settings.place = (next_one if self.place < 0 else self.place) % max(len(places), 1)
-        printing.resize(root)
+        markers.resize(root)
         if len(places):
             for obj in context.selected_objects:
                 obj.select_set(False)
-            for obj in printing.marks(root):
-                if obj[printing.MARK] == str(self.finding):
+            for obj in markers.marks(root):
+                if obj[markers.MARK] == str(self.finding):
                     obj.select_set(True)
             if self.view:
                 reach = to_unit(root.mu_unit).dimensions.cell
-                printing.frame(context, root, places[settings.place], reach)
+                markers.frame(root, places[settings.place], reach)
         return {"FINISHED"}
 
 
-class MU_OT_print_up(OnUnit, bpy.types.Operator):
+class MU_OT_print_up(UnitOperator, bpy.types.Operator):
     """Take this build direction; check again for what it finds"""
 
     bl_idname = "mu.print_up"
@@ -265,9 +220,20 @@ CLASSES = (
     MU_OT_print_check,
     MU_OT_print_export,
     MU_OT_print_specimens,
-    MU_OT_print_cancel,
-    MU_OT_print_dismiss,
-    MU_OT_print_open,
+    *job_operators(
+        printing.PRINTING,
+        "print_",
+        "check or export",
+        kept="files that are complete are kept",
+        first="check or export first",
+        items=[
+            ("report", "Report", "Every finding with pictures, and the build directions, in the browser"),
+            ("export", "Files", "Folder of the exported files"),
+            ("specimens", "Specimens", "Folder of the specimens, their sheet and the folder for the data"),
+            *RUN_FILES[1:3],
+        ],
+        path_of=_path_of,
+    ),
     MU_OT_print_marks,
     MU_OT_print_clear,
     MU_OT_print_show,

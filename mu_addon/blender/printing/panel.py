@@ -1,4 +1,4 @@
-"""The panel Print of the sidebar tab MU: the solid, what a printer would stumble over, and the files."""
+"""The panel Print of the sidebar tab MU: the solid, the printability check, and the files."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ import math
 import bpy
 
 from ...run.child import FAILED
-from ..simulate import state as simulation
+from ..jobs.panel import job_state
+from ..shared.panels import UnitPanel, alert, large_button, parameters, wrapped
 from ..unit import object as unit_object
-from ..unit.panel import OfUnit, parameters, told, wrapped
+from . import markers
 from . import state as printing
+from .properties import OWN_PRINTER
 
 JOB = "print_"
 ICONS = {"error": "CANCEL", "warning": "ERROR", "info": "INFO", "pass": "CHECKMARK"}
@@ -21,32 +23,28 @@ NOT_PRINTABLE = 6
 """Exit status of a check that went well and found an error."""
 
 
-class MU_PT_print(OfUnit, bpy.types.Panel):
+class MU_PT_print(UnitPanel, bpy.types.Panel):
     """The printable solid, its check and its files"""
 
     bl_idname = "MU_PT_print"
     bl_label = "Print"
 
     def show(self, layout, context, root):
-        row = layout.row()
-        row.scale_y = 1.4
-        row.operator("mu.solid", icon="MESH_DATA")
+        large_button(layout, "mu.solid", "MESH_DATA")
         solid = unit_object.part(root, unit_object.SOLID)
         if solid is None:
             wrapped(layout, "No solid built yet", "INFO")
         else:
             _gates(layout, root, solid)
-        child = simulation.of(printing.job(root))
+        child = printing.PRINTING.child(root)
         refused = child is not None and child.state == FAILED
         if refused and (child.error or {}).get("status") == NOT_PRINTABLE:
-            box = layout.box()
-            box.alert = True
-            wrapped(box, "Checked: do not print it, see Check", "ERROR")
+            box = alert(layout, "Checked: do not print it, see Check")
             box.operator("mu.print_dismiss")
         else:
             where = {printing.CHECK: "see Check", printing.EXPORT: "see Files"}
             name = child.folder.parent.name if child is not None else ""
-            told(layout, child, where.get(name, "its folder opens below"), JOB)
+            job_state(layout, child, where.get(name, "its folder opens below"), JOB)
 
 
 def _gates(layout, root, solid) -> None:
@@ -65,12 +63,12 @@ def _gates(layout, root, solid) -> None:
         box.label(text=f"Waveguide along {solid['mu_path']}", icon="CHECKMARK")
 
 
-class _OfPrint(OfUnit):
+class _OfPrint(UnitPanel):
     bl_parent_id = "MU_PT_print"
 
 
 class MU_PT_print_check(_OfPrint, bpy.types.Panel):
-    """What the printer would stumble over, where, and the best way up"""
+    """Findings of the printability check, their locations, and the best build direction"""
 
     bl_idname = "MU_PT_print_check"
     bl_label = "Check"
@@ -79,29 +77,25 @@ class MU_PT_print_check(_OfPrint, bpy.types.Panel):
     def show(self, layout, context, root):
         settings = root.mu_print
         layout.prop(settings, "printer")
-        if settings.printer == printing.OWN_PRINTER:
+        if settings.printer == OWN_PRINTER:
             layout.prop(settings, "printer_file")
         layout.prop(settings, "up")
-        row = layout.row()
-        row.scale_y = 1.4
-        row.operator("mu.print_check", icon="VIEWZOOM")
+        large_button(layout, "mu.print_check", "VIEWZOOM")
         found = printing.checked(root)
         if found is None:
             wrapped(layout, "Not checked yet", "INFO")
             return
         if found.stale:
-            box = layout.box()
-            box.alert = True
-            wrapped(box, f"Stale: {found.stale}. Check again", "ERROR")
+            alert(layout, f"Stale: {found.stale}. Check again")
         column = layout.column()
         column.active = not found.stale
         _findings(column, settings, found)
         row = layout.row(align=True)
         row.operator("mu.print_marks", icon="EMPTY_AXIS")
         row.operator("mu.print_clear", text="", icon="X")
-        if printing.marks(root):
+        if markers.marks(root):
             layout.prop(settings, "marker")
-            if printing.marked(root) != found.digest:
+            if markers.marked(root) != found.digest:
                 wrapped(layout, "The markers are of an earlier check: mark again", "INFO")
         _directions(layout, settings, found)
         layout.operator("mu.print_open", text="Report", icon="URL").what = "report"
@@ -203,10 +197,8 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
             f"With the waveguide along {path}" if path else "Without a waveguide: no path chosen",
             "INFO",
         )
-        _said(layout, found)
-        row = layout.row()
-        row.scale_y = 1.4
-        row.operator("mu.print_export", icon="EXPORT")
+        _check_state(layout, found)
+        large_button(layout, "mu.print_export", "EXPORT")
         _written(layout, printing.exported(root))
         layout.operator("mu.export_stl", text="Export STL As ...", icon="FILE_FOLDER")
         row = layout.row(align=True)
@@ -218,16 +210,14 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
             parameters(body, root.mu_unit, "print")
 
 
-def _said(layout, found) -> None:
-    """What the check says about what is to be exported."""
+def _check_state(layout, found) -> None:
+    """Result of the check of the unit that is to be exported."""
     if found is None or found.stale:
         wrapped(layout, f"Not checked: {found.stale}" if found else "Not checked", "QUESTION")
         return
-    count = {s: sum(f["severity"] == s for f in found.findings) for s in printing.FAULTS}
+    count = {s: sum(f["severity"] == s for f in found.findings) for s in markers.FAULTS}
     if count["error"]:
-        box = layout.box()
-        box.alert = True
-        wrapped(box, f"The check found {count['error']} error(s): export asks first", "CANCEL")
+        alert(layout, f"The check found {count['error']} error(s): export asks first", "CANCEL")
     else:
         doubts = f", {count['warning']} warning(s) to decide on" if count["warning"] else ""
         wrapped(layout, f"Checked: no errors{doubts}", "CHECKMARK")
@@ -255,13 +245,4 @@ def _written(layout, found) -> None:
 CLASSES = (MU_PT_print, MU_PT_print_check, MU_PT_print_files)
 
 
-def register() -> None:
-    """The panel Print and those in it."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Take them out."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -10,7 +10,7 @@ from bpy_extras.io_utils import ExportHelper
 
 from ...design.export import write_nodes, write_stl
 from ...design.solid import QUALITY
-from ..shared.acting import OnSoundUnit, telling
+from ..shared.operators import ValidUnitOperator, reports_errors
 from ..unit import object as unit_object
 from ..unit.properties import to_unit
 from . import state as printing
@@ -22,7 +22,7 @@ _QUALITY = [
 _FACETS = "How finely round parts are cut into flat ones"
 
 
-class MU_OT_solid(OnSoundUnit, bpy.types.Operator):
+class MU_OT_solid(ValidUnitOperator, bpy.types.Operator):
     """Build the printable solid, with the waveguide of the chosen path, and check it; takes seconds"""
 
     bl_idname = "mu.solid"
@@ -31,7 +31,7 @@ class MU_OT_solid(OnSoundUnit, bpy.types.Operator):
 
     quality: EnumProperty(name="Quality", description=_FACETS, items=_QUALITY, default="interactive")
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         core = to_unit(root.mu_unit)
@@ -42,7 +42,7 @@ class MU_OT_solid(OnSoundUnit, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_export_stl(OnSoundUnit, bpy.types.Operator, ExportHelper):
+class MU_OT_export_stl(ValidUnitOperator, bpy.types.Operator, ExportHelper):
     """Build the solid in the quality to print, check it and write it as binary STL in mm"""
 
     bl_idname = "mu.export_stl"
@@ -65,7 +65,7 @@ class MU_OT_export_stl(OnSoundUnit, bpy.types.Operator, ExportHelper):
             self.report({"WARNING"}, f"The check found: {found.errors[0]['check']}. Do not print this")
         return ExportHelper.invoke(self, context, event)
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         core = to_unit(root.mu_unit)

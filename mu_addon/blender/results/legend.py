@@ -18,6 +18,7 @@ from mathutils import Vector
 
 from ...usecases.simulate_and_place.motion import MODEL_A
 from ..shared.overlay import Overlay
+from ..shared.texts import path_symbol
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from . import fields
@@ -37,16 +38,16 @@ def ticks(low: float, high: float) -> list[float]:
     return [float(step * n) + 0.0 for n in np.arange(first, np.floor(high / step + 1e-9) + 1)]
 
 
-def words(root: Any, motion: Any, scene: Any) -> list[str]:
-    """Title, state and remark of the legend."""
+def lines(root: Any, motion: Any, scene: Any) -> list[str]:
+    """Lines of the legend: field, time and pressure, contact forces, and whether the results are stale."""
     field = fields.BY_NAME[root.mu_motion.field]
     time = motion_parts.time_of(motion, scene)
     pressure = float(np.interp(time, motion.time_s, motion.pressure_kPa))
     found = [f"{field.label} [{field.unit}]" if field.unit else field.label]
     found.append(f"{np.clip(time, motion.time_s[0], motion.time_s[-1]):.2f} s, {pressure + 0.0:.1f} kPa")
-    for touch in studies.touches(root):
-        force = float(np.interp(time, touch.time_s, touch.force_N))
-        found.append(f"{touch.name}: {force:.2f} N")
+    for contact in studies.contact_forces(root):
+        force = float(np.interp(time, contact.time_s, contact.force_N))
+        found.append(f"{contact.name}: {force:.2f} N")
     findings = studies.findings(root)
     if findings is None or findings.stale:
         found.append("stale: of other parameters")
@@ -71,7 +72,7 @@ def _draw() -> None:
         left = _beside_tools(context.area) + LEFT * scale
         if any(root.mu_motion.field in part.data.attributes for part in shown):
             _ramp(root, scale, left)
-        for line, text in enumerate(reversed(words(root, motion, context.scene))):
+        for line, text in enumerate(reversed(lines(root, motion, context.scene))):
             write(text, left, (BOTTOM + HEIGHT + 14) * scale + 1.5 * size * line, size)
     _names(context, root, motion, size)
 
@@ -119,7 +120,7 @@ def _names(context: Any, root: Any, motion: Any, size: int) -> None:
         at = part.matrix_world @ Vector((0.0, middle, 1.32 * top))
         place = location_3d_to_region_2d(context.region, context.region_data, at)
         if place is not None:
-            text = "Model A" if name == MODEL_A else name.replace("alpha", "α")
+            text = "Model A" if name == MODEL_A else path_symbol(name)
             text += ", print" if what == motion_parts.PRINT else ""
             blf.size(0, size)
             write(text, place.x - blf.dimensions(0, text)[0] / 2, place.y, size)

@@ -84,29 +84,29 @@ def update(root: Any) -> None:
     for text in [child for child in bar.children if child.get(LEGEND) == TICK]:
         remove_part(text)
     for value in legend.ticks(low, high):
-        _say(bar, TICK, f"{value:.4g}", (WIDTH + 0.02, (value - low) / (high - low)))
-    tell(root, bpy.context.scene)
+        _put_text(bar, TICK, f"{value:.4g}", (WIDTH + 0.02, (value - low) / (high - low)))
+    update_text(root, bpy.context.scene)
 
 
-def tell(root: Any, scene: Any) -> None:
+def update_text(root: Any, scene: Any) -> None:
     """Write the field's name, the frame's time and pressure, and what else the legend remarks."""
     bar, motion = bar_of(root), motion_parts.motion_of(root)
     if bar is not None and motion is not None:
-        _say(bar, HEAD, "\n".join(legend.words(root, motion, scene)), (0.0, 1.05))
+        _put_text(bar, HEAD, "\n".join(legend.lines(root, motion, scene)), (0.0, 1.05))
 
 
-def _say(bar: Any, what: str, words: str, place: tuple[float, float]) -> None:
-    """A text of the legend; all but ticks are there once."""
-    text = next((child for child in bar.children if child.get(LEGEND) == what and what != TICK), None)
-    if text is None:
-        text = _add(bar.parent, bar, what, bpy.data.curves.new("Legend Text", "FONT"))
+def _put_text(bar: Any, what: str, text: str, place: tuple[float, float]) -> None:
+    """Write a text of the legend; each but the ticks exists once."""
+    obj = next((child for child in bar.children if child.get(LEGEND) == what and what != TICK), None)
+    if obj is None:
+        obj = _add(bar.parent, bar, what, bpy.data.curves.new("Legend Text", "FONT"))
         # Not by its location: Blender would draw a line from there to the bar.
-        text.data.offset_x, text.data.offset_y = place
-        text.data.size = TEXT
-        text.data.align_y = "BOTTOM" if what == HEAD else "CENTER"
-        text.data.materials.append(materials.unlit("MU Legend Text"))
-    if text.data.body != words:
-        text.data.body = words
+        obj.data.offset_x, obj.data.offset_y = place
+        obj.data.size = TEXT
+        obj.data.align_y = "BOTTOM" if what == HEAD else "CENTER"
+        obj.data.materials.append(materials.unlit("MU Legend Text"))
+    if obj.data.body != text:
+        obj.data.body = text
 
 
 def _add(root: Any, parent: Any, what: str, data: Any) -> Any:
@@ -121,17 +121,19 @@ def _add(root: Any, parent: Any, what: str, data: Any) -> Any:
 @persistent
 def _before_frame(scene, *_):
     for root in unit_object.roots():
-        tell(root, scene)
+        update_text(root, scene)
 
 
 _HANDLERS = {"frame_change_pre": _before_frame}
 
 
 def register() -> None:
-    """The handler that writes time and pressure."""
+    """The handler that writes time and pressure, and the update when colours change."""
     handlers.add(_HANDLERS)
+    motion_parts.COLOURED.connect(update)
 
 
 def unregister() -> None:
-    """Take it out."""
+    """Take them out."""
+    motion_parts.COLOURED.disconnect(update)
     handlers.remove(_HANDLERS)

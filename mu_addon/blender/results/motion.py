@@ -30,6 +30,8 @@ from ...usecases.simulate_and_place.motion import (
 )
 from ..preview import arrays as preview
 from ..shared import handlers
+from ..shared.file_cache import FileCache
+from ..shared.updates import Signal
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from ..unit.object import MOTION
@@ -54,9 +56,12 @@ class Played:
     fields: dict[str, Any]
 
 
-_motions: dict[Path, tuple[float, Motion]] = {}
-_played: dict[tuple[Path, float, str, bool], Played] = {}
-"""By folder, its time, what is shown and whether it is cut; not of the printed body, which has its own."""
+COLOURED = Signal()
+"""Sent with the root whose motion was coloured anew."""
+
+_motions: FileCache[Motion] = FileCache()
+_played: dict[tuple[Path, str, bool], Played] = {}
+"""By folder, what is shown and whether it is cut; not of the printed body, which has its own."""
 
 
 def parts(root: Any) -> list[Any]:
@@ -83,18 +88,7 @@ def one(root: Any, name: str, what: str) -> Any:
 def motion_of(root: Any) -> Motion | None:
     """The motion in the unit's study folder, or None where there is none; read again when it changes."""
     folder = studies.folder_of(root)
-    try:
-        time = (folder / FOLDER / f"{MODEL_A}.npz").stat().st_mtime
-    except OSError:
-        return None
-    kept = _motions.get(folder)
-    if kept is None or kept[0] != time:
-        try:
-            kept = time, read_motion(folder)
-        except InputError:
-            return None
-        _motions[folder] = kept
-    return kept[1]
+    return _motions.read([folder / FOLDER / f"{MODEL_A}.npz"], lambda: read_motion(folder))
 
 
 def show(root: Any, name: str, what: str) -> None:
@@ -289,13 +283,14 @@ def played(root: Any, part: Any) -> Played | None:
     if body == PRINT:
         return _replayed(root, part, motion)
     cut = bool(root.mu_motion.cut and motion.halved)
-    key = motion.folder, _motions[motion.folder.parent][0], part[MOTION], cut
-    if key not in _played:
+    key = motion.folder, part[MOTION], cut
+    kept = _played.get(key)
+    if kept is None or kept.motion is not motion:
         try:
-            _played[key] = Played(motion, _fields_of(motion, name, body, motion.skin(body, cut)))
+            kept = _played[key] = Played(motion, _fields_of(motion, name, body, motion.skin(body, cut)))
         except InputError:
             return None
-    return _played[key]
+    return kept
 
 
 def _replayed(root: Any, part: Any, motion: Motion) -> Played | None:
@@ -327,10 +322,8 @@ def refresh(root: Any) -> None:
 
 def colour(root: Any) -> None:
     """Write the fields of the scene's frame, and their colours by the range as it is."""
-    from . import legend_object
-
     _write(root, bpy.context.scene)
-    legend_object.update(root)
+    COLOURED.send(root)
     field = root.mu_motion.field
     fields.paint(root, [(part, field in part.data.attributes) for part in parts(root)])
 

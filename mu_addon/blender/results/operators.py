@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ...errors import InputError
 from ...usecases.simulate_and_place.motion import FOLDER, MODEL_A
-from ..shared.acting import OnUnit, telling
+from ..shared.operators import UnitOperator, reports_errors
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from . import legend_object
@@ -16,7 +16,7 @@ from . import motion as motion_parts
 NO_MOTION = "No motion yet: simulate this unit first"
 
 
-class OnMotion(OnUnit):
+class MotionOperator(UnitOperator):
     """An operator on the active unit whose study holds a motion."""
 
     @classmethod
@@ -29,7 +29,7 @@ class OnMotion(OnUnit):
         return True
 
 
-class MU_OT_motion(OnMotion, bpy.types.Operator):
+class MU_OT_motion(MotionOperator, bpy.types.Operator):
     """Show this motion beside the unit, or take it away: Model A or a sensor path, as mesh or as print"""
 
     bl_idname = "mu.motion"
@@ -57,7 +57,7 @@ class MU_OT_motion(OnMotion, bpy.types.Operator):
         default=True,
     )
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         motion = motion_parts.motion_of(root)
@@ -80,7 +80,7 @@ class MU_OT_motion(OnMotion, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_motion_clear(OnUnit, bpy.types.Operator):
+class MU_OT_motion_clear(UnitOperator, bpy.types.Operator):
     """Take every motion of this unit out of the scene; the study's files stay"""
 
     bl_idname = "mu.motion_clear"
@@ -95,14 +95,14 @@ class MU_OT_motion_clear(OnUnit, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_motion_update(OnMotion, bpy.types.Operator):
+class MU_OT_motion_update(MotionOperator, bpy.types.Operator):
     """Build what is shown again from the study's files, after another simulation"""
 
     bl_idname = "mu.motion_update"
     bl_label = "Update Motion"
     bl_options = {"REGISTER", "UNDO"}
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         motion_parts.rebuild(root)
@@ -110,7 +110,7 @@ class MU_OT_motion_update(OnMotion, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_motion_range(OnMotion, bpy.types.Operator):
+class MU_OT_motion_range(MotionOperator, bpy.types.Operator):
     """Fit the range of the colours to the field over the whole motion"""
 
     bl_idname = "mu.motion_range"
@@ -124,7 +124,7 @@ class MU_OT_motion_range(OnMotion, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_motion_legend(OnMotion, bpy.types.Operator):
+class MU_OT_motion_legend(MotionOperator, bpy.types.Operator):
     """Stand the legend in the scene beside the unit, where renders see it, or take it away"""
 
     bl_idname = "mu.motion_legend"
@@ -133,14 +133,14 @@ class MU_OT_motion_legend(OnMotion, bpy.types.Operator):
 
     on: BoolProperty(name="Show", description="Show it, or take it away", default=True)
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         legend_object.show(root) if self.on else legend_object.hide(root)
         return {"FINISHED"}
 
 
-class MU_OT_picture(OnUnit, bpy.types.Operator):
+class MU_OT_picture(UnitOperator, bpy.types.Operator):
     """Open a picture of the study in an image editor of its own"""
 
     bl_idname = "mu.picture"
@@ -149,7 +149,7 @@ class MU_OT_picture(OnUnit, bpy.types.Operator):
 
     name: StringProperty(name="Picture", description="Name of its file in the study's folder")
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         path = studies.folder_of(root) / FOLDER / self.name

@@ -1,4 +1,4 @@
-"""Results on the model: which motion is shown, what its colours say, and the study's pictures."""
+"""The panel Results: angles, ranking and contact forces; motion, colours and pictures below it."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ import bpy
 
 from ...usecases.simulate_and_place.motion import FOLDER, MODEL_A
 from ...usecases.simulate_and_place.panel_pictures import ANGLE, delta_name
+from ..shared.panels import UnitPanel, alert, wrapped
+from ..shared.texts import path_symbol
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
-from ..unit.panel import OfUnit, wrapped
 from . import fields, legend_object, thumbnails
 from . import motion as motion_parts
 from .operators import NO_MOTION
@@ -19,7 +20,60 @@ PICTURE = 13.0
 """Side of a picture, in heights of a button."""
 
 
-class _OfResults(OfUnit):
+class MU_PT_results(UnitPanel, bpy.types.Panel):
+    """What the study has found"""
+
+    bl_idname = "MU_PT_results"
+    bl_label = "Results"
+
+    def show(self, layout, context, root):
+        found = studies.findings(root)
+        if found is None:
+            wrapped(layout, "Nothing simulated yet", "INFO")
+            return
+        if found.stale:
+            alert(layout, "Stale: these results belong to other parameters. Simulate again")
+        if found.status != "complete":
+            wrapped(layout, f"The run is {found.status or 'not finished'}", "INFO")
+        if found.quick:
+            wrapped(layout, "A quick look: linear elements lock, so that angles come out too small", "ERROR")
+        column = layout.column(align=True)
+        column.active = not found.stale
+        for pressure, angle in found.angles:
+            if pressure in (found.angles[0][0], found.angles[-1][0]):
+                column.label(text=f"{angle:+.1f} deg at {pressure:g} kPa")
+        for contact in studies.contact_forces(root):
+            most = int(contact.force_N.argmax())
+            words = (
+                f"{contact.force_N[most]:.2f} N at {contact.time_s[most]:.1f} s"
+                if contact.force_N[most]
+                else "not met"
+            )
+            column.label(text=f"{contact.name}: {words}", icon="CUBE")
+        ranking = found.ranking(found.rule)
+        if ranking:
+            best, j = ranking[0]
+            tied = (found.summary.get("tied_with_chosen") or {}).get(found.rule) or []
+            column.label(text=f"Best path {best}, J {j:.4f} mm")
+            if tied:
+                column.label(text=f"tied with {', '.join(tied)}")
+            if root.mu_unit.path == best:
+                column.label(text="It is the chosen one", icon="CHECKMARK")
+            elif not found.stale:
+                layout.operator("mu.path", text=f"Use {best}", icon="CON_FOLLOWPATH").name = best
+        search = found.summary.get("search")
+        if search:
+            best = search["best"]
+            column.label(text=f"Whole lattice: {best['name']}, J {best['J_hat_mm']:.4f} mm")
+            column.label(
+                text=f"{best['length_mm']:.0f} mm long, {search['checked']} of {search['paths']} solved"
+            )
+        row = layout.row(align=True)
+        row.operator("mu.open", text="Report", icon="URL").what = "report"
+        row.operator("mu.open", text="Folder", icon="FILE_FOLDER").what = "folder"
+
+
+class _OfResults(UnitPanel):
     bl_parent_id = "MU_PT_results"
     bl_options: ClassVar[set[str]] = set()
 
@@ -40,7 +94,7 @@ class MU_PT_motion(_OfResults, bpy.types.Panel):
             layout.label(text=title)
             grid = layout.grid_flow(columns=4, align=True, even_columns=True, row_major=True)
             for name in (MODEL_A, *motion.paths):
-                text = "A" if name == MODEL_A else name.replace("alpha", "α")
+                text = "A" if name == MODEL_A else path_symbol(name)
                 there = (name, what) in on
                 button = grid.operator("mu.motion", text=text, depress=there)
                 button.name, button.what, button.on = name, what, not there
@@ -121,16 +175,7 @@ class MU_PT_pictures(_OfResults, bpy.types.Panel):
             wrapped(layout, "Choose a sensor path to see its deviation", "INFO")
 
 
-CLASSES = (MU_PT_motion, MU_PT_field, MU_PT_pictures)
+CLASSES = (MU_PT_results, MU_PT_motion, MU_PT_field, MU_PT_pictures)
 
 
-def register() -> None:
-    """The panels under Results."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Take them out."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -3,10 +3,11 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ...errors import MuError
-from ..unit import live_update as live
+from ..shared import viewports
+from ..shared.registration import property_group_factory
 from . import fields
 from . import motion as motion_parts
 
@@ -14,12 +15,12 @@ from . import motion as motion_parts
 def _again(settings, context):
     """The field or its range changed: colours follow."""
     motion_parts.refresh(settings.id_data)
-    live.redraw()
+    viewports.redraw()
 
 
 def _range(settings, context):
     motion_parts.colour(settings.id_data)
-    live.redraw()
+    viewports.redraw()
 
 
 def _surface(settings, context):
@@ -87,18 +88,9 @@ class MU_PG_motion(bpy.types.PropertyGroup):
         default=True,
         update=_again,
     )
-    trouble: bpy.props.StringProperty(
+    trouble: StringProperty(
         name="Trouble", description="Why the motion could not be shown anew", options={"HIDDEN"}
     )
 
 
-def register():
-    """The class and the property on objects."""
-    bpy.utils.register_class(MU_PG_motion)
-    bpy.types.Object.mu_motion = PointerProperty(type=MU_PG_motion)
-
-
-def unregister():
-    """Take them out; values stay in the file."""
-    del bpy.types.Object.mu_motion
-    bpy.utils.unregister_class(MU_PG_motion)
+register, unregister = property_group_factory(bpy.types.Object, "mu_motion", (MU_PG_motion,))

@@ -1,4 +1,4 @@
-"""Pictures of a study as previews that a panel can draw, loaded when they change."""
+"""Pictures of a study as previews that a panel can draw, loaded again when they change."""
 
 from __future__ import annotations
 
@@ -7,22 +7,20 @@ from typing import Any
 
 import bpy.utils.previews
 
+from ..shared.file_cache import FileCache
+
 _previews: Any = None
-_times: dict[str, float] = {}
+_icons: FileCache[int] = FileCache()
 
 
 def icon_of(path: Path) -> int | None:
     """Number of a picture's preview, to be drawn by `template_icon`; None where there is no such file."""
-    try:
-        time = path.stat().st_mtime
-    except OSError:
-        return None
-    name = str(path)
-    if _times.get(name) != time:
-        _previews.pop(name, None)
-        _previews.load(name, name, "IMAGE", force_reload=True)
-        _times[name] = time
-    return int(_previews[name].icon_id)
+    return _icons.read([path], lambda: _load(str(path)))
+
+
+def _load(name: str) -> int:
+    _previews.pop(name, None)
+    return int(_previews.load(name, name, "IMAGE", force_reload=True).icon_id)
 
 
 def register() -> None:
@@ -36,4 +34,4 @@ def unregister() -> None:
     global _previews
     bpy.utils.previews.remove(_previews)
     _previews = None
-    _times.clear()
+    _icons.clear()

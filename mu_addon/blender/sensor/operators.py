@@ -5,22 +5,23 @@
 from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import BoolProperty, StringProperty
 
 from ...errors import InputError
-from ..results.operators import OnMotion
-from ..shared.acting import RUN_FILES, CancelsJob, DismissesJob, OnUnit, OpensFile, telling
-from ..simulate import state as simulation
+from ..jobs.operators import FILES, RUN_FILES, job_operators
+from ..results.operators import MotionOperator
+from ..shared import viewports
+from ..shared.operators import UnitOperator, reports_errors
 from ..simulate import study_folder as studies
-from ..unit import live_update as live
 from ..unit import object as unit_object
 from . import state as sensor
 from . import twin
+from .session import Guide
 
 NOT_CONNECTED = "Connect the sensor first"
 
 
-class OnSession(OnUnit):
+class SessionOperator(UnitOperator):
     """An operator on the active unit whose sensor is connected."""
 
     @classmethod
@@ -41,14 +42,14 @@ class MU_OT_sensor_ports(bpy.types.Operator):
     bl_label = "Find Ports"
     bl_options = {"REGISTER"}
 
-    @telling
+    @reports_errors
     def execute(self, context):
         found = sensor.find_ports()
         self.report({"INFO"}, f"{len(found)} serial port(s)" if found else "No serial port is there")
         return {"FINISHED"}
 
 
-class MU_OT_sensor_port(OnUnit, bpy.types.Operator):
+class MU_OT_sensor_port(UnitOperator, bpy.types.Operator):
     """Take this port"""
 
     bl_idname = "mu.sensor_port"
@@ -62,7 +63,7 @@ class MU_OT_sensor_port(OnUnit, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_sensor_connect(OnUnit, bpy.types.Operator):
+class MU_OT_sensor_connect(UnitOperator, bpy.types.Operator):
     """Read the sensor in a process of its own; every sample is on disk before it is shown"""
 
     bl_idname = "mu.sensor_connect"
@@ -82,18 +83,18 @@ class MU_OT_sensor_connect(OnUnit, bpy.types.Operator):
             return False
         return True
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         settings = root.mu_sensor
         if settings.source == "replay" and not settings.replay:
             raise InputError("no recording is chosen", "Recording", "choose the folder of one")
         sensor.connect(root)
-        live.redraw()
+        viewports.redraw()
         return {"FINISHED"}
 
 
-class MU_OT_sensor_disconnect(OnUnit, bpy.types.Operator):
+class MU_OT_sensor_disconnect(UnitOperator, bpy.types.Operator):
     """End the session: the port is free, and the recording whole"""
 
     bl_idname = "mu.sensor_disconnect"
@@ -111,7 +112,7 @@ class MU_OT_sensor_disconnect(OnUnit, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_sensor_pause(OnSession, bpy.types.Operator):
+class MU_OT_sensor_pause(SessionOperator, bpy.types.Operator):
     """Give the port to another program, for firmware say, or take it again; the session goes on"""
 
     bl_idname = "mu.sensor_pause"
@@ -124,7 +125,7 @@ class MU_OT_sensor_pause(OnSession, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_sensor_mark(OnSession, bpy.types.Operator):
+class MU_OT_sensor_mark(SessionOperator, bpy.types.Operator):
     """Leave words in the recording, at this moment"""
 
     bl_idname = "mu.sensor_mark"
@@ -143,7 +144,7 @@ class MU_OT_sensor_mark(OnSession, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_sensor_freeze(OnUnit, bpy.types.Operator):
+class MU_OT_sensor_freeze(UnitOperator, bpy.types.Operator):
     """Have the plot stand still, to read it, or go on; recording goes on in any case"""
 
     bl_idname = "mu.sensor_freeze"
@@ -155,11 +156,11 @@ class MU_OT_sensor_freeze(OnUnit, bpy.types.Operator):
         if session is None or session.traces is None:
             return {"CANCELLED"}
         session.frozen = session.traces.copy() if session.frozen is None else None
-        live.redraw()
+        viewports.redraw()
         return {"FINISHED"}
 
 
-class MU_OT_sensor_channel(OnUnit, bpy.types.Operator):
+class MU_OT_sensor_channel(UnitOperator, bpy.types.Operator):
     """Draw this channel, or leave it out of the plot"""
 
     bl_idname = "mu.sensor_channel"
@@ -175,7 +176,7 @@ class MU_OT_sensor_channel(OnUnit, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_sensor_sweep(OnSession, bpy.types.Operator):
+class MU_OT_sensor_sweep(SessionOperator, bpy.types.Operator):
     """Calibrate step by step: hold the unit at angles to and fro; a map is fitted after the last one"""
 
     bl_idname = "mu.sensor_sweep"
@@ -186,25 +187,25 @@ class MU_OT_sensor_sweep(OnSession, bpy.types.Operator):
         name="Begin", description="Begin a sweep, or give it up", default=True, options={"SKIP_SAVE"}
     )
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         session = sensor.of(root)
         if not self.on:
             session.guide = None
             return {"FINISHED"}
-        if sensor.calibrating(root) in simulation.running():
+        if sensor.CALIBRATION.is_running(root):
             raise InputError("a calibration is running", remedy="wait for it, or cancel it")
-        angles = sensor.sweep(root.mu_sensor)
+        angles = sensor.sweep_angles(root.mu_sensor)
         if len(set(angles)) < 3:
             raise InputError(
                 f"a sweep over {len(set(angles))} angle(s)", remedy="take a smaller step or a wider range"
             )
-        session.guide = sensor.Guide(angles)
+        session.guide = Guide(angles)
         return {"FINISHED"}
 
 
-class MU_OT_sensor_hold(OnSession, bpy.types.Operator):
+class MU_OT_sensor_hold(SessionOperator, bpy.types.Operator):
     """The unit is at this angle: keep it there while it is read"""
 
     bl_idname = "mu.sensor_hold"
@@ -229,11 +230,11 @@ class MU_OT_sensor_hold(OnSession, bpy.types.Operator):
 
     def execute(self, context):
         sensor.hold(sensor.of(unit_object.active_root(context)))
-        live.redraw()
+        viewports.redraw()
         return {"FINISHED"}
 
 
-class MU_OT_sensor_calibrate(OnUnit, bpy.types.Operator):
+class MU_OT_sensor_calibrate(UnitOperator, bpy.types.Operator):
     """Calibrate from a recording with angles marked, or from measured data, in a process of its own"""
 
     bl_idname = "mu.sensor_calibrate"
@@ -247,7 +248,7 @@ class MU_OT_sensor_calibrate(OnUnit, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         data = self.data or root.mu_sensor.data
@@ -256,45 +257,26 @@ class MU_OT_sensor_calibrate(OnUnit, bpy.types.Operator):
                 "no folder is chosen", "Sweeps", "choose a recording with marks, or measured data"
             )
         sensor.calibrate(root, Path(bpy.path.abspath(data)))
-        live.redraw()
+        viewports.redraw()
         return {"FINISHED"}
 
 
-class MU_OT_sensor_cancel(CancelsJob, bpy.types.Operator):
-    """Stop calibrating; the calibration that was there stays"""
-
-    bl_idname = "mu.sensor_cancel"
-    bl_label = "Cancel"
-    bl_options = {"REGISTER"}
-    idle = "Nothing is being calibrated"
-    job_of = staticmethod(sensor.calibrating)
-
-
-class MU_OT_sensor_dismiss(DismissesJob, bpy.types.Operator):
-    """Take the message of an ended calibration off the panel"""
-
-    bl_idname = "mu.sensor_dismiss"
-    bl_label = "Dismiss"
-    bl_options = {"REGISTER"}
-    job_of = staticmethod(sensor.calibrating)
-
-
-class MU_OT_sensor_zero(OnSession, bpy.types.Operator):
+class MU_OT_sensor_zero(SessionOperator, bpy.types.Operator):
     """Say at which angle the unit is now, to make up for light that grew weaker or stronger"""
 
     bl_idname = "mu.sensor_zero"
     bl_label = "Zero"
     bl_options = {"REGISTER"}
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         sensor.zero(root, root.mu_sensor.known_deg)
-        live.redraw()
+        viewports.redraw()
         return {"FINISHED"}
 
 
-class MU_OT_sensor_twin(OnMotion, bpy.types.Operator):
+class MU_OT_sensor_twin(MotionOperator, bpy.types.Operator):
     """Show the simulated unit bending as the sensor says, beside the design, or take it away"""
 
     bl_idname = "mu.sensor_twin"
@@ -303,34 +285,19 @@ class MU_OT_sensor_twin(OnMotion, bpy.types.Operator):
 
     on: BoolProperty(name="Show", description="Show it, or take it away", default=True)
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         twin.show(root) if self.on else twin.hide(root)
         return {"FINISHED"}
 
 
-class MU_OT_sensor_open(OpensFile, bpy.types.Operator):
-    """Open what was recorded, or how it was calibrated"""
-
-    bl_idname = "mu.sensor_open"
-    bl_label = "Open"
-    bl_options = {"REGISTER"}
-    first = "connect, or calibrate"
-
-    what: EnumProperty(
-        name="What",
-        description="Which file or folder; a report, log or errors of the latest calibration",
-        items=[("recording", "Recording", "Folder of the recording"), *RUN_FILES[:3]],
-    )
-
-    def path_of(self, root):
-        """The file or folder that `what` stands for."""
-        session, folder = sensor.of(root), studies.folder_of(root)
-        if self.what == "recording":
-            return session.watched.folder if session else folder / sensor.RECORDINGS
-        made = folder / sensor.CALIBRATIONS
-        return max(made.glob("*/"), default=made) / studies.FILES[self.what]
+def _path_of(root, what):
+    """The file or folder that `what` stands for."""
+    session = sensor.of(root)
+    if what == "recording":
+        return session.watched.folder if session else studies.folder_of(root) / sensor.RECORDINGS
+    return sensor.latest_calibration(root) / FILES[what]
 
 
 CLASSES = (
@@ -345,11 +312,17 @@ CLASSES = (
     MU_OT_sensor_sweep,
     MU_OT_sensor_hold,
     MU_OT_sensor_calibrate,
-    MU_OT_sensor_cancel,
-    MU_OT_sensor_dismiss,
     MU_OT_sensor_zero,
     MU_OT_sensor_twin,
-    MU_OT_sensor_open,
+    *job_operators(
+        sensor.CALIBRATION,
+        "sensor_",
+        "calibration",
+        kept="the previous calibration stays in use",
+        first="connect, or calibrate",
+        items=[("recording", "Recording", "Folder of the recording"), *RUN_FILES[:3]],
+        path_of=_path_of,
+    ),
 )
 
 

@@ -9,9 +9,9 @@ import bpy
 
 from ...run.child import FAILED
 from ...sensing.session import LOSSES
-from ..simulate import state as simulation
+from ..jobs.panel import job_state
+from ..shared.panels import UnitPanel, large_button, wrapped
 from ..simulate import study_folder as studies
-from ..unit.panel import OfUnit, told, wrapped
 from . import state as sensor
 from . import twin
 
@@ -26,7 +26,7 @@ STATES = {
 }
 
 
-class MU_PT_sensor(OfUnit, bpy.types.Panel):
+class MU_PT_sensor(UnitPanel, bpy.types.Panel):
     """The real sensor: connect, record, calibrate, and bend the twin by it"""
 
     bl_idname = "MU_PT_sensor"
@@ -65,9 +65,7 @@ def _source(layout, settings):
     elif settings.source == "replay":
         layout.prop(settings, "replay")
         layout.prop(settings, "speed")
-    row = layout.row()
-    row.scale_y = 1.4
-    row.operator("mu.sensor_connect", icon="LINKED")
+    large_button(layout, "mu.sensor_connect", "LINKED")
 
 
 def _session(layout, settings, session):
@@ -169,7 +167,7 @@ def _calibration(layout, root, session):
     body.prop(settings, "channel", placeholder=light)
     body.prop(settings, "dark", placeholder=str(dark))
     body.prop(settings, "calibration")
-    told(body, simulation.of(sensor.calibrating(root)), "it is applied", "sensor_")
+    job_state(body, sensor.CALIBRATION.child(root), "it is applied", "sensor_")
     guide = session.guide if session is not None and session.running else None
     if guide is None:
         column = body.column(align=True)
@@ -196,8 +194,8 @@ def _guide(layout, guide):
         wrapped(box, f"Bend to {angle:g}°, hold it there, then press", "FORWARD")
     row = box.row()
     row.scale_y = 1.6
-    said = f"It Is at {guide.angles[guide.held]:g}°" if guide.held < len(guide.angles) else "Done"
-    row.operator("mu.sensor_hold", text=said, icon="PINNED")
+    text = f"It Is at {guide.angles[guide.held]:g}°" if guide.held < len(guide.angles) else "Done"
+    row.operator("mu.sensor_hold", text=text, icon="PINNED")
     box.progress(factor=guide.held / len(guide.angles), text=f"{guide.held} of {len(guide.angles)}")
     box.operator("mu.sensor_sweep", text="Give Up", icon="CANCEL").on = False
 
@@ -212,7 +210,7 @@ def _twin(layout, root):
         "mu.sensor_twin", text="Hide Twin" if on else "Show Twin", icon="MOD_SIMPLEDEFORM", depress=on
     ).on = not on
     if on:
-        state, words = twin.said(root)
+        state, words = twin.status(root)
         if state == twin.OUTSIDE:
             body.alert = True
         wrapped(body, words, {twin.LIVE: "CHECKMARK", twin.OUTSIDE: "ERROR"}.get(state, "INFO"))
@@ -221,11 +219,7 @@ def _twin(layout, root):
             wrapped(body, "It moves as a unit of other parameters: simulate again", "ERROR")
 
 
-def register() -> None:
-    """The panel."""
-    bpy.utils.register_class(MU_PT_sensor)
+CLASSES = (MU_PT_sensor,)
 
 
-def unregister() -> None:
-    """The panel."""
-    bpy.utils.unregister_class(MU_PT_sensor)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -1,7 +1,7 @@
 """The sensor's last seconds, drawn over the viewport: its angle with the 95 % band, and its channels.
 
-Every column of pixels shows the extremes of the samples that fall into it, see `study.traces`; what is drawn
-does not grow with the sensor's rate. It is drawn with the viewport and is not part of a render.
+Every column of pixels shows the extremes of the samples that fall into it, see `usecases.sensor.traces`; what
+is drawn does not grow with the sensor's rate. It is drawn with the viewport and is not part of a render.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from ..shared.overlay import Overlay
 from ..unit import object as unit_object
 from . import state as sensor
 from . import twin
+from .session import Session
 
 COLOURS = (
     (1.0, 0.58, 0.15, 1.0),
@@ -57,7 +58,7 @@ def _draw() -> None:
         _plot(context, root.mu_sensor, session, traces, scale)
 
 
-def shown(settings: Any, session: sensor.Session) -> list[tuple[int, str]]:
+def shown(settings: Any, session: Session) -> list[tuple[int, str]]:
     """Number and name of the channels that are drawn."""
     hidden = settings.hidden.split(",")
     return [(k, name) for k, name in enumerate(session.channels) if name not in hidden]
@@ -73,7 +74,7 @@ def room(context: Any, scale: float) -> tuple[float, float]:
     return left + 40 * scale, min(width - RIGHT * scale, left + WIDEST * scale)
 
 
-def _plot(context: Any, settings: Any, session: sensor.Session, traces: Any, scale: float) -> None:
+def _plot(context: Any, settings: Any, session: Session, traces: Any, scale: float) -> None:
     left, right = room(context, scale)
     if right - left < 100 * scale:
         return
@@ -174,7 +175,7 @@ def _shape(kind: str, points: Any, colour: Any) -> None:
 
 
 def _over_twin(context: Any, root: Any, scale: float) -> None:
-    """What the twin says, above it: in red where the signal cannot be."""
+    """The twin's state above it: in red where the signal is out of range."""
     part = twin.parts(root)[0]
     if not part.visible_get():
         return
@@ -185,7 +186,7 @@ def _over_twin(context: Any, root: Any, scale: float) -> None:
     place = location_3d_to_region_2d(context.region, context.region_data, at)
     if place is None:
         return
-    state, words = twin.said(root)
+    state, words = twin.status(root)
     title = "Twin: OUT OF RANGE" if state == twin.OUTSIDE else "Twin"
     colour = WARNING if state == twin.OUTSIDE else TEXT
     size = round(12 * scale)

@@ -5,266 +5,49 @@ unit's study folder. So undo, loading a file and a render leave the session alon
 Blender, whose end it notices at its standard input.
 """
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+from __future__ import annotations
 
-import importlib.util
 import time
 from pathlib import Path
 from typing import Any
 
-import attrs
 import bpy
-import numpy as np
 from bpy.app.handlers import persistent
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from ...errors import InputError, MuError
-from ...run.child import DONE, FAILED, RUNNING, Child
-from ...sensing.recording import FIXED
-from ...usecases.sensor.traces import Traces
+from ...run.child import DONE, FAILED, RUNNING
 from ...usecases.sensor.watch import Watched
-from ..shared import handlers
-from ..simulate import state as simulation
+from ..jobs import start_child
+from ..jobs.start_child import JobKind
+from ..shared import handlers, viewports
+from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
-from ..unit.properties import BESIDE_BLEND_FILE
 from . import twin
+from .session import Session
 
+NEEDED = ("serial", "scipy")
+"""Modules that a sensor cannot do without."""
 INTERVAL_S = 1 / 60
 TWIN_S = 1 / 30
 """Seconds between poses of the twin, each of which moves every vertex."""
-BINS = 600
-"""Steps of time across the plot."""
-MEAN_S = 0.1
-"""The twin and the figures follow the mean of that long: noise goes, a bend of 2 Hz stays."""
 SILENT_S = 3.0
-"""A session that has not said anything for so long is told of as not answering."""
+"""A session without a new status for so long is shown as not answering."""
 HOLD_S = 1.2
 """How long each angle of a guided sweep is held: a little more than what calibration reads."""
 RECORDINGS, CALIBRATIONS, IN_USE = "recordings", "sensor", "calibration.toml"
-ANGLES = ("angle_deg", "angle_low_deg", "angle_high_deg")
-
-
-def _ports(group, context, typed):
-    return [pair for pair in _found_ports if typed.lower() in " ".join(pair).lower()]
-
-
-def _channels(group, context, typed):
-    session = of(group.id_data)
-    return [name for name in (session.channels if session else ()) if typed.lower() in name.lower()]
-
-
-def _again(group, context):
-    session = of(group.id_data)
-    if session is not None:
-        session.traces = None
-
-
-class MU_PG_sensor(bpy.types.PropertyGroup):
-    """How a unit's sensor is connected, calibrated and shown."""
-
-    source: EnumProperty(
-        name="From",
-        description="Where the samples come from",
-        items=[
-            ("port", "Serial Port", "The sensor at a port of this computer"),
-            ("simulated", "Simulated", "A sensor that is not there, bending by 45 degrees every 8 s"),
-            ("replay", "Recording", "A recording as if it came from the sensor"),
-        ],
-    )
-    port: StringProperty(
-        name="Port",
-        description="A port's device, or usb:VID:PID[:SERIAL], which finds it in any socket. Empty: the only "
-        "USB port",
-        search=_ports,
-        search_options={"SUGGESTION"},
-    )
-    baud: IntProperty(name="Baud", description="Bits a second", default=115200, min=300)
-    replay: StringProperty(
-        name="Recording",
-        description="Folder of the recording to play",
-        subtype="DIR_PATH",
-        options=BESIDE_BLEND_FILE,
-    )
-    speed: FloatProperty(
-        name="Speed", description="Times as fast as it was", default=1.0, min=0.01, max=100.0
-    )
-    channel: StringProperty(
-        name="Light",
-        description="Channel of the light. Empty: the first whose name begins with light, or the first",
-        search=_channels,
-        search_options={"SUGGESTION"},
-    )
-    dark: StringProperty(
-        name="Dark",
-        description="Channel of the dark level, or volts. Empty: the first whose name begins with dark, or 0",
-        search=_channels,
-        search_options={"SUGGESTION"},
-    )
-    calibration: StringProperty(
-        name="Calibration",
-        description="A calibration.toml. Empty: the one that was made for this unit",
-        subtype="FILE_PATH",
-        options=BESIDE_BLEND_FILE,
-    )
-    data: StringProperty(
-        name="Sweeps",
-        description="Folder of a recording with angles marked, or of measured data",
-        subtype="DIR_PATH",
-        options=BESIDE_BLEND_FILE,
-    )
-    plot: BoolProperty(name="Plot", description="Draw the signal in the viewport", default=True)
-    seconds: FloatProperty(
-        name="Seconds",
-        description="How much of the past the plot shows",
-        default=10.0,
-        min=1.0,
-        max=600.0,
-        update=_again,
-    )
-    hidden: StringProperty(options={"HIDDEN"})
-    sweep_from: FloatProperty(name="From (deg)", description="Where a sweep begins and ends", default=0.0)
-    sweep_to: FloatProperty(name="To (deg)", description="Where a sweep turns", default=45.0)
-    sweep_step: FloatProperty(
-        name="Step (deg)", description="From one angle held to the next", default=15.0, min=0.5
-    )
-    sweep_times: IntProperty(
-        name="Times", description="How often to and fro: two show how well it repeats", default=2, min=2
-    )
-    known_deg: FloatProperty(name="Angle (deg)", description="The angle at which the unit is held now")
-
-
-@attrs.define(eq=False)
-class Reading:
-    """What the sensor says now: means of the last moment, in V and degrees.
-
-    light_V: without its dark level; possible: whether the calibration can give such a voltage.
-    """
-
-    light_V: float
-    angle_deg: float = np.nan
-    low_deg: float = np.nan
-    high_deg: float = np.nan
-    possible: bool = True
-
-
-@attrs.define(eq=False)
-class Guide:
-    """A guided sweep: angles to hold in their order, how many were, and until when the present one is."""
-
-    angles: list[float]
-    held: int = 0
-    until: float = 0.0
-
-    @property
-    def holding(self) -> bool:
-        """Whether an angle is being held now."""
-        return time.monotonic() < self.until
-
-    @property
-    def finished(self) -> bool:
-        """Whether every angle was held."""
-        return self.held == len(self.angles) and not self.holding
-
-
-@attrs.define(eq=False)
-class Session:
-    """A unit's session, running or ended, and what of it is shown."""
-
-    child: Child
-    watched: Watched
-    traces: Traces | None = None
-    """Channels and angles over the last seconds; None until the channels are known, or to begin anew."""
-    frozen: Traces | None = None
-    """What the plot shows while it stands still."""
-    ranges: dict[str, tuple[float, float]] = attrs.field(factory=dict)
-    reading: Reading | None = None
-    guide: Guide | None = None
-    trouble: str = ""
-    """Why the calibration cannot read this stream."""
-    _shown: tuple[Any, ...] = ()
-    read_at: float = 0.0
-
-    @property
-    def running(self) -> bool:
-        """Whether its process is."""
-        return self.child.state == RUNNING
-
-    @property
-    def state(self) -> str:
-        """connected, searching, waiting, disconnected, paused or ended, as it said last."""
-        return str(self.watched.status.get("state", "starting"))
-
-    @property
-    def fresh(self) -> bool:
-        """Whether samples are coming."""
-        return self.running and self.watched.starved_s < 1.0
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Names of what the sensor measures."""
-        return self.watched.columns[len(FIXED) :]
-
-    def look(self, calibration: Any, seconds: float) -> bool:
-        """Take in what has come; returns whether it said how it goes. Never waits."""
-        was_running = self.running
-        self.child.poll()
-        said = self.watched.look() or was_running != self.running
-        if self.channels and (self.traces is None or self._shown != (self.channels, calibration)):
-            self._shown = self.channels, calibration
-            self.traces = Traces(len(self.channels) + len(ANGLES), seconds, BINS)
-            self.ranges.clear()
-            self.watched.rewind()
-        rows = self.watched.fresh()
-        if len(rows) and self.traces is not None:
-            values = rows[:, len(FIXED) :]
-            self.traces.add(rows[:, 0], np.column_stack([values, self._angles(values, calibration)]))
-        return said
-
-    def _angles(self, values: Any, calibration: Any) -> Any:
-        """Angle and its band (n, 3) in degrees, nan without a calibration that reads these channels."""
-        self.trouble = ""
-        if calibration is not None:
-            try:
-                return np.column_stack(calibration.angle_of(_light(calibration, self.channels, values))[:3])
-            except InputError as error:
-                self.trouble = str(error)
-        return np.full((len(values), len(ANGLES)), np.nan)
-
-    def read(self, calibration: Any, channel: str, dark: str | float) -> None:
-        """Take the mean of the last moment as the reading, with a calibration's angle where there is one."""
-        rate = float(self.watched.status.get("rate_hz") or 0.0)
-        rows = self.watched.latest(max(1, int(MEAN_S * rate)))
-        self.reading = None
-        if not len(rows) or channel not in self.channels:
-            return
-        mean = rows[:, len(FIXED) :].mean(axis=0, keepdims=True)
-        if calibration is None or self.trouble:
-            level = mean[0, self.channels.index(dark)] if dark in self.channels else dark
-            self.reading = Reading(float(mean[0, self.channels.index(channel)]) - float(level))
-            return
-        light = _light(calibration, self.channels, mean)
-        angle, low, high, possible = (float(part[0]) for part in calibration.angle_of(light))
-        self.reading = Reading(float(light[0]), angle, low, high, bool(possible))
-
-
-def _light(calibration: Any, channels: tuple[str, ...], values: Any) -> Any:
-    # Where it is used: it brings scipy, which a Blender without the wheels lacks.
-    from ...sensing.calibration import light_of
-
-    return light_of(calibration, channels, values)
 
 
 _sessions: dict[str, Session] = {}
 _calibrating: dict[str, Path] = {}
-"""Folders of the calibrations that run, by unit."""
-_read: dict[Path, tuple[int, Any, str]] = {}
+"""Folders of the calibrations that run, by the key of the job."""
+_calibrations: FileCache[tuple[Any, str]] = FileCache()
 _found_ports: list[tuple[str, str]] = []
 _rendering = False
 
 
 def missing() -> list[str]:
     """Names of the modules that a sensor needs and this Blender does not find."""
-    return [name for name in ("serial", "scipy") if importlib.util.find_spec(name) is None]
+    return start_child.missing(NEEDED)
 
 
 def of(root: Any) -> Session | None:
@@ -296,7 +79,7 @@ def connect(root: Any) -> Session:
     before = _sessions.get(uuid)
     if before is not None and before.running:
         raise InputError("this unit's sensor is connected already", str(before.watched.folder), "disconnect")
-    folder = _unused(studies.settle(root) / RECORDINGS)
+    folder = _unused(studies.assign_folder(root) / RECORDINGS)
     if settings.source == "replay":
         words = ["replay", bpy.path.abspath(settings.replay), "--speed", f"{settings.speed:g}"]
     else:
@@ -308,8 +91,7 @@ def connect(root: Any) -> Session:
     line = [*words, "--out", str(folder), "--controlled", "--json"]
     if before is not None:
         before.watched.close()
-    environment = simulation.environment()
-    child = Child(simulation.of_worker(line), folder / "blender", environment, ends_with_parent=True)
+    child = start_child.start(line, folder, ends_with_parent=True)
     _sessions[uuid] = Session(child, Watched(folder))
     _tick()
     return _sessions[uuid]
@@ -355,40 +137,39 @@ def calibration_file(root: Any) -> Path:
 def calibration(root: Any) -> tuple[Any, str]:
     """The unit's calibration or None, and why there is none; read again only when its file changes."""
     path = calibration_file(root)
+    known = _calibrations.read([path], lambda: _read_calibration(path))
+    return known or (None, f"There is no {path}" if root.mu_sensor.calibration else "")
+
+
+def _read_calibration(path: Path) -> tuple[Any, str]:
+    from ...sensing.calibration import read_calibration
+
     try:
-        changed = path.stat().st_mtime_ns
-    except OSError:
-        return None, f"There is no {path}" if root.mu_sensor.calibration else ""
-    kept = _read.get(path)
-    if kept is None or kept[0] != changed:
-        from ...sensing.calibration import read_calibration
-
-        try:
-            kept = changed, read_calibration(path), ""
-        except InputError as error:
-            kept = changed, None, str(error)
-        _read[path] = kept
-    return kept[1:]
+        return read_calibration(path), ""
+    except InputError as error:
+        return None, str(error)
 
 
-def calibrating(root: Any) -> str:
-    """Name under which the unit's calibration runs beside its simulation."""
-    return f"{root.mu_unit.uuid}:calibrate"
+def latest_calibration(root: Any) -> Path:
+    """Folder of the unit's latest calibration."""
+    folder = studies.folder_of(root) / CALIBRATIONS
+    return max(folder.glob("*/"), default=folder)
+
+
+CALIBRATION = JobKind("calibrate", lambda root: root.mu_unit.uuid, latest_calibration)
 
 
 def calibrate(root: Any, data: Path) -> None:
     """Calibrate from a folder in a process of its own, and then apply what it finds; raises MuError."""
-    if calibrating(root) in simulation.running():
-        raise InputError("it is being calibrated", str(data), "wait for it")
-    folder = _unused(studies.settle(root) / CALIBRATIONS)
+    folder = _unused(studies.assign_folder(root) / CALIBRATIONS)
     light, dark = chosen(root)
     line = ["calibrate", str(data), "--out", str(folder), "--json"]
     if light:
         line += ["--channel", light]
     if dark:
         line += ["--dark", str(dark)]
-    simulation.launch(calibrating(root), simulation.of_worker(line), folder / "blender")
-    _calibrating[root.mu_unit.uuid] = folder
+    CALIBRATION.start(root, line, folder)
+    _calibrating[CALIBRATION.key(root)] = folder
     _tick()
 
 
@@ -402,11 +183,11 @@ def zero(root: Any, angle_deg: float) -> None:
         raise InputError(trouble or "no calibrated signal is there", "zero", "connect and calibrate first")
     zeroed = found.zeroed(session.reading.light_V, angle_deg)
     words = f"zeroed at {angle_deg:g} degrees, {time.strftime('%Y-%m-%d %H:%M:%S')}"
-    write_calibration(studies.settle(root) / CALIBRATIONS / IN_USE, zeroed, words)
+    write_calibration(studies.assign_folder(root) / CALIBRATIONS / IN_USE, zeroed, words)
     root.mu_sensor.calibration = ""
 
 
-def sweep(settings: Any) -> list[float]:
+def sweep_angles(settings: Any) -> list[float]:
     """The angles of a guided sweep, to and fro, each end once between two ways."""
     low, high, step = settings.sweep_from, settings.sweep_to, settings.sweep_step
     count = int(abs(high - low) / step + 1e-6)
@@ -427,8 +208,8 @@ def hold(session: Session) -> None:
 
 
 def poll() -> tuple[bool, bool]:
-    """Look into every session; returns whether samples came, and whether panels have something new to say."""
-    moved = said = False
+    """Update every session; returns whether samples came, and whether panels have to be drawn again."""
+    sampled = news = False
     roots = {o.mu_unit.uuid: o for o in bpy.data.objects if o.mu_unit.uuid}
     for uuid, session in _sessions.items():
         if not session.running:
@@ -436,23 +217,23 @@ def poll() -> tuple[bool, bool]:
         root = roots.get(uuid)
         found = None if root is None else calibration(root)[0]
         seconds = 10.0 if root is None else root.mu_sensor.seconds
-        said |= session.look(found, seconds)
-        moved |= session.fresh
+        news |= session.update(found, seconds)
+        sampled |= session.fresh
         guide = session.guide
         if guide is not None and guide.until and not guide.holding:
             guide.until = 0.0
-            said = True
+            news = True
             if guide.finished and root is not None:
-                said |= _finish(root, session)
+                news |= _finish(root, session)
         now = time.monotonic()
         if root is not None and now - session.read_at >= TWIN_S:
             session.read_at = now
             session.read(found, *chosen(root))
             if not _rendering:
-                said |= twin.follow(root, session.reading, session.fresh)
-    for uuid, folder in list(_calibrating.items()):
-        said |= _take(uuid, folder)
-    return moved, said
+                news |= twin.set_pose(root, session.reading, session.fresh)
+    for key, folder in list(_calibrating.items()):
+        news |= _apply_finished(key, folder)
+    return sampled, news
 
 
 def _finish(root: Any, session: Session) -> bool:
@@ -465,12 +246,12 @@ def _finish(root: Any, session: Session) -> bool:
     return True
 
 
-def _take(uuid: str, folder: Path) -> bool:
+def _apply_finished(key: str, folder: Path) -> bool:
     """Apply a calibration that is finished."""
-    child = simulation.of(f"{uuid}:calibrate")
+    child = start_child.child_of(key)
     if child is not None and child.state == RUNNING:
         return False
-    del _calibrating[uuid]
+    del _calibrating[key]
     if child is not None and child.state == DONE:
         from ...sensing.calibration import read_calibration, write_calibration
 
@@ -484,20 +265,11 @@ def _take(uuid: str, folder: Path) -> bool:
 
 
 def _poll() -> float | None:
-    moved, said = poll()
-    if moved or said:
-        _redraw(said)
+    sampled, news = poll()
+    if sampled or news:
+        viewports.redraw_views(panels=news)
     busy = _calibrating or any(session.running for session in _sessions.values())
     return INTERVAL_S if busy else None
-
-
-def _redraw(panels: bool) -> None:
-    """Have the views drawn again, and their sidebars only where these have something new to say."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            for region in area.regions if area.type == "VIEW_3D" else ():
-                if region.type == "WINDOW" or (panels and region.type == "UI"):
-                    region.tag_redraw()
 
 
 def _tick() -> None:
@@ -527,14 +299,12 @@ _HANDLERS = {
 
 
 def register() -> None:
-    """The property group, the one property on objects that holds it, and the handlers."""
-    bpy.utils.register_class(MU_PG_sensor)
-    bpy.types.Object.mu_sensor = PointerProperty(type=MU_PG_sensor)
+    """The handlers."""
     handlers.add(_HANDLERS)
 
 
 def unregister() -> None:
-    """End every session, and take everything out; values stay in the file."""
+    """End every session, and take the handlers out."""
     for uuid in _sessions:
         disconnect(uuid)
     for session in _sessions.values():
@@ -544,5 +314,3 @@ def unregister() -> None:
     if bpy.app.timers.is_registered(_poll):
         bpy.app.timers.unregister(_poll)
     handlers.remove(_HANDLERS)
-    del bpy.types.Object.mu_sensor
-    bpy.utils.unregister_class(MU_PG_sensor)

@@ -1,4 +1,4 @@
-"""The twin: the simulated unit, beside the design, bent as far as the sensor says the real one is.
+"""The twin: the simulated unit, beside the design, bent to the angle that the real sensor reads.
 
 It moves between Model A's states and never beyond them: a signal that cannot come from the calibration or
 from the simulated motion leaves the last pose, in red, with the reason above it.
@@ -41,8 +41,8 @@ class _Shape:
 
 
 _shapes: dict[tuple[Path, bool], _Shape] = {}
-_said: dict[str, tuple[str, str]] = {}
-"""By unit: state and words of its twin."""
+_status: dict[str, tuple[str, str]] = {}
+"""By unit: state of its twin, and a text on it."""
 
 
 def parts(root: Any) -> list[Any]:
@@ -50,9 +50,9 @@ def parts(root: Any) -> list[Any]:
     return [child for child in root.children if child.get(TWIN)]
 
 
-def said(root: Any) -> tuple[str, str]:
-    """State of the unit's twin, LIVE, OUTSIDE or WAITING, and what it says."""
-    return _said.get(root.mu_unit.uuid, (WAITING, "no signal"))
+def status(root: Any) -> tuple[str, str]:
+    """State of the unit's twin, LIVE, OUTSIDE or WAITING, and a text on it."""
+    return _status.get(root.mu_unit.uuid, (WAITING, "no signal"))
 
 
 def _shape(root: Any) -> _Shape:
@@ -91,8 +91,8 @@ def show(root: Any) -> None:
         part.parent = root
         part.location = (0.0, 1.5 * wide, 0.0)
         part.lock_location = part.lock_rotation = part.lock_scale = (True, True, True)
-    _said.pop(root.mu_unit.uuid, None)
-    _dress(root, WAITING)
+    _status.pop(root.mu_unit.uuid, None)
+    _colour(root, WAITING)
 
 
 def hide(root: Any) -> None:
@@ -101,8 +101,8 @@ def hide(root: Any) -> None:
         unit_object.remove_part(part)
 
 
-def follow(root: Any, reading: Any, fresh: bool) -> bool:
-    """Bend the twin as the reading says; returns whether it has something new to say.
+def set_pose(root: Any, reading: Any, fresh: bool) -> bool:
+    """Bend the twin to the angle of a reading; returns whether its state has changed.
 
     reading: angle_deg, low_deg, high_deg and possible, or None; fresh: whether samples are coming.
     """
@@ -114,9 +114,9 @@ def follow(root: Any, reading: Any, fresh: bool) -> bool:
             state, words = _bend(root, _shape(root), reading)
         except InputError as error:
             words = error.what
-    before = _said.get(root.mu_unit.uuid)
-    _said[root.mu_unit.uuid] = state, words
-    _dress(root, state)
+    before = _status.get(root.mu_unit.uuid)
+    _status[root.mu_unit.uuid] = state, words
+    _colour(root, state)
     return before is None or before[0] != state
 
 
@@ -142,7 +142,7 @@ def _bend(root: Any, shape: _Shape, reading: Any) -> tuple[str, str]:
     return LIVE, f"{reading.angle_deg:.1f} ± {half:.1f}°, Model A at {pressure:.1f} kPa"
 
 
-def _dress(root: Any, state: str) -> None:
+def _colour(root: Any, state: str) -> None:
     """Colours of a state; written only where they change."""
     for part in parts(root):
         name = _COLOURS.get(state) or _LOOKS[state][part[TWIN]]
@@ -157,9 +157,9 @@ def _dress(root: Any, state: str) -> None:
 def _loaded(*_: Any) -> None:
     """A twin that was saved while it moved has no signal now, unless its session still runs."""
     _shapes.clear()
-    _said.clear()
+    _status.clear()
     for root in unit_object.roots():
-        _dress(root, WAITING)
+        _colour(root, WAITING)
 
 
 _HANDLERS = {"load_post": _loaded}
@@ -174,4 +174,4 @@ def unregister() -> None:
     """Take it out."""
     handlers.remove(_HANDLERS)
     _shapes.clear()
-    _said.clear()
+    _status.clear()

@@ -63,15 +63,16 @@ class MU_MT_more(bpy.types.Menu):
 CLASSES = (MU_MT_presets, MU_MT_presets_remove, MU_MT_more)
 
 
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
+
+
 def register() -> None:
     """Menus, and the entry in Add > Mesh."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
+    _register_classes()
     bpy.types.VIEW3D_MT_mesh_add.append(_add)
 
 
 def unregister() -> None:
     """Take them out again."""
     bpy.types.VIEW3D_MT_mesh_add.remove(_add)
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    _unregister_classes()

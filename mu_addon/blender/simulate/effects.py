@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from ...files import write_text
+from ..shared.texts import readable
 from ..unit.properties import exact
 
 MODEL = "model.toml"
 WEIGHT = "gravity"
 """The effect that depends on the direction of gravity."""
-ASKED = ("orientation_deg", "effects")
+INPUTS = ("orientation_deg", "effects")
 """What study.toml has of them, in its table of the simulation."""
 
 
@@ -39,9 +40,9 @@ def has_gravity(root: Any) -> bool:
     return WEIGHT in _tables(root)
 
 
-def said(root: Any) -> list[str]:
-    """A line a parameter: its effect, its value and the bounds of 95 %."""
-    lines = []
+def lines(root: Any) -> list[str]:
+    """A line for each parameter: its effect, its value and its 95 % bounds."""
+    found = []
     for effect, parameters in _tables(root).items():
         for name, table in parameters.items():
             unit = str(table.get("unit", ""))
@@ -50,13 +51,13 @@ def said(root: Any) -> list[str]:
                 known = f" ({table['low95']:.4g} to {table['high95']:.4g})"
             # A parameter's name ends with its unit.
             bare = name.removesuffix("_" + unit.replace("/", "_")) if unit else name
-            words = f"{effect}, {bare}".replace("_", " ")
-            lines.append(f"{words}: {table['value']:.4g}{' ' * bool(unit)}{unit}{known}")
-    return lines
+            label = readable(f"{effect}, {bare}")
+            found.append(f"{label}: {table['value']:.4g}{' ' * bool(unit)}{unit}{known}")
+    return found
 
 
-def asked(root: Any) -> dict[str, Any]:
-    """What a study of the unit would have in study.toml, see `ASKED`; nothing where there is no effect."""
+def inputs(root: Any) -> dict[str, Any]:
+    """What a study of the unit would have in study.toml, see `INPUTS`; nothing where there is no effect."""
     effects = {
         name: {p: float(table["value"]) for p, table in parameters.items()}
         for name, parameters in _tables(root).items()

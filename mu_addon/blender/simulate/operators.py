@@ -3,24 +3,26 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import EnumProperty
 
+from ...design.parameters import write_unit
 from ..body import state as bodies
+from ..jobs import start_child
+from ..jobs.operators import job_operators
 from ..obstacles import state as obstacles
-from ..shared.acting import RUN_FILES, CancelsJob, DismissesJob, OnSoundUnit, OpensRun, telling
-from ..unit import live_update as live
+from ..shared import viewports
+from ..shared.operators import ValidUnitOperator, reports_errors
 from ..unit import object as unit_object
 from ..unit.properties import to_unit
 from . import effects
-from . import state as simulation
 from . import study_folder as studies
+from .job import SIMULATION
 
 # A quick look: linear elements on a mesh of half the fineness, one rule, no second mesh.
 QUICK = ["--order", "1", "--refine", "0.5"]
 QUICK_PLACE = ["--rule", "volume_fraction", "--no-mesh-check"]
 
 
-class MU_OT_simulate(OnSoundUnit, bpy.types.Operator):
+class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
     """Simulate the unit in a process of its own; Blender stays free, and finished work is not repeated"""
 
     bl_idname = "mu.simulate"
@@ -32,16 +34,16 @@ class MU_OT_simulate(OnSoundUnit, bpy.types.Operator):
         if not super().poll(context):
             return False
         root = unit_object.active_root(context)
-        if root.mu_unit.uuid in simulation.running():
+        if SIMULATION.is_running(root):
             cls.poll_message_set("This unit is being simulated")
             return False
-        missing = simulation.missing()
+        missing = start_child.missing()
         if missing:
             cls.poll_message_set(f"Not in this Blender: {', '.join(missing)}")
             return False
         return True
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         core, settings = to_unit(root.mu_unit), root.mu_unit.study
@@ -50,46 +52,34 @@ class MU_OT_simulate(OnSoundUnit, bpy.types.Operator):
             arguments += ["--paths", settings.paths]
         if settings.detail == "quick":
             arguments += QUICK + (QUICK_PLACE if settings.command == "place" else [])
+        for name in ("solver", "device"):
+            if getattr(settings, name) != "auto":
+                arguments += [f"--{name}", getattr(settings, name)]
         if settings.protocol:
             arguments += ["--protocol", bpy.path.abspath(settings.protocol)]
-        folder = studies.settle(root)
+        folder = studies.assign_folder(root)
         arguments += bodies.arguments(root, core, folder / "blender")
         arguments += obstacles.arguments(root, core, folder / "blender")
         arguments += effects.arguments(root, folder / "blender")
-        simulation.start(root.mu_unit.uuid, core, folder, arguments)
-        live.redraw()
+        unit = folder / "blender" / "unit.toml"
+        write_unit(core, unit)
+        command, *options = arguments
+        line = [command, "--unit", str(unit), "--out", str(folder), "--json", *options]
+        SIMULATION.start(root, line, folder)
+        viewports.redraw()
         return {"FINISHED"}
 
 
-class MU_OT_cancel(CancelsJob, bpy.types.Operator):
-    """Stop the simulation; what it has finished is kept, and the next one goes on from there"""
-
-    bl_idname = "mu.cancel"
-    bl_label = "Cancel"
-    bl_options = {"REGISTER"}
-
-
-class MU_OT_dismiss(DismissesJob, bpy.types.Operator):
-    """Take the message of an ended simulation off the panel"""
-
-    bl_idname = "mu.dismiss"
-    bl_label = "Dismiss"
-    bl_options = {"REGISTER"}
-
-
-class MU_OT_open(OpensRun, bpy.types.Operator):
-    """Open a file of the unit's study"""
-
-    bl_idname = "mu.open"
-    bl_label = "Open"
-    bl_options = {"REGISTER"}
-    first = "simulate first"
-    folder_of = staticmethod(studies.folder_of)
-
-    what: EnumProperty(name="What", description="File or folder of the study to open", items=RUN_FILES)
-
-
-CLASSES = (MU_OT_simulate, MU_OT_cancel, MU_OT_dismiss, MU_OT_open)
+CLASSES = (
+    MU_OT_simulate,
+    *job_operators(
+        SIMULATION,
+        "",
+        "simulation",
+        kept="finished stages are kept, and the next run continues from there",
+        first="simulate first",
+    ),
+)
 
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -16,19 +16,15 @@ import numpy as np
 from ...design.parameters import read_unit
 from ...design.rigid_body import read_rigid_bodies
 from ...errors import MuError
-from ...run.child import ERRORS
 from ...usecases.simulate_and_place import study_file
 from ..body import state as bodies
 from ..obstacles import state as obstacles
 from ..shared.compat import user_folder
+from ..shared.file_cache import FileCache
 from ..unit.properties import to_unit
 from . import effects
 
-LOG = "log.ndjson"
-REPORT = "report.html"
 CONTACT = "contact.csv"
-FILES = {"report": REPORT, "log": LOG, "errors": f"blender/{ERRORS}", "folder": ""}
-"""What a job that was started here leaves in its folder, the folder itself last, by what it is asked for."""
 
 
 @attrs.frozen
@@ -64,13 +60,22 @@ class Findings:
         return "volume_fraction" if "volume_fraction" in rules else (rules or [""])[0]
 
 
+@attrs.frozen(eq=False)
+class ContactForce:
+    """Force (k,) in N of a study's unit on one obstacle at times (k,) in s, friction and all."""
+
+    name: str
+    time_s: Any
+    force_N: Any
+
+
 def folder_of(root: Any) -> Path:
     """Folder of the unit's study: the one it names, else beside the .blend file, else the user's own."""
     props = root.mu_unit
-    return place_of(props.study.folder, props.title, props.uuid)
+    return default_folder(props.study.folder, props.title, props.uuid)
 
 
-def place_of(named: str, title: str, uuid: str) -> Path:
+def default_folder(named: str, title: str, uuid: str) -> Path:
     """The folder that is named, else one for a title beside the .blend file, else in the user's own."""
     if named:
         return Path(bpy.path.abspath(named))
@@ -81,42 +86,41 @@ def place_of(named: str, title: str, uuid: str) -> Path:
     return user_folder("studies") / name
 
 
-def settle(root: Any) -> Path:
-    """The unit's study folder, from now on kept with the unit, relative to the .blend file if possible."""
+def assign_folder(root: Any) -> Path:
+    """The unit's study folder, stored with the unit from now on, relative to the .blend file if possible."""
     folder = folder_of(root)
     if not root.mu_unit.study.folder:
         root.mu_unit.study.folder = relative(folder)
     return folder
 
 
-_read: dict[Path, tuple[tuple[float, float], dict[str, Any], Any]] = {}
+_findings: FileCache[tuple[dict[str, Any], Any]] = FileCache()
+_forces: FileCache[list[ContactForce]] = FileCache()
 
 
 def findings(root: Any) -> Findings | None:
     """What the unit's study has found, or None where there is none; read again only when files change."""
     folder = folder_of(root)
-    try:
-        times = (folder / "summary.json").stat().st_mtime, (folder / "unit.toml").stat().st_mtime
-    except OSError:
+    names = ("summary.json", "unit.toml", study_file.NAME, "body.obj", study_file.FILES["obstacles"])
+    known = _findings.read([folder / name for name in names], lambda: _read_findings(folder))
+    if known is None:
         return None
-    kept = _read.get(folder)
-    if kept is None or kept[0] != times:
-        try:
-            summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-            inputs = read_unit(folder / "unit.toml").hash(), _body_hash(folder), _obstacles(folder)
-            inputs += (_effects(folder),)
-            kept = times, summary if isinstance(summary, dict) else {}, inputs
-        except (OSError, ValueError, MuError):
-            return None
-        _read[folder] = kept
+    summary, inputs = known
     try:
         unit = to_unit(root.mu_unit)
         body = bodies.envelope_in(root, unit)
         own = "" if body is None else body.hash
-        stale = (unit.hash(), own, obstacles.given(root), effects.asked(root)) != kept[2]
+        stale = (unit.hash(), own, obstacles.inputs(root), effects.inputs(root)) != inputs
     except MuError:
         stale = True
-    return Findings(folder, str(kept[1].get("status", "")), stale, kept[1])
+    return Findings(folder, str(summary.get("status", "")), stale, summary)
+
+
+def _read_findings(folder: Path) -> tuple[dict[str, Any], Any]:
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    unit = read_unit(folder / "unit.toml").hash()
+    inputs = unit, _body_hash(folder), _obstacles(folder), _effects(folder)
+    return summary if isinstance(summary, dict) else {}, inputs
 
 
 def _body_hash(folder: Path) -> str:
@@ -127,52 +131,30 @@ def _body_hash(folder: Path) -> str:
         return ""
 
 
-@attrs.frozen(eq=False)
-class Touch:
-    """Force (k,) in N of a study's unit on one obstacle at times (k,) in s, friction and all."""
-
-    name: str
-    time_s: Any
-    force_N: Any
-
-
-_touches: dict[Path, tuple[float, list[Touch]]] = {}
-
-
-def touches(root: Any) -> list[Touch]:
-    """What the study's unit met, and how hard it pressed; empty where it met nothing."""
+def contact_forces(root: Any) -> list[ContactForce]:
+    """Force of the study's unit on every obstacle; empty where there is none."""
     path = folder_of(root) / CONTACT
-    try:
-        time = path.stat().st_mtime
-    except OSError:
-        return []
-    kept = _touches.get(path)
-    if kept is None or kept[0] != time:
-        try:
-            kept = _touches[path] = time, _read_touches(path)
-        except (OSError, ValueError, KeyError):
-            return []
-    return kept[1]
+    return _forces.read([path], lambda: _read_forces(path)) or []
 
 
-def _read_touches(path: Path) -> list[Touch]:
+def _read_forces(path: Path) -> list[ContactForce]:
     with path.open(encoding="utf-8", newline="") as stream:
         rows = list(csv.DictReader(stream))
     found: dict[str, list[tuple[float, float]]] = {}
     for row in rows:
         force = np.linalg.norm([float(row[f"force_{axis}_N"]) for axis in "xyz"])
         found.setdefault(Path(row["obstacle"]).stem, []).append((float(row["time_s"]), float(force)))
-    return [Touch(name, *np.array(values).T) for name, values in found.items()]
+    return [ContactForce(name, *np.array(values).T) for name, values in found.items()]
 
 
 def _effects(folder: Path) -> dict[str, Any]:
-    """Effects that a study was made with, as `effects.asked` has them; raises InputError."""
+    """Effects that a study was made with, as `effects.inputs` has them; raises InputError."""
     asked = (study_file.read(folder) or {}).get("simulate", {})
-    return {name: asked[name] for name in effects.ASKED if name in asked}
+    return {name: asked[name] for name in effects.INPUTS if name in asked}
 
 
 def _obstacles(folder: Path) -> list[tuple[str, float]]:
-    """Obstacles that a study was made with, as `obstacles.given` has them; raises InputError."""
+    """Obstacles that a study was made with, as `obstacles.inputs` has them; raises InputError."""
     asked = (study_file.read(folder) or {}).get("simulate", {})
     if "obstacles" not in asked:
         return []

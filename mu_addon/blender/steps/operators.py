@@ -9,9 +9,10 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from ...design.parameters import SECTIONS
 from ...design.quantity import describe
 from ...design.steps import STEPS, Step, downstream
-from ..shared.acting import OnUnit, telling
+from ..shared import updates
+from ..shared.operators import UnitOperator, reports_errors
+from ..shared.texts import sentence
 from ..unit import object as unit_object
-from ..unit.live_update import held
 from ..unit.properties import blender_property, exact, from_unit, to_unit
 from . import state as stack
 
@@ -33,7 +34,7 @@ def _annotations(step: Step) -> dict:
     return found
 
 
-class _OfStep(OnUnit):
+class _OfStep(UnitOperator):
     """Sets a step's own parameters, as far as they are given, and makes the step again."""
 
     bl_options = {"REGISTER", "UNDO"}
@@ -47,7 +48,7 @@ class _OfStep(OnUnit):
             self.muted = props.stack[self.step.name].muted
         return self.execute(context)
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         props = root.mu_unit
@@ -58,7 +59,7 @@ class _OfStep(OnUnit):
                 value = exact(value) if isinstance(value, float) else value
                 unit = attrs.evolve(unit, **{section: attrs.evolve(getattr(unit, section), **{name: value})})
         before = stack.STACK.counts.copy()
-        with held():
+        with updates.paused():
             stack.fill(props)
             from_unit(props, unit)
             if self.step.muting and self.properties.is_property_set("muted"):
@@ -74,7 +75,7 @@ class _OfStep(OnUnit):
 
 
 def _generated(step: Step) -> type:
-    text = f"{step.text[:1].upper()}{step.text[1:]}"
+    text = sentence(step.text)
     after = downstream(step.name)
     if after:
         text += f". Made from it: {', '.join(after)}"
@@ -88,7 +89,7 @@ def _generated(step: Step) -> type:
     return type(f"MU_OT_{step.name}", (_OfStep, bpy.types.Operator), members)
 
 
-class MU_OT_mute(OnUnit, bpy.types.Operator):
+class MU_OT_mute(UnitOperator, bpy.types.Operator):
     """Mute or unmute a step of the design"""
 
     bl_idname = "mu.mute"
@@ -102,17 +103,17 @@ class MU_OT_mute(OnUnit, bpy.types.Operator):
     )
     muted: BoolProperty(name="Mute", description="Whether the step is left out", default=True)
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
-        with held():
+        with updates.paused():
             stack.fill(root.mu_unit)
             root.mu_unit.stack[self.step].muted = self.muted
         unit_object.rebuild(root)
         return {"FINISHED"}
 
 
-class MU_OT_again(OnUnit, bpy.types.Operator):
+class MU_OT_again(UnitOperator, bpy.types.Operator):
     """Make one step again, and of those after it only what comes out different"""
 
     bl_idname = "mu.again"
@@ -121,7 +122,7 @@ class MU_OT_again(OnUnit, bpy.types.Operator):
 
     step: StringProperty(name="Step", description="Name of a step of the design", default="profile")
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         stack.STACK.again(self.step, stack.given(root, to_unit(root.mu_unit)))

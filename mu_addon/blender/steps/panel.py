@@ -5,8 +5,9 @@ from __future__ import annotations
 import bpy
 
 from ...design.steps import STEPS
+from ..shared.panels import UnitPanel, wrapped
+from ..shared.texts import sentence
 from ..unit import object as unit_object
-from ..unit.panel import OfUnit, wrapped
 from . import state as stack
 
 
@@ -29,7 +30,7 @@ class MU_UL_steps(bpy.types.UIList):
         mute.prop(item, "muted", text="", emboss=False, icon=state)
 
 
-class MU_PT_stack(OfUnit, bpy.types.Panel):
+class MU_PT_stack(UnitPanel, bpy.types.Panel):
     """The design step by step: each can be shown, muted, changed and made again on its own"""
 
     bl_idname = "MU_PT_stack"
@@ -44,7 +45,7 @@ class MU_PT_stack(OfUnit, bpy.types.Panel):
         step = STEPS.get(entry.name)
         if step is None:
             return
-        wrapped(layout, f"{step.text[:1].upper()}{step.text[1:]}", "INFO")
+        wrapped(layout, sentence(step.text), "INFO")
         if entry.muted:
             wrapped(layout, f"Muted: {step.muting}", "ERROR")
         column = layout.column(align=True)
@@ -64,13 +65,4 @@ class MU_PT_stack(OfUnit, bpy.types.Panel):
 CLASSES = (MU_UL_steps, MU_PT_stack)
 
 
-def register() -> None:
-    """The list and its panel."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """The list and its panel."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

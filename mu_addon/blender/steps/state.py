@@ -1,4 +1,4 @@
-"""The core's steps for a unit in the scene: what is muted and shown, and the values, kept by content."""
+"""The core's steps for a unit in the scene: muted and shown ones, and values, cached by content hash."""
 
 from __future__ import annotations
 

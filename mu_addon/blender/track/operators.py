@@ -8,7 +8,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ...usecases.track_video.run import console_summary, figures, filmed, read_pressure, write_experiment
-from ..shared.acting import telling
+from ..shared.operators import reports_errors
 from ..unit import object as unit_object
 from . import properties as bench
 from . import state as tracking
@@ -77,7 +77,7 @@ class MU_OT_track_write(bpy.types.Operator):
             return False
         return True
 
-    @telling
+    @reports_errors
     def execute(self, context):
         clip = bpy.data.movieclips.get(self.clip) if self.clip else clip_of(context)
         if clip is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..unit.panel import wrapped
+from ..shared.panels import large_button, wrapped
 from . import properties as bench
 from .operators import NO_CLIP, clip_of
 
@@ -39,17 +39,13 @@ class MU_PT_track(bpy.types.Panel):
         lacks = bench.missing(clip)
         if lacks:
             wrapped(layout, lacks, "INFO")
-        row = layout.row()
-        row.scale_y = 1.4
-        row.operator("mu.track_write", icon="EXPORT")
+        large_button(layout, "mu.track_write", "EXPORT")
 
 
 def _markers(layout, clip, settings):
     layout.prop(settings, "camera")
     layout.prop(settings, "marks")
-    row = layout.row()
-    row.scale_y = 1.4
-    row.operator("mu.track", icon="TRACKING_FORWARDS")
+    large_button(layout, "mu.track", "TRACKING_FORWARDS")
     column = layout.column(align=True)
     for name in ("base_1", "base_2"):
         column.prop_search(settings, name, clip.tracking, "tracks", icon="TRACKER")
@@ -80,11 +76,7 @@ def _time(layout, clip, settings):
     column.prop(settings, "starts_s")
 
 
-def register() -> None:
-    """The panel."""
-    bpy.utils.register_class(MU_PT_track)
+CLASSES = (MU_PT_track,)
 
 
-def unregister() -> None:
-    """The panel."""
-    bpy.utils.unregister_class(MU_PT_track)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

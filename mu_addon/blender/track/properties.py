@@ -11,7 +11,6 @@ from bpy.props import (
     EnumProperty,
     FloatProperty,
     FloatVectorProperty,
-    PointerProperty,
     StringProperty,
 )
 
@@ -19,6 +18,7 @@ from ...errors import InputError
 from ...measured.kinds import ROLES
 from ...measured.video import View
 from ...usecases.track_video.run import Bench, Marks
+from ..shared.registration import property_group_factory
 from ..unit.properties import BESIDE_BLEND_FILE, exact
 
 
@@ -192,13 +192,4 @@ def title(clip: Any) -> str:
     return clip.mu_bench.title or Path(clip.name).stem
 
 
-def register() -> None:
-    """The property group and the one property on clips that holds it."""
-    bpy.utils.register_class(MU_PG_bench)
-    bpy.types.MovieClip.mu_bench = PointerProperty(type=MU_PG_bench)
-
-
-def unregister() -> None:
-    """Take them out again; values stay in the file."""
-    del bpy.types.MovieClip.mu_bench
-    bpy.utils.unregister_class(MU_PG_bench)
+register, unregister = property_group_factory(bpy.types.MovieClip, "mu_bench", (MU_PG_bench,))

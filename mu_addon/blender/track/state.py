@@ -1,4 +1,4 @@
-"""Markers followed by Blender's own movie clip tracker, in an open editor or without a window."""
+"""Markers tracked by Blender's own movie clip tracker, in an open editor or without a window."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ MODELS = {"crosses": "LocRot", "dots": "Loc"}
 CORRELATION = 0.75
 
 
-def follow(path: Path, marks: Marks) -> Tracks:
-    """Follow markers through a clip from where they are in its first frame; raises InputError.
+def track_markers(path: Path, marks: Marks) -> Tracks:
+    """Track markers through a clip from where they are in its first frame; raises InputError.
 
     The clip is gone from Blender's data afterwards.
     """

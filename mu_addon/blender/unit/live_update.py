@@ -7,113 +7,88 @@ taken; handlers look for such units and rebuild them.
 from __future__ import annotations
 
 import time
-from contextlib import contextmanager
 
 import bpy
 from bpy.app.handlers import persistent
 
-from ..shared import handlers
+from ..jobs.start_child import JOB_ENDED
+from ..shared import handlers, updates, viewports
+from . import object as unit_object
+from .properties import PARAMETERS_CHANGED, VIEW_CHANGED
 
 INTERVAL_S = 0.03
 
-_held = 0
-_flushed = 0.0
+_rebuilt_at = 0.0
 _pending: set[str] = set()
-
-
-@contextmanager
-def held():
-    """While the body sets parameters, none of them starts a rebuild; the body does that itself."""
-    global _held
-    _held += 1
-    try:
-        yield
-    finally:
-        _held -= 1
-
-
-def holds() -> bool:
-    """Whether parameters are being set that must start no rebuild."""
-    return _held > 0
 
 
 def schedule(root) -> None:
     """Have the preview of a unit rebuilt soon; at once in background, where timers never fire."""
-    if _held or not root.mu_unit.uuid:
+    if updates.are_paused() or not root.mu_unit.uuid:
         return
     if bpy.app.background:
-        _rebuild(root)
+        unit_object.rebuild(root)
         return
     _pending.add(root.mu_unit.uuid)
-    if not bpy.app.timers.is_registered(_flush):
+    if not bpy.app.timers.is_registered(_rebuild_pending):
         # The first change is followed at once, those that come after it while a slider moves at intervals.
-        wait = max(0.0, INTERVAL_S - (time.monotonic() - _flushed))
-        bpy.app.timers.register(_flush, first_interval=wait)
+        wait = max(0.0, INTERVAL_S - (time.monotonic() - _rebuilt_at))
+        bpy.app.timers.register(_rebuild_pending, first_interval=wait)
 
 
-def show(root) -> None:
-    """Show the parts that belong to what the user wants to see, preview or solid."""
-    from . import object as unit_object
-
-    if not _held and root.mu_unit.uuid:
-        unit_object.show_parts(root)
-
-
-def _flush():
-    from . import object as unit_object
-
-    global _flushed
+def _rebuild_pending():
+    global _rebuilt_at
     pending, names = set(_pending), []
     _pending.clear()
     # By UUID: undo may have deleted the object that asked, or brought back another in its place.
     for root in unit_object.roots():
         if root.mu_unit.uuid in pending:
-            _rebuild(root)
+            unit_object.rebuild(root)
             names.append(root.name)
     if names:
-        redraw()
-    _flushed = time.monotonic()
+        viewports.redraw()
+    _rebuilt_at = time.monotonic()
 
 
-def _rebuild(root) -> None:
-    from . import object as unit_object
-
-    unit_object.rebuild(root)
-
-
-def redraw() -> None:
-    """Have every 3D viewport and its panels drawn again."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+def _show(root) -> None:
+    """Show the parts that belong to what the user wants to see, preview or solid."""
+    if not updates.are_paused() and root.mu_unit.uuid:
+        unit_object.show_parts(root)
 
 
 @persistent
-def _catch_up(*_):
+def _after_undo_or_load(*_):
     catch_up()
 
 
 def catch_up() -> None:
     """Have every preview rebuilt that is behind its parameters or its study."""
-    from . import object as unit_object
-
     for root in unit_object.roots():
         if unit_object.behind(root):
             schedule(root)
 
 
-_HANDLERS = dict.fromkeys(("undo_post", "redo_post", "load_post"), _catch_up)
+def _job_ended(_key) -> None:
+    # What the study has found shows on the candidate paths.
+    catch_up()
+
+
+_HANDLERS = dict.fromkeys(("undo_post", "redo_post", "load_post"), _after_undo_or_load)
+_CONNECTIONS = ((PARAMETERS_CHANGED, schedule), (VIEW_CHANGED, _show), (JOB_ENDED, _job_ended))
 
 
 def register():
-    """Handlers for undo, redo and load."""
+    """Handlers for undo, redo and load, and the signals that start a rebuild."""
     handlers.add(_HANDLERS)
+    for signal, function in _CONNECTIONS:
+        signal.connect(function)
 
 
 def unregister():
-    """Take out handlers and a waiting rebuild."""
+    """Take out handlers, signals and a waiting rebuild."""
+    for signal, function in _CONNECTIONS:
+        signal.disconnect(function)
     handlers.remove(_HANDLERS)
-    if bpy.app.timers.is_registered(_flush):
-        bpy.app.timers.unregister(_flush)
+    if bpy.app.timers.is_registered(_rebuild_pending):
+        bpy.app.timers.unregister(_rebuild_pending)
     _pending.clear()

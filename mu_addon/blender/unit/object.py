@@ -25,22 +25,23 @@ from ..path import ranking
 from ..preview import arrays as preview
 from ..preview import colours as materials
 from ..preview import nodes
+from ..shared import updates
 from ..shared.compat import set_modifier_input
+from ..shared.texts import error_text
 from ..steps import state as stack
-from .live_update import held
 from .properties import from_unit, to_unit
 
 PART = "mu_part"
 MOTION = "mu_motion"
-"""Marks the parts that show a study's motion, see `motion_parts`."""
+"""Marks the parts that show a study's motion, see `results.motion`."""
 EVIDENCE = "mu_evidence_part"
-"""Marks the parts that show measured motion, see `evidence_motion`."""
+"""Marks the parts that show measured motion, see `evidence.motion`."""
 CHECK = "mu_check"
-"""Marks the objects that show what a print check found, see `printing`."""
+"""Marks the objects that show what a print check found, see `printing.markers`."""
 LEGEND = "mu_legend"
-"""Marks the objects of a legend in the scene, see `legend_object`."""
+"""Marks the objects of a legend in the scene, see `results.legend_object`."""
 TWIN = "mu_twin"
-"""Marks the parts that move as the real unit does, see `twin`."""
+"""Marks the parts that move as the real unit does, see `sensor.twin`."""
 CANDIDATE = "candidate:"
 FREE = "free"
 """The best path of the whole lattice, where a study has looked for it."""
@@ -83,7 +84,7 @@ def part(root: Any, name: str) -> Any | None:
 def create(context: Any, unit: Unit) -> Any:
     """A new unit at the 3D cursor of the scene, with its preview, selected and active."""
     root = new_root(context, "Monolithic Unit", unit.dimensions.cell)
-    with held():
+    with updates.paused():
         root.mu_unit.uuid = uuid.uuid4().hex
         stack.fill(root.mu_unit)
         from_unit(root.mu_unit, unit)
@@ -142,22 +143,18 @@ def rebuild(root: Any) -> bool:
     """Build the preview from the parameters; where they break a rule the last good one stays."""
     props = root.mu_unit
     _own_uuid(root)
-    with held():
+    with updates.paused():
         stack.fill(props)
     try:
         unit = to_unit(props)
         _draw(root, unit)
         trouble = ""
     except MuError as error:
-        trouble = _told(error)
+        trouble = error_text(error)
     if props.trouble != trouble:
         props.trouble = trouble
     props.built = _fingerprint(root)
     return not trouble
-
-
-def _told(error: MuError) -> str:
-    return "\n".join(text for text in (error.what, error.where, error.remedy) if text)
 
 
 def _own_uuid(root: Any) -> None:
@@ -221,7 +218,7 @@ DRAWN: dict[str, tuple[str, Callable[[Any, Any, bool], preview.Skeleton | None]]
     "struts": ("lattice", lambda value, given, cut: preview.lattice(value, cut)),
     "anchors": (
         "anchors",
-        lambda value, given, cut: preview.anchor_points(value, stack.STACK.value("struts", given)),
+        lambda value, given, cut: preview.anchor_skeleton(value, stack.STACK.value("struts", given)),
     ),
     "path": ("path", lambda value, given, cut: preview.line_through(value)),
     "wells": ("waveguide", lambda value, given, cut: preview.bar(value)),
@@ -301,7 +298,7 @@ def put_solid(root: Any, solid: Any, unit: Unit) -> Any:
     obj["mu_body"] = bodies.fingerprint(root)
     obj["mu_quality"] = solid.quality
     obj["mu_gates"] = json.dumps(attrs.asdict(solid.gates))
-    with held():
+    with updates.paused():
         root.mu_unit.show = SOLID
     show_parts(root)
     return obj

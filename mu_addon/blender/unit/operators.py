@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ...design.parameters import Unit
 from ...design.quantity import describe
-from ..shared.acting import OnUnit, telling
+from ..shared.operators import UnitOperator, reports_errors
 from . import object as unit_object
 from . import presets
 from .properties import exact, tooltip
@@ -67,7 +67,7 @@ class MU_OT_add(bpy.types.Operator):
     scaled: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
     frame: BoolProperty(name="Frame in View", description="Bring the new unit into view", default=True)
 
-    @telling
+    @reports_errors
     def execute(self, context):
         if not self.properties.is_property_set("preset"):
             self.preset = "mu-1.0x"
@@ -104,7 +104,7 @@ def _frame(context, root):
         child.select_set(False)
 
 
-class MU_OT_rebuild(OnUnit, bpy.types.Operator):
+class MU_OT_rebuild(UnitOperator, bpy.types.Operator):
     """Build the preview again from the parameters, with every part that was deleted"""
 
     bl_idname = "mu.rebuild"
@@ -119,7 +119,7 @@ class MU_OT_rebuild(OnUnit, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_delete(OnUnit, bpy.types.Operator):
+class MU_OT_delete(UnitOperator, bpy.types.Operator):
     """Delete the unit with all its parts; its study folder stays"""
 
     bl_idname = "mu.delete"
@@ -143,7 +143,7 @@ class MU_OT_millimetres(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_select(OnUnit, bpy.types.Operator):
+class MU_OT_select(UnitOperator, bpy.types.Operator):
     """Make the unit's root the active object, which holds its parameters and moves all its parts"""
 
     bl_idname = "mu.select"

@@ -5,14 +5,14 @@
 import bpy
 from bpy.props import StringProperty
 
-from ..shared.acting import OnUnit, telling
+from ..shared import updates
+from ..shared.operators import UnitOperator, reports_errors
 from . import object as unit_object
 from . import presets
-from .live_update import held
 from .properties import from_unit, to_unit
 
 
-class MU_OT_preset_load(OnUnit, bpy.types.Operator):
+class MU_OT_preset_load(UnitOperator, bpy.types.Operator):
     """Set every parameter of the unit to those of a preset"""
 
     bl_idname = "mu.preset_load"
@@ -21,17 +21,17 @@ class MU_OT_preset_load(OnUnit, bpy.types.Operator):
 
     name: StringProperty(name="Preset", description="Name of a preset; your own begin with `user:`")
 
-    @telling
+    @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
         core = presets.load(self.name)
-        with held():
+        with updates.paused():
             from_unit(root.mu_unit, core)
         unit_object.rebuild(root)
         return {"FINISHED"}
 
 
-class MU_OT_preset_save(OnUnit, bpy.types.Operator):
+class MU_OT_preset_save(UnitOperator, bpy.types.Operator):
     """Keep the unit's parameters as a preset of your own, a TOML file that headless/run.py reads, too"""
 
     bl_idname = "mu.preset_save"
@@ -44,7 +44,7 @@ class MU_OT_preset_save(OnUnit, bpy.types.Operator):
         self.name = unit_object.active_root(context).mu_unit.title
         return context.window_manager.invoke_props_dialog(self)
 
-    @telling
+    @reports_errors
     def execute(self, context):
         kept = presets.save(to_unit(unit_object.active_root(context).mu_unit), self.name)
         self.report({"INFO"}, f"Preset {kept.removeprefix(presets.USER)} is kept")
@@ -63,7 +63,7 @@ class MU_OT_preset_remove(bpy.types.Operator):
     def invoke(self, context, event):
         return context.window_manager.invoke_confirm(self, event)
 
-    @telling
+    @reports_errors
     def execute(self, context):
         presets.remove(self.name)
         return {"FINISHED"}

@@ -21,9 +21,13 @@ from bpy.props import (
 
 from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
-from . import live_update as live
+from ..shared.registration import property_group_factory
+from ..shared.texts import sentence
+from ..shared.updates import Signal
 
-UNITS = ("mm", "kPa")
+PARAMETERS_CHANGED, VIEW_CHANGED = Signal(), Signal()
+"""Sent with the root whose parameters changed, and with one of which other parts are to be seen."""
+UNITS = ("mm", "kPa", "s")
 BESIDE_BLEND_FILE = {"PATH_SUPPORTS_BLEND_RELATIVE"}
 
 
@@ -44,7 +48,7 @@ def tooltip(d: Description) -> str:
     """What a parameter is, its bounds and where its value comes from; Blender adds the last full stop."""
     allowed = f". {d.allowed} {d.unit}".rstrip() if d.allowed else ""
     fixed = ". The same at every scale" if d.fixed else ""
-    return f"{d.text[:1].upper()}{d.text[1:]}{allowed}{fixed}.\nSource: {d.source}"
+    return f"{sentence(d.text)}{allowed}{fixed}.\nSource: {d.source}"
 
 
 def blender_property(d: Description, update=None, options=frozenset()):
@@ -77,7 +81,7 @@ def blender_property(d: Description, update=None, options=frozenset()):
 
 
 def _changed(group, context):
-    live.schedule(group.id_data)
+    PARAMETERS_CHANGED.send(group.id_data)
 
 
 def _generated(section: type):
@@ -129,6 +133,26 @@ class MU_PG_study(bpy.types.PropertyGroup):
         ],
         default="full",
     )
+    solver: EnumProperty(
+        name="Solver",
+        description="What solves the linear systems; answers agree within its tolerance",
+        items=[
+            ("auto", "Automatic", "Factorisation, unless a motion's factor does not fit into memory"),
+            ("direct", "Factorisation", "The fastest as long as it fits into memory"),
+            ("iterative", "Iterative", "Little memory, slow: for the motion of very fine meshes"),
+        ],
+        default="auto",
+    )
+    device: EnumProperty(
+        name="Device",
+        description="What computes the finite elements",
+        items=[
+            ("auto", "Automatic", "A CUDA device from 200 000 unknowns on, where there is one"),
+            ("cpu", "CPU", "The processor"),
+            ("cuda:0", "CUDA", "The first CUDA device"),
+        ],
+        default="auto",
+    )
     protocol: StringProperty(
         name="Protocol",
         description="CSV file of time_s,pressure_kPa. Empty: the grasp that comes with the extension",
@@ -154,8 +178,8 @@ class MU_PG_study(bpy.types.PropertyGroup):
     )
 
 
-def _show_changed(group, context):
-    live.show(group.id_data)
+def _view_changed(group, context):
+    VIEW_CHANGED.send(group.id_data)
 
 
 class MU_PG_step(bpy.types.PropertyGroup):
@@ -208,7 +232,7 @@ class MU_PG_unit(bpy.types.PropertyGroup):
                 ("solid", "Solid", "The printable solid that was built last"),
             ],
             default="preview",
-            update=_show_changed,
+            update=_view_changed,
         ),
         # What the preview was last built from, and why it could not follow the parameters.
         "built": StringProperty(options={"HIDDEN"}),
@@ -233,7 +257,7 @@ def to_unit(props) -> Unit:
 
 
 def from_unit(props, unit: Unit) -> None:
-    """Set Blender's properties to a unit; each still calls its update, see `live.held`."""
+    """Set Blender's properties to a unit; each still calls its update, see `updates.paused`."""
     props.title, props.scale = unit.name, unit.scale
     for section in SECTIONS:
         group, values = getattr(props, section.section), getattr(unit, section.section)
@@ -245,15 +269,4 @@ def _value(d: Description, value):
     return exact(value) if d.type is float else value
 
 
-def register():
-    """Classes and the one property on objects that holds a unit."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-    bpy.types.Object.mu_unit = PointerProperty(type=MU_PG_unit)
-
-
-def unregister():
-    """Take them out again; values stay in the file and are found when the extension comes back."""
-    del bpy.types.Object.mu_unit
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = property_group_factory(bpy.types.Object, "mu_unit", CLASSES)

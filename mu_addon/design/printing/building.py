@@ -25,7 +25,7 @@ def building(built: Columns, chambers: Chambers, printer: Printer) -> tuple[list
             begun.places[inner],
             printer,
             "error",
-            "turn the part: no support can be taken out of there",
+            "rotate the part: supports there cannot be removed",
         ),
         _cups(closed, printer),
         _spans("overhang", "overhang_mm", over.places, over.reach, ~over.bridge, printer),
@@ -43,7 +43,9 @@ def _islands(name: str, places: Points, printer: Printer, severity: Severity, re
     return Finding(
         name,
         severity if len(places) else "pass",
-        numbered(len(places), "region begins on nothing", "regions begin on nothing"),
+        numbered(
+            len(places), "region starts without support (island)", "regions start without support (islands)"
+        ),
         float(len(places)),
         0.0,
         "",
@@ -62,7 +64,7 @@ def _cups(closed: layers.Cups, printer: Printer) -> Finding:
     return Finding(
         "cups",
         "warning" if large.any() else "pass",
-        f"{most:.3f} ml sealed against the film at the most",
+        f"{most:.3f} ml at most sealed against the film",
         most,
         limit.value,
         "ml",
@@ -85,7 +87,7 @@ def _spans(
     return Finding(
         name,
         "warning" if bad.any() else "pass",
-        f"{most:.3g} mm {where} at the most, flatter than {printer['overhang_deg']:g} degrees",
+        f"{most:.3g} mm {where} at most, flatter than {printer['overhang_deg']:g} degrees",
         most,
         limit.value,
         "mm",
@@ -93,5 +95,5 @@ def _spans(
         len(worst),
         limit.source,
         limit.assumed,
-        "support it, or turn the part" if bad.any() else "",
+        "support it, or rotate the part" if bad.any() else "",
     )

@@ -1,4 +1,4 @@
-"""Everything a printer would stumble over in a triangle surface, with value, limit, place and source."""
+"""Printability check of a triangle surface, with value, limit, place and source."""
 
 from __future__ import annotations
 
@@ -141,8 +141,8 @@ def _faces(vertices: Vertices, triangles: Triangles) -> tuple[list[Finding], Tri
     words = ("edge is not shared by two triangles", "edges are not shared by two triangles")
     found.append(none_of("open edges", count, places, words, "close the holes"))
     over = faces.turned(vertices, triangles)
-    words = ("triangle faces the wrong way", "triangles face the wrong way")
-    found.append(none_of("flipped faces", int(over.sum()), gathered(middles[over]), words, "turn them over"))
+    words = ("triangle is flipped", "triangles are flipped")
+    found.append(none_of("flipped faces", int(over.sum()), gathered(middles[over]), words, "flip them"))
     triangles = np.where(over[:, None], triangles[:, ::-1], triangles)
     cut = crossings(vertices, triangles)
     words = ("edge passes through another triangle", "edges pass through other triangles")
@@ -155,19 +155,19 @@ def _faces(vertices: Vertices, triangles: Triangles) -> tuple[list[Finding], Tri
         (
             "inside out",
             shells.inside_out,
-            ("shell has its inside outside", "shells have their insides outside"),
-            "turn all their triangles over",
+            ("shell is inside out", "shells are inside out"),
+            "flip all their triangles",
         ),
         (
             "loose pieces",
             shells.bodies[1:],
-            ("piece hangs on nothing", "pieces hang on nothing"),
+            ("piece is not connected to the part", "pieces are not connected to the part"),
             "join them to the part, or remove them",
         ),
         (
             "sealed voids",
             shells.voids,
-            ("void keeps its resin for good", "voids keep their resin for good"),
+            ("void traps resin permanently", "voids trap resin permanently"),
             "open them, or fill them",
         ),
         (
@@ -204,14 +204,14 @@ def _size(vertices: Vertices, printer: Printer, unit: Unit | None, up: Array) ->
             Finding(
                 "scale",
                 "pass" if same else "error",
-                f"the part is {ratio:.4g} times as large as its drawing{why}",
+                f"the part is {ratio:.4g} times its nominal size{why}",
                 ratio,
                 1.0,
                 "",
                 NOWHERE if same else np.stack([low, high])[np.argsort(-off)][:1],
                 0 if same else 1,
-                f"the unit's drawing, {drawn[0, 1] - drawn[0, 0]:g} x {drawn[1, 1] - drawn[1, 0]:g} x "
-                f"{drawn[2, 1] - drawn[2, 0]:g} mm",
+                f"nominal size of the unit, {drawn[0, 1] - drawn[0, 0]:g} x "
+                f"{drawn[1, 1] - drawn[1, 0]:g} x {drawn[2, 1] - drawn[2, 0]:g} mm",
                 remedy="" if same else "export in mm",
             )
         )
@@ -220,9 +220,9 @@ def _size(vertices: Vertices, printer: Printer, unit: Unit | None, up: Array) ->
     inside = fits(extent, room_mm)
     share = max(extent[2] / room_mm[2], min(_flat(extent, room_mm), _flat(extent[[1, 0, 2]], room_mm)))
     limit = printer.limits["build_x_mm"]
-    words = "it would fit if its figures were inches" if not inside and share / INCH < 1.0 else ""
+    words = "it would fit if its coordinates were inches" if not inside and share / INCH < 1.0 else ""
     tiny = float(extent.max()) < 5.0
-    words = "the whole part is smaller than 5 mm: were metres or inches meant?" if tiny else words
+    words = "the whole part is smaller than 5 mm: the file may be in metres or inches" if tiny else words
     found.append(
         Finding(
             "build volume",
@@ -258,7 +258,7 @@ def _drawing(unit: Unit, window: Window | None, printer: Printer) -> list[Findin
             f"struts of {d.junction_diameter:.3g} mm at the junctions; they scale with the unit down to "
             f"{unit.scale * printer['strut_mm'] / d.junction_diameter:.2f}x",
             "warning",
-            remedy="keep the strut's diameter below that scale, or print larger",
+            remedy="keep the strut diameter constant below that scale, or print at a larger scale",
         )
     ]
     if window is not None:
@@ -302,5 +302,5 @@ def _unexamined(sound: bool) -> Finding:
         "info",
         f"thickness, gaps, chambers and layers are measured once the surface is {what}",
         np.nan,
-        remedy="mend the errors above and check again",
+        remedy="correct the errors above and check again",
     )

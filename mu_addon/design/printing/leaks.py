@@ -45,14 +45,15 @@ def drains(solid: Any, chambers: Chambers, unit: Unit | None, printer: Printer) 
         Finding(
             "leaks",
             ("error" if unit is not None else "warning") if leaks else "pass",
-            numbered(len(leaks), "way", "ways") + f" out of chambers beside their inlet{wide}; "
-            f"holes under {1.75 * step:.2g} mm are too small for this test",
+            numbered(len(leaks), "way", "ways")
+            + f" out of chambers beside their inlet{wide}; leaks: holes below {1.75 * step:.2g} "
+            "mm are too small for this test",
             float(len(leaks)),
             0.0,
             "",
             places,
             len(leaks),
-            "a chamber that is to hold pressure has one opening",
+            "a chamber that must hold pressure may have only one opening",
             remedy="close the hole" if leaks else "",
         )
     ]
@@ -81,7 +82,7 @@ def drains(solid: Any, chambers: Chambers, unit: Unit | None, printer: Printer) 
             Finding(
                 "drain",
                 "warning" if bad else "pass",
-                f"{least:.3g} mm wide where the way out is narrowest",
+                f"{least:.3g} mm wide at the narrowest point of the drain",
                 least,
                 limit.value,
                 "mm",

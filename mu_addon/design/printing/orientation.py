@@ -103,7 +103,7 @@ def fits(extent: Array, room: tuple[float, float, float]) -> bool:
 
 
 def ranked(builds: list[Build]) -> list[Build]:
-    """The builds, the one to choose first, those that no other beats marked.
+    """The builds, the one to choose first, the Pareto-optimal ones marked.
 
     Order: fits, then the largest cup, flat surface in chambers, islands, supported surface, height.
     """

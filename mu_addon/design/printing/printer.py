@@ -15,9 +15,9 @@ from ..toml_text import parse, place
 
 DEFAULT = "form-4-elastic-50a"
 MEANING = {
-    "build_x_mm": "room of the build volume along x",
-    "build_y_mm": "room of the build volume along y",
-    "build_z_mm": "room of the build volume above the platform",
+    "build_x_mm": "size of the build volume along x",
+    "build_y_mm": "size of the build volume along y",
+    "build_z_mm": "height of the build volume above the platform",
     "layer_mm": "height of a layer",
     "solid_mm": "thinnest solid",
     "wall_mm": "thinnest wall between a chamber and the outside",
@@ -106,7 +106,7 @@ def _limit(name: str, table: dict[str, object], origin: str) -> Limit:
     if not real or not math.isfinite(float(value)) or float(value) <= 0.0:  # type: ignore[arg-type]
         raise InputError(f"value = {value!r} is not a number above zero", where, MEANING[name])
     if not isinstance(source, str) or not source.strip():
-        raise InputError("the limit names no source", where, 'write source = "where the figure is from"')
+        raise InputError("the limit has no source", where, 'write source = "where the figure is from"')
     if not isinstance(assumed, bool):
         raise InputError(f"assumed = {assumed!r} is not true or false", where, "write true or false")
     return Limit(float(value), source, assumed)  # type: ignore[arg-type]

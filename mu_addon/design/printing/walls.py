@@ -51,7 +51,7 @@ def _measured(
     least = float(width.min(initial=np.inf))
     bad = width < limit.value
     if not np.isfinite(least):
-        words = "nothing so thin is near the limit" if adjective == "thick" else "no gap is near the limit"
+        words = "no wall is near the limit" if adjective == "thick" else "no gap is near the limit"
         return Finding(
             name, "pass", words, np.nan, limit.value, "mm", NOWHERE, 0, limit.source, limit.assumed
         )
@@ -60,8 +60,8 @@ def _measured(
     return Finding(
         name,
         severity if bad.any() else "pass",
-        f"{least:.3g} mm {adjective} at the least"
-        + (f", in {len(places)} places too little" if bad.any() else ""),
+        f"{least:.3g} mm {adjective} at least"
+        + (f", in {len(places)} places below the limit" if bad.any() else ""),
         least,
         limit.value,
         "mm",

@@ -117,6 +117,7 @@ def effect(sides: Sequence[tuple[int, Side]], kind: str) -> Effect:
         f"how far a wall stands inside the farthest place of the free unit, {said}; below 0 toward -y",
     )
     mechanism = (
-        f"the unit touches a flat wall along its axis, reach_mm inside of where it would get to: {said}"
+        "the unit touches a flat wall parallel to its axis, reach_mm inside the outline it would "
+        f"reach without the wall: {said}"
     )
     return Effect(NAME, (size,), (kind,), mechanism)

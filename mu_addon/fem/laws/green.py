@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from .tensors import add_left, f64, mat33, mat99, vec3
+from .tensors import add_left, f64, mat33, mat99
 
 
 def of_green_strain(energy: Any, stress: Any, stiffness: Any) -> tuple[Any, Any, Any]:
@@ -57,19 +57,4 @@ def symmetric_identity(factor: wp.float64) -> mat99:
         for j in range(3):
             A[3 * i + j, 3 * i + j] += f64(0.5) * factor
             A[3 * i + j, 3 * j + i] += f64(0.5) * factor
-    return A
-
-
-@wp.func
-def add_fibre_shear(A: mat99, factor: wp.float64, f: vec3) -> mat99:
-    """A + factor times the second derivative of |E f|^2 by a symmetric E."""
-    for i in range(3):
-        for j in range(3):
-            for k in range(3):
-                x = f64(0.5) * factor * f[i] * f[k]
-                y = f64(0.5) * factor * f[j] * f[k]
-                A[3 * i + j, 3 * k + j] += x
-                A[3 * i + j, 3 * j + k] += x
-                A[3 * i + j, 3 * k + i] += y
-                A[3 * i + j, 3 * i + k] += y
     return A

@@ -26,12 +26,12 @@ from .run import Job
 
 FILES = {
     "check.toml": "inputs of this check",
-    "printer.toml": "the printer's limits, to be copied and set for `check --printer`",
+    "printer.toml": "limits of the printer; a template for `check --printer`",
     "unit.toml": "parameters of the unit",
-    "part.stl": "the part as it was checked",
-    "check.json": "every finding with its places, and every build direction",
+    "part.stl": "the part that was checked",
+    "check.json": "every finding with its locations, and every build direction",
     "summary.json": "key figures",
-    "log.ndjson": "what was said while it ran",
+    "log.ndjson": "log of this run",
 }
 COLORS = {"error": (0.75, 0.05, 0.10), "warning": (0.95, 0.55, 0.0)}
 GREY = (0.66, 0.70, 0.76)
@@ -53,13 +53,18 @@ def report(job: Job, found: PrintCheck, picture: Picture) -> str:
     files = {name: text for name, text in FILES.items() if name != "unit.toml" or job.unit is not None}
     sections = [
         ("findings", "What was checked", _findings(found)),
-        ("orientation", "Which way up", _orientation(found.builds)),
+        ("orientation", "Build direction", _orientation(found.builds)),
         ("limits", "The printer's limits", _limits(job)),
-        ("files", "Files of this check", facts_table("file", "what it holds", files)),
+        ("files", "Files of this check", facts_table("file", "content", files)),
         ("versions", "Versions", facts_table("program", "version", package_versions())),
     ]
     assumed = sum(f.assumed for f in found.findings if f.limit is not None)
-    notes = [f"{assumed} of these limits are assumed: nobody has published them for this resin. Set yours."]
+    notes = [
+        (
+            f"{assumed} of these limits are assumed, because no published values were found for this resin. "
+            "Replace them by measured ones."
+        )
+    ]
     lead = f'<div class="lead"><div>{_headline(job, found)}</div>{picture_figure(picture)}</div>'
     return page(f"Print check: {job.name}", job.printer.title, note(notes if assumed else []), lead, sections)
 
@@ -68,9 +73,9 @@ def _headline(job: Job, found: PrintCheck) -> str:
     faults = [f for f in found.findings if f.severity == "error"]
     warned = [f for f in found.findings if f.severity == "warning"]
     words = {
-        "error": f"<strong>Do not print it</strong>: {_joined(faults)}.",
-        "warning": f"<strong>It can be printed</strong>, once this is seen to: {_joined(warned)}.",
-        "pass": "<strong>It can be printed</strong>: every check passed.",
+        "error": f"<strong>Not printable</strong>: {_joined(faults)}.",
+        "warning": f"<strong>Printable with warnings</strong>: {_joined(warned)}.",
+        "pass": "<strong>Printable</strong>: every check passed.",
     }[found.worst]
     figures = found.figures
     facts = [("size", " x ".join(f"{figures[f'{a}_mm']:.4g}" for a in "xyz") + " mm")]
@@ -80,11 +85,12 @@ def _headline(job: Job, found: PrintCheck) -> str:
     if "chamber_ml" in figures:
         facts.append(("resin to drain from chambers", f"{figures['chamber_ml']:.3g} ml"))
     if "trapped_ml" in figures:
-        facts.append(("resin trapped for good", f"{figures['trapped_ml']:.3f} ml"))
+        facts.append(("resin trapped in sealed voids", f"{figures['trapped_ml']:.3f} ml"))
     up = direction_name(job.direction)
     return (
-        f'<p class="answer">{words}</p><p>Built along {escape(up)}, away from the platform, and held off it '
-        f"by supports. Balls mark the places: red must be mended, orange needs a decision.</p>{cards(facts)}"
+        f'<p class="answer">{words}</p><p>Built along {escape(up)}, away from the platform, on supports. '
+        "Spheres mark findings: red must be corrected, orange needs a decision."
+        f"</p>{cards(facts)}"
     )
 
 
@@ -118,7 +124,7 @@ def _places(found: PrintCheck) -> str:
         if f.is_fault and len(f.places) > 1:
             text = "; ".join(f"({x:.1f}, {y:.1f}, {z:.1f})" for x, y, z in f.places[:MOST_ROWS])
             rows.append(([f.check, text + (" ..." if f.count > MOST_ROWS else "")], False))
-    return table("Places in mm, the worst first", [("check", ""), ("places", "text")], rows) if rows else ""
+    return table("Locations in mm, worst first", [("check", ""), ("places", "text")], rows) if rows else ""
 
 
 def _orientation(builds: Sequence[Build]) -> str:
@@ -145,15 +151,18 @@ def _orientation(builds: Sequence[Build]) -> str:
         ]
         rows.append(([name, *cells, "yes" if b.best_among else ""], k == 0))
     words = (
-        f"{len(builds)} directions, pointing away from the platform: the sides, edges and corners of a cube, "
-        "and eight that lean 20 degrees from the best of these. They are ordered by what matters most: it "
-        "fits, seals off no cup of half a millilitre, has the least flat surface in chambers, where no "
-        "support can be taken out; then the fewest islands, the least surface to support, the least height. "
-        "Where a direction is unbeaten, none is as good in all of these and better in one."
+        f"{len(builds)} directions, pointing away from the platform: faces, edges and corners of a cube, "
+        "and eight tilted by 20 degrees from the best of these. They are ordered by, in this order: the "
+        "part fits, no cup of 0.5 ml or more, least flat surface in chambers (supports there cannot be "
+        "removed), fewest islands, least supported surface, least height. A direction is Pareto-optimal if "
+        "no other is at least as good in all of these criteria and better in one."
     )
     svg = trade_off(builds)
-    alt = "Surface to support against the largest cup, a point a build direction"
-    caption = "Few supports or no cup: each point is a build direction, orange the one to choose."
+    alt = "Supported surface against the largest cup, one point per build direction"
+    caption = (
+        "Supported surface against the largest cup: one point per build direction, recommended "
+        "direction in orange."
+    )
     return f"<p>{escape(words)}</p>" + figure(svg, caption, alt, "chart") + table("", head, rows)
 
 
@@ -231,7 +240,7 @@ def places_picture(
     caption = (
         f"{numbered(count, 'place', 'places')}; the arrow is the build direction, away from the platform."
     )
-    return Picture(png(image), caption, "The part seen through, with balls at the places of faults")
+    return Picture(png(image), caption, "Transparent view of the part with spheres at the findings")
 
 
 def plots_ink() -> tuple[float, float, float]:

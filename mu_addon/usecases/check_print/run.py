@@ -91,7 +91,7 @@ def check_print(job: Job, folder: Path, progress: Progress, context: RunContext)
     errors = [f for f in found.findings if f.severity == "error"]
     if errors:
         first = errors[0]
-        more = f" (and {len(errors) - 1} errors more, see report.html)" if len(errors) > 1 else ""
+        more = f" (and {len(errors) - 1} more errors, see report.html)" if len(errors) > 1 else ""
         raise GateError(
             f"not printable: {first.check}: {first.what}{more}", _where(first.places), first.remedy
         )
@@ -133,7 +133,7 @@ def _text_stl(content: bytes, name: str) -> tuple[Vertices, Triangles]:
         return vertices, np.ravel(index).reshape(-1, 3).astype(np.int64)
     except ValueError as error:
         raise InputError(
-            "this is not a whole STL file", name, "export the part again as binary STL"
+            "the STL file is truncated or malformed", name, "export the part again as binary STL"
         ) from error
 
 

@@ -1,4 +1,4 @@
-"""Charts of a diagnosis: measured beside predicted, what is left over, and what explains it."""
+"""Charts of a diagnosis: measured beside predicted, what is residual, and what explains it."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def panel(curve: Curve, extends: bool) -> str:
             above.plot(x, curve.after, "-", color=CHOSEN, linewidth=1.7, zorder=3)
             _left(beneath, x, curve.measured - curve.after, CHOSEN, "-")
         above.set_ylabel(titled(curve.channel), fontsize=8)
-        beneath.set_ylabel("left over", fontsize=8)
+        beneath.set_ylabel("residual", fontsize=8)
         beneath.set_xlabel(title, fontsize=8)
         for axes in (above, beneath):
             axes.tick_params(labelsize=7)
@@ -124,7 +124,7 @@ def dependence_chart(
         axes.grid(False, axis="y")
         ticks = [0, 3, 6, 9, 12]
         axes.set_xticks(ticks, ["certain", *(f"10$^{{-{t}}}$" for t in ticks[1:-1]), "less"])
-        axes.set(xlim=(-0.4, most + 0.9), xlabel="probability by chance")
+        axes.set(xlim=(-0.4, most + 0.9), xlabel="p-value")
         axes.set_ylim(len(names) - 0.5, -0.5)
         axes.annotate(
             "structure",
@@ -176,7 +176,7 @@ def residual_panel(d: Dependent, extends: bool) -> str:
             fontweight="bold",
             color=CHOSEN if d.structure else INK,
         )
-        axes.set_ylabel(f"left over [{d.unit}]", fontsize=8)
+        axes.set_ylabel(f"residual [{d.unit}]", fontsize=8)
         axes.tick_params(labelsize=7)
         axes.xaxis.set_major_locator(_few(4))
         axes.yaxis.set_major_locator(_few(4))
@@ -231,17 +231,17 @@ def rivals_chart(names: Sequence[str], left: Sequence[float], chosen: float, nam
         axes.tick_params(axis="y", length=0)
         axes.invert_yaxis()
         axes.grid(False, axis="y")
-        axes.set_xlabel("misfit left, of the model as it was")
+        axes.set_xlabel("remaining misfit relative to the base model")
     return svg()
 
 
 def gain_chart(errors: Errors) -> str:
     """Root mean square errors: the base model, the extended one, and the two that know no cause."""
     bars = [
-        ("model as it was", errors.before, BASE),
+        ("base model", errors.before, BASE),
         ("extended model", errors.after, CHOSEN),
-        ("effect on wrong experiments", errors.permuted, "#B9C3CF"),
-        ("black box", errors.black_box, "#B9C3CF"),
+        ("effect on permuted experiments", errors.permuted, "#B9C3CF"),
+        ("black-box model", errors.black_box, "#B9C3CF"),
     ]
     bars = [bar for bar in bars if math.isfinite(bar[1])]
     high = 0.62 + 0.3 * len(bars)

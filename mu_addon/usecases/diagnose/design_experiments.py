@@ -66,7 +66,7 @@ def noise_of(words: Sequence[str]) -> dict[str, float]:
             value = math.nan
         if name not in NOISE or not (math.isfinite(value) and value > 0):
             raise InputError(
-                f"{word!r} is no noise", "--noise", f"write QUANTITY=VALUE, of {', '.join(NOISE)}"
+                f"{word!r} is not a noise level", "--noise", f"write QUANTITY=VALUE, of {', '.join(NOISE)}"
             )
         found[name] = value
     return found
@@ -143,7 +143,9 @@ def _sources(planned: Record, noise: Mapping[str, float]) -> dict[str, Source]:
         head = members[0].channel.rpartition("_")[0]
         quantity = "marker" if head.startswith("marker") else head
         if quantity not in noise:
-            raise InputError(f"no noise of {quantity} is given", "--noise", f"known: {', '.join(noise)}")
+            raise InputError(
+                f"no noise level of {quantity} is given", "--noise", f"known: {', '.join(noise)}"
+            )
         size = noise[quantity] * math.sqrt(0.5)
         times = [s.time_s for s in members if not math.isnan(s.sample_s)]
         longest = max((float(t[-1] - t[0]) for t in times), default=1.0)
@@ -153,7 +155,7 @@ def _sources(planned: Record, noise: Mapping[str, float]) -> dict[str, Source]:
 
 def _limit(s: Sensitivity) -> str:
     p = s.effect.parameters[0]
-    return f"{bare(p)} {s.limit:.3g} {p.unit}".strip() if s.identifiable else "not at all"
+    return f"{bare(p)} {s.limit:.3g} {p.unit}".strip() if s.identifiable else "not detectable"
 
 
 def _write(found: Plan, path: Path) -> None:
@@ -179,28 +181,28 @@ def _report(found: Plan, name: str, told: Sequence[str], versions: Mapping[str, 
             f"{s.unabsorbed:.1%}" if s.unabsorbed else "–",
             ""
             if s.identifiable
-            else (f"absorbed by {by}" if by and s.unabsorbed else "nothing depends on it"),
+            else (f"absorbed by {by}" if by and s.unabsorbed else "no measured quantity depends on it"),
             listed([readable(a) for a in alike]) if alike else "",
             s.effect.reveals,
         ]
         rows.append((cells, s.identifiable))
     head = [
         ("effect", ""),
-        ("visible from", "line"),
+        ("detectable from", "line"),
         ("not absorbed", "n"),
-        ("why not", "text"),
-        ("looks like", "text"),
-        ("what shows it best", "text"),
+        ("reason if not", "text"),
+        ("similar to", "text"),
+        ("best experiment for it", "text"),
     ]
     html = (
-        "<p>An effect of the size given is seen in nearly every set of such data (χ² of 16). What is not "
-        "absorbed is the share of its signature that fitted moduli and zeros cannot imitate. "
-        f"Effects that look alike by more than {ALIKE:g} (cosine) are told from each other only by another "
-        "experiment.</p>" + table("", head, rows)
+        "<p>An effect of the given size is detected in nearly every set of such data (χ² of 16). "
+        "“Not absorbed” is the share of its signature that fitted moduli and zeros cannot reproduce. "
+        f"Effects whose signatures have a similarity above {ALIKE:g} (cosine) can be distinguished "
+        "only by another experiment.</p>" + table("", head, rows)
     )
     noise = {readable(k): v for k, v in found.noise.items()}
     sections = [
-        ("limits", "What these experiments would show", html),
+        ("limits", "Detectable effects", html),
         (
             "noise",
             "Noise of a reading",
@@ -209,11 +211,11 @@ def _report(found: Plan, name: str, told: Sequence[str], versions: Mapping[str, 
         ("versions", "Versions", facts_table("program", "version", versions)),
     ]
     count = len(found.experiments)
-    subtitle = f"{count} experiment{'s' if count != 1 else ''}, not yet made"
+    subtitle = f"{count} experiment{'s' if count != 1 else ''}, planned"
     shown = sum(s.identifiable for s in found.seen)
     share = f"<strong>{shown} of {len(found.seen)}</strong>"
-    lead = f'<p class="answer">These experiments would show {share} effects.</p>'
-    return page(f"What {name} would show", subtitle, note(told), lead, sections)
+    lead = f'<p class="answer">These experiments can detect {share} effects.</p>'
+    return page(f"Experiments planned in {name}", subtitle, note(told), lead, sections)
 
 
 def summary(found: Plan) -> dict[str, Any]:
@@ -228,8 +230,10 @@ def summary(found: Plan) -> dict[str, Any]:
 
 def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What a plan would show, in a few lines of text, of its `summary`."""
-    lines = [f"{readable(name)}: visible from {limit}" for name, (limit, _) in summary["visible"].items()]
+    lines = [f"{readable(name)}: detectable from {limit}" for name, (limit, _) in summary["visible"].items()]
     if summary["hidden"]:
-        lines.append(f"not visible: {listed([readable(n) for n in summary['hidden']])}")
-    lines += [f"look alike: {readable(a)} and {readable(b)} ({c:.3f})" for a, b, c in summary["alike"][:5]]
+        lines.append(f"not detectable: {listed([readable(n) for n in summary['hidden']])}")
+    lines += [
+        f"similar signatures: {readable(a)} and {readable(b)} ({c:.3f})" for a, b, c in summary["alike"][:5]
+    ]
     return lines

@@ -29,9 +29,9 @@ FILES = {
     "unit.toml": "parameters of the unit",
     "verdict.json": "the verdict and its figures",
     "model.toml": "the extended model: `simulate`, `place` and `homogenize` take it with --model",
-    "residuals.csv": "every measured value beside both models",
-    "summary.json": "every figure of this run",
-    "log.ndjson": "what was said while it ran",
+    "residuals.csv": "every measured value beside the predictions of both models",
+    "summary.json": "all results of this run as numbers",
+    "log.ndjson": "log of this run",
 }
 # Panels of measured beside predicted; the rest is in residuals.csv.
 MOST_PANELS = 30
@@ -51,13 +51,13 @@ def report(found: Diagnosis, out: Path, versions: dict[str, str]) -> str:
     sections = [
         ("measured", "Measured and predicted", _measured(found)),
         ("causes", "The cause", _causes(found)),
-        ("rivals", "Other explanations", _rivals(found)),
-        ("gain", "What mending it gains", _gain(found)),
-        ("left", "What the residual depends on", _dependence(found)),
-        ("seen", "What these data could show", _identifiability(found)),
+        ("rivals", "Rival explanations", _rivals(found)),
+        ("gain", "Error reduction", _gain(found)),
+        ("left", "Dependence of the residual", _dependence(found)),
+        ("seen", "Identifiability of each effect", _identifiability(found)),
         ("noise", "Noise", _noise(found)),
-        ("data", "The data", _data(found)),
-        ("files", "Files of this run", facts_table("file", "what it holds", _files(out))),
+        ("data", "Data", _data(found)),
+        ("files", "Files of this run", facts_table("file", "content", _files(out))),
         ("versions", "Versions", facts_table("program", "version", versions)),
     ]
     experiments = found.measured.experiments
@@ -67,7 +67,7 @@ def report(found: Diagnosis, out: Path, versions: dict[str, str]) -> str:
     subtitle = f"{count} experiment{'s' if count > 1 else ''} ({kinds}), {held or 'none'} of them held out"
     name = found.measured.folder.resolve().name
     return page(
-        f"What {name} says of the model",
+        f"Diagnosis of {name}",
         subtitle,
         _notes(found),
         _headline(found),
@@ -78,7 +78,7 @@ def report(found: Diagnosis, out: Path, versions: dict[str, str]) -> str:
 def _notes(found: Diagnosis) -> str:
     told = [f"{r[:1].upper()}{r[1:]}." for r in found.remarks]
     if len(told) > MOST_NOTES:
-        told = [f"There are {len(told)} remarks on the data, listed with them below."]
+        told = [f"There are {len(told)} remarks on the data; the section Data lists them."]
     return note(told)
 
 
@@ -89,23 +89,25 @@ def _headline(found: Diagnosis) -> str:
         f'<p class="answer">Verdict: <strong>{escape(headline)}</strong>.</p><p>{escape(signed(words))}</p>'
     )
     if next_ := advice(verdict):
-        html += f"<p><strong>What to measure next.</strong> {escape(next_)}</p>"
+        html += f"<p><strong>Next measurement.</strong> {escape(next_)}</p>"
     judged = verdict.gain.held_out or verdict.gain.fit
     facts = [("verdict", verdict.kind)]
     if found.extends:
         which = "held out" if verdict.gain.held_out else "fitted"
         facts += [
-            (f"error as it was, {which}", f"{judged.before:.3g} {judged.unit}"),
+            (f"error of the base model, {which}", f"{judged.before:.3g} {judged.unit}"),
             (
-                "with the effect" + ("" if verdict.names else ", not named"),
+                "with the effect" + ("" if verdict.names else " (not named)"),
                 f"{judged.after:.3g} {judged.unit}",
             ),
         ]
     else:
         facts.append(("error of the model", f"{judged.before:.3g} {judged.unit}"))
     if verdict.names:
-        facts.append(("chance of a false name", _chance(max(c.p_value for c in verdict.selection.causes))))
-    facts.append(("effects tried", str(len(verdict.selection.singles))))
+        facts.append(
+            ("false-positive probability", _chance(max(c.p_value for c in verdict.selection.causes)))
+        )
+    facts.append(("effects tested", str(len(verdict.selection.singles))))
     return html + cards(facts)
 
 
@@ -120,18 +122,21 @@ def _measured(found: Diagnosis) -> str:
     wide = ' style="max-width:52rem"' if len(drawn) > len({c.experiment.name for c in drawn}) else ""
     html = f'{_key(found)}<div class="triple"{wide}>'
     for curve in drawn:
-        alt = f"{curve.experiment.name}: {pictures.titled(curve.channel)}, measured, predicted, left over."
+        alt = (
+            f"{curve.experiment.name}: {pictures.titled(curve.channel)}: measurement, prediction "
+            "and residual."
+        )
         html += figure(pictures.panel(curve, found.extends), "", alt)
     html += "</div>"
     if more:
         html += f"<p>{more} more channels are in residuals.csv.</p>"
     if any(c.spread is not None for c in drawn):
-        html += "<p>Grey: the spread given with the data; a whole record may lie so much higher or lower.</p>"
+        html += "<p>Grey: standard deviation given with the data; it may shift a whole record up or down.</p>"
     return html
 
 
 def _key(found: Diagnosis) -> str:
-    marks = [(INK, "●", "measured"), (pictures.BASE, "╌╌", "model as it was")]
+    marks = [(INK, "●", "measured"), (pictures.BASE, "╌╌", "base model")]
     if found.extends:
         marks.append((CHOSEN, "━━", _extended_words(found)))
     said = [f'<span style="color:{color}">{mark}</span> {escape(what)}' for color, mark, what in marks]
@@ -182,20 +187,20 @@ def _causes(found: Diagnosis) -> str:
             )
     head = [
         ("effect", ""),
-        ("what it is", "text"),
+        ("mechanism", "text"),
         ("parameter", ""),
         ("value", "n"),
         ("95 %", "n"),
         ("unit", ""),
         ("note", "line"),
-        ("by chance", "n"),
+        ("p-value", "n"),
         ("rivals", "text"),
     ]
     words = (
         ""
         if verdict.names
-        else "<p>These are the best attempt, and no verdict: what they leave still depends on something, so "
-        "their parameters may stand for something else.</p>"
+        else "<p>These effects are the best fit and not a verdict: the remaining residual has "
+        "structure, so their parameters may compensate for another cause.</p>"
     )
     rest = []
     for p in found.simulator.nuisances:
@@ -203,7 +208,11 @@ def _causes(found: Diagnosis) -> str:
             value, (low, high) = verdict.selection.chosen.values[p.name], verdict.intervals[p.name]
             rest.append(([bare(p), _figures(value), signed(between(low, high)), p.unit], False))
     fitted = [("quantity", ""), ("value", "n"), ("95 %", "n"), ("unit", "")]
-    return words + table("", head, rows) + (table("Fitted whatever the cause.", fitted, rest) if rest else "")
+    return (
+        words
+        + table("", head, rows)
+        + (table("Nuisance parameters, fitted in every case.", fitted, rest) if rest else "")
+    )
 
 
 def _at_bound(p: Parameter, low: float, high: float) -> str:
@@ -243,19 +252,24 @@ def _rivals(found: Diagnosis) -> str:
         )
     picture = figure(
         chart,
-        "Each effect alone, refitted, nuisances with it. Orange: chosen, or as good. "
-        "Dashed: the model chosen.",
-        "Share of the misfit that each effect leaves.",
+        "Each effect alone, refitted together with the nuisance parameters. Orange: chosen or "
+        "equivalent. Dashed: chosen model.",
+        "Share of the misfit that remains with each effect.",
     )
     count = len(found.verdict.record)
     return (
-        f"<p>The model as it was leaves χ² = {base:.4g} of {count} values; {len(names)} effects that these "
-        f"data could show were tried. Two that differ by less than "
-        f"{RIVAL_DELTA_CHI2:g} cannot be told apart.</p>"
+        f"<p>The base model leaves χ² = {base:.4g} of {count} values; {len(names)} effects that these "
+        "data can identify were tested. Two effects whose χ² differ by less than "
+        f"{RIVAL_DELTA_CHI2:g} are not distinguishable.</p>"
         + f'<div class="chart">{picture}</div>'
         + table(
             "",
-            [("effect alone", ""), ("best fit", "text"), ("χ² left", "n"), ("held against it", "text")],
+            [
+                ("effect alone", ""),
+                ("best fit", "text"),
+                ("remaining χ²", "n"),
+                ("reason against it", "text"),
+            ],
             rows,
         )
     )
@@ -268,17 +282,17 @@ def _against(found: Diagnosis, f: Fit, rivals: set[str]) -> str:
     at = [bare(p) for k, p in zip(e.keys, e.parameters, strict=True) if _ended(p, f.values[k])]
     bound = f"; {' and '.join(at)} at its bound" if at else ""
     if name in selection.chosen.names and found.verdict.names:
-        return "nothing: named" if found.verdict.kind == "named" else "nothing: it fits best"
+        return "none: named" if found.verdict.kind == "named" else "none: best fit"
     if name in selection.chosen.names:
-        return "part of the best attempt"
+        return "part of the best fit"
     if name in rivals:
-        return f"nothing these data could tell: a rival{bound}"
+        return f"none: a rival that these data do not distinguish{bound}"
     if gained < RIVAL_DELTA_CHI2:
-        return f"gains no more than noise would ({_figures(max(gained, 0.0))}){bound}"
+        return f"no significant gain ({_figures(max(gained, 0.0))}){bound}"
     if not selection.chosen.effects:
-        return f"gains {gained:.3g}, too little for one of so many tried{bound}"
+        return f"gains {gained:.3g}, not significant for this number of tests{bound}"
     more = f.chi2 - selection.chosen.chi2
-    return f"leaves {more:.3g} more than the model chosen{bound}"
+    return f"leaves {more:.3g} more than the chosen model{bound}"
 
 
 def _ended(p: Parameter, value: float) -> bool:
@@ -298,7 +312,7 @@ def _gain(found: Diagnosis) -> str:
         low, high = errors.low95, errors.high95
         drop = ""
         if math.isfinite(low):
-            sure = "" if low > 0 else " It is not sure that it gains at all."
+            sure = "" if low > 0 else " The reduction is not significant."
             drop = (
                 f"The error drops by {_figures(errors.before - errors.after)} {errors.unit} "
                 f"(95 %: {_figures(low)} to {_figures(high)}).{sure}"
@@ -310,15 +324,19 @@ def _gain(found: Diagnosis) -> str:
         )
     html += "</div>"
     if gain.held_out is None:
-        html += '<p>None was held out: give one role = "held_out", and its gain is that on unseen data.</p>'
+        html += (
+            '<p>No experiment was held out. Set role = "held_out" for one of them to measure the '
+            "error reduction on unseen data.</p>"
+        )
     told = [name for name, (fit, _) in gain.by_quantity.items() if fit is gain.fit and name != KNOWN]
     which = f" of {readable(told[0])}" if told and len(gain.by_quantity) > 1 else ""
     return (
         html
         + _by_quantity(found)
-        + f"<p>Root mean square errors{which}. An honest cause beats the same effect put on the wrong "
-        "experiments, and a black box with as many parameters; the interval is from blocks drawn anew, so "
-        "that correlated values do not count as many.</p>"
+        + f"<p>Root mean square errors{which}. A true cause reduces the error more than the same "
+        "effect applied to permuted experiments, and more than a black-box model with as many "
+        "parameters. The interval is from a block bootstrap, which accounts for correlated "
+        "values.</p>"
     )
 
 
@@ -352,30 +370,28 @@ def _dependence(found: Diagnosis) -> str:
         cells.append(where.where if where.p_value < level else "")
         rows.append((cells, where.p_value < level))
         structured[d.against] = where.p_value < level
-    head = [("what is left, against", ""), ("by chance", "n"), ("structure", "")]
+    head = [("residual against", ""), ("p-value", "n"), ("structure", "")]
     if found.extends:
-        head += [("after, by chance", "n"), ("structure", "")]
+        head += [("p-value after", "n"), ("structure", "")]
     head.append(("strongest", "text"))
     chart = figure(
         pictures.dependence_chart(before, after, level, found.extends),
-        "Open: the model as it was"
-        + (f". Filled: {escape(_extended_words(found))}" if found.extends else "")
-        + ".",
-        "Probability by chance of each dependence of the residual.",
+        "Open: base model" + (f". Filled: {escape(_extended_words(found))}" if found.extends else "") + ".",
+        "p-value of each dependence of the residual.",
     )
     shown = "".join(
-        figure(pictures.residual_panel(d, found.extends), "", f"What is left against {readable(d.name)}.")
+        figure(pictures.residual_panel(d, found.extends), "", f"Residual against {readable(d.name)}.")
         for d in _dependents(found, structured)
     )
     panels = (
-        "<p>Means of what is left, over stretches of equally many values, with the middle half of them.</p>"
+        "<p>Mean residual in bins of equal count, with the interquartile range.</p>"
         f'<div class="triple">{shown}</div>'
         if shown
         else ""
     )
     return (
-        "<p>A right model leaves noise, which depends on nothing. The probability is that of noise as "
-        "correlated as these instruments' alone showing as much.</p>"
+        "<p>The residual of a correct model is noise and depends on nothing. The p-value is the "
+        "probability that correlated noise of these instruments shows at least this dependence.</p>"
         f'<div class="chart">{chart}</div>{table("", head, rows)}{panels}'
     )
 
@@ -436,16 +452,16 @@ def _identifiability(found: Diagnosis) -> str:
         )
     head = [
         ("effect", ""),
-        ("could be seen", ""),
+        ("identifiable", ""),
         ("from", "n"),
         ("not absorbed", "n"),
-        ("why not", "text"),
-        ("what shows it best", "text"),
+        ("reason if not", "text"),
+        ("best experiment for it", "text"),
     ]
     return (
-        "<p>An effect can hide behind a fitted modulus or zero. What is not absorbed is the share of its "
-        "signature that these cannot imitate; from the size given on it would have been seen.</p>"
-        + table("", head, rows)
+        "<p>An effect can be absorbed by a fitted modulus or zero. “Not absorbed” is the share of its "
+        "signature that these cannot reproduce; “from” is the smallest size that would have been "
+        "detected.</p>" + table("", head, rows)
     )
 
 
@@ -463,7 +479,7 @@ def _noise(found: Diagnosis) -> str:
                         "",
                         "",
                         "",
-                        f"{len(members)} values that stand for whole records",
+                        f"{len(members)} values, each for a whole record",
                     ],
                     False,
                 )
@@ -482,22 +498,22 @@ def _noise(found: Diagnosis) -> str:
                     f"{_figures(source.white)} {unit}",
                     f"{_figures(source.slow)} {unit}" if clocked and source.slow else "–",
                     f"{_figures(source.time_s)} s" if clocked and source.slow else "–",
-                    origin + ("" if clocked else ", without a clock"),
+                    origin + ("" if clocked else ", without time stamps"),
                 ],
                 False,
             )
         )
     head = [
         ("quantity", ""),
-        ("of a value", "n"),
+        ("white, per value", "n"),
         ("slow", "n"),
-        ("lasts", "n"),
+        ("correlation time", "n"),
         ("estimated from", "text"),
     ]
     return (
-        "<p>Estimated from what is left after everything that any effect could do smoothly is set aside, so "
-        "that a cause does not pass for noise. Slow noise wanders; residuals are judged with it.</p>"
-        + table("", head, rows)
+        "<p>Estimated from the residual after a smooth component that any effect could produce was "
+        "removed, so that a cause is not taken for noise. Slow noise is correlated in time; the "
+        "p-values account for it.</p>" + table("", head, rows)
     )
 
 

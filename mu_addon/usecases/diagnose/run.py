@@ -124,7 +124,7 @@ def diagnose_folder(
     for remark in measured.remarks:
         progress.warning(remark.what, remark.where, remark.remedy)
     if kept:
-        with progress.stage("verdict of the same data, kept"):
+        with progress.stage("verdict of the same data, from the cache"):
             context.summary |= kept
         return None
     simulators, told = simulators_of(measured.experiments, unit, out / "cache", progress, settings)
@@ -139,7 +139,7 @@ def diagnose_folder(
     told += _noisy_gauges(measured, verdict)
     remarks = [*(f"{r.what} ({_place(r.where)})" for r in measured.remarks), *told]
     unknown = dict.fromkeys(e.kind for e in measured.experiments if not simulator.knows(e))
-    remarks += [f"nothing predicts {kind}: its experiments were left out" for kind in unknown]
+    remarks += [f"there is no model for {kind}: its experiments were left out" for kind in unknown]
     found = Diagnosis(measured, simulator, verdict, model, unit, tuple(remarks))
     write_json(out / "verdict.json", verdict.as_json())
     found.model.save(out / "model.toml")
@@ -242,8 +242,8 @@ def _resin(model: ExtendedModel, unit: Unit | None) -> list[str]:
         return []
     drawn = float(model.lattice.modulus_MPa(1.0, 0.0, 1.0))
     return [
-        f"the lattice's modulus as drawn, {fitted.value:.3g} kPa, is that of a resin of "
-        f"{fitted.value / 1e3 / drawn:.3g} MPa; the unit's walls have "
+        f"the lattice's modulus as drawn, {fitted.value:.3g} kPa, corresponds to a resin of "
+        f"{fitted.value / 1e3 / drawn:.3g} MPa, but the modulus of the unit's walls is "
         f"{unit.material.membrane_modulus_MPa:.3g} MPa"
     ]
 
@@ -256,8 +256,8 @@ def _noisy_gauges(measured: Measured, verdict: Verdict) -> list[str]:
             if not np.array_equal(values, e.columns[column], equal_nan=True):
                 noise[column] = max(noise.get(column, 0.0), reading_noise(e.columns[column]))
     return [
-        f"{column} was read with white noise of up to {sd:.2g}; where it runs straight this was averaged "
-        "away, and no effect is named for what is left of it"
+        f"{column} was read with white noise of up to {sd:.2g}; this noise was removed by averaging "
+        "over straight stretches, and no effect is named for its remainder"
         for column, sd in noise.items()
     ]
 
@@ -266,7 +266,7 @@ def _bounds_met(verdict: Verdict, simulator: Composite) -> list[str]:
     """Which fitted values of the base model ended at a bound, in words."""
     values = verdict.selection.base.values
     return [
-        f"fitted without any effect, {readable(p.name)} ends at its bound, {values[p.name]:.3g} ({p.source})"
+        f"in the fit without effects, {readable(p.name)} is at its bound, {values[p.name]:.3g} ({p.source})"
         for p in simulator.nuisances
         if any(math.isclose(values.get(p.name, p.null), end, rel_tol=1e-6) for end in (p.low, p.high))
     ]
@@ -390,32 +390,34 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
         said = [f"{readable(c.effect.name)} has {sized(verdict, c)}" for c in found.causes]
         return (
             " and ".join(choices),
-            "Something is wrong, and these data cannot tell which of these it is: each explains them. "
-            f"Fitted, {'; '.join(said)}.",
+            "The model is wrong. Each of these effects explains the data, and these data do not "
+            f"distinguish them. Fitted values: {'; '.join(said)}.",
         )
     if verdict.kind == "none":
         return (
-            "nothing wrong",
-            "What the model leaves of these data looks like the noise of the instruments. An effect larger "
-            "than its limit in the table below would have been seen.",
+            "no model error detected",
+            "The residual is consistent with instrument noise. An effect larger than its limit in the "
+            "table below would have been detected.",
         )
     if verdict.kind == "unidentifiable":
         return (
-            "cannot be told",
-            "The model follows the data only with a fitted value far from what is known of it. Whatever is "
-            "behind that, these data could not show it, however many of their kind there were.",
+            "not identifiable",
+            "The model fits the data only with a parameter far from its known value. More data of "
+            "this kind cannot identify the cause.",
         )
     where = [readable(n) for n in found.left if n != SPREAD]
-    tried = "What it leaves is more than the spread that the data give. " if SPREAD in found.left else ""
-    tried += f"What it leaves depends on {listed(where)}. " if where else ""
+    tried = (
+        "The residual exceeds the standard deviation given with the data. " if SPREAD in found.left else ""
+    )
+    tried += f"The residual depends on {listed(where)}. " if where else ""
     if found.doubted:
         tried += f"{_upper(readable(found.doubted))}. "
     if found.chosen.effects:
         names = listed([readable(n) for n in found.chosen.names])
-        tried += f"The best attempt, {names}, is not named, since it leaves structure behind."
+        tried += f"The best fit, {names}, is not named because its residual has structure."
     return (
-        "something no known effect explains",
-        f"The model is wrong, but the cause is not known here. {tried}".strip(),
+        "unexplained by any known effect",
+        f"The model is wrong, and no effect of the library explains it. {tried}".strip(),
     )
 
 
@@ -423,23 +425,23 @@ def advice(verdict: Verdict) -> str:
     """What to measure next, in words."""
     if verdict.proposal is not None:
         told = listed([readable(n) for n in verdict.proposal.separates])
-        return f"{_upper(verdict.proposal.what)}. It tells {told} apart."
+        return f"{_upper(verdict.proposal.what)}. It distinguishes {told}."
     found = verdict.selection
     if verdict.kind == "named":
-        return f"To confirm it on fresh data: {'; '.join(c.effect.reveals for c in found.causes)}."
+        return f"To confirm it on new data: {'; '.join(c.effect.reveals for c in found.causes)}."
     if verdict.kind == "unexplained":
         places = [d for d in found.table if d.against in found.left and d.where and d.against != SPREAD]
         places.sort(key=lambda d: d.p_value)
-        at = f" It is strongest at: {places[0].where}." if places else ""
-        return f"Repeat an experiment and change nothing: what does not come back is not the model's.{at}"
+        at = f" The deviation is largest at: {places[0].where}." if places else ""
+        return f"Repeat an experiment unchanged: what does not recur is not a model error.{at}"
     hidden = [s for s in best_seen(verdict.seen).values() if not s.identifiable]
     if not hidden:
         return ""
     shown = dict.fromkeys(s.effect.reveals for s in hidden)
     some = list(shown)[:3]
     return (
-        f"These data could not show {listed([readable(s.effect.name) for s in hidden])}. "
-        f"To see more: {'; or '.join(some)}."
+        f"These data cannot identify {listed([readable(s.effect.name) for s in hidden])}. To identify "
+        f"more: {'; or '.join(some)}."
     )
 
 
@@ -468,7 +470,7 @@ def summary(found: Diagnosis) -> dict[str, Any]:
 def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What a diagnosis found, in a few lines of text, of its `summary`."""
     lines = [f"verdict: {summary['verdict']}: {summary['headline']}", summary["sentence"]]
-    for name, words in (("fit", "data that were fitted"), ("held_out", "data held out")):
+    for name, words in (("fit", "fitted data"), ("held_out", "held-out data")):
         errors = summary["gain"][name]
         if errors and summary["causes"]:
             before, after = errors["rmse_before"], errors["rmse_after"]

@@ -36,7 +36,9 @@ def read_sheet(path: Path) -> dict[str, tuple[float, float, float]]:
         name, value = row.get("feature") or "", (row.get("measured_mm") or "").strip()
         if name not in known:
             raise InputError(
-                f"the gauge has no feature {name!r}", f"{path}, line {number}", "see `specimens`"
+                f"the gauge has no feature {name!r}",
+                f"{path}, line {number}",
+                "the features are those of `specimens`",
             )
         if not value:
             continue
@@ -55,7 +57,7 @@ def read_sheet(path: Path) -> dict[str, tuple[float, float, float]]:
     found = offsets(chosen, sizes)
     if set(found) != {"xy", "z"}:
         raise InputError(
-            f"{len(chosen)} sizes were measured, too few in {'z' if 'xy' in found else 'the plane'}",
+            f"{len(chosen)} sizes were measured, which is too few in {'z' if 'xy' in found else 'the plane'}",
             str(path),
             "measure at least three along x and y, and three along z",
         )
@@ -73,9 +75,9 @@ def taken_off(unit: Unit, source: str | None) -> tuple[tuple[float, float], str]
         found = unit.print.offset_xy_mm, unit.print.offset_z_mm
         if not any(found):
             raise InputError(
-                "the unit's [print] has no offsets to take off",
+                "the unit's [print] has no print offset to compensate",
                 "--compensate",
-                "give --model of a diagnosis that found overcure, or the gauge's filled sheet",
+                "give a --model with overcure, or the filled CSV sheet of the gauge",
             )
         return found, "the unit's [print]"
     of = read_sheet(Path(source))

@@ -41,9 +41,9 @@ STEP_TOLERANCE = 5e-3
 
 # In which order CAD takes the bodies, and what each does to those before it.
 _ASSEMBLY = (
-    ("envelope.step", "start with it: the box of the lattice, without the actuator"),
+    ("envelope.step", "base body: the box of the lattice without the actuator"),
     ("membrane.step", "add: wall, end caps and inlet"),
-    ("waveguide.step", "add last of all that is solid: bar and seats, already cut"),
+    ("waveguide.step", "add after all other solids: bar and seats, already trimmed"),
     ("cavity.step", "subtract after everything was added, or keep as the volume of air"),
 )
 
@@ -144,9 +144,9 @@ class Export:
         enclosed, open_edges = volume(vertices, triangles), bad_edges(triangles)
         error = enclosed / solid.gates.volume_mm3 - 1.0
         if open_edges:
-            raise _mismatch(name, f"has {open_edges} edges that are not shared by two triangles")
+            raise _mismatch(name, f"has {open_edges} edges not shared by exactly two triangles")
         if len(triangles) != len(solid.triangles):
-            raise _mismatch(name, f"has {len(triangles)} triangles and not {len(solid.triangles)}")
+            raise _mismatch(name, f"has {len(triangles)} triangles, expected {len(solid.triangles)}")
         if abs(error) > MESH_TOLERANCE:
             raise _mismatch(name, f"encloses {enclosed:.3f} mm3 and not {solid.gates.volume_mm3:.3f} mm3")
         return {
@@ -259,7 +259,7 @@ class Export:
             "taken_off_mm": {
                 "xy": job.take_off[0],
                 "z": job.take_off[1],
-                "source": job.offset_source or "nothing: the drawing is nominal",
+                "source": job.offset_source or "nothing: nominal geometry",
             },
             "resin": {
                 "name": job.resin.name,
@@ -319,7 +319,7 @@ def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What was written, in a few lines of text, of a run's `summary`."""
     solid, resin = summary["solid"], summary["resin"]
     lines = [
-        f"{entry['file']}: {entry['bytes'] / 1e6:.2f} MB, read back and the same"
+        f"{entry['file']}: {entry['bytes'] / 1e6:.2f} MB, read back and verified"
         for entry in summary["files"]
     ]
     lines += [f"not written: {entry['format']}: {entry['why']}" for entry in summary["refused"]]

@@ -57,7 +57,7 @@ def specimens(unit: Unit, scales: tuple[float, ...] = SCALES, cells: int = CELLS
         Specimen(
             "gauge",
             coupons.gauge,
-            "with calipers, every size of gauge.csv; back by `export --compensate gauge.csv`",
+            "measure every size of gauge.csv with calipers; `export --compensate gauge.csv` uses them",
         )
     ]
     for scale in scales:
@@ -118,7 +118,7 @@ def specimens(unit: Unit, scales: tuple[float, ...] = SCALES, cells: int = CELLS
         Specimen(
             "beam",
             lambda: coupons.beam_coupon(d),
-            "clamp the block, beam level; note how far each weight at its tip lowers it",
+            "clamp the block with the beam level; record the tip deflection under each weight",
             "beam_deadweight",
             {"section_mm": [d.waveguide_section] * 2, "length_mm": coupons.ARM_MM},
             ("added_mass_g", "tip_deflection_mm"),
@@ -127,7 +127,7 @@ def specimens(unit: Unit, scales: tuple[float, ...] = SCALES, cells: int = CELLS
         Specimen(
             "waveguide",
             lambda: coupons.waveguide_coupon(d, length),
-            "put light source and detector into the seats; bend it between two arms, wells outward",
+            "insert light source and detector into the seats; bend it between two arms, wells outward",
             "waveguide_bending",
             {"section_mm": [d.waveguide_section] * 2, "length_mm": round(length, 4)},
             ("time_s", "angle_deg", "voltage_V"),
@@ -251,13 +251,14 @@ def _page(unit: Unit, resin: Material, every: list[Specimen], rows: list[dict[st
         ("measured [mm]", "n"),
     ]
     lead = (
-        "<p>Print all with z upward, wash and cure them as the unit, and wait a day. The mass is that of "
-        f"{escape(resin.name)} at nominal size: a heavier part has thicker struts.</p>"
+        "<p>Print all specimens with z upward, wash and cure them like the unit, and wait a day. The mass "
+        f"is that of {escape(resin.name)} at nominal size: a heavier part has thicker struts.</p>"
     )
     back = (
-        "<p>Write the sizes into gauge.csv, in millimetres; leave empty what cannot be reached. Then "
-        "<code>run.py export --compensate gauge.csv</code> takes the offsets off the drawing. Solids come "
-        "out larger by twice the offset, gaps smaller; the long sizes tell shrinkage from it.</p>"
+        "<p>Write the sizes into gauge.csv, in millimetres; leave cells empty where a size cannot be "
+        "measured. Then <code>run.py export --compensate gauge.csv</code> compensates the print offset. "
+        "Solids come out larger by twice the offset, gaps smaller; the long sizes separate shrinkage from "
+        "the offset.</p>"
     )
     return page(
         "Specimens",
@@ -266,7 +267,7 @@ def _page(unit: Unit, resin: Material, every: list[Specimen], rows: list[dict[st
         lead,
         [
             ("parts", "Parts", table("", head, parts)),
-            ("gauge", "The gauge, by calipers", back + table("", gauge, sizes)),
+            ("gauge", "Gauge: caliper measurements", back + table("", gauge, sizes)),
         ],
     )
 
@@ -274,5 +275,5 @@ def _page(unit: Unit, resin: Material, every: list[Specimen], rows: list[dict[st
 def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What was written, in a few lines of text, of a run's `summary`."""
     return [f"{row['file']}: {row['mass_g']:.2f} g, {row['measure']}" for row in summary["specimens"]] + [
-        "sheet.html says what to measure; measured/ takes it, for `diagnose`"
+        "sheet.html lists the measurements; measured/ holds the templates that `diagnose` reads"
     ]

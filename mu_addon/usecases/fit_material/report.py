@@ -20,13 +20,13 @@ from .run import Fitting, modes, tested
 
 FILES = {
     "fit.toml": "inputs of this run",
-    "material.toml": "the chosen law as a material: simulations take it in place of a library's name",
-    "fit.csv": "every measured value beside every law",
+    "material.toml": "the chosen law as a material file for simulations",
+    "fit.csv": "every measured value beside the prediction of every law",
     "parameters.csv": "parameters with their intervals",
-    "errors.csv": "how far each law is from each coupon",
-    "fit_*.svg": "a chart a mode",
-    "summary.json": "every figure of this run",
-    "log.ndjson": "what was said while it ran",
+    "errors.csv": "error of each law on each coupon",
+    "fit_*.svg": "one chart per mode",
+    "summary.json": "all results of this run as numbers",
+    "log.ndjson": "log of this run",
 }
 WEIGHTS_MEAN = {
     "absolute": "each residual counts as a share of its coupon's largest stress",
@@ -45,11 +45,11 @@ def report(found: Fitting, versions: dict[str, str]) -> str:
     """The whole report as HTML text."""
     sections = [
         ("modes", "Tests and laws", _charts(found)),
-        ("errors", "How far each law is from each test", _errors(found)),
+        ("errors", "Error of each law on each test", _errors(found)),
         ("parameters", "Parameters", _parameters(found)),
         ("stability", "Stability", _stability(found)),
-        ("method", "How it was done", _method(found)),
-        ("files", "Files of this run", facts_table("file", "what it holds", FILES)),
+        ("method", "Method", _method(found)),
+        ("files", "Files of this run", facts_table("file", "content", FILES)),
         ("versions", "Versions", facts_table("program", "version", versions)),
     ]
     count = len(found.fitted) + len(found.held_out)
@@ -65,21 +65,22 @@ def _warnings(found: Fitting) -> list[str]:
     missed = [TITLES[m] for m in chosen.fails]
     if missed:
         told.append(
-            f"{chosen.form.title} misses {_listed(missed)} by more than {TOLERANCE:.0%}: do not use it there."
+            f"{chosen.form.title} has an error on {_listed(missed)} of more than {TOLERANCE:.0%}: do "
+            "not use it in that mode."
         )
     for mode, (stretch, ratio) in found.apart.items():
         i = int(np.argmax(ratio > 1.1)) if (ratio > 1.1).any() else len(ratio) - 1
         told.append(
-            f"{TITLES[mode].capitalize()} was not tested. Laws that fit the rest differ there by a factor of "
-            f"{ratio[i]:.3g} at a stretch of {stretch[i]:.3g}"
+            f"{TITLES[mode].capitalize()} was not tested. Laws that fit the other modes differ there "
+            f"by a factor of {ratio[i]:.3g} at a stretch of {stretch[i]:.3g}"
             + (f" and {_factor(ratio[-1])} at {stretch[-1]:.3g}." if i < len(ratio) - 1 else ".")
-            + (" Test it before relying on any of them." if ratio[-1] > 1.1 else "")
+            + (" Test this mode before using any of them in it." if ratio[-1] > 1.1 else "")
         )
     if found.compressibility > 0.02:
         told.append(
             f"With Poisson's ratio {POISSON:g}, stress at the end of the range differs by "
-            f"{found.compressibility:.0%} from that of an incompressible body, which was fitted: measure "
-            "the bulk modulus, or stay well within the range."
+            f"{found.compressibility:.0%} from the incompressible law that was fitted: measure the "
+            "bulk modulus, or stay well within the range."
         )
     told += [
         f"{r.what[0].upper()}{r.what[1:]} ({Path(r.where.split(',')[0]).name})."
@@ -101,35 +102,40 @@ def _headline(found: Fitting) -> str:
     kept = [e for e in chosen.errors if e.mode not in chosen.fails] or list(chosen.errors)
     worst = max(kept, key=lambda e: e.share)
     html = (
-        f'<p class="answer">Take <strong>{escape(chosen.form.title)}</strong>: it is within '
-        f"{worst.share:.1%} of the measured stresses"
+        f'<p class="answer">Recommended law: <strong>{escape(chosen.form.title)}</strong>. Its error '
+        "is "
+        f"{worst.share:.1%} of the measured stress"
         + (
             f" in {_listed(list(dict.fromkeys(TITLES[e.mode] for e in kept)))}"
             if len(chosen.errors) > 1
             else ""
         )
-        + (f", but misses {_listed([TITLES[m] for m in chosen.fails])}" if chosen.fails else "")
+        + (f", but it does not fit {_listed([TITLES[m] for m in chosen.fails])}" if chosen.fails else "")
         + ".</p>"
     )
-    by = "misses the held-out tests least" if choice.by == "held out" else "has the least AICc"
-    whose = "the stable laws that follow what they were fitted to"
+    by = (
+        "has the smallest error on the held-out tests" if choice.by == "held out" else "has the smallest AICc"
+    )
+    whose = "the stable laws that fit their tests"
     words = f"Of {whose} it {by}"
     if not chosen.follows:
-        words = f"No stable law follows what it was fitted to; of all, this one {by}"
+        words = f"No stable law fits its tests; of all laws, this one {by}"
     if choice.tied:
         tied = [f.form.title for f in choice.tied]
         score = "held-out error" if choice.by == "held out" else "AICc"
         words = (
-            f"{_listed(tied)} {'does' if len(tied) == 1 else 'do'} as well ({score}); of these it has the "
-            "fewest parameters"
+            f"{_listed(tied)} {'is' if len(tied) == 1 else 'are'} equally good ({score}); of these it "
+            "has the fewest parameters"
         )
     unstable = [f.form.title for f in found.fits if not f.stable]
     if unstable:
         was = "was" if len(unstable) == 1 else "were"
-        words += f". {_listed(unstable)} came out unstable and {was} not considered"
+        words += (
+            f". {_listed(unstable)} {'is' if len(unstable) == 1 else 'are'} unstable and {was} not considered"
+        )
     mu, _ = chosen.form.law.small_strain(chosen.parameters[None])[0]
     facts = [
-        ("Young's modulus at rest", f"{3 * mu:.3g} MPa"),
+        ("initial Young's modulus", f"{3 * mu:.3g} MPa"),
         ("parameters", str(chosen.form.count)),
         *((f"error, {TITLES[e.mode]}", f"{e.share:.1%}") for e in chosen.errors[:4]),
     ]
@@ -138,9 +144,9 @@ def _headline(found: Fitting) -> str:
 
 def _charts(found: Fitting) -> str:
     html = (
-        "<p>Filled marks were fitted, open ones held out. The thick orange line is the chosen law. “Misses” "
-        f"is said of laws that are off by more than {TOLERANCE:.0%}, norm over norm. Below each, what is "
-        "left over; the grey band is ±5% of the largest stress.</p>"
+        "<p>Filled marks were fitted, open ones held out. The thick orange line is the chosen law. A "
+        f"law “does not fit” a test if its error exceeds {TOLERANCE:.0%} (relative L2 norm). Below "
+        "each chart, the residual; the grey band is ±5% of the largest stress.</p>"
         '<div class="pair">'
     )
     chosen = found.choice.chosen.form.name
@@ -152,9 +158,9 @@ def _charts(found: Fitting) -> str:
             + figure(
                 mode_chart(mode, fitted, held, found.fits, chosen),
                 escape(
-                    f"{_listed(missed)} miss{'es' if len(missed) == 1 else ''} it."
+                    f"{_listed(missed)} {'does' if len(missed) == 1 else 'do'} not fit it."
                     if missed
-                    else "No law misses it."
+                    else "Every law fits it."
                 ),
                 f"Nominal stress against stretch, {TITLES[mode]}: tests and {len(found.fits)} laws.",
             )
@@ -184,13 +190,13 @@ def _errors(found: Fitting) -> str:
         cells.append("unstable" if score is None else _score(score, found.choice.by))
         cells.append(_listed([TITLES[m] for m in f.fails]) if f.fails else "nothing")
         rows.append((cells, f is found.choice.chosen))
-    groups = [("", 2), ("error, norm over norm", len(tests))]
+    groups = [("", 2), ("error, relative L2 norm", len(tests))]
     if unseen:
-        groups.append(("error when fitted without it", len(unseen)))
+        groups.append(("leave-one-out error", len(unseen)))
     groups.append(("", 2))
     by = "error of the held-out tests" if found.choice.by == "held out" else "AICc"
     return table(
-        f"Score: {by}, less is better. A law fails where it is off by more than {TOLERANCE:.0%}.",
+        f"Score: {by}; smaller is better. A law does not fit where its error exceeds {TOLERANCE:.0%}.",
         head,
         rows,
         groups,
@@ -223,7 +229,7 @@ def _parameters(found: Fitting) -> str:
                         _figures(p.value),
                         _figures(p.low95) if known else "–",
                         _figures(p.high95) if known else "–",
-                        p.note or ("its sign is not sure" if p.low95 <= 0 <= p.high95 else ""),
+                        p.note or ("its sign is not determined" if p.low95 <= 0 <= p.high95 else ""),
                     ],
                     f is found.choice.chosen,
                 )
@@ -238,10 +244,11 @@ def _parameters(found: Fitting) -> str:
         ("note", "text"),
     ]
     words = (
-        "<p>Intervals by Student's t: those of Ogden's parameters by the profile of the fit, the others, "
-        "whose laws are linear in them, exactly. They are widened where residuals resemble those before "
-        f"them: of the chosen law, {chosen.n} values count as {chosen.n_effective:.3g} independent ones. "
-        "Where a law does not follow the test, what is left over is no noise, and no interval is honest.</p>"
+        "<p>Confidence intervals by Student's t: for Ogden parameters from the profile likelihood, "
+        "for the other laws, which are linear in their parameters, exact. They are widened for "
+        f"autocorrelated residuals: of the chosen law, {chosen.n} values count as "
+        f"{chosen.n_effective:.3g} independent ones. Where a law does not fit the test, its residual "
+        "is not noise and the interval is not valid.</p>"
     )
     return words + table("", head, rows)
 
@@ -269,19 +276,19 @@ def _stability(found: Fitting) -> str:
         ("verdict", ""),
     ]
     return (
-        "<p>Drucker's postulate in Hill's form: every further increment of logarithmic strain, at constant "
-        "volume and in any direction, costs work, d(τ):d(e) &gt; 0 with the Kirchhoff stress τ. Checked at "
-        "101 stretches of each mode, over the tested range; of a mode that was not tested, in tension to the "
-        "same logarithmic strain.</p>" + table("", head, rows)
+        "<p>Drucker's postulate in Hill's form: every further increment of logarithmic strain, at "
+        "constant volume and in any direction, requires positive work, d(τ):d(e) &gt; 0 with the "
+        "Kirchhoff stress τ. Checked at 101 stretches of each mode over the tested range; untested "
+        "modes are checked in tension to the same logarithmic strain.</p>" + table("", head, rows)
     )
 
 
 def _method(found: Fitting) -> str:
     facts = {
         "weights": f"{found.weights}: {WEIGHTS_MEAN[found.weights]}",
-        "stress": "nominal, of the laws at constant volume",
-        "Ogden terms": "each with mu alpha of 0 or more, which is enough for stability",
-        "bulk modulus": f"not seen by these tests; of Poisson's ratio {POISSON:g}",
+        "stress": "nominal, of incompressible laws",
+        "Ogden terms": "each with mu alpha of 0 or more, which is sufficient for stability",
+        "bulk modulus": f"not measured by these tests; from Poisson's ratio {POISSON:g}",
         "measured data": str(found.measured.folder.name),
     }
     return facts_table("what", "how", facts)

@@ -14,7 +14,7 @@ from ...errors import InputError
 from ...files import write_csv, write_text
 from ...materials.choice import Choice, choose, disagreement
 from ...materials.coupon import Array, Coupon, response
-from ...materials.fit import POISSON, TOLERANCE, WEIGHTS, Fit, fit, leave_one_mode_out, ranges
+from ...materials.fit import POISSON, TOLERANCE, WEIGHTS, Fit, fit_coupons, leave_one_mode_out, ranges
 from ...materials.forms import FORMS, form
 from ...materials.library import Material, write_material
 from ...measured import Measured, read_folder
@@ -67,9 +67,7 @@ def fit_material(
 
     forms = [form(name) for name in dict.fromkeys(laws)] or list(FORMS.values())
     if weights not in WEIGHTS:
-        raise InputError(
-            f"there are no {weights!r} weights", "--weights", f"choose from {', '.join(WEIGHTS)}"
-        )
+        raise InputError(f"unknown weights {weights!r}", "--weights", f"choose from {', '.join(WEIGHTS)}")
     measured = read_folder(Path(folder))
     fitted, held = _coupons(measured, held_out_modes)
     inputs = {"fit.toml": _inputs(measured, [f.name for f in forms], held_out_modes, weights)}
@@ -79,7 +77,7 @@ def fit_material(
     with progress.stage("fit", expected_s=2.0 * len(forms)):
         fits, unseen = [], {}
         for i, one in enumerate(forms):
-            fits.append(fit(one, fitted, held, weights, profile=True))
+            fits.append(fit_coupons(one, fitted, held, weights, profile=True))
             unseen[one.name] = _unseen(one, fitted, weights)
             progress.update((i + 1) / len(forms))
         choice = choose(fits)
@@ -111,7 +109,7 @@ def _coupons(
     if not experiments:
         kinds = ", ".join(dict.fromkeys(e.kind for e in measured.experiments))
         raise InputError(
-            f"there is no coupon among the experiments ({kinds})",
+            f"the folder contains no coupon test ({kinds})",
             str(measured.folder),
             'laws are fitted to experiments of kind = "coupon"',
         )
@@ -119,7 +117,7 @@ def _coupons(
     for mode in held_out_modes:
         if mode not in modes:
             raise InputError(
-                f"no coupon of mode {mode!r} is there to hold out",
+                f"there is no coupon of mode {mode!r} to hold out",
                 "--hold-out",
                 f"modes: {', '.join(sorted(modes))}",
             )
@@ -178,8 +176,8 @@ def _material(measured: Measured, fitted: Sequence[Coupon], choice: Choice) -> M
         law=chosen.form.law,
         parameters=chosen.parameters,
         law_confidence="fitted",
-        law_source=f"{chosen.form.title}, fitted to {names} ({chosen.n} values, {chosen.weights} weights); "
-        f"kappa is not measured but of Poisson's ratio {POISSON:g}",
+        law_source=f"{chosen.form.title}, fitted to {names} ({chosen.n} values, {chosen.weights} "
+        f"weights); kappa is not measured but follows from Poisson's ratio {POISSON:g}",
         ranges=ranges(fitted),
         fails=chosen.fails,
         low95={p.name: p.low95 for p in known},
@@ -268,11 +266,11 @@ def console_summary(summary: Mapping[str, Any]) -> list[str]:
     law = summary["laws"][chosen]
     values = ", ".join(f"{name} {p['value']:.4g}" for name, p in law["parameters"].items())
     errors = ", ".join(f"{e['share']:.1%} in {e['coupon']}" for e in law["errors"])
-    lines = [f"law: {chosen}, {values}", f"off by {errors}"]
+    lines = [f"law: {chosen}, {values}", f"error {errors}"]
     if summary["tied"]:
-        lines.append(f"as good: {', '.join(summary['tied'])}")
+        lines.append(f"equivalent: {', '.join(summary['tied'])}")
     if law["fails"]:
-        lines.append(f"misses {', '.join(law['fails'])} by more than {summary['tolerance']:.0%}")
+        lines.append(f"error on {', '.join(law['fails'])} exceeds {summary['tolerance']:.0%}")
     if summary["untested"]:
         lines.append(f"not tested: {', '.join(summary['untested'])}")
     return lines

@@ -13,7 +13,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.anchors import anchors
+from ...design.anchors import anchor_points
 from ...design.gripper import Gripper
 from ...errors import ConvergenceError, InputError
 from ...fem.equilibrium import Equilibrium
@@ -58,7 +58,7 @@ class Cube:
     lighter.
     """
 
-    side_mm: float = attrs.field(validator=_above(0.0, 200.0, "a cube with a side", "give mm"))
+    side_mm: float = attrs.field(validator=_above(0.0, 200.0, "a cube with a side length", "give mm"))
     density_g_per_ml: float = attrs.field(default=1.24, validator=_above(0.0, 25.0, "a density", "give g/ml"))
 
     @property
@@ -249,7 +249,7 @@ class _Hand:
         on_instant: Callable[[float, str], None],
     ) -> None:
         self.cube, self.grip, self.phases, self.mesh = cube, grip, phases, mesh
-        self.anchors = anchors(gripper.unit)
+        self.anchors = anchor_points(gripper.unit)
         self.tip = TipSection.of(mesh)
         self.place = place_of(gripper, grip)
         self.obstacle = obstacle_of(gripper, cube, grip, mesh)

@@ -15,7 +15,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.anchors import anchors, windows
+from ...design.anchors import anchor_points, windows
 from ...design.assets import asset_root
 from ...design.gripper import Gripper
 from ...fem.equilibrium import Equilibrium
@@ -26,7 +26,7 @@ from ...fem.obstacle import CONTACT
 from ...fem.trajectory import Trajectory, simulate
 from ...meshing.mesh import Mesh
 from ...placement.batch import CandidateBatch
-from ...placement.candidates import candidates, evaluation, moved_points, roi, with_sensor
+from ...placement.candidates import candidate_paths, evaluation, moved_points, roi, with_sensor
 from ...placement.inclusion import sensor_share
 from ..simulate_and_place.job import grasp as grasp_protocol
 from .grasp import Cube, Grip, obstacle_of
@@ -87,11 +87,11 @@ def column(
     run kept with `store`. Raises ConvergenceError where a unit has no equilibrium.
     """
     unit, grip = gripper.unit, grip or Grip()
-    points = anchors(unit)
+    points = anchor_points(unit)
     monitored = (points, probe(mesh, points))
     radius, sensor = unit.dimensions.inclusion_radius, unit.material.sensor_modulus_MPa
     time, pressure = grasp_protocol().sample(TIMES)
-    every = candidates(points, windows(len(points)))
+    every = candidate_paths(points, windows(len(points)))
     shares = {c.name: sensor_share(rule, roi(mesh, c, radius)) for c in every}
     model = Model(mesh, threads=threads)
     if cube is not None:

@@ -20,11 +20,11 @@ Array = np.ndarray[Any, Any]
 SHIPPED = "protocols/gripper.csv"
 NAMES = ("i", "ii", "iii", "iv", "v")
 MEANING = {
-    "i": "open by vacuum while the cube comes between the tips",
+    "i": "open by vacuum; the cube is placed between the tips",
     "ii": "close",
-    "iii": "hold, the cube on its support",
-    "iv": "lift: the support is gone",
-    "v": "release, the cube on a support again",
+    "iii": "hold; the cube rests on its support",
+    "iv": "lift; the support is removed",
+    "v": "release; the cube is on a support again",
 }
 
 
@@ -80,7 +80,7 @@ def read_phases(path: Path) -> Phases:
         raise InputError(
             f"the phases are {', '.join(met) or 'not named'}",
             str(path),
-            f"name {', '.join(NAMES)}, each for one stretch of time, in this order",
+            f"name {', '.join(NAMES)}, each once, in this order",
         )
     return Phases(protocol, phase)
 

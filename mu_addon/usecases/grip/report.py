@@ -24,16 +24,16 @@ if TYPE_CHECKING:
 
 FILES = {
     "grip.toml": "inputs of this run",
-    "gripper.toml": "the gripper, beside its unit.toml",
+    "gripper.toml": "gripper parameters; unit.toml holds those of its units",
     "protocol.csv": "pressure and phases",
     "gripper.stl": "the printable part, mm",
     "gripper.3mf": "the same as 3MF",
-    "grasp_SIDE.csv": "every instant of the grasp of a cube",
-    "pull_SIDE.csv": "what friction carries as the cube is pulled down",
+    "grasp_SIDE.csv": "time series of the grasp of a cube",
+    "pull_SIDE.csv": "friction capacity against displacement of the cube",
     "cube-SIDE": "its motion: finger.pvd (ParaView), motion/, gripper.npz, left.pc2, right.pc2 (Blender)",
     "deviation.csv": "deviation of every sensor path",
-    "summary.json": "every figure of this run",
-    "log.ndjson": "what was said while it ran",
+    "summary.json": "all results of this run as numbers",
+    "log.ndjson": "log of this run",
 }
 
 
@@ -64,16 +64,16 @@ def report(
     """The whole report as HTML text, as far as the run came."""
     warnings = list(run.warnings)
     if stopped:
-        warnings.insert(0, f"This run is partial: {stopped}. What is missing was not reached.")
+        warnings.insert(0, f"This run is partial: {stopped}. Later stages were not computed.")
     job = run.job
     sections = [
         ("frames", "The grasp, phase by phase", _frames(run, frames)),
         ("force", "Forces", _forces(run)),
         ("lift", "Lifting", _lift(run)),
-        ("light", "Light of the waveguides", _light(run)),
-        ("paths", "Sensor paths of a finger that closes", _paths(run)),
-        ("assumed", "What was assumed", _assumed(run)),
-        ("files", "Files of this run", facts_table("file", "what it holds", FILES)),
+        ("light", "Waveguide signal", _light(run)),
+        ("paths", "Sensor paths of the closing finger", _paths(run)),
+        ("assumed", "Assumptions", _assumed(run)),
+        ("files", "Files of this run", facts_table("file", "content", FILES)),
         ("versions", "Versions", facts_table("program", "version", versions)),
     ]
     gap = job.gripper.fingers.gap_mm
@@ -94,12 +94,12 @@ def _headline(run: Gripping) -> str:
         hold, lift = found.end("iii"), found.lift
         facts.append((f"{side:g} mm, plateau", f"{found.angle_deg[hold]:.1f}°, {found.normal_N[hold]:.2f} N"))
         sentences.append(
-            f"It lifts the cube of {side:g} mm: friction carries {lift.margin:.1f} times its weight."
+            f"The cube of {side:g} mm is lifted: friction can carry {lift.margin:.1f} times its weight."
             if lift.held
-            else f"It drops the cube of {side:g} mm: friction carries {lift.capacity_N:.2g} N of "
+            else f"The cube of {side:g} mm is dropped: friction can carry {lift.capacity_N:.2g} N of "
             f"{lift.weight_N:.2g} N."
         )
-    words = " ".join(sentences) or "The printable part passed its gates."
+    words = " ".join(sentences) or "The printable part passed every geometry check."
     return f'<p class="answer">{escape(words)}</p>{cards(facts)}'
 
 
@@ -112,7 +112,7 @@ def _frames(run: Gripping, frames: dict[float, list[Picture]]) -> str:
         html += f"<h3>Cube of {side:g} mm</h3>"
         html += f'<div class="many">{"".join(picture_figure(picture) for picture in every)}</div>'
     shapes = pictures.shapes(run.job.gripper, run.grasps)
-    return html + figure(shapes, "The anchors' lines; thin: the cubes.", "shapes of the fingers", "chart")
+    return html + figure(shapes, "Lines of anchors; thin lines: the cubes.", "shapes of the fingers", "chart")
 
 
 def _forces(run: Gripping) -> str:
@@ -127,7 +127,7 @@ def _forces(run: Gripping) -> str:
         figure(pictures.over_time(run.grasps, values, words), "", words, "chart") for words, values in charts
     )
     head = [("cube [mm]", ""), ("phase", ""), ("kPa", "n"), ("angle [deg]", "n"), ("normal [N]", "n")]
-    head += [("down [N]", "n"), ("sticking [%]", "n"), ("slid [mm]", "n"), ("gap error [mm]", "n")]
+    head += [("down [N]", "n"), ("sticking [%]", "n"), ("slip [mm]", "n"), ("gap error [mm]", "n")]
     rows = []
     for side, g in run.grasps.items():
         for name in MEANING:
@@ -138,8 +138,8 @@ def _forces(run: Gripping) -> str:
             cells += [f"{100 * g.sticking[k]:.0f}" if touching else "", f"{g.slid_mm[k]:.2f}"]
             rows.append(([*map(signed, cells), f"{g.deepest_mm[k]:.2f}"], False))
     words = (
-        "Of one whole finger. Slid: the farthest that any point has slid so far, over all contacts. Gap "
-        "error: how deep the finger is in the cube at most, the penalty's price."
+        "Values of one whole finger. Slip: largest accumulated slip of any contact point. Gap error: "
+        "largest penetration of the finger into the cube, which the penalty method admits."
     )
     return f'<div class="pair">{html}</div>' + table(words, head, rows)
 
@@ -148,12 +148,12 @@ def _lift(run: Gripping) -> str:
     if not run.grasps:
         return ""
     words = (
-        "As a finger closes it also grows longer, and drags the cube down: on its support the cube is "
-        "pressed, not hung. The gripper must rise by some millimetres, the tips lagging behind, until "
-        "friction has turned round and carries the weight; then the cube leaves its support."
+        "A closing finger also elongates and pushes the cube onto its support. The gripper must rise by "
+        "some millimetres until friction has reversed and carries the weight; then the cube leaves its "
+        "support."
     )
     head = [("cube [mm]", ""), ("mass [g]", "n"), ("weight [N]", "n"), ("held", ""), ("rise [mm]", "n")]
-    head += [("most friction carries [N]", "n"), ("over the weight", "n"), ("2 mu N over the weight", "n")]
+    head += [("friction capacity [N]", "n"), ("capacity / weight", "n"), ("2 mu N / weight", "n")]
     rows = []
     for side, g in run.grasps.items():
         f = g.lift
@@ -161,7 +161,10 @@ def _lift(run: Gripping) -> str:
         cells = [f"{side:g}", f"{g.cube.mass_g:.1f}", f"{f.weight_N:.3f}", "yes" if f.held else "no", rise]
         rows.append(([*cells, f"{f.capacity_N:.3f}", f"{f.margin:.1f}", f"{f.margin_by_rule:.1f}"], False))
     chart = figure(
-        pictures.pulling(run.grasps), "Dots: where the weight is carried.", "force against way", "chart"
+        pictures.pulling(run.grasps),
+        "Dots: friction equals the weight.",
+        "force against displacement",
+        "chart",
     )
     return f"<p>{escape(words)}</p>{chart}" + table("", head, rows)
 
@@ -185,14 +188,14 @@ def _light(run: Gripping) -> str:
         if compared == "more than" and more < 0:
             compared = "less than"
         words += (
-            f" Within what the rays can tell, the cube of {small:g} mm changes the light {compared} that of "
-            f"{large:g} mm; the paper measured more for the smaller one"
-            f"{'.' if compared == 'more than' else ', which this model misses.'}"
+            f" Within the error of the ray tracing, the cube of {small:g} mm changes the light {compared} "
+            f"that of {large:g} mm; the paper measured a larger signal for the smaller "
+            f"cube{'.' if compared == 'more than' else '; this model does not reproduce that.'}"
         )
     about = (
-        "By rays through the bent bar of the chosen path. Lost is positive, of the light at rest. Both "
-        "fingers are equal here, and so are their signals. The resin's optics are assumed, since nobody has "
-        "published them."
+        "Computed by ray tracing through the deformed waveguide of the chosen path. The loss is positive "
+        "and relative to the light at rest. Both fingers are modelled alike, so their signals are equal. "
+        "The optical constants of the resin are assumed: no published values were found."
     )
     return f"<p>{escape(words)}</p><p>{escape(about)}</p>" + figure(
         chart, "", "light over the phases", "chart"
@@ -209,7 +212,7 @@ def _paths(run: Gripping) -> str:
     for rule in dict.fromkeys(c.rule for c in run.columns):
         own = [c for c in run.columns if c.rule == rule]
         groups.append((rule, len(own)))
-        head += [("on nothing" if c.cube is None else f"on {c.cube.side_mm:g} mm", "n") for c in own]
+        head += [("free" if c.cube is None else f"on {c.cube.side_mm:g} mm", "n") for c in own]
     rows = [
         (
             [label(name), f"{printed[name]:.3f}" if name in printed else ""]
@@ -228,7 +231,7 @@ def _paths(run: Gripping) -> str:
     chart = pictures.against_paper([c for c in run.columns if c.rule == headline], printed)
     words = (
         "Mean deviation in mm of the backbone from that of a finger without a sensor, through the grasp "
-        "protocol (13 samples, −20 to 40 kPa); contact without friction, each path followed on its own."
+        "protocol (13 samples, −20 to 40 kPa); contact without friction; each path is simulated separately."
     )
     caption = f"Inclusion rule {headline}."
     return (
@@ -250,17 +253,20 @@ def _assumed(run: Gripping) -> str:
             rows.append(([f"{section.section}.{d.name}", f"{getattr(values, d.name):g}", d.unit, why], False))
     reason = {
         "friction": "published coefficients of dry elastomers on hard plastics are mostly 0.5 to 1 and above",
-        "beyond_mm": "how far the cube's middle lies beyond the tips: their edges meet it near its middle",
-        "pressure_MPa": "contact: at this pressure",
-        "depth_mm": "it gives way so far",
-        "stick_mm": "and slips so far before it slides",
-        "halvings": "of the faces' sides, for the contact's points",
-        "step_s": "longest time between instants",
+        "beyond_mm": (
+            "distance of the cube's centre beyond the tips, so that their edges touch it near its centre"
+        ),
+        "pressure_MPa": "contact stiffness: reference pressure",
+        "depth_mm": "penetration depth at that pressure",
+        "stick_mm": "elastic slip before sliding",
+        "halvings": "subdivision of the faces for contact points",
+        "step_s": "largest time step",
     }
     for name, value in attrs.asdict(grip).items():
         rows.append(([f"grip.{name}", f"{value:g}", "", reason[name]], False))
     words = (
-        "The paper prints no size of its gripper, no pressure of its grasp beyond 0, −20 and 40 kPa, and no "
-        "mass of its cubes. The plate is clamped, the fingers' own weight left out, both fingers are equal."
+        "The paper does not print the size of its gripper, the pressures of its grasp other than 0, −20 and "
+        "40 kPa, or the mass of its cubes. The plate is clamped, the weight of the fingers is neglected, "
+        "and both fingers are equal."
     )
     return f"<p>{escape(words)}</p>" + table("", head, rows)

@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.anchors import anchors, window
+from ...design.anchors import anchor_points, window
 from ...design.gripper import Gripper, GripperSolid, build_gripper, load_gripper, to_toml
 from ...design.parameters import to_toml as unit_toml
 from ...design.solid import QUALITY
@@ -28,7 +28,7 @@ from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.folder import begin
 from ...run.progress import Progress
-from ...sensing.embedded_waveguide import Joints, held
+from ...sensing.embedded_waveguide import Joints, embed_waveguide
 from ...sensing.optics import Optics
 from ...sensing.signal import Signal, traced_signal
 from ..simulate_and_place.study_file import table_lines, toml_value
@@ -73,6 +73,7 @@ class Job:
     optics: Optics = attrs.field(factory=Optics)
 
     def __attrs_post_init__(self) -> None:
+        self.gripper.unit.wall.require_without_memory("a grasp")
         sides = [cube.side_mm for cube in self.cubes]
         if len(set(sides)) < len(sides):
             raise InputError("two cubes have the same side", "--cube", "name each side once")
@@ -159,7 +160,9 @@ class Gripping:
             packed = write_3mf([Part(name, found.vertices, found.triangles)], [1], name)
             back = read_3mf(packed)[0][1]
             if len(back.triangles) != len(found.triangles):
-                raise OutputError("the 3MF file does not hold the part that was written", "gripper.3mf")
+                raise OutputError(
+                    "the 3MF file, read back, does not contain the part that was written", "gripper.3mf"
+                )
             write_bytes(self.folder / "gripper.3mf", packed)
         self.context.summary["gates"] = attrs.asdict(found.gates)
         x, y = self.job.gripper.size_mm
@@ -214,8 +217,8 @@ class Gripping:
         self.context.summary.setdefault("grasps", {})[f"{cube.side_mm:g}"] = grasp_figures(found)
         if not found.lift.held:
             self.warn(
-                f"The cube of {cube.side_mm:g} mm ({cube.mass_g:.3g} g) is not lifted: friction carries at "
-                f"most {found.lift.capacity_N:.3g} N of its {cube.weight_N:.3g} N."
+                f"The cube of {cube.side_mm:g} mm ({cube.mass_g:.3g} g) is not lifted: friction can carry "
+                f"at most {found.lift.capacity_N:.3g} N of its {cube.weight_N:.3g} N."
             )
 
     def follow_light(self) -> None:
@@ -224,8 +227,8 @@ class Gripping:
         unit, optics = self.job.gripper.unit, self.job.optics
         with self.progress.stage("light", 20.0):
             path = window(unit, self.job.gripper.path)
-            nodes = anchors(unit)[list(path.indices)]
-            bar = held(waveguide(unit, path), nodes, unit.printed)
+            nodes = anchor_points(unit)[list(path.indices)]
+            bar = embed_waveguide(waveguide(unit, path), nodes, unit.printed)
             joints = Joints.of(self.mesh, nodes, unit.dimensions.cell)
             for side, found in self.grasps.items():
                 moved = [joints.moved(u) for u in found.u]
@@ -367,8 +370,8 @@ def console_summary(summary: Mapping[str, Any]) -> list[str]:
     for rule, found in summary.get("J_hat_mm", {}).items():
         for on, one in found.items():
             lines.append(
-                f"paths ({rule}, on {on}): {one['chosen']} disturbs least, rank correlation with the paper's "
-                f"column {one['rank_correlation_with_paper']:.2f}"
+                f"paths ({rule}, on {on}): {one['chosen']} has the least deviation, rank correlation with "
+                f"the paper's column {one['rank_correlation_with_paper']:.2f}"
             )
     return lines
 

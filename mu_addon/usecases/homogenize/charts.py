@@ -40,7 +40,7 @@ def cell_picture(nodes: Floats, faces: Any, size: float, density: float, width: 
     image = render(parts, camera, width, width, background=WHITE)
     return Picture(
         png(image),
-        f"One cell of {size:g} mm as it is printed; {density:.1%} of its box is filled.",
+        f"One cell of {size:g} mm as it is printed; {density:.1%} of its bounding box is solid.",
         "A cell of the lattice: struts from its centre to its corners, inside a wire box.",
     )
 
@@ -89,7 +89,7 @@ def modulus_surface(C: Floats, width: int = 620) -> Picture:
         _with_scale(image, low, high),
         f"Young's modulus of the lattice by direction: {along[0]:.3g} kPa along an axis of the cell [100], "
         f"{along[1]:.3g} kPa along a face diagonal [110], {along[2]:.3g} kPa along a strut [111].",
-        "A surface around the origin that bulges where the lattice is stiff: along the struts.",
+        "Surface around the origin whose radius is Young's modulus; largest along the struts.",
     )
 
 

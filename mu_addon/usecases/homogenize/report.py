@@ -21,15 +21,15 @@ FILES = {
     "unit.toml": "parameters of the unit",
     "effective.toml": "moduli and the lattice's law: `place --lattice effective.toml` takes it",
     "tensor.csv": "effective elasticity, kPa, in Voigt's order with engineering shears",
-    "cell.csv": "the endless lattice pulled and pressed along an axis",
+    "cell.csv": "the periodic lattice in tension and compression along an axis",
     "cell.vtu": "analysis mesh of an eighth of a cell (ParaView)",
     "specimen.stl": "printable block of cells, nominal size, mm",
-    "specimen_slide.csv": "the block between plates that let it slide",
-    "specimen_stick.csv": "the block between plates that hold it",
-    "summary.json": "every figure of this run",
-    "log.ndjson": "what was said while it ran",
+    "specimen_slide.csv": "the block between frictionless plates",
+    "specimen_stick.csv": "the block between bonded plates",
+    "summary.json": "all results of this run as numbers",
+    "log.ndjson": "log of this run",
 }
-FRICTION = {"slide": "plates that slide", "stick": "plates that hold"}
+FRICTION = {"slide": "frictionless plates", "stick": "bonded plates"}
 
 
 def write_report(study: Homogenisation, stopped: str = "") -> None:
@@ -45,13 +45,13 @@ def report(study: Homogenisation, versions: dict[str, str], stopped: str = "") -
     cell = study.job.cell
     warnings = list(study.warnings)
     if stopped:
-        warnings.insert(0, f"This run is partial: {stopped}. What is missing was not reached.")
+        warnings.insert(0, f"This run is partial: {stopped}. Later stages were not computed.")
     sections = [
         ("cell", "The cell and its moduli", _moduli(study)),
-        ("test", "A block between plates", _test(study)),
-        ("law", "The law for the analysis mesh", _law(study)),
-        ("inputs", "What went in", _inputs(study)),
-        ("files", "Files of this run", facts_table("file", "what it holds", _files(study))),
+        ("test", "Block between plates", _test(study)),
+        ("law", "Lattice law for the analysis mesh", _law(study)),
+        ("inputs", "Inputs", _inputs(study)),
+        ("files", "Files of this run", facts_table("file", "content", _files(study))),
         ("versions", "Versions", facts_table("program", "version", versions)),
     ]
     title = f"From struts to moduli: the lattice of {study.job.unit.name}"
@@ -81,10 +81,10 @@ def _headline(study: Homogenisation) -> str:
     sentences.append(
         f"The unit's parameters say {kPa(measured)}, {ratio:.2g} times the prediction: "
         + (
-            "they agree within a tenth."
+            "they agree within 10 %."
             if 0.9 < ratio < 1.1
-            else "resin, print offset or strut diameters differ from what is assumed here. Weighing the "
-            "specimen tells which: see the mass below."
+            else "resin, print offset or strut diameters differ from the values assumed here. The mass of a "
+            "printed specimen shows which: see the computed mass below."
         )
     )
     facts = [
@@ -118,10 +118,10 @@ def _moduli(study: Homogenisation) -> str:
     return (
         f'<div class="pair">{shown}</div>'
         + table(
-            "Effective elasticity of the endless lattice, kPa.", [("", ""), *((n, "n") for n in names)], rows
+            "Effective elasticity of the periodic lattice, kPa.", [("", ""), *((n, "n") for n in names)], rows
         )
-        + f"<p>A cubic tensor has three constants; this one is cubic to {e.cubic_error:.2%}, which is the "
-        "mesh's noise unless the print's offset differs along z.</p>"
+        + f"<p>A cubic tensor has three constants; this one is cubic to {e.cubic_error:.2%}, which is mesh "
+        "error unless the print offset differs along z.</p>"
     )
 
 
@@ -148,26 +148,27 @@ def _test(study: Homogenisation) -> str:
     if study.stretched is not None:
         curve = study.stretched.curve
         side = curve.stretch <= 1
-        lines.append(Line("endless lattice", -curve.strain[side][::-1], -1e3 * curve.stress_MPa[side][::-1]))
+        lines.append(Line("periodic lattice", -curve.strain[side][::-1], -1e3 * curve.stress_MPa[side][::-1]))
     chart = figure(
         pictures.compression_chart(lines),
-        "Nominal stress of the block and of the endless lattice. Dot: the curve stops being valid, for the "
-        "reason below; what is beyond it (dotted) is not what a test would show.",
+        "Nominal stress of the block and of the periodic lattice. Dot: end of the valid range, for the "
+        "reason below; a test would not follow the dotted part.",
         "Nominal stress against compression.",
     )
     words = "".join(f"<p>Between {FRICTION[f]}: {escape(t.why)}.</p>" for f, t in study.tests.items())
     moduli_table = table(
-        "Modulus by procedure; the paper prints none, and the marked one stands for it here.",
+        "Modulus by evaluation procedure; the paper does not print its procedure, the marked one is used "
+        "here.",
         [("procedure", ""), ("plates", ""), ("modulus [kPa]", "n"), ("", "")],
         rows,
     )
     shown = "".join(picture_figure(p) for p in _specimen_pictures(study))
     n = study.job.cells
     return (
-        f"<p>{n} x {n} x {n} cells, cut flat, between two rigid plates. Real plates lie between the two "
-        "bounds: without friction, and holding fast.</p>"
-        f'<div class="pair"><div>{chart}</div><div>{moduli_table}</div></div>{words}'
-        f'<div class="triple">{shown}</div>'
+        f"<p>{n} x {n} x {n} cells, cut flat, between two rigid plates. Real plates lie between two bounds: "
+        "frictionless and bonded.</p>"
+        f'<div class="pair"><div>{chart}</div><div>{moduli_table}</div></div>{words}<div '
+        f'class="triple">{shown}</div>'
     )
 
 
@@ -198,7 +199,7 @@ def _law(study: Homogenisation) -> str:
             charts,
             (
                 "Stress along an axis.",
-                "Stretch of the sides: a foam law cannot follow the struts' kinematics.",
+                "Lateral stretch: a foam law cannot follow the kinematics of the struts.",
             ),
             strict=True,
         )
@@ -210,11 +211,11 @@ def _law(study: Homogenisation) -> str:
     ]
     m = fit.misfit
     return (
-        "<p>Compressible foam, tension and compression apart, side by side with a cubic shear that brings "
-        "the shear modulus up to the cell's. It stands for the lattice between stretches of "
-        f"{low:g} and {high:g} along the axes; misfit (root mean square) {m.tension:.1%} of the largest "
-        f"stress in tension, {m.compression:.1%} in compression, {m.lateral:.0%} of the largest lateral "
-        "strain.</p>"
+        "<p>Compressible foam with separate parameters in tension and compression, in parallel with a "
+        "cubic shear term that raises the shear modulus to the cell's. Valid for the lattice between "
+        f"stretches of {low:g} and {high:g} along the axes; misfit (root mean square) {m.tension:.1%} of "
+        f"the largest stress in tension, {m.compression:.1%} in compression, {m.lateral:.0%} of the largest "
+        "lateral strain.</p>"
         f'<div class="pair">{shown}</div>'
         + table("At small strain.", [("", ""), ("cell", "n"), ("law", "n")], rows)
     )
@@ -229,8 +230,8 @@ def _inputs(study: Homogenisation) -> str:
         "strut at mid-span [mm]": 2 * cell.midspan_radius_mm,
         "print offset in the plane [mm]": cell.offset_xy_mm,
         "print offset along z [mm]": cell.offset_z_mm,
-        "skin's depth [mm]": cell.skin_depth_mm,
-        "skin's modulus over the core's": cell.skin_factor,
+        "skin depth [mm]": cell.skin_depth_mm,
+        "skin modulus over core modulus": cell.skin_factor,
         "resin": resin.name,
         "resin's Young's modulus [kPa]": 1e3 * resin.modulus_MPa,
         "resin's Poisson's ratio": resin.poisson,

@@ -15,15 +15,15 @@ from ...design.surface import stl_bytes
 from ...errors import ConvergenceError, InputError, MuError
 from ...fem.materials import Materials
 from ...files import write_bytes, write_csv
-from ...homogenize.cell_mesh import CellMeshSettings, cell_materials, cell_mesh
+from ...homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell
 from ...homogenize.compression import STRAINS, Compressed, Compression, Friction, compress
 from ...homogenize.curve import Curve
 from ...homogenize.effective import Effective, effective, write_effective
 from ...homogenize.elasticity import Elasticity, effective_tensor
 from ...homogenize.foam_fit import FoamFit, fit_foam
 from ...homogenize.modulus import moduli
-from ...homogenize.specimen import Specimen, specimen
-from ...homogenize.stretch import Stretched, StretchSettings, stretch
+from ...homogenize.specimen import Specimen, block_specimen
+from ...homogenize.stretch import Stretched, StretchSettings, stretch_lattice
 from ...materials.library import Material, load_material
 from ...meshing.mesh import Mesh
 from ...report.vtk import write_mesh
@@ -91,7 +91,7 @@ class Job:
 
     def __attrs_post_init__(self) -> None:
         if not 1 <= self.cells <= 12:
-            raise InputError(f"a specimen of {self.cells} cells a side", "--cells", "give 1 to 12")
+            raise InputError(f"a specimen of {self.cells} cells per side", "--cells", "give 1 to 12")
         if not 0.01 <= self.strain <= 0.8:
             raise InputError(f"a compression to {self.strain:g}", "--strain", "give a share from 0.01 to 0.8")
         if not 0.3 <= self.refine <= 4.0:
@@ -186,7 +186,7 @@ class Homogenisation:
         """Analysis mesh of the cell's octant."""
         job = self.job
         with self.progress.stage("mesh of the cell", 5.0):
-            self.mesh = cell_mesh(job.cell, job.mesh, self.cache.folder)
+            self.mesh = mesh_cell(job.cell, job.mesh, self.cache.folder)
             resin = job.resin
             self.materials = cell_materials(job.cell, self.mesh, resin.modulus_MPa, resin.poisson)
             modulus, _ = self.materials.small_strain(len(self.mesh.tets))
@@ -235,7 +235,7 @@ class Homogenisation:
                     done[0] += 1
                     self.progress.update(done[0] / len(STRETCHES))
 
-                found = stretch(self.mesh, self.materials, settings=settings, on_point=reached)
+                found = stretch_lattice(self.mesh, self.materials, settings=settings, on_point=reached)
                 arrays = attrs.asdict(found.curve) | {"stopped": np.array(found.stopped)}
                 self.cache.put("stretch", name, arrays)
         self.stretched = found
@@ -251,7 +251,7 @@ class Homogenisation:
             "stopped": found.stopped,
         }
         if found.stopped:
-            self.warn(f"The endless lattice's curve ends early: {found.stopped}.")
+            self.warn(f"The curve of the periodic lattice ends early: {found.stopped}.")
 
     def fit_law(self) -> None:
         """The law that the analysis mesh takes, in effective.toml."""
@@ -291,9 +291,9 @@ class Homogenisation:
     def specimen(self) -> Specimen:
         """An eighth of the block that is compressed."""
         cell, resin = self.job.cell, self.job.resin
-        mesh = cell_mesh(cell, self.job.block_mesh, self.cache.folder)
+        mesh = mesh_cell(cell, self.job.block_mesh, self.cache.folder)
         materials = cell_materials(cell, mesh, resin.modulus_MPa, resin.poisson)
-        return specimen(mesh, self.job.cells, materials)
+        return block_specimen(mesh, self.job.cells, materials)
 
     def compress(self, friction: Friction) -> None:
         """The block between two plates, to the strain that was asked for."""

@@ -34,7 +34,7 @@ class Cluster:
             import distributed
         except ImportError as error:
             raise InputError(
-                "sweeps run on Dask, which is not installed", "", "pip install 'mu_addon[sweeps]'"
+                "parameter studies need Dask, which is not installed", "", "pip install 'mu_addon[sweeps]'"
             ) from error
         self._distributed = distributed
         self._gone = (distributed.CancelledError, distributed.scheduler.KilledWorker)
@@ -110,7 +110,10 @@ class Cluster:
                     alone_since = time.monotonic()
                 elif time.monotonic() - alone_since > ALONE_S:
                     alone_since = float("inf")
-                    warn("no worker is connected to the scheduler: the sweep waits for one (`dask worker`)")
+                    warn(
+                        "no worker is connected to the scheduler: the parameter study waits for one (`dask "
+                        "worker`)"
+                    )
                 while waiting and len(running) < max(AHEAD * threads, 1):
                     number = waiting.pop()
                     name = f"point-{tasks[number].name}-{number}-{attempts[number]}-{time.time_ns()}"
@@ -126,11 +129,11 @@ class Cluster:
             for number in lost:
                 attempts[number] += 1
                 if attempts[number] > ATTEMPTS:
-                    yield number, _lost("it was given up by the scheduler again and again")
+                    yield number, _lost("the scheduler abandoned it repeatedly")
                 else:
                     waiting.append(number)
             if lost:
-                warn(f"the scheduler was lost, and {len(lost)} points with it: they are given to it again")
+                warn(f"the scheduler was lost, and {len(lost)} points with it: they are submitted again")
             if gone:
                 self.reconnect()
 
@@ -158,7 +161,7 @@ class Cluster:
     def _failed(self, future: Any) -> dict[str, Any]:
         error = future.exception()
         if isinstance(error, self._distributed.scheduler.KilledWorker):
-            return _lost("every worker that was given it was lost")
+            return _lost("every worker that ran it was lost")
         if isinstance(error, MuError):
             return _lost(error.what, error.where, error.remedy)
         return _lost(f"{type(error).__name__}: {error}")

@@ -131,10 +131,10 @@ def read_plan(path: Path) -> Plan:
         text = file_text(path)
     except OSError as error:
         raise InputError(
-            f"cannot read the sweep: {error.strerror}", where, "give the path of a TOML file"
+            f"cannot read the parameter study: {error.strerror}", where, "give the path of a TOML file"
         ) from error
     except UnicodeDecodeError as error:
-        raise InputError("this is not UTF-8 text", where, "save it as UTF-8") from error
+        raise InputError("the file is not UTF-8 text", where, "save it as UTF-8") from error
     return parse_plan(text, path.parent, where)
 
 
@@ -149,7 +149,7 @@ def parse_plan(text: str, folder: Path, where: str = "sweep.toml") -> Plan:
     vary = document.get("vary")
     if not isinstance(vary, dict) or not vary:
         raise InputError(
-            "nothing is varied",
+            "no input is varied",
             where,
             'add [vary] and lines like "chambers.wall_mm" = { low = .., high = .. }',
         )
@@ -159,7 +159,7 @@ def parse_plan(text: str, folder: Path, where: str = "sweep.toml") -> Plan:
     for name in STAGES[len(stages) :]:
         if name in document:
             raise InputError(
-                f"[{name}] has no part in it", where, f'write stages = "{name}", or leave it out'
+                f"[{name}] is not one of its stages", where, f'write stages = "{name}", or leave it out'
             )
     variables = tuple(variable(name, given, where) for name, given in _flat(vary).items())
     inputs = Inputs(_unit(document, folder, where), _protocol(document, folder), tables)
@@ -206,7 +206,7 @@ def _settings(document: Mapping[str, Any], stage: str, where: str) -> dict[str, 
     for key in found:
         if key in FILES or key in OF_FILES:
             raise InputError(
-                f"a sweep takes no {key}",
+                f"a parameter study does not take {key}",
                 f"{where}, [{stage}]",
                 "leave it out; unit and protocol stand at the top of the file",
             )
@@ -215,7 +215,7 @@ def _settings(document: Mapping[str, Any], stage: str, where: str) -> dict[str, 
 
 def _unit(document: Mapping[str, Any], folder: Path, where: str) -> Unit:
     if ("preset" in document) == ("unit" in document):
-        raise InputError("which unit?", where, 'write preset = "mu-1.0x" or unit = "my-unit.toml"')
+        raise InputError("no unit is given", where, 'write preset = "mu-1.0x" or unit = "my-unit.toml"')
     if "preset" in document:
         return load_preset(_word(document, "preset", "", where))
     return read_unit(folder / _word(document, "unit", "", where))
@@ -229,14 +229,14 @@ def _protocol(document: Mapping[str, Any], folder: Path) -> Protocol:
 def _word(document: Mapping[str, Any], key: str, default: str, where: str) -> str:
     found = document.get(key, default)
     if not isinstance(found, str):
-        raise InputError(f"{key} = {found!r} is no text", where, "write it in quotes")
+        raise InputError(f"{key} = {found!r} is not a text", where, "write it in quotes")
     return found
 
 
 def _words(document: Mapping[str, Any], key: str, where: str) -> tuple[str, ...]:
     found = document.get(key, [])
     if not isinstance(found, list) or not all(isinstance(word, str) for word in found):
-        raise InputError(f"{key} = {found!r} is no list of names", where, f'write {key} = ["mass_g"]')
+        raise InputError(f"{key} = {found!r} is not a list of names", where, f'write {key} = ["mass_g"]')
     return tuple(found)
 
 

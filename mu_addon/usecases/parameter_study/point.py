@@ -122,13 +122,13 @@ def _watch(child: Child, task: Task) -> tuple[float, dict[str, str] | None]:
 def _too_much(child: Child, task: Task, peak_MB: float) -> dict[str, str] | None:
     if peak_MB > task.memory_MB:
         return {
-            "what": f"the study took more than the {task.memory_MB} MB of memory that it may",
+            "what": f"the study took more than the {task.memory_MB} MB of memory that are allowed",
             "where": str(child.progress.get("stage", "at its start")),
             "what_to_do": "raise memory_MB, or take a coarser mesh",
         }
     if child.seconds > 60 * task.minutes:
         return {
-            "what": f"the study took longer than the {task.minutes:g} minutes that it may",
+            "what": f"the study took longer than the {task.minutes:g} minutes that are allowed",
             "where": str(child.progress.get("stage", "at its start")),
             "what_to_do": "raise minutes, or take a coarser mesh",
         }

@@ -42,27 +42,27 @@ def report(found: Found) -> str:
         else []
     )
     if waiting:
-        remarks.append(f"{waiting} points have not been run yet.")
+        remarks.append(f"{waiting} points have not been run.")
     seconds = [row["seconds"] for row in done]
     lead = cards(
         [
             ("points", str(len(found.rows))),
             ("done", str(len(done))),
             ("failed", str(len(failed))),
-            ("a point takes", f"{np.mean(seconds):.1f} s" if seconds else "-"),
-            ("memory, at most", f"{max(row['memory_MB'] for row in done)} MB" if done else "-"),
+            ("time per point", f"{np.mean(seconds):.1f} s" if seconds else "-"),
+            ("largest memory", f"{max(row['memory_MB'] for row in done)} MB" if done else "-"),
         ]
     )
     p = found.plan
     return page(
-        f"Sweep of {p.inputs.unit.name}",
+        f"Parameter study of {p.inputs.unit.name}",
         f"{len(found.inputs)} inputs, {p.method.replace('_', ' ')}, {' + '.join(p.stages)}",
         note(remarks),
         lead,
         [
-            ("effects", "What each input does", _effects(found)),
-            ("pareto", "Best compromises", _fronts(found)),
-            ("inputs", "What was varied", _inputs(found)),
+            ("effects", "Main effects", _effects(found)),
+            ("pareto", "Pareto front", _fronts(found)),
+            ("inputs", "Inputs varied", _inputs(found)),
             ("points", "Points", _points(found)),
             ("failures", "Failures", _failures(found)),
             ("versions", "Versions", facts_table("package", "version", package_versions())),
@@ -88,8 +88,8 @@ def _effects(found: Found) -> str:
     if not outputs:
         return ""
     html = (
-        "<p>Each dot is a study. The line joins the means of studies with like values of one input, bars are "
-        "their standard error: what is left after the other inputs are averaged out.</p>"
+        "<p>Each dot is a study. The line joins means of studies with similar values of one input; bars are "
+        "their standard error. The other inputs are averaged out.</p>"
     )
     shares: dict[str, list[str]] = {name: [] for name in found.inputs}
     for output in outputs:
@@ -101,10 +101,10 @@ def _effects(found: Found) -> str:
             charts += figure(
                 effect_chart(effect, [row[name] for row in rows], y, name, output),
                 "",
-                f"{output} against {name}: one dot a study, and the mean.",
+                f"{output} against {name}: one dot per study, and the mean.",
             )
         html += f'<h3>{escape(output)}</h3><div class="triple">{charts}</div>'
-    caption = "Share of a figure's variance that one input alone explains, corrected for chance."
+    caption = "First-order share of each result's variance due to one input, corrected for chance."
     head = [("input", ""), *((output, "n") for output in outputs)]
     return html + table(caption, head, [([name, *row], False) for name, row in shares.items()])
 
@@ -139,7 +139,7 @@ def _fronts(found: Found) -> str:
     charts = ""
     for i, j in itertools.combinations(range(len(goals)), 2):
         front = pareto_front(costs[:, [i, j]])
-        alt = f"{goals[j][0]} against {goals[i][0]}; {len(front)} of {len(rows)} studies are on the front."
+        alt = f"{goals[j][0]} against {goals[i][0]}; {len(front)} of {len(rows)} studies are Pareto-optimal."
         charts += figure(front_chart(rows, goals[i], goals[j], front), "", alt)
     best = pareto_front(costs)
     order = best[np.argsort(costs[best, 0], kind="stable")]
@@ -152,14 +152,14 @@ def _fronts(found: Found) -> str:
         for n in order
     ]
     aims = ", ".join(f"{'small' if sign > 0 else 'large'} {escape(name)}" for name, sign in goals)
-    caption = f"The {len(best)} of {len(rows)} points that no other beats in all of these at once."
-    return f'<p>Wanted: {aims}.</p><div class="pair">{charts}</div>' + table(caption, head, listed)
+    caption = f"The {len(best)} of {len(rows)} points that are Pareto-optimal."
+    return f'<p>Objectives: {aims}.</p><div class="pair">{charts}</div>' + table(caption, head, listed)
 
 
 def front_chart(
     rows: list[dict[str, Any]], first: tuple[str, float], second: tuple[str, float], front: Array
 ) -> str:
-    """Studies by two figures; those that no other beats in both are joined and numbered."""
+    """Studies by two figures; the Pareto-optimal ones are joined and numbered."""
     x, y = (np.array([float(row[name]) for row in rows]) for name, _ in (first, second))
     with canvas(4.0, 3.2) as (drawn, svg):
         axes = drawn.add_axes((0.16, 0.15, 0.80, 0.80))
@@ -190,8 +190,8 @@ def _inputs(found: Found) -> str:
     facts = {
         "method": p.method,
         "seed": p.seed,
-        "memory a study may take [MB]": p.memory_MB,
-        "minutes a study may take": p.minutes,
+        "memory limit of a study [MB]": p.memory_MB,
+        "time limit of a study [min]": p.minutes,
         "resin of the mass": p.resin,
     }
     return table("", [("input", ""), ("values", "")], rows) + facts_table("setting", "", facts)
@@ -218,7 +218,7 @@ def _points(found: Found) -> str:
         for row in found.rows[:MOST_ROWS]
     ]
     more = len(found.rows) - len(rows)
-    caption = "points.csv has every figure" + (f", and {more} more points." if more > 0 else ".")
+    caption = "points.csv holds all results" + (f", and {more} more points." if more > 0 else ".")
     return table(caption, head, rows)
 
 

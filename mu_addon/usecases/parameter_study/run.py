@@ -77,7 +77,7 @@ def sweep(
 
     density = _density(plan)
     if add and plan.method == "grid":
-        raise InputError("a grid has its levels' points", "--add", "give more steps in sweep.toml instead")
+        raise InputError("points cannot be added to a grid", "--add", "give more steps in sweep.toml")
     begin(context, folder, HEADER, plan.texts(), RESULTS)
     values, places = _extended(plan, folder, add)
     points = plan.points(values)

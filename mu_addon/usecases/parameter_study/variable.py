@@ -81,20 +81,20 @@ def variable(name: str, given: Any, where: str) -> Variable:
     where = f"{where}, [vary] {name}"
     if name not in names():
         raise InputError(
-            f"there is no input {name!r}{nearest(name, names())}",
+            f"unknown input {name!r}{nearest(name, names())}",
             where,
             "name it as in unit.toml (chambers.wall_mm) or in study.toml (simulate.mesh.refine)",
         )
     if not isinstance(given, dict) or not (set(given) == {"values"} or {"low", "high"} <= set(given)):
         raise InputError(
-            f"{given!r} says not what to vary",
+            f"{given!r} does not define a range",
             where,
             "write { low = 0.8, high = 1.2 } or { values = [1, 2] }",
         )
     if "values" in given:
         values = given["values"]
         if not isinstance(values, list) or not values:
-            raise InputError(f"values = {values!r} is no list", where, "write values = [1, 2]")
+            raise InputError(f"values = {values!r} is not a list", where, "write values = [1, 2]")
         return Variable(name, values=tuple(values))
     unknown = set(given) - {"low", "high", "log", "steps"}
     if unknown:
@@ -107,10 +107,12 @@ def variable(name: str, given: Any, where: str) -> Variable:
     )
     if not numbers or not low < high:
         raise InputError(
-            f"low = {low!r} and high = {high!r} are no range", where, "give two numbers that rise"
+            f"low = {low!r} and high = {high!r} are not a range", where, "give two numbers with low < high"
         )
     if not isinstance(log, bool) or (log and low <= 0):
-        raise InputError(f"log = {log!r} from {low!r}", where, "write log = true only where low is positive")
+        raise InputError(
+            f"log = {log!r} with low = {low!r}", where, "write log = true only where low is positive"
+        )
     if isinstance(steps, bool) or not isinstance(steps, int) or not 2 <= steps <= 1000:
         raise InputError(f"steps = {steps!r}", where, "give a whole number from 2 to 1000")
     return Variable(name, low, high, log=log, steps=steps)
@@ -154,7 +156,7 @@ def put(inputs: Inputs, values: Mapping[str, Any], folder: Path) -> Inputs:
         elif head in own:
             sections.setdefault(head, {})[rest] = value
         elif head not in tables:
-            raise InputError(f"{name} has no part in these stages", "[vary]", f'write stages = "{head}"')
+            raise InputError(f"{name} is not an input of these stages", "[vary]", f'write stages = "{head}"')
         else:
             *inner, key = rest.split(".")
             table: dict[str, Any] = tables[head]

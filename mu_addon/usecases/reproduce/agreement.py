@@ -12,7 +12,7 @@ from ...report.results import Path
 
 Array = np.ndarray[Any, Any]
 
-HELD, NOT_HELD, CANNOT_TELL = "held", "not held", "cannot tell"
+HELD, NOT_HELD, CANNOT_TELL = "held", "not held", "undecided"
 
 
 @attrs.frozen
@@ -118,13 +118,13 @@ def statements(
     found = []
     for name, J in table.items():
         other = coarser.get(name)
-        text = f"{name}: of one length, the distal path disturbs least"
+        text = f"{name}: of paths of equal length, the distal one deviates least"
         found.append(_judged(text, _distal(J, other, paths)))
-        text = f"{name}: a longer path disturbs more than those within it"
+        text = f"{name}: a path deviates more than any path contained in it"
         found.append(_judged(text, _longer(J, other, paths)))
     scales = sorted((name for name in table if name.endswith("x")), key=lambda name: float(name[:-1]))
     for smaller in scales[:-1]:
-        text = f"{scales[-1]} disturbs less than {smaller}"
+        text = f"{scales[-1]} deviates less than {smaller}"
         found.append(_judged(text, [_less(table, coarser, scales[-1], smaller)]))
     return found
 

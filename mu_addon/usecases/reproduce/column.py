@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.anchors import anchors, windows
+from ...design.anchors import anchor_points, windows
 from ...design.parameters import Unit
 from ...design.quantity import in_kPa
 from ...fem.equilibrium import Equilibrium
@@ -20,8 +20,8 @@ from ...fem.trajectory import simulate
 from ...fem.unit import materials_of
 from ...meshing.mesh import Mesh
 from ...placement.batch import CandidateBatch
-from ...placement.candidates import candidates, roi
-from ...placement.deviation import Deviation, centreline, deviation
+from ...placement.candidates import candidate_paths, roi
+from ...placement.deviation import Deviation, centreline, centreline_deviation
 from ...placement.inclusion import RULES, sensor_share
 from ...placement.sampling import polynomials
 
@@ -75,7 +75,10 @@ class Paths:
         baseline = at_rest + np.tensordot(between, self.still - at_rest, axes=1)
         apart = np.tensordot(between, self.apart[:, self.rules.index(rule)], axes=1)
         lines = centreline(baseline, STATIONS)
-        return [deviation(centreline(baseline + apart[:, i], STATIONS), lines) for i in range(apart.shape[1])]
+        return [
+            centreline_deviation(centreline(baseline + apart[:, i], STATIONS), lines)
+            for i in range(apart.shape[1])
+        ]
 
     def J_hat(self, rule: str, at_rest: Array, samples_kPa: Array) -> Array:
         """J_hat (paths,) in mm."""
@@ -122,8 +125,8 @@ def paths(
     solved_kPa: Sequence[float] = SOLVED_KPA,
 ) -> Paths:
     """Every window by every rule at some of the pressures of Model A. Raises ConvergenceError."""
-    points = anchors(unit)
-    every = candidates(points, windows(len(points)))
+    points = anchor_points(unit)
+    every = candidate_paths(points, windows(len(points)))
     found = [roi(mesh, path, unit.dimensions.inclusion_radius) for path in every]
     shares = [sensor_share(rule, one) for rule in rules for one in found]
     monitor = probe(mesh, points)

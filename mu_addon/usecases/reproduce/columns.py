@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.anchors import anchors
+from ...design.anchors import anchor_points
 from ...design.parameters import Unit
 from ...errors import ConvergenceError
 from ...meshing.settings import MeshSettings
@@ -88,7 +88,7 @@ def _solve(task: Task) -> Solved:
         stopped = error.what
         moved = motion(task.unit, mesh, [p for p in BENDING_KPA if min(SOLVED_KPA) <= p <= max(SOLVED_KPA)])
     found = paths(task.unit, mesh, moved)
-    at_rest, samples = anchors(task.unit), np.array(task.samples_kPa)
+    at_rest, samples = anchor_points(task.unit), np.array(task.samples_kPa)
     delta = [[d.delta for d in found.deviations(rule, at_rest, samples)] for rule in RULES]
     angle = [moved.angle_at(p) if p in moved.pressure_kPa else np.nan for p in BENDING_KPA]
     sides = [[p for p in moved.crossing_kPa if p * sign > 0] for sign in (-1, 1)]

@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.anchors import anchors
+from ...design.anchors import anchor_points
 from ...design.parameters import Unit
 from ...errors import ConvergenceError, MuError
 from ...fem.protocol import Protocol
@@ -150,7 +150,7 @@ def solve(
         angles.append([moved.angle_at(p) if p in moved.pressure_kPa else np.nan for p in MOTION_KPA])
         sides = [[p for p in moved.crossing_kPa if p * sign > 0] for sign in (-1, 1)]
         crossings.append([min(side, key=abs) if side else np.nan for side in sides])
-        at_rest.append(anchors(one))
+        at_rest.append(anchor_points(one))
         found.append(paths(one, mine, moved, (RULE,), ENDS_KPA))
     return PointResult(tuple(moduli_kPa), np.array(angles), np.array(crossings), tuple(at_rest), tuple(found))
 

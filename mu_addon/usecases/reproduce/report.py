@@ -26,8 +26,8 @@ from .scatter import Scatter
 Array = np.ndarray[Any, Any]
 
 _WORDS = {
-    "volume_fraction": "each element stiffened by the share of it that lies in the sensor",
-    "intersect": "the paper's own: every element that the sensor touches, whole",
+    "volume_fraction": "each element is stiffened by the volume fraction of it inside the sensor",
+    "intersect": "the rule of the paper: every element that the sensor intersects is stiffened entirely",
 }
 # The rule that decides comes first.
 _ORDER = sorted(RULES, key=lambda rule: rule != RULE)
@@ -45,19 +45,19 @@ def write_report(found: Found, path: Path) -> None:
 def report(found: Found) -> str:
     """The page as HTML text."""
     return page(
-        "The paper, done again",
+        "Reproduction of the paper",
         "Exley, Nardin, Trunin, Cafiso, Beccai, Monolithic Units, arXiv:2511.13120: Table I, bending, and "
-        f"how much of either is the mesh or an assumption. Values: {found.settings.values_name}.",
+        f"the share of mesh and assumptions in the differences. Values: {found.settings.values_name}.",
         note(_remarks(found)),
         cards(_facts(found)),
         [
             ("table", "Table I", _table(found)),
             ("deviation", "Deviation along the length and over time", _deviations(found)),
-            ("statements", "What the paper states", _statements(found)),
+            ("statements", "Statements of the paper", _statements(found)),
             ("bending", "Bending", _bending(found)),
-            ("meshes", "How much of the table is the mesh", _meshes(found)),
-            ("open", "What the paper leaves open", _open(found)),
-            ("sampling", "The protocol's sampling", _sampling(found)),
+            ("meshes", "Mesh dependence of the table", _meshes(found)),
+            ("open", "Parameters that the paper does not print", _open(found)),
+            ("sampling", "Sampling of the protocol", _sampling(found)),
             ("versions", "Versions", facts_table("package", "version", package_versions())),
         ],
     )
@@ -67,7 +67,7 @@ def _facts(found: Found) -> list[tuple[str, str]]:
     facts = []
     printed = {name: a for name, a in found.agreements(RULE).items() if name in found.paper.J_hat}
     for name, a in printed.items():
-        facts.append((f"{name}, rank correlation", f"{a.spearman:.2f} (wanted {GOALS[name]:g})"))
+        facts.append((f"{name}, rank correlation", f"{a.spearman:.2f} (goal {GOALS[name]:g})"))
     same = [a.same_choice for a in printed.values()]
     facts.append(("the paper's path chosen, or tied", f"{sum(same)} of {len(same)}"))
     middle = next(c for c in found.columns if c.scale == 1.0)
@@ -87,8 +87,8 @@ def _remarks(found: Found) -> list[str]:
         if len(crossing):
             where = " and ".join(f"{p:.3g}" for p in crossing)
             remarks.append(
-                f"{c.name}: from {where} kPa on walls pass through each other. Nothing here resists contact, "
-                "and the states beyond are wrong."
+                f"{c.name}: from {where} kPa on, walls intersect. Self-contact is not modelled, so states "
+                "beyond this pressure are invalid."
             )
         if c.fine.stopped:
             remarks.append(f"{c.name}: the range of bending was not reached: {c.fine.stopped}.")
@@ -96,18 +96,18 @@ def _remarks(found: Found) -> list[str]:
     if GRIPPER in found.others:
         refine = min(found.settings.mesh.refine, gripper.REFINE)
         remarks.append(
-            f"The gripper's columns are of one finger on a mesh of refine {refine:g}, closing on nothing and "
-            "on each of the paper's cubes, without friction. How far their mesh moves them is not known."
+            f"The gripper's columns are of one finger on a mesh of refine {refine:g}, closing freely and on "
+            "each of the paper's cubes, without friction. Their mesh uncertainty is not known."
         )
     else:
         remarks.append("The gripper's column is not part of this run.")
     if found.settings.held_cells:
         remarks.append(
-            f"The three units are held fast up to {found.settings.held_cells:g} cells above the base; the "
+            f"The three units are clamped up to {found.settings.held_cells:g} cells above the base; the "
             "gripper's fingers and the random meshes are not."
         )
     if found.settings.mesh.order == 1:
-        remarks.append("Linear elements lock in thin walls: these answers are for a quick look only.")
+        remarks.append("Linear elements lock in thin walls: these results are for a quick look only.")
     return remarks
 
 
@@ -129,10 +129,11 @@ def _table(found: Found) -> str:
             rows.append((cells, False))
         rows += [(cells, False) for cells in _feet(agreed, spread)]
         groups = [("", 1), *((name, 2) for name in ours)]
-        words = f"{rule.replace('_', ' ')}: {_WORDS[rule]}. J_hat in mm, * the best of its column."
+        words = f"{rule.replace('_', ' ')}: {_WORDS[rule]}. J_hat in mm, * smallest of its column."
         html += table(words, head, rows, groups)
         alt = (
-            "J_hat of every path here and in the paper, a panel a column; the numbers are in the table above."
+            "J_hat of every path, here and in the paper, one panel per column; the table above holds the "
+            "numbers."
         )
         printed = {name: J for name, J in ours.items() if name in paper.J_hat}
         html += figure(charts.against_paper(printed, paper, paper.paths), "", alt)
@@ -143,8 +144,8 @@ def _feet(agreed: Mapping[str, Agreement], spread: Mapping[str, float]) -> list[
     """The last rows of a table: how its columns agree with the paper's."""
     feet = {
         "rank correlation": [f"{a.spearman:.2f}" for a in agreed.values()],
-        "here over paper": [f"{a.magnitude:.2f}" for a in agreed.values()],
-        "mesh moves it by": [_doubt(spread[name]) for name in agreed],
+        "ratio to paper": [f"{a.magnitude:.2f}" for a in agreed.values()],
+        "mesh uncertainty": [_doubt(spread[name]) for name in agreed],
         "tied with the best": [" ".join(map(label, a.tied)) or "-" for a in agreed.values()],
     }
     return [[title, *(cell for value in values for cell in (value, ""))] for title, values in feet.items()]
@@ -160,7 +161,7 @@ def _deviations(found: Found) -> str:
         svg = charts.deviations(found.columns, RULE, found.paper.paths, along)
         words = "actuator's length" if along == "length" else "actuation"
         html += figure(
-            svg, f"Average deviation along the {words}.", f"A panel a path, a line a scale: {along}."
+            svg, f"Average deviation along the {words}.", f"One panel per path, one line per scale: {along}."
         )
     return html
 
@@ -172,7 +173,10 @@ def _statements(found: Found) -> str:
         rows = [([s.text, s.verdict, s.numbers], False) for s in found.statements(rule)]
         held = sum(s.verdict == HELD for s in found.statements(rule))
         unclear = sum(s.verdict == CANNOT_TELL for s in found.statements(rule))
-        words = f"{rule.replace('_', ' ')}: {held} of {len(rows)} hold, of {unclear} the mesh cannot tell."
+        words = (
+            f"{rule.replace('_', ' ')}: {held} of {len(rows)} hold; {unclear} cannot be decided within "
+            "the mesh uncertainty."
+        )
         html += table(words, head, rows, css="stack")
     relative = {c.name: c.fine.J_hat(RULE).mean() / c.scale for c in found.columns}
     words = ", ".join(f"{name} {value:.3f}" for name, value in relative.items())
@@ -192,7 +196,7 @@ def _bending(found: Found) -> str:
         rows.append(
             ([c.name, *angles, f"{c.angle_uncertainty_deg():.1f}", signed(f"{low:g} to {high:g}")], False)
         )
-    caption = "Bending angle in degrees; mesh: how far the coarser mesh moves it at most."
+    caption = "Bending angle in degrees; mesh: largest difference to the coarser mesh."
     chart = figure(
         charts.bending(found.columns, paper),
         "Lines: here. Crosses: ends of the ranges that the paper prints as approximate, with 2.5 degrees.",
@@ -235,24 +239,24 @@ def _meshes(found: Found) -> str:
         ("size", "n"),
     ]  # fmt: skip
     html += (
-        "<p>Meshes as the paper's may have been: the whole body in linear tetrahedra of about 5 mm, by "
-        "Gmsh, without regard to the anchors. A seed moves all sizes by up to a tenth: no one would call two "
-        "of them different. <i>grown</i>: elements grow with the unit; <i>same</i>: 5 mm at every scale; "
-        "<i>coarse</i>: 9 mm at 1.0x. "
-        "Volume: what the rule stiffens over the sensor's own. Rank correlation: least, median, most of all "
-        "meshes. Size: mean J_hat over the paper's.</p>"
+        "<p>Random meshes of the kind the paper may have used: the whole body in linear tetrahedra of about "
+        "5 mm by Gmsh, not aligned with the anchors. The seed varies all element sizes by up to 10 %, so "
+        "that any of them could have been used. <i>grown</i>: elements grow with the unit; <i>same</i>: 5 "
+        "mm at every scale; <i>coarse</i>: 9 mm at 1.0x. Volume: stiffened volume over the sensor's volume. "
+        "Rank correlation: minimum, median and maximum over all meshes. Magnitude: mean J_hat over the "
+        "paper's.</p>"
     )
     html += table(f"From: {found.origin['meshes']}.", head, rows)
     for family in ("grown", "same", "coarse"):
         picked = _by_column(found, family, "intersect")
         if picked:
             svg = charts.mesh_scatter(picked, found.paper.paths)
-            words = f"Every dot is a mesh ({family}, intersect); crosses are the paper's."
+            words = f"Dots: one mesh each ({family}, intersect). Crosses: the paper."
             html += figure(svg, words, words)
             svg = charts.orders(picked, found.paper.paths)
             words = (
-                "In how many of a hundred meshes two paths lie in the paper's order "
-                f"({family}, intersect); no number: in all."
+                f"Percentage of meshes in which two paths are in the paper's order ({family}, intersect); "
+                "no number: 100 %."
             )
             html += figure(svg, words, words)
     return html
@@ -266,15 +270,18 @@ def _open(found: Found) -> str:
     failed = sum(bool(p.failed) for p in found.points)
     touching = sum(p.touches for p in solved)
     html = (
-        f"<p>{len(solved) + failed} sets of values within the ranges below, one set for all three units each "
-        f"(refine 0.5, volume fraction): {failed} have a limit point on the way, in {touching} of the others "
-        "walls pass through each other before the end of the range, which nothing here resists.</p>"
+        f"<p>{len(solved) + failed} sets of values within the ranges below, one set for all three units "
+        f"each (refine 0.5, volume fraction): {failed} have a limit point within the range; in {touching} "
+        "of the others walls intersect before the end of the range; self-contact is not modelled.</p>"
     )
     rows = [([o.name, f"{o.variable.low:g} to {o.variable.high:g}", o.why], False) for o in OPEN]
-    html += table(f"From: {found.origin['points']}.", [("open value", ""), ("range", ""), ("why", "")], rows)
+    html += table(f"From: {found.origin['points']}.", [("parameter", ""), ("range", ""), ("why", "")], rows)
     found_effects = effects(solved, paper)
     told = [e for e in found_effects if e.Q2 >= _PREDICTED]
-    words = "Percent of a figure's variance that a value makes, alone and with others (Sobol's total index)."
+    words = (
+        "Share in percent of a result's variance due to a parameter, alone and in interaction (Sobol "
+        "total index)."
+    )
     if told:
         html += figure(charts.shares(told), words, words)
     head = [("figure", ""), ("least", "n"), ("most", "n"), ("variance predicted", "n")]
@@ -283,7 +290,10 @@ def _open(found: Found) -> str:
         for e in found_effects
     ]
     html += table(
-        "Over all sets; the last column: of sets left out, by the polynomial behind the shares.", head, rows
+        "Over all sets; last column: variance of held-out sets predicted by the polynomial that the indices "
+        "are computed from.",
+        head,
+        rows,
     )
     return html + _sets(found, solved)
 
@@ -298,7 +308,7 @@ def _sets(found: Found, solved: list[OpenPoint]) -> str:
         *((f"{name_of(s)} size", "n") for s in paper.scales),
         ("chosen", ""),
         *((f"{p:g} kPa", "n") for p in MOTION_KPA),
-        ("walls meet", ""),
+        ("self-contact", ""),
         ("goals", ""),
         ("distance", "n"),
     ]
@@ -324,9 +334,9 @@ def _sets(found: Found, solved: list[OpenPoint]) -> str:
             )
         )
     words = (
-        "Sets told beside, and the five of the design that agree best with walls apart. Rank "
-        "correlation; size, the mean over the paper's; path chosen at 0.75x, 1.0x and 1.5x; angles at "
-        "1.0x; distance as docs/reproduce.md has it."
+        "Named sets, and the five sampled sets without self-contact that agree best. Rank correlation; "
+        "magnitude, the mean J_hat over the paper's; path chosen at 0.75x, 1.0x and 1.5x; angles at 1.0x; "
+        "distance as docs/reproduce.md has it."
     )
     return table(words, head, rows)
 
@@ -351,7 +361,7 @@ def weightings(samples_kPa: Array) -> Mapping[str, Array]:
     ones = np.ones(len(samples_kPa))
     _, inverse, count = np.unique(samples_kPa, return_inverse=True, return_counts=True)
     return {
-        "the grasp, uniform in time": ones,
+        "the grasp protocol, uniform in time": ones,
         "every pressure once": 1.0 / count[inverse],
         "vacuum alone": (samples_kPa < 0) * 1.0,
         "pressure alone": (samples_kPa > 0) * 1.0,
@@ -371,7 +381,7 @@ def _sampling(found: Found) -> str:
             chosen.append(label(a.chosen))
         rows.append(([*cells, " ".join(chosen)], False))
     words = (
-        "The paper prints neither times nor rates. Rank correlation, size and chosen path by column, volume "
-        "fraction."
+        "The paper prints neither times nor rates. Rank correlation, magnitude and chosen path by column, "
+        "volume fraction."
     )
     return table(words, head, rows)

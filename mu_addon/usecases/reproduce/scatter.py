@@ -11,7 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.anchors import anchors
+from ...design.anchors import anchor_points
 from ...design.parameters import Unit
 from ...errors import InputError, MuError
 from ...meshing.mesh import Mesh
@@ -110,7 +110,7 @@ def _solved(one: Draw, samples_kPa: Array) -> dict[str, Array]:
         found = paths(one.unit, mesh, moved, RULES, ENDS_KPA)
     except MuError as error:
         return {"failed": np.array(error.what)}
-    J = [found.J_hat(rule, anchors(one.unit), samples_kPa) for rule in RULES]
+    J = [found.J_hat(rule, anchor_points(one.unit), samples_kPa) for rule in RULES]
     return {"J_hat": np.array(J), "volume_ratio": found.volume_ratio}
 
 

@@ -64,7 +64,7 @@ def calibrate_sensor(
         if (folder / INDEX).exists():
             recordings = read_recording(folder)
             if not recordings:
-                raise InputError("that recording holds no samples", str(folder), "choose another one")
+                raise InputError("the recording contains no samples", str(folder), "choose another recording")
             # The last file has the channels that the device has now.
             name = _channel(recordings[-1], name, folder)
             fitted += _of_recording(recordings[-1], name, level, angles, folder)
@@ -119,15 +119,15 @@ def console_summary(summary: Mapping[str, Any]) -> list[str]:
     """What was found, in a few lines of text, of its `summary`."""
     low, high = summary["range_deg"]
     lines = [
-        f"{summary['channel']}: {low:.1f} to {high:.1f} deg, {summary['sweeps']} sweeps, each foretold by "
-        f"the others to {summary['error_deg']:.2f} deg rms"
+        f"{summary['channel']}: {low:.1f} to {high:.1f} deg, {summary['sweeps']} sweeps, leave-one-out "
+        f"error {summary['error_deg']:.2f} deg rms"
     ]
     lines += [
-        f"{c['name']}, never fitted: {c['rms_deg']:.2f} deg, {c['within']:.0%} within the 95 % band"
+        f"{c['name']}, held out: {c['rms_deg']:.2f} deg, {c['within']:.0%} within the 95 % band"
         for c in summary["held_out"]
     ]
     blind = summary["insensitive_deg"]
-    return [*lines, *([f"says little between {blind[0]:.0f} and {blind[1]:.0f} deg"] if blind else [])]
+    return [*lines, *([f"low sensitivity between {blind[0]:.0f} and {blind[1]:.0f} deg"] if blind else [])]
 
 
 def _insensitive(found: Calibration) -> list[float]:
@@ -151,7 +151,11 @@ def _channel(recording: Recording, name: str | None, folder: Path) -> str:
     if name is None and len(channels) == 1:
         return channels[0]
     if name is None or name not in channels:
-        what = f"{len(channels)} channels are there" if name is None else f"there is no channel {name}"
+        what = (
+            f"{len(channels)} channels are available, and none was chosen"
+            if name is None
+            else f"unknown channel {name}"
+        )
         raise InputError(what, str(folder), f"--channel one of: {', '.join(channels)}")
     return name
 
@@ -163,14 +167,14 @@ def _of_recording(
     if isinstance(dark, str):
         if dark not in recording.columns:
             raise InputError(
-                f"there is no channel {dark}", str(folder), f"--dark one of: {', '.join(recording.channels)}"
+                f"unknown channel {dark}", str(folder), f"--dark one of: {', '.join(recording.channels)}"
             )
         dark = recording.columns[dark]  # type: ignore[assignment]
     volts = volts - dark
     angle = _marked(recording, time_s) if angles is None else _joined_angles(angles, time_s)
     if not np.isfinite(angle).any():
         raise InputError(
-            "nothing says at which angle the sensor was",
+            "the recording has no reference angles",
             str(folder),
             'leave marks such as "angle 30" while recording, or give --angles FILE (time_s,angle_deg)',
         )
@@ -205,19 +209,23 @@ def _joined_angles(path: Path, time_s: Array) -> Array:
         raise InputError(f"cannot read {path.name}: {error.strerror}", str(path), "check its name") from None
     except (KeyError, TypeError, ValueError):
         raise InputError(
-            "not a table of time_s,angle_deg", str(path), "numbers in these two columns"
+            "the file is not a table of time_s,angle_deg", str(path), "give numbers in these two columns"
         ) from None
     if (np.diff(t) <= 0).any():
-        raise InputError("its times do not rise", str(path), "sort the rows by time_s")
+        raise InputError("time_s does not increase", str(path), "sort the rows by time_s")
     return np.asarray(np.interp(time_s, t, a, left=math.nan, right=math.nan))
 
 
 def _of_measured(folder: Path, dark: str | float) -> tuple[list[Sweep], list[tuple[str, Sweep]]]:
     experiments = read_folder(folder).of("waveguide_bending")
     if not experiments:
-        raise InputError("no experiment bends a waveguide", str(folder), 'kind = "waveguide_bending"')
+        raise InputError(
+            "the folder has no experiment of the kind waveguide_bending",
+            str(folder),
+            'kind = "waveguide_bending"',
+        )
     if isinstance(dark, str):
-        raise InputError("measured data have no channel of the dark level", "--dark", "give it in V")
+        raise InputError("measured data contain no dark-level channel", "--dark", "give the dark level in V")
     fitted: list[Sweep] = []
     held: list[tuple[str, Sweep]] = []
     for experiment in experiments:
@@ -243,29 +251,37 @@ def _report(
     low, high = found.range_deg
     facts = [
         ("range", f"{low:.1f} to {high:.1f} deg"),
-        ("error in sweeps left out", f"{found.error_deg:.2f} deg rms"),
+        ("leave-one-out error", f"{found.error_deg:.2f} deg rms"),
         ("95 % band", f"{1000 * found.band_V:.1f} mV"),
-        ("drift taken out", f"{100 * found.drift_per_h:.2f} % an hour" if found.drift_per_h else "none seen"),
+        (
+            "drift removed",
+            f"{100 * found.drift_per_h:.2f} % an hour" if found.drift_per_h else "none detected",
+        ),
     ]
     blind = _insensitive(found)
     words = (
-        f"<p>Between {blind[0]:.0f} and {blind[1]:.0f} degrees the voltage hardly changes: the sensor cannot "
-        "tell these angles apart.</p>"
+        f"<p>Between {blind[0]:.0f} and {blind[1]:.0f} degrees the voltage is nearly constant: the sensor "
+        "cannot resolve the angle there.</p>"
         if blind
         else ""
     )
-    head = [("sweep", ""), ("error, deg rms", "n"), ("within the 95 % band", "n"), ("within its range", "n")]
+    head = [
+        ("sweep", ""),
+        ("error, deg rms", "n"),
+        ("within the 95 % band", "n"),
+        ("within the calibrated range", "n"),
+    ]
     rows = [([c.name, f"{c.rms_deg:.2f}", f"{c.within:.0%}", f"{c.possible:.0%}"], False) for c in checks]
-    checked = table("Sweeps that were not fitted", head, rows) if rows else ""
+    checked = table("Error on held-out sweeps", head, rows) if rows else ""
     chart = figure(
-        _chart(found, fitted, held), "Readings, the map, and its 95 % band", "voltage against angle"
+        _chart(found, fitted, held), "Readings, calibration curve and its 95 % band", "voltage against angle"
     )
     return page(
         "Calibration",
         f"{escape(found.channel)}, {found.sweeps} sweeps",
         "",
         cards(facts) + words,
-        [("map", "The map", chart), ("held-out", "On sweeps it never saw", checked)],
+        [("map", "Calibration curve", chart), ("held-out", "Held-out sweeps", checked)],
     )
 
 

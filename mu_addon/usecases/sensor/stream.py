@@ -33,7 +33,7 @@ def serial_source(port: str | None, baud: int) -> Source:
     usb = [p for p in ports() if p.identity is not None]
     if len(usb) == 1 and usb[0].identity is not None:
         return SerialLine(usb[0].identity, baud)
-    what = "no USB serial port is there" if not usb else f"{len(usb)} USB serial ports are there"
+    what = "no USB serial port was found" if not usb else f"{len(usb)} USB serial ports were found"
     raise InputError(what, "--port", "plug the sensor in, or name its port (`ports` lists them)")
 
 
@@ -81,8 +81,12 @@ def stream(
             # Into the log, which five lines a second would fill.
             progress.emit(message)
         if event in ("disconnected", "waiting"):
-            words = "the sensor is unplugged" if event == "disconnected" else "the sensor is not there"
-            progress.warning(f"{words}: {details.get('detail', '')}", "", "it is looked for until it comes")
+            words = (
+                "the sensor was disconnected" if event == "disconnected" else "the sensor is not connected"
+            )
+            progress.warning(
+                f"{words}: {details.get('detail', '')}", "", "it is searched for until it is connected"
+            )
         elif event == "unreadable":
             progress.warning(str(details["detail"]), "", str(details["what_to_do"]))
 

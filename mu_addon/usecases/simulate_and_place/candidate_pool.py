@@ -83,7 +83,7 @@ class Evaluator:
         return self._sweep.alone(job, pressures_MPa)
 
     def simulated_in_time(self, job: int, time_s: Array, pressure_kPa: Array) -> Array:
-        """Anchors (k, p, 3) in mm that a job moves at k instants, beside obstacles; ConvergenceError."""
+        """Anchors (k, p, 3) in mm that a job moves at k instants, in their order; ConvergenceError."""
         return self._sweep.simulated_in_time(job, time_s, pressure_kPa)
 
 
@@ -126,9 +126,9 @@ def _worker_errors() -> Iterator[None]:
         yield
     except BrokenProcessPool:
         raise MuError(
-            "a worker process ended before its time",
+            "a worker process ended unexpectedly",
             "candidates",
-            "run again, it resumes; if memory is short give --workers 1",
+            "run the command again, it resumes; if memory is short, use --workers 1",
         ) from None
 
 

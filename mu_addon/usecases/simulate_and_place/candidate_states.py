@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...design.anchors import anchors
+from ...design.anchors import anchor_points
 from ...design.quantity import in_kPa, in_MPa
 from ...fem.kinematics import probe
 from ...fem.state import State
@@ -45,7 +45,7 @@ class CandidateSolver:
     ) -> None:
         self._job, self._cache, self._mesh, self._jobs = job, cache, mesh, jobs
         unit = job.unit
-        self._anchors = anchors(unit)
+        self._anchors = anchor_points(unit)
         self._radius = unit.dimensions.inclusion_radius
         sensor = unit.material.sensor_modulus_MPa
         materials = job.materials(mesh)

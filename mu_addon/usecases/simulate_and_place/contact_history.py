@@ -40,9 +40,9 @@ def obstacles_of(bodies: Sequence[RigidBody], unit: Unit, mesh: Mesh) -> tuple[O
         if deep > _OVERLAP * depth:
             x, y, z = obstacle.deepest_place(at_rest)
             raise InputError(
-                f"the obstacle stands in the unit at rest, {deep:.2g} mm deep",
+                f"the obstacle overlaps the unit at rest, by {deep:.2g} mm deep",
                 f"{rigid.name}, at ({x:.2f}, {y:.2f}, {z:.2f}) mm",
-                "move it away until they do not touch",
+                "move the obstacle away from the unit",
             )
         found.append(obstacle)
     return tuple(found)

@@ -31,10 +31,12 @@ _DESCRIPTIONS = {
 }
 # Effects that a simulation is told of otherwise.
 _ELSEWHERE = {
-    "contact": "what a unit touches is given with --obstacle",
-    "mesh_error": "a finer mesh is made with --refine",
+    "contact": "obstacles are given with --obstacle",
+    "mesh_error": "a finer mesh is given with --refine",
 }
-_NOWHERE = "it is of time, gauge or bench, and a quasi-static simulation of the unit has neither"
+_NOWHERE = (
+    "it concerns time, gauge or test bench, which a quasi-static simulation of the unit does not contain"
+)
 
 
 @attrs.frozen
@@ -54,7 +56,7 @@ class Extended:
     def of_parameters(self) -> Extended:
         """As far as the unit's parameters go, for what simulates no whole unit."""
         said = self.effects.words()
-        whole = tuple(f"{words}: only `simulate` and `place` know the unit as a whole" for words in said)
+        whole = tuple(f"{words}: only `simulate` and `place` simulate the whole unit" for words in said)
         applied = tuple(words for words in self.applied if words not in said)
         return attrs.evolve(self, applied=applied, left_out=(*self.left_out, *whole), effects=StaticEffects())
 
@@ -95,14 +97,20 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
             unit, words = _put(unit, origin, name, fitted, _as_printed(model))
             applied.append(words)
         else:
-            left_out.append(f"{readable(name)} ({fitted.value:.4g}) is of the bench, not of the unit")
+            left_out.append(
+                f"{readable(name)} ({fitted.value:.4g}) belongs to the test bench, not to the unit"
+            )
     named = {name: {p: fitted.value for p, fitted in values.items()} for name, values in static.items()}
     effects = StaticEffects(named, where=f"{origin}, [effect]")
     applied += effects.words()
     if model.verdict == "ambiguous" and applied:
-        left_out.insert(0, "the verdict is ambiguous: other effects fit these data as well, see its report")
+        left_out.insert(
+            0, "the verdict is ambiguous: other effects fit these data equally well, see its report"
+        )
     if model.verdict == "unexplained":
-        left_out.insert(0, "the verdict is unexplained: no effect is in the model, though something is wrong")
+        left_out.insert(
+            0, "the verdict is unexplained: the model is wrong, and it contains no effect that corrects it"
+        )
     kept = ExtendedModel(model.verdict, {n: v for n, v in static.items() if n in effects.values}, {})
     return Extended(unit, tuple(applied), tuple(left_out), effects, kept)
 
@@ -122,7 +130,7 @@ def require_same_print(unit: Unit, lattice: Effective, origin: str | Path) -> No
             raise InputError(
                 f"the model prints {name} = {mine:.4g}, and the lattice's law is of struts with {law:.4g}",
                 f"--model {origin} with --lattice",
-                f"homogenize the lattice with --model {origin} too, and give --lattice what that finds",
+                f"run `homogenize` with --model {origin} too, and give its effective.toml as --lattice",
             )
 
 
@@ -174,7 +182,7 @@ def _as_printed(model: ExtendedModel) -> Put:
             factor = SLENDER.stiffness(unit.scale, offset, excess)
         modulus = drawn_kPa * factor
         if not math.isfinite(modulus):
-            raise InputError(f"its lattice's modulus would be {modulus}", "lattice_modulus_kPa", "")
+            raise InputError(f"its lattice modulus would be {modulus}", "lattice_modulus_kPa", "")
         material = attrs.evolve(unit.material, lattice_modulus_kPa=modulus)
         return attrs.evolve(unit, material=material), (
             f"the lattice's modulus at {unit.scale:g}x is {modulus:.4g} kPa ({drawn_kPa:.4g} kPa as drawn)"

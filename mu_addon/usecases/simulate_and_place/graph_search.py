@@ -15,14 +15,14 @@ from ...placement.graph import Graph, lattice_graph
 from ...placement.influence import (
     deviation_map,
     gradients_of,
-    influence,
+    influence_map,
     loaded,
     mean_deviation,
     shares_of_time,
     telling_pressures,
 )
-from ...placement.response import response
-from ...placement.search import SearchSettings, front, search
+from ...placement.response import reduced_response
+from ...placement.search import SearchSettings, front, search_paths
 from ...placement.whole import whole_body
 from ...report.results import LatticePath, LatticeSearch
 from ...report.vtk import write_fields
@@ -49,7 +49,7 @@ def sensitivity_map(study: Study) -> Array:
         monitor = probe(study.mesh, study.anchors)
         materials = study.job.materials(study.mesh)
         chosen = telling_pressures(study.trajectory)
-        found = influence(model, materials, study.trajectory, monitor, chosen)
+        found = influence_map(model, materials, study.trajectory, monitor, chosen)
         pressures = np.array([s.pressure_MPa for s in loaded(study.trajectory)])
         gradients = gradients_of(study.trajectory, study.anchors, monitor, study.job.stations)
         dJ = deviation_map(found.at(pressures), gradients, shares_of_time(study.trajectory))
@@ -72,9 +72,9 @@ def chains_within(job: Job) -> tuple[Graph, list[tuple[int, ...]]]:
     options = "--shortest-cells, --longest-cells, --bend-deg"
     if not chains:
         raise InputError(
-            "no path of the lattice is within the limits",
+            "no path of the lattice satisfies the limits",
             options,
-            "admit shorter or longer paths, or sharper bends",
+            "allow shorter or longer paths, or sharper bends",
         )
     if len(chains) > MOST_PATHS:
         raise InputError(
@@ -105,11 +105,11 @@ def search_graph(study: Study) -> LatticeSearch:
         return np.array([e.deviation.J_hat for e in study.sweep(mesh, trajectory, jobs)])
 
     with study.progress.stage("check of the best paths"):
-        outcome = search(predicted, check, SearchSettings(most=job.most_checks))
+        outcome = search_paths(predicted, check, SearchSettings(most=job.most_checks))
     if not outcome.complete:
         study.warn(
-            f"After {job.most_checks} checks an unchecked path may still be better than the best one, with a "
-            f"probability of up to {outcome.risk:.0%}: give more checks (--checks)."
+            f"After {job.most_checks} full solutions, the probability that an unsolved path is better than "
+            f"the best one is up to {outcome.risk:.0%}: increase --checks."
         )
     best = set(front(lengths, outcome.exact_mm).tolist())
     known = np.isfinite(outcome.exact_mm)
@@ -156,7 +156,7 @@ def _predicted(study: Study, graph: Graph, chains: list[tuple[int, ...]], rule: 
     unit = study.job.unit
     model = study.job.model(study.mesh)
     monitor = probe(study.mesh, study.anchors)
-    found = response(
+    found = reduced_response(
         model,
         study.job.materials(study.mesh),
         unit.material.sensor_modulus_MPa,

@@ -18,6 +18,7 @@ from ...design.solid import QUALITY
 from ...errors import InputError
 from ...fem.obstacle import CONTACT
 from ...fem.protocol import Protocol, read_protocol
+from ...fem.solver import SolverChoice
 from ...fem.unit import materials_of
 from ...homogenize.effective import Effective, read_effective
 from ...meshing.settings import MeshSettings
@@ -84,26 +85,55 @@ class Job:
     obstacles: tuple[RigidBody, ...] = attrs.field(default=(), converter=tuple)
     # What measured data named beside what the unit has parameters for, and the direction of gravity.
     effects: StaticEffects = attrs.field(factory=StaticEffects)
+    # How linear systems are solved: within their tolerance it decides nothing, and is no part of study.toml.
+    solver: SolverChoice = attrs.field(factory=SolverChoice)
     # What is run of it: the first, the first two or all.
     stages: tuple[str, ...] = STAGES
 
     def __attrs_post_init__(self) -> None:
         if self.obstacles and "place" in self.stages and self.paths == "graph":
             raise InputError(
-                "the search of the whole lattice knows a unit that touches nothing",
+                "the search of the whole lattice does not support obstacles",
                 "obstacles, paths",
                 "leave one of them out",
             )
+        if self.unit.wall.has_memory and "place" in self.stages and self.paths == "graph":
+            raise InputError(
+                "the search of the whole lattice knows a unit whose wall remembers nothing",
+                "[wall], paths",
+                "rank the windows of anchors, or take an elastic law",
+            )
+        for name in ("anisotropy", "strain_stiffening"):
+            if self.unit.wall.names and name in self.effects.values:
+                raise InputError(
+                    f"{name} changes a neo-Hookean wall, and this unit's has a law of its own",
+                    f"[wall], {name}",
+                    "leave [wall] out, or the effect and give the wall layers_excess or c2_over_c1",
+                )
         if self.effects.clogged and "place" in self.stages and self.paths == "graph":
             raise InputError(
-                "the search of the whole lattice knows a unit whose chambers share one pressure",
+                "the search of the whole lattice does not support a clogged chamber",
                 "clogged_chamber, paths",
                 "leave one of them out",
+            )
+        if (
+            self.solver.method == "iterative"
+            and "place" in self.stages
+            and self.solver.device in ("auto", "cpu")
+        ):
+            raise InputError(
+                "on the CPU all paths are solved with one factor, which two levels do not make",
+                "--solver",
+                "give --solver direct or auto, or a CUDA device with --device",
+            )
+        if self.solver.method == "iterative" and self.mesh.order == 1 and "simulate" in self.stages:
+            raise InputError(
+                "two levels need quadratic elements", "--solver, --order", "give --order 2 or --solver direct"
             )
         _, pressure = self.samples
         if not pressure.any():
             raise InputError(
-                f"none of the {self.times} samples of the protocol has any pressure",
+                f"none of the {self.times} samples of the protocol has a pressure other than 0",
                 "times",
                 "give more samples, or a protocol that leaves 0 kPa",
             )
@@ -116,7 +146,7 @@ class Job:
     def tables(self) -> Tables:
         """Everything that decides the results, a table a stage, as study.toml has it.
 
-        Not `workers`, which decides nothing.
+        Not `workers` and `solver`, which decide nothing.
         """
         mesh = attrs.asdict(self.mesh)
         tables: Tables = {
@@ -154,7 +184,9 @@ class Job:
 
     def model(self, mesh: Mesh, threads: int = 2) -> Model:
         """Model of the unit's mesh: pressure, what weighs, what it may touch. Raises InputError."""
-        model = self.effects.model(self.unit, mesh, threads)
+        device, solver = self.solver.resolved(mesh, needs_factor="place" in self.stages)
+        model = self.effects.model(self.unit, mesh, threads, device)
+        model.solver = solver
         if self.obstacles:
             model.obstacles = obstacles_of(self.obstacles, self.unit, mesh)
         return model
@@ -162,7 +194,12 @@ class Job:
     @property
     def newton(self) -> NewtonSettings:
         """Settings of Newton's method for this unit."""
-        return CONTACT if self.obstacles else self.effects.newton
+        return CONTACT if self.in_time else self.effects.newton
+
+    @property
+    def in_time(self) -> bool:
+        """Whether motion is solved instant by instant, since contact or the wall's law remembers."""
+        return bool(self.obstacles) or self.unit.wall.has_memory
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; study.toml is the first."""
@@ -235,19 +272,19 @@ def _named(key: str, text: str | None) -> dict[str, str]:
     return {} if text is None else {key: FILES[key], f"{key}_sha256": digest(text)}
 
 
-def read_job(folder: Path, workers: int = 2) -> Job:
+def read_job(folder: Path, workers: int = 2, solver: SolverChoice | None = None) -> Job:
     """The job that a study's folder describes; raises InputError where it cannot be used, and OutputError."""
     where = str(folder / NAME)
     tables = read_tables(folder)
     if tables is None:
-        raise InputError("there is no study in this folder", where, "give a folder that holds study.toml")
+        raise InputError("this folder contains no study", where, "give a folder that holds study.toml")
     if holds(folder, tables) is None:
         raise InputError(
-            "a file of inputs is not the one that this study was made with",
+            "an input file has changed since this study was made",
             str(folder),
-            "put it back, or start a new study with it: --unit, --protocol, --lattice, --obstacle",
+            "restore it, or start a new study with it: --unit, --protocol, --lattice, --obstacle",
         )
-    return job_of(tables, folder, workers)
+    return attrs.evolve(job_of(tables, folder, workers), solver=solver or SolverChoice())
 
 
 def job_of(tables: Mapping[str, Mapping[str, Any]], folder: Path, workers: int = 2) -> Job:
@@ -311,7 +348,7 @@ def _built(kind: Any, values: dict[str, Any], where: str) -> Any:
     try:
         return kind(**values)
     except TypeError as error:
-        raise InputError(f"this is no study: {error}", where, "correct that key") from error
+        raise InputError(f"study.toml is invalid: {error}", where, "correct that key") from error
     except ValueError as error:
         raise InputError(f"a value is not offered: {error.args[0]}", where, "correct that key") from error
 

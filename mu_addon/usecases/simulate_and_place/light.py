@@ -13,7 +13,7 @@ from ...errors import InputError
 from ...files import write_csv
 from ...report.results import Checks, Signals
 from ...run.cache import key
-from ...sensing.embedded_waveguide import Held, Joints, held
+from ...sensing.embedded_waveguide import EmbeddedWaveguide, Joints, embed_waveguide
 from ...sensing.law import CURVATURE_OF_WELLS, Law, features, fit_law
 from ...sensing.optics import Optics
 from ...sensing.signal import best_sets, differential_pairs, pareto, response, signal_of_nodes, traced_signal
@@ -39,7 +39,7 @@ def signals(study: Study, optics: Optics) -> Signals | None:
     try:
         return _signals(study, optics)
     except InputError as error:
-        study.warn(f"What the light would tell is not known: {error.what} ({error.where}).")
+        study.warn(f"The light signal is not available: {error.what} ({error.where}).")
         return None
 
 
@@ -63,7 +63,7 @@ def _signals(study: Study, optics: Optics) -> Signals:
         errors, slopes = [], []
         for name, (_, bar) in bars.items():
             # Over the whole motion: the law's error grows with what changes.
-            ends = [features(bar.guided, bar.legs(*own[name][i])) for i in (angle.argmin(), angle.argmax())]
+            ends = [features(bar.shape, bar.legs(*own[name][i])) for i in (angle.argmin(), angle.argmax())]
             errors.append(law.error(ends[1] - ends[0]) / float(np.ptp(angle)))
             slopes.append(_by_cell(law, bar, study.anchors))
         names = tuple(bars)
@@ -92,7 +92,7 @@ def _signals(study: Study, optics: Optics) -> Signals:
     return told
 
 
-def _bars(study: Study) -> dict[str, tuple[list[int], Held]]:
+def _bars(study: Study) -> dict[str, tuple[list[int], EmbeddedWaveguide]]:
     """Anchors' numbers and waveguide of every candidate path; one without room for it is left out and told.
 
     Raises InputError where there is room for none.
@@ -105,16 +105,16 @@ def _bars(study: Study) -> dict[str, tuple[list[int], Held]]:
             bar = waveguide(unit, window)
         except InputError as error:
             why = error
-            study.warn(f"What light along {window.name} would tell is not known: {error.what}.")
+            study.warn(f"The light signal along {window.name} is not available: {error.what}.")
             continue
-        found[window.name] = numbers, held(bar, study.anchors[numbers], unit.printed)
+        found[window.name] = numbers, embed_waveguide(bar, study.anchors[numbers], unit.printed)
     if why is not None and not found:
         raise why
     return found
 
 
 def _checked(
-    bar: Held, moved: list[tuple[Array, Array]], angle: Array, optics: Optics, has_gravity: bool
+    bar: EmbeddedWaveguide, moved: list[tuple[Array, Array]], angle: Array, optics: Optics, has_gravity: bool
 ) -> Checks:
     """Rays through a bar at rest, at its ends of the motion and between them; `moved` begins with rest.
 
@@ -149,9 +149,9 @@ def _law(study: Study, optics: Optics) -> Law:
     return Law(stored["coefficients"], stored["covariance"], float(stored["rms"]))
 
 
-def _by_cell(law: Law, bar: Held, anchors: Array) -> Array:
+def _by_cell(law: Law, bar: EmbeddedWaveguide, anchors: Array) -> Array:
     """d log(light) by the curvature of each cell along the anchors, (n,) in mm, at rest."""
-    wells = np.asarray(bar.guided.wells) + bar.points[0, 2]
+    wells = np.asarray(bar.shape.wells) + bar.points[0, 2]
     edges = np.concatenate([[-np.inf], (anchors[1:, 2] + anchors[:-1, 2]) / 2, [np.inf]])
     return -law.coefficients[CURVATURE_OF_WELLS] * np.histogram(wells, edges)[0]
 

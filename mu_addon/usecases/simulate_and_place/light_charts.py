@@ -11,7 +11,7 @@ from ...report.results import Signals
 
 
 def front_chart(found: Signals, chosen: str) -> str:
-    """Disturbance against sensitivity of every path, those that no other beats joined by a line."""
+    """Disturbance against sensitivity of every path, the Pareto-optimal ones joined by a line."""
     sense = 100 * np.abs([r.sensitivity_per_deg for r in found.responses])
     with canvas(WIDTH, 3.0) as (figure, svg):
         axes = figure.add_axes((0.13, 0.17, 0.83, 0.79))
@@ -32,7 +32,7 @@ def front_chart(found: Signals, chosen: str) -> str:
         axes.set_xlim(left=0)
         axes.set_ylim(bottom=0)
         axes.set_xlabel("mean deviation Ĵ [mm]")
-        axes.set_ylabel("signal [% of light a degree]")
+        axes.set_ylabel("signal [% of light per degree]")
     return svg()
 
 
@@ -51,5 +51,5 @@ def response_chart(found: Signals, chosen: str) -> str:
         )
         axes.axhline(0, color=QUIET, lw=0.6)
         axes.set_xlabel("bending angle [deg]")
-        axes.set_ylabel("light lost [% of that at rest]")
+        axes.set_ylabel("light loss [% of light at rest]")
     return svg()

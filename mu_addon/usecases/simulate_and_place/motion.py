@@ -14,6 +14,7 @@ Written as the study finds them, in single precision, and read again by whatever
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -200,15 +201,24 @@ class Motion:
         return int(self.state[first]), int(self.state[first + 1]), float(place - first)
 
 
-def write_model_a(folder: Path, mesh: Mesh, materials: Materials, trajectory: Trajectory) -> None:
-    """Write mesh.npz and model_a.npz of a finished Model A into `folder`/motion. Raises OutputError."""
+def write_model_a(
+    folder: Path,
+    mesh: Mesh,
+    materials: Materials,
+    trajectory: Trajectory,
+    history: Callable[[int], Sequence[Array]] = lambda number: (),
+) -> None:
+    """Write mesh.npz and model_a.npz of a finished Model A into `folder`/motion. Raises OutputError.
+
+    history: what materials with memory remember of a state, by its number.
+    """
     arrays = {f.name: getattr(mesh, f.name) for f in attrs.fields(Mesh)}
     arrays["symmetry"] = np.array(mesh.symmetry, dtype="U1")
     surfaces = {name: surface_of(mesh, region) for name, region in REGIONS.items()}
     for name, surface in surfaces.items():
         arrays |= {f"{name}_{part}": values for part, values in attrs.asdict(surface).items()}
     looked = SurfaceFields(mesh, {name: surface.node for name, surface in surfaces.items()})
-    found = looked.of_states([state.u for state in trajectory.states], materials)
+    found = looked.of_states([state.u for state in trajectory.states], materials, history)
     write_npz(folder / FOLDER / "mesh.npz", arrays)
     write_npz(
         folder / FOLDER / f"{MODEL_A}.npz",
@@ -233,14 +243,19 @@ class SurfaceFields:
         self._means = {r: NodalMean(mesh, np.flatnonzero(mesh.region == REGIONS[r])) for r in nodes}
         self._places = {r: np.searchsorted(self._means[r].nodes, node) for r, node in nodes.items()}
 
-    def of_states(self, displacements: list[Array], materials: Materials) -> dict[str, Array]:
+    def of_states(
+        self,
+        displacements: list[Array],
+        materials: Materials,
+        history: Callable[[int], Sequence[Array]] = lambda number: (),
+    ) -> dict[str, Array]:
         """Fields `REGION_FIELD` (s, v) of states, each given by its displacement (n, 3) in mm."""
         from ...fem.lattice_law import stretches
         from ...fem.stress import cauchy, von_mises
 
         found: dict[str, list[Array]] = {f"{r}_{field}": [] for r in self._means for field in FIELDS}
-        for u in displacements:
-            sigma, F = cauchy(self._mesh, u, materials)
+        for number, u in enumerate(displacements):
+            sigma, F = cauchy(self._mesh, u, materials, history(number))
             for region, mean in self._means.items():
                 stress_kPa = in_kPa(mean(sigma))[self._places[region]]
                 stretch = stretches(mean(F)[self._places[region]])
@@ -290,16 +305,16 @@ def read_motion(folder: Path) -> Motion:
     """The motion in a study's folder. Raises InputError where there is none that can be read whole."""
     place = folder / FOLDER
     mesh, model = read_npz(place / "mesh.npz"), read_npz(place / f"{MODEL_A}.npz")
-    remedy = "simulate again: what is finished is not repeated"
+    remedy = "simulate again: finished stages are not repeated"
     if mesh is None or model is None:
-        raise InputError("this study holds no motion to show", str(place), remedy)
+        raise InputError("this study contains no motion", str(place), remedy)
     sensitivity = read_npz(place / "sensitivity.npz") or {}
     try:
         found = _motion(place, mesh, model, sensitivity)
     except KeyError as missing:
         raise InputError(f"the motion lacks {missing}", str(place), remedy) from None
     if not _fits(found):
-        raise InputError("the motion's files do not fit together", str(place), remedy)
+        raise InputError("the files of the motion are inconsistent", str(place), remedy)
     return found
 
 

@@ -26,8 +26,13 @@ RULE = {
     "intersect": "intersect",
 }
 RULE_MEANS = {
-    "volume_fraction": "E blended by the share of each element inside the sensor; converges with the mesh",
-    "intersect": "The paper's: every element the sensor touches gets the sensor's E; depends on the mesh",
+    "volume_fraction": (
+        "E is blended by the volume fraction of each element inside the sensor; converges with mesh "
+        "refinement"
+    ),
+    "intersect": (
+        "The rule of the paper: every element that the sensor intersects gets the sensor's E; mesh-dependent"
+    ),
 }
 
 
@@ -46,17 +51,17 @@ def report_html(results: ReportData) -> str:
 def _sections(r: ReportData) -> list[tuple[str, str, str]]:
     return [
         ("ranking", "Ranking of the paths", _ranking(r)),
-        ("search", "The whole lattice", _search(r)),
-        ("light", "What the light would tell", _light(r)),
-        ("motion", "How the unit moves", _motion(r)),
-        ("contact", "What the unit touches", _contact(r)),
-        ("where", "Where and when each path disturbs the motion", _heatmaps(r)),
-        ("marginals", "Along the unit, and over time", _marginals(r)),
+        ("search", "Search of the whole lattice", _search(r)),
+        ("light", "Light signal of the sensor", _light(r)),
+        ("motion", "Motion of the unit", _motion(r)),
+        ("contact", "Contact with obstacles", _contact(r)),
+        ("where", "Deviation of each path over length and time", _heatmaps(r)),
+        ("marginals", "Mean deviation along the unit and over time", _marginals(r)),
         ("mesh", "Solid, mesh and solver", _mesh(r)),
-        ("assumed", "What was assumed", _assumed(r)),
+        ("assumed", "Assumptions", _assumed(r)),
         ("parameters", "All parameters", _parameters(r)),
-        ("time", "How long each stage took", _time(r)),
-        ("files", "Files of this run", facts_table("file", "what it holds", r.files)),
+        ("time", "Computing time of each stage", _time(r)),
+        ("files", "Files of this run", facts_table("file", "content", r.files)),
         ("versions", "Versions", facts_table("program", "version", r.versions)),
     ]
 
@@ -66,8 +71,8 @@ def _notes(r: ReportData) -> str:
     if r.status != "complete":
         html += (
             '<div class="note" role="alert"><p><strong>This run is partial.</strong> '
-            f"{escape(r.reason or 'It stopped before its end.')}</p>"
-            "<p>What is shown was finished before it stopped; the rest is missing, not zero.</p></div>"
+            f"{escape(r.reason or 'It stopped before the end.')}</p><p>The results shown were finished "
+            "before it stopped; missing results are not zero.</p></div>"
         )
     return html + note(r.warnings)
 
@@ -80,8 +85,8 @@ def _headline(r: ReportData) -> str:
         path = r.paths[best]
         html += (
             f'<p class="answer">Put the sensor along <strong>{_name(path.name)}</strong>, anchors '
-            f"{path.anchors}: of {len(r.paths)} candidates it disturbs the motion least, by "
-            f"{rule.j_hat[best]:.3f}&nbsp;mm on average.</p><p>{_caveat(r, rule)}</p>{_key_figures(r, rule)}"
+            f"{path.anchors}: of {len(r.paths)} candidates it has the smallest mean deviation, "
+            f"{rule.j_hat[best]:.3f}&nbsp;mm.</p><p>{_caveat(r, rule)}</p>{_key_figures(r, rule)}"
         )
     pictures = "".join(picture_figure(picture) for picture in r.pictures[:1])
     if r.view is None:
@@ -106,14 +111,15 @@ def _caveat(r: ReportData, rule: RuleResult) -> str:
         names = _listed([_name(name) for name in rule.tied])
         within = f" ({rule.uncertainty_mm:.3f} mm)" if rule.uncertainty_mm is not None else ""
         words.append(
-            f"On this mesh it is tied with {names}: they differ by less than the mesh's uncertainty{within}."
+            f"Within the mesh uncertainty it is tied with {names}; they differ by less than the "
+            f"uncertainty{within}."
         )
     for name, other in r.rules.items():
         if name == r.headline_rule:
             continue
         same = other.chosen == rule.chosen
         words.append(
-            f"This is by the rule “{_rule(r.headline_rule)}”; by “{_rule(name)}” "
+            f"This holds for the inclusion rule “{_rule(r.headline_rule)}”; for “{_rule(name)}” "
             + ("the same path is best." if same else f"{_name(other.chosen)} would be best.")
         )
     return " ".join(words)
@@ -138,15 +144,15 @@ def _ranking(r: ReportData) -> str:
     if not r.rules:
         return ""
     html = (
-        "<p>Ĵ is the distance between the unit with the sensor and the unit without, averaged over the line "
-        "of anchors and over the whole pressure cycle. Less is better.</p>"
+        "<p>Ĵ is the mean distance between the unit with the sensor and the unit without it, over the line "
+        "of anchors and the whole pressure cycle. Smaller is better.</p>"
     )
     html += '<div class="pair">'
     for name, rule in r.rules.items():
         title = _rule(name)
         tied = f" Hatched: tied with {_name(rule.chosen)}." if rule.tied else ""
         bars = (
-            f" Whiskers: ± {rule.uncertainty_mm:.3f} mm by the mesh."
+            f" Whiskers: ± {rule.uncertainty_mm:.3f} mm mesh uncertainty."
             if rule.uncertainty_mm is not None
             else ""
         )
@@ -178,8 +184,8 @@ def _ranking(r: ReportData) -> str:
             ]
         rows.append((cells, headline is not None and path.name == headline.chosen))
     caption = (
-        "Every path by every rule. J cont: root mean square instead of mean. Volume ratio: what was "
-        "stiffened over the sensor's own volume."
+        "Every path for every inclusion rule. J cont: root mean square instead of mean. Volume ratio: "
+        "stiffened volume over the sensor's volume."
     )
     html += table(caption, head, rows, groups)
     return html
@@ -192,11 +198,12 @@ def _search(r: ReportData) -> str:
     best = s.solved[0]
     certain = f"less than {max(s.risk, 1e-3):.1%}" if s.risk < 0.5 else f"up to {s.risk:.0%}"
     html = (
-        f"<p>Of {s.paths} paths through nodes of the lattice, bent ones too, <strong>{escape(best.name)}"
-        f"</strong> disturbs the motion least: {best.j_hat:.3f}&nbsp;mm by the rule “{_rule(s.rule)}”. "
-        f"All were ranked by a reduced model, and the {len(s.solved)} below solved exactly; the chance that "
-        f"another is better is {certain}, as far as the others are predicted as well as these. Paths marked "
-        "as best for their length are beaten by no longer one.</p>"
+        f"<p>Of {s.paths} paths through nodes of the lattice, bent paths included, "
+        f"<strong>{escape(best.name)}</strong> has the smallest deviation: {best.j_hat:.3f}&nbsp;mm by the "
+        f"rule “{_rule(s.rule)}”. All were ranked by a reduced model; the {len(s.solved)} below were solved "
+        f"by the full model. The probability that another path is better is {certain}, if the reduced model "
+        "is as accurate for the others as for these. Paths marked “best for their length” are "
+        "Pareto-optimal in deviation and length.</p>"
     )
     if r.search_picture is not None:
         html += f'<div class="triple">{picture_figure(r.search_picture)}</div>'
@@ -218,7 +225,7 @@ def _search(r: ReportData) -> str:
         )
         for i, p in enumerate(s.solved)
     ]
-    return html + table("Paths that were solved", head, rows)
+    return html + table("Paths solved by the full model", head, rows)
 
 
 def _light(r: ReportData) -> str:
@@ -229,26 +236,26 @@ def _light(r: ReportData) -> str:
     index = s.names.index(chosen) if chosen in s.names else 0
     mine = s.responses[index]
     low, high = mine.monotonic_deg
-    front = "No path disturbs less and tells more than those joined by the line."
-    told = "The chosen path in colour; dots are rays through its bent waveguide, bars twice their error."
+    front = (
+        "The line joins the Pareto-optimal paths: no path has both a smaller deviation and a larger signal."
+    )
+    told = "Chosen path in colour; dots: ray tracing through the bent waveguide, bars: two standard errors."
     way = "rises" if mine.sensitivity_per_deg < 0 else "falls"
     html = (
         f"<p>Along <strong>{escape(label(s.names[index]))}</strong> the light at the detector changes by "
-        f"{100 * abs(mine.sensitivity_per_deg):.2f} ± {100 * s.errors_per_deg[index]:.2f}&nbsp;% a degree "
-        f"about rest, and {way} without a turn from {signed(f'{low:.0f}')} to {high:.0f} degrees. Light is "
-        f"followed along each path by a law "
-        f"fitted to traced rays, which it misses by {100 * s.law.rms:.0f}&nbsp;%. Two things work "
-        f"against each other: light runs along the outer side of a bend, away from wells on its inner side; "
-        f"and a bar that is pulled gives way at its wells, and loses light there. The resin's optics are "
-        f"assumed, since nobody has published them: "
-        f"index {o.index:g}, attenuation {o.attenuation_per_mm:g} a mm, slopes of the walls "
-        f"{o.roughness:g}.</p>"
-        f'<div class="pair">{figure(front_chart(s, chosen), front, "disturbance against sensitivity")}'
+        f"{100 * abs(mine.sensitivity_per_deg):.2f} ± {100 * s.errors_per_deg[index]:.2f}&nbsp;% per degree "
+        f"around rest, and {way} without a turn from {signed(f'{low:.0f}')} to {high:.0f} degrees. The "
+        "light along each path follows a law fitted to traced rays; its error is "
+        f"{100 * s.law.rms:.0f}&nbsp;%. Two effects oppose each other: in a bend, light follows the outer "
+        "side, away from wells on the inner side; a stretched bar deforms at its wells and loses light "
+        "there. The optical constants of the resin are assumed, because no published values were found: "
+        f"index {o.index:g}, attenuation {o.attenuation_per_mm:g} per mm, wall slopes {o.roughness:g}.</p>"
+        f'<div class="pair">{figure(front_chart(s, chosen), front, "deviation against sensitivity")}'
         f"{figure(response_chart(s, chosen), told, 'light against angle')}</div>"
     )
     head = [
-        ("path", ""), ("Ĵ [mm]", "n"), ("signal [%/deg]", "n"), ("±", "n"), ("one way from [deg]", "n"),
-        ("to [deg]", "n"), ("light at rest [%]", "n"), ("beaten by none", ""),
+        ("path", ""), ("Ĵ [mm]", "n"), ("signal [%/deg]", "n"), ("±", "n"), ("monotonic from [deg]", "n"),
+        ("to [deg]", "n"), ("light at rest [%]", "n"), ("Pareto-optimal", ""),
     ]  # fmt: skip
     rows = [
         (
@@ -266,20 +273,20 @@ def _light(r: ReportData) -> str:
         )
         for k, name in enumerate(s.names)
     ]
-    html += table("Disturbance and signal of every path", head, rows)
+    html += table("Deviation and signal of every path", head, rows)
     if s.differential:
         names, slope = s.differential[0]
         html += (
-            f"<p>Read against each other, {escape(_listed([label(n) for n in names]))} differ by "
-            f"{100 * abs(slope):.2f}&nbsp;% more a degree; what dims both alike, such as a light source that "
-            "warms, is not in their difference.</p>"
+            f"<p>As a differential pair, {escape(_listed([label(n) for n in names]))} differ by "
+            f"{100 * abs(slope):.2f}&nbsp;% per degree more than alone; a common change of light, such as "
+            "warming of the source, cancels.</p>"
         )
     best = {len(names): names for names, _ in reversed(s.sets)}
     for size, word in ((2, "pairs"), (3, "triples")):
         if size in best:
             html += (
-                f"<p>Of all {word} {escape(_listed([label(n) for n in best[size]]))} together tell most of "
-                "how the bending is spread along the unit.</p>"
+                f"<p>Of all {word} {escape(_listed([label(n) for n in best[size]]))} together determine the "
+                "distribution of bending along the unit best.</p>"
             )
     return html
 
@@ -290,19 +297,19 @@ def _motion(r: ReportData) -> str:
         low, high = float(r.pressure_kPa.min()), float(r.pressure_kPa.max())
         html += figure(
             plots.angle_against_pressure(r.pressure_kPa, r.angle_deg),
-            "Bending angle of the tip against the base, without a sensor; each dot is a converged state"
-            + (", in the order of time: friction makes the way back another." if r.contact else "."),
+            "Bending angle of the tip relative to the base, without a sensor; each dot is a converged state"
+            + (", in order of time: friction causes hysteresis." if r.contact else "."),
             f"Bending angle against pressure from {low:g} to {high:g} kPa.",
         )
     if len(r.protocol_s):
         html += figure(
             plots.protocol(r.protocol_s, r.protocol_kPa),
-            "The pressure cycle; each dot is a time at which the paths are compared.",
+            "Pressure protocol; dots: times at which the paths are compared.",
             "Pressure against time.",
         )
     html = f'<div class="pair">{html}</div>' if html else ""
     if html and r.effects:
-        html = f"<p>With what measured data named: {escape('; '.join(r.effects))}.</p>{html}"
+        html = f"<p>With the effects identified from measured data: {escape('; '.join(r.effects))}.</p>{html}"
     if r.pictures[1:]:
         html += (
             '<div class="triple">' + "".join(picture_figure(picture) for picture in r.pictures[1:]) + "</div>"
@@ -315,7 +322,7 @@ def _contact(r: ReportData) -> str:
     if c is None:
         return ""
     if not c.force_N.any():
-        return f"<p>The unit does not reach {escape(_listed(c.names))}.</p>"
+        return f"<p>The unit does not touch {escape(_listed(c.names))}.</p>"
     rows, charts = [], ""
     for b, name in enumerate(c.names):
         k = int(c.force_N[b].argmax())
@@ -337,12 +344,12 @@ def _contact(r: ReportData) -> str:
                 f"Force of the unit on {escape(name)}.",
                 f"Normal force and friction on {name} over time.",
             )
-    columns = ["friction", "largest force [N]", "when", "gap error [mm]", "slid [mm]", "lost [mJ]"]
+    columns = ["friction", "largest force [N]", "when", "gap error [mm]", "slip [mm]", "dissipated [mJ]"]
     head = [("obstacle", ""), *((name, "n") for name in columns)]
     return (
-        "<p>The obstacles are rigid and fixed; friction is Coulomb's. The gap error is how deep the unit is "
-        "let into one at most.</p>"
-        + table("What the unit may touch", head, [(row, False) for row in rows])
+        "<p>The obstacles are rigid and fixed, with Coulomb friction. Gap error: largest penetration of the "
+        "unit into an obstacle, which the penalty method admits.</p>"
+        + table("Obstacles", head, [(row, False) for row in rows])
         + f'<div class="pair">{charts}</div>'
     )
 
@@ -365,9 +372,9 @@ def _heatmaps(r: ReportData) -> str:
     if not html:
         return ""
     return (
-        "<p>Each square is one path. To the right: length [%], from the inlet to the tip. Upward: time [%] "
-        "in the pressure cycle. The squares of a rule share one colour scale, by the square root of Δ; its "
-        "choice is framed.</p>" + html
+        "<p>One map per path. Horizontal: length [%], from inlet to tip. Vertical: time [%] of the pressure "
+        "cycle. All maps of a rule share one colour scale, in the square root of Δ; the chosen path is "
+        "framed.</p>" + html
     )
 
 
@@ -389,10 +396,7 @@ def _marginals(r: ReportData) -> str:
         html += "</div>"
     if not html:
         return ""
-    return (
-        "<p>Colour tells how many anchors a path has, dashes at which anchor it starts; the thick orange "
-        "line is the rule's choice.</p>" + html
-    )
+    return "<p>Colour: number of anchors; dashes: first anchor; thick orange line: chosen path.</p>" + html
 
 
 def _mesh(r: ReportData) -> str:
@@ -403,9 +407,7 @@ def _mesh(r: ReportData) -> str:
             ([gate.name, number(gate.value), gate.limit, "passed" if gate.passed else "FAILED"], False)
             for gate in r.gates
         ]
-        html += table(
-            "The printable solid, checked after it was read back from its file.", head, rows, css="stack"
-        )
+        html += table("Checks of the printable solid, after reading its file back.", head, rows, css="stack")
     if r.mesh:
         html += facts_table("mesh", "", r.mesh)
     if r.solver:
@@ -418,7 +420,7 @@ def _assumed(r: ReportData) -> str:
     if not rows:
         return ""
     head = [("parameter", ""), ("value", "n"), ("unit", ""), ("why", "text")]
-    return "<p>The source paper does not print these. The answer rests on them.</p>" + table(
+    return "<p>The paper does not print these values. The results depend on them.</p>" + table(
         "", head, rows, css="stack"
     )
 
@@ -439,8 +441,8 @@ def _time(r: ReportData) -> str:
     whole = sum(r.seconds.values())
     return figure(
         plots.seconds(r.seconds),
-        f"Seconds a stage; {spell(whole)} in all.",
-        "Bar chart of seconds a stage.",
+        f"Seconds per stage; {spell(whole)} in all.",
+        "Bar chart of seconds per stage.",
         "chart",
     )
 

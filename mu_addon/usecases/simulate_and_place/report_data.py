@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from ...design.parameters import SECTIONS, assumed
-from ...design.quantity import describe
+from ...design.parameters import assumed, stated
 from ...evidence.unit_effects import EFFECTS
 from ...files import write_bytes
 from ...report.results import Gate, Parameter, Path, Picture, ReportData, RuleResult, SideView
@@ -29,21 +28,21 @@ FILES = {
     "unit.toml": "parameters of the unit",
     "protocol.csv": "pressure protocol",
     "effective.toml": "law of the lattice, from its struts and resin",
-    "obstacles.obj": "rigid bodies that the unit may touch, mm",
+    "obstacles.obj": "rigid obstacles, mm",
     "unit.stl": "printable unit without a sensor, mm",
     "anchors.txt": "lattice nodes and anchors, mm",
     "mesh.vtu": "analysis mesh with regions and moduli",
-    "model_a.pvd": "motion without a sensor, a state a sample (ParaView)",
+    "model_a.pvd": "motion without a sensor, one state per sample (ParaView)",
     "angle.csv": "bending angle of every converged state",
-    "contact.csv": "what the unit touches, with what force, how deep and how far it slides, at every instant",
+    "contact.csv": "contact force, penetration and slip on each obstacle over time",
     "deviation.csv": "deviation and rank of every path and rule",
     "delta.npz": "deviation over time and length of every path and rule, mm",
-    "sensitivity.vtu": "how much stiffening each element alone would disturb the motion, mm (ParaView)",
-    "signals.csv": "what light along each path would tell of bending, beside how much it disturbs",
+    "sensitivity.vtu": "sensitivity of the deviation to the stiffness of each element, mm (ParaView)",
+    "signals.csv": "light signal of each path beside its deviation",
     "paths.csv": "every path of the lattice: length, predicted and, where it was solved, exact deviation",
-    "motion": "displacements, stress and stretch of every state, with and without a sensor, to look at",
-    "summary.json": "every figure of this run",
-    "log.ndjson": "what was said while it ran",
+    "motion": "displacement, stress and stretch of every state, with and without a sensor, for display",
+    "summary.json": "all results of this run as numbers",
+    "log.ndjson": "log of this run",
 }
 
 
@@ -96,8 +95,8 @@ def report_data(
     complete = all((w.name, rule) in study.evaluations for w in windows for rule in job.rules)
     time, pressure = job.samples
     states = study.trajectory.states if study.trajectory else tuple(study.states)
-    if not job.obstacles:
-        # One state a pressure; beside obstacles one an instant, in the order of time.
+    if not job.in_time:
+        # One state a pressure; where something remembers one an instant, in the order of time.
         states = tuple(sorted(states, key=lambda s: s.pressure_MPa))
     rules = {rule: _rule_result(study, rule) for rule in job.rules} if complete else {}
     return ReportData(
@@ -153,16 +152,12 @@ def _parameters(study: Study) -> list[Parameter]:
     unit = study.job.unit
     reasons = {a.path: a.reason for a in assumed(unit)}
     rows = [Parameter("scale", unit.scale, "", "paper")]
-    for section in SECTIONS:
-        # Each section class names its table; the unit holds its values under the same name.
-        values = getattr(unit, section.section)  # type: ignore[attr-defined]
-        for d in describe(section):
-            value = getattr(values, d.name)
-            path = f"{section.section}.{d.name}"  # type: ignore[attr-defined]
-            if study.job.lattice is not None and path in REPLACED:
-                rows.append(Parameter(path, value, d.unit, f"not used: {LATTICE_LAW} has the lattice's law"))
-                continue
-            rows.append(Parameter(path, value, d.unit, reasons.get(path, d.source), d.assumed))
+    for section, d, value in stated(unit):
+        path = f"{section}.{d.name}"
+        if study.job.lattice is not None and path in REPLACED:
+            rows.append(Parameter(path, value, d.unit, f"not used: {LATTICE_LAW} gives the lattice law"))
+            continue
+        rows.append(Parameter(path, value, d.unit, reasons.get(path, d.source), d.assumed))
     rows += _lattice_parameters(study.job.lattice)
     rows += _effects(study.job.effects)
     m, k, j = study.job.mesh, study.job.times, study.job.stations
@@ -196,7 +191,9 @@ def _effects(effects: StaticEffects) -> list[Parameter]:
         for p, value in given.items()
     ]
     if effects.has_gravity:
-        turned = Parameter("orientation", effects.orientation_deg, "deg", "asked for: 0 hangs, tip down")
+        turned = Parameter(
+            "orientation", effects.orientation_deg, "deg", "given by the user; 0: hanging, tip down"
+        )
         rows.append(turned)
     return rows
 
@@ -297,7 +294,8 @@ def _search_picture(study: Study) -> Picture | None:
     radius = max(d.inclusion_radius, d.waveguide_section / 2)
     return Picture(
         png(portrait(parts, study.anchors, best.points * [side, 1.0, 1.0], radius)),
-        f"The best path of the lattice, {best.name}, before the unit cut open; its mirror image is as good.",
+        f"The best path of the lattice, {best.name}, before the unit cut open; its mirror image is "
+        "equivalent.",
         "The unit cut along its plane of bending, and the path of the sensor through its lattice.",
     )
 

@@ -19,16 +19,17 @@ def run_stages(study: Study, path: Window | None = None) -> None:
         study.simulate(candidates_beside="place" in stages)
     if "place" in stages:
         chosen = study.place()
-        if study.job.obstacles:
+        if study.job.in_time:
+            where = (
+                "With obstacles" if study.job.obstacles else "With a wall whose state depends on its history"
+            )
             study.warn(
-                "Beside obstacles neither the map of what each element would disturb nor what light would "
-                "tell is known: both take a unit with one state a pressure."
+                f"{where} neither the sensitivity map nor the light signal is computed: both need a unit "
+                "whose state depends on pressure only."
             )
         else:
             if study.job.effects.clogged:
-                study.warn(
-                    "What each element alone would disturb is not known for a unit with a clogged neck."
-                )
+                study.warn("The sensitivity map is not computed for a unit with a clogged neck.")
             else:
                 sensitivity_map(study)
             signals(study, study.job.optics)

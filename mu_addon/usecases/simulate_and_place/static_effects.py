@@ -28,11 +28,11 @@ _LAWS = ("anisotropy", "strain_stiffening", "tension_compression_asymmetry")
 NAMES = tuple(name for name, e in EFFECTS.items() if e.materials or e.model or e.load)
 # Of each in a few words, its size included.
 _DESCRIPTIONS = {
-    "gravity": "solid parts weigh {:.4g} kg/m³",
+    "gravity": "solid parts have a density of {:.4g} kg/m³",
     "strain_stiffening": "the wall stiffens at large stretch, c2/c1 = {:.3g}",
     "anisotropy": "the wall is stiffer by {:.0%} along the print's layers than across them",
     "tension_compression_asymmetry": "struts are stiffer by {:.0%} in compression than in tension",
-    "clogged_chamber": "the last chamber lacks {:.0%} of the pressure",
+    "clogged_chamber": "the last chamber receives less pressure, by {:.0%} of the pressure",
 }
 
 Values = Mapping[str, Mapping[str, float]]
@@ -55,9 +55,9 @@ class StaticEffects:
         turn = self.orientation_deg
         if not _is_number(turn) or abs(turn) > 360:
             raise InputError(
-                f"orientation_deg = {turn!r} is no direction of gravity",
+                f"orientation_deg = {turn!r} is not a valid orientation",
                 self.where,
-                "give a number from -360 to 360: 0 hangs, the tip down",
+                "give a number from -360 to 360; 0: hanging, tip down",
             )
         if not isinstance(self.values, Mapping):
             raise InputError(f"{self.values!r} is not a table", self.where, "write it as a table")
@@ -70,7 +70,7 @@ class StaticEffects:
     def _checked(self, name: str, given: Any) -> float:
         where = f"{self.where}.{name}"
         if name not in NAMES:
-            why = " it is not one that a simulation of the unit can have" if name in LIBRARY else ""
+            why = " it is not an effect that a simulation of the unit can contain" if name in LIBRARY else ""
             raise InputError(
                 f"no effect {name!r} is known here{';' + why if why else nearest(name, NAMES)}",
                 self.where,
@@ -141,9 +141,9 @@ class StaticEffects:
                 base = change(base, mesh, sizes[name])
         return base
 
-    def model(self, unit: Unit, mesh: Mesh, threads: int = 2) -> Model:
+    def model(self, unit: Unit, mesh: Mesh, threads: int = 2, device: str = "cpu") -> Model:
         """Model of a unit's mesh with these effects. Raises InputError where one does not fit the unit."""
-        body = Body(unit, orientation_deg=self.orientation_deg)
+        body = Body(unit, orientation_deg=self.orientation_deg, device=device)
         sizes = self.sizes
         # One at most has a model of its own.
         found = next((make(body, mesh, s) for n, s in sizes.items() if (make := EFFECTS[n].model)), None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from contextlib import closing
 from functools import cached_property
 from pathlib import Path
@@ -11,12 +12,13 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.anchors import Window, anchors, windows
+from ...design.anchors import Window, anchor_points, windows
 from ...design.export import write_nodes, write_stl
 from ...design.parameters import Material
 from ...design.quantity import in_kPa
 from ...design.solid import Solid, build_solid
 from ...design.strut_cell import strut_cell
+from ...design.wall import Wall
 from ...errors import ConvergenceError, InputError, MeshingError
 from ...fem.equilibrium import Equilibrium
 from ...fem.kinematics import TipSection
@@ -30,10 +32,10 @@ from ...fem.trajectory import Trajectory, simulate
 from ...files import write_csv, write_npz
 from ...homogenize.foam_response import ellipticity
 from ...meshing.mesh import LATTICE, Mesh
-from ...meshing.quality import Quality, quality
+from ...meshing.quality import Quality, mesh_quality
 from ...meshing.settings import MeshSettings
 from ...meshing.unit import MeshingWarning, mesh_unit
-from ...placement.candidates import Candidate, Evaluation, candidates
+from ...placement.candidates import Candidate, Evaluation, candidate_paths
 from ...placement.deviation import rank
 from ...reading import file_bytes, parse_json
 from ...report.results import CONTACT_COLUMNS, ContactHistory, LatticeSearch, Signals
@@ -43,11 +45,11 @@ from ...run.context import RunContext
 from ...run.folder import begin, keep_inputs, require_space
 from ...run.progress import Progress
 from .candidate_states import PATH_DIFFERENCE_MM, CandidateSolver
+from .candidates_in_time import evaluations
 from .contact_history import history
 from .job import Job
 from .motion import FOLDER as MOTION
 from .motion import write_model_a
-from .obstacle_candidates import evaluations
 from .path_motion import keep_motion
 from .report_data import package_versions
 from .study_file import FILES, HEADER, STAGES
@@ -140,7 +142,7 @@ class Study:
             summary["study"] |= job.effects.tables
         self._warn_of_missed_corners()
         if job.mesh.order == 1:
-            self.warn("Linear elements lock in thin walls: these answers are for a quick look only.")
+            self.warn("Linear elements lock in thin walls: these results are for a quick look only.")
 
     @cached_property
     def _tip(self) -> TipSection:
@@ -171,7 +173,7 @@ class Study:
     @property
     def anchors(self) -> Array:
         """P1..Pn in mm, (n, 3)."""
-        return anchors(self.job.unit)
+        return anchor_points(self.job.unit)
 
     @property
     def windows(self) -> list[Window]:
@@ -203,7 +205,7 @@ class Study:
         with self.progress.stage("mesh"):
             self.mesh = self._mesh(self.job.mesh)
             self._require_space(len(self.mesh.nodes))
-            self.quality = quality(self.mesh, self.job.unit, self.job.body)
+            self.quality = mesh_quality(self.mesh, self.job.unit, self.job.body)
             modulus, _ = self.job.materials(self.mesh).small_strain(len(self.mesh.tets))
             write_mesh(self.folder / "mesh.vtu", self.mesh, modulus)
         self.context.summary["mesh"] = {**attrs.asdict(self.quality), "hash": self.mesh.hash()}
@@ -212,7 +214,7 @@ class Study:
     def _mesh(self, settings: MeshSettings) -> Mesh:
         settings = self.job.mesh_settings(settings)
         # Only the shape: what it is made of, or called, leaves a mesh as it is.
-        shape = attrs.evolve(self.job.unit, name="shape", material=Material())
+        shape = attrs.evolve(self.job.unit, name="shape", material=Material(), wall=Wall())
         body = [] if self.job.body is None else [self.job.body.hash]
         name = key(shape.hash(), attrs.astuple(settings), self.job.mesher, *body)
         found = self.cache.get("mesh", name)
@@ -248,7 +250,7 @@ class Study:
         time, pressure = self.job.samples
         with self.progress.stage("Model A"):
             model = self.job.model(self.mesh)
-            if candidates_beside and self.job.workers > 1 and not self.job.obstacles:
+            if candidates_beside and self.job.workers > 1 and not self.job.in_time:
                 self._ahead = CandidateSolver(
                     self.job, self.cache, self.mesh, self._jobs(), pressure, self.headline_rule
                 )
@@ -261,11 +263,14 @@ class Study:
                 raise
             self._write_motion(self.trajectory.states)
             self._write_contact()
-            write_model_a(self.folder, self.mesh, self.job.materials(self.mesh), self.trajectory)
+            materials = self.job.materials(self.mesh)
+            write_model_a(self.folder, self.mesh, materials, self.trajectory, self._remembered(model))
             self._look_for_contact(self.trajectory.states)
             self._look_beyond_the_fit(self.trajectory.states)
         states = [s for s in self.trajectory.states if s.loaded]
         self.solver = {
+            "method": model.solver,
+            "device": model.device,
             "unknowns": len(model.free),
             "states": len(states),
             "newton_iterations": sum(s.iterations for s in states),
@@ -283,8 +288,8 @@ class Study:
     def _model_a(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
         """Model A's trajectory on a model's mesh, load step by load step from the cache where it is there."""
         materials = self.job.materials(model.mesh)
-        if self.job.obstacles:
-            return self._touching(model, time, pressure, on_state)
+        if self.job.in_time:
+            return self._in_time(model, time, pressure, on_state)
         # A state's last digits depend on the pressures visited before it.
         visited = np.unique(pressure)
         name = key(model.mesh.hash(), materials.hash(), visited, self.job.newton, *self.job.effects.parts)
@@ -308,28 +313,19 @@ class Study:
             ),
         )
 
-    def _touching(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
-        """Model A beside obstacles: instant by instant, since friction remembers, from the cache likewise."""
+    def _in_time(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
+        """Model A instant by instant, since contact or the wall remembers, from the cache likewise."""
         job, materials = self.job, self.job.materials(model.mesh)
-        parts = [(o.depth_mm, o.stiffness, o.stick_stiffness, o.friction) for o in model.obstacles]
-        name = key(
-            model.mesh.hash(),
-            materials.hash(),
-            time,
-            pressure,
-            job.newton,
-            job.obstacles_text() or "",
-            parts,
-            *job.effects.parts,
-        )
+        name = self._in_time_key(model, time, pressure)
         found: list[list[Touch]] = []
 
         def keep(state: State) -> None:
             found.append([o.contact(state.u) for o in model.obstacles])
-            force = sum(float(np.linalg.norm(c.force_N)) for c in found[-1])
-            self.progress.update(
-                len(found) / len(time), f"{state.pressure_kPa:.4g} kPa, contact {force:.3g} N"
-            )
+            words = f"{state.pressure_kPa:.4g} kPa"
+            if job.obstacles:
+                force = sum(float(np.linalg.norm(c.force_N)) for c in found[-1])
+                words += f", contact {force:.3g} N"
+            self.progress.update(len(found) / len(time), words)
             on_state(state)
 
         motion = simulate_in_time(
@@ -340,9 +336,35 @@ class Study:
             load=lambda number: self._kept_instant(key(name, number), model),
             store=lambda number, instant: self._keep_instant(key(name, number), instant),
         )
-        if model.mesh is self.mesh:
+        if model.mesh is self.mesh and job.obstacles:
             self.contact = history(job.obstacles, model.mesh, time, pressure, found)
         return motion
+
+    def _in_time_key(self, model: Model, time: Array, pressure: Array) -> str:
+        job = self.job
+        parts = [(o.depth_mm, o.stiffness, o.stick_stiffness, o.friction) for o in model.obstacles]
+        return key(
+            model.mesh.hash(),
+            job.materials(model.mesh).hash(),
+            time,
+            pressure,
+            job.newton,
+            job.obstacles_text() or "",
+            parts,
+            *job.effects.parts,
+        )
+
+    def _remembered(self, model: Model) -> Callable[[int], tuple[Array, ...]]:
+        """What the wall remembers of an instant of the protocol, by its number; nothing of an elastic one."""
+        if not self.job.unit.wall.has_memory:
+            return lambda number: ()
+        name = self._in_time_key(model, *self.job.samples)
+
+        def remembered(number: int) -> tuple[Array, ...]:
+            kept = self._kept_instant(key(name, number), model)
+            return () if kept is None else kept.history
+
+        return remembered
 
     def _keep_instant(self, name: str, instant: Instant) -> None:
         arrays = attrs.asdict(instant.state, recurse=False) | {"time_s": instant.time_s}
@@ -350,6 +372,8 @@ class Study:
             arrays["rate"] = instant.rate
         for number, memory in enumerate(instant.contacts):
             arrays |= {f"{number} {part}": values for part, values in memory.items()}
+        for number, values in enumerate(instant.history):
+            arrays[f"history {number}"] = values
         self.cache.put("instant", name, arrays)
 
     def _kept_instant(self, name: str, model: Model) -> Instant | None:
@@ -360,7 +384,8 @@ class Study:
             {part.partition(" ")[2]: a for part, a in found.items() if part.startswith(f"{number} ")}
             for number in range(len(model.obstacles))
         ]
-        return Instant(float(found["time_s"]), _state(found), found.get("rate"), tuple(contacts))
+        memory = tuple(found[f"history {n}"] for n in range(len(found)) if f"history {n}" in found)
+        return Instant(float(found["time_s"]), _state(found), found.get("rate"), tuple(contacts), memory)
 
     def _stored(self, name: str, pressure_MPa: float, model: Model) -> State | None:
         found = self.cache.get("state", key(name, pressure_MPa))
@@ -370,7 +395,7 @@ class Study:
 
     def _write_motion(self, states: Any) -> None:
         assert self.mesh is not None
-        if self.job.obstacles:
+        if self.job.in_time:
             self._write_in_time(states)
             return
         ordered = sorted(states, key=lambda s: s.pressure_MPa)
@@ -388,7 +413,7 @@ class Study:
         write_trajectory(self.folder / "model_a.pvd", self.mesh, reached)
 
     def _write_in_time(self, states: Any) -> None:
-        """As `_write_motion`, of states an instant: what touches moves otherwise on the way back."""
+        """As `_write_motion`, of states an instant: with contact or memory the way back differs."""
         assert self.mesh is not None
         time, _ = self.job.samples
         reached = list(zip(time.tolist(), states, strict=False))
@@ -425,9 +450,9 @@ class Study:
             pressure = f"{in_kPa(contact.pressure_MPa):.4g}"
             found[pressure] = [str(c) for c in contact.crossings]
             self.warn(
-                f"From {pressure} kPa on, walls pass through each other: {contact.crossings[0]}. Nothing "
-                "here resists contact, and the states beyond are wrong. Thicken the wall, or keep the "
-                "protocol short of this pressure."
+                f"From {pressure} kPa on, walls intersect: {contact.crossings[0]}. Self-contact is not "
+                "modelled, so states beyond this pressure are invalid. Use a thicker wall or a smaller "
+                "pressure."
             )
         self.context.summary["walls_cross_at_kPa"] = found
 
@@ -461,24 +486,24 @@ class Study:
             self.warn(
                 f"The lattice is strained to stretches from {least:.2f} to {largest:.2f}, but its law was "
                 f"fitted from {low:g} to {high:g}: at {pressure} kPa {worst['share_beyond_fit']:.1%} of the "
-                "lattice's volume is beyond, and answers by extrapolation."
+                "lattice volume is outside that range, where the law is extrapolated."
             )
         pressure, worst = max(found.items(), key=lambda item: item[1]["share_not_elliptic"])
         if worst["share_not_elliptic"]:
             self.warn(
-                f"At {pressure} kPa the law is not elliptic any more in {worst['share_not_elliptic']:.1%} of "
-                "the lattice's volume: struts buckle there, in patterns that depend on the mesh. Compare two "
+                f"At {pressure} kPa the law is no longer elliptic in {worst['share_not_elliptic']:.1%} of "
+                "the lattice volume: struts buckle there, and the result depends on the mesh. Compare two "
                 "meshes (--refine)."
             )
 
     def _keep_partial_motion(self) -> None:
         """What was found before a failure is kept; summary.json says that it is partial."""
         if self.mesh is not None and self.states:
-            start = [] if self.job.obstacles or self.job.effects.has_gravity else [rest(self.mesh)]
+            start = [] if self.job.in_time or self.job.effects.has_gravity else [rest(self.mesh)]
             self._write_motion([*start, *self.states])
 
     def _jobs(self) -> list[tuple[Candidate, str]]:
-        return [(c, rule) for rule in self.job.rules for c in candidates(self.anchors, self.windows)]
+        return [(c, rule) for rule in self.job.rules for c in candidate_paths(self.anchors, self.windows)]
 
     def place(self) -> dict[str, str]:
         """Every candidate under every rule against Model A; returns the chosen path of each rule."""
@@ -488,13 +513,13 @@ class Study:
         with self.progress.stage("candidates"):
             found = self.sweep(self.mesh, self.trajectory, jobs, self._ahead, verify=True, to_look_at=True)
         self.evaluations = {(e.name, e.rule): e for e in found}
-        every = candidates(self.anchors, self.windows)
+        every = candidate_paths(self.anchors, self.windows)
         chosen = self._write_ranking(every)
         if self.job.mesh_check:
             try:
                 self._compare_meshes(jobs)
             except (ConvergenceError, MeshingError) as error:
-                self.warn(f"The mesh's uncertainty is not known: on a coarser mesh, {error.what}.")
+                self.warn(f"The mesh uncertainty is not known: on the coarser mesh, {error.what}.")
             chosen = self._write_ranking(every)
         return chosen
 
@@ -511,7 +536,7 @@ class Study:
 
         to_look_at: whether the paths' motion is kept, too; of the study's own mesh or the whole body's.
         """
-        if self.job.obstacles:
+        if self.job.in_time:
             self.context.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = {"along_paths": True}
             return evaluations(self.job, self.cache, mesh, trajectory, jobs, self.progress.update)
         whole = self.headline_rule if to_look_at else ""
@@ -522,8 +547,9 @@ class Study:
                 keep_motion(self, mesh, trajectory, sweep, jobs)
         if sweep.path_difference_mm > PATH_DIFFERENCE_MM:
             self.warn(
-                "A candidate started from Model A's states was not where its own path from rest leads "
-                f"({sweep.path_difference_mm:.2g} mm apart), so every candidate was solved along its path."
+                "A candidate started from Model A's states does not lie on its own equilibrium path from "
+                f"rest (difference {sweep.path_difference_mm:.2g} mm), so every candidate was solved from "
+                "rest."
             )
         self.context.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = {
             "pressures_solved_kPa": sweep.solved_kPa,
@@ -544,9 +570,9 @@ class Study:
         chosen = extremes(pressure)
         instants = [int(np.flatnonzero(pressure == p)[0]) for p in chosen]
         time = np.arange(len(chosen), dtype=float)
-        if self.job.obstacles:
-            # What friction remembers is of the whole protocol.
-            time, chosen = self.job.samples
+        if self.job.in_time:
+            # What contact or wall remembers is of the whole protocol.
+            time, chosen = self.job.protocol.sample(self.job.times)
             instants = list(range(len(time)))
         with self.progress.stage("mesh check"):
             mesh = self._mesh(coarse)
@@ -608,7 +634,7 @@ class Study:
             if value != mine and (words or not np.isclose(value, mine, rtol=1e-6)):
                 other.append(f"{name} {value} (unit: {mine})")
         if other:
-            self.warn(f"The lattice's law is that of another cell than the unit's: {', '.join(other)}.")
+            self.warn(f"The lattice law was computed for another cell than the unit's: {', '.join(other)}.")
 
     def _warn_of_missed_corners(self) -> None:
         """Say where uniform samples miss the protocol's extremes."""
@@ -617,8 +643,8 @@ class Study:
         for extreme, met in ((corners.min(), samples.min()), (corners.max(), samples.max())):
             if abs(extreme - met) > 1e-6:
                 self.warn(
-                    f"The protocol goes to {extreme:g} kPa, but its {self.job.times} samples only to "
-                    f"{met:g} kPa: give a number of samples that meets its corners."
+                    f"The protocol goes to {extreme:g} kPa, but its {self.job.times} samples reach only "
+                    f"{met:g} kPa: choose a number of samples that includes its extremes."
                 )
 
     def warn(self, text: str) -> None:

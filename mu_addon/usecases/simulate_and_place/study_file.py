@@ -95,7 +95,11 @@ def _text(path: Path) -> str:
     except UnicodeDecodeError as error:
         raise InputError("this is not UTF-8 text", str(path), "choose another folder") from error
     if len(text) > _LONGEST:
-        raise InputError(f"more than {_LONGEST} characters are no study", str(path), "choose another folder")
+        raise InputError(
+            f"more than {_LONGEST} characters are too long for a study.toml",
+            str(path),
+            "choose another folder",
+        )
     return text
 
 
@@ -119,9 +123,10 @@ def parse(text: str, folder: Path) -> tuple[Tables, bool]:
     stages = STAGES[: len(document)]
     if set(document) != set(stages) or not document:
         raise InputError(
-            f"the tables [{'], ['.join(map(str, document))}] are no study", where, "the tables are "
-            f"[{'], ['.join(STAGES)}], each with those before it"
-        )  # fmt: skip
+            f"the tables [{'], ['.join(map(str, document))}] are not those of a study",
+            where,
+            f"the tables are [{'], ['.join(STAGES)}], each with those before it",
+        )
     for stage in stages:
         if not isinstance(document[stage], dict):
             raise InputError(f"{stage} is not a table", where, f"write it as [{stage}]")

@@ -111,9 +111,7 @@ def read_bench(path: Path) -> Bench:
     pixels, places = _markers(document.get("marker"), str(path))
     base = _pair(document, "base", at)
     if base is None:
-        raise InputError(
-            "the base is not named", str(path), 'name its two markers, base = ["low", "high"], see the page'
-        )
+        raise InputError("the base is not named", str(path), 'name its two markers, base = ["low", "high"]')
     missing = [name for name in base if name not in places]
     if missing:
         raise InputError(
@@ -178,7 +176,7 @@ def _pair(document: Mapping[str, Any], key: str, at: Callable[[str], str]) -> Pa
     if value is None:
         return None
     if not (isinstance(value, list) and len(value) == 2 and all(isinstance(v, str) for v in value)):
-        raise InputError(f"{key} = {value!r} is not two names", at(key), 'write it as ["one", "other"]')
+        raise InputError(f"{key} = {value!r} is not a pair of names", at(key), 'write it as ["one", "other"]')
     return value[0], value[1]
 
 
@@ -203,13 +201,13 @@ def _markers(
                 continue
             if not (isinstance(value, list) and len(value) == 2 and all(_finite(v) for v in value)):
                 raise InputError(
-                    f"{key} = {value!r} of marker {name!r} is not two numbers",
+                    f"{key} = {value!r} of marker {name!r} is not a pair of numbers",
                     origin,
                     "write it as [1.0, 2.0]",
                 )
             (pixels if key == "pixel" else places)[name] = float(value[0]), float(value[1])
     if not names:
-        raise InputError("no marker is described", origin, "describe each under [[marker]]")
+        raise InputError("no marker is defined", origin, "define each marker under [[marker]]")
     return pixels, places
 
 
@@ -237,7 +235,7 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
     """
     fps = bench.fps if bench.fps is not None else tracks.fps
     if not (math.isfinite(fps) and fps > 0):
-        raise InputError("the clip does not say how many frames a second it has", where, "give fps")
+        raise InputError("the clip has no frame rate", where, "give fps")
     time = bench.starts_s + np.arange(len(tracks)) / fps
     clock, kPa = pressure
     slack = 0.5 / fps
@@ -245,7 +243,7 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
     told = []
     if inside.sum() < 2:
         raise InputError(
-            f"the clip lasts from {time[0]:.4g} to {time[-1]:.4g} s, the pressure's record from "
+            f"the clip lasts from {time[0]:.4g} to {time[-1]:.4g} s, the pressure record from "
             f"{clock[0]:.4g} to {clock[-1]:.4g} s",
             where,
             "give starts_s, the pressure's clock at the first frame",
@@ -253,9 +251,10 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
     if not inside.all():
         told.append(
             Remark(
-                f"{(~inside).sum()} of {len(inside)} frames are outside the pressure's record and left out",
+                f"{(~inside).sum()} of {len(inside)} frames are outside the pressure record and were left "
+                "out",
                 where,
-                "start the pressure's record first and end it last",
+                "start the pressure record before the clip and end it after",
             )
         )
     kept = attrs.evolve(tracks, pixels=tracks.pixels[:, inside])
@@ -269,10 +268,10 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
         rest[first] = True
         told.append(
             Remark(
-                f"no frame shows the unit at rest; the angle counts from {p[first]:.4g} kPa at "
+                f"no frame shows the unit at rest; the angle is relative to {p[first]:.4g} kPa at "
                 f"{time[first]:.4g} s",
                 where,
-                "begin the clip at no pressure; the angle's zero is fitted by `diagnose` all the same",
+                "begin the clip at zero pressure; `diagnose` fits the zero of the angle in any case",
             )
         )
     found = motion(kept, bench.view, rest, time, where)
@@ -297,9 +296,9 @@ def write_experiment(found: Filmed, bench: Bench, name: str, folder: Path) -> tu
         before = listed.read_text(encoding="utf-8")
         if same and block not in before:
             raise InputError(
-                f"an experiment named {same[0].name!r}, in {same[0].file.name}, is there already",
+                f"an experiment named {same[0].name!r}, in {same[0].file.name}, already exists",
                 str(listed),
-                "give this one another name, or take that one out",
+                "rename this experiment, or remove the other one",
             )
     write_text(folder / f"{stem}.pixels.csv", _pixels(found))
     write_text(table, text)
@@ -329,7 +328,7 @@ def _table(found: Filmed, bench: Bench) -> str:
     for number, name in enumerate(numbered, 1):
         stream.write(f"# marker{number} is {name!r}\n")
     if view.tip:
-        against = "as it is in each frame" if view.follow_base else "taken to stand still"
+        against = "tracked in each frame" if view.follow_base else "assumed fixed"
         stream.write(f"# angle of {view.tip[0]!r}, {view.tip[1]!r} against the base, {against}\n")
     columns = {"time_s": found.time_s, "pressure_kPa": found.pressure_kPa}
     if m.angle_deg is not None:
@@ -379,7 +378,7 @@ def read_pixels(path: Path) -> Tracks:
     try:
         lines = file_text(path).splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError("cannot read the followed markers", str(path), "check path and file") from error
+        raise InputError("cannot read the tracked markers", str(path), "check path and file") from error
     rows = [
         (n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")
     ]
@@ -389,7 +388,7 @@ def read_pixels(path: Path) -> Tracks:
     missing = [column for column in wanted if column not in head]
     if not names or missing or len(body) < 2:
         raise InputError(
-            f"column {missing[0]!r} is missing" if missing else "it holds no followed markers",
+            f"column {missing[0]!r} is missing" if missing else "the file contains no tracked markers",
             str(path),
             "name the columns `NAME right_px` and `NAME down_px`, a row a frame",
         )
@@ -417,7 +416,7 @@ def track(
     """
     if not Path(clip).exists():
         raise InputError(
-            "there is no such clip", str(clip), "give a movie, or the first picture of a sequence"
+            "the clip does not exist", str(clip), "give a movie, or the first picture of a sequence"
         )
     recorded = read_pressure(pressure)
     if Path(clip).suffix.lower() == ".csv":
@@ -428,7 +427,9 @@ def track(
         }
         if unplaced:
             raise InputError(
-                f"marker {min(unplaced)!r} has no pixel", str(clip), "say where it is in the first frame"
+                f"marker {min(unplaced)!r} has no pixel",
+                str(clip),
+                "give its pixel position in the first frame",
             )
         tracks = follow(Path(clip), bench.marks)
     found = filmed(tracks, bench, recorded, str(clip))

@@ -7,10 +7,19 @@ of the extension has been imported.
 
 import ast
 import inspect
+import shutil
 import types
 
 import pytest
 
+from mu_addon.design.parameters import load_preset
+from mu_addon.evidence import unit_fem
+
+from ...evidence import analytic
+from ...headless.processes import run
+from ...usecases.diagnosis_data import bent_unit, weighed_blocks
+from ...usecases.test_diagnose import run as diagnosed
+from ..filming import ANGLES, film, pressures
 from ..session import Blender, needs_bpy
 
 INSIDE = "monkeypatch"
@@ -67,3 +76,58 @@ def blender(each_bpy, tmp_path_factory):
 
     yield run
     shared.close()
+
+
+# What a quick look takes, with one path of the whole lattice beside the ten of the anchors.
+PLACE = ["place", "--preset", "mu-0.75x", "--order", "1", "--refine", "0.5", "--rule", "volume_fraction"]
+PLACE += ["--no-mesh-check", "--workers", "1", "--paths", "graph", "--longest-cells", "2.5", "--checks", "2"]
+
+
+@pytest.fixture(scope="session")
+def placed(tmp_path_factory):
+    """A finished study of `place`; whoever writes into it takes `study`."""
+    folder = tmp_path_factory.mktemp("placed") / "out"
+    done = run(*PLACE, "--out", folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture
+def study(placed, tmp_path):
+    """A copy of a finished study of `place`."""
+    return shutil.copytree(
+        placed, tmp_path / "study", ignore=shutil.ignore_patterns("cache", "played"), dirs_exist_ok=True
+    )
+
+
+@pytest.fixture
+def blocks(tmp_path):
+    """Measured data of weighed blocks, overcured by 0.09 mm; not diagnosed."""
+    return weighed_blocks(tmp_path / "data", 0.09)
+
+
+@pytest.fixture(scope="session")
+def clogged(tmp_path_factory):
+    """A unit with a clogged chamber and the verdict on it; a written response stands for its simulation."""
+    root = tmp_path_factory.mktemp("clogged")
+    folder = bent_unit(root / "data", {"clogged_chamber.share_lost": 0.5})
+
+    def responses(unit, experiments, settings, cache, progress):
+        return tuple(
+            analytic.response(*k) for k in sorted({(e.scale, e.orientation_deg) for e in experiments})
+        )
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(unit_fem, "unit_responses", responses)
+        ending, messages = diagnosed(folder, root / "study" / "evidence", load_preset("mu-1.0x"))
+    assert ending.status == 0, messages[-1]
+    assert ending.summary["verdict"] == "named"
+    return root
+
+
+@pytest.fixture
+def filmed(tmp_path):
+    """Pictures of a bench in clip/, its pressure.csv; the true pixels of the markers and the angles."""
+    truth = film(tmp_path / "clip", ANGLES)
+    pressures(tmp_path, ANGLES)
+    return truth, ANGLES

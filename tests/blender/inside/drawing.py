@@ -17,7 +17,7 @@ def drawn(panels):
     layout.template_icon.side_effect = lambda icon, scale: said.append("a picture")
     for panel in panels:
         if getattr(panel, "poll", lambda _: True)(bpy.context):
-            seat = MagicMock(layout=layout, seek=getattr(panel, "seek", None))
+            seat = MagicMock(layout=layout, find_root=getattr(panel, "find_root", None))
             seat.show = lambda *words, panel=panel, seat=seat: panel.show(seat, *words)
             panel.draw(seat, bpy.context)
     return " ".join(said)

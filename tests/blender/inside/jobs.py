@@ -4,8 +4,10 @@ import sys
 import time
 from pathlib import Path
 
-from mu_addon.blender.simulate import state as simulation
-from mu_addon.blender.simulate import study_folder as studies
+from mu_addon.blender.jobs import start_child
+from mu_addon.blender.simulate.job import SIMULATION
+from mu_addon.run.child import Child
+from mu_addon.run.interpreter import environment
 
 FAKE = str(Path(__file__).resolve().parents[2] / "run" / "fake_worker.py")
 # No measure of speed: what hangs must end some time.
@@ -14,12 +16,13 @@ PATIENCE_S = 1800.0
 
 def launch(root, how):
     """A fake child as the unit's own simulation."""
-    return fake(root.mu_unit.uuid, how, studies.folder_of(root))
+    return fake(SIMULATION, root, how)
 
 
-def fake(job, how, folder):
-    """A fake child as the job of this name."""
-    return simulation.launch(job, [sys.executable, FAKE, how], folder / "blender")
+def fake(kind, root, how, folder=None):
+    """A fake child as the job of this kind."""
+    folder = (folder or kind.folder_of(root)) / start_child.OWN_FOLDER
+    return start_child.watch(kind.key(root), Child([sys.executable, FAKE, how], folder, environment()))
 
 
 def watch(until):
@@ -28,7 +31,7 @@ def watch(until):
     end = time.monotonic() + PATIENCE_S
     while not until():
         assert time.monotonic() < end, "it never came"
-        simulation.poll()
+        start_child.poll()
         time.sleep(0.05)
 
 

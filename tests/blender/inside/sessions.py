@@ -3,10 +3,17 @@
 import bpy
 
 import mu_addon
+from mu_addon.blender.jobs import start_child as jobs
+from mu_addon.blender.sensor import state as sensor
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit import presets
 
 from .acting import add, refused
+from .jobs import launch, watch
+from .test_sensor import connected, started
+from .test_sensor import drawn as sensor_panel_drawn
+from .test_sensor import watch as watch_sensor
+from .test_simulation import drawn
 
 
 def begin():
@@ -45,3 +52,55 @@ def find_presets():
     assert presets.names()[-1] == "user:thick one"
     assert bpy.ops.mu.preset_remove(name="user:thick one") == {"FINISHED"}
     assert presets.names() == ["mu-0.75x", "mu-1.0x", "mu-1.5x"]
+
+
+def leave_a_simulation():
+    """A simulation that survives loading a file and still runs as the session ends; returns its process."""
+    begin()
+    root = add()
+    uuid = root.mu_unit.uuid
+    child = launch(root, "hang")
+    watch(lambda: child.progress)
+    assert bpy.app.timers.is_registered(jobs._poll)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert jobs.running() == [f"{uuid}:simulate"]
+    assert bpy.app.timers.is_registered(jobs._poll)
+    add()
+    assert "other job" in drawn()
+    return child._process.pid
+
+
+def leave_a_sensor(tmp_path):
+    """A sensor's session that outlives undo, loading and rendering; returns its reader and its folder."""
+    begin()
+    bpy.context.preferences.edit.use_global_undo = True
+    root = started()
+    bpy.ops.ed.undo_push(message="added")
+    s = connected(root)
+    root.mu_sensor.seconds = 5.0
+    bpy.ops.ed.undo_push(message="seconds")
+    bpy.ops.ed.undo()
+    (root,) = unit_object.roots()
+    assert sensor.of(root) is s
+    assert s.running
+    rows = s.watched.status["rows"]
+    watch_sensor(lambda: s.watched.status["rows"] > rows and s.traces is not None)
+
+    sensor._render_began()
+    watch_sensor(lambda: s.watched.status["rows"] > rows + 20)
+    sensor._render_ended()
+
+    assert bpy.app.timers.is_registered(sensor._poll)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "study" / "seat.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert s.running
+    assert bpy.app.timers.is_registered(sensor._poll)
+    before = s.watched.status["rows"]
+    watch_sensor(lambda: s.watched.status["rows"] > before + 10)
+    add()
+    assert "1 sensor(s) of other units connected" in sensor_panel_drawn()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "study" / "seat.blend"))
+    (root,) = unit_object.roots()
+    assert sensor.of(root) is s
+    assert "Connected" in sensor_panel_drawn()
+    return s.child.pid, s.watched.folder

@@ -6,8 +6,9 @@ import bpy
 import numpy as np
 
 from mu_addon.blender.body import state as bodies
-from mu_addon.blender.simulate import state as simulation
+from mu_addon.blender.jobs import start_child
 from mu_addon.blender.unit import object as unit_object
+from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.body import read_body
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.surface import volume
@@ -145,9 +146,10 @@ def test_a_simulation_is_given_the_body(monkeypatch):
     choose(barrel(), root)
     bpy.ops.mu.body()
     given = []
-    monkeypatch.setattr(simulation, "start", lambda *arguments: given.append(arguments))
+    monkeypatch.setattr(start_child.JobKind, "start", lambda *arguments: given.append(arguments))
     assert bpy.ops.mu.simulate() == {"FINISHED"}
-    ((_, core, _, arguments),) = given
+    ((_, _, arguments, _),) = given
+    core = to_unit(root.mu_unit)
     path = arguments[arguments.index("--body") + 1]
     body = read_body(path)
     assert body.hash == bodies.envelope_in(root, core).hash

@@ -8,11 +8,12 @@ import pytest
 from mathutils import Vector
 
 from mu_addon.blender.body import state as bodies
+from mu_addon.blender.jobs import start_child
 from mu_addon.blender.obstacles import state as obstacles
 from mu_addon.blender.results import legend
 from mu_addon.blender.results import motion as motion_parts
-from mu_addon.blender.simulate import state as simulation
 from mu_addon.blender.simulate import study_folder as studies
+from mu_addon.blender.simulate.job import SIMULATION
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.design.body import read_body
 from mu_addon.design.surface import volume
@@ -38,9 +39,9 @@ def choose(root, *objects):
 
 
 def asked():
-    with patch.object(simulation, "start") as start:
+    with patch.object(start_child.JobKind, "start") as start:
         assert bpy.ops.mu.simulate() == {"FINISHED"}
-    return start.call_args.args[3]
+    return start.call_args.args[1]
 
 
 def test_what_a_simulation_is_given():
@@ -62,7 +63,7 @@ def test_what_a_simulation_is_given():
     assert np.allclose(near.bounds.mean(axis=0), [0, 60, 60], atol=0.5)
     assert far.bounds.mean(axis=0).max() > 100
     assert volume(far.vertices, far.triangles) > 0
-    assert obstacles.given(root) == sorted([(near.hash, 0.3), (far.hash, 0.0)])
+    assert obstacles.inputs(root) == sorted([(near.hash, 0.3), (far.hash, 0.0)])
 
     assert bpy.ops.mu.obstacle_remove(name="Far") == {"FINISHED"}
     assert asked().count("--obstacle") == 1
@@ -78,12 +79,12 @@ def test_what_moves_or_is_edited_is_another_obstacle():
     one = ball((0, 60, 60))
     choose(root, one)
     bpy.ops.mu.obstacle()
-    seen = [obstacles.given(root)]
-    assert obstacles.given(root) == seen[0]
+    seen = [obstacles.inputs(root)]
+    assert obstacles.inputs(root) == seen[0]
 
     def changed():
         bpy.context.view_layer.update()
-        seen.append(obstacles.given(root))
+        seen.append(obstacles.inputs(root))
         return seen[-1] not in seen[:-1]
 
     one.location.y = 70.0
@@ -124,7 +125,7 @@ def test_flaws_are_told_and_marked():
     one = ball((0, 33, 60))
     choose(root, one)
     assert bpy.ops.mu.obstacle() == {"FINISHED"}
-    assert obstacles.placed(root, one).flaws[0].what.startswith("it stands in the unit, up to 6.")
+    assert obstacles.placed(root, one).flaws[0].what.startswith("it overlaps the unit by up to 6.")
     assert bpy.ops.mu.obstacle_check() == {"FINISHED"}
     at = np.array([v.co for v in unit_object.part(root, bodies.FLAWS).data.vertices])
     assert len(at) == 1, at
@@ -159,7 +160,7 @@ def test_a_box_in_the_way_is_met_and_its_move_makes_the_study_stale(tmp_path):
     def bent(folder):
         root.mu_unit.study.folder = str(tmp_path) + folder
         assert bpy.ops.mu.simulate() == {"FINISHED"}
-        child = simulation.of(root.mu_unit.uuid)
+        child = SIMULATION.child(root)
         watch(lambda: child.state != "running")
         assert child.state == "done", child.error
         return dict(studies.findings(root).angles)[40.0]
@@ -167,18 +168,18 @@ def test_a_box_in_the_way_is_met_and_its_move_makes_the_study_stale(tmp_path):
     root = add(preset="mu-0.75x")
     root.mu_unit.study.command, root.mu_unit.study.detail = "simulate", "quick"
     free = bent("/free")
-    assert studies.touches(root) == []
+    assert studies.contact_forces(root) == []
     assert bpy.ops.mu.obstacle_box(size=(20, 12, 12), gap=0.6) == {"FINISHED"}
     bpy.context.view_layer.update()
     assert studies.findings(root).stale, "it was free to move then"
     stopped = bent("/met")
     assert 1.0 < stopped < free - 1.0, (stopped, free)
-    (touch,) = studies.touches(root)
+    (touch,) = studies.contact_forces(root)
     assert touch.name == "Obstacle"
     assert touch.force_N[0] == 0.0
     assert touch.time_s[touch.force_N.argmax()] == 8.0, "at the protocol's peak"
     bpy.context.scene.frame_set(193)
-    said = legend.words(root, motion_parts.motion_of(root), bpy.context.scene)
+    said = legend.lines(root, motion_parts.motion_of(root), bpy.context.scene)
     assert f"Obstacle: {touch.force_N.max():.2f} N" in said
 
     assert not studies.findings(root).stale

@@ -7,9 +7,10 @@ import bpy
 import numpy as np
 
 from mu_addon.blender.preview import arrays as preview
+from mu_addon.blender.shared import updates
 from mu_addon.blender.unit import live_update as live
 from mu_addon.blender.unit import object as unit_object
-from mu_addon.design.anchors import anchors
+from mu_addon.design.anchors import anchor_points
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.profile import cavity_polygon, outer_polygon, outer_volume
@@ -64,7 +65,7 @@ def test_parts_show_the_cores_geometry():
     reach = np.abs(thick).max(0)[0] - high_x
     assert 0.3 * d.junction_diameter < reach < 0.6 * d.junction_diameter, reach
     assert skinned.materials[0].name == "MU Lattice"
-    assert np.allclose(points(unit_object.part(root, "anchors").data), anchors(core), atol=1e-5)
+    assert np.allclose(points(unit_object.part(root, "anchors").data), anchor_points(core), atol=1e-5)
 
 
 def test_cut_open_shows_the_wall():
@@ -124,13 +125,12 @@ def test_every_slider_reaches_the_preview_quickly():
 
 
 def test_a_preview_that_fell_behind_is_caught_up():
-
     root = add()
-    with live.held():
+    with updates.paused():
         root.mu_unit.chambers.count = 4
     assert unit_object.behind(root)
     for handler in bpy.app.handlers.undo_post:
-        if handler is live._catch_up:
+        if handler is live._after_undo_or_load:
             handler(bpy.context.scene)
     assert not unit_object.behind(root)
     tall = max(v.co.z for v in unit_object.part(root, "actuator").data.vertices)

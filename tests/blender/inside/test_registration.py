@@ -108,7 +108,7 @@ def test_a_new_section_of_the_core_appears_by_itself():
     root = bpy.data.objects.new("x", None)
     group = root.mu_unit.novelty
     group.depth_mm, group.way = 1.25, "right"
-    from mu_addon.blender.unit.panel import parameters as draw
+    from mu_addon.blender.shared.panels import parameters as draw
     from mu_addon.blender.unit.properties import section_of
 
     assert section_of(root.mu_unit, "novelty") == {"depth_mm": 1.25, "way": "right"}
@@ -127,7 +127,7 @@ def test_a_new_section_of_the_core_appears_by_itself():
 
 
 def test_values_survive_single_precision():
-    from mu_addon.blender.unit.live_update import held
+    from mu_addon.blender.shared import updates
     from mu_addon.blender.unit.properties import exact, from_unit, to_unit
     from mu_addon.design.parameters import load_preset, preset_names
 
@@ -138,7 +138,7 @@ def test_values_survive_single_precision():
     assert exact(1e6) == 1e6
     root = add()
     for name in preset_names():
-        with held():
+        with updates.paused():
             from_unit(root.mu_unit, load_preset(name))
         assert to_unit(root.mu_unit) == load_preset(name)
         assert to_unit(root.mu_unit).hash() == load_preset(name).hash()

@@ -1,4 +1,4 @@
-"""Guccione's exponential law of heart muscle."""
+"""Guccione's exponential law of heart muscle, which the benchmark of Land et al. (2015) is solved with."""
 
 from __future__ import annotations
 
@@ -7,14 +7,29 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from .green import add_fibre_shear, of_green_strain, symmetric_identity
-from .isochoric import split
-from .law import Array, Law
-from .tensors import add_dyad, f64, mat33, mat99, vec3
-from .transversely_isotropic import averaged, require_unit, unit
-from .valid import require_positive
+from mu_addon.fem.laws.direction import require_unit, unit
+from mu_addon.fem.laws.green import of_green_strain, symmetric_identity
+from mu_addon.fem.laws.isochoric import split
+from mu_addon.fem.laws.law import Array, Law
+from mu_addon.fem.laws.tensors import add_dyad, f64, mat33, mat99, vec3
+from mu_addon.fem.laws.valid import require_positive
 
 _FIBRE = 5
+
+
+@wp.func
+def add_fibre_shear(A: mat99, factor: wp.float64, f: vec3) -> mat99:
+    """A + factor times the second derivative of |E f|^2 by a symmetric E."""
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                x = f64(0.5) * factor * f[i] * f[k]
+                y = f64(0.5) * factor * f[j] * f[k]
+                A[3 * i + j, 3 * k + j] += x
+                A[3 * i + j, 3 * j + k] += x
+                A[3 * i + j, 3 * k + i] += y
+                A[3 * i + j, 3 * i + k] += y
+    return A
 
 
 @wp.func
@@ -100,3 +115,11 @@ class Guccione(Law):
         """Raise InputError unless C, all b and kappa are positive and the fibre is a unit vector."""
         require_positive(Guccione, parameters, *Guccione.parameter_names[:_FIBRE])
         require_unit(Guccione, parameters, _FIBRE)
+
+
+def averaged(lame: Array, across: Array, alpha: Array, along: Array, beta: Array) -> Array:
+    """Voigt's average of a transversely isotropic stiffness: shear and bulk modulus (k, 2)."""
+    axial = lame + 2 * alpha + 4 * along - 2 * across + beta
+    pressure = axial + 2 * (lame + 2 * across) + 4 * (lame + alpha) + 2 * lame
+    total = axial + 2 * (lame + 2 * across) + 4 * along + 2 * across
+    return np.stack([(3 * total - pressure) / 30, pressure / 9], axis=1)

@@ -1,4 +1,4 @@
-"""A study's candidates beside obstacles: each through its whole motion, since friction has memory."""
+"""A study's candidates where contact or wall has memory: each through its whole motion."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...design.anchors import anchors
+from ...design.anchors import anchor_points
 from ...fem.kinematics import probe
 from ...fem.obstacle import CONTACT
 from ...fem.trajectory import Trajectory
@@ -32,11 +32,11 @@ def evaluations(
 ) -> list[Evaluation]:
     """Evaluation of every candidate, each under an inclusion rule, against Model A's motion.
 
-    None of the shortcuts of `sweeping` holds beside obstacles, which make a state depend on those before it:
-    every candidate is marched through all instants, and kept in the cache. Raises ConvergenceError.
+    None of the shortcuts of `candidate_states` holds where a state depends on those before it:
+    every candidate is solved through all instants, and kept in the cache. Raises ConvergenceError.
     """
     unit, materials = job.unit, job.materials(mesh)
-    points, radius = anchors(unit), unit.dimensions.inclusion_radius
+    points, radius = anchor_points(unit), unit.dimensions.inclusion_radius
     sensor = unit.material.sensor_modulus_MPa
     time, pressure = trajectory.time_s, trajectory.pressure_kPa
     setting = CandidateProblem(mesh, materials, points, tuple(jobs), radius, sensor, study=job)

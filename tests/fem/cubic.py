@@ -1,4 +1,4 @@
-"""Linear elasticity of a cubic crystal or lattice, in the body's own frame."""
+"""Linear elasticity of a cubic crystal or lattice: what laws fitted to a lattice are held against."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from .green import of_green_strain, symmetric_identity
-from .law import Array, Law
-from .tensors import add_dyad, f64, mat33, mat99, vec3
-from .transversely_isotropic import require_unit, unit
-from .valid import require, require_positive
+from mu_addon.fem.laws.direction import require_unit, unit
+from mu_addon.fem.laws.green import of_green_strain, symmetric_identity
+from mu_addon.fem.laws.law import Array, Law
+from mu_addon.fem.laws.tensors import add_dyad, f64, mat33, mat99, vec3
+from mu_addon.fem.laws.valid import require, require_positive
 
 
 @wp.func

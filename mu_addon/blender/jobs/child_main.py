@@ -1,4 +1,4 @@
-"""The process that simulates: `python worker.py place --unit unit.toml --out folder --json`, without bpy.
+"""What a child process runs, without bpy: `python child_main.py place --unit unit.toml --out folder --json`.
 
 It makes the package it lies in importable as `mu_addon`, whatever Blender calls it. The processes that it
 starts run these lines, too, and find the package the same way.

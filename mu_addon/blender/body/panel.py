@@ -1,0 +1,18 @@
+"""The part of the panel Lattice for an envelope of the user's own."""
+
+from __future__ import annotations
+
+from ..unit import object as unit_object
+from . import state as bodies
+
+
+def draw(layout, root) -> None:
+    """Buttons to check, use and remove a mesh as the unit's envelope."""
+    header, body = layout.panel("MU_own_body", default_closed=True)
+    header.label(text="Body of Your Own")
+    if body:
+        row = body.row(align=True)
+        row.operator("mu.body_check", icon="VIEWZOOM")
+        row.operator("mu.body", icon="MESH_MONKEY")
+        if any(unit_object.part(root, name) for name in bodies.PARTS):
+            body.operator("mu.body_remove", icon="X")

@@ -1,0 +1,70 @@
+"""The grasp on the timeline: both fingers and the cube, as the latest run found them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...errors import InputError
+from ...files import read_npz
+from ..preview import arrays as preview
+from ..preview import colours as materials
+from ..results import motion as motion_parts
+from ..shared.compat import set_curve
+from ..unit import object as unit_object
+from . import object as gripper_object
+from . import state as grasps
+
+MOVING = "moving:"
+"""What the names of the parts that play the grasp begin with."""
+
+
+def parts(root: Any) -> list[Any]:
+    """Parts that play the grasp: left finger, right finger, cube."""
+    found = (gripper_object.part(root, MOVING + name) for name in (*gripper_object.SIDES, "cube"))
+    return [obj for obj in found if obj is not None]
+
+
+def show(root: Any, scene: Any) -> None:
+    """Play the latest grasp on the timeline: both fingers and the cube; raises InputError."""
+    found = grasps.of(root)
+    data = None if found is None else read_npz(found.folder / "gripper.npz")
+    if found is None or data is None:
+        raise InputError(
+            "there is no grasp of this cube yet", str(grasps.folder_of(root)), "press Grasp first"
+        )
+    hide(root)
+    rate = scene.render.fps / scene.render.fps_base
+    time = data["time_s"]
+    for side, rest in zip(gripper_object.SIDES, data["rest_mm"], strict=True):
+        obj = gripper_object.new_part(
+            root, root, MOVING + side, bpy.data.meshes.new(f"{side.capitalize()} Finger")
+        )
+        slots = np.where(data["membrane"], 0, 1)
+        skeleton = preview.Skeleton(rest.astype(float), faces=(data["triangles"],), slots=slots)
+        preview.write(obj.data, skeleton)
+        materials.assign(obj.data, "MU Membrane", "MU Lattice")
+        file = found.folder / f"{side}.pc2"
+        motion_parts.play(obj, file, motion_parts.step_of(file))
+    half = np.full(3, float(data["cube_side_mm"]) / 2.0)
+    cube = gripper_object.put_box(root, MOVING + "cube", -half, half, "MU Obstacle")
+    frames = scene.frame_start + (time - time[0]) * rate
+    for axis in range(3):
+        set_curve(cube, "location", axis, frames, data["cube_mm"][:, axis])
+    scene.frame_end = int(np.ceil(frames[-1]))
+    _hide_preview(root, True)
+
+
+def hide(root: Any) -> None:
+    """Take the grasp out of the scene; its files stay."""
+    for obj in parts(root):
+        unit_object.remove_part(obj)
+    _hide_preview(root, False)
+
+
+def _hide_preview(root: Any, hidden: bool) -> None:
+    for child in root.children_recursive:
+        if child.get(gripper_object.PART, "").startswith(("finger:", "cube")):
+            child.hide_viewport = child.hide_render = hidden

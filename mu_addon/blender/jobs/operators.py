@@ -1,0 +1,101 @@
+"""The three operators that every kind of job has: cancel it, dismiss its message, open its files."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import EnumProperty
+
+from ...errors import InputError
+from ...run.child import ERRORS
+from ..shared import viewports
+from ..shared.operators import UnitOperator, open_file, reports_errors
+from .start_child import OWN_FOLDER, JobKind
+
+FILES = {"report": "report.html", "log": "log.ndjson", "errors": f"{OWN_FOLDER}/{ERRORS}", "folder": ""}
+"""What a run leaves in its folder, the folder itself last, by the name that `RUN_FILES` gives it."""
+RUN_FILES = [
+    ("report", "Report", "Report of the run, in the browser"),
+    ("log", "Log", "Every message of the run, as a text in Blender"),
+    ("errors", "Errors", "What the process wrote to its error output, as a text in Blender"),
+    ("folder", "Folder", "Folder of the run"),
+]
+"""What can be opened of a run, as items of a property."""
+
+
+class _Cancel:
+    """Stops the job; greyed out, with the reason, where none runs."""
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if not cls.kind.is_running(cls.find_root(context)):
+            cls.poll_message_set(cls.not_running)
+            return False
+        return True
+
+    def execute(self, context):
+        self.kind.child(self.find_root(context)).cancel()
+        viewports.redraw()
+        return {"FINISHED"}
+
+
+class _Dismiss:
+    def execute(self, context):
+        self.kind.dismiss(self.find_root(context))
+        return {"FINISHED"}
+
+
+class _Open:
+    @reports_errors
+    def execute(self, context):
+        path = self.path_of(self.find_root(context), self.what)
+        if not path.exists():
+            raise InputError("there is no such file yet", str(path), self.first)
+        open_file(context, path)
+        return {"FINISHED"}
+
+
+def job_operators(
+    kind: JobKind,
+    prefix: str,
+    noun: str,
+    *,
+    kept: str,
+    first: str,
+    base: type = UnitOperator,
+    items: list[tuple[str, str, str]] = RUN_FILES,
+    path_of: Callable[[Any, str], Path] | None = None,
+) -> tuple[type, type, type]:
+    """Operator classes mu.PREFIXcancel, mu.PREFIXdismiss and mu.PREFIXopen of a kind of job.
+
+    noun: the job in words; kept: what is left when it is stopped; first: what to do before there is a file;
+    base: operator of the object that has the job; items: what can be opened, its path given by
+    `path_of(root, what)`, by default in the folder of the run.
+    """
+
+    def in_run(root: Any, what: str) -> Path:
+        return kind.folder_of(root) / FILES[what]
+
+    def made(part: type, what: str, text: str, **members: Any) -> type:
+        own = {"__doc__": text, "bl_idname": f"mu.{prefix}{what}", "bl_label": what.capitalize()}
+        own |= {"bl_options": {"REGISTER"}, "kind": kind}
+        return type(f"MU_OT_{prefix}{what}", (part, base, bpy.types.Operator), own | members)
+
+    choice = EnumProperty(name="What", description=f"File or folder of the {noun} to open", items=items)
+    return (
+        made(_Cancel, "cancel", f"Stop the {noun}; {kept}", not_running=f"No {noun} is running"),
+        made(_Dismiss, "dismiss", f"Remove the message of the ended {noun} from the panel"),
+        made(
+            _Open,
+            "open",
+            f"Open a file or the folder of the {noun}",
+            first=first,
+            path_of=staticmethod(path_of or in_run),
+            __annotations__={"what": choice},
+        ),
+    )

@@ -1,0 +1,134 @@
+"""Child processes that this session started: one a job, read by a timer, ended with the session.
+
+What runs is kept here, in Python, and never in the .blend file: a file that is loaded later has no button
+stuck at "running". Nothing here writes to Blender's data.
+"""
+
+from __future__ import annotations
+
+import atexit
+import importlib.util
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+import bpy
+
+from ...errors import InputError
+from ...run.child import RUNNING, Child
+from ...run.interpreter import environment, worker_command
+from ..shared import viewports
+from ..shared.updates import Signal
+
+INTERVAL_S = 0.2
+CHILD_MAIN = Path(__file__).with_name("child_main.py")
+SOLVER = ("warp", "scipy", "cvxopt", "meshio", "matplotlib")
+"""Modules that a simulation cannot do without."""
+OWN_FOLDER = "blender"
+"""Folder within a run's folder for what the child writes to its outputs."""
+
+JOB_ENDED = Signal()
+"""Sent with the key of a job that has ended."""
+
+_children: dict[str, Child] = {}
+
+
+def missing(modules: Sequence[str] = SOLVER) -> list[str]:
+    """Names of those modules that this Blender does not find."""
+    return [name for name in modules if importlib.util.find_spec(name) is None]
+
+
+def start(arguments: Sequence[str], folder: Path, ends_with_parent: bool = False) -> Child:
+    """Start one command line of the core for a run in `folder`; raises MuError. See `Child`."""
+    command = worker_command(CHILD_MAIN, arguments, bpy.app.binary_path)
+    return Child(command, folder / OWN_FOLDER, environment(), ends_with_parent)
+
+
+@attrs.frozen(eq=False)
+class JobKind:
+    """A kind of job that objects of the scene have done for them, one at a time for each object.
+
+    name: what tells the kinds apart; uuid_of, folder_of: identifier of a root object and folder of its run.
+    """
+
+    name: str
+    uuid_of: Callable[[Any], str]
+    folder_of: Callable[[Any], Path]
+
+    def key(self, root: Any) -> str:
+        """Identifier of the job of that object."""
+        return f"{self.uuid_of(root)}:{self.name}"
+
+    def child(self, root: Any) -> Child | None:
+        """The latest child of this session for the object, running or ended, or None."""
+        return child_of(self.key(root))
+
+    def is_running(self, root: Any) -> bool:
+        """Whether the job runs."""
+        return self.key(root) in running()
+
+    def start(self, root: Any, arguments: Sequence[str], folder: Path) -> Child:
+        """Start one command line of the core for the object, its run in `folder`; raises MuError."""
+        if self.is_running(root):
+            raise InputError("this job is running already", str(folder), "wait for it or cancel it")
+        return watch(self.key(root), start(arguments, folder))
+
+    def dismiss(self, root: Any) -> None:
+        """Forget an ended job, so that no panel shows it."""
+        child = self.child(root)
+        if child is not None and child.state != RUNNING:
+            del _children[self.key(root)]
+
+
+def child_of(key: str) -> Child | None:
+    """The latest child of the job of that key, running or ended, or None."""
+    return _children.get(key)
+
+
+def running() -> list[str]:
+    """Keys of the jobs that are running."""
+    return [key for key, child in _children.items() if child.state == RUNNING]
+
+
+def watch(key: str, child: Child) -> Child:
+    """Have the timer read what a child says, as the job of that key."""
+    _children[key] = child
+    if not bpy.app.timers.is_registered(_poll):
+        # Persistent: loading another file does not end a job.
+        bpy.app.timers.register(_poll, first_interval=INTERVAL_S, persistent=True)
+    return child
+
+
+def poll() -> bool:
+    """Read what every child has written; returns whether there was anything new."""
+    news = [child.poll() for child in _children.values()]
+    return any(news)
+
+
+def _poll() -> float | None:
+    before = running()
+    if poll():
+        viewports.redraw()
+    for key in set(before) - set(running()):
+        JOB_ENDED.send(key)
+    return INTERVAL_S if running() else None
+
+
+def _end_all() -> None:
+    for child in _children.values():
+        child.kill()
+
+
+def register() -> None:
+    """Children end with the session that started them."""
+    atexit.register(_end_all)
+
+
+def unregister() -> None:
+    """End every child and its timer."""
+    atexit.unregister(_end_all)
+    _end_all()
+    _children.clear()
+    if bpy.app.timers.is_registered(_poll):
+        bpy.app.timers.unregister(_poll)

@@ -1,0 +1,102 @@
+"""Markers in the view of what a check found: a ball at every place, an arrow along the build direction."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from ..preview import arrays as preview
+from ..preview import colours as materials
+from ..preview import nodes
+from ..shared import viewports
+from ..shared.compat import set_modifier_input
+from ..unit import object as unit_object
+from ..unit.properties import to_unit
+
+FAULTS = ("error", "warning")
+MARK = unit_object.CHECK
+"""Its value on a marker is the finding's number, and `UP` on the arrow along the build direction."""
+UP = "up"
+LARGER = 1.8
+"""How much larger the ball at the place that is looked at is."""
+OF = "mu_check_of"
+"""On that arrow: digest of the check that is marked."""
+MATERIAL = {"error": "MU Flaws", "warning": "MU Doubt"}
+
+
+def marks(root: Any) -> list[Any]:
+    """The objects that show where a check found something."""
+    return [child for child in root.children if MARK in child]
+
+
+def marked(root: Any) -> str:
+    """Digest of the check whose places are marked, or nothing."""
+    return next((obj[OF] for obj in marks(root) if obj[MARK] == UP), "")
+
+
+def clear(root: Any) -> None:
+    """Take the markers out."""
+    for obj in marks(root):
+        unit_object.remove_part(obj)
+    root.mu_print.finding = -1
+
+
+def mark(root: Any, found: Any) -> None:
+    """Put a ball at every place of every error and warning, in place of those that were there."""
+    clear(root)
+    for number, finding in enumerate(found.findings):
+        if finding["severity"] not in FAULTS or not len(finding["places"]):
+            continue
+        name = f"{finding['check'].capitalize()} ({finding['severity']})"
+        obj = _marker(root, name, bpy.data.meshes.new(name), str(number))
+        radius = np.full(len(finding["places"]), root.mu_print.marker)
+        preview.write(obj.data, preview.Skeleton(finding["places"], attributes={"radius": radius}))
+        materials.assign(obj.data, MATERIAL[finding["severity"]])
+        set_modifier_input(nodes.skin(obj, "MU Balls"), "Material", obj.data.materials[0])
+        obj.hide_render = True
+    arrow = _marker(root, "Build Direction", None, UP)
+    arrow[OF] = found.digest
+    arrow.empty_display_type = "SINGLE_ARROW"
+    unit = to_unit(root.mu_unit).dimensions
+    arrow.empty_display_size = 2.0 * unit.cell
+    arrow.location = (0.0, unit.bounds[1][0] - unit.cell, 0.0)
+    arrow.rotation_mode = "QUATERNION"
+    arrow.rotation_quaternion = Vector(found.found["direction"]).to_track_quat("Z", "Y")
+
+
+def _marker(root: Any, name: str, data: Any, value: str) -> Any:
+    obj = bpy.data.objects.new(name, data)
+    obj[MARK] = value
+    for collection in root.users_collection:
+        collection.objects.link(obj)
+    obj.parent = root
+    obj.lock_location = obj.lock_rotation = obj.lock_scale = (True, True, True)
+    obj.show_in_front = True
+    return obj
+
+
+def resize(root: Any) -> None:
+    """Give the markers the radius that is set, and the place that is looked at a larger one."""
+    settings = root.mu_print
+    for obj in marks(root):
+        if obj.data is None:
+            continue
+        values = np.full(len(obj.data.vertices), settings.marker, np.float32)
+        if obj[MARK] == str(settings.finding):
+            values[settings.place % len(values)] *= LARGER
+        obj.data.attributes["radius"].data.foreach_set("value", values)
+        obj.data.update()
+
+
+def frame(root: Any, place: Any, reach: float) -> None:
+    """Turn every 3D view to a place (3,) in mm of the unit's frame, so that `reach` mm around it are seen."""
+    centre = root.matrix_world @ Vector(place)
+    for area in viewports.areas():
+        view = area.spaces.active.region_3d
+        view.view_location = centre
+        view.view_distance = 4.0 * reach
+        if view.view_perspective == "CAMERA":
+            view.view_perspective = "PERSP"

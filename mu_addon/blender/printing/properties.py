@@ -1,0 +1,100 @@
+"""How a unit is to be printed, kept on its root object beside its parameters."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+
+from ...design.assets import asset_names
+from ...design.printing.printer import DEFAULT
+from ..shared.registration import property_group_factory
+from ..unit.properties import BESIDE_BLEND_FILE
+from . import markers
+
+OWN_PRINTER = "own"
+FORMATS = (
+    ("stl", "STL", "The printable solid, mm"),
+    ("3mf", "3MF", "The printable solid with its unit of length"),
+    ("3mf-beams", "Beams", "3MF with the struts as beams, nominal size: not every slicer knows them"),
+    ("step", "STEP", "Cavity, membrane, envelope and waveguide for CAD, nominal size"),
+    ("txt", "TXT", "Nodes of the lattice and the anchors"),
+)
+"""Kinds of files of an export: the core's name, the name here, and what they hold."""
+
+
+class MU_PG_print(bpy.types.PropertyGroup):
+    """How a unit is to be printed, and what is written for it."""
+
+    printer: EnumProperty(
+        name="Printer",
+        description="Whose limits the check compares with",
+        items=[
+            *(
+                (name, name.replace("-", " ").title(), "Comes with the extension")
+                for name in asset_names("printers")
+            ),
+            (
+                OWN_PRINTER,
+                "Own File",
+                "A TOML file of your own; start from printer.toml in the check's folder",
+            ),
+        ],
+        default=DEFAULT,
+    )
+    printer_file: StringProperty(
+        name="Limits",
+        description="TOML file of a printer and its resin",
+        subtype="FILE_PATH",
+        options=BESIDE_BLEND_FILE,
+    )
+    up: FloatVectorProperty(
+        name="Up",
+        description="Build direction in the unit's frame, away from the platform. 0 0 1: inlet down",
+        subtype="XYZ",
+        default=(0.0, 0.0, 1.0),
+    )
+    formats: EnumProperty(
+        name="Files",
+        description="What an export writes; each file is read back and compared",
+        items=[(*item, 1 << number) for number, item in enumerate(FORMATS)],
+        options={"ENUM_FLAG"},
+        default={"stl", "3mf"},
+    )
+    quality: EnumProperty(
+        name="Facets",
+        description="How finely round parts are cut into flat ones",
+        items=[
+            ("export", "Fine", "The quality to print"),
+            ("interactive", "Coarse", "Quicker, smaller files"),
+        ],
+    )
+    compensate: EnumProperty(
+        name="Compensate",
+        description="Whether the drawing is made smaller by what the printer adds",
+        items=[
+            ("none", "Nothing", "The drawing is nominal"),
+            ("unit", "How It Prints", "The offsets of this unit, see How It Prints"),
+            ("gauge", "Gauge", "What calipers found on the printed gauge of the specimens"),
+        ],
+    )
+    gauge: StringProperty(
+        name="Sheet",
+        description="gauge.csv of the specimens with the sizes that were measured",
+        subtype="FILE_PATH",
+        options=BESIDE_BLEND_FILE,
+    )
+    marker: FloatProperty(
+        name="Markers",
+        description="Radius of the balls at the places that were found",
+        subtype="DISTANCE",
+        default=0.8,
+        min=0.05,
+        max=10.0,
+        update=lambda settings, context: markers.resize(settings.id_data),
+    )
+    # Which finding is looked at, and which of its places; -1: none.
+    finding: IntProperty(default=-1, options={"HIDDEN"})
+    place: IntProperty(options={"HIDDEN"})
+
+
+register, unregister = property_group_factory(bpy.types.Object, "mu_print", (MU_PG_print,))

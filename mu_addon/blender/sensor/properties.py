@@ -1,0 +1,102 @@
+"""How a unit's sensor is connected, calibrated and shown: kept on the unit's root object."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from ..shared.registration import property_group_factory
+from ..unit.properties import BESIDE_BLEND_FILE
+from . import state as sensor
+
+
+def _ports(group, context, typed):
+    return [pair for pair in sensor.known_ports() if typed.lower() in " ".join(pair).lower()]
+
+
+def _channels(group, context, typed):
+    session = sensor.of(group.id_data)
+    return [name for name in (session.channels if session else ()) if typed.lower() in name.lower()]
+
+
+def _again(group, context):
+    session = sensor.of(group.id_data)
+    if session is not None:
+        session.traces = None
+
+
+class MU_PG_sensor(bpy.types.PropertyGroup):
+    """How a unit's sensor is connected, calibrated and shown."""
+
+    source: EnumProperty(
+        name="From",
+        description="Where the samples come from",
+        items=[
+            ("port", "Serial Port", "The sensor at a port of this computer"),
+            ("simulated", "Simulated", "A sensor that is not there, bending by 45 degrees every 8 s"),
+            ("replay", "Recording", "A recording as if it came from the sensor"),
+        ],
+    )
+    port: StringProperty(
+        name="Port",
+        description="A port's device, or usb:VID:PID[:SERIAL], which finds it in any socket. Empty: the only "
+        "USB port",
+        search=_ports,
+        search_options={"SUGGESTION"},
+    )
+    baud: IntProperty(name="Baud", description="Bits a second", default=115200, min=300)
+    replay: StringProperty(
+        name="Recording",
+        description="Folder of the recording to play",
+        subtype="DIR_PATH",
+        options=BESIDE_BLEND_FILE,
+    )
+    speed: FloatProperty(
+        name="Speed", description="Times as fast as it was", default=1.0, min=0.01, max=100.0
+    )
+    channel: StringProperty(
+        name="Light",
+        description="Channel of the light. Empty: the first whose name begins with light, or the first",
+        search=_channels,
+        search_options={"SUGGESTION"},
+    )
+    dark: StringProperty(
+        name="Dark",
+        description="Channel of the dark level, or volts. Empty: the first whose name begins with dark, or 0",
+        search=_channels,
+        search_options={"SUGGESTION"},
+    )
+    calibration: StringProperty(
+        name="Calibration",
+        description="A calibration.toml. Empty: the one that was made for this unit",
+        subtype="FILE_PATH",
+        options=BESIDE_BLEND_FILE,
+    )
+    data: StringProperty(
+        name="Sweeps",
+        description="Folder of a recording with angles marked, or of measured data",
+        subtype="DIR_PATH",
+        options=BESIDE_BLEND_FILE,
+    )
+    plot: BoolProperty(name="Plot", description="Draw the signal in the viewport", default=True)
+    seconds: FloatProperty(
+        name="Seconds",
+        description="How much of the past the plot shows",
+        default=10.0,
+        min=1.0,
+        max=600.0,
+        update=_again,
+    )
+    hidden: StringProperty(options={"HIDDEN"})
+    sweep_from: FloatProperty(name="From (deg)", description="Where a sweep begins and ends", default=0.0)
+    sweep_to: FloatProperty(name="To (deg)", description="Where a sweep turns", default=45.0)
+    sweep_step: FloatProperty(
+        name="Step (deg)", description="From one angle held to the next", default=15.0, min=0.5
+    )
+    sweep_times: IntProperty(
+        name="Times", description="How often to and fro: two show how well it repeats", default=2, min=2
+    )
+    known_deg: FloatProperty(name="Angle (deg)", description="The angle at which the unit is held now")
+
+
+register, unregister = property_group_factory(bpy.types.Object, "mu_sensor", (MU_PG_sensor,))

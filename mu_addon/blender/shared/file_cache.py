@@ -1,0 +1,49 @@
+"""What was read from files, kept until one of them changes: panels ask many times a second."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from ...errors import MuError
+
+T = TypeVar("T")
+UNREADABLE = (OSError, ValueError, KeyError, TypeError, MuError)
+"""What reading a file of another kind, or one that is half there, may raise."""
+
+
+class FileCache(Generic[T]):
+    """Results of reading files, by the first of these files; each is read again when a file changes."""
+
+    def __init__(self) -> None:
+        self._kept: dict[Path, tuple[tuple[Any, ...], T | None]] = {}
+
+    def read(self, files: Sequence[Path], read: Callable[[], T]) -> T | None:
+        """What `read()` returns, from memory while no file changed its time or size.
+
+        None where the first file is not there, or where `read` raises one of `UNREADABLE`.
+        """
+        state = tuple(_state(path) for path in files)
+        if state[0] is None:
+            return None
+        kept = self._kept.get(files[0])
+        if kept is None or kept[0] != state:
+            try:
+                kept = state, read()
+            except UNREADABLE:
+                kept = state, None
+            self._kept[files[0]] = kept
+        return kept[1]
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._kept.clear()
+
+
+def _state(path: Path) -> tuple[int, int] | None:
+    try:
+        stat = path.stat()
+    except OSError:
+        return None
+    return stat.st_mtime_ns, stat.st_size

@@ -1,0 +1,89 @@
+"""Base classes of the panels in the sidebar tab MU, and what several of them draw."""
+
+from __future__ import annotations
+
+import textwrap
+
+from ...design.parameters import SECTIONS
+from ...design.quantity import describe
+from ...design.wall import Wall, offered
+from ..unit.object import active_root
+
+# Where a section's parameters are shown. A section that the core gains appears under Design by itself.
+PLACES = {
+    "chambers": "design",
+    "lattice": "lattice",
+    "waveguide": "path",
+    "material": "simulate",
+    "wall": "simulate",
+    "print": "print",
+}
+CHARACTERS = 34
+"""Letters in one line of a panel of usual width: labels do not wrap."""
+
+
+class TabPanel:
+    """A panel in the sidebar tab MU."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "MU"
+
+
+class RootPanel(TabPanel):
+    """A panel of the active root object, see `find_root`; `show(layout, context, root)` fills it."""
+
+    @classmethod
+    def poll(cls, context):
+        return cls.find_root(context) is not None
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        self.show(layout, context, self.find_root(context))
+
+
+class UnitPanel(RootPanel):
+    """A panel of the active unit."""
+
+    bl_parent_id = "MU_PT_unit"
+    bl_options = {"DEFAULT_CLOSED"}
+    find_root = staticmethod(active_root)
+
+
+def wrapped(layout, text: str, icon: str = "NONE", width: int = CHARACTERS) -> None:
+    """Labels that show a text in several lines."""
+    column = layout.column(align=True)
+    column.scale_y = 0.85
+    for paragraph in text.split("\n"):
+        for line in textwrap.wrap(paragraph, width) or [""]:
+            column.label(text=line, icon=icon)
+            icon = "BLANK1" if icon != "NONE" else "NONE"
+
+
+def alert(layout, text: str, icon: str = "ERROR"):
+    """A box in red with a text; returns the box."""
+    box = layout.box()
+    box.alert = True
+    wrapped(box, text, icon)
+    return box
+
+
+def large_button(layout, operator: str, icon: str, **settings) -> None:
+    """The main button of a panel."""
+    row = layout.row()
+    row.scale_y = 1.4
+    row.operator(operator, icon=icon, **settings)
+
+
+def parameters(layout, props, place: str) -> None:
+    """Fields of every section that belongs to a place."""
+    for section in SECTIONS:
+        if PLACES.get(section.section, "design") == place:
+            group = getattr(props, section.section)
+            column = layout.column(align=True)
+            shown = offered(group.law, group.friction_share) if section is Wall else None
+            for d in describe(section):
+                if shown is None or d.name in shown:
+                    column.prop(group, d.name)

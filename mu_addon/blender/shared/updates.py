@@ -1,0 +1,50 @@
+"""Updates after a change: signals to which drawing modules connect, and a pause for setting many values.
+
+Blender fixes a property's update function with its class. A signal lets that function reach what draws the
+property without importing it: the module that draws connects when it is registered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+_pauses = 0
+
+
+class Signal:
+    """Calls every connected function with the root object that has changed."""
+
+    def __init__(self) -> None:
+        self._connected: list[Callable[[Any], Any]] = []
+
+    def connect(self, function: Callable[[Any], Any]) -> None:
+        """Have a function called from now on."""
+        self._connected.append(function)
+
+    def disconnect(self, function: Callable[[Any], Any]) -> None:
+        """Have it called no more."""
+        if function in self._connected:
+            self._connected.remove(function)
+
+    def send(self, root: Any) -> None:
+        """Call every connected function."""
+        for function in self._connected:
+            function(root)
+
+
+@contextmanager
+def paused() -> Iterator[None]:
+    """While the body sets properties, none of them starts a rebuild; the body does that itself."""
+    global _pauses
+    _pauses += 1
+    try:
+        yield
+    finally:
+        _pauses -= 1
+
+
+def are_paused() -> bool:
+    """Whether properties are being set that must start no rebuild."""
+    return _pauses > 0

@@ -1,0 +1,70 @@
+"""The panel Simulate: what is simulated, its progress, and the effects that a diagnosis added."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..jobs import start_child
+from ..jobs.panel import job_state, start_button
+from ..shared.panels import UnitPanel, parameters, wrapped
+from . import effects
+from .job import SIMULATION
+
+
+class MU_PT_simulate(UnitPanel, bpy.types.Panel):
+    """Motion and ranking of paths, in a process of its own"""
+
+    bl_idname = "MU_PT_simulate"
+    bl_label = "Simulate"
+
+    def show(self, layout, context, root):
+        missing = start_child.missing()
+        if missing:
+            box = layout.box()
+            wrapped(
+                box,
+                f"Cannot simulate: {', '.join(missing)} not found in this Blender. Design, solid and export "
+                "work without. Install the extension built for this Blender and system.",
+                "ERROR",
+            )
+        study = root.mu_unit.study
+        layout.prop(study, "command")
+        if study.command == "place":
+            layout.prop(study, "paths")
+        layout.prop(study, "detail")
+        layout.prop(study, "protocol")
+        _effects(layout, root)
+        child = SIMULATION.child(root)
+        start_button(layout, child, "mu.simulate", "PLAY")
+        job_state(layout, child, "see Results")
+        others = [key for key in start_child.running() if key != SIMULATION.key(root)]
+        if others:
+            wrapped(layout, f"{len(others)} other job(s) running", "INFO")
+        header, body = layout.panel("MU_material", default_closed=True)
+        header.label(text="Material")
+        if body:
+            parameters(body, root.mu_unit, "simulate")
+            body.prop(study, "solver")
+            body.prop(study, "device")
+            body.prop(study, "folder")
+
+
+def _effects(layout, root) -> None:
+    """What a diagnosis named beside the unit's parameters, and the direction of gravity where it matters."""
+    lines = effects.lines(root)
+    if not lines:
+        return
+    box = layout.box()
+    row = box.row()
+    row.label(text="With what was found", icon="LIGHT")
+    row.operator("mu.evidence_remove", text="", icon="X")
+    for line in lines:
+        wrapped(box, line)
+    if effects.has_gravity(root):
+        box.prop(root.mu_unit.study, "orientation_deg")
+
+
+CLASSES = (MU_PT_simulate,)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -1,0 +1,88 @@
+"""Layers of laws that fill a membrane's wall, as the unit's [wall] asks for them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..design.quantity import in_MPa
+from .laws import Friction, Layered, NeoHooke, OgdenRoxburgh, Prony, Yeoh
+from .materials import Layer
+
+if TYPE_CHECKING:
+    from ..design.wall import Wall
+
+Array = np.ndarray[Any, Any]
+
+# Across the axis, along which a unit is printed.
+LAYER_NORMAL = (0.0, 0.0, 1.0)
+
+
+def wall_layers(wall: Wall, elements: Array, modulus_MPa: float, poisson: float) -> tuple[Layer, ...]:
+    """Layers in a wall's elements (k,), of its Young's modulus in MPa and Poisson's ratio at small strain.
+
+    The moduli are those after long of a wall that relaxes, and of a wall not stretched before of one that
+    softens; a branch that slides comes on top of them.
+    """
+    (mu, kappa) = NeoHooke.parameters(modulus_MPa, poisson)[0]
+    added, share = layer_stiffness(1 + wall.layers_excess, mu, kappa) if wall.layers_excess else (0.0, 1.0)
+    less = min(added, 0.0)
+    row = law_row(wall, mu + less / 2, kappa + less / 3)
+    found = [_layer(_LAWS[wall.law], elements, row, share)]
+    if added:
+        more = Layered.parameters(max(added, 0.0), -less, LAYER_NORMAL)[0]
+        found.append(_layer(Layered, elements, more, share))
+    if wall.friction_share:
+        sliding = np.array([wall.friction_share * mu, in_MPa(wall.friction_yield_kPa)])
+        found.append(_layer(Friction, elements, sliding))
+    return tuple(found)
+
+
+_LAWS = {"neo-hooke": NeoHooke, "yeoh": Yeoh, "prony": Prony, "ogden-roxburgh": OgdenRoxburgh}
+
+
+def law_row(wall: Wall, mu_MPa: float, kappa_MPa: float) -> Array:
+    """Parameters (count,) of the wall's law for shear and bulk modulus at small strain in MPa."""
+    if wall.law == "neo-hooke":
+        return np.array([mu_MPa, kappa_MPa])
+    # Yeoh's law with c1 = mu/2 alone is neo-Hooke's.
+    c1 = mu_MPa / 2
+    row = [c1, wall.c2_over_c1 * c1, wall.c3_over_c1 * c1, kappa_MPa]
+    if wall.law == "prony":
+        # The law's branches are relative to the modulus after long, the shares g to that at once.
+        rest = 1 - sum(wall.prony_shares)
+        for g, tau in zip(wall.prony_shares, wall.prony_times_s, strict=True):
+            row += [g / rest, tau]
+    elif wall.law == "ogden-roxburgh":
+        row += [wall.mullins_r, in_MPa(wall.mullins_m_kPa), wall.mullins_beta]
+    return np.array(row)
+
+
+def layer_stiffness(ratio: float, shear_MPa: float, bulk_MPa: float) -> tuple[float, float]:
+    """What `Layered` adds along the layers in MPa, and the share of all, that make a wall's layers differ.
+
+    Beside an isotropic law of these moduli the modulus along the layers is then `ratio` times that across,
+    which stays what it was. Below 0: as much across them, with as much less of the isotropic law's shear,
+    which is the same at small strain.
+    """
+    from scipy.optimize import brentq
+
+    lame = bulk_MPa - 2 * shear_MPa / 3
+
+    def moduli(added: float) -> tuple[float, float]:
+        """Young's moduli along and across the layers."""
+        stiffness = np.full((3, 3), lame) + np.diag(2 * shear_MPa + added * np.array([1.0, 1.0, 0.0]))
+        compliance = np.linalg.inv(stiffness)
+        return 1 / compliance[0, 0], 1 / compliance[2, 2]
+
+    def off(added: float) -> float:
+        along, across = moduli(added)
+        return along / across - ratio
+
+    added = float(brentq(off, -1.999 * shear_MPa, 1e4 * shear_MPa, xtol=1e-12 * shear_MPa))
+    return added, moduli(0.0)[1] / moduli(added)[1]
+
+
+def _layer(law: Any, elements: Array, row: Array, weight: float = 1.0) -> Layer:
+    return Layer(law, elements, np.tile(row, (len(elements), 1)), weight)

@@ -1,0 +1,386 @@
+"""Measured data in Blender: checked, diagnosed, shown on the timeline, put into the unit."""
+
+import csv
+import importlib.util
+import json
+import math
+import shutil
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from mu_addon.blender.evidence import motion as evidence_motion
+from mu_addon.blender.evidence import panel as evidence_panel
+from mu_addon.blender.evidence import state as evidence
+from mu_addon.blender.simulate import effects
+from mu_addon.blender.simulate import panel as panels
+from mu_addon.blender.simulate import study_folder as studies
+from mu_addon.blender.simulate.job import SIMULATION
+from mu_addon.blender.unit import object as unit_object
+from mu_addon.blender.unit.properties import to_unit
+from mu_addon.evidence.extended import ExtendedModel, Fitted
+from mu_addon.fem.protocol import read_protocol
+from mu_addon.measured import read_folder
+
+from .acting import add, refused
+from .drawing import drawn as drawn_by
+from .jobs import ended, fake, watch
+
+
+def diagnose(root):
+    assert bpy.ops.mu.evidence_diagnose() == {"FINISHED"}
+    child = evidence.DIAGNOSIS.child(root)
+    ended(child)
+    assert child.state == "done", child.error
+
+
+def parts(root):
+    return {part["mu_evidence_part"]: part for part in evidence_motion.parts(root)}
+
+
+def drawn(*more):
+    return drawn_by([evidence_panel.MU_PT_evidence, *more])
+
+
+def test_a_folder_is_checked_as_it_is_chosen(blocks):
+    root, data = add(), blocks
+    assert "Choose a folder with experiments.toml" in drawn()
+    assert not bpy.ops.mu.evidence_diagnose.poll()
+    root.mu_evidence.folder = str(data / "none")
+    assert "cannot read experiments.toml" in drawn()
+    assert not bpy.ops.mu.evidence_diagnose.poll()
+    root.mu_evidence.folder = str(data)
+    assert "0.75x: 4 rows" in drawn()
+    assert "1.5x: 4 rows" in drawn()
+    assert "Not diagnosed yet" in drawn()
+    assert bpy.ops.mu.evidence_diagnose.poll()
+    assert not bpy.ops.mu.evidence_apply.poll()
+    table = data / "block_1.csv"
+    good = table.read_text()
+    table.write_text(good.replace("0.1,", "0.1,much"))
+    # Where a line is broken depends on how long the folder's name is.
+    assert "isnotanumber" in "".join(drawn().split())
+    assert "block_1.csv,row" in "".join(drawn().split())
+    table.write_text(good)
+    assert "1.5x: 4 rows" in drawn()
+
+
+def test_from_data_to_a_unit_that_has_what_was_found(blocks, tmp_path):
+    """The whole way with a real diagnosis; undone, saved, found again, and stale once the data change."""
+    folder = tmp_path
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "seat.blend"))
+    root = add()
+    root.mu_evidence.folder = "//data"
+    diagnose(root)
+    assert evidence.folder_of(root).parent == studies.folder_of(root)
+    said = drawn()
+    assert "Named: overcure" in said, said
+    assert "95 %" in said, said
+    assert "Stale" not in said, said
+    assert "p = " in said or "p < " in said
+    assert bpy.ops.mu.evidence_open(what="errors") == {"FINISHED"}
+    assert "No unit under pressure" in refused(bpy.ops.mu.evidence_motion, experiment="1x")
+
+    found = json.loads((evidence.folder_of(root) / "verdict.json").read_text())
+    offset = found["causes"][0]["parameters"]["offset_mm"]["value"]
+    bpy.ops.ed.undo_push(message="diagnosed")
+    assert bpy.ops.mu.evidence_apply() == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="applied")
+    printed = to_unit(root.mu_unit).print
+    assert abs(printed.offset_xy_mm - offset) < 1e-6
+    assert not unit_object.behind(root)
+    assert "The unit has it: every printed surface moves outward" in drawn().replace("  ", " ")
+    assert not bpy.ops.mu.evidence_apply.poll(), "given twice it would count twice"
+    bpy.ops.ed.undo()
+    root = unit_object.active_root(bpy.context)
+    assert to_unit(root.mu_unit).print.offset_xy_mm == 0.0
+    assert bpy.ops.mu.evidence_apply.poll()
+    bpy.ops.ed.redo()
+    root = unit_object.active_root(bpy.context)
+    assert abs(to_unit(root.mu_unit).print.offset_xy_mm - offset) < 1e-6
+
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+    (root,) = unit_object.roots()
+    assert "Named: overcure" in drawn()
+    assert not bpy.ops.mu.evidence_apply.poll()
+    table = blocks / "block_1.csv"
+    table.write_text(table.read_text().replace("0.1,", "0.11,"))
+    assert "Stale: it is of other measured data" in drawn()
+    assert "The diagnosis is stale: it is of other measured data" in refused(bpy.ops.mu.evidence_apply)
+
+
+def test_a_diagnosis_that_fails_and_one_that_is_stopped(blocks):
+    root = add()
+    root.mu_evidence.folder = str(blocks)
+
+    def start(how):
+        return fake(evidence.DIAGNOSIS, root, how)
+
+    for how, expected in {"told_error": "thicker wall", "crash": "SIGSEGV", "good": "see below"}.items():
+        child = start(how)
+        ended(child)
+        assert expected in drawn(), (how, drawn())
+        assert bpy.ops.mu.evidence_dismiss() == {"FINISHED"}
+        assert expected not in drawn()
+    child = start("hang")
+    watch(lambda: child.progress)
+    assert "0.50 Model A" in drawn()
+    assert "mu.evidence_cancel" in drawn()
+    assert not bpy.ops.mu.evidence_diagnose.poll()
+    # The unit's own simulation is another one.
+    assert SIMULATION.child(root) is None
+    assert not bpy.ops.mu.cancel.poll()
+    assert bpy.ops.mu.evidence_cancel() == {"FINISHED"}
+    ended(child)
+    assert "Cancelled" in drawn()
+    assert not bpy.ops.mu.evidence_cancel.poll()
+    assert "there is no such file" in refused(bpy.ops.mu.evidence_open, what="report")
+
+
+def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
+    """Applied, undone, saved, simulated, changed and removed; found again as what the results are of."""
+
+    folder = tmp_path
+    shutil.copytree(clogged / "study", folder / "study")
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "seat.blend"))
+    root = add()
+    root.mu_evidence.folder, root.mu_unit.study.folder = str(clogged / "data"), "//study"
+    study = root.mu_unit.study
+    study.command, study.detail = "simulate", "quick"
+    unit = to_unit(root.mu_unit)
+    assert effects.arguments(root, folder) == []
+    assert "With what was found" not in drawn(panels.MU_PT_simulate)
+    assert "no effects beside" in refused(bpy.ops.mu.evidence_remove)
+    bpy.ops.ed.undo_push(message="diagnosed")
+    assert bpy.ops.mu.evidence_apply() == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="applied")
+    assert to_unit(root.mu_unit).chambers == unit.chambers
+    share = json.loads((folder / "study/evidence/verdict.json").read_text())
+    share = share["causes"][0]["parameters"]["share_lost"]["value"]
+    (line,) = effects.lines(root)
+    assert line.startswith(f"clogged chamber, share lost: {share:.4g} (")
+    assert " to " in line
+    said = drawn(panels.MU_PT_simulate)
+    assert "With what was found" in said, said
+    assert "clogged chamber, share lost: 0.5" in said, said
+    assert "The unit has it: all moduli" in said, said
+    assert "the last chamber lacks" in said, said
+    assert not bpy.ops.mu.evidence_apply.poll()
+    # Pressure alone knows no direction.
+    assert not effects.has_gravity(root)
+    assert "--orientation" not in effects.arguments(root, folder)
+
+    bpy.ops.ed.undo()
+    root = unit_object.active_root(bpy.context)
+    assert effects.inputs(root) == {}
+    assert bpy.ops.mu.evidence_apply.poll()
+    bpy.ops.ed.redo()
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+    (root,) = unit_object.roots()
+    asked = {"effects": {"clogged_chamber": {"share_lost": share}}}
+    assert effects.inputs(root) == asked
+    assert "The unit has it" in drawn(panels.MU_PT_simulate)
+
+    def simulated():
+        assert bpy.ops.mu.simulate() == {"FINISHED"}
+        child = SIMULATION.child(root)
+        ended(child)
+        assert child.state == "done", child.error
+        return studies.findings(root)
+
+    found = simulated()
+    assert not found.stale
+    assert found.summary["study"]["effects"] == asked["effects"]
+    root.mu_unit.study.orientation_deg = 90.0
+    assert not studies.findings(root).stale
+
+    # Weight has a direction, and results of another one are stale.
+    known = Fitted(1300.0, 50.0, 1200.0, 1400.0, "kg/m3")
+    effects.keep(root, ExtendedModel("named", {"gravity": {"density_kg_m3": known}}, {}).text())
+    assert studies.findings(root).stale
+    assert "gravity, density: 1300 kg/m3 (1200 to 1400)" in drawn(panels.MU_PT_simulate).replace("  ", " ")
+    level = simulated()
+    assert not level.stale
+    assert level.summary["study"]["orientation_deg"] == 90.0
+    assert dict(level.angles)[0.0] < -0.5
+    root.mu_unit.study.orientation_deg = -90.0
+    assert studies.findings(root).stale
+    assert bpy.ops.mu.evidence_remove() == {"FINISHED"}
+    assert studies.findings(root).stale
+    assert "With what was found" not in drawn(panels.MU_PT_simulate)
+    assert effects.arguments(root, folder) == []
+
+
+def opened(clogged):
+    """A unit with the diagnosed data; returns it, the scene and the experiments."""
+    bpy.context.preferences.edit.use_global_undo = True
+    root = add()
+    root.mu_evidence.folder, root.mu_unit.study.folder = str(clogged / "data"), str(clogged / "study")
+    scene = bpy.context.scene
+    scene.render.fps, scene.render.fps_base = 30, 1.001
+    return root, scene, read_folder(clogged / "data").experiments
+
+
+def test_measured_and_simulated_motion_on_the_timeline(clogged):
+
+    root, scene, measured = opened(clogged)
+    first = measured[0]
+
+    assert "Named: clogged chamber" in drawn()
+    assert not evidence.diagnosis(root).stale
+    assert bpy.ops.mu.evidence_motion(experiment=first.name) == {"FINISHED"}
+    found = parts(root)
+    assert {"measured|angle", "model|angle", "extended|angle", "|dial", "measured|marker 1"} <= set(found)
+    assert all(part.type == "MESH" for mark, part in found.items() if mark != "|frame")
+    table = list(csv.DictReader((clogged / "study/evidence/residuals.csv").open()))
+    table = [r for r in table if r["experiment"] == first.name]
+    angle = {r["row"]: r for r in table if r["channel"] == "angle_deg"}
+    for i in (0, 7, len(first) - 1):
+        frame = scene.frame_start + (first["time_s"][i] - first["time_s"][0]) * 30 / 1.001
+        scene.frame_set(int(frame), subframe=frame % 1)
+        time, said = evidence_motion.reading(root, scene)
+        assert abs(time - first["time_s"][i]) < 1e-3
+        row = angle[str(first.rows[i])]
+        # Single precision of a frame, at some tens of degrees a second.
+        for series, column in (
+            ("measured", "measured"),
+            ("model", "base_model"),
+            ("extended", "extended_model"),
+        ):
+            assert abs(said[series] - float(row[column])) < 0.02, (series, said, row)
+        assert np.abs(np.array(found["measured|marker 1"].location) - first.markers[1][i]).max() < 1e-2
+        (y,) = (r for r in table if r["channel"] == "marker1_y_mm" and r["row"] == str(first.rows[i]))
+        assert abs(found["extended|marker 1"].location[1] - float(y["extended_model"])) < 1e-2
+        # To the side with more lattice for a positive angle: the needle's point.
+        needle = found["measured|angle"]
+        bpy.context.view_layer.update()
+        point = needle.matrix_world @ needle.data.vertices[2].co
+        tilt = math.degrees(math.atan2(*(point - needle.matrix_world.translation).yz))
+        assert abs(tilt - said["measured"]) < 1e-3
+    assert scene.frame_end >= frame - 1
+    assert bpy.ops.mu.evidence_protocol(experiment=first.name) == {"FINISHED"}
+    played = read_protocol(Path(root.mu_unit.study.protocol))
+    assert np.allclose(played.pressure_kPa[1:], first["pressure_kPa"][1:])
+    assert played.time_s[-1] == first["time_s"][-1] - first["time_s"][0]
+    assert "measured " in drawn()
+    assert "extended model " in drawn()
+
+
+def test_motion_is_kept_undone_replaced_and_leaves_nothing_behind(tmp_path, clogged):
+
+    root, _, measured = opened(clogged)
+    first = measured[0]
+
+    bpy.ops.ed.undo_push(message="start")
+    assert bpy.ops.mu.evidence_motion(experiment=first.name) == {"FINISHED"}
+    count = len(evidence_motion.parts(root))
+    assert bpy.ops.mu.evidence_motion(experiment=measured[1].name) == {"FINISHED"}
+    assert evidence_motion.shown(root) == measured[1].name
+    assert bpy.ops.mu.rebuild() == {"FINISHED"}
+    assert len(evidence_motion.parts(root)) == count
+    meshes, actions = len(bpy.data.meshes), len(bpy.data.actions)
+    assert bpy.ops.mu.evidence_motion(experiment=first.name) == {"FINISHED"}
+    assert (len(bpy.data.meshes), len(bpy.data.actions)) == (meshes, actions)
+    bpy.ops.ed.undo_push(message="shown")
+    bpy.ops.ed.undo()
+    root = unit_object.active_root(bpy.context)
+    assert evidence_motion.parts(root) == []
+    bpy.ops.ed.redo()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "seat.blend"))
+    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+    (root,) = unit_object.roots()
+    assert evidence_motion.shown(root) == first.name
+    bpy.context.scene.frame_set(20)
+    assert "measured" in evidence_motion.reading(root, bpy.context.scene)[1]
+    # Other parameters: what was predicted for the unit as it was is not shown any more.
+    root.mu_unit.chambers.wall_mm = 1.0
+    assert "Stale: it is of the unit with other parameters" in drawn()
+    assert bpy.ops.mu.evidence_motion(experiment=first.name) == {"FINISHED"}
+    assert {mark.partition("|")[0] for mark in parts(root)} == {"", "measured"}
+    assert bpy.ops.mu.evidence_motion(experiment="") == {"FINISHED"}
+    assert evidence_motion.parts(root) == []
+    assert not bpy.data.actions
+    assert "was measured as 'none'" in refused(bpy.ops.mu.evidence_motion, experiment="none")
+    bpy.ops.mu.evidence_motion(experiment=first.name)
+    bpy.ops.mu.delete()
+    assert not [o for o in bpy.data.objects if o.get("mu_evidence_part")]
+
+
+def test_what_was_not_seen_is_not_there(tmp_path):
+    """A marker and an angle lost for a while: their objects vanish for as long, and come back."""
+    folder = tmp_path / "data"
+    folder.mkdir()
+    time = np.arange(30) / 10
+    lost = (time > 0.95) & (time < 1.55)
+    rows = []
+    for t, gone in zip(time, lost, strict=True):
+        values = ["", "", ""] if gone else [f"{10 * t:g}", f"{5 * t:g}", "75"]
+        rows.append(",".join([f"{t:g}", f"{4 * t:g}", *values]))
+    head = "time_s,pressure_kPa,angle_deg,marker2_y_mm,marker2_z_mm"
+    (folder / "a.csv").write_text("\n".join([head, *rows]) + "\n")
+    (folder / "experiments.toml").write_text(
+        '[[experiment]]\nname = "gap"\nkind = "unit_pressure"\nfile = "a.csv"\nrole = "fit"\n'
+    )
+    assert len(read_folder(folder).experiments[0]) == 30
+    root = add()
+    root.mu_evidence.folder = str(folder)
+    scene = bpy.context.scene
+    scene.render.fps = 10
+    assert bpy.ops.mu.evidence_motion(experiment="gap") == {"FINISHED"}
+    found = parts(root)
+    assert {name.partition("|")[0] for name in found} == {"", "measured"}
+    for frame in range(1, 31):
+        scene.frame_set(frame)
+        gone = 10 <= frame - 1 <= 15
+        assert found["measured|angle"].hide_viewport == gone, frame
+        assert found["measured|marker 2"].hide_render == gone
+        assert evidence_motion.reading(root, scene)[1].keys() == (set() if gone else {"measured"})
+        if not gone:
+            assert abs(found["measured|marker 2"].location[1] - 0.5 * (frame - 1)) < 1e-4
+            assert found["measured|marker 2"].location[0] == 0.0
+    assert "6 of 30 values of angle_deg are missing" in drawn()
+
+
+def test_without_the_solver_measured_motion_is_shown_and_the_panel_says_why(blocks, monkeypatch):
+
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name, *a: None if name == "warp" else find(name, *a)
+    )
+    root = add()
+    root.mu_evidence.folder = str(blocks)
+    assert "1x: 4 rows" in drawn()
+    assert "Not in this Blender: warp" in refused(bpy.ops.mu.evidence_diagnose)
+
+
+def test_the_verdict_files_are_read_as_diagnose_writes_them(clogged):
+    """What the panel shows stands in the files under these names."""
+    found = json.loads((clogged / "study" / "evidence" / "verdict.json").read_text())
+    summary = json.loads((clogged / "study" / "evidence" / "summary.json").read_text())
+    assert {"verdict", "causes", "gain", "residual_table"} <= found.keys()
+    assert {"headline", "sentence", "next", "status"} <= summary.keys()
+    assert {"against", "p_value", "where"} <= found["residual_table"][0].keys()
+
+
+def test_a_diagnosis_that_was_broken_off_shows_no_verdict(tmp_path, clogged):
+    """Its files are there in part: verdict.json is written before the run ends."""
+
+    root, _, measured = opened(clogged)
+    first = measured[0]
+
+    shutil.copytree(clogged / "study", tmp_path / "study")
+    root.mu_unit.study.folder = str(tmp_path / "study")
+    assert "Named: clogged chamber" in drawn()
+    path = tmp_path / "study/evidence/summary.json"
+    path.write_text(json.dumps({"status": "running"}))
+    assert "The diagnosis is not finished" in drawn()
+    assert "clogged" not in drawn()
+    assert "Diagnose the measured data first" in refused(bpy.ops.mu.evidence_apply)
+    assert list(evidence.course(root, first.name).series) == ["measured"]
+    path.write_text("{")
+    assert "The diagnosis is not finished" in drawn()

@@ -1,0 +1,245 @@
+"""A gripper in Blender: drawn from the core's parameters, sent to grasp, its grasp on the timeline."""
+
+import json
+
+import bpy
+import numpy as np
+import pytest
+
+from mu_addon.blender.gripper import motion as grasp_motion
+from mu_addon.blender.gripper import object as gripper_object
+from mu_addon.blender.gripper import panel as gripper_panel
+from mu_addon.blender.gripper import state as grasps
+from mu_addon.blender.gripper.properties import to_gripper
+from mu_addon.blender.results import motion as motion_parts
+from mu_addon.blender.unit import object as unit_object
+from mu_addon.design.gripper import load_gripper, read_gripper
+from mu_addon.design.gripper import to_toml as gripper_toml
+from mu_addon.design.parameters import to_toml
+from mu_addon.files import write_npz
+from mu_addon.report.pc2 import write_pc2
+from mu_addon.usecases.grip.grasp import Grip
+
+from .acting import add, refused
+from .drawing import drawn as drawn_by
+from .jobs import ended, fake, watch
+
+PANELS = gripper_panel.CLASSES
+
+
+def held(**settings):
+    assert bpy.ops.mu.gripper_add(**settings) == {"FINISHED"}
+    bpy.context.view_layer.update()
+    return gripper_object.active(bpy.context)
+
+
+def world(obj):
+    at = motion_parts.vertices_of(obj.data)
+    matrix = np.array(obj.matrix_world)
+    return at @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def drawn():
+    return drawn_by(PANELS)
+
+
+def test_two_fingers_face_each_other_over_the_plate():
+    root = held()
+    assert root.mu_gripper.trouble == ""
+    assert not unit_object.roots()
+    assert abs(bpy.context.scene.unit_settings.scale_length - 0.001) < 1e-9
+    for gap in (30.0, 40.0):
+        root.mu_gripper.fingers.gap_mm = gap
+        bpy.context.view_layer.update()
+        bars = [world(gripper_object.part(root, f"finger:{s}:waveguide")) for s in ("left", "right")]
+        assert np.allclose(bars[0] * [-1, -1, 1], bars[1], atol=1e-4), "each half a turn from the other"
+        inner = [world(gripper_object.part(root, f"finger:{s}:lattice"))[:, 1] for s in ("left", "right")]
+        # Struts end at the envelope's faces: the gap is between those.
+        assert abs(inner[1].min() - inner[0].max() - gap) < 1e-3
+    plate, cube = (world(gripper_object.part(root, name)) for name in ("plate", "cube"))
+    assert plate[:, 2].max() == 0.0
+    assert abs(plate[:, 2].min() + 5.0) < 1e-6
+    assert np.allclose(cube.min(axis=0), [-12.5, -12.5, 75 + 3 - 12.5], atol=1e-4)
+    root.mu_gripper.cube_mm = 12.5
+    assert np.allclose(np.ptp(world(gripper_object.part(root, "cube")), axis=0), 12.5, atol=1e-4)
+    # It is the user's to move, along the fingers, and stays there.
+    moved = gripper_object.part(root, "cube")
+    assert tuple(moved.lock_location) == (True, True, False)
+    moved.location.z = 80.3
+    root.mu_gripper.cube_mm = 20.0
+    bpy.context.view_layer.update()
+    assert np.allclose(world(moved).mean(axis=0), [0, 0, 80.3], atol=1e-4)
+    assert gripper_object.beyond_mm(root) == 5.3
+
+    root.mu_gripper.plate.hole_diameter_mm = 9.0
+    assert "leave too little" in root.mu_gripper.trouble
+    assert "leave too little" in drawn()
+    assert "leave too little" in refused(bpy.ops.mu.grasp)
+    root.mu_gripper.plate.hole_diameter_mm = 4.0
+    assert root.mu_gripper.trouble == ""
+    assert bpy.ops.mu.grasp.poll()
+    assert bpy.ops.mu.gripper_delete() == {"FINISHED"}
+    assert not bpy.data.objects
+    assert "Add > Mesh > Monolithic Gripper" in refused(bpy.ops.mu.gripper_delete)
+
+
+def test_its_fingers_may_be_a_unit_of_ones_own(tmp_path):
+    unit = add(preset="mu-0.75x")
+    unit.mu_unit.chambers.wall_mm = 1.1
+    bpy.ops.mu.path(name="alpha3")
+    root = held(of_unit=True)
+    core = to_gripper(root.mu_gripper)
+    assert (core.unit.scale, core.unit.chambers.wall_mm, core.path) == (0.75, 1.1, "alpha3")
+    # The active object decides whether unit or gripper is worked on.
+    assert gripper_object.active(bpy.context) == root
+    bpy.context.view_layer.objects.active = unit
+    assert gripper_object.active(bpy.context) is None
+    unit.mu_unit.chambers.wall_mm = 0.9
+    assert to_gripper(root.mu_gripper).unit.chambers.wall_mm == 1.1
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "seat.blend"))
+    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+    (root,) = gripper_object.roots()
+    assert to_gripper(root.mu_gripper) == core
+
+
+def test_what_a_grasp_is_asked_and_how_it_ends(tmp_path):
+    root = held()
+    props = root.mu_gripper
+    props.folder, props.cube_mm, props.friction = str(tmp_path / "out"), 20.0, 0.3
+    props.fingers.gap_mm = 26.5
+    line = grasps.arguments(root)
+    assert line[0] == "grip"
+    assert line[line.index("--cube") + 1] == "20"
+    assert line[line.index("--beyond") + 1] == "3"
+    assert line[line.index("--friction") + 1] == "0.3"
+    assert "--coarse" in line
+    assert "--no-paths" in line
+    assert read_gripper(line[line.index("--gripper") + 1]).fingers.gap_mm == 26.5
+    props.detail = "part"
+    assert "--solid-only" in grasps.arguments(root)
+    assert "--cube" not in grasps.arguments(root)
+    assert "was not grasped yet" in drawn()
+    assert "there is no grasp" in refused(bpy.ops.mu.grasp_show)
+
+    child = fake(grasps.GRASP, root, "hang")
+    watch(lambda: child.progress)
+    assert "0.50 Model A" in drawn()
+    assert "mu.grasp_cancel" in drawn()
+    assert "job of this gripper is running" in refused(bpy.ops.mu.grasp)
+    assert bpy.ops.mu.grasp_cancel() == {"FINISHED"}
+    ended(child)
+    assert "Cancelled" in drawn()
+    assert bpy.ops.mu.grasp_dismiss() == {"FINISHED"}
+    assert "Cancelled" not in drawn()
+    child = fake(grasps.GRASP, root, "crash")
+    ended(child)
+    assert "SIGSEGV" in drawn()
+    assert bpy.ops.mu.grasp_open(what="errors") == {"FINISHED"}
+
+
+def write_folder(folder):
+    """What `grip` leaves of a grasp of 20 mm in 2 s: a triangle a finger, which goes 5 mm inward and back."""
+    gripper = load_gripper("gripper")
+    (folder / "cube-20").mkdir(parents=True)
+    (folder / "gripper.toml").write_text(gripper_toml(gripper, "unit.toml"), encoding="utf-8")
+    (folder / "unit.toml").write_text(to_toml(gripper.unit), encoding="utf-8")
+    cubes = "cubes = [{ side_mm = 20.0, density_g_per_ml = 1.24 }]"
+    (folder / "grip.toml").write_text(f"{cubes}\n[grip]\nfriction = 0.5\nbeyond_mm = 3.0\n", encoding="utf-8")
+    figures = {"angle_at_hold_deg": 12.3, "normal_at_hold_N": 0.45, "held": True, "margin": 4.0}
+    figures["gap_error_mm"] = 0.02
+    (folder / "summary.json").write_text(json.dumps({"grasps": {"20": figures}}), encoding="utf-8")
+    rows = ["phase,time_s,normal_N", "i,0,0", "ii,1,0.5", "v,2,0"]
+    (folder / "grasp_20.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    triangle = np.array([[0.0, 0.0, 0.0], [0.0, 10.0, 0.0], [0.0, 0.0, 10.0]])
+    apart = np.array([0.0, 30.0, 0.0])
+    rest = np.array([triangle - apart, triangle + apart])
+    way = np.array([0.0, 5.0, 0.0])[:, None, None] * [0.0, 1.0, 0.0]
+    for side, at, inward in (("left", rest[0], 1.0), ("right", rest[1], -1.0)):
+        write_pc2(folder / "cube-20" / f"{side}.pc2", at + inward * way, 0.0, 1.0)
+    write_npz(
+        folder / "cube-20" / "gripper.npz",
+        {
+            "rest_mm": rest.astype(np.float32),
+            "triangles": np.array([[0, 1, 2]], np.int32),
+            "membrane": np.array([True]),
+            "time_s": np.array([0.0, 1.0, 2.0]),
+            "cube_mm": np.array([[0.0, 0.0, 98.0], [0.0, 0.0, 78.0], [0.0, 0.0, 79.0]]),
+            "cube_side_mm": np.array(20.0),
+        },
+    )
+
+
+def test_a_grasp_plays_on_the_timeline(tmp_path):
+    write_folder(tmp_path / "out")
+    root = held()
+    props = root.mu_gripper
+    props.folder = str(tmp_path / "out")
+    assert grasps.of(root) is None, "another cube"
+    props.cube_mm = 20.0
+    found = grasps.of(root)
+    assert not found.stale
+    assert "12.3 deg, 0.45 N" in drawn()
+    assert "Held: 4 times its weight" in drawn()
+    scene = bpy.context.scene
+    scene.render.fps = 10
+    assert bpy.ops.mu.grasp_show() == {"FINISHED"}
+    left, right, cube = grasp_motion.parts(root)
+    assert scene.frame_end == 21
+    for frame, way, height, said in (
+        (1, 0.0, 98.0, "i, opening: 0.00 N"),
+        (6, 2.5, 88.0, "0.25 N"),
+        (11, 5.0, 78.0, "ii, closing: 0.50 N"),
+        (21, 0.0, 79.0, "v, rel"),
+    ):
+        scene.frame_set(frame)
+        graph = bpy.context.evaluated_depsgraph_get()
+        moved = [motion_parts.vertices_of(o.evaluated_get(graph).data) for o in (left, right)]
+        assert np.allclose(moved[0][:, 1].min(), -30 + way, atol=1e-3), frame
+        assert np.allclose(moved[1][:, 1].min(), 30 - way, atol=1e-3), frame
+        assert abs(cube.matrix_world.translation.z - height) < 1e-3, frame
+        assert said in drawn(), drawn()
+    assert gripper_object.part(root, "cube").hide_viewport
+    assert not cube.hide_viewport
+    assert bpy.ops.mu.grasp_show() == {"FINISHED"}
+    assert len(grasp_motion.parts(root)) == 3
+    bpy.ops.mu.grasp_show(on=False)
+    assert not grasp_motion.parts(root)
+    assert not gripper_object.part(root, "cube").hide_viewport
+    for name, value in (("friction", 0.4), ("density_g_per_ml", 1.0), ("path", "alpha3")):
+        before = getattr(props, name)
+        setattr(props, name, value)
+        assert grasps.of(root).stale, name
+        assert "Stale" in drawn(), name
+        setattr(props, name, before)
+        assert not grasps.of(root).stale
+    gripper_object.part(root, "cube").location.z += 2.0
+    assert grasps.of(root).stale
+    assert "Stale" in drawn()
+
+
+def test_the_cube_is_drawn_where_the_core_puts_it():
+    assert Grip().beyond_mm == 3.0, "gripper_object.BEYOND_MM, which the first test here sees drawn"
+
+
+@pytest.mark.slow
+def test_a_coarse_grasp_from_start_to_timeline(tmp_path):
+    root = held()
+    props = root.mu_gripper
+    props.folder, props.cube_mm = str(tmp_path / "out"), 25.0
+    assert bpy.ops.mu.grasp() == {"FINISHED"}
+    child = grasps.GRASP.child(root)
+    ended(child)
+    assert child.state == "done", child.error
+    found = grasps.of(root)
+    assert not found.stale
+    assert found.figures["normal_at_hold_N"] > 0
+    assert bpy.ops.mu.grasp_show() == {"FINISHED"}
+    left, _, cube = grasp_motion.parts(root)
+    hold = found.columns["time_s"][max(i for i, p in enumerate(found.phase) if p == "iii")]
+    bpy.context.scene.frame_set(1 + round(24 * hold))
+    graph = bpy.context.evaluated_depsgraph_get()
+    at = motion_parts.vertices_of(left.evaluated_get(graph).data)
+    # The finger is wider than the cube: beside it, it bulges past the cube's face.
+    beside = (np.abs(at[:, 0]) < 12.5) & (np.abs(at[:, 2] - cube.matrix_world.translation.z) < 12.5)
+    inner = at[beside, 1].max()
+    assert abs(inner + 12.5) < 0.3, f"the left finger's face lies on the cube's: {inner}"

@@ -1,0 +1,284 @@
+"""Results on the model: objects, attributes, timeline and panels, from a study that was run by the core."""
+
+import bpy
+import numpy as np
+
+from mu_addon.blender.path import ranking
+from mu_addon.blender.results import fields, legend_object
+from mu_addon.blender.results import motion as motion_parts
+from mu_addon.blender.results import panel as results_panel
+from mu_addon.blender.shared.compat import modifier_input
+from mu_addon.blender.unit import live_update as live
+from mu_addon.blender.unit import object as unit_object
+
+from .acting import add, refused
+from .drawing import drawn
+
+
+def started(study):
+    root = add(preset="mu-0.75x")
+    root.mu_unit.study.folder = str(study)
+    return root
+
+
+def show(**settings):
+    assert bpy.ops.mu.motion(**settings) == {"FINISHED"}
+
+
+def values(mesh, name):
+    found = np.empty(len(mesh.vertices), np.float32)
+    mesh.attributes[name].data.foreach_get("value", found)
+    return found
+
+
+def evaluated(part):
+    bpy.context.view_layer.update()
+    return part.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+
+
+def moved(part):
+    return np.linalg.norm(
+        motion_parts.vertices_of(evaluated(part)) - motion_parts.vertices_of(part.data), axis=1
+    )
+
+
+def test_motion_plays_in_its_own_time_and_carries_its_fields(study):
+    root = started(study)
+    show(name="model_a")
+    show(name="alpha4")
+    scene, motion = bpy.context.scene, motion_parts.motion_of(root)
+    assert motion_parts.shown(root) == [("model_a", "mesh"), ("alpha4", "mesh")]
+    assert scene.frame_end == 289  # 12 s at 24 frames a second, from frame 1
+    part = motion_parts.one(root, "model_a", "mesh")
+    for rate, frame in ((24, 1), (24, 193), (24, 205), (12, 97), (25, 201)):
+        scene.render.fps = rate
+        scene.frame_set(frame)
+        time = (frame - 1) / rate
+        first, second, share = motion.at(time)
+        own = {"Model A membrane": "membrane", "Model A lattice": "lattice"}[part.name]
+        skin = motion.skin(own, True)
+        u = (1 - share) * motion.model_a[first] + share * motion.model_a[second]
+        expected = skin.of_nodes(motion.mesh.nodes + u)
+        assert np.abs(motion_parts.vertices_of(evaluated(part)) - expected).max() < 1e-4, (rate, frame)
+        # At a sample, what the attribute says is how far the point is from where it was.
+        if share == 0.0:
+            assert np.allclose(moved(part), values(evaluated(part), "displacement_mm"), atol=1e-4)
+        mises = motion.fields[own]["von_mises_kPa"]
+        between = (1 - share) * mises[first] + share * mises[second]
+        assert np.allclose(values(part.data, "von_mises_kPa"), between, atol=1e-3)
+    other = motion_parts.one(root, "alpha4", "mesh")
+    stress = [values(mesh, "von_mises_kPa") for mesh in (other.data, part.data)]
+    assert not np.allclose(*stress, rtol=0.02)
+    assert values(other.data, "deviation_mm").max() > 1e-3
+    assert not values(part.data, "deviation_mm").any()
+    assert other.location.y < part.location.y < 0.0
+    root.mu_motion.apart = 0.0
+    assert other.location.y == part.location.y == 0.0
+    assert bpy.ops.mu.motion(name="model_a", on=False) == {"FINISHED"}
+    assert motion_parts.shown(root) == [("alpha4", "mesh")]
+    assert bpy.ops.mu.motion_clear() == {"FINISHED"}
+    assert motion_parts.parts(root) == []
+
+
+def test_colours_follow_the_range_and_grey_is_what_is_not_known(study):
+    root = started(study)
+    show(name="model_a")
+    show(name="alpha4")
+    bpy.context.scene.frame_set(193)
+    settings = root.mu_motion
+    known, unknown = (motion_parts.one(root, name, "mesh") for name in ("model_a", "alpha4"))
+    for field in fields.FIELDS:
+        settings.field = field.name
+        material = fields.material_of(root)
+        assert material.node_tree.nodes["Field"].attribute_name == field.name
+        assert settings.low < settings.high
+        assert known.data.materials[0] == material
+        there = field.name in unknown.data.attributes
+        assert there == (field.name != "dJ_by_modulus_mm_per_MPa")
+        assert (unknown.data.materials[0] == material) == there, field.name
+    settings.field = "largest_principal_stress_kPa"
+    low, high = settings.low, settings.high
+    ramp = fields.material_of(root).node_tree.nodes["Range"].inputs
+    assert (ramp["From Min"].default_value, ramp["From Max"].default_value) == (low, high)
+    assert low < 0 < high
+    settings.symmetric = True
+    assert settings.low == -settings.high
+    assert abs(settings.high - max(-low, high)) < 1e-3 * high
+    settings.symmetric = False
+    settings.high = 10.0
+    settings.lock = True
+    settings.field = "displacement_mm"
+    assert settings.high == 10.0  # locked
+    colours = np.empty(4 * len(known.data.vertices), np.float32)
+    known.data.color_attributes[fields.COLOUR].data.foreach_get("color", colours)
+    u = values(known.data, "displacement_mm")
+    expected = fields.colours(root, u)
+    assert np.allclose(colours.reshape(-1, 4), expected)
+    assert len(np.unique(expected, axis=0)) > 10
+    assert bpy.ops.mu.motion_range() == {"FINISHED"}
+    assert settings.high < 10.0
+
+
+def test_the_legend_stands_in_the_scene(study):
+    root = started(study)
+    show(name="model_a")
+    root.mu_motion.field = "displacement_mm"
+    assert bpy.ops.mu.motion_legend() == {"FINISHED"}
+    bar = legend_object.bar_of(root)
+
+    def said(what):
+        return [text.data.body for text in bar.children if text["mu_legend"] == what]
+
+    assert not bar.hide_render
+    for frame, state in ((1, "0.00 s, 0.0 kPa"), (193, "8.00 s, 40.0 kPa")):
+        bpy.context.scene.frame_set(frame)
+        said_then = f"Displacement [mm]\n{state}\nquick look: linear elements lock"
+        assert said("head") == [said_then], said("head")
+    root.mu_motion.lock = True
+    root.mu_motion.low, root.mu_motion.high = 0.0, 4.0
+    assert said("tick") == ["0", "1", "2", "3", "4"]
+    # At a tick's height the bar has the colour that the model has there.
+    ramp = next(n for n in bar.data.materials[0].node_tree.nodes if n.type == "VALTORGB").color_ramp
+    field = fields.material_of(root).node_tree.nodes["Ramp"].color_ramp
+    assert np.allclose(ramp.evaluate(0.3), field.evaluate(0.3))
+    bar.location.y = 99.0  # moved by the user, it stays there
+    root.mu_motion.field = "von_mises_kPa"
+    assert said("head")[0].startswith("Von Mises Stress [kPa]")
+    assert bar.location.y == 99.0
+    count = len(bpy.data.objects)
+    assert bpy.ops.mu.motion_legend(on=False) == {"FINISHED"}
+    assert legend_object.bar_of(root) is None
+    assert bpy.ops.mu.motion_legend() == {"FINISHED"}
+    assert len(bpy.data.objects) == count
+    bpy.ops.mu.delete()
+    assert not bpy.data.objects
+    assert not bpy.data.curves
+
+
+def test_a_path_of_the_whole_lattice_moves_and_is_shown_where_it_lies(study):
+    root = started(study)
+    name, j, points = ranking.free(root)
+    assert name in motion_parts.motion_of(root).paths
+    assert 0 < j < 1
+    root.mu_unit.candidates = True
+    tube = unit_object.part(root, "free")
+    assert np.allclose(motion_parts.vertices_of(tube.data), points, atol=1e-4)
+    show(name=name)
+    show(name=name, what="print")
+    bpy.context.scene.frame_set(193)
+    for part in motion_parts.parts(root):
+        assert np.allclose(moved(part), values(part.data, "displacement_mm"), atol=1e-4)
+        assert values(part.data, "deviation_mm").max() > 1e-3
+    root.mu_unit.chambers.wall_mm = 1.0
+    assert ranking.free(root) is None
+    assert unit_object.part(root, "free") is None
+
+
+def test_the_print_is_carried_by_the_mesh(study):
+    root = started(study)
+    show(name="model_a", what="print")
+    (part,) = motion_parts.parts(root)
+    solid = unit_object.part(root, "solid")
+    assert len(part.data.vertices) == len(solid.data.vertices)
+    assert part.data != solid.data
+    assert root.mu_unit.show == "preview"
+    assert "outside the mesh" in part["mu_outside"]
+    bpy.context.scene.frame_set(193)
+    rest, now = motion_parts.vertices_of(part.data), motion_parts.vertices_of(evaluated(part))
+    assert np.allclose(moved(part), values(part.data, "displacement_mm"), atol=1e-4)
+    tip = rest[:, 2] > 0.99 * rest[:, 2].max()
+    assert (now - rest)[tip, 1].mean() > 1.0  # it bends toward +y under pressure
+    inlet = rest[:, 2] < 0.0
+    assert inlet.any()
+    assert not values(part.data, "displacement_mm")[inlet].any()
+    # Neighbours stay neighbours: no vertex is torn away.
+    edges = np.empty(2 * len(part.data.edges), np.int32)
+    part.data.edges.foreach_get("vertices", edges)
+    a, b = edges.reshape(-1, 2).T
+    before, after = (np.linalg.norm(p[a] - p[b], axis=1) for p in (rest, now))
+    assert np.abs(after - before).max() < 1.0
+    root.mu_unit.chambers.wall_mm = 1.0
+    assert "other parameters" in refused(bpy.ops.mu.motion, name="alpha4", what="print")
+
+
+def test_undo_save_and_reload(study):
+    bpy.ops.ed.undo_push(message="before") if bpy.ops.ed.undo_push.poll() else None
+    root = started(study)
+    show(name="model_a")
+    show(name="model_a", what="print")
+    root.mu_motion.field, root.mu_motion.cut = "von_mises_kPa", False
+    counts = {part.name: len(part.data.vertices) for part in motion_parts.parts(root)}
+    bpy.ops.wm.save_as_mainfile(filepath=str(study / "../seat.blend"))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.open_mainfile(filepath=str(study / "../seat.blend"))
+    (root,) = unit_object.roots()
+    assert {part.name: len(part.data.vertices) for part in motion_parts.parts(root)} == counts
+    bpy.context.scene.frame_set(193)
+    for part in motion_parts.parts(root):
+        assert np.allclose(moved(part), values(part.data, "displacement_mm"), atol=1e-4)
+        assert part.modifiers["Motion"].filepath.startswith("//")
+    # Nothing is drawn twice, and what belongs to the unit goes with it.
+    show(name="model_a")
+    assert len(motion_parts.parts(root)) == 3
+    assert bpy.ops.mu.delete() == {"FINISHED"}
+    assert not [o for o in bpy.data.objects if o.get(unit_object.MOTION)]
+
+
+def test_what_is_missing_is_said(study):
+    root = add(preset="mu-0.75x")
+    assert "simulate this unit first" in refused(bpy.ops.mu.motion)
+    assert "no such picture" in refused(bpy.ops.mu.picture, name="angle.png")
+    root.mu_unit.study.folder = str(study)
+    assert "no motion of 'alpha77'" in refused(bpy.ops.mu.motion, name="alpha77")
+    assert bpy.ops.mu.picture(name="angle.png") == {"FINISHED"}
+    assert "angle.png" in bpy.data.images
+    show(name="model_a")
+    # The study's files go: frames still come, and the operators say what is missing.
+    (study / "motion" / "model_a.npz").unlink()
+    bpy.context.scene.frame_set(50)
+    assert "simulate this unit first" in refused(bpy.ops.mu.motion)
+    root.mu_motion.cut = False
+    assert "no motion to show" in root.mu_motion.trouble
+
+
+def test_candidates_say_their_rank(study):
+    root = add(preset="mu-0.75x")
+    root.mu_unit.candidates = True
+    assert modifier_input(unit_object.part(root, "candidate:alpha1").modifiers[0], "Label") == "α1"
+    root.mu_unit.study.folder = str(study)
+    live.catch_up()  # as when a simulation has ended
+    known = ranking.ranked(root)
+    assert sorted(rank for _, rank in known.values()) == list(range(1, 11))
+    bpy.ops.mu.path(name="alpha4")
+    tubes = {name: unit_object.part(root, f"candidate:{name}") for name in known}
+    for name, tube in tubes.items():
+        label = modifier_input(tube.modifiers[0], "Label")
+        assert label.startswith("α"), label
+        assert label.endswith(f"#{known[name][1]}"), label
+    assert tubes["alpha4"].data.materials[0].name == "MU Waveguide"
+    colours = {tuple(t.data.materials[0].diffuse_color) for n, t in tubes.items() if n != "alpha4"}
+    assert len(colours) == 9
+    assert not unit_object.behind(root)
+    root.mu_unit.chambers.wall_mm = 1.0  # stale: they say nothing any more
+    assert ranking.ranked(root) == {}
+    assert modifier_input(unit_object.part(root, "candidate:alpha1").modifiers[0], "Label") == "α1"
+
+
+def test_panels_show_the_motion(study):
+
+    root = add(preset="mu-0.75x")
+    assert "simulate this unit first" in drawn(results_panel.CLASSES)
+    assert "No pictures yet" in drawn(results_panel.CLASSES)
+    root.mu_unit.study.folder = str(study)
+    said = drawn(results_panel.CLASSES)
+    assert "A α1 α2" in said
+    assert "Play" not in said
+    assert said.count("a picture") == 1
+    assert "Choose a sensor path" in said
+    bpy.ops.mu.path(name="alpha4")
+    assert drawn(results_panel.CLASSES).count("a picture") == 2
+    show(name="alpha4")
+    root.mu_motion.field = "dJ_by_modulus_mm_per_MPa"
+    said = drawn(results_panel.CLASSES)
+    assert "Play" in said
+    assert "Not known of alpha4" in said

@@ -1,0 +1,360 @@
+"""Print check, markers and files from Blender: real children, and children that misbehave."""
+
+import json
+from unittest.mock import MagicMock
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Vector
+
+from mu_addon.blender.jobs import start_child as jobs
+from mu_addon.blender.printing import markers
+from mu_addon.blender.printing import panel as print_panel
+from mu_addon.blender.printing import state as printing
+from mu_addon.blender.printing.operators import MU_OT_print_export as operator
+from mu_addon.blender.simulate import study_folder as studies
+from mu_addon.blender.simulate.job import SIMULATION
+from mu_addon.blender.unit import object as unit_object
+from mu_addon.blender.unit.properties import to_unit
+from mu_addon.design.parameters import write_unit
+from mu_addon.design.printing.printer import printer_text
+from mu_addon.design.surface import bad_edges, stl_surface
+from mu_addon.usecases.export.run import FORMATS, MANIFEST
+
+from .acting import add, refused
+from .drawing import drawn as drawn_by
+from .jobs import ended, fake, watch
+
+PANELS = print_panel.CLASSES
+
+
+def done(root, *, state="done"):
+    child = printing.PRINTING.child(root)
+    ended(child)
+    assert child.state == state, (child.state, child.error)
+    return child
+
+
+def short():
+    # Three chambers at 0.75x are checked in a fifth of the time.
+    root = add(preset="mu-0.75x")
+    root.mu_unit.chambers.count = 3
+    return root
+
+
+def drawn():
+    return drawn_by(PANELS)
+
+
+def finding(check, severity, places=(), value=None, limit=None, unit="", **more):
+    return {
+        "check": check,
+        "severity": severity,
+        "what": f"{check} was measured",
+        "value": value,
+        "limit": limit,
+        "unit": unit,
+        "places": list(places),
+        "count": len(places),
+        "source": "",
+        "assumed": False,
+        "remedy": "",
+        **more,
+    }
+
+
+def write_check(root, findings, up=(0, 0, 1), builds=()):
+    folder = printing.folder_of(root, "check")
+    write_unit(to_unit(root.mu_unit), folder / "unit.toml")
+    path = printing.path_of(root, to_unit(root.mu_unit))
+    (folder / "check.toml").write_text(f"direction = {list(up)}\n" + (f'path = "{path}"\n' if path else ""))
+    (folder / "printer.toml").write_text(printer_text(printing.printer_of(root)))
+    said = {"findings": findings, "orientation": list(builds), "direction": list(up)}
+    (folder / "check.json").write_text(json.dumps(said))
+
+
+def test_a_check_from_start_to_markers(tmp_path):
+    """A real check in its child: what the panel says is what check.json holds, and is found again."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "seat.blend"))
+    root = short()
+    assert "Not checked yet" in drawn()
+    assert not bpy.ops.mu.print_show.poll()
+    assert "Check the print first" in refused(bpy.ops.mu.print_marks)
+    assert bpy.ops.mu.print_check() == {"FINISHED"}
+    assert "A job for the printer is running" in refused(bpy.ops.mu.print_export)
+    assert "mu.print_cancel" in drawn()
+    done(root)
+    found = printing.checked(root)
+    assert found.stale == ""
+    assert found.folder.parent == studies.folder_of(root)
+    faults = [f for f in found.findings if f["severity"] in ("error", "warning")]
+    assert faults
+    assert not found.errors, found.findings
+    said = drawn()
+    for fault in faults:
+        assert fault["check"].capitalize() in said
+    assert "checks passed" in said
+    assert "Checked: no errors" in said
+    assert "Stale" not in said
+    best = found.found["orientation"][0]
+    assert f"{best['islands']} islands" in said
+
+    assert bpy.ops.mu.print_show(finding=0) == {"FINISHED"}
+    balls = [m for m in markers.marks(root) if m.data is not None]
+    assert len(balls) == sum(len(f["places"]) > 0 for f in faults)
+    (chosen,) = bpy.context.selected_objects
+    first = found.findings[0]
+    assert len(chosen.data.vertices) == len(first["places"])
+    assert np.allclose(chosen.data.vertices[0].co, first["places"][0], atol=1e-4)
+    assert first["what"].split()[0] in drawn()
+    assert "place 1 of" in drawn()
+    assert bpy.ops.mu.print_open(what="errors") == {"FINISHED"}
+
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+    (root,) = unit_object.roots()
+    assert printing.checked(root).stale == ""
+    assert len(markers.marks(root)) == len(balls) + 1
+    assert "place 1 of" in drawn()
+    (folder,) = (tmp_path / "seat.mu").glob("*/check")
+    assert (folder / "report.html").is_file()
+    assert json.loads((folder / "summary.json").read_text())["verdict"] == "warning"
+
+
+def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.context.scene.cursor.location = (100, 0, 0)
+    root = add()
+    bpy.context.view_layer.update()
+    places = [[1, 2, 3], [4, 5, 6]]
+    build = {
+        "direction": [0.6, 0, 0.8],
+        "cup_ml": 0.25,
+        "islands": 7,
+        "support_mm2": 12.0,
+        "inner_mm2": 3.0,
+        "height_mm": 80,
+        "fits": True,
+        "best_among": True,
+    }
+    write_check(
+        root,
+        [
+            finding("gap", "pass", value=1.0, limit=0.5, unit="mm"),
+            finding("bridge", "warning", [[0, 0, 70]], 21.4, 21.0, "mm", assumed=True),
+            finding("thinnest solid", "error", places, 0.2, 0.4, "mm", remedy="thicken it"),
+            finding("not examined", "info", value=float("nan")),
+        ],
+        builds=[build],
+    )
+    said = drawn()
+    assert said.index("Thinnest solid  (2):  0.2 / 0.4 mm") < said.index("Bridge:  21.4 / 21 mm")
+    assert "1 error(s): export asks first" in said
+    assert "7 islands, cups of 0.25 ml" in said
+    assert said.index("Not examined") < said.index("1 checks passed")
+    bpy.ops.ed.undo_push(message="before")
+    assert bpy.ops.mu.print_show(finding=0) == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="shown")
+    view = next(a for a in bpy.context.window_manager.windows[0].screen.areas if a.type == "VIEW_3D")
+    view = view.spaces.active.region_3d
+    assert (view.view_location - Vector((101, 2, 3))).length < 1e-4
+    assert "Thicken it" in drawn()
+    assert "place 1 of 2" in drawn()
+    bpy.ops.mu.print_show(finding=0)
+    assert (view.view_location - Vector((104, 5, 6))).length < 1e-4
+    assert "place 2 of 2" in drawn()
+    bpy.ops.mu.print_show(finding=0)
+    assert "place 1 of 2" in drawn()
+    bpy.ops.mu.print_show(finding=1)
+    assert "The limit is assumed" in drawn().replace("  ", " ")
+    assert "There are 4 findings" in refused(bpy.ops.mu.print_show, finding=9)
+    assert "has 2 places" in refused(bpy.ops.mu.print_show, finding=0, place=2)
+
+    marks = {m.get("mu_check"): m for m in markers.marks(root)}
+    assert set(marks) == {"0", "1", "up"}
+    colours = [marks[k].data.materials[0].name for k in "01"]
+    assert colours == ["MU Flaws", "MU Doubt"]
+    graph = bpy.context.evaluated_depsgraph_get()
+
+    def width():
+        return marks["0"].evaluated_get(graph).dimensions.x - 3.0
+
+    bpy.context.view_layer.update()
+    assert abs(width() - 2 * 0.8) < 0.05
+    bpy.ops.mu.print_show(finding=0)
+    bpy.context.view_layer.update()
+    assert abs(width() - 0.8 * (1 + markers.LARGER)) < 0.1  # the place that is looked at is larger
+    bpy.ops.mu.print_show(finding=1)
+    root.mu_print.marker = 2.0
+    bpy.context.view_layer.update()
+    assert abs(width() - 2 * 2.0) < 0.1
+    up = marks["up"].rotation_quaternion @ Vector((0, 0, 1))
+    assert (up - Vector((0, 0, 1))).length < 1e-5
+
+    while markers.marks(root):
+        bpy.ops.ed.undo()
+        (root,) = unit_object.roots()
+    assert "No place is marked" in refused(bpy.ops.mu.print_clear)
+    bpy.ops.mu.print_marks()
+    root.mu_unit.chambers.wall_mm = 1.0  # a rebuild leaves them, and the panel says that they are old
+    assert len(markers.marks(root)) == 3
+    assert "Stale: it is of the unit with other parameters" in drawn()
+    assert "The check is stale" in refused(bpy.ops.mu.print_marks)
+    root.mu_unit.chambers.wall_mm = 0.9
+    write_check(root, [finding("cup", "warning", [[0, 0, 0]])])
+    assert "markers are of an earlier check" in drawn().replace("  ", " ")
+    assert bpy.ops.mu.print_clear() == {"FINISHED"}
+    assert not markers.marks(root)
+
+    assert bpy.ops.mu.print_up(direction=(0.6, 0, 0.8)) == {"FINISHED"}
+    assert "Stale: it is of another build direction" in drawn()
+    bpy.ops.mu.print_up()
+    assert "Stale" not in drawn()
+    bpy.ops.mu.path(name="alpha4")
+    assert "Stale: it is of the unit with other parameters" in drawn()
+    bpy.ops.mu.path(name="none")
+    own = tmp_path / "mine.toml"
+    text = (printing.folder_of(root, "check") / "printer.toml").read_text()
+    own.write_text(text.replace("value = 0.6", "value = 0.8"))
+    root.mu_print.printer, root.mu_print.printer_file = "own", str(own)
+    assert "Stale: it is for another printer" in drawn()
+    assert bpy.ops.mu.print_check.poll()
+    own.write_text(text.replace("value = 0.6", "value = -1"))
+    assert "is not a number above zero" in refused(bpy.ops.mu.print_check)
+
+    unit_object.delete(root)
+    assert not [o for o in bpy.data.objects if "mu_check" in o]
+
+
+def test_an_export_as_chosen(tmp_path):
+    """Files of a real export, with the path and less what the printer adds; asked first where in error."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "seat.blend"))
+    root = add()
+    assert [name for name, *_ in printing.FORMATS] == list(FORMATS)
+    bpy.ops.mu.path(name="alpha4")
+    settings = root.mu_print
+    settings.formats = set()
+    assert "Choose at least one kind of file" in refused(bpy.ops.mu.print_export)
+    settings.formats, settings.quality = {"stl", "txt"}, "interactive"
+    settings.compensate = "gauge"
+    assert "Choose the gauge's sheet" in refused(bpy.ops.mu.print_export)
+    settings.compensate = "unit"
+    assert "set them under How It Prints" in refused(bpy.ops.mu.print_export)
+    root.mu_unit.print.offset_xy_mm = 0.1
+    bpy.ops.mu.mute(step="trim")
+    assert "is not the unit" in refused(bpy.ops.mu.print_export)
+    bpy.ops.mu.mute(step="trim", muted=False)
+    assert "waveguide along alpha4" in drawn().replace("  ", " ")
+    assert "Not checked" in drawn()
+
+    write_check(root, [finding("chamber wall", "error", [[0, 0, 0]], 0.2, 0.6, "mm")])
+    asked = {}
+
+    class Manager:
+        def invoke_confirm(self, *_, **words):
+            asked.update(words)
+            return {"RUNNING_MODAL"}
+
+    context = MagicMock(wraps=bpy.context, window_manager=Manager(), object=root)
+    assert operator.invoke(MagicMock(), context, None) == {"RUNNING_MODAL"}
+    assert "chamber wall" in asked["message"]
+    assert not jobs.running()
+
+    assert bpy.ops.mu.print_export() == {"FINISHED"}
+    done(root)
+    said = drawn()
+    assert "unit.stl" in said
+    assert "nodes.txt" in said
+    assert "unit.3mf" not in said
+    assert "Done in" in said
+    root.mu_unit.chambers.wall_mm = 1.0
+    assert "Stale: they are of the unit" in drawn()
+    manifest = printing.exported(root).folder / "manifest.json"
+    whole = manifest.read_text()
+    manifest.write_text("{}")
+    assert printing.exported(root) is None
+    assert "unit.stl" not in drawn()
+    manifest.write_text(whole)
+    (folder,) = (tmp_path / "seat.mu").glob("*/export")
+    manifest = json.loads((folder / MANIFEST).read_text())
+    assert manifest["path"]["name"] == "alpha4"
+    assert manifest["taken_off_mm"]["xy"] == pytest.approx(0.1)
+    vertices, triangles = stl_surface((folder / "unit.stl").read_bytes())
+    assert bad_edges(triangles) == 0
+    assert np.ptp(vertices[:, 2]) == pytest.approx(81.0, abs=0.5)
+
+
+def test_jobs_that_fail_and_one_that_is_stopped():
+    root = add()
+
+    def start(how):
+        return fake(printing.PRINTING, root, how, printing.folder_of(root, "check"))
+
+    for how, expected in {
+        "told_error": "thicker wall",
+        "crash": "SIGSEGV",
+        "wordless": "without a word",
+        "good": "see Check",
+    }.items():
+        child = start(how)
+        ended(child)
+        assert expected in drawn(), (how, drawn())
+        assert bpy.ops.mu.print_dismiss() == {"FINISHED"}
+        assert expected not in drawn()
+    child = start("told_error")
+    ended(child)
+    child.error["status"] = print_panel.NOT_PRINTABLE
+    assert "Checked: do not print it" in drawn()
+    assert "thicker wall" not in drawn()
+    child = start("hang")
+    watch(lambda: child.progress)
+    # The unit's own simulation is another one.
+    assert SIMULATION.child(root) is None
+    assert not bpy.ops.mu.cancel.poll()
+    assert bpy.ops.mu.print_cancel() == {"FINISHED"}
+    ended(child)
+    assert "Cancelled" in drawn()
+    assert not bpy.ops.mu.print_cancel.poll()
+    assert "there is no such file" in refused(bpy.ops.mu.print_open, what="report")
+    # A torn file is no check.
+    folder = printing.folder_of(root, "check")
+    (folder / "check.json").write_text('{"findings": [')
+    assert "Not checked yet" in drawn()
+
+
+@pytest.mark.slow
+def test_a_unit_that_must_not_be_printed():
+    """A wall of 0.54 mm at this scale: the child ends with an error, which the panel shows as found."""
+    root = short()
+    root.mu_unit.chambers.wall_mm = 0.72
+    assert bpy.ops.mu.print_check() == {"FINISHED"}
+    child = done(root, state="failed")
+    assert child.error["status"] == print_panel.NOT_PRINTABLE
+    found = printing.checked(root)
+    assert [f["check"] for f in found.errors] == ["chamber wall"]
+    assert not found.stale
+    assert abs(found.errors[0]["value"] - 0.54) < 0.02
+    said = drawn()
+    assert "Checked: do not print it" in said
+    assert "export asks first" in said
+    assert bpy.ops.mu.print_show(finding=0) == {"FINISHED"}
+
+
+@pytest.mark.slow
+def test_a_body_of_ones_own_is_checked_by_its_solid():
+    root = short()
+    bpy.ops.mesh.primitive_cylinder_add(vertices=64, radius=20, depth=30, location=(0, 0, 14))
+    root.select_set(True)
+    assert bpy.ops.mu.body() == {"FINISHED"}
+    bpy.context.view_layer.objects.active = root
+    assert "only STL is written" in refused(bpy.ops.mu.print_export)
+    assert bpy.ops.mu.print_check() == {"FINISHED"}
+    child = printing.PRINTING.child(root)
+    ended(child)
+    found = printing.checked(root)
+    assert found is not None, child.error
+    assert not found.stale, child.error
+    assert abs(found.found["figures"]["x_mm"] - 40.0) < 0.1
+    bpy.ops.mu.body_remove()
+    assert "Stale: it is of the unit with other parameters" in drawn()

@@ -1,0 +1,138 @@
+"""The words of the house: retired ones stay out, and every link into a page meets a heading."""
+
+import ast
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
+SOURCES = sorted((ROOT / "mu_addon").rglob("*.py"))
+
+# Phrases of texts, with the term of docs/glossary.md that took their place.
+PHRASES = {
+    "beaten by none": "Pareto-optimal",
+    "no other beats": "Pareto-optimal",
+    "chance of a false name": "false-positive probability",
+    "foretold": "leave-one-out error",
+    "would stumble over": "printability check",
+    "says more": "has a larger signal",
+    "may be pulled": "a plain statement of the direction",
+    "kept by content": "cached by content hash",
+    "unpressed": "at zero pressure",
+    "model as it was": "base model",
+    "hangs on nothing": "is not connected",
+    "begins on nothing": "island",
+    "of one's own": "user-defined",
+    "what was said while it ran": "log of this run",
+    "what mending": "error reduction",
+}
+# Identifiers and their parts, with what they are called now.
+IDENTIFIERS = {
+    "lockstep": "batched_newton",
+    "marching": "time_stepping",
+    "unpressed": "at_zero_pressure",
+    "rubs": "has_friction",
+    "weighs": "has_gravity",
+    "told_apart": "a chi-squared threshold by its name",
+    "stuffed": "cobs_encoded",
+    "reviewed": "reselected",
+}
+
+
+@cache
+def _nodes(path):
+    return list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+
+
+def _texts(path):
+    """Line and text of every string of a module, docstrings included."""
+    for node in _nodes(path):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.lineno, " ".join(node.value.split())
+
+
+def _identifiers(path):
+    for node in _nodes(path):
+        if isinstance(node, ast.Name):
+            yield node.lineno, node.id
+        elif isinstance(node, ast.Attribute):
+            yield node.lineno, node.attr
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+            yield node.lineno, node.name
+        elif isinstance(node, ast.arg):
+            yield node.lineno, node.arg
+
+
+def _retired_phrases(text):
+    return [phrase for phrase in PHRASES if phrase in text.lower()]
+
+
+def _retired_identifiers(name):
+    return [word for word in IDENTIFIERS if re.search(rf"(?:^|_){word}(?:_|$)", name.lower())]
+
+
+def test_no_retired_phrase_in_a_text():
+    found = []
+    for path in SOURCES:
+        for line, text in _texts(path):
+            found += [f"{path.relative_to(ROOT)}:{line}: {p} -> {PHRASES[p]}" for p in _retired_phrases(text)]
+    for page in PAGES:
+        text = " ".join(page.read_text(encoding="utf-8").split())
+        found += [f"{page.relative_to(ROOT)}: {p} -> {PHRASES[p]}" for p in _retired_phrases(text)]
+    assert found == []
+
+
+def test_no_retired_identifier():
+    found = []
+    for path in SOURCES:
+        names = [(1, path.stem), *_identifiers(path)]
+        for line, name in names:
+            found += [
+                f"{path.relative_to(ROOT)}:{line}: {name} -> {IDENTIFIERS[w]}"
+                for w in _retired_identifiers(name)
+            ]
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    ("name", "retired"),
+    [
+        ("run_lockstep", True),
+        ("weighs", True),
+        ("TOLD_APART", True),
+        ("weights", False),
+        ("unmarching", False),
+    ],
+)
+def test_the_search_for_identifiers_can_find_one(name, retired):
+    assert bool(_retired_identifiers(name)) == retired
+
+
+def _anchors(page):
+    """The anchors that a page's headings make: lower case, spaces as hyphens, punctuation dropped."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    plain = [re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", h) for h in headings]
+    return {re.sub(r"[^\w\- ]", "", h.lower()).strip().replace(" ", "-") for h in plain}
+
+
+def test_links_into_pages_meet_a_heading():
+    missing = []
+    for page in PAGES:
+        for target, anchor in re.findall(r"\]\(([^)#\s]*)#([^)\s]+)\)", page.read_text(encoding="utf-8")):
+            if target.startswith(("http://", "https://")):
+                continue
+            aim = page.parent / target if target else page
+            if not aim.exists() or anchor not in _anchors(aim):
+                missing.append(f"{page.name}: {target}#{anchor}")
+    assert missing == []
+
+
+def test_the_glossary_gives_every_term_once():
+    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8").split("## Words with")[0]
+    rows = re.findall(r"^\| ([^|]+?) \|", text, re.MULTILINE)
+    terms = [term for row in rows for term in row.split(", ") if term not in ("term", "---")]
+    assert len(terms) > 100
+    assert sorted(terms) == sorted(set(terms))

@@ -1,0 +1,249 @@
+"""A wall with a law of its own: limits of what it remembers, through a study's own job."""
+
+import json
+
+import attrs
+import numpy as np
+import pytest
+
+from mu_addon.design.parameters import Chambers, Unit, from_toml, read_unit, to_toml, write_unit
+from mu_addon.design.wall import Wall
+from mu_addon.errors import InputError
+from mu_addon.fem.laws import Friction, Layered, NeoHooke, OgdenRoxburgh, Prony, Yeoh
+from mu_addon.fem.materials import Materials
+from mu_addon.fem.protocol import Protocol
+from mu_addon.fem.unit import materials_of
+from mu_addon.materials.library import load_material, material_text, parse_material
+from mu_addon.meshing.mesh import MEMBRANE
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.unit import mesh_unit
+from mu_addon.run.context import RunContext
+from mu_addon.run.progress import Progress
+from mu_addon.usecases.simulate_and_place.job import Job, read_job
+from mu_addon.usecases.simulate_and_place.motion import read_motion
+from mu_addon.usecases.simulate_and_place.study import Study
+
+BASE = Unit(chambers=Chambers(count=3))
+MESH = MeshSettings(order=1, refine=0.4)
+STAGES = ("design", "simulate")
+
+
+def walled(**values):
+    return attrs.evolve(BASE, wall=Wall(**values))
+
+
+def job_of(unit, time, pressure, **more):
+    protocol = Protocol(np.asarray(time, float), np.asarray(pressure, float))
+    return Job(unit=unit, protocol=protocol, mesh=MESH, stages=STAGES, **more)
+
+
+def opened(job, folder):
+    progress = Progress()
+    return Study.open(job, folder, progress, RunContext(progress))
+
+
+def simulated(folder, job):
+    """Angles (k,) in degrees of a study of motion, at the samples of its protocol."""
+    study = opened(job, folder)
+    study.make_mesh()
+    trajectory = study.simulate()
+    study.context.unlock()
+    return trajectory.of_time(np.array([study.bending_angle_deg(s.u) for s in trajectory.states])), study
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return mesh_unit(BASE, MESH)
+
+
+def test_a_wall_without_a_law_of_its_own_is_what_it_always_was(mesh):
+    assert "[wall]" not in to_toml(BASE)
+    assert to_toml(attrs.evolve(BASE, wall=Wall(prony_g1=0.3, mullins_r=4.0))) == to_toml(BASE)
+    (only,) = materials_of(BASE, mesh).layers
+    assert only.law is NeoHooke
+    m = BASE.material
+    inside = mesh.region != MEMBRANE
+    expected = Materials.neo_hooke(
+        np.where(inside, m.lattice_modulus_MPa, m.membrane_modulus_MPa),
+        np.where(inside, m.lattice_poisson, m.membrane_poisson),
+    )
+    assert materials_of(BASE, mesh).hash() == expected.hash()
+
+
+@pytest.mark.parametrize(
+    ("values", "laws"),
+    [
+        ({"law": "yeoh", "c2_over_c1": 0.2}, [Yeoh]),
+        ({"law": "prony", "prony_g1": 0.2, "prony_g2": 0.3}, [Prony]),
+        ({"law": "ogden-roxburgh"}, [OgdenRoxburgh]),
+        ({"layers_excess": 0.5}, [NeoHooke, Layered]),
+        ({"law": "yeoh", "layers_excess": -0.3, "friction_share": 0.5}, [Yeoh, Layered, Friction]),
+    ],
+)
+def test_small_strain_is_the_units_moduli_under_every_law(mesh, values, laws):
+    unit = walled(**values)
+    materials = materials_of(unit, mesh)
+    assert [layer.law for layer in materials.layers] == [*laws, NeoHooke]
+    E, nu = (x[mesh.region == MEMBRANE] for x in materials.small_strain(len(mesh.tets)))
+    if "layers_excess" not in values:
+        np.testing.assert_allclose(E, unit.material.membrane_modulus_MPa, rtol=1e-12)
+        np.testing.assert_allclose(nu, unit.material.membrane_poisson, rtol=1e-12)
+    assert unit.wall.has_memory == any(law.history for law in laws)
+
+
+def test_a_file_keeps_the_law_and_no_parameter_of_another(tmp_path):
+    unit = walled(law="prony", prony_g1=0.2, prony_tau1_s=3.0, friction_share=0.1)
+    write_unit(unit, tmp_path / "unit.toml")
+    assert read_unit(tmp_path / "unit.toml") == unit
+    assert "mullins" not in to_toml(unit)
+    for text, words in (
+        ('[wall]\nlaw = "yeoh"\nprony_g1 = 0.2\n', r"prony_g1 means nothing to law = 'yeoh'"),
+        ('[wall]\nlaw = "prony"\nprony_g1 = 0.6\nprony_g2 = 0.5\n', "add up to 1.1"),
+        ('[wall]\nlaw = "prnoy"\n', "did you mean 'prony'"),
+        ('[wall]\nlaw = "prony"\nprony_tau1_s = 0.0\n', "prony_tau1_s = 0 s is out of bounds"),
+    ):
+        with pytest.raises(InputError, match=words) as caught:
+            from_toml("format = 1\n" + text, "unit.toml")
+        assert "unit.toml, line" in caught.value.where
+
+
+@pytest.mark.slow
+def test_a_wall_that_relaxes_is_stiff_at_once_and_the_units_own_after_long(tmp_path):
+    """At once the shear modulus is 1/(1 - g) times that after long; the bulk modulus does not relax."""
+    g, tau, p = 0.4, 1.0, 10.0
+    relaxing = walled(law="prony", prony_g1=g, prony_tau1_s=tau)
+    # Held for 40 tau; and pressed within a millionth of one.
+    found, study = simulated(tmp_path / "held", job_of(relaxing, [0, 20.0, 60.0], [0, p, p], times=4))
+    assert study.job.in_time
+    jump, _ = simulated(tmp_path / "jump", job_of(relaxing, [0, 1e-6], [0, p], times=2))
+    elastic, _ = simulated(tmp_path / "elastic", job_of(BASE, [0, 1], [0, p], times=2))
+    mu, kappa = NeoHooke.parameters(BASE.material.membrane_modulus_MPa, BASE.material.membrane_poisson)[0]
+    at_once = mu / (1 - g)
+    stiff = attrs.evolve(
+        BASE.material,
+        membrane_modulus_kPa=1e3 * 9 * kappa * at_once / (3 * kappa + at_once),
+        membrane_poisson=(3 * kappa - 2 * at_once) / (6 * kappa + 2 * at_once),
+    )
+    stiffer, _ = simulated(
+        tmp_path / "stiff", job_of(attrs.evolve(BASE, material=stiff), [0, 1], [0, p], times=2)
+    )
+    assert jump[-1] == pytest.approx(stiffer[-1], rel=1e-4)
+    assert found[-1] == pytest.approx(elastic[-1], rel=1e-4)
+    assert elastic[-1] > 1.2 * stiffer[-1] > 0
+
+
+@pytest.mark.slow
+def test_a_wall_that_softens_does_not_on_its_first_loading_and_a_stopped_run_goes_on(tmp_path):
+    time, pressure = [0, 1, 2, 3, 4], [0, 10, 20, 10, 20]
+    soft, study = simulated(
+        tmp_path / "soft",
+        job_of(walled(law="ogden-roxburgh", mullins_r=1.5, mullins_m_kPa=2.0), time, pressure, times=5),
+    )
+    plain, _ = simulated(tmp_path / "plain", job_of(BASE, time, pressure, times=5))
+    np.testing.assert_allclose(soft[:3], plain[:3], rtol=1e-6)
+    assert soft[3] > 1.05 * plain[3]
+    # Back at the largest strain it is as stiff as it was.
+    assert soft[4] == pytest.approx(plain[4], rel=1e-4)
+    rows = (tmp_path / "soft" / "angle.csv").read_text().splitlines()
+    assert rows[0] == "time_s,pressure_kPa,angle_deg"
+    assert len(rows) == 6
+    # A stop loses the last two instants; what the wall remembered at the third is there.
+    kept = sorted((study.cache.folder).glob("instant*"), key=lambda f: f.stat().st_mtime)
+    for file in kept[-2:]:
+        file.unlink()
+    again, _ = simulated(tmp_path / "soft", read_job(tmp_path / "soft"))
+    np.testing.assert_array_equal(again, soft)
+    fields = read_motion(tmp_path / "soft").fields["membrane"]["von_mises_kPa"]
+    # The stress that bears one pressure is about the same; unsoftened, the larger strain would have more.
+    assert np.median(fields[3]) == pytest.approx(np.median(fields[1]), rel=0.01)
+
+
+@pytest.mark.slow
+def test_friction_in_the_wall_leaves_a_loop_whatever_the_rate(tmp_path):
+    unit = walled(friction_share=0.5, friction_yield_kPa=10.0)
+    pressure = [0, 15, 0]
+    slow, _ = simulated(tmp_path / "slow", job_of(unit, [0, 50, 100], pressure, times=3))
+    fast, _ = simulated(tmp_path / "fast", job_of(unit, [0, 0.5, 1], pressure, times=3))
+    np.testing.assert_allclose(slow, fast, rtol=1e-6)
+    plain, _ = simulated(tmp_path / "plain", job_of(BASE, [0, 1, 2], pressure, times=3))
+    assert 0 < slow[1] < plain[1]
+    assert slow[2] > 0.02 * slow[1]
+
+
+@pytest.mark.slow
+def test_sensor_paths_are_ranked_in_a_wall_that_remembers(tmp_path):
+    from mu_addon.usecases.simulate_and_place.run import run_stages
+
+    unit = walled(law="prony", prony_g1=0.3, prony_tau1_s=1.0)
+    job = attrs.evolve(
+        job_of(unit, [0, 1, 2], [0, 15, 0], times=3),
+        stages=("design", "simulate", "place"),
+        rules=("volume_fraction",),
+        mesh_check=False,
+        workers=1,
+    )
+    study = opened(job, tmp_path / "out")
+    run_stages(study)
+    chosen = study.context.summary["chosen"]["volume_fraction"]
+    assert study.context.summary["J_hat_mm"]["volume_fraction"][chosen] > 0
+    assert any("wall that remembers" in words for words in study.warnings)
+    assert json.dumps(study.context.summary["J_hat_mm"])
+
+
+def test_jobs_that_know_no_such_wall_refuse_it(mesh):
+    from mu_addon.design.gripper import load_gripper
+    from mu_addon.evidence.unit_effects import Body
+    from mu_addon.fem.equilibrium import Equilibrium
+    from mu_addon.fem.model import Model
+    from mu_addon.fem.trajectory import simulate
+    from mu_addon.usecases.grip.run import Job as GripJob
+    from mu_addon.usecases.simulate_and_place.static_effects import StaticEffects
+
+    unit = walled(law="prony", prony_g1=0.3)
+    with pytest.raises(InputError, match="neo-Hookean wall"):
+        Body(unit).materials(mesh)
+    gripper = load_gripper("gripper")
+    gripper = attrs.evolve(gripper, unit=attrs.evolve(gripper.unit, wall=unit.wall))
+    with pytest.raises(InputError, match="a grasp knows no wall that remembers"):
+        GripJob(gripper)
+    with pytest.raises(InputError, match="depends on its history"):
+        simulate(Equilibrium(Model(mesh), materials_of(unit, mesh)), np.arange(2.0), np.array([0.0, 5.0]))
+    with pytest.raises(InputError, match="remembers nothing"):
+        attrs.evolve(job_of(unit, [0, 1], [0, 5]), stages=("design", "simulate", "place"), paths="graph")
+    stiffening = StaticEffects({"strain_stiffening": {"c2_over_c1": 0.2}})
+    with pytest.raises(InputError, match="has a law of its own"):
+        job_of(unit, [0, 1], [0, 5], effects=stiffening)
+
+
+YEOH = """format = 1
+name = "mine"
+[law]
+name = "Yeoh"
+parameters = { c1_MPa = 0.5, c2_MPa = 0.05, c3_MPa = 0.0, kappa_MPa = 10.0 }
+confidence = "fitted"
+source = "my coupons"
+ranges = { uniaxial = [0.8, 1.5] }
+"""
+RELAXING = (
+    '[wall]\nlaw = "prony"\nprony_g1 = 0.25\nprony_tau1_s = 4.0\nconfidence = "fitted"\nsource = "holds"\n'
+)
+
+
+def test_a_resin_of_the_library_makes_a_wall():
+    resin = load_material("elastic-50a-v1")
+    unit = resin.in_unit(BASE)
+    assert unit.wall == Wall()
+    assert unit.material.membrane_modulus_kPa == pytest.approx(2700)
+    mine = parse_material(YEOH + RELAXING)
+    wall = mine.in_unit(BASE).wall
+    assert (wall.law, wall.c2_over_c1, wall.prony_g1) == ("prony", pytest.approx(0.1), 0.25)
+    assert parse_material(YEOH).in_unit(BASE).wall.law == "yeoh"
+    assert parse_material(material_text(mine)).in_unit(BASE) == mine.in_unit(BASE)
+    with pytest.raises(InputError, match="mullins_r means nothing") as caught:
+        parse_material(YEOH + RELAXING + "mullins_r = 2.0\n", "mine.toml")
+    assert "[wall] mullins_r" in caught.value.where
+    ogden = YEOH.replace("Yeoh", "Mooney-Rivlin").replace(
+        "c1_MPa = 0.5, c2_MPa = 0.05, c3_MPa = 0.0", "c1_MPa = 0.5, c2_MPa = 0.05"
+    )
+    with pytest.raises(InputError, match="cannot have the Mooney-Rivlin law"):
+        parse_material(ogden).in_unit(BASE)
