@@ -3,7 +3,9 @@
     python .ci/extension.py FOLDER            check it and write its .zip, without wheels
     python .ci/extension.py FOLDER --bundle   one .zip a platform with the wheels of every Blender's Python
                                               inside, and index.json: FOLDER can then be hosted as it is
+    python .ci/extension.py FOLDER --install  install bpy into this Python first, where it is missing
 
+The tool needs bpy, which a plain `pip install -e .` leaves out: without it this says so before any work.
 Beside them it puts sample.blend, the sample scene.
 
 Blender wants the manifest beside the package's `__init__.py`; the checkout keeps them apart so that the core
@@ -53,6 +55,36 @@ def blender_ext() -> Path | None:
         if folder.name == "site-packages":
             break
     return None
+
+
+def missing_bpy(folder: Path) -> str:
+    """What to do where bpy is not installed: one command."""
+    name, marker = bpy_requirement()
+    lack = f"{name} is not installed here, and Blender's extension tool comes with it"
+    if not wheels_fit():
+        return f"{lack}; its wheels are for Python {marker}, which this is not: use python{marker}"
+    return f"{lack} (some 330 MB); install it and build: python .ci/extension.py {folder} --install"
+
+
+def bpy_requirement() -> tuple[str, str]:
+    """bpy as pyproject.toml pins it, and the Python that its wheels are for."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    (line,) = (r for r in project["optional-dependencies"]["blender"] if r.startswith("bpy"))
+    name, _, marker = line.partition(";")
+    return name.strip(), marker.split("'")[1]
+
+
+def wheels_fit() -> bool:
+    """Whether bpy's wheels are for this Python."""
+    return f"{sys.version_info.major}.{sys.version_info.minor}" == bpy_requirement()[1]
+
+
+def install_bpy() -> bool:
+    """Install the checkout with bpy into this Python; whether it worked. pip says what went wrong."""
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "-e", f"{ROOT}[blender]"]
+    done = subprocess.run(pip, check=False).returncode == 0
+    importlib.invalidate_caches()
+    return done
 
 
 def stage(folder: Path) -> None:
@@ -131,10 +163,13 @@ def main(arguments: list[str]) -> int:
     )
     parser.add_argument("--platform", nargs="+", choices=PLATFORMS, default=list(PLATFORMS))
     parser.add_argument("--python", nargs="+", choices=PYTHONS, default=list(PYTHONS))
+    parser.add_argument("--install", action="store_true", help="install bpy first, where it is missing")
     options = parser.parse_args(arguments)
     tool = blender_ext()
+    if tool is None and options.install and wheels_fit():
+        tool = blender_ext() if install_bpy() else None
     if tool is None:
-        sys.stderr.write("bpy is not installed here: pip install -e '.[blender]' with Python 3.11\n")
+        sys.stderr.write(missing_bpy(options.folder) + "\n")
         return 2
     out = options.folder.resolve()
     out.mkdir(parents=True, exist_ok=True)

@@ -18,6 +18,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 ROOT = Path(__file__).resolve().parent.parent
 CHILD_MAIN = ROOT / "mu_addon" / "blender" / "jobs" / "child_main.py"
+NEED_BLENDER = ("track",)
+"""Commands that use Blender itself, its movie clip tracker, and solve nothing."""
 
 
 def arguments() -> list[str]:
@@ -34,9 +36,8 @@ def extension_packages() -> list[Path]:
 
     version = f"python{sys.version_info.major}.{sys.version_info.minor}"
     root = Path(bpy.utils.user_resource("EXTENSIONS"), ".local")
-    return [
-        p for p in (root / "lib" / version / "site-packages", root / "Lib" / "site-packages") if p.is_dir()
-    ]
+    folders = root / "lib" / version / "site-packages", root / "Lib" / "site-packages"
+    return [folder for folder in folders if folder.is_dir()]
 
 
 def in_own_process(line: list[str]) -> int:
@@ -71,7 +72,9 @@ def in_own_process(line: list[str]) -> int:
 def main(line: list[str]) -> int:
     """Run a command line here, or, inside Blender, in a process of its own; returns the exit status."""
     if "bpy" in sys.modules:
-        return in_own_process(line)
+        if not line or line[0] not in NEED_BLENDER:
+            return in_own_process(line)
+        sys.path += [str(folder) for folder in extension_packages()]
     try:
         from mu_addon.cli.main import main as run
     except ModuleNotFoundError as error:

@@ -1,7 +1,7 @@
 """The subcommands of the command line, a module each.
 
 Each has `add(commands)`, which adds its parser and may import nothing heavy; `run(options, progress,
-ending)`, which does the work; and `answer(summary)`, the lines that end a run at a terminal.
+context)`, which does the work; and `console_summary(summary)`, the lines printed at its end.
 """
 
 from __future__ import annotations

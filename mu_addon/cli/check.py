@@ -1,4 +1,4 @@
-"""`check`: the printability of a part."""
+"""`check`: the printability check of a part."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`design-experiments`: what planned measurements would show."""
+"""`design-experiments`: the effects that planned experiments can detect."""
 
 from __future__ import annotations
 

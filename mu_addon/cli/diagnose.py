@@ -1,4 +1,4 @@
-"""`diagnose`: what measured data say is wrong with the model."""
+"""`diagnose`: model error from measured data."""
 
 from __future__ import annotations
 

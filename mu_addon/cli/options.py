@@ -1,4 +1,4 @@
-"""Options that several subcommands share, and what they stand for."""
+"""Options that several subcommands share, and the objects that they name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`reproduce`: the paper's table, its bending ranges, and what stands between them and ours."""
+"""`reproduce`: the paper's table and bending ranges beside this simulation's."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from .options import add_results, require_out
 if TYPE_CHECKING:
     from ..run.context import RunContext
     from ..run.progress import Progress
+    from ..usecases.reproduce.settings import Settings
     from .options import Commands
 
 
@@ -22,11 +23,16 @@ def add(commands: Commands[Any]) -> None:
         "simulation.",
         epilog="example: run.py reproduce --out out/reproduce",
     )
+    add_options(command)
+
+
+def add_options(command: argparse.ArgumentParser) -> None:
+    """Folder, meshes and values of a reproduction."""
     add_results(command)
     command.add_argument(
         "--coarse",
         action="store_true",
-        help="Quick, less accurate run of one to two minutes: coarse meshes, no random meshes.",
+        help="Quick, less accurate run of one to two minutes: coarse meshes, no gripper.",
     )
     command.add_argument(
         "--refine",
@@ -42,23 +48,6 @@ def add(commands: Commands[Any]) -> None:
         help="Set of values for the parameters that the paper does not print (default: default).",
     )
     command.add_argument(
-        "--meshes",
-        type=int,
-        default=None,
-        metavar="N",
-        help="Number of random meshes of each kind; 0: the shipped ones (default: 12; 0 with --coarse).",
-    )
-    command.add_argument(
-        "--open",
-        dest="points",
-        type=int,
-        default=0,
-        metavar="N",
-        help=(
-            "Number of sampled parameter sets to solve, which takes hours; 0: the shipped ones (default: 0)."
-        ),
-    )
-    command.add_argument(
         "--no-gripper",
         dest="gripper",
         action="store_false",
@@ -69,24 +58,27 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
-    """Do the paper's table again."""
+def settings_of(options: argparse.Namespace) -> Settings:
+    """What the options ask for; raises InputError."""
     from ..meshing.settings import MeshSettings
-    from ..usecases.reproduce.run import reproduce
     from ..usecases.reproduce.settings import Settings, read_set
 
     require_out(options)
     coarse = options.coarse
-    settings = Settings(
+    return Settings(
         **read_set(options.set),
         values_name=Path(options.set).stem,
         mesh=MeshSettings(refine=options.refine if options.refine is not None else 0.4 if coarse else 1.0),
-        meshes=options.meshes if options.meshes is not None else 0 if coarse else 12,
-        points=options.points,
         gripper=options.gripper and not coarse,
         workers=options.workers,
     )
-    reproduce(settings, Path(options.out), progress, context)
+
+
+def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+    """Do the paper's table again."""
+    from ..usecases.reproduce.run import reproduce
+
+    reproduce(settings_of(options), Path(options.out), progress, context)
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:

@@ -1,4 +1,4 @@
-"""`sweep`: many studies that differ in some of their inputs."""
+"""`sweep`: a parameter study."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`track`: a video of the bench becomes an experiment in a folder of measured data."""
+"""`track`: from a video of the bench to an experiment in a folder of measured data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The charts of a report as SVG text: narrow enough for a phone, and never told by colour alone."""
+"""The charts of a report as SVG text: narrow enough for a phone, distinguishable without colour."""
 
 from __future__ import annotations
 

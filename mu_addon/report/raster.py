@@ -1,4 +1,4 @@
-"""Warp kernels of the picture maker: triangles into a depth buffer, and sky light from depth maps.
+"""Warp kernels of the renderer: triangles into a depth buffer, and sky light from depth maps.
 
 Single precision, on the CPU, one triangle after another: a picture is the same every time.
 """

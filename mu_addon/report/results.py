@@ -1,4 +1,4 @@
-"""What a report is made of: plain data of one run, without how it was computed."""
+"""The data that a report shows, independent of how they were computed."""
 
 from __future__ import annotations
 

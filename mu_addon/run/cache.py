@@ -1,4 +1,4 @@
-"""Finished work of a study, kept by a hash of all that it depends on."""
+"""Finished work of a study, cached by a hash of its inputs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A run's folder: whose it is, and whether what lies in it belongs to these inputs."""
+"""A run's folder: its owner, and whether its content belongs to these inputs."""
 
 from __future__ import annotations
 

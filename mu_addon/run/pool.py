@@ -1,4 +1,4 @@
-"""Pieces of work that know nothing of each other, in processes of their own."""
+"""Independent tasks in worker processes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What processes that share the cores and a parent have to agree on."""
+"""Limits and signals of processes that share cores and a parent."""
 
 from __future__ import annotations
 

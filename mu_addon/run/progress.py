@@ -1,4 +1,4 @@
-"""What a run says while it runs: stages with time left, warnings, one result or one error.
+"""Progress of a run: stages with time left, warnings, one result or one error.
 
 A `Progress` makes messages, plain dictionaries with a `type`, and hands each to its sinks:
 

@@ -1,1 +1,1 @@
-"""One run end to end: its folder, its progress, its pictures and its report."""
+"""Use cases: one folder a job, with its inputs, its stages, its report and its charts."""

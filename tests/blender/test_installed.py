@@ -14,6 +14,7 @@ import warnings
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -80,6 +81,38 @@ def test_a_designers_day(installed, home, tmp_path):
     said = call(home, "-b", "--python-exit-code", "4", "-P", HERE / "designers_day.py", "--", tmp_path)
     assert "the day is over" in said, said
     assert (tmp_path / "unit.stl").stat().st_size > 1_000_000
+
+
+COARSE = (
+    "place",
+    "--preset",
+    "mu-0.75x",
+    "--refine",
+    "0.5",
+    "--times",
+    "5",
+    "--stations",
+    "11",
+    "--no-mesh-check",
+)
+
+
+def test_the_command_line_gives_the_same_digits_as_plain_python(installed, home, tmp_path):
+    """Blender has a CHOLMOD of its own loaded, of another version than the one in the extension's wheels."""
+    run = ROOT / "headless" / "run.py"
+    call(home, "-b", "--python-exit-code", "4", "-P", run, "--", *COARSE, "--out", tmp_path / "blender")
+    (packages,) = installed.glob(".local/lib/python*/site-packages")
+    # By the Python that this Blender runs on, in a process that never saw Blender.
+    line = ["-P", str(run), *COARSE, "--out", str(tmp_path / "plain")]
+    plain = f"""
+import os, subprocess, sys
+path = os.pathsep.join([{str(packages)!r}, *(p for p in sys.path if p.endswith("-packages"))])
+subprocess.run([sys.executable, *{line!r}], env={{**os.environ, "PYTHONPATH": path}}, check=True)
+"""
+    call(home, "-b", "--python-exit-code", "4", "--python-expr", plain)
+    with np.load(tmp_path / "blender" / "delta.npz") as a, np.load(tmp_path / "plain" / "delta.npz") as b:
+        assert set(a.files) == set(b.files)
+        assert all(np.array_equal(a[name], b[name]) for name in a.files)
 
 
 def test_an_upgrade_keeps_the_users_presets(installed, home, archive):

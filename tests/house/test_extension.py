@@ -52,6 +52,21 @@ def test_blender_refuses_a_bad_manifest(tmp_path):
     assert "tagline" in done.stdout + done.stderr
 
 
+def test_without_bpy_it_says_what_to_do_before_any_work(tmp_path):
+    out = tmp_path / "out"
+    # Without site-packages there is no bpy, as after a plain `pip install -e .`.
+    done = subprocess.run(
+        [sys.executable, "-S", ROOT / ".ci" / "extension.py", out],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "bpy==" in done.stderr
+    assert "--install" in done.stderr or "use python3.11" in done.stderr
+    assert not out.exists()
+
+
 INSTALL = """
 import sys
 import bpy

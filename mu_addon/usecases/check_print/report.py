@@ -1,4 +1,4 @@
-"""The report of a print check: the verdict, where every fault is, and which way up to print."""
+"""The report of a printability check: verdict, location of each finding, build directions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The print check of a unit or of an STL file, in one folder: findings, pictures, a report."""
+"""The printability check of a unit or an STL file in one folder: findings, pictures, a report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Before any measurement: which effects a set of experiments would show, and from which size on."""
+"""Design of experiments: which effects planned experiments can detect, and the smallest detectable sizes."""
 
 from __future__ import annotations
 

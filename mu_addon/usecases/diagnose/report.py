@@ -1,4 +1,4 @@
-"""The report of a diagnosis: the verdict in a sentence, and all that it rests on."""
+"""The report of a diagnosis: the verdict in a sentence, and the evidence for it."""
 
 from __future__ import annotations
 

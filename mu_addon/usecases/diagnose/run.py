@@ -1,4 +1,4 @@
-"""From measured data to a verdict on the model: read, predict, judge and write down, in one folder."""
+"""From measured data to a verdict on the model: read, predict, judge and write, in one folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The printer's offsets: from a unit's own [print], or from calipers on the printed gauge."""
+"""The print offset: from a unit's own [print], or from calipers on the printed gauge."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files of a unit for printers and CAD, each read back and compared, and a manifest of them."""
+"""Files of a unit for printers and CAD, each read back and compared, with a manifest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Specimens ready to print, what to measure on them, and the folder that takes the measurements."""
+"""Specimens ready to print, their data sheets, and a folder of templates for the measurements."""
 
 from __future__ import annotations
 

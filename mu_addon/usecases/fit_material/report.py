@@ -1,4 +1,4 @@
-"""The report of a fit: which law, how well it fits each mode, how sure its parameters are."""
+"""The report of a fit: the recommended law, its error in each mode, the intervals of its parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From coupon tests to a material: laws fitted, compared and written down, in one folder."""
+"""From coupon tests to a material: laws fitted, compared and written, in one folder."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The gripper at work: a grasp phase by phase, what its light tells, and its sensor paths' deviation."""
+"""The gripper: its grasp phase by phase, its light signal, and the deviation of its sensor paths."""

@@ -1,4 +1,4 @@
-"""A grasp's motion to look at and to play: a folder a cube.
+"""The motion of a grasp for display, one folder a cube.
 
 - motion/: one finger in its own frame, as `study.motion` has it, each instant a state of its own
 - finger.pvd and its .vtu files: the half mesh, for ParaView

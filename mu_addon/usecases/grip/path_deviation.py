@@ -1,4 +1,4 @@
-"""The paper's Table I for a finger of the gripper: how far each sensor path moves a finger that closes.
+"""The paper's Table I for a finger of the gripper: deviation of each sensor path on a closing finger.
 
 On a cube the finger is stopped, and each path's unit is followed along its own path of equilibria. There is
 no friction here: with it a state depends on how it was reached, and the paths' differences, some tenths of a

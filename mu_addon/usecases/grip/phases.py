@@ -1,4 +1,4 @@
-"""A grasp's protocol: pressure over time, and which of its five phases each time belongs to."""
+"""The protocol of a grasp: pressure over time, and the phase of each time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The report of a gripper: the part, its grasps, its light, its table of paths, and what was assumed."""
+"""The report of a gripper: the part, its grasps, its light signal, its sensor paths, and the assumptions."""
 
 from __future__ import annotations
 

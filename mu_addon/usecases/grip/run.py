@@ -1,4 +1,4 @@
-"""A gripper in one folder: its printable part, its grasp of cubes, its light and its sensor paths."""
+"""A gripper in one folder: its printable part, its grasp of cubes, its light signal and its sensor paths."""
 
 from __future__ import annotations
 

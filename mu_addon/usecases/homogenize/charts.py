@@ -1,4 +1,4 @@
-"""Pictures and charts of a homogenised lattice: its cell, its directional stiffness, its virtual tests."""
+"""Pictures and charts of a homogenised lattice: cell, directional stiffness, virtual tests."""
 
 from __future__ import annotations
 

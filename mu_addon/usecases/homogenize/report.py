@@ -1,4 +1,4 @@
-"""The report of a homogenisation: what the lattice amounts to, how it was found, and how far to trust it."""
+"""The report of a homogenisation: effective moduli, their method, and their validity."""
 
 from __future__ import annotations
 

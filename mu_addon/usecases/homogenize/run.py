@@ -1,4 +1,4 @@
-"""From a unit's struts and resin to its lattice's moduli, virtual tests and law, in one folder."""
+"""From a unit's struts and resin to the lattice's moduli, virtual tests and law, in one folder."""
 
 from __future__ import annotations
 

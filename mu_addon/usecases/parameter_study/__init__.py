@@ -1,1 +1,1 @@
-"""Many studies that differ in some of their inputs: the plan, the runs, the table and what it shows."""
+"""Parameter studies: many studies that differ in some inputs; plan, runs, table and analysis."""

@@ -1,4 +1,4 @@
-"""What a study's summary says as the columns of a sweep's table: figures with their unit in the name."""
+"""A study's summary as columns of the parameter study's table: numbers with the unit in the name."""
 
 from __future__ import annotations
 

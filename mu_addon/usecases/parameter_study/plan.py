@@ -1,4 +1,4 @@
-"""What a sweep is asked to do: sweep.toml, and its points."""
+"""The inputs of a parameter study: sweep.toml, and its points."""
 
 from __future__ import annotations
 

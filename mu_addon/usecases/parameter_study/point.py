@@ -1,4 +1,4 @@
-"""One point of a sweep: its study in a process of its own, within the memory and time that it may take.
+"""One point of a parameter study: its study in a child process, within limits of memory and time.
 
 A worker on any machine runs this: what it needs comes with the task, and what it found goes back as a row.
 """

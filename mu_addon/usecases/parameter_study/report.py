@@ -1,4 +1,4 @@
-"""A sweep's report: what was varied, how each figure answers, the best compromises, what failed."""
+"""The report of a parameter study: inputs varied, main effects, Pareto front, failures."""
 
 from __future__ import annotations
 

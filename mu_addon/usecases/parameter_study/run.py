@@ -1,4 +1,4 @@
-"""A sweep in its folder: points that are there are taken, the others run; the table is kept up to date."""
+"""A parameter study in its folder: finished points are kept, the others run; the table is kept up to date."""
 
 from __future__ import annotations
 

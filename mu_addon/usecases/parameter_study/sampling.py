@@ -1,4 +1,4 @@
-"""Points of a sweep in the unit cube: more can be added later, and those that were there stay."""
+"""Points of a parameter study in the unit cube; more can be added later without moving the first ones."""
 
 from __future__ import annotations
 

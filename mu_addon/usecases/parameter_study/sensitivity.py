@@ -1,4 +1,4 @@
-"""What a sweep's table shows: how each input moves each figure, and which points no other one beats."""
+"""Analysis of a parameter study's table: first-order effects, and the Pareto-optimal points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One input that a sweep varies: its name, the values it may take, and how it is put into a study."""
+"""One varied input: its name, its values, and how it enters a study."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a column of ours agrees with the paper's, and which of the paper's statements hold in a table."""
+"""Agreement of a column with the paper's, and which of the paper's statements a table supports."""
 
 from __future__ import annotations
 
@@ -66,21 +66,6 @@ def spearman(one: Array, other: Array) -> Any:
     ranks = [rankdata(column, axis=-1) for column in (one, other)]
     x, y = (r - r.mean(axis=-1, keepdims=True) for r in ranks)
     return (x * y).sum(axis=-1) / np.sqrt((x * x).sum(axis=-1) * (y * y).sum(axis=-1))
-
-
-def objective(ours: Array, theirs: Array, bending: Array, wanted: Array) -> Any:
-    """How far sets of values are from the paper in all columns at once, (...); 0 were perfect.
-
-    ours (..., c, n) and theirs (c, n): J_hat in mm by column; bending (..., c, 2) and wanted (c, 2): the
-    angles in degrees at the ends of the paper's range. The mean over columns of 1 - Spearman, plus a tenth
-    of the mean squares of two logarithms, ours over theirs: of a column's J_hat and of the angles. Rank
-    comes first since it decides the path; a factor of two in every J_hat or angle weighs like 0.05 of rank.
-    """
-    rank = (1.0 - spearman(ours, theirs)).mean(axis=-1)
-    size = (np.log(ours / theirs).mean(axis=-1) ** 2).mean(axis=-1)
-    # An angle of the wrong sign has no logarithm; it counts like a hundredth of what is wanted.
-    angle = (np.log(np.maximum(bending / wanted, 0.01)) ** 2).mean(axis=(-2, -1))
-    return rank + 0.1 * (size + angle)
 
 
 @attrs.frozen

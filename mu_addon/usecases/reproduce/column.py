@@ -85,11 +85,6 @@ class Paths:
         return np.array([d.J_hat for d in self.deviations(rule, at_rest, samples_kPa)])
 
 
-def scaled(mesh: Mesh, factor: float) -> Mesh:
-    """The mesh of the same unit at another scale: the mesher gives every scale the same elements."""
-    return attrs.evolve(mesh, nodes=mesh.nodes * factor)
-
-
 def held(mesh: Mesh, height_mm: float) -> Mesh:
     """The mesh with all of its nodes up to a height held fast, as a fixture around the base would."""
     return attrs.evolve(mesh, base=np.flatnonzero(mesh.nodes[:, 2] <= height_mm * (1 + 1e-9)))

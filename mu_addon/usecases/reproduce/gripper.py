@@ -1,4 +1,4 @@
-"""The paper's fourth column: a finger of the gripper, closing on nothing and on each of the cubes.
+"""The paper's fourth column: a finger of the gripper, closing freely and on each of the cubes.
 
 The paper does not say on what its simulated finger closes.
 """
@@ -17,8 +17,8 @@ from ...placement.inclusion import RULES
 from ...run.cache import Cache, key
 from ..grip.grasp import Cube
 from ..grip.run import CUBES, gripper_column
-from .open_values import RULE, with_values
 from .published import GRIPPER
+from .values import RULE, with_values
 
 Array = np.ndarray[Any, Any]
 

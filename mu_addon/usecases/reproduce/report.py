@@ -1,8 +1,8 @@
-"""report.html of a reproduction: the table beside the paper's, and what stands between them."""
+"""The report of a reproduction: the table beside the paper's, and the differences."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -17,13 +17,13 @@ from ..simulate_and_place.report_data import package_versions
 from . import charts, gripper
 from .agreement import CANNOT_TELL, HELD, Agreement, agreement
 from .columns import BENDING_KPA
-from .open_study import OpenPoint, best, distance, effects
-from .open_values import MOTION_KPA, OPEN, RULE
-from .published import GRIPPER, name_of
+from .published import GRIPPER
 from .run import Found
-from .scatter import Scatter
+from .values import RULE
 
 Array = np.ndarray[Any, Any]
+# Name, title and HTML text.
+Section = tuple[str, str, str]
 
 _WORDS = {
     "volume_fraction": "each element is stiffened by the volume fraction of it inside the sensor",
@@ -31,19 +31,17 @@ _WORDS = {
 }
 # The rule that decides comes first.
 _ORDER = sorted(RULES, key=lambda rule: rule != RULE)
-# Share of the variance that a polynomial must predict before its shares are shown.
-_PREDICTED = 0.5
 # Goals of the reproduction: rank correlation by column.
 GOALS = {"0.75x": 0.9, "1.0x": 0.9, "1.5x": 0.8, GRIPPER: 0.9}
 
 
-def write_report(found: Found, path: Path) -> None:
-    """Write report.html; raises OutputError."""
-    write_text(path, report(found))
+def write_report(found: Found, path: Path, further: Sequence[Section] = ()) -> None:
+    """Write report.html; raises OutputError. further: as `report` has it."""
+    write_text(path, report(found, further))
 
 
-def report(found: Found) -> str:
-    """The page as HTML text."""
+def report(found: Found, further: Sequence[Section] = ()) -> str:
+    """The page as HTML text; further: sections of other studies, before that on sampling."""
     return page(
         "Reproduction of the paper",
         "Exley, Nardin, Trunin, Cafiso, Beccai, Monolithic Units, arXiv:2511.13120: Table I, bending, and "
@@ -55,8 +53,7 @@ def report(found: Found) -> str:
             ("deviation", "Deviation along the length and over time", _deviations(found)),
             ("statements", "Statements of the paper", _statements(found)),
             ("bending", "Bending", _bending(found)),
-            ("meshes", "Mesh dependence of the table", _meshes(found)),
-            ("open", "Parameters that the paper does not print", _open(found)),
+            *further,
             ("sampling", "Sampling of the protocol", _sampling(found)),
             ("versions", "Versions", facts_table("package", "version", package_versions())),
         ],
@@ -71,12 +68,13 @@ def _facts(found: Found) -> list[tuple[str, str]]:
     same = [a.same_choice for a in printed.values()]
     facts.append(("the paper's path chosen, or tied", f"{sum(same)} of {len(same)}"))
     middle = next(c for c in found.columns if c.scale == 1.0)
-    ends = [_angle(a) for a in middle.fine.angle_deg[[0, -1]]]
+    ends = [angle_words(a) for a in middle.fine.angle_deg[[0, -1]]]
     facts.append(("angle at 1.0x, -20 and 50 kPa", f"{ends[0]}, {ends[1]} (paper -65, 50)"))
     return facts
 
 
-def _angle(value: float) -> str:
+def angle_words(value: float) -> str:
+    """An angle in degrees, or that it was not reached."""
     return f"{value:.0f}°" if np.isfinite(value) else "not reached"
 
 
@@ -104,7 +102,7 @@ def _remarks(found: Found) -> list[str]:
     if found.settings.held_cells:
         remarks.append(
             f"The three units are clamped up to {found.settings.held_cells:g} cells above the base; the "
-            "gripper's fingers and the random meshes are not."
+            "gripper's fingers are not."
         )
     if found.settings.mesh.order == 1:
         remarks.append("Linear elements lock in thin walls: these results are for a quick look only.")
@@ -203,157 +201,6 @@ def _bending(found: Found) -> str:
         "Angle against pressure of three scales, beside the paper's ends.",
     )
     return f'<div class="pair">{chart}</div>' + table(caption, head, rows)
-
-
-def _by_column(found: Found, family: str, rule: str) -> dict[str, Scatter]:
-    every = found.scatters()
-    keys = [(family, rule, scale) for scale in found.paper.scales]
-    return {name_of(scale): every[key] for key in keys if key in every for scale in key[2:]}
-
-
-def _meshes(found: Found) -> str:
-    """Tables and pictures of the random meshes, or nothing where there are none."""
-    html = ""
-    rows = []
-    for (family, rule, scale), s in sorted(found.scatters().items()):
-        chosen = s.chosen
-        most = np.argsort(-chosen)[:3]
-        names = [p.name for p in found.paper.paths]
-        theirs = int(np.argmin(s.theirs))
-        cells = [
-            name_of(scale), family, rule.replace("_", " "), len(s.J_hat), f"{s.volume_ratio.mean():.1f}",
-            f"{s.spearman.min():.2f} .. {np.median(s.spearman):.2f} .. {s.spearman.max():.2f}",
-            f"{(s.spearman >= GOALS[name_of(scale)]).mean():.0%}",
-            ", ".join(f"{label(names[i])} {chosen[i]:.0%}" for i in most if chosen[i] > 0),
-            f"{label(names[theirs])} {chosen[theirs]:.0%}",
-            f"{s.agree[1, 0]:.0%}",
-            f"{s.J_hat.mean() / s.theirs.mean():.2f}",
-        ]  # fmt: skip
-        rows.append((cells, False))
-    if not rows:
-        return ""
-    head = [
-        ("scale", ""), ("elements", ""), ("rule", ""), ("meshes", "n"), ("volume", "n"),
-        ("rank correlation", ""),
-        ("goal reached", "n"), ("chosen", ""), ("paper's chosen", ""), ("α₁ α₂ as in the paper", "n"),
-        ("size", "n"),
-    ]  # fmt: skip
-    html += (
-        "<p>Random meshes of the kind the paper may have used: the whole body in linear tetrahedra of about "
-        "5 mm by Gmsh, not aligned with the anchors. The seed varies all element sizes by up to 10 %, so "
-        "that any of them could have been used. <i>grown</i>: elements grow with the unit; <i>same</i>: 5 "
-        "mm at every scale; <i>coarse</i>: 9 mm at 1.0x. Volume: stiffened volume over the sensor's volume. "
-        "Rank correlation: minimum, median and maximum over all meshes. Magnitude: mean J_hat over the "
-        "paper's.</p>"
-    )
-    html += table(f"From: {found.origin['meshes']}.", head, rows)
-    for family in ("grown", "same", "coarse"):
-        picked = _by_column(found, family, "intersect")
-        if picked:
-            svg = charts.mesh_scatter(picked, found.paper.paths)
-            words = f"Dots: one mesh each ({family}, intersect). Crosses: the paper."
-            html += figure(svg, words, words)
-            svg = charts.orders(picked, found.paper.paths)
-            words = (
-                f"Percentage of meshes in which two paths are in the paper's order ({family}, intersect); "
-                "no number: 100 %."
-            )
-            html += figure(svg, words, words)
-    return html
-
-
-def _open(found: Found) -> str:
-    paper = found.paper
-    solved = [p for p in found.points if not p.name and not p.failed]
-    if len(solved) < len(OPEN) + 2:
-        return ""
-    failed = sum(bool(p.failed) for p in found.points)
-    touching = sum(p.touches for p in solved)
-    html = (
-        f"<p>{len(solved) + failed} sets of values within the ranges below, one set for all three units "
-        f"each (refine 0.5, volume fraction): {failed} have a limit point within the range; in {touching} "
-        "of the others walls intersect before the end of the range; self-contact is not modelled.</p>"
-    )
-    rows = [([o.name, f"{o.variable.low:g} to {o.variable.high:g}", o.why], False) for o in OPEN]
-    html += table(f"From: {found.origin['points']}.", [("parameter", ""), ("range", ""), ("why", "")], rows)
-    found_effects = effects(solved, paper)
-    told = [e for e in found_effects if e.Q2 >= _PREDICTED]
-    words = (
-        "Share in percent of a result's variance due to a parameter, alone and in interaction (Sobol "
-        "total index)."
-    )
-    if told:
-        html += figure(charts.shares(told), words, words)
-    head = [("figure", ""), ("least", "n"), ("most", "n"), ("variance predicted", "n")]
-    rows = [
-        ([signed(e.name), f"{e.low:.3g}", f"{e.high:.3g}", f"{e.Q2:.0%}" if e.Q2 > 0 else "none"], False)
-        for e in found_effects
-    ]
-    html += table(
-        "Over all sets; last column: variance of held-out sets predicted by the polynomial that the indices "
-        "are computed from.",
-        head,
-        rows,
-    )
-    return html + _sets(found, solved)
-
-
-def _sets(found: Found, solved: list[OpenPoint]) -> str:
-    paper = found.paper
-    named = [p for p in found.points if p.name and not p.failed]
-    leading = best(solved, paper)[:5]
-    head = [
-        ("set", ""),
-        *((name_of(s), "n") for s in paper.scales),
-        *((f"{name_of(s)} size", "n") for s in paper.scales),
-        ("chosen", ""),
-        *((f"{p:g} kPa", "n") for p in MOTION_KPA),
-        ("self-contact", ""),
-        ("goals", ""),
-        ("distance", "n"),
-    ]
-    rows = []
-    for p in [*named, *leading]:
-        agreed = _agreed(found, p)
-        chosen = " ".join(label(paper.paths[int(J.argmin())].name) for J in p.J_hat)
-        middle = paper.scales.index(1.0)
-        touch = p.crossing_kPa[np.isfinite(p.crossing_kPa)]
-        rows.append(
-            (
-                [
-                    p.name or "of the design",
-                    *(f"{rank:.2f}" for rank, _ in agreed),
-                    *(f"{size:.2f}" for _, size in agreed),
-                    chosen,
-                    *(_angle(a) for a in p.angle_deg[middle]),
-                    f"{touch[np.argmin(np.abs(touch))]:.3g} kPa" if len(touch) else "-",
-                    "reached" if _reached(found, p) else "-",
-                    f"{distance(p, paper):.3f}",
-                ],
-                _reached(found, p),
-            )
-        )
-    words = (
-        "Named sets, and the five sampled sets without self-contact that agree best. Rank correlation; "
-        "magnitude, the mean J_hat over the paper's; path chosen at 0.75x, 1.0x and 1.5x; angles at 1.0x; "
-        "distance as docs/reproduce.md has it."
-    )
-    return table(words, head, rows)
-
-
-def _reached(found: Found, p: OpenPoint) -> bool:
-    """Whether all columns reach the goals at once, walls apart."""
-    wanted = [GOALS[name_of(scale)] for scale in found.paper.scales]
-    ranks = [rank for rank, _ in _agreed(found, p)]
-    return not p.touches and all(rank >= goal for rank, goal in zip(ranks, wanted, strict=True))
-
-
-def _agreed(found: Found, p: OpenPoint) -> list[tuple[float, float]]:
-    compared = [
-        agreement(J, found.paper.column(scale), found.paper.paths)
-        for scale, J in zip(found.paper.scales, p.J_hat, strict=True)
-    ]
-    return [(a.spearman, a.magnitude) for a in compared]
 
 
 def weightings(samples_kPa: Array) -> Mapping[str, Array]:

@@ -1,4 +1,4 @@
-"""The paper's table, done again: three units, their meshes' share in it, and what the paper leaves open."""
+"""The paper's table, done again: three units and the gripper's finger, beside what the paper prints."""
 
 from __future__ import annotations
 
@@ -10,11 +10,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.assets import asset_root
 from ...design.parameters import Unit
-from ...errors import InputError
 from ...files import write_csv
-from ...meshing.settings import MeshSettings
 from ...placement.inclusion import RULES
 from ...run.cache import Cache
 from ...run.context import RunContext
@@ -23,24 +20,21 @@ from ...run.pool import each
 from ...run.progress import Progress
 from ..simulate_and_place.job import grasp
 from ..simulate_and_place.report_data import package_versions
-from . import gripper, open_study, scatter
+from . import gripper
 from .agreement import Agreement, Statement, agreement, statements
 from .columns import BENDING_KPA, Solved, TableColumn, solved, tasks
-from .open_study import OpenPoint, point
-from .open_values import BESIDE, RULE, Beside, PointResult, column_unit, design, kept
 from .published import Published, name_of, published
-from .settings import FOLDER, HEADER, Settings
+from .settings import HEADER, Settings
+from .values import RULE, column_unit
 
 Array = np.ndarray[Any, Any]
 
 INPUTS = "reproduce.toml"
 TABLE, AGREEMENT, STATEMENTS, BENDING = "table.csv", "agreement.csv", "statements.csv", "bending.csv"
-MESHES, OPEN_TABLE, REPORT = "meshes.csv", "open.csv", "report.html"
-RESULTS = (TABLE, AGREEMENT, STATEMENTS, BENDING, MESHES, OPEN_TABLE, REPORT)
+REPORT = "report.html"
+RESULTS = (TABLE, AGREEMENT, STATEMENTS, BENDING, REPORT)
 # Samples of the grasp protocol, as in `place`.
 TIMES = 13
-# Mesh of the points of the open values.
-OPEN_MESH = MeshSettings(refine=0.5)
 
 
 @attrs.frozen(eq=False)
@@ -54,19 +48,13 @@ class OtherColumn:
 
 @attrs.frozen(eq=False)
 class Found:
-    """All that a reproduction found. drawn and points may be those that come with the package: see `origin`.
-
-    samples: pressure in kPa at the protocol's instants (k,).
-    """
+    """All that a reproduction found. samples: pressure in kPa at the protocol's instants (k,)."""
 
     settings: Settings
     paper: Published
     columns: tuple[TableColumn, ...]
     others: Mapping[str, OtherColumn]
-    drawn: tuple[scatter.Drawn, ...]
-    points: tuple[OpenPoint, ...]
     samples_kPa: Array
-    origin: Mapping[str, str]
 
     def table(self, rule: str) -> dict[str, Array]:
         """J_hat (paths,) in mm by column."""
@@ -100,10 +88,6 @@ class Found:
         known = {name: J for name, J in self.table(rule).items() if name in coarser}
         return statements(known, coarser, self.paper.paths)
 
-    def scatters(self) -> dict[tuple[str, str, float], scatter.Scatter]:
-        """What many meshes say, by family, rule and scale."""
-        return scatter.scatters(self.drawn, {s: self.paper.column(s) for s in self.paper.scales})
-
 
 def reproduce(
     settings: Settings,
@@ -115,31 +99,26 @@ def reproduce(
     from .report import write_report
 
     begin(context, folder, HEADER, {INPUTS: settings.text()}, RESULTS)
+    found = solve(settings, Cache(folder / "cache"), progress)
+    write_tables(found, folder)
+    context.summary |= summary(found)
+    with progress.stage("report", expected_s=10.0):
+        write_report(found, folder / REPORT)
+    return found
+
+
+def solve(settings: Settings, cache: Cache, progress: Progress) -> Found:
+    """Table and bending of the three units, and the gripper's column where it is asked for."""
     paper, unit = published(), settings.unit
     _, samples = grasp().sample(TIMES)
     units = [column_unit(unit, scale, modulus) for scale, modulus in paper.modulus_kPa.items()]
-    cache = Cache(folder / "cache")
     with progress.stage("columns"):
         columns = _columns(units, settings, samples, cache, progress)
     others: dict[str, OtherColumn] = {}
     if settings.gripper:
         with progress.stage("gripper"):
             others = _gripper(settings, paper, cache, progress)
-    drawn, points, origin = shipped(paper)
-    if settings.meshes:
-        with progress.stage("random meshes"):
-            drawn = _draws(units, settings, samples, cache, progress)
-        origin["meshes"] = "this run"
-    if settings.points:
-        with progress.stage("open values"):
-            points = _points(unit, paper, settings, samples, cache, progress)
-        origin["points"] = "this run"
-    found = Found(settings, paper, columns, others, tuple(drawn), tuple(points), samples, origin)
-    write_tables(found, folder)
-    context.summary |= summary(found)
-    with progress.stage("report", expected_s=10.0):
-        write_report(found, folder / REPORT)
-    return found
+    return Found(settings, paper, columns, others, samples)
 
 
 def _columns(
@@ -174,64 +153,6 @@ def _gripper(
         else:
             found[task.name] = attrs.evolve(column, J_hat={**column.J_hat, task.rule: J_hat})
     return found
-
-
-def _draws(
-    units: Sequence[Unit], settings: Settings, samples: Array, cache: Cache, progress: Progress
-) -> list[scatter.Drawn]:
-    todo = scatter.draws(units, settings.meshes)
-    work = partial(scatter.draw, samples_kPa=samples, cache=cache)
-    known: dict[int, list[scatter.Drawn]] = {}
-    for number, found in each(work, todo, settings.workers):
-        known[number] = found
-        progress.update(len(known) / len(todo))
-    return [drawn for number in sorted(known) for drawn in known[number]]
-
-
-def _points(
-    unit: Unit, paper: Published, settings: Settings, samples: Array, cache: Cache, progress: Progress
-) -> list[OpenPoint]:
-    sets = [Beside("", values) for values in design(settings.points)]
-    sets = [*BESIDE, *sets]
-    work = partial(_open, unit=unit, cache=cache, moduli=dict(paper.modulus_kPa))
-    known: dict[int, PointResult | str] = {}
-    for number, found in each(work, sets, settings.workers):
-        known[number] = found
-        progress.update(len(known) / len(sets))
-    own = open_study.values_of(unit)
-    points = [point(one.name, {**own, **one.values}, known[i], samples) for i, one in enumerate(sets)]
-    solved_ones = [p for p in points if not p.name and not p.failed]
-    if len(solved_ones) >= open_study.FEWEST:
-        proposed = Beside(open_study.PROPOSED, open_study.proposal(solved_ones, paper))
-        points.append(point(proposed.name, proposed.values, work(proposed), samples))
-    return points
-
-
-def _open(one: Beside, unit: Unit, cache: Cache, moduli: Mapping[float, float]) -> PointResult | str:
-    return kept(cache, unit, one.values, moduli, OPEN_MESH, one.held_cells)
-
-
-def shipped(paper: Published) -> tuple[list[scatter.Drawn], list[OpenPoint], dict[str, str]]:
-    """The tables of the long studies that come with the package, and what their first lines say of them."""
-    folder = asset_root() / FOLDER
-    names = [p.name for p in paper.paths]
-    try:
-        meshes, opened = ((folder / name).read_text(encoding="utf-8") for name in (MESHES, OPEN_TABLE))
-    except OSError as error:
-        raise InputError(
-            f"the tables of the long studies are missing: {error}", str(folder), "install the whole extension"
-        ) from error
-    origin = {"meshes": _first_words(meshes), "points": _first_words(opened)}
-    return (
-        scatter.from_text(meshes, folder / MESHES),
-        open_study.from_text(opened, paper.scales, names, folder / OPEN_TABLE),
-        origin,
-    )
-
-
-def _first_words(text: str) -> str:
-    lines = [line[1:].strip() for line in text.splitlines() if line.startswith("#")]
-    return " ".join(lines)
 
 
 def write_tables(found: Found, folder: Path) -> None:
@@ -280,12 +201,6 @@ def write_tables(found: Found, folder: Path) -> None:
             for p, a, b in zip(BENDING_KPA, c.fine.angle_deg, c.coarse.angle_deg, strict=True)
         ],
     )
-    names = [p.name for p in paper.paths]
-    if found.origin["meshes"] == "this run":
-        write_csv(folder / MESHES, [*scatter.COLUMNS, *names], scatter.to_rows(found.drawn))
-    if found.origin["points"] == "this run":
-        head = open_study.columns(paper.scales, names)
-        write_csv(folder / OPEN_TABLE, head, open_study.to_rows(found.points, paper.scales, names))
 
 
 def summary(found: Found) -> dict[str, Any]:

@@ -13,14 +13,16 @@ from ...design.parameters import Unit, load_preset
 from ...errors import InputError
 from ...meshing.settings import MeshSettings
 from ...reading import file_text, parse_toml
-from .open_values import with_values
+from .values import with_values
 
 HEADER = "# The inputs of a reproduction of the paper's table."
 DEFAULT = "default"
 FOLDER = "reproduce"
 
 
-def _between(low: int, high: int) -> Any:
+def between(low: int, high: int) -> Any:
+    """An attrs validator of a number's bounds; InputError names the option."""
+
     def check(_: object, field: attrs.Attribute[Any], value: float) -> None:
         if not low <= value <= high:
             raise InputError(f"{value:g} is out of bounds", f"--{field.name}", f"give {low} to {high}")
@@ -33,19 +35,16 @@ class Settings:
     """What decides a reproduction. Raises InputError.
 
     values: of the set that all columns share, beside the preset's own. held_cells: the height from the base,
-    in cells, up to which the three units are held fast. mesh: of the table. meshes: random ones a family,
-    points: sets of open values; where 0, those that come with the package are shown.
+    in cells, up to which the three units are held fast. mesh: of the table.
     """
 
     values: Mapping[str, Any] = attrs.field(factory=dict)
     values_name: str = DEFAULT
-    held_cells: float = attrs.field(default=0.0, validator=_between(0, 5))
+    held_cells: float = attrs.field(default=0.0, validator=between(0, 5))
     mesh: MeshSettings = attrs.field(factory=MeshSettings)
-    meshes: int = attrs.field(default=12, validator=_between(0, 1000))
-    points: int = attrs.field(default=0, validator=_between(0, 4096))
     # Whether the paper's fourth column is found, too.
     gripper: bool = True
-    workers: int = attrs.field(default=2, validator=_between(1, 256))
+    workers: int = attrs.field(default=2, validator=between(1, 256))
 
     @property
     def unit(self) -> Unit:
@@ -54,10 +53,9 @@ class Settings:
 
     def text(self) -> str:
         """reproduce.toml: all that decides the results."""
-        lines = [HEADER, "format = 1", f'set = "{self.values_name}"', f"meshes = {self.meshes}"]
+        lines = [HEADER, "format = 1", f'set = "{self.values_name}"']
         lines += [
             f"held_cells = {self.held_cells:g}",
-            f"points = {self.points}",
             f"gripper = {str(self.gripper).lower()}",
             "",
             "[values]",

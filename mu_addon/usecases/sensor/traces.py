@@ -1,4 +1,4 @@
-"""Channels over the last seconds as they are drawn: their extremes in every column of pixels, nothing lost.
+"""Channels of the last seconds as they are drawn: minimum and maximum in every pixel column.
 
 A sample is looked at once, when it comes: what is drawn costs the same at 10 Hz and at 10 kHz, and a spike of
 one sample still shows.

@@ -1,4 +1,4 @@
-"""A sensor's session seen from another process: its status, and its samples as they come. Nothing waits."""
+"""A sensor's session seen from another process: status and samples as they arrive, without blocking."""
 
 from __future__ import annotations
 

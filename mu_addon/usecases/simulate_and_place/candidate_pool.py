@@ -1,4 +1,4 @@
-"""Many candidates on several cores: processes that are each given the mesh and the baseline once."""
+"""Candidates on several cores: processes that receive the mesh and the baseline once."""
 
 from __future__ import annotations
 

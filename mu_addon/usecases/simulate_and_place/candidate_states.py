@@ -1,4 +1,4 @@
-"""A study's candidates on one mesh: solved state by state as Model A reaches them, and kept."""
+"""A study's candidates on one mesh, solved state by state as Model A reaches them, and cached."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A study's unit beside rigid bodies: what it touches, with what force, and how it slides, over time."""
+"""Contact of a study's unit with rigid obstacles over time: forces, penetration, slip."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A unit as an extended model has it: what model.toml says is wrong, put into parameters and mechanics."""
+"""A unit with the effects of an extended model (model.toml) in its parameters and mechanics."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The stages of a study beyond the windows: the sensitivity map, and the best path of the whole lattice."""
+"""The sensitivity map, and the search of the whole lattice for the best path."""
 
 from __future__ import annotations
 

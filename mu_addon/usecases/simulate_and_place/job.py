@@ -1,4 +1,4 @@
-"""What a study is asked to do: its inputs, and the text that stands for them in study.toml."""
+"""The inputs of a study, and their text in study.toml."""
 
 from __future__ import annotations
 

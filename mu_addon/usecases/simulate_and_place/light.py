@@ -1,4 +1,4 @@
-"""The second aim of a placement: how well light along each candidate path would tell the bending."""
+"""The light signal of each candidate path: its change with bending, beside the deviation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Charts of what light along the candidate paths would tell."""
+"""Charts of the light signal of candidate paths."""
 
 from __future__ import annotations
 

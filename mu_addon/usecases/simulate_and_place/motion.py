@@ -1,4 +1,4 @@
-"""A study's motion to look at: displacements, stress and stretch of every state, in the folder `motion/`.
+"""A study's motion for display: displacement, stress and stretch of every state, in `motion/`.
 
 Written as the study finds them, in single precision, and read again by whatever draws them.
 

@@ -1,4 +1,4 @@
-"""Square pictures of a study's answers, small enough for a panel: letters large, nothing but the answer."""
+"""Square pictures of a study's results for a panel: few elements, large letters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The motion of a unit with a sensor in place, to look at: its differences from Model A's, fields and all."""
+"""The motion of a unit with a sensor, for display, as differences from Model A's."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The simulated unit at a measured bending angle: between Model A's states, and never beyond them.
+"""The simulated unit at a measured bending angle, interpolated between Model A's states.
 
 Under pressure alone the elastic unit has one state a pressure. Where its angle rises with pressure all the
 way from rest, an angle belongs to one state; beyond the first turn it would belong to two, so that there the

@@ -1,4 +1,4 @@
-"""One run as one HTML file: styles and pictures are inside, it runs no script and asks no server.
+"""The report of a study as one HTML file without scripts or requests.
 
 It answers first (which path), then shows why, and ends with what the answer rests on.
 """

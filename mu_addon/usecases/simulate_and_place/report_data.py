@@ -1,4 +1,4 @@
-"""The report of a study, as far as the study came."""
+"""The data of a study's report, as far as the study was finished."""
 
 from __future__ import annotations
 

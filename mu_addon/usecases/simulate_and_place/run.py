@@ -1,4 +1,4 @@
-"""The stages of a study of one unit, in the order they need each other: design, simulate, place."""
+"""The stages of a study of one unit in their order: design, simulate, place."""
 
 from __future__ import annotations
 

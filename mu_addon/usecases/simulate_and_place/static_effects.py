@@ -1,4 +1,4 @@
-"""Effects that evidence named and that a quasi-static simulation of the unit can have, side by side."""
+"""Identified effects that a quasi-static simulation of the unit can contain."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""study.toml: what a study was asked for, a table a stage; read in this format and in older ones."""
+"""study.toml: the inputs of a study, a table a stage; read in this format and in older ones."""
 
 from __future__ import annotations
 

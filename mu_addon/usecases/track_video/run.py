@@ -1,4 +1,4 @@
-"""From a followed video to an experiment in a folder of measured data: pressure, angle, places.
+"""From a tracked video to an experiment in a folder of measured data: pressure, angle, positions.
 
 What is followed comes from a tracker: Blender's, or a CSV file of pixels from any other.
 """

@@ -14,13 +14,13 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.dimensions import Dimensions
-from ...design.parameters import Unit
-from ...errors import MeshingError
-from ...meshing.lattice import gmsh_model, load_gmsh
-from ...meshing.membrane import Meridian, division, membrane_mesh, stations
-from ...meshing.mesh import LATTICE, MEMBRANE, Array, Mesh, edges_of, mirror, oriented, second_order
-from ...meshing.quality import check_positive
+from mu_addon.design.dimensions import Dimensions
+from mu_addon.design.parameters import Unit
+from mu_addon.errors import MeshingError
+from mu_addon.meshing.lattice import gmsh_model, load_gmsh
+from mu_addon.meshing.membrane import Meridian, division, membrane_mesh, stations
+from mu_addon.meshing.mesh import LATTICE, MEMBRANE, Array, Mesh, edges_of, mirror, oriented, second_order
+from mu_addon.meshing.quality import check_positive
 
 # The membrane's elements, along the meridian and around, in mm at a cell of 12.5 mm.
 _MERIDIAN_MM, _HOOP_MM = 2.5, 5.0

@@ -11,14 +11,15 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.anchors import anchor_points
-from ...design.parameters import Unit
-from ...errors import InputError, MuError
-from ...meshing.mesh import Mesh
-from ...placement.inclusion import RULES
-from ...run.cache import Cache, key
-from .agreement import spearman
-from .column import ENDS_KPA, motion, paths
+from mu_addon.design.anchors import anchor_points
+from mu_addon.design.parameters import Unit
+from mu_addon.errors import InputError, MuError
+from mu_addon.meshing.mesh import Mesh
+from mu_addon.placement.inclusion import RULES
+from mu_addon.run.cache import Cache, key
+from mu_addon.usecases.reproduce.agreement import spearman
+from mu_addon.usecases.reproduce.column import ENDS_KPA, motion, paths
+
 from .unstructured import Recipe, unstructured_mesh
 
 Array = np.ndarray[Any, Any]

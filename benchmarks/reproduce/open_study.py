@@ -11,11 +11,12 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.parameters import Unit
-from ...errors import InputError
-from .agreement import objective, spearman
+from mu_addon.design.parameters import Unit
+from mu_addon.errors import InputError
+from mu_addon.usecases.reproduce.agreement import spearman
+from mu_addon.usecases.reproduce.published import Published, name_of
+
 from .open_values import MOTION_KPA, OPEN, PointResult
-from .published import Published, name_of
 from .surrogate import Shares, Surrogate, fit, shares
 
 Array = np.ndarray[Any, Any]
@@ -46,6 +47,21 @@ class OpenPoint:
     def touches(self) -> bool:
         """Whether walls pass through each other somewhere in the range of bending."""
         return bool(np.isfinite(self.crossing_kPa).any())
+
+
+def objective(ours: Array, theirs: Array, bending: Array, wanted: Array) -> Any:
+    """How far sets of values are from the paper in all columns at once, (...); 0 were perfect.
+
+    ours (..., c, n) and theirs (c, n): J_hat in mm by column; bending (..., c, 2) and wanted (c, 2): the
+    angles in degrees at the ends of the paper's range. The mean over columns of 1 - Spearman, plus a tenth
+    of the mean squares of two logarithms, ours over theirs: of a column's J_hat and of the angles. Rank
+    comes first since it decides the path; a factor of two in every J_hat or angle weighs like 0.05 of rank.
+    """
+    rank = (1.0 - spearman(ours, theirs)).mean(axis=-1)
+    size = (np.log(ours / theirs).mean(axis=-1) ** 2).mean(axis=-1)
+    # An angle of the wrong sign has no logarithm; it counts like a hundredth of what is wanted.
+    angle = (np.log(np.maximum(bending / wanted, 0.01)) ** 2).mean(axis=(-2, -1))
+    return rank + 0.1 * (size + angle)
 
 
 def point(name: str, values: Mapping[str, float], found: PointResult | str, samples_kPa: Array) -> OpenPoint:

@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import attrs
 import numpy as np
 
-from ...design.anchors import anchor_points
-from ...design.parameters import Unit
-from ...errors import ConvergenceError, MuError
-from ...fem.protocol import Protocol
-from ...meshing.settings import MeshSettings
-from ...meshing.unit import mesh_unit
-from ...run.cache import Cache, key
-from ..parameter_study.variable import Inputs, Variable, put
-from .column import ENDS_KPA, Paths, held, motion, paths, scaled
+from mu_addon.design.anchors import anchor_points
+from mu_addon.design.parameters import Unit
+from mu_addon.errors import ConvergenceError, MuError
+from mu_addon.meshing.mesh import Mesh
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.unit import mesh_unit
+from mu_addon.run.cache import Cache, key
+from mu_addon.usecases.parameter_study.variable import Variable
+from mu_addon.usecases.reproduce.column import ENDS_KPA, Paths, held, motion, paths
+from mu_addon.usecases.reproduce.values import RULE, column_unit, with_values
 
 Array = np.ndarray[Any, Any]
-
-REST = Protocol(np.array([0.0, 1.0]), np.array([0.0, 1.0]))
 
 
 @attrs.frozen
@@ -77,8 +75,6 @@ BESIDE = (
     Beside("held up to one cell", held_cells=1.0),
     Beside("held up to one and a half cells", held_cells=1.5),
 )
-# The rule that keeps the sensor's volume: what the other gives is its mesh's, see `scatter`.
-RULE = "volume_fraction"
 # Pressures in kPa of Model A: the protocol's ends, and that of the paper's range of bending.
 MOTION_KPA = (*ENDS_KPA, 50.0)
 
@@ -104,15 +100,9 @@ class PointResult:
         return np.array([p.J_hat(RULE, at_rest, samples_kPa) for p, at_rest in found])
 
 
-def with_values(unit: Unit, values: Mapping[str, Any]) -> Unit:
-    """The unit with some values of other than its own, named as in unit.toml. Raises InputError."""
-    return put(Inputs(unit, REST, {}), values, Path()).unit
-
-
-def column_unit(unit: Unit, scale: float, lattice_modulus_kPa: float) -> Unit:
-    """A unit at a column's scale, with the modulus that the paper measured there."""
-    material = attrs.evolve(unit.material, lattice_modulus_kPa=lattice_modulus_kPa)
-    return attrs.evolve(unit, name=f"mu-{scale:g}x", scale=scale, material=material)
+def scaled(mesh: Mesh, factor: float) -> Mesh:
+    """The mesh of the same unit at another scale: the mesher gives every scale the same elements."""
+    return attrs.evolve(mesh, nodes=mesh.nodes * factor)
 
 
 def design(count: int, seed: int = 1) -> list[dict[str, float]]:

@@ -1,0 +1,29 @@
+"""The units of the table: values that the paper does not print, and each column's scale and modulus."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...design.parameters import Unit
+from ...fem.protocol import Protocol
+from ..parameter_study.variable import Inputs, put
+
+# The rule that keeps the sensor's volume: what the other gives is its mesh's.
+RULE = "volume_fraction"
+_REST = Protocol(np.array([0.0, 1.0]), np.array([0.0, 1.0]))
+
+
+def with_values(unit: Unit, values: Mapping[str, Any]) -> Unit:
+    """The unit with some values of other than its own, named as in unit.toml. Raises InputError."""
+    return put(Inputs(unit, _REST, {}), values, Path()).unit
+
+
+def column_unit(unit: Unit, scale: float, lattice_modulus_kPa: float) -> Unit:
+    """A unit at a column's scale, with the modulus that the paper measured there."""
+    material = attrs.evolve(unit.material, lattice_modulus_kPa=lattice_modulus_kPa)
+    return attrs.evolve(unit, name=f"mu-{scale:g}x", scale=scale, material=material)

@@ -1,0 +1,46 @@
+"""The examples of docs/python.md run as they stand, and print what the page shows."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+EXAMPLES = re.findall(r"```python\n(.*?)```\s*```text\n(.*?)```", PAGE, re.DOTALL)
+
+
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]\d+)?")
+
+
+def printed(code, folder):
+    """What a script prints, run from the repository with the package that is tested here."""
+    script = folder / "example.py"
+    script.write_text(code, encoding="utf-8")
+    run = f"import sys; sys.path.insert(0, {str(ROOT)!r}); import runpy; runpy.run_path({str(script)!r})"
+    found = subprocess.run([sys.executable, "-c", run], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert found.returncode == 0, found.stderr
+    return found.stdout
+
+
+def require_alike(found, shown):
+    """Equal words, and numbers within what a mesher without a seed scatters."""
+    assert NUMBER.sub("#", found).split() == NUMBER.sub("#", shown).split()
+    figures = [[float(number) for number in NUMBER.findall(text)] for text in (found, shown)]
+    assert figures[0] == pytest.approx(figures[1], rel=0.03)
+
+
+def test_ten_lines_lead_from_a_preset_to_an_angle(tmp_path):
+    code, shown = EXAMPLES[0]
+    statements = [line for line in code.splitlines() if line and not line.startswith(("import", "from"))]
+    assert len(statements) <= 10
+    require_alike(printed(code, tmp_path), shown)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(1, len(EXAMPLES)))
+def test_the_other_examples_print_what_the_page_shows(number, tmp_path):
+    code, shown = EXAMPLES[number]
+    require_alike(printed(code, tmp_path), shown)
