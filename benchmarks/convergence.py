@@ -41,7 +41,7 @@ def angles(preset, refines):
     for refine in refines:
         job = job_of(preset, refine)
         with tempfile.TemporaryDirectory() as folder, run_to_end(Progress()) as context:
-            mesh = Study(job, Path(folder), context.progress, context).make_mesh()
+            mesh = Study(job, Path(folder), context).make_mesh()
         start = time.perf_counter()
         model = Model(mesh)
         path = simulate(Equilibrium(model, materials_of(job.unit, mesh)), np.arange(8.0), PRESSURES)
@@ -55,7 +55,7 @@ def deviations(preset, refines):
     tables = {}
     for refine in refines:
         with tempfile.TemporaryDirectory() as folder, run_to_end(Progress()) as context:
-            study = Study.open(job_of(preset, refine), Path(folder), context.progress, context)
+            study = Study.open(job_of(preset, refine), Path(folder), context)
             study.make_mesh()
             study.simulate()
             study.place()

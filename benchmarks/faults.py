@@ -135,7 +135,7 @@ def forked(folder):
     status = 70
     try:
         with run_to_end(Progress()) as context:
-            run_stages(Study.open(attrs.evolve(JOB, workers=1), folder, context.progress, context))
+            run_stages(Study.open(attrs.evolve(JOB, workers=1), folder, context))
         status = context.status
     finally:
         os._exit(status)

@@ -29,7 +29,7 @@ from mu_addon.run.progress import Progress  # noqa: E402
 from mu_addon.usecases.parameter_study.cluster import Cluster  # noqa: E402
 from mu_addon.usecases.parameter_study.plan import parse_plan  # noqa: E402
 from mu_addon.usecases.parameter_study.point import Task, run_point, version  # noqa: E402
-from mu_addon.usecases.parameter_study.run import sweep  # noqa: E402
+from mu_addon.usecases.parameter_study.run import USE_CASE, Job  # noqa: E402
 
 POINTS = 200
 # What a real study of this sweep answers, so that as many bytes travel back.
@@ -201,13 +201,8 @@ def real(count):
     for workers in (1, 2):
         with tempfile.TemporaryDirectory() as name, run_to_end(Progress()) as context:
             begun = time.perf_counter()
-            found = sweep(
-                parse_plan(TEXT.format(points=count), ROOT),
-                Path(name),
-                context.progress,
-                context,
-                workers=workers,
-            )
+            job = Job(parse_plan(TEXT.format(points=count), ROOT), workers=workers)
+            found = USE_CASE.start(job, Path(name), context)
             taken = time.perf_counter() - begun
         assert context.status == 0
         assert not found.failed

@@ -16,6 +16,7 @@ from pathlib import Path
 from mu_addon.cli import reproduce as table
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress, json_lines, terminal
+from mu_addon.usecases.reproduce.run import console_summary
 
 from .run import LongSettings, reproduce
 
@@ -45,9 +46,9 @@ def main(arguments: list[str]) -> int:
     with run_to_end(progress) as context:
         meshes = options.meshes if options.meshes is not None else 0 if options.coarse else 12
         settings = LongSettings(table.settings_of(options), meshes, options.points)
-        reproduce(settings, Path(options.out), progress, context)
+        reproduce(settings, Path(options.out), context)
     if context.status == 0 and not options.json:
-        print("\n".join([f"results: {context.folder}", *table.console_summary(context.summary)]))
+        print("\n".join([f"results: {context.folder}", *console_summary(context.summary)]))
     return context.status
 
 

@@ -19,10 +19,13 @@ from mu_addon.run.context import RunContext
 from mu_addon.run.folder import begin
 from mu_addon.run.pool import each
 from mu_addon.run.progress import Progress
+from mu_addon.toml_writer import toml_text
+from mu_addon.usecases.reproduce.found import Found
 from mu_addon.usecases.reproduce.published import Published
 from mu_addon.usecases.reproduce.report import write_report
-from mu_addon.usecases.reproduce.run import INPUTS, REPORT, RESULTS, Found, solve, summary, write_tables
-from mu_addon.usecases.reproduce.settings import HEADER, Settings, between
+from mu_addon.usecases.reproduce.run import solve, summary, write_tables
+from mu_addon.usecases.reproduce.settings import LAYOUT as TABLE_LAYOUT
+from mu_addon.usecases.reproduce.settings import REPORT, Settings, between
 from mu_addon.usecases.reproduce.values import column_unit
 
 from . import open_study, scatter
@@ -32,6 +35,7 @@ from .open_values import BESIDE, Beside, PointResult, design, kept
 Array = np.ndarray[Any, Any]
 
 MESHES, OPEN_TABLE = "meshes.csv", "open.csv"
+LAYOUT = attrs.evolve(TABLE_LAYOUT, results=(*TABLE_LAYOUT.results, MESHES, OPEN_TABLE))
 # Mesh of the points of the open values.
 OPEN_MESH = MeshSettings(refine=0.5)
 
@@ -52,10 +56,10 @@ class LongSettings:
         """Processes."""
         return self.table.workers
 
-    def text(self) -> str:
-        """reproduce.toml: all that decides the results."""
-        lines = [self.table.text(), "[long]", f"meshes = {self.meshes}", f"points = {self.points}"]
-        return "\n".join(lines) + "\n"
+    def texts(self) -> dict[str, str]:
+        """Text of the file of inputs, by name: all that decides the results."""
+        long = {"meshes": self.meshes, "points": self.points}
+        return {LAYOUT.inputs: toml_text({**self.table.inputs(), "long": long}, LAYOUT.header)}
 
 
 @attrs.frozen(eq=False)
@@ -72,11 +76,12 @@ class LongFound:
         return scatter.scatters(self.drawn, {s: self.table.paper.column(s) for s in self.table.paper.scales})
 
 
-def reproduce(settings: LongSettings, folder: Path, progress: Progress, context: RunContext) -> LongFound:
+def reproduce(settings: LongSettings, folder: Path, context: RunContext) -> LongFound:
     """Make a folder with table, long studies and report; InputError, MeshingError, ConvergenceError."""
     from .report import sections
 
-    begin(context, folder, HEADER, {INPUTS: settings.text()}, (*RESULTS, MESHES, OPEN_TABLE))
+    progress = context.progress
+    begin(context, folder, LAYOUT, settings.texts())
     cache = Cache(folder / "cache")
     table = solve(settings.table, cache, progress)
     paper, unit, samples = table.paper, settings.table.unit, table.samples_kPa

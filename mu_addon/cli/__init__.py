@@ -1,7 +1,7 @@
 """The subcommands of the command line, a module each.
 
-Each has `add(commands)`, which adds its parser and may import nothing heavy; `run(options, progress,
-context)`, which does the work; and `console_summary(summary)`, the lines printed at its end.
+Each has `add(commands)`, which adds its parser and may import nothing heavy, and `run(options, context)`,
+which makes a use case's job of the options and starts it.
 """
 
 from __future__ import annotations

@@ -10,7 +10,6 @@ from .options import add_results, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from .options import Commands
 
 
@@ -42,24 +41,15 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Calibrate."""
-    from ..usecases.sensor.calibrate import calibrate_sensor
+    from ..usecases.sensor.calibrate import USE_CASE, Job
 
     require_out(options)
-    calibrate_sensor(
-        [Path(folder) for folder in options.data],
-        Path(options.out),
+    job = Job(
+        tuple(Path(folder) for folder in options.data),
         channel=options.channel,
         dark=options.dark,
         angles=None if options.angles is None else Path(options.angles),
-        progress=progress,
-        context=context,
     )
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was found, in a few lines."""
-    from ..usecases.sensor.calibrate import console_summary
-
-    return console_summary(summary)
+    USE_CASE.start(job, Path(options.out), context)

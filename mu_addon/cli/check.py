@@ -11,7 +11,6 @@ from .study_options import add_solid
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from .options import Commands
 
 
@@ -49,13 +48,13 @@ def add(commands: Commands[Any]) -> None:
     add_solid(command)
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Check the part."""
     from ..design.anchors import window
     from ..design.printing.printer import load_printer
     from ..errors import InputError
-    from ..reading import file_bytes
-    from ..usecases.check_print.run import Job, check_print
+    from ..usecases.check_print.job import Job, read_stl
+    from ..usecases.check_print.run import USE_CASE
 
     unit = unit_if_named(options)
     if unit is None and options.stl is None:
@@ -64,28 +63,14 @@ def run(options: argparse.Namespace, progress: Progress, context: RunContext) ->
         raise InputError("--path needs a unit", "--path", "give --preset or --unit as well")
     if not 1e-6 < sum(x * x for x in options.up) < 1e12:
         raise InputError(f"{options.up} is not a direction", "--up", "give three numbers, such as 0 0 1")
-    content = None
-    if options.stl is not None:
-        try:
-            content = file_bytes(options.stl, 1 << 31)
-        except OSError as error:
-            raise InputError(
-                f"cannot read the file: {error.strerror or error}", options.stl, "check its name"
-            ) from error
+    stl = None if options.stl is None else Path(options.stl)
     job = Job(
         printer=load_printer(options.printer),
         unit=unit,
         window=None if options.path is None or unit is None else window(unit, options.path),
         quality=options.quality,
-        stl=content,
-        stl_name="" if options.stl is None else Path(options.stl).name,
+        stl=None if stl is None else read_stl(stl),
+        stl_file=stl,
         direction=tuple(options.up),
     )
-    check_print(job, Path(options.out), progress, context)
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was found, in a few lines."""
-    from ..usecases.check_print.run import console_summary
-
-    return console_summary(summary)
+    USE_CASE.start(job, Path(options.out), context)

@@ -10,7 +10,6 @@ from .options import add_measured_folder, add_unit, unit_if_named
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from .options import Commands
 
 
@@ -38,19 +37,11 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Plan the folder's experiments."""
-    from ..usecases.diagnose.design_experiments import design_experiments, noise_of
+    from ..measured import read_folder
+    from ..usecases.diagnose.design_experiments import USE_CASE, Job, noise_of
 
     unit = unit_if_named(options)
     noise = noise_of(options.noise)
-    design_experiments(
-        Path(options.folder), Path(options.out), unit, noise, progress=progress, context=context
-    )
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What the plan would show, in a few lines."""
-    from ..usecases.diagnose.design_experiments import console_summary
-
-    return console_summary(summary)
+    USE_CASE.start(Job(read_folder(Path(options.folder)), unit, noise), Path(options.out), context)

@@ -10,7 +10,6 @@ from .options import add_measured_folder, add_unit, unit_if_named
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from .options import Commands
 
 
@@ -26,16 +25,11 @@ def add(commands: Commands[Any]) -> None:
     add_unit(command, required=False)
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Diagnose the folder."""
-    from ..usecases.diagnose.run import diagnose_folder
+    from ..measured import read_folder
+    from ..usecases.diagnose.job import Job
+    from ..usecases.diagnose.run import USE_CASE
 
     unit = unit_if_named(options)
-    diagnose_folder(Path(options.folder), Path(options.out), unit, progress=progress, context=context)
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was found, in a few lines."""
-    from ..usecases.diagnose.run import console_summary
-
-    return console_summary(summary)
+    USE_CASE.start(Job(read_folder(Path(options.folder)), unit), Path(options.out), context)

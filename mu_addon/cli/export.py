@@ -10,7 +10,6 @@ from .options import add_model, add_unit, modelled_unit
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from .options import Commands
 
 FORMATS = ("stl", "3mf", "3mf-beams", "step", "txt")
@@ -65,19 +64,18 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Export the unit."""
-    from ..materials.library import load_material, read_material
+    from ..usecases.export.job import Job, path_of, resin_of
     from ..usecases.export.print_offsets import taken_off
-    from ..usecases.export.run import Job, export, path_of
+    from ..usecases.export.run import USE_CASE
 
-    unit = modelled_unit(options, progress, context)
+    unit = modelled_unit(options, context)
     path, name = path_of(unit, options.path, options.path_row)
     offsets, source = taken_off(unit, options.compensate)
-    resin = options.resin or "elastic-50a-v1"
     job = Job(
         unit=unit,
-        resin=read_material(Path(resin)) if resin.endswith(".toml") else load_material(resin),
+        resin=resin_of(options.resin),
         path=path,
         path_name=name,
         formats=tuple(dict.fromkeys(options.formats)),
@@ -85,11 +83,4 @@ def run(options: argparse.Namespace, progress: Progress, context: RunContext) ->
         take_off=offsets,
         offset_source=source,
     )
-    export(job, Path(options.out), progress, context)
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was written, in a few lines."""
-    from ..usecases.export.run import console_summary
-
-    return console_summary(summary)
+    USE_CASE.start(job, Path(options.out), context)

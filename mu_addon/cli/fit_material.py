@@ -10,7 +10,6 @@ from .options import add_measured_folder, add_results, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from .options import Commands
 
 
@@ -47,24 +46,14 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Fit laws to the folder's coupons."""
-    from ..usecases.fit_material.run import fit_material
+    from ..measured import read_folder
+    from ..usecases.fit_material.job import Job
+    from ..usecases.fit_material.run import USE_CASE
 
     require_out(options)
-    fit_material(
-        Path(options.folder),
-        Path(options.out),
-        options.laws,
-        options.hold_out,
-        options.weights,
-        progress=progress,
-        context=context,
+    job = Job(
+        read_folder(Path(options.folder)), tuple(options.laws), tuple(options.hold_out), options.weights
     )
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was found, in a few lines."""
-    from ..usecases.fit_material.run import console_summary
-
-    return console_summary(summary)
+    USE_CASE.start(job, Path(options.out), context)

@@ -10,7 +10,6 @@ from .options import add_results, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from .options import Commands
 
 COARSE = 0.4
@@ -86,13 +85,15 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Design the gripper and let it grasp."""
     from ..design.gripper import load_gripper, read_gripper
     from ..meshing.settings import MeshSettings
     from ..placement.inclusion import RULES
+    from ..usecases.grip.grasp import Cube, Grip
+    from ..usecases.grip.job import REFINE, Job
     from ..usecases.grip.phases import read_phases, shipped_phases
-    from ..usecases.grip.run import REFINE, Cube, Grip, Job, grip
+    from ..usecases.grip.run import USE_CASE
 
     require_out(options)
     gripper = load_gripper(options.preset) if options.preset is not None else read_gripper(options.gripper)
@@ -108,11 +109,4 @@ def run(options: argparse.Namespace, progress: Progress, context: RunContext) ->
         rules=() if options.solid_only or options.no_paths else rules,
         quality=options.quality,
     )
-    grip(job, Path(options.out), progress, context)
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was found, in a few lines."""
-    from ..usecases.grip.run import console_summary
-
-    return console_summary(summary)
+    USE_CASE.start(job, Path(options.out), context)

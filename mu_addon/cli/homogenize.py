@@ -10,7 +10,6 @@ from .options import add_model, add_unit, modelled_unit
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from .options import Commands
 
 
@@ -67,11 +66,12 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Homogenise the unit's lattice."""
-    from ..usecases.homogenize.run import FRICTIONS, Job, homogenize, resin_of
+    from ..usecases.homogenize.job import FRICTIONS, Job, resin_of
+    from ..usecases.homogenize.run import USE_CASE
 
-    unit = modelled_unit(options, progress, context)
+    unit = modelled_unit(options, context)
     frictions = FRICTIONS if options.friction == "both" else (options.friction,)
     job = Job(
         unit=unit,
@@ -81,11 +81,4 @@ def run(options: argparse.Namespace, progress: Progress, context: RunContext) ->
         strain=options.strain,
         refine=options.refine,
     )
-    homogenize(job, Path(options.out), progress, context)
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was found, in a few lines."""
-    from ..usecases.homogenize.run import console_summary
-
-    return console_summary(summary)
+    USE_CASE.start(job, Path(options.out), context)

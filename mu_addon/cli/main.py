@@ -83,9 +83,9 @@ def main(arguments: list[str]) -> int:
     progress = Progress([json_lines(sys.stdout) if json else terminal(sys.stderr)])
     with run_to_end(progress) as context:
         _require_usable(options)
-        command.run(options, progress, context)
+        command.run(options, context)
     if context.status == 0 and not json:
         results = [f"results: {context.folder}"] if context.folder is not None else []
-        lines = [*results, *command.console_summary(context.summary)]
+        lines = [*results, *context.console_summary(context.summary)]
         sys.stdout.write(printable("\n".join(lines), sys.stdout) + "\n")
     return context.status

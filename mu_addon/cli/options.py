@@ -9,7 +9,6 @@ if TYPE_CHECKING:
     from ..design.parameters import Unit
     from ..fem.solver import SolverChoice
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from ..usecases.simulate_and_place.extended_unit import Extended
     from ..usecases.simulate_and_place.static_effects import StaticEffects
 
@@ -132,9 +131,7 @@ def unit_if_named(options: argparse.Namespace) -> Unit | None:
     return None if options.preset is None and options.unit is None else unit_of(options)
 
 
-def modelled(
-    options: argparse.Namespace, progress: Progress, context: RunContext
-) -> tuple[Unit, StaticEffects]:
+def modelled(options: argparse.Namespace, context: RunContext) -> tuple[Unit, StaticEffects]:
     """The unit with what the extended model of --model adds to it, and effects beyond a unit's parameters.
 
     What no simulation of a unit can take is warned of.
@@ -149,16 +146,16 @@ def modelled(
     if options.model is not None:
         from ..usecases.simulate_and_place.extended_unit import read_extended
 
-        found = _report_applied(read_extended(unit, options.model), options, progress, context)
+        found = _report_applied(read_extended(unit, options.model), options, context)
         unit, effects = found.unit, attrs.evolve(found.effects, orientation_deg=turn)
     if turn and not effects.has_gravity:
-        progress.warning(
+        context.progress.warning(
             "gravity is not part of this model, so the orientation has no effect", "--orientation"
         )
     return unit, effects
 
 
-def modelled_unit(options: argparse.Namespace, progress: Progress, context: RunContext) -> Unit:
+def modelled_unit(options: argparse.Namespace, context: RunContext) -> Unit:
     """The unit, with what the model of --model adds to its parameters; what else that has is warned of."""
     unit = unit_of(options)
     if options.model is None:
@@ -166,13 +163,11 @@ def modelled_unit(options: argparse.Namespace, progress: Progress, context: RunC
     from ..usecases.simulate_and_place.extended_unit import read_extended
 
     found = read_extended(unit, options.model).of_parameters()
-    return _report_applied(found, options, progress, context).unit
+    return _report_applied(found, options, context).unit
 
 
-def _report_applied(
-    found: Extended, options: argparse.Namespace, progress: Progress, context: RunContext
-) -> Extended:
+def _report_applied(found: Extended, options: argparse.Namespace, context: RunContext) -> Extended:
     for words in found.left_out:
-        progress.warning(f"not applied here: {words}", str(options.model))
+        context.progress.warning(f"not applied here: {words}", str(options.model))
     context.summary["model"] = {"applied": found.applied, "left_out": found.left_out}
     return found

@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from .options import add_model, add_orientation, add_resin, add_unit
-from .study_options import EXAMPLE, add_body, add_obstacles, add_simulation, add_solid, console_summary, run
+from .study_job import run
+from .study_options import EXAMPLE, add_body, add_obstacles, add_simulation, add_solid
 
 if TYPE_CHECKING:
     from .options import Commands
 
-__all__ = ["add", "console_summary", "run"]
+__all__ = ["add", "run"]
 
 
 def add(commands: Commands[Any]) -> None:

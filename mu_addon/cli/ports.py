@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from .options import Commands
 
 
@@ -16,13 +15,9 @@ def add(commands: Commands[Any]) -> None:
     commands.add_parser("ports", help="List the serial ports, for `stream` and `record`.")
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Put a line for each port into the summary."""
     from ..usecases.sensor.stream import port_lines
 
     context.summary["ports"] = port_lines()
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """A line for each port."""
-    return summary["ports"] or ["no serial port was found"]
+    context.console_summary = lambda summary: summary["ports"] or ["no serial port was found"]

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from .options import Commands
 
 
@@ -16,7 +15,7 @@ def add(commands: Commands[Any]) -> None:
     commands.add_parser("presets", help="List the shipped presets: units, and grippers for `grip`.")
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Put every preset's name and size into the summary."""
     from ..design.gripper import gripper_names, load_gripper
     from ..design.parameters import load_preset, preset_names
@@ -27,11 +26,6 @@ def run(options: argparse.Namespace, progress: Progress, context: RunContext) ->
     for name in gripper_names():
         gripper = load_gripper(name)
         context.summary[name] = f"two fingers {gripper.unit.name}, {gripper.fingers.gap_mm:g} mm apart"
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """A line for each preset."""
-    from ..design.gripper import gripper_names
-    from ..design.parameters import preset_names
-
-    return [f"{name:12s} {summary[name]}" for name in (*preset_names(), *gripper_names())]
+    context.console_summary = lambda summary: [
+        f"{name:12s} {summary[name]}" for name in (*preset_names(), *gripper_names())
+    ]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .stream import add_source, console_summary, run
+from .stream import add_source, run
 
 if TYPE_CHECKING:
     from .options import Commands
 
-__all__ = ["add", "console_summary", "run"]
+__all__ = ["add", "run"]
 
 
 def add(commands: Commands[Any]) -> None:

@@ -11,7 +11,6 @@ from .stream import add_calibration, shown
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from .options import Commands
 
 
@@ -35,7 +34,7 @@ def add(commands: Commands[Any]) -> None:
     command.add_argument("--controlled", action="store_true", help="As for `stream`.")
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Play the recording to its end."""
     from ..sensing.sources import Replay
     from ..usecases.sensor.stream import stream
@@ -46,17 +45,9 @@ def run(options: argparse.Namespace, progress: Progress, context: RunContext) ->
         Path(options.out),
         seconds=None,
         about={"source": f"replay of {Path(options.recording).name}"},
-        progress=progress,
         context=context,
         controlled=options.controlled,
         calibration=options.calibration,
         keep_time=True,
         show=shown(options),
     )
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was played, in a few lines."""
-    from ..usecases.sensor.stream import console_summary
-
-    return console_summary(summary)

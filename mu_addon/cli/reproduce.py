@@ -10,7 +10,6 @@ from .options import add_results, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from ..usecases.reproduce.settings import Settings
     from .options import Commands
 
@@ -74,15 +73,8 @@ def settings_of(options: argparse.Namespace) -> Settings:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Do the paper's table again."""
-    from ..usecases.reproduce.run import reproduce
+    from ..usecases.reproduce.run import USE_CASE
 
-    reproduce(settings_of(options), Path(options.out), progress, context)
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was found, in a few lines."""
-    from ..usecases.reproduce.run import console_summary
-
-    return console_summary(summary)
+    USE_CASE.start(settings_of(options), Path(options.out), context)

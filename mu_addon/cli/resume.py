@@ -1,4 +1,4 @@
-"""`resume`: the study that a folder's study.toml describes, from where it stopped."""
+"""`resume`: the run that a folder's inputs describe, from where it stopped."""
 
 from __future__ import annotations
 
@@ -6,31 +6,25 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_solver
-from .study_options import console_summary
+from .options import add_solver, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from .options import Commands
-
-__all__ = ["add", "console_summary", "run"]
 
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `resume`."""
     command = commands.add_parser(
         "resume",
-        help="Resume a stopped study, or run again what the study.toml of a folder describes.",
+        help="Resume a stopped run, or run again what the inputs in a folder describe.",
         epilog="example: run.py resume out/mu-1.0x",
     )
-    command.add_argument("out", metavar="FOLDER", help="Folder written by `design`, `simulate` or `place`.")
+    command.add_argument("out", metavar="FOLDER", help="Folder of any run: its --out, or its inputs alone.")
     command.add_argument(
         "--json", action="store_true", help="Write one JSON message per line to standard output."
     )
-    command.add_argument(
-        "--workers", type=int, default=2, metavar="N", help="Number of worker processes (default: 2)."
-    )
+    command.add_argument("--workers", type=int, metavar="N", help="Number of worker processes (default: 2).")
     command.add_argument(
         "--no-report",
         dest="report",
@@ -40,19 +34,15 @@ def add(commands: Commands[Any]) -> None:
     add_solver(command)
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
-    """Run what study.toml says; what is finished is taken from the cache."""
-    from ..usecases.simulate_and_place.job import read_job
-    from ..usecases.simulate_and_place.report_data import write_report
-    from ..usecases.simulate_and_place.run import run_stages
-    from ..usecases.simulate_and_place.study import Study
-    from .options import require_out, solver_of
+def run(options: argparse.Namespace, context: RunContext) -> None:
+    """Run what the folder's inputs say; what is finished is taken from the cache."""
+    from ..fem.solver import SolverChoice
+    from ..usecases.resume import resume
+    from .options import solver_of
 
     require_out(options)
-    folder = Path(options.out)
-    study = Study.open(read_job(folder, options.workers, solver_of(options)), folder, progress, context)
-    if options.report:
-        context.on_stop = lambda reason: write_report(study, reason["what"])
-    run_stages(study)
-    if options.report:
-        write_report(study)
+    context.wants_report = options.report
+    solver = solver_of(options)
+    # The folder's own say, where the command says nothing else.
+    given = {"workers": options.workers, "solver": None if solver == SolverChoice() else solver}
+    resume(Path(options.out), context, {name: value for name, value in given.items() if value is not None})

@@ -10,7 +10,6 @@ from .options import add_unit, unit_if_named
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from .options import Commands
 
 
@@ -30,20 +29,11 @@ def add(commands: Commands[Any]) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Write the specimens of a unit, mu-1.0x unless one is named."""
     from ..design.parameters import load_preset
-    from ..materials.library import load_material, read_material
-    from ..usecases.export.specimens import make_specimens
+    from ..usecases.export.job import resin_of
+    from ..usecases.export.specimens import USE_CASE, Job
 
     unit = unit_if_named(options) or load_preset("mu-1.0x")
-    resin = options.resin or "elastic-50a-v1"
-    known = read_material(Path(resin)) if resin.endswith(".toml") else load_material(resin)
-    make_specimens(unit, known, Path(options.out), progress, context)
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was written, in a few lines."""
-    from ..usecases.export.specimens import console_summary
-
-    return console_summary(summary)
+    USE_CASE.start(Job(unit, resin_of(options.resin)), Path(options.out), context)

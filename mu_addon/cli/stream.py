@@ -12,7 +12,7 @@ from .options import add_results, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress, Sink
+    from ..run.progress import Sink
     from .options import Commands
 
 
@@ -69,7 +69,7 @@ def add_calibration(command: argparse.ArgumentParser) -> None:
     )
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Stream until Ctrl-C."""
     from ..errors import InputError
     from ..usecases.sensor.stream import serial_source, simulated_source, stream
@@ -88,7 +88,6 @@ def run(options: argparse.Namespace, progress: Progress, context: RunContext) ->
         Path(options.out),
         seconds=options.seconds,
         about=about,
-        progress=progress,
         context=context,
         controlled=options.controlled,
         calibration=options.calibration,
@@ -102,10 +101,3 @@ def shown(options: argparse.Namespace) -> Sink:
     from ..usecases.sensor.stream import Display
 
     return json_lines(sys.stdout) if options.json else Display(sys.stdout)
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was recorded, in a few lines."""
-    from ..usecases.sensor.stream import console_summary
-
-    return console_summary(summary)

@@ -10,7 +10,6 @@ from .options import add_results, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from .options import Commands
 
 
@@ -44,11 +43,11 @@ def add(commands: Commands[Any]) -> None:
     command.add_argument("--retry", action="store_true", help="Run the failed points again.")
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Run the points that are not there yet, and report on all."""
     from ..errors import InputError
     from ..usecases.parameter_study.plan import read_plan
-    from ..usecases.parameter_study.run import sweep
+    from ..usecases.parameter_study.run import USE_CASE, Job
 
     require_out(options)
     for name, least in (("workers", 1), ("add", 0)):
@@ -56,20 +55,11 @@ def run(options: argparse.Namespace, progress: Progress, context: RunContext) ->
             raise InputError(
                 f"{getattr(options, name)} is out of bounds", f"--{name}", f"give {least} or more"
             )
-    sweep(
+    job = Job(
         read_plan(Path(options.file)),
-        Path(options.out),
-        progress,
-        context,
         scheduler=options.scheduler,
         workers=options.workers,
         add=options.add,
         retry=options.retry,
     )
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was found, in a few lines."""
-    from ..usecases.parameter_study.run import console_summary
-
-    return console_summary(summary)
+    USE_CASE.start(job, Path(options.out), context)

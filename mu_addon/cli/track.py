@@ -12,7 +12,6 @@ from .options import add_results, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.progress import Progress
     from ..usecases.track_video.run import Tracker
     from .options import Commands
 
@@ -49,24 +48,17 @@ def add(commands: Commands[Any]) -> None:
     add_results(command)
 
 
-def run(options: argparse.Namespace, progress: Progress, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Follow the markers and put the experiment into the folder."""
     import attrs
 
-    from ..usecases.track_video.run import read_bench, track
+    from ..usecases.track_video.run import read_bench, track_into
 
     require_out(options)
     bench = read_bench(Path(options.markers))
     if options.fps is not None:
         bench = attrs.evolve(bench, fps=options.fps)
-    context.open_folder(Path(options.out))
-    with progress.stage("track"):
-        figures, remarks = track(
-            Path(options.clip), bench, Path(options.pressure), Path(options.out), _tracker()
-        )
-    for remark in remarks:
-        progress.warning(remark.what, remark.where, remark.remedy)
-    context.summary |= figures | {"remarks": [remark.what for remark in remarks]}
+    track_into(Path(options.out), Path(options.clip), bench, Path(options.pressure), _tracker(), context)
 
 
 def _tracker() -> Tracker:
@@ -86,10 +78,3 @@ def _tracker() -> Tracker:
         return import_module("..blender.track.state", __package__).track_markers(clip, marks)
 
     return follow
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was found, in a few lines."""
-    from ..usecases.track_video.run import console_summary
-
-    return console_summary(summary)

@@ -22,15 +22,15 @@ from .progress import Progress, log_file
 DONE, UNEXPECTED, INTERRUPTED, TERMINATED = 0, 70, 130, 143
 
 
-class _Stopped(MuError):
-    """The user or the parent process asked the run to stop."""
+class _Interrupted(MuError):
+    """The user asked the run to stop, by Ctrl-C."""
 
-
-class _Interrupted(_Stopped):
     status = INTERRUPTED
 
 
-class _Terminated(_Stopped):
+class _Terminated(MuError):
+    """The parent process asked the run to stop, by SIGTERM."""
+
     status = TERMINATED
 
 
@@ -42,15 +42,26 @@ class _Unexpected(MuError):
 
 @attrs.define
 class RunContext:
-    """What a run leaves: its exit status, and the `summary` that its body fills and its folder keeps."""
+    """What a run leaves: its exit status, and the `summary` that its body fills and its folder keeps.
+
+    report: writes the report of what was found so far; its argument says why the run stops early, and is
+    empty where it does not. wants_report: whether it is written. console_summary: the lines that end the run
+    at a terminal, of its summary.
+    """
 
     progress: Progress
     folder: Path | None = None
     summary: dict[str, Any] = attrs.field(factory=dict)
     status: int = DONE
-    # Called with the reason when a run stops early, to save what there is: a partial report, say.
-    on_stop: Callable[[dict[str, str]], None] | None = None
+    report: Callable[[str], None] | None = None
+    wants_report: bool = True
+    console_summary: Callable[[dict[str, Any]], list[str]] = lambda summary: []
     _lock: FolderLock | None = None
+
+    def write_report(self, stopped: str = "") -> None:
+        """Write the report, where there is one and it is wanted."""
+        if self.report is not None and self.wants_report:
+            self.report(stopped)
 
     def lock_folder(self, folder: Path) -> None:
         """Keep other processes out of `folder` until the run ends. Raises InUseError and OutputError."""
@@ -100,20 +111,15 @@ def run_to_end(progress: Progress) -> Iterator[RunContext]:
             _write_summary(context, {"status": "complete"})
             progress.result({"folder": context.folder, "summary": context.summary})
         except KeyboardInterrupt:
-            _stop(context, _Interrupted("stopped by Ctrl-C", remedy=_kept(context)))
+            _stop(context, _Interrupted("stopped by Ctrl-C", remedy=_where_results_are(context)))
         except MuError as error:
             _stop(context, error)
         except ModuleNotFoundError as error:
             what = f"the package {error.name} is not installed"
             _stop(context, MuError(what, sys.executable, "install the packages that README.md names"))
         except MemoryError:
-            what = "out of memory"
-            _stop(
-                context,
-                MuError(
-                    what, _kept(context), "use a coarser mesh, fewer workers or a machine with more memory"
-                ),
-            )
+            remedy = "use a coarser mesh, fewer workers or a machine with more memory"
+            _stop(context, MuError("out of memory", _where_results_are(context), remedy))
         except Exception as error:  # noqa: BLE001 - the last resort: told, logged and turned into exit status 70
             _log_traceback(context, error)
             fault = _Unexpected(
@@ -127,12 +133,12 @@ def run_to_end(progress: Progress) -> Iterator[RunContext]:
             context.unlock()
 
 
-def _kept(context: RunContext) -> str:
+def _where_results_are(context: RunContext) -> str:
     return f"finished results are in {context.folder}" if context.folder else ""
 
 
 def _stop(context: RunContext, error: MuError) -> None:
-    """The last words of a run that ends early: summary.json, what `on_stop` saves, and the error message."""
+    """End a run early: summary.json, a report of what there is, and the error message."""
     _set_signals(signal.SIG_IGN)
     context.status = error.status
     reason = {"what": error.what, "where": error.where, "what_to_do": error.remedy}
@@ -140,11 +146,11 @@ def _stop(context: RunContext, error: MuError) -> None:
     # The reason for stopping may be that nothing can be written any more.
     with suppress(MuError):
         _write_summary(context, partial)
-    if context.on_stop is not None:
+    if context.report is not None:
         # What takes long can be cut short by a second Ctrl-C; a failure here would only hide the first one.
         _set_signals(signal.default_int_handler)
         with suppress(Exception, KeyboardInterrupt):
-            context.on_stop(reason)
+            context.write_report(error.what)
         _set_signals(signal.SIG_IGN)
         with suppress(MuError):
             _write_summary(context, partial)

@@ -6,11 +6,13 @@ import os
 import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import attrs
 
 from ..errors import InputError, OutputError
 from ..files import make_folder, output_error, write_text
-from ..reading import file_bytes
+from ..reading import file_bytes, parse_toml
 from .lock import LOCK
 
 if TYPE_CHECKING:
@@ -22,49 +24,86 @@ ALWAYS = ("summary.json", "log.ndjson")
 OWN = ("cache", "stale", LOCK)
 
 
-def begin(
-    context: RunContext,
-    folder: Path,
-    header: str,
-    inputs: Mapping[str, str],
-    results: Iterable[str],
-    optional: Iterable[str] = (),
-) -> None:
+# A table of a file of inputs for what decides no result: where other files lie, how many processes work.
+RUN = "run"
+
+
+@attrs.frozen
+class FolderLayout:
+    """What a folder of one kind of run holds.
+
+    inputs: its first file of inputs; header: the first line of that, by which the folder is known; results:
+    files and folders by name or pattern; optional: further inputs that a run may do without; older_headers:
+    what the first line of an older version's begins with.
+    """
+
+    inputs: str
+    header: str
+    results: tuple[str, ...]
+    optional: tuple[str, ...] = ()
+    older_headers: tuple[str, ...] = ()
+
+    def is_of(self, folder: Path) -> bool:
+        """Whether a folder is of such a run."""
+        return _read(folder / self.inputs).startswith((self.header, *self.older_headers))
+
+
+def begin(context: RunContext, folder: Path, layout: FolderLayout, inputs: Mapping[str, str]) -> None:
     """Make a folder that of a run, alone in it until it ends: locked, claimed, its log open, its inputs kept.
 
     See `claim`. Raises InputError, also where another process works in the folder, and OutputError.
     """
     context.lock_folder(folder)
-    claim(folder, header, inputs, results, optional)
+    claim(folder, layout, inputs)
     context.open_folder(folder)
-    keep_inputs(folder, inputs)
 
 
-def claim(
-    folder: Path, header: str, inputs: Mapping[str, str], results: Iterable[str], optional: Iterable[str] = ()
-) -> None:
-    """Make a folder that of a run with these inputs, text by file name; the first begins with `header`.
+def claim(folder: Path, layout: FolderLayout, inputs: Mapping[str, str]) -> None:
+    """Make a folder that of a run with these inputs, text by file name, and write them.
 
-    Results of other inputs, files and folders by name or pattern, are moved to stale/, never shown as
-    current. optional: inputs that a run may do without. Raises InputError where the folder holds somebody
+    Results of other inputs are moved to stale/, never shown as current. Inputs are the same where they say
+    the same, the table `RUN` of a TOML file left aside. Raises InputError where the folder holds somebody
     else's files under these names or a link among them, and OutputError.
     """
     make_folder(folder)
-    names, results = list(inputs), list(results)
-    may = list(dict.fromkeys((*names, *optional)))
-    _refuse_links(folder, (*may, *results, *ALWAYS, *OWN))
-    if not _read(folder / names[0]).startswith(header):
+    may = tuple(dict.fromkeys((*inputs, *layout.optional)))
+    _refuse_links(folder, (*may, *layout.results, *ALWAYS, *OWN))
+    if not layout.is_of(folder):
         # An input that is there already, to the letter, is no loss.
         kept = [name for name, text in inputs.items() if _read(folder / name) == text]
-        foreign = [name for name in (*may, *results) if (folder / name).exists() and name not in kept]
+        foreign = [name for name in (*may, *layout.results) if (folder / name).exists() and name not in kept]
         if foreign:
             raise InputError(
                 f"the folder contains a file of another kind of run, or an unknown file: {foreign[0]}",
                 str(folder),
                 "choose a new or empty folder for the results",
             )
-    if any((folder / name).is_file() and _read(folder / name) != inputs.get(name) for name in may):
-        _set_aside(folder, (*may, *results, *ALWAYS))
+    before = {name: _read(folder / name) for name in may if (folder / name).is_file()}
+    if any(not _same(name, text, inputs.get(name)) for name, text in before.items()):
+        _set_aside(folder, (*may, *layout.results, *ALWAYS))
+    keep_inputs(folder, inputs)
+
+
+def same_inputs(folder: Path, inputs: Mapping[str, str]) -> bool:
+    """Whether a folder holds these inputs, whole."""
+    return all(
+        (folder / name).is_file() and _same(name, _read(folder / name), text) for name, text in inputs.items()
+    )
+
+
+def _same(name: str, before: str, now: str | None) -> bool:
+    """Whether a file of inputs says the same as before."""
+    if now is None or before == now or not name.endswith(".toml"):
+        return before == now
+    return _document(before) == _document(now) is not None
+
+
+def _document(text: str) -> dict[str, Any] | None:
+    try:
+        return {key: value for key, value in parse_toml(text, "").items() if key != RUN}
+    # Thousands of nested brackets exhaust the parser's stack.
+    except InputError:
+        return None
 
 
 def keep_inputs(folder: Path, inputs: Mapping[str, str]) -> None:

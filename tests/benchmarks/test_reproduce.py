@@ -203,8 +203,9 @@ def test_a_scaled_mesh_is_the_mesh_of_the_scaled_unit():
 def test_settings_say_all_and_refuse_what_is_out_of_bounds():
     with pytest.raises(InputError, match="out of bounds"):
         LongSettings(meshes=-1)
-    text = LongSettings(Settings(), 3, 8).text()
-    assert text.startswith(Settings().text())
+    (text,) = LongSettings(Settings(), 3, 8).texts().values()
+    (own,) = Settings().texts().values()
+    assert text.startswith(own)
     assert "meshes = 3" in text
     assert "points = 8" in text
 

@@ -19,13 +19,13 @@ how, folder = sys.argv[1], Path(sys.argv[2])
 progress = Progress([terminal(sys.stderr)])
 with run_to_end(progress) as ending:
 
-    def last_words(reason):
+    def last_words(stopped):
         if how == "patience":
             print("saving", flush=True)
             time.sleep(60)
-        write_text(folder / "last_words.txt", reason["what"])
+        write_text(folder / "last_words.txt", stopped)
 
-    ending.on_stop = last_words
+    ending.report = last_words
     if how != "early":
         ending.open_folder(folder)
     ending.summary["angle_deg"] = [1.0, 2.0]

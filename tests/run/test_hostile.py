@@ -13,7 +13,7 @@ from mu_addon.errors import InputError
 from mu_addon.files import read_npz, write_npz
 from mu_addon.run.cache import Cache
 from mu_addon.run.context import run_to_end
-from mu_addon.run.folder import begin
+from mu_addon.run.folder import FolderLayout, begin
 from mu_addon.run.progress import Progress
 
 HEADER = "# mine"
@@ -142,7 +142,7 @@ def test_every_flipped_bit_is_found_out_or_harmless(tmp_path):
 def started(folder, results=("a.csv", "model_a")):
     told = []
     with run_to_end(Progress([told.append])) as context:
-        begin(context, folder, HEADER, {"mine.toml": HEADER + "\n"}, results)
+        begin(context, folder, FolderLayout("mine.toml", HEADER, results), {"mine.toml": HEADER + "\n"})
     return context, told
 
 

@@ -8,9 +8,11 @@ import pytest
 
 from mu_addon.errors import OutputError
 from mu_addon.run.context import run_to_end
-from mu_addon.run.folder import begin
+from mu_addon.run.folder import FolderLayout, begin
 from mu_addon.run.lock import LOCK, FolderLock, InUseError
 from mu_addon.run.progress import Progress
+
+LAYOUT = FolderLayout("a.toml", "# mine", ())
 
 HOLD = """
 import sys
@@ -85,7 +87,7 @@ def test_a_run_in_a_folder_in_use_ends_and_touches_nothing(tmp_path, holder):
     before = sorted(path.name for path in tmp_path.iterdir())
     told = []
     with run_to_end(Progress([told.append])) as context:
-        begin(context, tmp_path, "# mine", {"a.toml": "# mine\n"}, ())
+        begin(context, tmp_path, LAYOUT, {"a.toml": "# mine\n"})
     assert context.status == 2
     assert "another run uses this folder" in told[-1]["what"]
     assert sorted(path.name for path in tmp_path.iterdir()) == before
@@ -94,7 +96,7 @@ def test_a_run_in_a_folder_in_use_ends_and_touches_nothing(tmp_path, holder):
 def test_a_run_gives_its_folder_free_however_it_ends(tmp_path):
     for fault in (None, RuntimeError, KeyboardInterrupt):
         with run_to_end(Progress()) as context:
-            begin(context, tmp_path, "# mine", {"a.toml": "# mine\n"}, ())
+            begin(context, tmp_path, LAYOUT, {"a.toml": "# mine\n"})
             if fault is not None:
                 raise fault
         FolderLock(tmp_path).release()
@@ -109,6 +111,6 @@ def test_a_disk_without_locks_is_warned_of(tmp_path, monkeypatch):
     monkeypatch.setattr(fcntl, "flock", none)
     told = []
     with run_to_end(Progress([told.append])) as context:
-        begin(context, tmp_path, "# mine", {"a.toml": "# mine\n"}, ())
+        begin(context, tmp_path, LAYOUT, {"a.toml": "# mine\n"})
     assert context.status == 0
     assert any(m["type"] == "warning" and "does not support file locks" in m["what"] for m in told)

@@ -27,7 +27,7 @@ from mu_addon.homogenize.effective import read_effective
 from mu_addon.materials.library import read_material
 from mu_addon.measured.folder import read_folder
 from mu_addon.reading import file_text, parse_json, parse_toml
-from mu_addon.run.folder import claim
+from mu_addon.run.folder import FolderLayout, claim
 from mu_addon.sensing.calibration import read_calibration
 from mu_addon.sensing.recording import read_recording
 from mu_addon.usecases.grip.phases import read_phases
@@ -215,7 +215,7 @@ def test_a_pipe_in_a_folder_of_results(tmp_path: Path) -> None:
     assert read_npz(tmp_path / "state-x.npz") is None
     os.mkfifo(tmp_path / "log.ndjson")
     with pytest.raises(InputError, match="pipe"):
-        claim(tmp_path, "format = 1", {"study.toml": "format = 1\n"}, [])
+        claim(tmp_path, FolderLayout("study.toml", "format = 1", ()), {"study.toml": "format = 1\n"})
 
 
 @pytest.mark.parametrize(

@@ -70,6 +70,31 @@ def test_a_recording_is_calibrated(tmp_path: Path, marked: bool, capsys: pytest.
     assert recording.channels == ("light_V", "dark_V")
 
 
+def test_the_same_folder_serves_again_and_describes_its_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record(tmp_path / "bench", marked=True)
+    out = tmp_path / "out"
+    words = ("calibrate", tmp_path / "bench", "--channel", "light_V", "--out", out)
+    assert run(*words) == 0
+    before = (out / "calibration.toml").read_text()
+    assert run(*words) == 0, capsys.readouterr().err
+    assert run("resume", out) == 0, capsys.readouterr().err
+    assert (out / "calibration.toml").read_text() == before
+    assert not (out / "stale").exists()
+    # Another dark level is another input.
+    assert run(*words, "--dark", 0.05) == 0
+    assert (out / "stale" / "calibration.toml").read_text() == before
+    # A folder of the version that wrote no header.
+    (out / "calibrate.toml").write_text("data = ['bench']\nchannel = 'light_V'\ndark = 0\n")
+    assert run(*words) == 0, capsys.readouterr().err
+    # Other recordings than those that were calibrated are not taken for them.
+    (tmp_path / "bench" / "recording-000.csv").unlink()
+    capsys.readouterr()
+    assert run("resume", out) == 2
+    assert "what to do" in capsys.readouterr().err
+
+
 def test_measured_data_with_a_sweep_held_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     generator = np.random.default_rng(1)
     blocks = []

@@ -7,12 +7,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mu_addon.errors import InputError
+from mu_addon.measured import read_folder
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.diagnose.design_experiments import (
     NOISE,
+    USE_CASE,
+    Job,
     console_summary,
-    design_experiments,
     noise_of,
     plan,
 )
@@ -73,7 +75,7 @@ def test_it_leaves_a_table_and_a_report(tmp_path):
     progress = Progress()
     with run_to_end(progress) as context:
         folder = weighed_blocks(tmp_path / "data", 0.0)
-        design_experiments(folder, tmp_path / "out", progress=progress, context=context)
+        USE_CASE.start(Job(read_folder(folder)), tmp_path / "out", context)
     assert context.status == 0
     # Weighed, the two are no longer one.
     assert not {"overcure", "skin_cure"} <= {n for pair in context.summary["alike"] for n in pair[:2]}

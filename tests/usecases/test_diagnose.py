@@ -18,7 +18,8 @@ from mu_addon.measured import read_folder
 from mu_addon.run.context import RunContext, run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.diagnose import run as diagnosing
-from mu_addon.usecases.diagnose.run import console_summary, diagnose_folder
+from mu_addon.usecases.diagnose.job import Job
+from mu_addon.usecases.diagnose.run import USE_CASE, console_summary
 from mu_addon.usecases.simulate_and_place.extended_unit import read_extended
 from tests.evidence import analytic
 
@@ -33,7 +34,7 @@ def run(folder, out, *arguments, **options):
     messages = []
     progress = Progress([messages.append])
     with run_to_end(progress) as context:
-        diagnose_folder(folder, out, *arguments, progress=progress, context=context, **options)
+        USE_CASE.start(Job(read_folder(folder), *arguments, **options), out, context)
     return context, messages
 
 
@@ -222,7 +223,7 @@ def test_what_cannot_be_judged_is_named_before_anything_is_written(tmp_path, spo
     spoil(folder)
     progress = Progress()
     with pytest.raises(InputError) as caught:
-        diagnose_folder(folder, tmp_path / "out", progress=progress, context=RunContext(progress))
+        USE_CASE.start(Job(read_folder(folder)), tmp_path / "out", RunContext(progress))
     assert what in caught.value.what
     assert where in f"{caught.value.where} {caught.value.remedy}"
     assert not (tmp_path / "out").exists()

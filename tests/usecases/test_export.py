@@ -24,18 +24,20 @@ from mu_addon.meshing import lattice as meshing_lattice
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.export import run as exporting
+from mu_addon.usecases.export import specimens
+from mu_addon.usecases.export.job import Job, path_of
 from mu_addon.usecases.export.print_offsets import read_sheet, sheet, taken_off
-from mu_addon.usecases.export.run import Job, export, path_of
-from mu_addon.usecases.export.specimens import make_specimens
+from mu_addon.usecases.export.run import USE_CASE as EXPORT
+from mu_addon.usecases.export.specimens import USE_CASE as SPECIMENS
 
 SMALL = Unit(name="three", chambers=Chambers(count=3))
 RESIN = load_material("elastic-50a-v1")
 
 
-def run(work, *arguments):
+def run(use_case, job, folder):
     said = []
     with run_to_end(Progress([said.append])) as context:
-        work(*arguments, context.progress, context)
+        use_case.start(job, folder, context)
     return context, said
 
 
@@ -43,7 +45,7 @@ def run(work, *arguments):
 def exported(tmp_path_factory):
     folder = tmp_path_factory.mktemp("export")
     job = Job(SMALL, RESIN, window(SMALL, "alpha1"), "alpha1", quality="interactive")
-    context, _ = run(export, job, folder)
+    context, _ = run(EXPORT, job, folder)
     assert context.status == 0
     return folder, json.loads((folder / "manifest.json").read_text())
 
@@ -204,7 +206,7 @@ def test_without_gmsh_the_rest_is_written(tmp_path, monkeypatch):
 
     monkeypatch.setattr("mu_addon.meshing.step.load_gmsh", missing)
     job = Job(SMALL, RESIN, formats=("stl", "step", "txt"), quality="interactive")
-    context, said = run(export, job, tmp_path)
+    context, said = run(EXPORT, job, tmp_path)
     assert context.status == 0
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     assert [f["file"] for f in manifest["files"]] == ["unit.stl", "nodes.txt"]
@@ -218,7 +220,7 @@ def test_without_gmsh_the_rest_is_written(tmp_path, monkeypatch):
 def test_a_file_that_is_not_what_was_built_is_an_error(tmp_path, monkeypatch):
     real = exporting.stl_bytes
     monkeypatch.setattr(exporting, "stl_bytes", lambda v, t: real(v * 1.001, t))
-    context, _ = run(export, Job(SMALL, RESIN, formats=("stl",), quality="interactive"), tmp_path)
+    context, _ = run(EXPORT, Job(SMALL, RESIN, formats=("stl",), quality="interactive"), tmp_path)
     assert context.status == 5
     assert "read back, encloses" in json.loads((tmp_path / "summary.json").read_text())["reason"]["what"]
 
@@ -263,7 +265,7 @@ def test_calliper_sheets_become_offsets(tmp_path):
 @pytest.fixture(scope="module")
 def printed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("specimens")
-    context, _ = run(make_specimens, Unit(), RESIN, folder)
+    context, _ = run(SPECIMENS, specimens.Job(Unit(), RESIN), folder)
     assert context.status == 0
     return folder, json.loads((folder / "manifest.json").read_text())
 

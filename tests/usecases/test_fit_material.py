@@ -12,9 +12,11 @@ from mu_addon.errors import InputError
 from mu_addon.materials.coupon import incompressible
 from mu_addon.materials.forms import FORMS
 from mu_addon.materials.library import read_material
+from mu_addon.measured import read_folder
 from mu_addon.run.context import RunContext, run_to_end
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.fit_material.run import console_summary, fit_material
+from mu_addon.usecases.fit_material.job import Job
+from mu_addon.usecases.fit_material.run import USE_CASE, console_summary
 
 DATA = Path(__file__).parent.parent / "data"
 
@@ -23,7 +25,7 @@ def run(folder, out, *arguments, **options):
     messages = []
     progress = Progress([messages.append])
     with run_to_end(progress) as context:
-        fit_material(folder, out, *arguments, progress=progress, context=context, **options)
+        USE_CASE.start(Job(read_folder(folder), *arguments, **options), out, context)
     return context, messages
 
 
@@ -137,7 +139,5 @@ def test_one_mode_alone_brings_a_warning_of_the_others(tmp_path):
 def test_what_cannot_be_fitted_is_refused_before_anything_is_written(tmp_path, folder, arguments, what):
     progress = Progress()
     with pytest.raises(InputError, match=re.escape(what)):
-        fit_material(
-            DATA / folder, tmp_path / "out", *arguments, progress=progress, context=RunContext(progress)
-        )
+        USE_CASE.start(Job(read_folder(DATA / folder), *arguments), tmp_path / "out", RunContext(progress))
     assert not (tmp_path / "out").exists()

@@ -28,7 +28,7 @@ JOB = Job(
 def simulated(folder, lattice):
     progress = Progress([])
     with run_to_end(progress) as context:
-        study = Study.open(attrs.evolve(JOB, lattice=lattice), folder, progress, context)
+        study = Study.open(attrs.evolve(JOB, lattice=lattice), folder, context)
         study.make_mesh()
         study.simulate()
     assert context.status == 0
@@ -82,7 +82,7 @@ def test_a_law_of_another_cell_is_warned_of(tmp_path):
     for lattice in (same, other):
         progress = Progress([])
         folder = tmp_path / str(len(told))
-        study = Study.open(attrs.evolve(JOB, lattice=lattice), folder, progress, RunContext(progress))
+        study = Study.open(attrs.evolve(JOB, lattice=lattice), folder, RunContext(progress))
         told.append([text for text in study.warnings if "another cell" in text])
     assert told[0] == []
     assert "kind octet (unit: body-centred), offset_xy_mm 0.1 (unit: 0.0)" in told[1][0]
@@ -105,10 +105,10 @@ def test_a_file_of_the_law_that_is_there_already_is_no_obstacle_but_another_is(t
     law = body_centred()
     (tmp_path / "effective.toml").write_text(law.text())
     progress = Progress([])
-    Study.open(attrs.evolve(JOB, lattice=law), tmp_path, progress, RunContext(progress))
+    Study.open(attrs.evolve(JOB, lattice=law), tmp_path, RunContext(progress))
     other = tmp_path / "other"
     other.mkdir()
     (other / "effective.toml").write_text("not yours")
     with pytest.raises(InputError, match=r"somebody else's: effective\.toml"):
-        Study.open(attrs.evolve(JOB, lattice=law), other, progress, RunContext(progress))
+        Study.open(attrs.evolve(JOB, lattice=law), other, RunContext(progress))
     assert (other / "effective.toml").read_text() == "not yours"

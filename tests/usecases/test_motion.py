@@ -1,7 +1,5 @@
 """The motion that a study keeps to be looked at: surfaces, states, sensor paths, point caches, pictures."""
 
-from types import SimpleNamespace
-
 import attrs
 import numpy as np
 import pytest
@@ -77,8 +75,7 @@ def swept(folder, mesh, solved_on, trajectory, jobs):
     sweep = CandidateSolver(JOB, Cache(folder / "cache"), solved_on, jobs, PRESSURES, "volume_fraction")
     evaluations = sweep.evaluations(trajectory, lambda _: None)
     sweep.close()
-    of = SimpleNamespace(job=JOB, headline_rule="volume_fraction", mesh=mesh, folder=folder)
-    keep_motion(of, solved_on, trajectory, sweep, jobs)
+    keep_motion(JOB, folder, mesh, solved_on, trajectory, sweep, jobs)
     return sweep, evaluations
 
 

@@ -22,7 +22,7 @@ from mu_addon.run.progress import Progress
 from mu_addon.usecases.parameter_study import cluster as cluster_module
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.parameter_study.point import Task, run_point, version
-from mu_addon.usecases.parameter_study.run import sweep
+from mu_addon.usecases.parameter_study.run import USE_CASE, Job
 
 pytest.importorskip("distributed", reason="sweeps are an extra")
 
@@ -72,7 +72,7 @@ def swept(text, folder, work=formula, status=0, **options):
     told = []
     asked.clear()
     with run_to_end(Progress([told.append])) as context:
-        sweep(parse_plan(text, folder), folder, context.progress, context, work=work, **options)
+        USE_CASE.start(Job(parse_plan(text, folder), work=work, **options), folder, context)
     assert context.status == status, told[-1]
     return list(csv.DictReader((folder / "points.csv").open(newline=""))), told
 
@@ -141,7 +141,7 @@ def test_a_grid_cannot_be_added_to(tmp_path):
     text = TEXT.replace('"latin_hypercube"', '"grid"')
     _, told = [], []
     with run_to_end(Progress([told.append])) as context:
-        sweep(parse_plan(text, tmp_path), tmp_path / "out", context.progress, context, add=2, work=formula)
+        USE_CASE.start(Job(parse_plan(text, tmp_path), add=2, work=formula), tmp_path / "out", context)
     assert context.status == 2
     assert "--add" in told[-1]["where"]
 
@@ -338,7 +338,7 @@ def test_a_lost_worker_and_a_restarted_scheduler_lose_no_point(farm, tmp_path):
 
     with run_to_end(Progress([Trouble()])) as context:
         plan = parse_plan(text, tmp_path)
-        sweep(plan, folder, context.progress, context, scheduler=farm.address, work=slow_formula)
+        USE_CASE.start(Job(plan, scheduler=farm.address, work=slow_formula), folder, context)
     assert context.status == 0, told[-1]
     assert lost.poll() is not None
     assert first.poll() is not None
@@ -353,13 +353,8 @@ def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(cluster_module, "PATIENCE_S", 4.0)
     told = []
     with run_to_end(Progress([told.append])) as context:
-        sweep(
-            parse_plan(TEXT, tmp_path),
-            tmp_path / "out",
-            context.progress,
-            context,
-            scheduler=f"tcp://127.0.0.1:{free_port()}",
-        )
+        job = Job(parse_plan(TEXT, tmp_path), scheduler=f"tcp://127.0.0.1:{free_port()}")
+        USE_CASE.start(job, tmp_path / "out", context)
     assert context.status == 1
     assert "no scheduler answers" in told[-1]["what"]
     assert "dask scheduler" in told[-1]["what_to_do"]

@@ -34,7 +34,7 @@ def ran(job, folder):
     """Its summary; the report, which takes longest, is left out."""
     told = []
     with run_to_end(Progress([told.append])) as context:
-        run_stages(Study.open(job, folder, context.progress, context))
+        run_stages(Study.open(job, folder, context))
     assert context.status == 0, told[-1]
     return json.loads((folder / "summary.json").read_text())
 
@@ -118,7 +118,7 @@ def test_a_smaller_job_keeps_what_is_still_valid(copied, stages):
     from mu_addon.usecases.simulate_and_place.report_data import write_report
 
     with run_to_end(Progress()) as context:
-        write_report(Study.open(study, folder, context.progress, context))
+        write_report(Study.open(study, folder, context))
     assert context.status == 0
     assert (folder / "report.html").read_text() == "of the full study"
 
@@ -173,7 +173,7 @@ def test_too_little_room_is_told_before_any_work(tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=20_000_000))
     told = []
     with run_to_end(Progress([told.append])) as context:
-        Study.open(JOB, tmp_path / "out", context.progress, context)
+        Study.open(JOB, tmp_path / "out", context)
     assert context.status == 5
     assert "20 MB are free" in told[-1]["what"]
     assert "free some space" in told[-1]["what_to_do"]

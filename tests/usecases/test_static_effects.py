@@ -90,7 +90,7 @@ def ran(job, folder):
     """Its summary; the report, which takes longest, is left out."""
     told = []
     with run_to_end(Progress([told.append])) as context:
-        run_stages(Study.open(job, folder, context.progress, context))
+        run_stages(Study.open(job, folder, context))
     assert context.status == 0, told[-1]
     return json.loads((folder / "summary.json").read_text())
 
@@ -194,7 +194,7 @@ def test_sensor_paths_are_ranked_in_the_unit_that_has_the_effect(placed, name, m
     assert all(abs(J[path] / without[path] - 1) > 2e-3 for path in without)
     points = np.array([[0.0, 0.0, 0.0]])
     with run_to_end(Progress()) as context:
-        study = Study.open(job, folder, context.progress, context)
+        study = Study.open(job, folder, context)
         points, windows = study.anchors, study.windows
     trajectory, _ = moved(job, mesh)
     monitored, d = (points, probe(mesh, points)), UNIT.dimensions
@@ -231,7 +231,7 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_digits(placed, tmp_path):
         for path in kept[::2]:
             path.unlink()
     # By processes of their own, beside the motion, as far as there is something left to do.
-    job = read_job(copy, workers=2)
+    job = attrs.evolve(read_job(copy), workers=2)
     assert job.effects == with_effects(90.0, gravity=1300.0).effects
     assert ran(job, copy)["J_hat_mm"] == found["J_hat_mm"]
     same_digits(folder, copy)
@@ -331,7 +331,7 @@ def given(unit_of, *words):
     told = []
     options = parser().parse_args([str(w) for w in [*words, "--preset", "mu-1.0x", "--out", "out"]])
     with run_to_end(Progress([told.append])) as context:
-        found = unit_of(options, context.progress, context)
+        found = unit_of(options, context)
     assert context.status == 0, told[-1]
     return found, context.summary, [m["what"] for m in told if m.get("type") == "warning"]
 

@@ -21,8 +21,8 @@ from ...report.render import Floats, Part, fit, png, render
 from ...report.results import Picture
 from ...report.shapes import ball, tube
 from ...run.progress import Progress
-from ..simulate_and_place.report_data import package_versions
-from .run import Job
+from ...run.versions import package_versions
+from .job import Job
 
 FILES = {
     "check.toml": "inputs of this check",

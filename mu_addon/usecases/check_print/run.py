@@ -2,74 +2,27 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import attrs
 import numpy as np
 
-from ...design.anchors import Window
 from ...design.gates import GateError
-from ...design.parameters import Unit, to_toml
 from ...design.printing.check import PrintCheck, check
-from ...design.printing.printer import Printer, printer_text
 from ...design.solid import build_solid
 from ...design.surface import Triangles, Vertices, stl_bytes, stl_surface
 from ...errors import InputError
 from ...files import write_bytes, write_json
 from ...run.context import RunContext
-from ...run.folder import begin
-from ...run.progress import Progress
-
-HEADER = "# The inputs of this print check; the files beside it belong to it."
-RESULTS = ("part.stl", "check.json", "report.html", "places.png")
+from ...run.usecase import UseCase
+from .job import LAYOUT, Job, read_job
+from .report import write_report
 
 
-@attrs.frozen(eq=False)
-class Job:
-    """Inputs of a check: a unit, or the bytes of an STL file, or a file checked against its unit.
-
-    direction points away from the platform, in the part's frame.
-    """
-
-    printer: Printer
-    unit: Unit | None = None
-    window: Window | None = None
-    quality: str = "interactive"
-    stl: bytes | None = None
-    stl_name: str = ""
-    direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
-
-    @property
-    def name(self) -> str:
-        """What is checked, in a few words."""
-        unit = "" if self.unit is None else self.unit.name
-        path = "" if self.window is None else f", {self.window.name}"
-        if self.stl is None:
-            return unit + path
-        return self.stl_name + (f" against {unit}{path}" if unit else "")
-
-    def texts(self) -> dict[str, str]:
-        """Text of every file of inputs, by name; check.toml is the first."""
-        lines = [HEADER, "format = 1", 'printer = "printer.toml"']
-        if self.unit is not None:
-            lines += ['unit = "unit.toml"', f'quality = "{self.quality}"']
-        if self.window is not None:
-            lines.append(f'path = "{self.window.name}"')
-        if self.stl is not None:
-            lines.append(f'stl_sha256 = "{hashlib.sha256(self.stl).hexdigest()}"')
-        lines.append(f"direction = [{', '.join(f'{x:g}' for x in self.direction)}]")
-        texts = {"check.toml": "\n".join(lines) + "\n", "printer.toml": printer_text(self.printer)}
-        return texts if self.unit is None else texts | {"unit.toml": to_toml(self.unit)}
-
-
-def check_print(job: Job, folder: Path, progress: Progress, context: RunContext) -> PrintCheck:
+def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
     """Check a part and leave part.stl, check.json and report.html; GateError if it must not be printed."""
-    from .report import write_report
-
-    begin(context, folder, HEADER, job.texts(), RESULTS, optional=("unit.toml",))
+    progress = context.progress
     with progress.stage("part"):
         vertices, triangles = surface_of(job)
     found = check(
@@ -84,7 +37,10 @@ def check_print(job: Job, folder: Path, progress: Progress, context: RunContext)
     context.summary |= summary(found)
     write_bytes(folder / "part.stl", stl_bytes(vertices, triangles))
     write_json(folder / "check.json", as_plain(job, found))
-    write_report(job, vertices, triangles, found, folder, progress)
+    context.report = lambda _: write_report(job, vertices, triangles, found, folder, progress)
+    # Before the error of a part that must not be printed: that is the answer, and no reason to leave early.
+    context.write_report()
+    context.report = None
     for finding in found.findings:
         if finding.severity == "warning":
             progress.warning(f"{finding.check}: {finding.what}", _where(finding.places), finding.remedy)
@@ -159,7 +115,7 @@ def summary(found: PrintCheck) -> dict[str, Any]:
     return {"verdict": found.worst, "count": count, "figures": found.figures, "faults": faults, **best}
 
 
-def console_summary(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What a check found, in a few lines of text, of its `summary`."""
     count = summary["count"]
     lines = [f"{count['pass']} checks passed, {count['warning']} warnings, {count['error']} errors"]
@@ -179,3 +135,6 @@ def _where(places: np.ndarray[Any, Any]) -> str:
     x, y, z = places[0]
     more = f" and {len(places) - 1} places more" if len(places) > 1 else ""
     return f"({x:.2f}, {y:.2f}, {z:.2f}) mm{more}"
+
+
+USE_CASE = UseCase("check", LAYOUT, read_job, check_print, console_summary)

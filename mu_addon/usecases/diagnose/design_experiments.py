@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.parameters import Unit
+from ...design.parameters import Unit, read_unit, to_toml
 from ...errors import InputError
 from ...evidence.fit import Fitter
 from ...evidence.noise import Source
@@ -18,18 +18,27 @@ from ...evidence.record import KNOWN, Record, record
 from ...evidence.sensitivity import Sensitivity, sensitivities, similarity
 from ...evidence.simulator import Composite
 from ...files import write_csv, write_text
-from ...measured import Experiment, read_folder
+from ...measured import Experiment, Measured, read_folder
 from ...report.html import facts_table, note, page, table
 from ...run.context import RunContext
-from ...run.folder import begin
-from ...run.progress import Progress
-from ..simulate_and_place.report_data import package_versions
-from .run import UNIT, bare, folder_inputs, listed, readable, simulators_of, unit_behind
+from ...run.folder import FolderLayout
+from ...run.inputs import FORMAT, named_path, read_inputs
+from ...run.usecase import UseCase
+from ...run.versions import package_versions
+from ...toml_writer import toml_text
+from ..measured_data import described, experiments_digest, require_same_data
+from .job import UNIT, unit_behind
+from .simulators import simulators_of
+from .words import bare, listed, readable
 
 Array = np.ndarray[Any, Any]
 
-HEADER = "# The inputs of this design of experiments; its protocols are named by the SHA-256 of their files."
-RESULTS = ("limits.csv", "report.html")
+LAYOUT = FolderLayout(
+    "protocols.toml",
+    "# The inputs of this design of experiments; its protocols are named by the SHA-256 of their files.",
+    results=("limits.csv", "report.html"),
+    optional=(UNIT,),
+)
 # Standard deviation of a reading, by quantity: an ordinary camera, gauge, load cell and voltmeter.
 NOISE = {
     "angle": 0.3,
@@ -72,34 +81,63 @@ def noise_of(words: Sequence[str]) -> dict[str, float]:
     return found
 
 
-def design_experiments(
-    folder: Path,
-    out: Path,
-    unit: Unit | None = None,
-    noise: Mapping[str, float] = NOISE,
-    *,
-    progress: Progress,
-    context: RunContext,
-) -> Plan:
-    """What the experiments of a folder would show, made with instruments of this noise; results in `out`.
+@attrs.frozen(eq=False)
+class Job:
+    """Inputs of a design of experiments.
 
-    The folder is laid out as for `diagnose`; what would be measured may hold any numbers. Writes limits.csv
-    and report.html. Raises InputError, OutputError.
+    measured: laid out as for `diagnose`; what would be measured may hold any numbers. unit: the preset
+    without one. noise: standard deviation of a reading, by quantity.
     """
-    measured = read_folder(Path(folder))
-    unit = unit_behind(measured.experiments, unit)
-    inputs = folder_inputs(
-        "protocols.toml", HEADER, measured, unit, [f"{k} = {v!r}" for k, v in noise.items()]
-    )
-    begin(context, out, HEADER, inputs, RESULTS, optional=(UNIT,))
-    simulators, told = simulators_of(measured.experiments, unit, out / "cache", progress)
+
+    measured: Measured
+    unit: Unit | None = None
+    noise: Mapping[str, float] = attrs.field(factory=lambda: dict(NOISE))
+
+    @property
+    def subject(self) -> Unit | None:
+        """The unit that the experiments are of."""
+        return unit_behind(self.measured.experiments, self.unit)
+
+    def texts(self) -> dict[str, str]:
+        """Text of every file of inputs, by name; protocols.toml is the first."""
+        values = {
+            "format": FORMAT,
+            "experiments_sha256": experiments_digest(self.measured),
+            **self.noise,
+            "data": described(self.measured),
+            "run": {"data": str(self.measured.folder.resolve())},
+        }
+        texts = {LAYOUT.inputs: toml_text(values, LAYOUT.header)}
+        return texts if self.subject is None else texts | {UNIT: to_toml(self.subject)}
+
+
+def read_job(folder: Path) -> Job:
+    """The job that a folder of `design-experiments` describes, its protocols where they lay; InputError."""
+    path = folder / LAYOUT.inputs
+    values, run = read_inputs(path)
+    measured = read_folder(named_path(path, run, "data", "folder of measured data"))
+    require_same_data(measured, values.get("data"), described(measured))
+    unit = folder / UNIT
+    noise = noise_of([f"{name}={values[name]}" for name in NOISE if name in values])
+    return Job(measured, read_unit(unit) if unit.is_file() else None, noise)
+
+
+def design_experiments(job: Job, folder: Path, context: RunContext) -> Plan:
+    """What experiments would show, made with instruments of some noise; writes limits.csv and report.html.
+
+    Raises InputError, OutputError.
+    """
+    measured, progress = job.measured, context.progress
+    simulators, told = simulators_of(measured.experiments, job.subject, folder / "cache", progress)
     simulator = Composite(simulators)
     with progress.stage("sensitivities", expected_s=5.0):
-        found = plan(measured.experiments, simulator, noise)
-    _write(found, out / "limits.csv")
+        found = plan(measured.experiments, simulator, job.noise)
+    _write(found, folder / "limits.csv")
     context.summary |= summary(found)
-    versions = package_versions()
-    write_text(out / "report.html", _report(found, measured.folder.resolve().name, told, versions))
+    name = measured.folder.resolve().name
+    context.report = lambda _: write_text(
+        folder / "report.html", _report(found, name, told, package_versions())
+    )
     return found
 
 
@@ -228,7 +266,7 @@ def summary(found: Plan) -> dict[str, Any]:
     }
 
 
-def console_summary(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What a plan would show, in a few lines of text, of its `summary`."""
     lines = [f"{readable(name)}: detectable from {limit}" for name, (limit, _) in summary["visible"].items()]
     if summary["hidden"]:
@@ -237,3 +275,6 @@ def console_summary(summary: Mapping[str, Any]) -> list[str]:
         f"similar signatures: {readable(a)} and {readable(b)} ({c:.3f})" for a, b, c in summary["alike"][:5]
     ]
     return lines
+
+
+USE_CASE = UseCase("design-experiments", LAYOUT, read_job, design_experiments, console_summary)

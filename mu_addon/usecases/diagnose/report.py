@@ -20,9 +20,10 @@ from ...files import write_text
 from ...report.charts import CHOSEN, INK, signed
 from ...report.html import cards, facts_table, figure, note, page, table
 from ...run.context import RunContext
-from ..simulate_and_place.report_data import package_versions
+from ...run.versions import package_versions
 from . import charts as pictures
-from .run import Curve, Diagnosis, advice, bare, between, curves, listed, readable, sentence
+from .diagnosis import Curve, Diagnosis, curves
+from .words import advice, bare, between, listed, readable, sentence
 
 FILES = {
     "diagnose.toml": "inputs of this run",
@@ -41,9 +42,10 @@ MOST_NOTES = 3
 
 def write_report(found: Diagnosis, out: Path, context: RunContext) -> None:
     """Write report.html; raises OutputError."""
-    versions = package_versions()
-    context.summary["versions"] = versions
-    write_text(out / "report.html", report(found, out, versions))
+    with context.progress.stage("report", expected_s=5.0):
+        versions = package_versions()
+        context.summary["versions"] = versions
+        write_text(out / "report.html", report(found, out, versions))
 
 
 def report(found: Diagnosis, out: Path, versions: dict[str, str]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,27 +11,20 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from ...design.anchors import Window, window
 from ...design.beams import beam_parts
 from ...design.export import write_nodes
 from ...design.lattice import lattice_of
-from ...design.parameters import Unit, to_toml
 from ...design.solid import QUALITY, Solid, build_solid
 from ...design.surface import bad_edges, stl_bytes, stl_surface, volume
 from ...design.threemf import Part, read_3mf, write_3mf
-from ...errors import InputError, MeshingError, OutputError
+from ...errors import MeshingError, OutputError
 from ...files import write_bytes, write_json
-from ...materials.library import Material
 from ...run.context import RunContext
-from ...run.folder import begin
 from ...run.progress import Progress
+from ...run.usecase import UseCase
+from .job import LAYOUT, MANIFEST, Job, read_job
 
 Array = NDArray[np.float64]
-
-HEADER = "# The inputs of this export; unit.toml beside it belongs to them."
-FORMATS = ("stl", "3mf", "3mf-beams", "step", "txt")
-MANIFEST = "manifest.json"
-RESULTS = ("unit.stl", "unit.3mf", "unit-beams.3mf", "*.step", "nodes.txt", MANIFEST)
 
 MESH_TOLERANCE = 1e-4
 """Relative difference of volume allowed between a solid and its STL or 3MF read back."""
@@ -48,58 +40,20 @@ _ASSEMBLY = (
 )
 
 
-@attrs.frozen(eq=False)
-class Job:
-    """Inputs of an export. path: of the waveguide, or None; take_off: the printer's offsets in mm."""
-
-    unit: Unit
-    resin: Material
-    path: Window | Array | None = None
-    path_name: str = ""
-    formats: tuple[str, ...] = FORMATS
-    quality: str = "export"
-    take_off: tuple[float, float] = (0.0, 0.0)
-    offset_source: str = ""
-
-    def __attrs_post_init__(self) -> None:
-        for name in self.formats:
-            if name not in FORMATS:
-                raise InputError(
-                    f"there is no format {name!r}", "--formats", f"choose from {', '.join(FORMATS)}"
-                )
-        if self.quality not in QUALITY:
-            raise InputError(
-                f"there is no quality {self.quality!r}", "--quality", f"one of {', '.join(QUALITY)}"
-            )
-
-    def texts(self) -> dict[str, str]:
-        """Text of every file of inputs, by name; export.toml is the first."""
-        formats = ", ".join(f'"{name}"' for name in self.formats)
-        lines = [
-            HEADER,
-            "format = 1",
-            'unit = "unit.toml"',
-            f'path = "{self.path_name}"',
-            f"formats = [{formats}]",
-            f'quality = "{self.quality}"',
-            f"take_off_mm = [{self.take_off[0]}, {self.take_off[1]}]",
-            f'resin = "{self.resin.name}"',
-        ]
-        if self.path is not None and not isinstance(self.path, Window):
-            lines.append(f"points_mm = {np.asarray(self.path).tolist()}")
-        return {"export.toml": "\n".join(lines) + "\n", "unit.toml": to_toml(self.unit)}
-
-
 @attrs.define
 class Export:
     """An export under way: what was written so far is here, and in `folder` as soon as it is whole."""
 
     job: Job
     folder: Path
-    progress: Progress
     context: RunContext
     files: list[dict[str, Any]] = attrs.field(factory=list)
     refused: list[dict[str, str]] = attrs.field(factory=list)
+
+    @property
+    def progress(self) -> Progress:
+        """Where the run says how it goes."""
+        return self.context.progress
 
     def run(self) -> None:
         """Build the solid, write every format, read each back, and leave the manifest."""
@@ -282,40 +236,12 @@ def _mismatch(name: str, what: str) -> OutputError:
     )
 
 
-def export(job: Job, folder: Path, progress: Progress, context: RunContext) -> None:
-    """Run an export in a folder of its own; raises InputError, GateError and OutputError."""
-    begin(context, folder, HEADER, job.texts(), RESULTS)
-    Export(job, folder, progress, context).run()
+def export(job: Job, folder: Path, context: RunContext) -> None:
+    """Write a unit's files in a folder of its own; raises InputError, GateError and OutputError."""
+    Export(job, folder, context).run()
 
 
-def path_of(unit: Unit, name: str | None, row: str | None = None) -> tuple[Window | Array | None, str]:
-    """A path and its name: a window, alpha1 .., or one of a paths.csv of `place`, its first unless named."""
-    if name is None:
-        return None, ""
-    if not name.endswith(".csv"):
-        return window(unit, name), name
-    try:
-        with Path(name).open(encoding="utf-8", newline="") as stream:
-            rows = list(csv.DictReader(stream))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"cannot read the paths: {error}", name, "give paths.csv of `place --paths graph`"
-        ) from error
-    named = [r for r in rows if row is None or r.get("path") == row]
-    if not named:
-        raise InputError(
-            f"there is no path {row!r}" if row else "there is no path", name, "see its first column"
-        )
-    try:
-        points = np.array([[float(c) for c in p.split()] for p in named[0]["points_mm"].split(";")])
-        return points.reshape(-1, 3), named[0]["path"]
-    except (KeyError, ValueError) as error:
-        raise InputError(
-            "its column points_mm is not a list of points", name, "write it again by `place`"
-        ) from error
-
-
-def console_summary(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What was written, in a few lines of text, of a run's `summary`."""
     solid, resin = summary["solid"], summary["resin"]
     lines = [
@@ -325,3 +251,6 @@ def console_summary(summary: Mapping[str, Any]) -> list[str]:
     lines += [f"not written: {entry['format']}: {entry['why']}" for entry in summary["refused"]]
     lines.append(f"{solid['volume_mm3'] / 1e3:.2f} ml, {resin['g']:.1f} g of {resin['name']}")
     return lines
+
+
+USE_CASE = UseCase("export", LAYOUT, read_job, export, console_summary)

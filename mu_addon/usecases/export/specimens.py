@@ -12,24 +12,30 @@ import attrs
 import numpy as np
 
 from ...design import coupons
-from ...design.parameters import Unit, to_toml
+from ...design.parameters import Unit, read_unit, to_toml
 from ...design.strut_cell import specimen_solid, strut_cell
 from ...design.surface import Triangles, Vertices, bad_edges, stl_bytes, stl_surface, volume
 from ...errors import OutputError
 from ...files import write_bytes, write_json, write_text
-from ...materials.library import Material
+from ...materials.library import Material, material_text
 from ...measured.kinds import KINDS
 from ...report.html import page, table
 from ...run.context import RunContext
-from ...run.folder import begin
-from ...run.progress import Progress
+from ...run.folder import FolderLayout
+from ...run.inputs import FORMAT, read_inputs
+from ...run.usecase import UseCase
+from ...toml_writer import toml_text, toml_value
+from .job import RESIN, UNIT, read_resin
 from .print_offsets import sheet
 
-HEADER = "# The inputs of these specimens; unit.toml beside it belongs to them."
 SCALES = (0.75, 1.0, 1.5)
 CELLS = 3
 TEMPLATE = "measured"
-RESULTS = ("*.stl", "manifest.json", "gauge.csv", "sheet.html", TEMPLATE)
+LAYOUT = FolderLayout(
+    "specimens.toml",
+    "# The inputs of these specimens; unit.toml beside it belongs to them.",
+    results=("*.stl", "manifest.json", "gauge.csv", "sheet.html", TEMPLATE),
+)
 
 Surface = tuple[Vertices, Triangles]
 
@@ -137,12 +143,32 @@ def specimens(unit: Unit, scales: tuple[float, ...] = SCALES, cells: int = CELLS
     return found
 
 
-def make_specimens(
-    unit: Unit, resin: Material, folder: Path, progress: Progress, context: RunContext
-) -> None:
+@attrs.frozen(eq=False)
+class Job:
+    """Whose specimens are made: a unit's, of a resin."""
+
+    unit: Unit
+    resin: Material
+
+    def texts(self) -> dict[str, str]:
+        """Text of every file of inputs, by name; specimens.toml is the first."""
+        values = {"format": FORMAT, "unit": UNIT, "resin": self.resin.name}
+        return {
+            LAYOUT.inputs: toml_text(values, LAYOUT.header),
+            UNIT: to_toml(self.unit),
+            RESIN: material_text(self.resin),
+        }
+
+
+def read_job(folder: Path) -> Job:
+    """The job that a folder of `specimens` describes; raises InputError."""
+    values, _ = read_inputs(folder / LAYOUT.inputs)
+    return Job(read_unit(folder / UNIT), read_resin(folder, str(values.get("resin"))))
+
+
+def make_specimens(job: Job, folder: Path, context: RunContext) -> None:
     """Write every specimen, the gauge's sheet, the manifest and the folder to fill; raises MuError."""
-    inputs = {"specimens.toml": f'{HEADER}\nformat = 1\nunit = "unit.toml"\nresin = "{resin.name}"\n'}
-    begin(context, folder, HEADER, inputs | {"unit.toml": to_toml(unit)}, RESULTS)
+    unit, resin, progress = job.unit, job.resin, context.progress
     every = specimens(unit)
     rows = []
     with progress.stage("specimens", 10.0):
@@ -193,18 +219,18 @@ def _write_template(every: list[Specimen], folder: Path) -> None:
             lines += [
                 "",
                 "[[experiment]]",
-                f'name = "{name}"',
-                f'kind = "{specimen.kind}"',
-                f'file = "{name}.csv"',
-                f'role = "{role}"',
+                f"name = {toml_value(name)}",
+                f"kind = {toml_value(specimen.kind)}",
+                f"file = {toml_value(f'{name}.csv')}",
+                f"role = {toml_value(role)}",
                 f"scale = {specimen.scale:g}",
-                f'specimen = "{letter}"',
+                f"specimen = {toml_value(letter)}",
             ]
             for key, value in specimen.keys.items():
                 if value is None:
                     lines.append(f"# {key} =   # as weighed")
                 else:
-                    lines.append(f"{key} = {_toml(value)}")
+                    lines.append(f"{key} = {toml_value(value)}")
             write_text(folder / f"{name}.csv", ",".join(specimen.columns) + "\n")
     lines += [
         "",
@@ -212,10 +238,6 @@ def _write_template(every: list[Specimen], folder: Path) -> None:
         "# (kind pressure_hold), columns " + ", ".join(KINDS["unit_pressure"].columns) + ".",
     ]
     write_text(folder / "experiments.toml", "\n".join(lines) + "\n")
-
-
-def _toml(value: Any) -> str:
-    return f'"{value}"' if isinstance(value, str) else str(value)
 
 
 def _page(unit: Unit, resin: Material, every: list[Specimen], rows: list[dict[str, Any]]) -> str:
@@ -272,8 +294,11 @@ def _page(unit: Unit, resin: Material, every: list[Specimen], rows: list[dict[st
     )
 
 
-def console_summary(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What was written, in a few lines of text, of a run's `summary`."""
     return [f"{row['file']}: {row['mass_g']:.2f} g, {row['measure']}" for row in summary["specimens"]] + [
         "sheet.html lists the measurements; measured/ holds the templates that `diagnose` reads"
     ]
+
+
+USE_CASE = UseCase("specimens", LAYOUT, read_job, make_specimens, console_summary)

@@ -14,9 +14,9 @@ from ...materials.fit import FLOOR, POISSON, TOLERANCE
 from ...report.charts import signed
 from ...report.html import cards, facts_table, figure, note, page, table
 from ...run.context import RunContext
-from ..simulate_and_place.report_data import package_versions
+from ...run.versions import package_versions
 from .charts import TITLES, mode_chart, residual_chart
-from .run import Fitting, modes, tested
+from .fitting import Fitting, modes, tested
 
 FILES = {
     "fit.toml": "inputs of this run",
@@ -36,9 +36,10 @@ WEIGHTS_MEAN = {
 
 def write_report(found: Fitting, out: Path, context: RunContext) -> None:
     """Write report.html; raises OutputError."""
-    versions = package_versions()
-    context.summary["versions"] = versions
-    write_text(out / "report.html", report(found, versions))
+    with context.progress.stage("report", expected_s=4.0):
+        versions = package_versions()
+        context.summary["versions"] = versions
+        write_text(out / "report.html", report(found, versions))
 
 
 def report(found: Fitting, versions: dict[str, str]) -> str:

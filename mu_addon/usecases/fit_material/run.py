@@ -1,9 +1,8 @@
-"""From coupon tests to a material: laws fitted, compared and written, in one folder."""
+"""`fit-material`: from coupon tests to a material; laws fitted, compared and written down."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,65 +12,25 @@ import numpy as np
 from ...errors import InputError
 from ...files import write_csv, write_text
 from ...materials.choice import Choice, choose, disagreement
-from ...materials.coupon import Array, Coupon, response
-from ...materials.fit import POISSON, TOLERANCE, WEIGHTS, Fit, fit_coupons, leave_one_mode_out, ranges
-from ...materials.forms import FORMS, form
+from ...materials.coupon import Coupon, response
+from ...materials.fit import POISSON, TOLERANCE, Fit, fit_coupons, leave_one_mode_out, ranges
 from ...materials.library import Material, write_material
-from ...measured import Measured, read_folder
+from ...measured import Measured
 from ...run.context import RunContext
-from ...run.folder import begin
-from ...run.progress import Progress
+from ...run.usecase import UseCase
+from .charts import mode_chart
+from .fitting import Fitting, modes, tested
+from .job import LAYOUT, Job, read_job
+from .report import write_report
 
-HEADER = "# The inputs of this fit; the measured data are named by the SHA-256 of their files."
-RESULTS = ("material.toml", "fit.csv", "parameters.csv", "errors.csv", "fit_*.svg", "report.html")
 
+def fit_material(job: Job, folder: Path, context: RunContext) -> Fitting:
+    """Fit laws to coupons; writes material.toml, fit.csv, parameters.csv, errors.csv and a chart a mode.
 
-@attrs.frozen(eq=False)
-class Fitting:
-    """Coupons and what was found with them.
-
-    unseen: share by which each law misses a mode when fitted without it; apart: how far laws differ in modes
-    that were not tested, see `disagreement`; compressibility: share by which kappa moves the chosen law's
-    stress at the end of its range.
+    Raises OutputError.
     """
-
-    measured: Measured
-    fitted: tuple[Coupon, ...]
-    held_out: tuple[Coupon, ...]
-    weights: str
-    fits: tuple[Fit, ...]
-    choice: Choice
-    unseen: dict[str, dict[str, float]]
-    apart: dict[str, tuple[Array, Array]]
-    compressibility: float
-    material: Material
-
-
-def fit_material(
-    folder: Path,
-    out: Path,
-    laws: Sequence[str] = (),
-    held_out_modes: Sequence[str] = (),
-    weights: str = "absolute",
-    *,
-    progress: Progress,
-    context: RunContext,
-) -> Fitting:
-    """Fit laws (all of them without names) to the coupons of a folder of measured data; results in `out`.
-
-    held_out_modes: modes that no law is fitted to, beside the experiments whose role is "held_out". Writes
-    material.toml, fit.csv, parameters.csv, errors.csv, a chart a mode, report.html. Raises InputError,
-    OutputError.
-    """
-    from .report import write_report
-
-    forms = [form(name) for name in dict.fromkeys(laws)] or list(FORMS.values())
-    if weights not in WEIGHTS:
-        raise InputError(f"unknown weights {weights!r}", "--weights", f"choose from {', '.join(WEIGHTS)}")
-    measured = read_folder(Path(folder))
-    fitted, held = _coupons(measured, held_out_modes)
-    inputs = {"fit.toml": _inputs(measured, [f.name for f in forms], held_out_modes, weights)}
-    begin(context, out, HEADER, inputs, RESULTS)
+    measured, progress, forms, weights = job.measured, context.progress, job.forms, job.weights
+    fitted, held = job.coupons
     for remark in measured.remarks:
         progress.warning(remark.what, remark.where, remark.remedy)
     with progress.stage("fit", expected_s=2.0 * len(forms)):
@@ -94,49 +53,10 @@ def fit_material(
         compressibility=_compressibility(choice.chosen, fitted),
         material=material,
     )
-    _write(found, out)
+    _write(found, folder)
     context.summary |= summary(found)
-    with progress.stage("report", expected_s=4.0):
-        write_report(found, out, context)
+    context.report = lambda _: write_report(found, folder, context)
     return found
-
-
-def _coupons(
-    measured: Measured, held_out_modes: Sequence[str]
-) -> tuple[tuple[Coupon, ...], tuple[Coupon, ...]]:
-    """Coupons to fit, and those held out."""
-    experiments = measured.of("coupon")
-    if not experiments:
-        kinds = ", ".join(dict.fromkeys(e.kind for e in measured.experiments))
-        raise InputError(
-            f"the folder contains no coupon test ({kinds})",
-            str(measured.folder),
-            'laws are fitted to experiments of kind = "coupon"',
-        )
-    modes = {str(e.mode) for e in experiments}
-    for mode in held_out_modes:
-        if mode not in modes:
-            raise InputError(
-                f"there is no coupon of mode {mode!r} to hold out",
-                "--hold-out",
-                f"modes: {', '.join(sorted(modes))}",
-            )
-    fitted: list[Coupon] = []
-    held: list[Coupon] = []
-    for e in experiments:
-        away = e.role == "held_out" or e.mode in held_out_modes
-        (held if away else fitted).append(Coupon.of(e))
-    if not fitted:
-        raise InputError("every coupon is held out", str(measured.folder), 'leave some with role = "fit"')
-    return tuple(fitted), tuple(held)
-
-
-def _inputs(measured: Measured, laws: Sequence[str], held_out: Sequence[str], weights: str) -> str:
-    lines = [HEADER, f"laws = {json.dumps(list(laws))}", f"held_out_modes = {json.dumps(list(held_out))}"]
-    lines += [f"weights = {json.dumps(weights)}", "", "[data]"]
-    for e in measured.of("coupon"):
-        lines.append(f"{json.dumps(e.name, ensure_ascii=False)} = {json.dumps([e.role, e.mode, e.sha256])}")
-    return "\n".join(lines) + "\n"
 
 
 def _unseen(one: Any, fitted: Sequence[Coupon], weights: str) -> dict[str, float]:
@@ -186,8 +106,6 @@ def _material(measured: Measured, fitted: Sequence[Coupon], choice: Choice) -> M
 
 
 def _write(found: Fitting, out: Path) -> None:
-    from .charts import mode_chart
-
     write_material(found.material, out / "material.toml", "Fitted by fit-material; fit.toml names the data.")
     names = [f.form.name for f in found.fits]
     rows: list[list[Any]] = []
@@ -215,16 +133,6 @@ def _write(found: Fitting, out: Path) -> None:
     for mode in modes(found):
         chart = mode_chart(mode, *tested(found, mode), found.fits, found.choice.chosen.form.name)
         write_text(out / f"fit_{mode}.svg", chart)
-
-
-def modes(found: Fitting) -> list[str]:
-    """Modes that were tested, in the order of the coupons."""
-    return list(dict.fromkeys(c.mode for c in (*found.fitted, *found.held_out)))
-
-
-def tested(found: Fitting, mode: str) -> tuple[list[Coupon], list[Coupon]]:
-    """Coupons of a mode, fitted and held out."""
-    return [c for c in found.fitted if c.mode == mode], [c for c in found.held_out if c.mode == mode]
 
 
 def summary(found: Fitting) -> dict[str, Any]:
@@ -260,7 +168,7 @@ def summary(found: Fitting) -> dict[str, Any]:
     }
 
 
-def console_summary(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What a fit found, in a few lines of text, of its `summary`."""
     chosen = summary["chosen"]
     law = summary["laws"][chosen]
@@ -274,3 +182,6 @@ def console_summary(summary: Mapping[str, Any]) -> list[str]:
     if summary["untested"]:
         lines.append(f"not tested: {', '.join(summary['untested'])}")
     return lines
+
+
+USE_CASE = UseCase("fit-material", LAYOUT, read_job, fit_material, console_summary)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from html import escape
-from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -14,13 +13,11 @@ from ...files import write_bytes, write_text
 from ...report.charts import label, signed
 from ...report.html import cards, facts_table, figure, note, page, picture_figure, table
 from ...report.results import Picture
-from ..simulate_and_place.report_data import package_versions
+from ...run.versions import package_versions
 from . import charts as pictures
+from .gripping import Gripping
 from .path_deviation import printed_column
 from .phases import MEANING
-
-if TYPE_CHECKING:
-    from .run import Gripping
 
 FILES = {
     "grip.toml": "inputs of this run",

@@ -1,318 +1,28 @@
-"""A gripper in one folder: its printable part, its grasp of cubes, its light signal and its sensor paths."""
+"""`grip`: a gripper's printable part, its grasp of cubes, its light and its sensor paths."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import attrs
-import numpy as np
-
-from ...design.anchors import anchor_points, window
-from ...design.gripper import Gripper, GripperSolid, build_gripper, load_gripper, to_toml
-from ...design.parameters import to_toml as unit_toml
-from ...design.solid import QUALITY
-from ...design.surface import stl_bytes
-from ...design.threemf import Part, read_3mf, write_3mf
-from ...design.waveguide import waveguide
-from ...errors import InputError, OutputError
-from ...fem.materials import Materials
+from ...design.gripper import Gripper, load_gripper
 from ...fem.unit import materials_of
-from ...files import write_bytes, write_csv
-from ...meshing.mesh import Mesh
 from ...meshing.settings import MeshSettings
 from ...meshing.unit import mesh_unit
-from ...placement.inclusion import RULES
-from ...run.cache import Cache, key
 from ...run.context import RunContext
-from ...run.folder import begin
-from ...run.progress import Progress
-from ...sensing.embedded_waveguide import Joints, embed_waveguide
-from ...sensing.optics import Optics
-from ...sensing.signal import Signal, traced_signal
-from ..simulate_and_place.study_file import table_lines, toml_value
-from .grasp import Cube, Grasp, Grip, Lift, grasp
-from .motion import write_grasp
-from .path_deviation import Column, column, printed_column
-from .phases import MEANING, Phases, shipped_phases
-
-__all__ = ["Cube", "Grip", "Gripping", "Job", "console_summary", "grasp", "grip", "gripper_column"]
-
-Array = np.ndarray[Any, Any]
-
-HEADER = "# The inputs of this grasp; gripper.toml, unit.toml and protocol.csv beside it belong to them."
-CUBES = (12.5, 25.0)
-REFINE = 0.5
-# Rays through the waveguide, an instant.
-RAYS = 40_000
-RESULTS = (
-    "gripper.stl",
-    "gripper.3mf",
-    "grasp_*.csv",
-    "pull_*.csv",
-    "deviation.csv",
-    "cube-*",
-    "gripper.png",
-    "frame_*.png",
-    "report.html",
-)
+from ...run.usecase import UseCase
+from .grasp import Cube
+from .gripping import Gripping
+from .job import CUBES, LAYOUT, REFINE, Job, read_job
+from .path_deviation import column
+from .report import write_report
 
 
-@attrs.frozen
-class Job:
-    """Inputs of a run. cubes: none leaves the grasp out; rules: none leaves the table of paths out."""
-
-    gripper: Gripper
-    cubes: tuple[Cube, ...] = tuple(Cube(side) for side in CUBES)
-    grip: Grip = attrs.field(factory=Grip)
-    phases: Phases = attrs.field(factory=shipped_phases)
-    mesh: MeshSettings = attrs.field(factory=lambda: MeshSettings(refine=REFINE))
-    rules: tuple[str, ...] = RULES
-    quality: str = attrs.field(default="interactive", validator=attrs.validators.in_(tuple(QUALITY)))
-    optics: Optics = attrs.field(factory=Optics)
-
-    def __attrs_post_init__(self) -> None:
-        self.gripper.unit.wall.require_without_memory("a grasp")
-        sides = [cube.side_mm for cube in self.cubes]
-        if len(set(sides)) < len(sides):
-            raise InputError("two cubes have the same side", "--cube", "name each side once")
-        for side in sides:
-            if side >= self.gripper.fingers.gap_mm:
-                raise InputError(
-                    f"a cube of {side:g} mm does not fit between fingers "
-                    f"{self.gripper.fingers.gap_mm:g} mm apart",
-                    "--cube",
-                    "choose a smaller cube, or a gripper with a wider gap",
-                )
-
-    def texts(self) -> dict[str, str]:
-        """Text of every file of inputs, by name; grip.toml is the first."""
-        cubes = [attrs.asdict(cube) for cube in self.cubes]
-        lines = [HEADER, "format = 1", f"quality = {toml_value(self.quality)}"]
-        lines += [f"cubes = {toml_value(cubes)}", f"rules = {toml_value(self.rules)}"]
-        for name, values in (("grip", self.grip), ("mesh", self.mesh), ("optics", self.optics)):
-            lines += table_lines(name, attrs.asdict(values))
-        return {
-            "grip.toml": "\n".join(lines) + "\n",
-            "gripper.toml": to_toml(self.gripper, "unit.toml"),
-            "unit.toml": unit_toml(self.gripper.unit),
-            "protocol.csv": self.phases.text(),
-        }
-
-
-@attrs.define
-class Gripping:
-    """A gripper's run under way: what was found so far is here, and in `folder` as soon as it is whole."""
-
-    job: Job
-    folder: Path
-    progress: Progress
-    context: RunContext
-    solid: GripperSolid | None = None
-    mesh: Mesh | None = None
-    grasps: dict[float, Grasp] = attrs.field(factory=dict)
-    signals: dict[float, Signal] = attrs.field(factory=dict)
-    columns: list[Column] = attrs.field(factory=list)
-    warnings: list[str] = attrs.field(factory=list)
-
-    @classmethod
-    def open(cls, job: Job, folder: Path, progress: Progress, context: RunContext) -> Gripping:
-        """Make the folder this run's; results of other inputs are moved to stale/. Raises InputError."""
-        begin(context, folder, HEADER, job.texts(), RESULTS)
-        context.summary["inputs"] = {
-            "gripper": attrs.asdict(job.gripper.fingers) | attrs.asdict(job.gripper.plate),
-            "unit": job.gripper.unit.name,
-            "path": job.gripper.path,
-            "grip": attrs.asdict(job.grip),
-        }
-        return cls(job, folder, progress, context)
-
-    @property
-    def cache(self) -> Cache:
-        """Finished work, so that a killed run resumes."""
-        return Cache(self.folder / "cache")
-
-    # Stages, in the order they need each other.
-
-    def run(self) -> None:
-        """Every stage."""
-        self.design()
-        if self.job.cubes or self.job.rules:
-            self.make_mesh()
-        for cube in self.job.cubes:
-            self.close_on(cube)
-        if self.grasps:
-            self.follow_light()
-        for rule in self.job.rules:
-            self.rank(rule, None)
-            for cube in self.job.cubes[-1:]:
-                self.rank(rule, cube)
-        if self.columns:
-            self._write_columns()
-
-    def design(self) -> None:
-        """The printable part as STL and 3MF, the latter read back."""
-        with self.progress.stage("solid", 6.0):
-            found = self.solid = build_gripper(self.job.gripper, self.job.quality)
-            write_bytes(self.folder / "gripper.stl", stl_bytes(found.vertices, found.triangles))
-            name = self.job.gripper.name
-            packed = write_3mf([Part(name, found.vertices, found.triangles)], [1], name)
-            back = read_3mf(packed)[0][1]
-            if len(back.triangles) != len(found.triangles):
-                raise OutputError(
-                    "the 3MF file, read back, does not contain the part that was written", "gripper.3mf"
-                )
-            write_bytes(self.folder / "gripper.3mf", packed)
-        self.context.summary["gates"] = attrs.asdict(found.gates)
-        x, y = self.job.gripper.size_mm
-        self.context.summary["size_mm"] = [x, y, float(np.ptp(found.vertices[:, 2]))]
-
-    def make_mesh(self) -> None:
-        """Analysis mesh of half a finger."""
-        with self.progress.stage("mesh", 5.0):
-            mesh = self.mesh = mesh_unit(self.job.gripper.unit, self.job.mesh)
-        self.context.summary["mesh"] = {"nodes": len(mesh.nodes), "tetrahedra": len(mesh.tets)}
-
-    @property
-    def materials(self) -> Materials:
-        """Materials of the finger's mesh."""
-        assert self.mesh is not None
-        return materials_of(self.job.gripper.unit, self.mesh)
-
-    def _key(self, *parts: Any) -> str:
-        assert self.mesh is not None
-        own = attrs.astuple(self.job.grip), self.job.gripper.fingers.gap_mm
-        return key(self.mesh.hash(), self.materials.hash(), own, *parts)
-
-    def close_on(self, cube: Cube) -> None:
-        """The grasp of one cube, phase by phase."""
-        assert self.mesh is not None
-        job, name = self.job, f"cube-{cube.side_mm:g}"
-        entry = self._key("grasp", attrs.astuple(cube), job.phases.text())
-        with self.progress.stage(f"grasp of {cube.side_mm:g} mm"):
-            kept = self.cache.get("grasp", entry)
-            if kept is None:
-                found = grasp(
-                    job.gripper,
-                    cube,
-                    job.phases,
-                    self.mesh,
-                    self.materials,
-                    job.grip,
-                    on_instant=self.progress.update,
-                )
-                self.cache.put("grasp", entry, _arrays(found))
-            else:
-                found = _grasp(cube, kept)
-            self.grasps[cube.side_mm] = found
-            _write_grasp_csv(self.folder / f"grasp_{cube.side_mm:g}.csv", found)
-            rows = zip(found.lift.pull_mm, found.lift.pull_N, strict=True)
-            write_csv(
-                self.folder / f"pull_{cube.side_mm:g}.csv",
-                ["down_mm", "carried_N"],
-                [(f"{way:.6g}", f"{force:.6g}") for way, force in rows],
-            )
-            write_grasp(self.folder / name, job.gripper, self.mesh, self.materials, found)
-        self.context.summary.setdefault("grasps", {})[f"{cube.side_mm:g}"] = grasp_figures(found)
-        if not found.lift.held:
-            self.warn(
-                f"The cube of {cube.side_mm:g} mm ({cube.mass_g:.3g} g) is not lifted: friction can carry "
-                f"at most {found.lift.capacity_N:.3g} N of its {cube.weight_N:.3g} N."
-            )
-
-    def follow_light(self) -> None:
-        """The waveguide's light through every grasp, by rays through the bent bar."""
-        assert self.mesh is not None
-        unit, optics = self.job.gripper.unit, self.job.optics
-        with self.progress.stage("light", 20.0):
-            path = window(unit, self.job.gripper.path)
-            nodes = anchor_points(unit)[list(path.indices)]
-            bar = embed_waveguide(waveguide(unit, path), nodes, unit.printed)
-            joints = Joints.of(self.mesh, nodes, unit.dimensions.cell)
-            for side, found in self.grasps.items():
-                moved = [joints.moved(u) for u in found.u]
-                self.signals[side] = traced_signal(bar, moved, optics, RAYS)
-                _write_grasp_csv(self.folder / f"grasp_{side:g}.csv", found, self.signals[side])
-        light: dict[str, Any] = {}
-        for side, signal in self.signals.items():
-            ends = {name: self.grasps[side].end(name) for name in MEANING}
-            error = signal.errors * signal.transmitted / signal.at_rest
-            light[f"{side:g}"] = {
-                "lost_at_end_of": {name: float(signal.delta[k]) for name, k in ends.items()},
-                "error_at_end_of": {name: float(error[k]) for name, k in ends.items()},
-            }
-        self.context.summary["light"] = light
-
-    def rank(self, rule: str, cube: Cube | None) -> None:
-        """J_hat of every path's finger, closing on a cube or on nothing."""
-        assert self.mesh is not None
-        on = "nothing" if cube is None else f"{cube.side_mm:g} mm"
-
-        def entry(name: str) -> str:
-            about = None if cube is None else cube.side_mm
-            # Model A is the same under every rule.
-            return self._key("column", about, "" if name == "model_a" else rule, name)
-
-        def load(name: str) -> Array | None:
-            found = self.cache.get("moved", entry(name))
-            return None if found is None else found["points_mm"]
-
-        def store(name: str, moved: Array) -> None:
-            self.cache.put("moved", entry(name), {"points_mm": moved})
-
-        with self.progress.stage(f"paths, {rule}, on {on}"):
-            found = column(
-                self.job.gripper,
-                self.mesh,
-                self.materials,
-                rule,
-                cube,
-                self.job.grip,
-                load=load,
-                store=store,
-                on_path=self.progress.update,
-            )
-        self.columns.append(found)
-        table = self.context.summary.setdefault("J_hat_mm", {})
-        table.setdefault(rule, {})[on] = {
-            "J_hat_mm": found.J_hat_mm,
-            "chosen": found.chosen,
-            "rank_correlation_with_paper": found.rank_correlation(printed_column()),
-        }
-
-    def _write_columns(self) -> None:
-        printed = printed_column()
-        rows = [
-            (
-                name,
-                c.rule,
-                "" if c.cube is None else f"{c.cube.side_mm:g}",
-                f"{value:.9g}",
-                printed.get(name, ""),
-            )
-            for c in self.columns
-            for name, value in c.J_hat_mm.items()
-        ]
-        columns = ["path", "rule", "cube_mm", "J_hat_mm", "paper_gripper_mm"]
-        write_csv(self.folder / "deviation.csv", columns, rows)
-
-    def warn(self, text: str) -> None:
-        """Tell something that the user should know, now and in the report."""
-        if text not in self.warnings:
-            self.warnings.append(text)
-            self.progress.warning(text)
-        self.context.summary["warnings"] = self.warnings
-
-
-def grip(job: Job, folder: Path, progress: Progress, context: RunContext) -> Gripping:
-    """Design a gripper, close it on cubes, follow its light, rank its paths, and leave a report."""
-    from .report import write_report
-
-    run = Gripping.open(job, folder, progress, context)
-    context.on_stop = lambda reason: write_report(run, reason["what"])
+def grip(job: Job, folder: Path, context: RunContext) -> Gripping:
+    """Design a gripper, close it on cubes, follow its light, rank its paths, and report as far as it came."""
+    run = Gripping(job, folder, context)
+    context.report = lambda stopped: write_report(run, stopped)
     run.run()
-    write_report(run)
     return run
 
 
@@ -331,33 +41,7 @@ def gripper_column(
     return column(chosen, mesh, materials_of(chosen.unit, mesh), rule, cube).J_hat_mm
 
 
-def grasp_figures(found: Grasp) -> dict[str, Any]:
-    """Key figures of a grasp for summary.json."""
-    hold, lift = found.end("iii"), found.lift
-    return {
-        "mass_g": found.cube.mass_g,
-        "angle_at_hold_deg": float(found.angle_deg[hold]),
-        "angle_at_opening_deg": float(found.angle_deg[found.end("i")]),
-        "normal_at_hold_N": float(found.normal_N[hold]),
-        "down_at_hold_N": float(found.down_N[hold]),
-        "most_normal_N": float(found.normal_N.max()),
-        "sticking_at_hold": float(found.sticking[hold]),
-        "slid_at_hold_mm": float(found.slid_mm[hold]),
-        "gap_error_mm": float(found.deepest_mm.max()),
-        "held": lift.held,
-        "sag_mm": lift.sag_mm,
-        "carried_after_lift_N": -2.0 * float(found.down_N[found.end("iv")]),
-        "weight_N": lift.weight_N,
-        "capacity_N": lift.capacity_N,
-        "margin": lift.margin,
-        "margin_by_rule": lift.margin_by_rule,
-        "pressure_work_mJ": found.pressure_work_mJ,
-        "cube_work_mJ": found.cube_work_mJ,
-        "lost_to_friction_mJ": float(found.lost_mJ[-1]),
-    }
-
-
-def console_summary(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What a run found, in a few lines of text, of its `summary`."""
     x, y, z = summary["size_mm"]
     lines = [f"one part of {x:g} x {y:g} x {z:.4g} mm, {summary['gates']['inner_shells']} chambers"]
@@ -376,33 +60,4 @@ def console_summary(summary: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-_OF_GRASP = tuple(f.name for f in attrs.fields(Grasp) if f.name not in ("cube", "phase", "lift"))
-_OF_LIFT = tuple(f.name for f in attrs.fields(Lift))
-
-
-def _arrays(found: Grasp) -> dict[str, Array]:
-    """A grasp as arrays, for the cache."""
-    arrays = {name: getattr(found, name) for name in _OF_GRASP}
-    arrays |= {f"lift_{name}": np.asarray(getattr(found.lift, name)) for name in _OF_LIFT}
-    return arrays | {"phase": np.array(found.phase, dtype="U4")}
-
-
-def _grasp(cube: Cube, arrays: dict[str, Array]) -> Grasp:
-    lift: dict[str, Any] = {name: arrays[f"lift_{name}"] for name in _OF_LIFT}
-    lift = {name: value if value.ndim else value.item() for name, value in lift.items()}
-    phase = tuple(str(name) for name in arrays["phase"])
-    return Grasp(cube=cube, phase=phase, lift=Lift(**lift), **{n: arrays[n] for n in _OF_GRASP})
-
-
-def _write_grasp_csv(path: Path, found: Grasp, signal: Signal | None = None) -> None:
-    names = ["time_s", "pressure_kPa", "angle_deg", "normal_N", "down_N", "area_mm2", "sticking", "slid_mm"]
-    names += ["deepest_mm", "lost_mJ", "volume_mm3"]
-    values = [getattr(found, name) for name in names] + [found.cube_mm[:, 2]]
-    columns = ["phase", *names, "cube_z_mm"]
-    if signal is not None:
-        columns += ["light", "light_lost"]
-        values += [signal.transmitted, signal.delta]
-    rows = [
-        (name, *(f"{v:.6g}" for v in row)) for name, row in zip(found.phase, np.array(values).T, strict=True)
-    ]
-    write_csv(path, columns, rows)
+USE_CASE = UseCase("grip", LAYOUT, read_job, grip, console_summary)

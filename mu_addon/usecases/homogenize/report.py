@@ -11,10 +11,10 @@ from ...homogenize.modulus import DEFAULT, moduli
 from ...report.html import cards, facts_table, figure, note, page, picture_figure, table
 from ...report.results import Picture
 from ...report.unit_pictures import skin
-from ..simulate_and_place.report_data import package_versions
+from ...run.versions import package_versions
 from . import charts as pictures
 from .charts import Line, kPa
-from .run import Homogenisation
+from .homogenisation import Homogenisation
 
 FILES = {
     "homogenize.toml": "inputs of this run",

@@ -14,16 +14,24 @@ from ...design.parameters import Unit, load_preset, read_unit, to_toml
 from ...design.toml_text import nearest
 from ...errors import InputError, MuError
 from ...fem.protocol import Protocol
-from ...reading import file_text, parse_toml
+from ...reading import parse_toml
+from ...run.folder import RUN, FolderLayout
+from ...run.inputs import FORMAT, read_toml
+from ...toml_writer import toml_text
 from ..simulate_and_place.job import OF_FILES, Job, job_with, protocol_of, protocol_text
-from ..simulate_and_place.study_file import FILES, STAGES, table_lines, toml_value
+from ..simulate_and_place.study_file import FILES, STAGES
 from .sampling import METHODS, sample
 from .variable import FILE, Inputs, Variable, put, variable
 
 Array = np.ndarray[Any, Any]
 
-HEADER = "# The inputs of this sweep; unit.toml and protocol.csv beside it belong to them."
-FORMAT = 1
+UNIT, PROTOCOL = "unit.toml", "protocol.csv"
+PLAN, TABLE, REPORT = "plan.csv", "points.csv", "report.html"
+LAYOUT = FolderLayout(
+    "sweep.toml",
+    "# The inputs of this sweep; unit.toml and protocol.csv beside it belong to them.",
+    results=(PLAN, TABLE, REPORT),
+)
 MOST_POINTS = 100_000
 _KEYS = (
     "format", "preset", "unit", "protocol", "resin", "stages", "method", "points", "seed", "memory_MB",
@@ -103,7 +111,7 @@ class Plan:
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; not how many points, since more may be added."""
-        head = {
+        values = {
             "format": FORMAT,
             "method": self.method,
             "seed": self.seed,
@@ -112,37 +120,48 @@ class Plan:
             "resin": self.resin,
             "minimize": self.minimize,
             "maximize": self.maximize,
+            **self.inputs.tables,
+            "vary": {v.name: v.table for v in self.variables},
+            "run": {"points": self.count, "files": str(self.folder.resolve())},
         }
-        lines = [HEADER, *(f"{key} = {toml_value(value)}" for key, value in head.items())]
-        for stage, table in self.inputs.tables.items():
-            lines += table_lines(stage, table)
-        lines += ["", "[vary]", *(f'"{v.name}" = {toml_value(v.table)}' for v in self.variables)]
         return {
-            "sweep.toml": "\n".join(lines) + "\n",
-            "unit.toml": to_toml(self.inputs.unit),
-            "protocol.csv": protocol_text(self.inputs.protocol),
+            LAYOUT.inputs: toml_text(values, LAYOUT.header),
+            UNIT: to_toml(self.inputs.unit),
+            PROTOCOL: protocol_text(self.inputs.protocol),
         }
 
 
 def read_plan(path: Path) -> Plan:
     """The sweep of a TOML file; raises InputError."""
-    where = str(path)
-    try:
-        text = file_text(path)
-    except OSError as error:
-        raise InputError(
-            f"cannot read the parameter study: {error.strerror}", where, "give the path of a TOML file"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError("the file is not UTF-8 text", where, "save it as UTF-8") from error
-    return parse_plan(text, path.parent, where)
+    return _plan_of(
+        read_toml(path, "parameter study", "give the path of a TOML file"), path.parent, str(path)
+    )
 
 
 def parse_plan(text: str, folder: Path, where: str = "sweep.toml") -> Plan:
     """The sweep of TOML text; folder: where the files lie that it names. Raises InputError."""
-    document = parse_toml(text, where)
+    return _plan_of(parse_toml(text, where), folder, where)
+
+
+def read_plan_of_run(folder: Path) -> Plan:
+    """The sweep that was run in a folder; raises InputError."""
+    path = folder / LAYOUT.inputs
+    document = read_toml(path, "parameter study")
+    run = document.pop(RUN, {})
+    if not isinstance(run, dict):
+        raise InputError(f"{RUN} is not a table", str(path), f"write it as [{RUN}]")
+    last = [stage for stage in STAGES if stage in document][-1:]
+    document |= {"unit": UNIT, "protocol": PROTOCOL, "stages": last[0] if last else STAGES[0]}
+    if "points" in run:
+        document["points"] = run["points"]
+    files = run.get("files", str(folder))
+    return _plan_of(document, folder, str(path), Path(str(files)))
+
+
+def _plan_of(document: dict[str, Any], folder: Path, where: str, files: Path | None = None) -> Plan:
+    """The sweep of a document; files: where those lie that its variables name, its own folder without."""
     for key in document:
-        if key not in _KEYS:
+        if key not in (*_KEYS, RUN):
             raise InputError(f"unknown key {key!r}{nearest(key, _KEYS)}", where, f"known: {', '.join(_KEYS)}")
     if document.get("format") != FORMAT or isinstance(document.get("format"), bool):
         raise InputError(f"format = {document.get('format', 'missing')}", where, f"write format = {FORMAT}")
@@ -166,7 +185,7 @@ def parse_plan(text: str, folder: Path, where: str = "sweep.toml") -> Plan:
     plan = Plan(
         inputs=inputs,
         variables=variables,
-        folder=folder,
+        folder=folder if files is None else files,
         method=_one_of(document, "method", METHODS, "sobol", where),
         count=int(_number(document, "points", 16, 2, MOST_POINTS, where, whole=True)),
         seed=int(_number(document, "seed", 0, 0, 2**31, where, whole=True)),
@@ -185,7 +204,7 @@ def parse_plan(text: str, folder: Path, where: str = "sweep.toml") -> Plan:
     for v in variables:
         if v.name == FILE:
             for name in v.values:
-                protocol_of(folder / str(name))
+                protocol_of(plan.folder / str(name))
     return plan
 
 

@@ -20,7 +20,7 @@ from ...files import plain
 from ...run.cache import REVISION, key
 from ...run.child import RUNNING, Child
 from ...run.folder import keep_inputs
-from ..simulate_and_place.report_data import package_versions
+from ...run.versions import package_versions
 
 # Seconds between two looks at a study's memory.
 LOOK_S = 0.05

@@ -5,18 +5,17 @@ from __future__ import annotations
 import itertools
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from ...files import write_text
 from ...report.charts import CHOSEN, INK, QUIET, canvas
 from ...report.html import cards, facts_table, figure, note, number, page, table
-from ..simulate_and_place.report_data import package_versions
+from ...run.progress import Progress
+from ...run.versions import package_versions
+from .found import Found
 from .sensitivity import Effect, main_effect, pareto_front
-
-if TYPE_CHECKING:
-    from .run import Found
 
 Array = np.ndarray[Any, Any]
 
@@ -27,9 +26,10 @@ FEWEST = 4
 MOST_ROWS = 200
 
 
-def write_report(found: Found, path: Path) -> None:
+def write_report(found: Found, path: Path, progress: Progress) -> None:
     """Write report.html; raises OutputError."""
-    write_text(path, report(found))
+    with progress.stage("report", expected_s=5.0):
+        write_text(path, report(found))
 
 
 def report(found: Found) -> str:

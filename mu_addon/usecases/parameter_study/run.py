@@ -5,29 +5,29 @@ from __future__ import annotations
 import csv
 import json
 import time
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
 import attrs
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, OutputError
 from ...files import write_csv
 from ...materials.library import load_material, read_material
 from ...run.cache import Cache
 from ...run.context import RunContext
-from ...run.folder import begin
 from ...run.progress import Progress
+from ...run.usecase import UseCase
 from .cluster import Cluster, Work
 from .columns import Row, cell, columns, figures
-from .plan import HEADER, Plan, Point
+from .found import Found
+from .plan import LAYOUT, PLAN, REPORT, TABLE, Plan, Point, read_plan_of_run
 from .point import Task, run_point, version
+from .report import write_report
 
 Array = np.ndarray[Any, Any]
 
-PLAN, TABLE, REPORT = "plan.csv", "points.csv", "report.html"
-RESULTS = (PLAN, TABLE, REPORT)
 # Columns after the figures: what a point took, and why it failed.
 LAST = ("seconds", "memory_MB", "worker", "what", "where", "what_to_do")
 # Seconds between two writings of the table.
@@ -35,62 +35,55 @@ EVERY_S = 10.0
 
 
 @attrs.frozen(eq=False)
-class Found:
-    """A sweep's rows, one a point: `number`, `status`, its inputs and figures, or why it failed.
+class Job:
+    """A plan to be run, and how.
 
-    inputs, outputs: names of the columns that are varied and found.
+    scheduler: address of a Dask scheduler, or None for a cluster of `workers` on this machine; add: so many
+    points more than there are; retry: whether those that failed are run again; work: runs a task.
     """
 
     plan: Plan
-    rows: tuple[Row, ...]
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
+    scheduler: str | None = None
+    workers: int = 2
+    add: int = 0
+    retry: bool = False
+    work: Work = run_point
 
-    @property
-    def done(self) -> list[Row]:
-        """Rows of the points that were solved."""
-        return [row for row in self.rows if row["status"] == "done"]
+    def __attrs_post_init__(self) -> None:
+        if self.add and self.plan.method == "grid":
+            raise InputError("points cannot be added to a grid", "--add", "give more steps in sweep.toml")
+        _density(self.plan)
 
-    @property
-    def failed(self) -> list[Row]:
-        """Rows of the points that were not."""
-        return [row for row in self.rows if row["status"] == "failed"]
+    def texts(self) -> dict[str, str]:
+        """Text of every file of inputs, by name; sweep.toml is the first."""
+        return self.plan.texts()
 
 
-def sweep(
-    plan: Plan,
-    folder: Path,
-    progress: Progress,
-    context: RunContext,
-    scheduler: str | None = None,
-    workers: int = 2,
-    add: int = 0,
-    retry: bool = False,
-    work: Work = run_point,
-) -> Found:
+def read_job(folder: Path) -> Job:
+    """The sweep that a folder describes, with the points that it has; raises InputError."""
+    return Job(read_plan_of_run(folder))
+
+
+def sweep(job: Job, folder: Path, context: RunContext) -> Found:
     """Run a plan's points, as far as they are not there, and write points.csv and report.html.
 
-    add: so many points more than there are; retry: whether those that failed are run again. Raises
-    InputError, OutputError, and MuError where the scheduler stays away.
+    Raises InputError, OutputError, and MuError where the scheduler stays away.
     """
-    from .report import write_report
-
-    density = _density(plan)
-    if add and plan.method == "grid":
-        raise InputError("points cannot be added to a grid", "--add", "give more steps in sweep.toml")
-    begin(context, folder, HEADER, plan.texts(), RESULTS)
-    values, places = _extended(plan, folder, add)
-    points = plan.points(values)
-    run = Run(plan, points, folder, places, density)
-    run.look(retry)
+    plan, progress = job.plan, context.progress
+    values, places = _extended(plan, folder, job.add)
+    run = Run(plan, plan.points(values), folder, places, _density(plan))
+    run.look(job.retry)
     run.write()
-    context.on_stop = lambda _: run.write()
-    with progress.stage("points"):
-        run.solve(progress, scheduler, workers, work)
+    try:
+        with progress.stage("points"):
+            run.solve(progress, job.scheduler, job.workers, job.work)
+    except BaseException:
+        with suppress(OutputError):
+            run.write()
+        raise
     found = run.found()
     context.summary |= summary(found)
-    with progress.stage("report", expected_s=5.0):
-        write_report(found, folder / REPORT)
+    context.report = lambda _: write_report(found, folder / REPORT, progress)
     return found
 
 
@@ -218,3 +211,6 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     if summary["seconds_a_point"] is not None:
         lines[0] += f"; {summary['seconds_a_point']:.1f} s and up to {summary['most_memory_MB']} MB each"
     return [*lines, *(f"failed: {what}" for what in summary["failures"][:5])]
+
+
+USE_CASE = UseCase("sweep", LAYOUT, read_job, sweep, console_summary)

@@ -16,7 +16,8 @@ from ...errors import ConvergenceError
 from ...placement.inclusion import RULES
 from ...run.cache import Cache, key
 from ..grip.grasp import Cube
-from ..grip.run import CUBES, gripper_column
+from ..grip.job import CUBES
+from ..grip.run import gripper_column
 from .published import GRIPPER
 from .values import RULE, with_values
 

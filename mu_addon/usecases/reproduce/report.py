@@ -13,12 +13,12 @@ from ...files import write_text
 from ...placement.inclusion import RULES
 from ...report.charts import label, signed
 from ...report.html import cards, facts_table, figure, note, page, table
-from ..simulate_and_place.report_data import package_versions
+from ...run.versions import package_versions
 from . import charts, gripper
 from .agreement import CANNOT_TELL, HELD, Agreement, agreement
 from .columns import BENDING_KPA
+from .found import Found
 from .published import GRIPPER
-from .run import Found
 from .values import RULE
 
 Array = np.ndarray[Any, Any]

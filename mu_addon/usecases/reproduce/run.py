@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,95 +15,36 @@ from ...files import write_csv
 from ...placement.inclusion import RULES
 from ...run.cache import Cache
 from ...run.context import RunContext
-from ...run.folder import begin
 from ...run.pool import each
 from ...run.progress import Progress
+from ...run.usecase import UseCase
+from ...run.versions import package_versions
 from ..simulate_and_place.job import grasp
-from ..simulate_and_place.report_data import package_versions
 from . import gripper
-from .agreement import Agreement, Statement, agreement, statements
 from .columns import BENDING_KPA, Solved, TableColumn, solved, tasks
+from .found import Found, OtherColumn
 from .published import Published, name_of, published
-from .settings import HEADER, Settings
+from .report import write_report
+from .settings import AGREEMENT, BENDING, LAYOUT, REPORT, STATEMENTS, TABLE, Settings, read_settings
 from .values import RULE, column_unit
 
 Array = np.ndarray[Any, Any]
 
-INPUTS = "reproduce.toml"
-TABLE, AGREEMENT, STATEMENTS, BENDING = "table.csv", "agreement.csv", "statements.csv", "bending.csv"
-REPORT = "report.html"
-RESULTS = (TABLE, AGREEMENT, STATEMENTS, BENDING, REPORT)
 # Samples of the grasp protocol, as in `place`.
 TIMES = 13
 
 
-@attrs.frozen(eq=False)
-class OtherColumn:
-    """A column beside the three units: J_hat (paths,) in mm by rule, and on a coarser mesh where known."""
-
-    J_hat: Mapping[str, Array]
-    coarser: Mapping[str, Array] = attrs.field(factory=dict)
-    remark: str = ""
-
-
-@attrs.frozen(eq=False)
-class Found:
-    """All that a reproduction found. samples: pressure in kPa at the protocol's instants (k,)."""
-
-    settings: Settings
-    paper: Published
-    columns: tuple[TableColumn, ...]
-    others: Mapping[str, OtherColumn]
-    samples_kPa: Array
-
-    def table(self, rule: str) -> dict[str, Array]:
-        """J_hat (paths,) in mm by column."""
-        own = {c.name: c.fine.J_hat(rule) for c in self.columns}
-        return own | {name: o.J_hat[rule] for name, o in self.others.items() if rule in o.J_hat}
-
-    def coarser(self, rule: str) -> dict[str, Array]:
-        """J_hat (paths,) in mm on a coarser mesh, by column, as far as known."""
-        own = {c.name: c.coarse.J_hat(rule) for c in self.columns}
-        return own | {name: o.coarser[rule] for name, o in self.others.items() if rule in o.coarser}
-
-    def uncertainty_mm(self, rule: str) -> dict[str, float]:
-        """By column, how far the coarser mesh moves the J_hat that it moves most; nan where not known."""
-        coarser = self.coarser(rule)
-        return {
-            name: float(np.abs(J - coarser[name]).max()) if name in coarser else float("nan")
-            for name, J in self.table(rule).items()
-        }
-
-    def agreements(self, rule: str) -> dict[str, Agreement]:
-        """Each column against the paper's."""
-        coarser = self.coarser(rule)
-        return {
-            name: agreement(J, self.paper.like(name), self.paper.paths, coarser.get(name))
-            for name, J in self.table(rule).items()
-        }
-
-    def statements(self, rule: str) -> list[Statement]:
-        """The paper's statements, judged in those of our columns whose doubt by the mesh is known."""
-        coarser = self.coarser(rule)
-        known = {name: J for name, J in self.table(rule).items() if name in coarser}
-        return statements(known, coarser, self.paper.paths)
-
-
-def reproduce(
-    settings: Settings,
-    folder: Path,
-    progress: Progress,
-    context: RunContext,
-) -> Found:
-    """Make a folder with table, figures and report. Raises InputError, MeshingError and ConvergenceError."""
-    from .report import write_report
-
-    begin(context, folder, HEADER, {INPUTS: settings.text()}, RESULTS)
-    found = solve(settings, Cache(folder / "cache"), progress)
+def reproduce(settings: Settings, folder: Path, context: RunContext) -> Found:
+    """Make the paper's table again, with figures. Raises InputError, MeshingError and ConvergenceError."""
+    found = solve(settings, Cache(folder / "cache"), context.progress)
     write_tables(found, folder)
     context.summary |= summary(found)
-    with progress.stage("report", expected_s=10.0):
-        write_report(found, folder / REPORT)
+
+    def write(_: str) -> None:
+        with context.progress.stage("report", expected_s=10.0):
+            write_report(found, folder / REPORT)
+
+    context.report = write
     return found
 
 
@@ -225,7 +166,7 @@ def summary(found: Found) -> dict[str, Any]:
     }
 
 
-def console_summary(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What a reproduction came to, in a few lines of text."""
     lines = []
     for rule, by_column in summary.get("agreement", {}).items():
@@ -240,3 +181,6 @@ def console_summary(summary: Mapping[str, Any]) -> list[str]:
     if held:
         lines.append("statements: " + ", ".join(f"{count} {verdict}" for verdict, count in held.items()))
     return lines
+
+
+USE_CASE = UseCase("reproduce", LAYOUT, read_settings, reproduce, console_summary)

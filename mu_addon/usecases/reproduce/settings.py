@@ -13,9 +13,18 @@ from ...design.parameters import Unit, load_preset
 from ...errors import InputError
 from ...meshing.settings import MeshSettings
 from ...reading import file_text, parse_toml
+from ...run.folder import FolderLayout
+from ...run.inputs import FORMAT, read_inputs, structured
+from ...toml_writer import toml_text
 from .values import with_values
 
-HEADER = "# The inputs of a reproduction of the paper's table."
+TABLE, AGREEMENT, STATEMENTS, BENDING = "table.csv", "agreement.csv", "statements.csv", "bending.csv"
+REPORT = "report.html"
+LAYOUT = FolderLayout(
+    "reproduce.toml",
+    "# The inputs of a reproduction of the paper's table.",
+    results=(TABLE, AGREEMENT, STATEMENTS, BENDING, REPORT),
+)
 DEFAULT = "default"
 FOLDER = "reproduce"
 
@@ -51,22 +60,36 @@ class Settings:
         """The unit at 1.0x with the set's values. Raises InputError where it breaks a rule."""
         return with_values(load_preset("mu-1.0x"), self.values)
 
-    def text(self) -> str:
-        """reproduce.toml: all that decides the results."""
-        lines = [HEADER, "format = 1", f'set = "{self.values_name}"']
-        lines += [
-            f"held_cells = {self.held_cells:g}",
-            f"gripper = {str(self.gripper).lower()}",
-            "",
-            "[values]",
-        ]
-        lines += [f'"{name}" = {_toml(value)}' for name, value in sorted(self.values.items())]
-        lines += ["", "[mesh]", *(f"{k} = {_toml(v)}" for k, v in attrs.asdict(self.mesh).items())]
-        return "\n".join(lines) + "\n"
+    def inputs(self) -> dict[str, Any]:
+        """What reproduce.toml says: all that decides the results."""
+        return {
+            "format": FORMAT,
+            "set": self.values_name,
+            "held_cells": self.held_cells,
+            "gripper": self.gripper,
+            "values": dict(sorted(self.values.items())),
+            "mesh": attrs.asdict(self.mesh),
+        }
+
+    def texts(self) -> dict[str, str]:
+        """Text of the file of inputs, by name."""
+        return {LAYOUT.inputs: toml_text(self.inputs(), LAYOUT.header)}
 
 
-def _toml(value: Any) -> str:
-    return f'"{value}"' if isinstance(value, str) else str(value).lower()
+def read_settings(folder: Path) -> Settings:
+    """The settings that a folder of `reproduce` describes; raises InputError."""
+    path = folder / LAYOUT.inputs
+    values, _ = read_inputs(path)
+    if any(key in values for key in ("long", "meshes", "points")):
+        raise InputError(
+            "the folder belongs to the long studies of random meshes and open values",
+            str(path),
+            "run `python -m benchmarks.reproduce` with this folder as --out, or `reproduce` in a new one",
+        )
+    name, given = values.pop("set", DEFAULT), values.pop("values", {})
+    if not isinstance(name, str) or not isinstance(given, dict):
+        raise InputError("set is not a name, or values is not a table", str(path), "correct that key")
+    return structured(Settings, values, str(path), values_name=name, values=given)
 
 
 def read_set(name: str) -> dict[str, Any]:

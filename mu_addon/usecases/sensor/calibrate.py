@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -15,18 +15,25 @@ import numpy as np
 from ...errors import InputError
 from ...files import write_csv, write_text
 from ...measured import read_folder
+from ...measured.folder import FILE
 from ...report.charts import canvas
 from ...report.html import cards, figure, page, table
 from ...run.context import RunContext
-from ...run.folder import begin
-from ...run.progress import Progress
+from ...run.folder import FolderLayout
+from ...run.inputs import FORMAT, digest, named_path, read_inputs, structured
+from ...run.usecase import UseCase
 from ...sensing.calibration import Calibration, Sweep, calibrate, sweeps_of, write_calibration
 from ...sensing.recording import INDEX, Recording, read_recording
+from ...toml_writer import toml_text
 
 Array = np.ndarray[Any, Any]
 
-HEADER = "# The inputs of this calibration."
-RESULTS = ("calibration.toml", "calibration.csv", "report.html")
+LAYOUT = FolderLayout(
+    "calibrate.toml",
+    "# The inputs of this calibration; the recordings are named by the SHA-256 of their files.",
+    results=("calibration.toml", "calibration.csv", "report.html"),
+    older_headers=("data = [",),
+)
 # After the mark "angle 30" the sensor is held there for that long.
 _HOLD_S = 1.0
 
@@ -41,61 +48,137 @@ class Check:
     possible: float
 
 
-def calibrate_sensor(
-    data: Sequence[Path],
-    out: Path,
-    *,
-    channel: str | None = None,
-    dark: str | None = None,
-    angles: Path | None = None,
-    progress: Progress,
-    context: RunContext,
-) -> Calibration:
-    """Fit a calibration to folders of measured data or recordings, and write it with its report into `out`.
+@attrs.frozen(eq=False)
+class Sweeps:
+    """Sweeps to fit, those held out by name, the channel of the light, that of the dark or its level in V."""
 
-    channel: the column of the light, needed where there are several; dark: the column of the dark level, or
-    volts; angles: CSV of time_s, angle_deg for a recording whose marks do not say them ("angle 30"). Held-out
-    experiments are not fitted but checked. Raises InputError and OutputError.
+    fitted: list[Sweep]
+    held: list[tuple[str, Sweep]]
+    channel: str
+    dark: str | float
+
+
+@attrs.frozen
+class Job:
+    """Inputs of a calibration, read and checked as it is made. Raises InputError.
+
+    data: folders of measured data or recordings; channel: the column of the light, needed where there are
+    several; dark: the column of the dark level, or volts; angles: CSV of time_s, angle_deg for a recording
+    whose marks do not say them ("angle 30").
     """
+
+    data: tuple[Path, ...]
+    channel: str | None = None
+    dark: str | None = None
+    angles: Path | None = None
+    sweeps: Sweeps = attrs.field(init=False, eq=False, repr=False)
+
+    @sweeps.default
+    def _read(self) -> Sweeps:
+        return _sweeps(self)
+
+    def inputs(self) -> dict[str, Any]:
+        """What decides the result: files by their SHA-256; raises InputError where one cannot be read."""
+        return {
+            "channel": self.channel,
+            "dark": self.dark,
+            "data": [_digest_of(folder) for folder in self.data],
+            "angles": None if self.angles is None else digest(_content(self.angles)),
+        }
+
+    def texts(self) -> dict[str, str]:
+        """Text of every file of inputs, by name; raises InputError where a file cannot be read."""
+        run = {
+            "data": [str(folder.resolve()) for folder in self.data],
+            "angles": None if self.angles is None else str(self.angles.resolve()),
+        }
+        values = {"format": FORMAT, **self.inputs(), "run": run}
+        return {LAYOUT.inputs: toml_text(values, LAYOUT.header)}
+
+
+def _digest_of(folder: Path) -> str:
+    """SHA-256 of a recording's or measured folder's tables and of what describes them."""
+    if not folder.is_dir():
+        raise InputError(
+            "there is no such folder", str(folder), "give a recording, or a folder of measured data"
+        )
+    names = {INDEX, FILE, *(path.name for path in folder.glob("*.csv"))}
+    files = [folder / name for name in sorted(names) if (folder / name).is_file()]
+    return digest("\n".join(f"{path.name} {digest(_content(path))}" for path in files))
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot read {path.name}: {error.strerror}", str(path), "check its name") from None
+
+
+def read_job(folder: Path) -> Job:
+    """The job that a folder of `calibrate` describes, its data where they lay then; raises InputError."""
+    path = folder / LAYOUT.inputs
+    values, run = read_inputs(path)
+    places = run.get("data")
+    data = [
+        named_path(path, {"data": place}, "data", "recording")
+        for place in (places if isinstance(places, list) and places else [None])
+    ]
+    angles = named_path(path, run, "angles", "table of angles") if "angles" in values else None
+    asked = {key: values[key] for key in ("channel", "dark") if key in values}
+    job = structured(Job, asked, str(path), data=tuple(data), angles=angles)
+    now = job.inputs()
+    if any(values[key] != now[key] for key in ("data", "angles") if key in values):
+        raise InputError(
+            "the recordings are not those that the calibration was made with",
+            ", ".join(map(str, data)),
+            "put those back, or calibrate these in a folder of their own",
+        )
+    return job
+
+
+def calibrate_sensor(job: Job, folder: Path, context: RunContext) -> Calibration:
+    """Fit a calibration to recorded bending; writes calibration.toml and calibration.csv.
+
+    Held-out experiments are not fitted but checked. Raises InputError and OutputError.
+    """
+    fitted, held = job.sweeps.fitted, job.sweeps.held
+    with context.progress.stage("calibrate", expected_s=1.0):
+        found = calibrate(fitted, job.sweeps.channel, job.sweeps.dark)
+    checks = [_check(words, sweep, found) for words, sweep in held]
+    low, high = found.range_deg
+    write_calibration(
+        folder / "calibration.toml",
+        found,
+        f"{len(fitted)} sweeps, {low:.1f} to {high:.1f} degrees, from {', '.join(p.name for p in job.data)}",
+    )
+    at = np.linspace(low, high, 201)
+    volts = found.voltage_of(at)
+    _, near, far, _ = found.angle_of(volts)
+    rows = np.column_stack([at, volts, near, far]).tolist()
+    write_csv(folder / "calibration.csv", ("angle_deg", "voltage_V", "angle_low_deg", "angle_high_deg"), rows)
+    context.summary |= summary(found, checks)
+    context.report = lambda _: write_text(folder / "report.html", _report(found, fitted, held, checks))
+    return found
+
+
+def _sweeps(job: Job) -> Sweeps:
     fitted: list[Sweep] = []
     held: list[tuple[str, Sweep]] = []
-    name, level = channel, _level(dark)
-    for folder in data:
+    name, level = job.channel, _level(job.dark)
+    for folder in job.data:
         if (folder / INDEX).exists():
             recordings = read_recording(folder)
             if not recordings:
                 raise InputError("the recording contains no samples", str(folder), "choose another recording")
             # The last file has the channels that the device has now.
             name = _channel(recordings[-1], name, folder)
-            fitted += _of_recording(recordings[-1], name, level, angles, folder)
+            fitted += _of_recording(recordings[-1], name, level, job.angles, folder)
         else:
             name = name or "voltage_V"
             more, others = _of_measured(folder, level)
             fitted += more
             held += others
-    inputs = {
-        "calibrate.toml": "\n".join(
-            [f"data = {[str(path) for path in data]!r}", f"channel = {name!r}", f"dark = {dark or 0!r}", ""]
-        )
-    }
-    begin(context, out, HEADER, inputs, RESULTS)
-    with progress.stage("calibrate", expected_s=1.0):
-        found = calibrate(fitted, str(name), level)
-    checks = [_check(words, sweep, found) for words, sweep in held]
-    low, high = found.range_deg
-    write_calibration(
-        out / "calibration.toml",
-        found,
-        f"{len(fitted)} sweeps, {low:.1f} to {high:.1f} degrees, from {', '.join(p.name for p in data)}",
-    )
-    at = np.linspace(low, high, 201)
-    volts = found.voltage_of(at)
-    _, near, far, _ = found.angle_of(volts)
-    rows = np.column_stack([at, volts, near, far]).tolist()
-    write_csv(out / "calibration.csv", ("angle_deg", "voltage_V", "angle_low_deg", "angle_high_deg"), rows)
-    context.summary |= summary(found, checks)
-    write_text(out / "report.html", _report(found, fitted, held, checks))
-    return found
+    return Sweeps(fitted, held, str(name), level)
 
 
 def summary(found: Calibration, checks: Sequence[Check]) -> dict[str, Any]:
@@ -115,7 +198,7 @@ def summary(found: Calibration, checks: Sequence[Check]) -> dict[str, Any]:
     }
 
 
-def console_summary(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What was found, in a few lines of text, of its `summary`."""
     low, high = summary["range_deg"]
     lines = [
@@ -311,3 +394,6 @@ def _chart(found: Calibration, fitted: Sequence[Sweep], held: Sequence[tuple[str
         axes.set_ylabel("voltage, V")
         axes.legend(frameon=False, fontsize=8)
     return svg()
+
+
+USE_CASE = UseCase("calibrate", LAYOUT, read_job, calibrate_sensor, console_summary)

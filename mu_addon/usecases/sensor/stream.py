@@ -14,7 +14,7 @@ from typing import Any, TextIO
 
 from ...errors import InputError
 from ...run.context import RunContext
-from ...run.progress import Progress, Sink, printable
+from ...run.progress import Sink, printable
 from ...sensing.calibration import deriver, read_calibration
 from ...sensing.recording import REJECTS
 from ...sensing.session import LOSSES, Control, run_session
@@ -53,7 +53,6 @@ def stream(
     *,
     seconds: float | None,
     about: Mapping[str, Any],
-    progress: Progress,
     context: RunContext,
     controlled: bool = False,
     calibration: str | None = None,
@@ -72,6 +71,8 @@ def stream(
         threading.Thread(target=_obey, args=(control,), daemon=True).start()
     derive = None if calibration is None else deriver(read_calibration(Path(calibration)))
     context.open_folder(folder)
+    context.console_summary = console_summary
+    progress = context.progress
 
     def tell(event: str, details: dict[str, Any]) -> None:
         message = {"type": "stream", "event": event, **details}
@@ -170,7 +171,7 @@ def _losses(status: Mapping[str, Any]) -> list[str]:
     return [f"{status[key]} {word}" for key, word in LOSSES.items() if status.get(key)]
 
 
-def console_summary(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What a session recorded, in a few lines of text, of its `summary`."""
     rows, seconds = summary["rows"], summary["duration_s"]
     losses = _losses(summary) or ["nothing lost" if summary["bytes"] else "nothing came"]

@@ -16,7 +16,7 @@ from ...evidence.lattice_fem import printed
 from ...evidence.prediction.lattice import SLENDER, ComputedCell
 from ...evidence.unit_effects import EFFECTS, Body
 from ...homogenize.effective import Effective
-from ..diagnose.run import readable
+from ..diagnose.words import readable
 from .static_effects import NAMES, StaticEffects
 
 Values = Mapping[str, Fitted]

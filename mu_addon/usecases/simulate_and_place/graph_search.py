@@ -93,7 +93,7 @@ def search_graph(study: Study) -> LatticeSearch:
     """
     assert study.mesh is not None
     assert study.trajectory is not None
-    job, rule = study.job, study.headline_rule
+    job, rule = study.job, study.job.headline_rule
     graph, chains = chains_within(job)
     lengths = np.array([graph.lengths[graph.steps_of(c)].sum() for c in chains])
     with study.progress.stage("ranking of the lattice's paths"):

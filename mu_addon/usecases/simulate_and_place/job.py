@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from ...design.anchors import windows
 from ...design.assets import asset_root
-from ...design.body import Body, read_body
+from ...design.body import Body, envelope, read_body, require_path_inside
 from ...design.parameters import Unit, read_unit, to_toml
-from ...design.rigid_body import RigidBody, mirrored, read_rigid_bodies, to_obj
+from ...design.rigid_body import FRICTION, RigidBody, mirrored, read_rigid_bodies, require_beside, to_obj
 from ...design.solid import QUALITY
 from ...errors import InputError
 from ...fem.obstacle import CONTACT
@@ -24,10 +25,11 @@ from ...homogenize.effective import Effective, read_effective
 from ...meshing.settings import MeshSettings
 from ...placement.graph import Limits
 from ...placement.inclusion import RULES
+from ...run.inputs import digest
 from ...sensing.optics import Optics
 from .contact_history import obstacles_of
 from .static_effects import StaticEffects
-from .study_file import FILES, NAME, STAGES, Tables, compose, digest, holds
+from .study_file import FILES, NAME, STAGES, Tables, compose, holds, read_run
 from .study_file import read as read_tables
 
 if TYPE_CHECKING:
@@ -85,10 +87,12 @@ class Job:
     obstacles: tuple[RigidBody, ...] = attrs.field(default=(), converter=tuple)
     # What measured data named beside what the unit has parameters for, and the direction of gravity.
     effects: StaticEffects = attrs.field(factory=StaticEffects)
-    # How linear systems are solved: within their tolerance it decides nothing, and is no part of study.toml.
+    # How linear systems are solved: within their tolerance it decides nothing.
     solver: SolverChoice = attrs.field(factory=SolverChoice)
     # What is run of it: the first, the first two or all.
     stages: tuple[str, ...] = STAGES
+    # Name of a path along which the unit with a waveguide is built, too; decides no figure.
+    path: str = attrs.field(default="", validator=attrs.validators.instance_of(str))
 
     def __attrs_post_init__(self) -> None:
         if self.obstacles and "place" in self.stages and self.paths == "graph":
@@ -175,7 +179,17 @@ class Job:
 
     def text(self) -> str:
         """study.toml, see `tables`."""
-        return compose(self.tables())
+        return compose(self.tables(), self._run)
+
+    @property
+    def _run(self) -> dict[str, Any]:
+        """The table [run] of study.toml: what decides no figure."""
+        return {"path": self.path} if self.path else {}
+
+    @property
+    def headline_rule(self) -> str:
+        """The rule whose best path is the answer: the one that converges with the mesh, if asked for."""
+        return "volume_fraction" if "volume_fraction" in self.rules else self.rules[0]
 
     def materials(self, mesh: Mesh) -> Materials:
         """Materials of the unit's mesh, effects and all."""
@@ -232,7 +246,7 @@ class Job:
             return self.texts(), False
         merged = old | own
         tables = {stage: merged[stage] for stage in STAGES if stage in merged}
-        return {**self.texts(), **files, NAME: compose(tables)}, True
+        return {**self.texts(), **files, NAME: compose(tables, self._run)}, True
 
     def lattice_text(self) -> str | None:
         """effective.toml: the lattice's law and where it is from, or None where it is the unit's modulus."""
@@ -272,7 +286,7 @@ def _named(key: str, text: str | None) -> dict[str, str]:
     return {} if text is None else {key: FILES[key], f"{key}_sha256": digest(text)}
 
 
-def read_job(folder: Path, workers: int = 2, solver: SolverChoice | None = None) -> Job:
+def read_job(folder: Path) -> Job:
     """The job that a study's folder describes; raises InputError where it cannot be used, and OutputError."""
     where = str(folder / NAME)
     tables = read_tables(folder)
@@ -284,10 +298,10 @@ def read_job(folder: Path, workers: int = 2, solver: SolverChoice | None = None)
             str(folder),
             "restore it, or start a new study with it: --unit, --protocol, --lattice, --obstacle",
         )
-    return attrs.evolve(job_of(tables, folder, workers), solver=solver or SolverChoice())
+    return job_of(tables, folder)
 
 
-def job_of(tables: Mapping[str, Mapping[str, Any]], folder: Path, workers: int = 2) -> Job:
+def job_of(tables: Mapping[str, Mapping[str, Any]], folder: Path) -> Job:
     """The job of study.toml's tables and the files beside it; raises InputError that names an unknown key."""
     where = str(folder / NAME)
     job: dict[str, Any] = {"unit": read_unit(folder / FILES["unit"]), "protocol": grasp()}
@@ -300,7 +314,8 @@ def job_of(tables: Mapping[str, Mapping[str, Any]], folder: Path, workers: int =
         if "obstacles" in tables["simulate"]:
             friction = tables["simulate"].get("friction")
             job["obstacles"] = read_rigid_bodies(folder / FILES["obstacles"], friction)
-    return job_with(tables, where, workers=workers, **job)
+    job["path"] = read_run(folder).get("path", "")
+    return job_with(tables, where, **job)
 
 
 def job_with(tables: Mapping[str, Mapping[str, Any]], where: str, **given: Any) -> Job:
@@ -361,6 +376,34 @@ def grasp() -> Protocol:
 def protocol_of(path: str | Path | None) -> Protocol:
     """The protocol in a CSV file, or the one that comes with the package. Raises InputError."""
     return grasp() if path is None else read_protocol(Path(path))
+
+
+def body_for(unit: Unit, path: str | Path, stages: Sequence[str] = STAGES, paths: str = "windows") -> Body:
+    """The body in a file, cut to the unit's length; raises InputError, also where a path leaves it."""
+    body = envelope(read_body(path), unit.dimensions)
+    if "place" in stages:
+        if paths == "graph":
+            raise InputError(
+                "the search of the whole lattice knows the lattice's box only",
+                "--body, --paths graph",
+                "leave one of them out",
+            )
+        for window in windows(unit.chambers.count):
+            require_path_inside(body, unit, window)
+    return body
+
+
+def obstacles_for(
+    unit: Unit, files: Sequence[tuple[str | Path, float | None]], own: Body | None = None
+) -> tuple[RigidBody, ...]:
+    """Rigid bodies from files, each with its friction or None for the assumed one, beside a unit.
+
+    own: the unit's body where it is not the lattice's box. Raises InputError, also where a body stands in
+    the unit at rest.
+    """
+    found = [RigidBody(read_body(file), FRICTION if mu is None else mu) for file, mu in files]
+    require_beside(found, unit.dimensions, own)
+    return tuple(found)
 
 
 def optics_of(words: Sequence[str]) -> Optics:

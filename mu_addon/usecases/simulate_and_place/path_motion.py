@@ -12,15 +12,19 @@ from ...placement.inclusion import sensor_share
 from .motion import IMAGE, REGIONS, SurfaceFields, surface_of, write_path
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from ...fem.trajectory import Trajectory
     from .candidate_states import CandidateSolver
-    from .study import Study
+    from .job import Job
 
 Array = np.ndarray[Any, Any]
 
 
 def keep_motion(
-    study: Study,
+    job: Job,
+    folder: Path,
+    own: Mesh,
     mesh: Mesh,
     trajectory: Trajectory,
     sweep: CandidateSolver,
@@ -28,14 +32,13 @@ def keep_motion(
 ) -> None:
     """Write the motion of every path whose displacement a sweep on a mesh has kept. Raises OutputError.
 
-    The mesh is the study's, or the whole body of which the study's is a half.
+    own: the study's mesh; mesh: the same, or that of the whole body of which it is a half.
     """
-    unit, rule = study.job.unit, study.headline_rule
-    assert study.mesh is not None
-    image = images(study.mesh, mesh)
-    nodes = {region: surface_of(study.mesh, number).node for region, number in REGIONS.items()}
+    unit, rule = job.unit, job.headline_rule
+    image = images(own, mesh)
+    nodes = {region: surface_of(own, number).node for region, number in REGIONS.items()}
     both = {r: n if image is None else np.concatenate([n, image[n]]) for r, n in nodes.items()}
-    looked, materials = SurfaceFields(mesh, both), study.job.materials(mesh)
+    looked, materials = SurfaceFields(mesh, both), job.materials(mesh)
     candidates = {candidate.name: candidate for candidate, of in jobs if of == rule}
     by_pressure = {state.pressure_kPa: state.u for state in trajectory.states}
     without: dict[str, Array] = {}
@@ -50,10 +53,10 @@ def keep_motion(
         if image is not None:
             further["image_mm"] = difference_mm[:, image] * np.array([-1.0, 1.0, 1.0])
             for key, values in fields.items():
-                own = len(nodes[key.partition("_")[0]])
-                fields[key], further[IMAGE + key] = values[:, :own], values[:, own:]
-            difference_mm = difference_mm[:, : len(study.mesh.nodes)]
-        write_path(study.folder, name, pressure_kPa, difference_mm, **fields, **further)
+                count = len(nodes[key.partition("_")[0]])
+                fields[key], further[IMAGE + key] = values[:, :count], values[:, count:]
+            difference_mm = difference_mm[:, : len(own.nodes)]
+        write_path(folder, name, pressure_kPa, difference_mm, **fields, **further)
 
 
 def images(half: Mesh, mesh: Mesh) -> Array | None:

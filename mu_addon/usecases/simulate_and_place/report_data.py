@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import platform
-from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -13,6 +11,7 @@ from ...design.parameters import assumed, stated
 from ...evidence.unit_effects import EFFECTS
 from ...files import write_bytes
 from ...report.results import Gate, Parameter, Path, Picture, ReportData, RuleResult, SideView
+from ...run.versions import package_versions
 from .job import LATTICE_LAW
 
 if TYPE_CHECKING:
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
     from .static_effects import StaticEffects
     from .study import Study
 
-PACKAGES = ("numpy", "scipy", "warp-lang", "cvxopt", "pymetis", "manifold3d", "gmsh", "pytetwild", "meshio")
 # What the lattice's law stands in for.
 REPLACED = ("material.lattice_modulus_kPa", "material.lattice_poisson")
 FILES = {
@@ -74,7 +72,7 @@ def _panel_pictures(study: Study) -> None:
     states = study.trajectory.states
     angles = np.array([study.bending_angle_deg(s.u) for s in states])
     write_angle(study.folder, np.array([s.pressure_kPa for s in states]), angles)
-    rule = study.headline_rule
+    rule = study.job.headline_rule
     found = [e for e in study.evaluations.values() if e.rule == rule]
     top = max((float(e.deviation.delta.max()) for e in found), default=0.0)
     for e in found:
@@ -109,7 +107,7 @@ def report_data(
         pictures=tuple(pictures),
         paths=tuple(Path(w.name, w.start, w.length) for w in windows),
         rules=rules,
-        headline_rule=study.headline_rule,
+        headline_rule=study.job.headline_rule,
         search=study.search,
         search_picture=search_picture,
         light=study.light,
@@ -255,7 +253,7 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
         return None, []
     d = study.job.unit.dimensions
     parts = unit_parts(d, study.solid.vertices, study.solid.triangles)
-    name = study.context.summary.get("chosen", {}).get(study.headline_rule)
+    name = study.context.summary.get("chosen", {}).get(study.job.headline_rule)
     window = next((w for w in study.windows if w.name == name), None)
     path = study.anchors[list(window.indices)] if window else study.anchors[:0]
     radius = max(d.inclusion_radius, d.waveguide_section / 2)
@@ -303,16 +301,3 @@ def _search_picture(study: Study) -> Picture | None:
 def _files(study: Study) -> dict[str, str]:
     solids = sorted(p.name for p in study.folder.glob("unit_*.stl"))
     return FILES | dict.fromkeys(solids, "printable unit with that waveguide, mm")
-
-
-def package_versions() -> dict[str, str]:
-    """Versions of the program, of Python and of every package that decides a figure."""
-    versions = {"mu_addon": _version("mu_addon"), "Python": platform.python_version()}
-    return versions | {name: _version(name) for name in PACKAGES}
-
-
-def _version(package: str) -> str:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "not installed as a package"

@@ -1,38 +1,83 @@
-"""The stages of a study of one unit in their order: design, simulate, place."""
+"""A study of one unit, stage after stage: its solid, its motion, the ranking of sensor paths."""
 
 from __future__ import annotations
 
-from ...design.anchors import Window, window
-from .graph_search import search_graph, sensitivity_map
+from pathlib import Path
+from typing import Any
+
+from ...design.anchors import window
+from ...run.context import RunContext
+from ...run.usecase import UseCase
+from .graph_search import chains_within, search_graph, sensitivity_map
+from .job import Job, read_job
 from .light import signals
-from .study import Study
+from .report_data import write_report
+from .study import Study, begin_study
+from .study_file import LAYOUT
 
 
-def run_stages(study: Study, path: Window | None = None) -> None:
-    """Every stage of a study's job; path: also the unit with a waveguide along it."""
+def simulate_and_place(job: Job, folder: Path, context: RunContext) -> Study:
+    """Run a study's stages in a folder that is its own, and report as far as it came."""
+    study = Study.begun(job, folder, context)
+    context.report = lambda stopped: write_report(study, stopped)
+    run_stages(study)
+    return study
+
+
+def run_stages(study: Study) -> None:
+    """Every stage of a study's job, in the order they need each other."""
+    job = study.job
+    # An unknown path, or none in the whole lattice, is found out before an hour's work, not after.
+    path = window(job.unit, job.path) if job.path else None
+    if job.paths == "graph" and "place" in job.stages:
+        chains_within(job)
     study.design()
     if path is not None:
         study.design(path)
-    stages = study.job.stages
-    if "simulate" in stages:
+    if "simulate" in job.stages:
         study.make_mesh()
-        study.simulate(candidates_beside="place" in stages)
-    if "place" in stages:
+        study.simulate(candidates_beside="place" in job.stages)
+    if "place" in job.stages:
         chosen = study.place()
-        if study.job.in_time:
-            where = (
-                "With obstacles" if study.job.obstacles else "With a wall whose state depends on its history"
-            )
+        if job.in_time:
+            where = "With obstacles" if job.obstacles else "With a wall whose state depends on its history"
             study.warn(
                 f"{where} neither the sensitivity map nor the light signal is computed: both need a unit "
                 "whose state depends on pressure only."
             )
         else:
-            if study.job.effects.clogged:
+            if job.effects.clogged:
                 study.warn("The sensitivity map is not computed for a unit with a clogged neck.")
             else:
                 sensitivity_map(study)
-            signals(study, study.job.optics)
-        if study.job.paths == "graph":
+            signals(study, job.optics)
+        if job.paths == "graph":
             search_graph(study)
-        study.design(window(study.job.unit, chosen[study.headline_rule]))
+        study.design(window(job.unit, chosen[job.headline_rule]))
+
+
+def console_summary(summary: dict[str, Any]) -> list[str]:
+    """Angles, chosen paths and the best of a search, as far as the stages went."""
+    lines = []
+    angles = summary.get("angle_deg")
+    if isinstance(angles, dict):
+        ends = sorted((float(p), a) for p, a in angles.items())
+        lines.append("angle: " + ", ".join(f"{a:+.1f} deg at {p:g} kPa" for p, a in (ends[0], ends[-1])))
+    chosen = summary.get("chosen")
+    if isinstance(chosen, dict):
+        J, tied = summary["J_hat_mm"], summary["tied_with_chosen"]
+        for rule, name in chosen.items():
+            equal = f", tied with {', '.join(tied[rule])}" if tied[rule] else ""
+            lines.append(f"{rule}: {name}, J_hat {J[rule][name]:.4f} mm{equal}")
+    search = summary.get("search")
+    if isinstance(search, dict):
+        best = search["best"]
+        lines.append(
+            f"whole-lattice search, {search['rule']}: {best['name']}, J_hat {best['J_hat_mm']:.4f} mm, "
+            f"{best['length_mm']:.1f} mm long; {search['checked']} of {search['paths']} paths solved by the "
+            "full model"
+        )
+    return lines
+
+
+USE_CASE = UseCase("place", LAYOUT, read_job, simulate_and_place, console_summary, begin_study)

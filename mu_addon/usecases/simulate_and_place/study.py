@@ -44,35 +44,17 @@ from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.folder import begin, keep_inputs, require_space
 from ...run.progress import Progress
+from ...run.versions import package_versions
 from .candidate_states import PATH_DIFFERENCE_MM, CandidateSolver
 from .candidates_in_time import evaluations
 from .contact_history import history
 from .job import Job
-from .motion import FOLDER as MOTION
 from .motion import write_model_a
 from .path_motion import keep_motion
-from .report_data import package_versions
-from .study_file import FILES, HEADER, STAGES
-from .study_file import NAME as STUDY
+from .study_file import LAYOUT, NAME, STAGES
 
 Array = np.ndarray[Any, Any]
 
-RESULTS = (
-    "unit.stl",
-    "anchors.txt",
-    "mesh.vtu",
-    "model_a.pvd",
-    "angle.csv",
-    "contact.csv",
-    "deviation.csv",
-    "delta.npz",
-    "sensitivity.vtu",
-    "signals.csv",
-    "paths.csv",
-    "report.html",
-    "unit.png",
-    MOTION,
-)
 # Figures of summary.json that tell that a stage was run.
 _TELLS = {"design": "gates", "simulate": "angle_deg", "place": "chosen"}
 # What a study writes, with as much to spare: so much anyway, and so much a node and distinct pressure.
@@ -88,7 +70,6 @@ class Study:
 
     job: Job
     folder: Path
-    progress: Progress
     context: RunContext
     solid: Solid | None = None
     mesh: Mesh | None = None
@@ -105,21 +86,18 @@ class Study:
     _ahead: CandidateSolver | None = None
 
     @classmethod
-    def open(cls, job: Job, folder: Path, progress: Progress, context: RunContext) -> Study:
-        """Make the folder a study's; results of other inputs are moved to stale/, never shown as current.
+    def open(cls, job: Job, folder: Path, context: RunContext) -> Study:
+        """A study in a folder that becomes its own, see `begin_study`. Raises InputError and OutputError."""
+        begin_study(job, folder, context)
+        return cls.begun(job, folder, context)
 
-        What a job of more stages found there from the same inputs is kept. Raises InputError, also where
-        another process works in the folder, and OutputError, also where the disk has too little room.
+    @classmethod
+    def begun(cls, job: Job, folder: Path, context: RunContext) -> Study:
+        """A study in a folder that is its own already; its inputs are in the summary.
+
+        Raises OutputError where the disk has too little room.
         """
-        context.lock_folder(folder)
-        texts, current = job.texts_in(folder)
-        if current:
-            # Further stages of the same inputs make study.toml longer, and nothing stale.
-            keep_inputs(folder, {STUDY: texts[STUDY]})
-            context.summary = _earlier(folder) | context.summary
-        optional = [name for name in FILES.values() if name not in texts]
-        begin(context, folder, HEADER, texts, (*RESULTS, "unit_alpha[0-9]*.stl", "model_a"), optional)
-        study = cls(job, folder, progress, context)
+        study = cls(job, folder, context)
         study._require_space(_expected_nodes(job) if "simulate" in job.stages else 0)
         context.summary["versions"] = package_versions()
         context.summary["parameters"] = attrs.asdict(job.unit)
@@ -129,6 +107,11 @@ class Study:
         if "simulate" in job.stages:
             study._tell_settings()
         return study
+
+    @property
+    def progress(self) -> Progress:
+        """Where the run says how it goes."""
+        return self.context.progress
 
     def _tell_settings(self) -> None:
         """Settings of the simulation in the summary, and warnings of what they leave out."""
@@ -179,11 +162,6 @@ class Study:
     def windows(self) -> list[Window]:
         """The candidate paths' windows of anchors."""
         return windows(len(self.anchors))
-
-    @property
-    def headline_rule(self) -> str:
-        """The rule whose best path is the answer: the one that converges with the mesh, if asked for."""
-        return "volume_fraction" if "volume_fraction" in self.job.rules else self.job.rules[0]
 
     # Stages, in the order they need each other.
 
@@ -252,7 +230,7 @@ class Study:
             model = self.job.model(self.mesh)
             if candidates_beside and self.job.workers > 1 and not self.job.in_time:
                 self._ahead = CandidateSolver(
-                    self.job, self.cache, self.mesh, self._jobs(), pressure, self.headline_rule
+                    self.job, self.cache, self.mesh, self._jobs(), pressure, self.job.headline_rule
                 )
             try:
                 self.trajectory = self._model_a(model, time, pressure, self._reached)
@@ -539,12 +517,13 @@ class Study:
         if self.job.in_time:
             self.context.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = {"along_paths": True}
             return evaluations(self.job, self.cache, mesh, trajectory, jobs, self.progress.update)
-        whole = self.headline_rule if to_look_at else ""
+        whole = self.job.headline_rule if to_look_at else ""
         sweep = under_way or CandidateSolver(self.job, self.cache, mesh, jobs, trajectory.pressure_kPa, whole)
         with closing(sweep):
             found = sweep.evaluations(trajectory, self.progress.update, verify)
             if to_look_at:
-                keep_motion(self, mesh, trajectory, sweep, jobs)
+                assert self.mesh is not None
+                keep_motion(self.job, self.folder, self.mesh, mesh, trajectory, sweep, jobs)
         if sweep.path_difference_mm > PATH_DIFFERENCE_MM:
             self.warn(
                 "A candidate started from Model A's states does not lie on its own equilibrium path from "
@@ -652,6 +631,21 @@ class Study:
         if text not in self.warnings:
             self.warnings.append(text)
             self.progress.warning(text)
+
+
+def begin_study(job: Job, folder: Path, context: RunContext) -> None:
+    """Make a folder a study's; results of other inputs are moved to stale/, never shown as current.
+
+    What a job of more stages found there from the same inputs is kept. Raises InputError, also where
+    another process works in the folder, and OutputError.
+    """
+    context.lock_folder(folder)
+    texts, current = job.texts_in(folder)
+    if current:
+        # Further stages of the same inputs make study.toml longer, and nothing stale.
+        keep_inputs(folder, {NAME: texts[NAME]})
+        context.summary = _earlier(folder) | context.summary
+    begin(context, folder, LAYOUT, texts)
 
 
 def _state(arrays: dict[str, Array]) -> State:

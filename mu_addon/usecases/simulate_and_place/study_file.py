@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from ...errors import InputError
 from ...files import write_text
 from ...reading import file_bytes, parse_toml
+from ...run.folder import RUN, FolderLayout
+from ...run.inputs import digest
+from ...toml_writer import toml_text
 
 NAME = "study.toml"
 # The first line, by which a study's folder is known.
@@ -27,46 +29,38 @@ FILES = {
     "obstacles": "obstacles.obj",
 }
 _FILES_OF = {"design": ("unit", "body"), "simulate": ("protocol", "lattice", "obstacles"), "place": ()}
+LAYOUT = FolderLayout(
+    NAME,
+    HEADER,
+    results=(
+        "unit.stl",
+        "anchors.txt",
+        "mesh.vtu",
+        "model_a.pvd",
+        "model_a",
+        "angle.csv",
+        "contact.csv",
+        "deviation.csv",
+        "delta.npz",
+        "sensitivity.vtu",
+        "signals.csv",
+        "paths.csv",
+        "report.html",
+        "unit.png",
+        "unit_alpha[0-9]*.stl",
+        "motion",
+    ),
+    optional=tuple(FILES.values()),
+)
 # Far more than any study.toml has: a file this long is not one.
 _LONGEST = 100_000
 
 Tables = dict[str, dict[str, Any]]
 
 
-def digest(text: str) -> str:
-    """SHA-256 of a file's text, in hexadecimal."""
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def compose(tables: Mapping[str, Mapping[str, Any]]) -> str:
-    """Text of study.toml with a table a stage; a value that is a table itself becomes [stage.key]."""
-    lines = [HEADER, f"format = {FORMAT}"]
-    for stage, values in tables.items():
-        lines += table_lines(stage, values)
-    return "\n".join(lines) + "\n"
-
-
-def table_lines(name: str, values: Mapping[str, Any]) -> list[str]:
-    """Lines of a TOML table, each value that is a table itself as [name.key] after it."""
-    flat = {key: value for key, value in values.items() if not isinstance(value, dict)}
-    lines = ["", f"[{name}]", *(f"{key} = {toml_value(value)}" for key, value in flat.items())]
-    for key, inner in values.items():
-        if isinstance(inner, dict):
-            lines += table_lines(f"{name}.{key}", inner)
-    return lines
-
-
-def toml_value(value: Any) -> str:
-    """A truth, number, text, or a list or table of them, on one line of TOML."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(toml_value(item) for item in value)}]"
-    if isinstance(value, Mapping):
-        return f"{{ {', '.join(f'{key} = {toml_value(item)}' for key, item in value.items())} }}"
-    return repr(value)
+def compose(tables: Mapping[str, Mapping[str, Any]], run: Mapping[str, Any] = MappingProxyType({})) -> str:
+    """Text of study.toml with a table a stage, and a table [run] of what decides no figure."""
+    return toml_text({"format": FORMAT, **tables, **({RUN: run} if run else {})}, HEADER)
 
 
 def read(folder: Path) -> Tables | None:
@@ -82,6 +76,14 @@ def read(folder: Path) -> Tables | None:
     if outdated:
         write_text(path, compose(tables))
     return tables
+
+
+def read_run(folder: Path) -> dict[str, Any]:
+    """The table [run] of a folder's study.toml; empty where there is none. Raises InputError."""
+    found = parse_toml(_text(folder / NAME), str(folder / NAME)).get(RUN, {})
+    if not isinstance(found, dict):
+        raise InputError(f"{RUN} is not a table", str(folder / NAME), f"write it as [{RUN}]")
+    return found
 
 
 def _text(path: Path) -> str:
@@ -111,6 +113,7 @@ def parse(text: str, folder: Path) -> tuple[Tables, bool]:
     where = str(folder / NAME)
     document = parse_toml(text, where, "choose another folder")
     found = document.pop("format", None)
+    document.pop(RUN, None)
     if found == 1 and not isinstance(found, bool):
         return _from_format_1(document, folder), True
     if found != FORMAT or isinstance(found, bool):

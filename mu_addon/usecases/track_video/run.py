@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 import re
 import tempfile
@@ -28,6 +27,8 @@ from ...measured.rest import AT_REST, SAMPLES
 from ...measured.table import Remark, read_table
 from ...measured.video import Motion, Pair, Tracks, View, motion, resting
 from ...reading import file_text
+from ...run.context import RunContext
+from ...toml_writer import toml_text
 
 Array = np.ndarray[Any, Any]
 
@@ -309,13 +310,7 @@ def write_experiment(found: Filmed, bench: Bench, name: str, folder: Path) -> tu
 
 def _block(name: str, file: str, bench: Bench) -> str:
     keys = {"name": name, "kind": KIND, "file": file, "role": "fit"} | dict(bench.experiment) | {"name": name}
-    return "[[experiment]]\n" + "".join(f"{key} = {_toml(value)}\n" for key, value in keys.items())
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    return str(value).lower() if isinstance(value, bool) else repr(value)
+    return "[[experiment]]\n" + toml_text(keys)
 
 
 def _table(found: Filmed, bench: Bench) -> str:
@@ -438,6 +433,19 @@ def track(
     return figures(found, name, table), (*found.remarks, *remarks)
 
 
+def track_into(
+    folder: Path, clip: Path, bench: Bench, pressure: Path, follow: Tracker, context: RunContext
+) -> None:
+    """`track` as a run in the folder of measured data, its remarks as warnings."""
+    context.open_folder(folder)
+    context.console_summary = console_summary
+    with context.progress.stage("track"):
+        found, remarks = track(clip, bench, pressure, folder, follow)
+    for remark in remarks:
+        context.progress.warning(remark.what, remark.where, remark.remedy)
+    context.summary |= found | {"remarks": [remark.what for remark in remarks]}
+
+
 def figures(found: Filmed, name: str, table: Path) -> dict[str, Any]:
     """What an experiment from a video comes to, in plain data."""
     m = found.motion
@@ -457,7 +465,7 @@ def figures(found: Filmed, name: str, table: Path) -> dict[str, Any]:
     }
 
 
-def console_summary(summary: Mapping[str, Any]) -> list[str]:
+def console_summary(summary: dict[str, Any]) -> list[str]:
     """What came of a video, in a few lines."""
     low, high = summary["pressure_kPa"]
     lines = [

@@ -20,7 +20,7 @@ from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.parameters import write_unit
 from mu_addon.design.printing.printer import printer_text
 from mu_addon.design.surface import bad_edges, stl_surface
-from mu_addon.usecases.export.run import FORMATS, MANIFEST
+from mu_addon.usecases.export.job import FORMATS, MANIFEST
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by

@@ -1,0 +1,47 @@
+"""What every kind of run has in common: inputs as files in a folder, work, a report and a summary."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import attrs
+
+from .context import RunContext
+from .folder import FolderLayout, begin
+
+Job = TypeVar("Job")
+
+
+@attrs.frozen
+class UseCase(Generic[Job]):
+    """One kind of run. Its job is a frozen class whose `texts()` gives the files of inputs by name.
+
+    name: of its command. read: the job that a folder's inputs describe; raises InputError. run: does the job
+    in its folder, fills `context.summary` and sets `context.report`; what it returns is what was found.
+    console_summary: a run's summary in a few lines of text. begin: makes a folder the run's, where that takes
+    more than `folder.begin`.
+    """
+
+    name: str
+    layout: FolderLayout
+    read: Callable[[Path], Job]
+    run: Callable[[Job, Path, RunContext], Any]
+    console_summary: Callable[[dict[str, Any]], list[str]]
+    begin: Callable[[Job, Path, RunContext], None] | None = None
+
+    def start(self, job: Job, folder: Path, context: RunContext) -> Any:
+        """Run a job in a folder and leave its report, also where it stops early; returns what was found.
+
+        Raises InputError, also for a folder of another kind of run or one in use, OutputError, and what the
+        job itself raises.
+        """
+        if self.begin is not None:
+            self.begin(job, folder, context)
+        else:
+            begin(context, folder, self.layout, job.texts())  # type: ignore[attr-defined]
+        context.console_summary = self.console_summary
+        found = self.run(job, folder, context)
+        context.write_report()
+        return found

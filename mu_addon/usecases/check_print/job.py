@@ -1,0 +1,101 @@
+"""What a print check is asked to do: the part, its printer, the way up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import attrs
+
+from ...design.anchors import Window, window
+from ...design.parameters import Unit, read_unit, to_toml
+from ...design.printing.printer import Printer, printer_text, read_printer
+from ...errors import InputError
+from ...reading import file_bytes
+from ...run.folder import FolderLayout
+from ...run.inputs import FORMAT, digest, named_path, read_inputs, require_digest, structured
+from ...toml_writer import toml_text
+
+UNIT, PRINTER = "unit.toml", "printer.toml"
+LAYOUT = FolderLayout(
+    "check.toml",
+    "# The inputs of this print check; the files beside it belong to it.",
+    results=("part.stl", "check.json", "report.html", "places.png"),
+    optional=(UNIT,),
+)
+
+
+@attrs.frozen(eq=False)
+class Job:
+    """Inputs of a check: a unit, or the bytes of an STL file, or a file checked against its unit.
+
+    direction points away from the platform, in the part's frame.
+    """
+
+    printer: Printer
+    unit: Unit | None = None
+    window: Window | None = None
+    quality: str = "interactive"
+    stl: bytes | None = None
+    stl_file: Path | None = None
+    direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+    @property
+    def stl_name(self) -> str:
+        """Name of the STL file, or nothing."""
+        return "" if self.stl_file is None else self.stl_file.name
+
+    @property
+    def name(self) -> str:
+        """What is checked, in a few words."""
+        unit = "" if self.unit is None else self.unit.name
+        path = "" if self.window is None else f", {self.window.name}"
+        if self.stl is None:
+            return unit + path
+        return self.stl_name + (f" against {unit}{path}" if unit else "")
+
+    def texts(self) -> dict[str, str]:
+        """Text of every file of inputs, by name; check.toml is the first."""
+        values = {
+            "format": FORMAT,
+            "printer": PRINTER,
+            "unit": None if self.unit is None else UNIT,
+            "quality": None if self.unit is None else self.quality,
+            "path": None if self.window is None else self.window.name,
+            "stl_sha256": None if self.stl is None else digest(self.stl),
+            "direction": self.direction,
+            "run": {"stl": str(self.stl_file.resolve())} if self.stl_file is not None else None,
+        }
+        texts = {LAYOUT.inputs: toml_text(values, LAYOUT.header), PRINTER: printer_text(self.printer)}
+        return texts if self.unit is None else texts | {UNIT: to_toml(self.unit)}
+
+
+def read_stl(path: Path) -> bytes:
+    """The bytes of an STL file to check; raises InputError."""
+    try:
+        return file_bytes(path, 1 << 31)
+    except OSError as error:
+        raise InputError(
+            f"cannot read the file: {error.strerror or error}", str(path), "check its name"
+        ) from error
+
+
+def read_job(folder: Path) -> Job:
+    """The job that a folder of `check` describes, the STL file where it lay then; raises InputError."""
+    path = folder / LAYOUT.inputs
+    values, run = read_inputs(path)
+    stl = named_path(path, run, "stl", "STL file") if "stl_sha256" in values else None
+    content = None if stl is None else read_stl(stl)
+    if stl is not None and content is not None:
+        require_digest(stl, content, values["stl_sha256"], "STL file")
+    unit = read_unit(folder / UNIT) if "unit" in values else None
+    taken = {key: values[key] for key in ("quality", "direction") if key in values}
+    return structured(
+        Job,
+        taken,
+        str(path),
+        printer=read_printer(folder / PRINTER),
+        unit=unit,
+        window=window(unit, str(values["path"])) if unit is not None and "path" in values else None,
+        stl_file=stl,
+        stl=content,
+    )

@@ -1,0 +1,75 @@
+"""What a diagnosis found, and its curves: measured beside predicted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...design.parameters import Unit
+from ...evidence.extended import ExtendedModel
+from ...evidence.simulator import Composite
+from ...evidence.verdict import Verdict
+from ...measured import Experiment, Measured
+
+Array = np.ndarray[Any, Any]
+
+
+@attrs.frozen(eq=False)
+class Diagnosis:
+    """A verdict and what it was found with; remarks: of the reader, in words."""
+
+    measured: Measured
+    simulator: Composite
+    verdict: Verdict
+    model: ExtendedModel
+    unit: Unit | None
+    remarks: tuple[str, ...]
+
+    @property
+    def before(self) -> Mapping[str, float]:
+        """Values of the base model."""
+        return self.verdict.selection.base.values
+
+    @property
+    def after(self) -> Mapping[str, float]:
+        """Values of the extended model, or of the best attempt where nothing was named."""
+        return self.verdict.selection.chosen.values
+
+    @property
+    def extends(self) -> bool:
+        """Whether any effect was added to the base model, named or not."""
+        return bool(self.verdict.selection.chosen.effects)
+
+
+@attrs.frozen(eq=False)
+class Curve:
+    """One channel of an experiment: measured, and predicted by the base and the extended model, all (n,)."""
+
+    experiment: Experiment
+    channel: str
+    measured: Array
+    before: Array
+    after: Array
+
+    @property
+    def spread(self) -> Array | None:
+        """Standard deviation (n,) of the channel, where the data give it."""
+        head, _, unit = self.channel.rpartition("_")
+        return self.experiment.columns.get(f"{head}_sd_{unit}")
+
+
+def curves(found: Diagnosis) -> list[Curve]:
+    """Every predicted channel of every experiment, in the order of the folder."""
+    simulator = found.simulator
+    listed = []
+    for e, judged in zip(found.measured.experiments, found.verdict.experiments, strict=True):
+        if not simulator.knows(e):
+            continue
+        before = simulator.predict(judged, found.before)
+        after = simulator.predict(judged, found.after)
+        for row, channel in enumerate(simulator.channels(e)):
+            listed.append(Curve(e, channel, e[channel], before[row], after[row]))
+    return listed

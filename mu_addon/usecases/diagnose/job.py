@@ -1,0 +1,106 @@
+"""What a diagnosis is asked to do: measured data, and the unit that they are of."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import attrs
+
+from ...design.parameters import Unit, load_preset, read_unit, to_toml
+from ...errors import InputError
+from ...evidence.prediction import unit as unit_pressure
+from ...measured import Experiment, Measured, read_folder
+from ...measured.folder import FILE
+from ...run.folder import FolderLayout
+from ...run.inputs import FORMAT, named_path, read_inputs
+from ...toml_writer import toml_text
+from ..measured_data import described, experiments_digest, require_same_data
+
+if TYPE_CHECKING:
+    from ...evidence.unit_fem import UnitSettings
+
+UNIT = "unit.toml"
+LAYOUT = FolderLayout(
+    "diagnose.toml",
+    "# The inputs of this diagnosis; the measured data are named by the SHA-256 of their files.",
+    results=("verdict.json", "model.toml", "residuals.csv", "report.html"),
+    optional=(UNIT,),
+)
+PRESET = "mu-1.0x"
+
+
+@attrs.frozen(eq=False)
+class Job:
+    """Inputs of a diagnosis.
+
+    unit: what unit_pressure experiments and blocks of counted cells are of, whatever its scale; the preset
+    `PRESET` without one. settings: how it is simulated.
+    """
+
+    measured: Measured
+    unit: Unit | None = None
+    settings: UnitSettings | None = None
+
+    def __attrs_post_init__(self) -> None:
+        if not any(e.role == "fit" for e in self.measured.experiments):
+            raise InputError(
+                "every experiment is held out",
+                str(self.measured.folder / FILE),
+                'give role = "fit" to some',
+            )
+
+    @property
+    def subject(self) -> Unit | None:
+        """The unit that the experiments are of."""
+        return unit_behind(self.measured.experiments, self.unit)
+
+    def texts(self) -> dict[str, str]:
+        """Text of every file of inputs, by name; diagnose.toml is the first."""
+        values = {
+            "format": FORMAT,
+            "experiments_sha256": experiments_digest(self.measured),
+            "program_sha256": _program(),
+            "settings": None if self.settings is None else repr(self.settings),
+            "data": described(self.measured),
+            "run": {"data": str(self.measured.folder.resolve())},
+        }
+        texts = {LAYOUT.inputs: toml_text(values, LAYOUT.header)}
+        return texts if self.subject is None else texts | {UNIT: to_toml(self.subject)}
+
+
+def read_job(folder: Path) -> Job:
+    """The job that a folder of `diagnose` describes, its data where they lay then; raises InputError."""
+    path = folder / LAYOUT.inputs
+    values, run = read_inputs(path)
+    if "settings" in values:
+        raise InputError("it was made with settings given in Python", str(path), "make it there again")
+    measured = read_folder(named_path(path, run, "data", "folder of measured data"))
+    require_same_data(measured, values.get("data"), described(measured))
+    unit = folder / UNIT
+    return Job(measured, read_unit(unit) if unit.is_file() else None)
+
+
+def unit_behind(experiments: Sequence[Experiment], unit: Unit | None = None) -> Unit | None:
+    """The unit that experiments are of, the preset where none is given; None where none of them is of one.
+
+    A block of lattice is a unit's where its cells are counted.
+    """
+    if any(e.kind == unit_pressure.KIND or e.cells for e in experiments):
+        return unit or load_preset(PRESET)
+    return None
+
+
+@cache
+def _program() -> str:
+    """SHA-256 of the code that a verdict comes from."""
+    package = Path(__file__).resolve().parents[2]
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        name = path.relative_to(package).as_posix()
+        if not name.startswith("blender/"):
+            digest.update(name.encode() + path.read_bytes())
+    return digest.hexdigest()

@@ -1,0 +1,124 @@
+"""A diagnosis in words: its verdict in a sentence, parameters with intervals, what to measure next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ...evidence.effect import Parameter
+from ...evidence.selection import Cause
+from ...evidence.sensitivity import best_seen
+from ...evidence.verdict import Verdict
+
+# Of the table of dependences: the size of what is left against the data's own spread.
+SPREAD = "spread"
+
+
+def readable(name: str) -> str:
+    """An effect's or quantity's name as it is said."""
+    return name.replace("_", " ")
+
+
+def listed(names: Sequence[str], last: str = "and") -> str:
+    """Names in a row: "a, b and c"."""
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + f" {last} " + names[-1]
+
+
+def bare(p: Parameter) -> str:
+    """A parameter's name as it is said, without the unit that stands behind its value."""
+    unit = p.unit.replace("1/", "per_").replace("/", "_")
+    return readable(p.name.removesuffix(f"_{unit}") if unit else p.name)
+
+
+def between(low: float, high: float) -> str:
+    """An interval in as few figures as tell its ends apart, three at least."""
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return "not known"
+    for digits in range(3, 7):
+        ends = f"{low:.{digits}g}", f"{high:.{digits}g}"
+        if ends[0] != ends[1]:
+            break
+    return f"{ends[0]} to {ends[1]}"
+
+
+def sized(verdict: Verdict, cause: Cause) -> str:
+    """Parameters of a cause with their intervals in words."""
+    said = []
+    for key, p in zip(cause.effect.keys, cause.effect.parameters, strict=True):
+        low, high = verdict.intervals.get(key, (math.nan, math.nan))
+        unit = f" {p.unit}" if p.unit else ""
+        value = verdict.selection.chosen.values[key]
+        said.append(f"{bare(p)} {value:.3g}{unit} (95 %: {between(low, high)})")
+        if (cause.effect.name, p.name) == ("overcure", "offset_mm"):
+            said.append(f"of every surface, so that struts and walls are {2 * value:.2g} mm thicker")
+    return ", ".join(said)
+
+
+def sentence(verdict: Verdict) -> tuple[str, str]:
+    """The verdict in words: its headline, and one plain sentence."""
+    found = verdict.selection
+    if verdict.kind == "named":
+        said = [f"{_upper(c.effect.mechanism)}; {sized(verdict, c)}." for c in found.causes]
+        return listed([readable(n) for n in verdict.names]), " ".join(said)
+    if verdict.kind == "ambiguous":
+        choices = [listed([readable(n) for n in (c.effect.name, *c.rivals)], "or") for c in found.causes]
+        said = [f"{readable(c.effect.name)} has {sized(verdict, c)}" for c in found.causes]
+        return (
+            " and ".join(choices),
+            "The model is wrong. Each of these effects explains the data, and these data do not "
+            f"distinguish them. Fitted values: {'; '.join(said)}.",
+        )
+    if verdict.kind == "none":
+        return (
+            "no model error detected",
+            "The residual is consistent with instrument noise. An effect larger than its limit in the "
+            "table below would have been detected.",
+        )
+    if verdict.kind == "unidentifiable":
+        return (
+            "not identifiable",
+            "The model fits the data only with a parameter far from its known value. More data of "
+            "this kind cannot identify the cause.",
+        )
+    where = [readable(n) for n in found.left if n != SPREAD]
+    tried = (
+        "The residual exceeds the standard deviation given with the data. " if SPREAD in found.left else ""
+    )
+    tried += f"The residual depends on {listed(where)}. " if where else ""
+    if found.doubted:
+        tried += f"{_upper(readable(found.doubted))}. "
+    if found.chosen.effects:
+        names = listed([readable(n) for n in found.chosen.names])
+        tried += f"The best fit, {names}, is not named because its residual has structure."
+    return (
+        "unexplained by any known effect",
+        f"The model is wrong, and no effect of the library explains it. {tried}".strip(),
+    )
+
+
+def advice(verdict: Verdict) -> str:
+    """What to measure next, in words."""
+    if verdict.proposal is not None:
+        told = listed([readable(n) for n in verdict.proposal.separates])
+        return f"{_upper(verdict.proposal.what)}. It distinguishes {told}."
+    found = verdict.selection
+    if verdict.kind == "named":
+        return f"To confirm it on new data: {'; '.join(c.effect.reveals for c in found.causes)}."
+    if verdict.kind == "unexplained":
+        places = [d for d in found.table if d.against in found.left and d.where and d.against != SPREAD]
+        places.sort(key=lambda d: d.p_value)
+        at = f" The deviation is largest at: {places[0].where}." if places else ""
+        return f"Repeat an experiment unchanged: what does not recur is not a model error.{at}"
+    hidden = [s for s in best_seen(verdict.seen).values() if not s.identifiable]
+    if not hidden:
+        return ""
+    shown = dict.fromkeys(s.effect.reveals for s in hidden)
+    some = list(shown)[:3]
+    return (
+        f"These data cannot identify {listed([readable(s.effect.name) for s in hidden])}. To identify "
+        f"more: {'; or '.join(some)}."
+    )
+
+
+def _upper(text: str) -> str:
+    return text[:1].upper() + text[1:]

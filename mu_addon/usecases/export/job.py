@@ -1,0 +1,146 @@
+"""What an export is asked to do: the unit, its sensor's path, formats, the printer's offsets, the resin."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from ...design.anchors import Window, window
+from ...design.parameters import Unit, read_unit, to_toml
+from ...design.solid import QUALITY
+from ...errors import InputError
+from ...materials.library import Material, load_material, material_text, read_material
+from ...run.folder import FolderLayout
+from ...run.inputs import FORMAT, read_inputs, structured
+from ...toml_writer import toml_text
+
+Array = NDArray[np.float64]
+
+UNIT, RESIN = "unit.toml", "resin.toml"
+USUAL_RESIN = "elastic-50a-v1"
+FORMATS = ("stl", "3mf", "3mf-beams", "step", "txt")
+MANIFEST = "manifest.json"
+LAYOUT = FolderLayout(
+    "export.toml",
+    "# The inputs of this export; unit.toml beside it belongs to them.",
+    results=("unit.stl", "unit.3mf", "unit-beams.3mf", "*.step", "nodes.txt", MANIFEST),
+)
+
+
+@attrs.frozen(eq=False)
+class Job:
+    """Inputs of an export. path: of the waveguide, or None; take_off: the printer's offsets in mm."""
+
+    unit: Unit
+    resin: Material
+    path: Window | Array | None = None
+    path_name: str = ""
+    formats: tuple[str, ...] = FORMATS
+    quality: str = "export"
+    take_off: tuple[float, float] = (0.0, 0.0)
+    offset_source: str = ""
+
+    def __attrs_post_init__(self) -> None:
+        for name in self.formats:
+            if name not in FORMATS:
+                raise InputError(
+                    f"there is no format {name!r}", "--formats", f"choose from {', '.join(FORMATS)}"
+                )
+        if self.quality not in QUALITY:
+            raise InputError(
+                f"there is no quality {self.quality!r}", "--quality", f"one of {', '.join(QUALITY)}"
+            )
+
+    def texts(self) -> dict[str, str]:
+        """Text of every file of inputs, by name; export.toml is the first."""
+        values = {
+            "format": FORMAT,
+            "unit": UNIT,
+            "path": self.path_name,
+            "formats": self.formats,
+            "quality": self.quality,
+            "take_off_mm": self.take_off,
+            "offset_source": self.offset_source or None,
+            "resin": self.resin.name,
+            "points_mm": None if self.path is None or isinstance(self.path, Window) else self.path,
+        }
+        return {
+            LAYOUT.inputs: toml_text(values, LAYOUT.header),
+            UNIT: to_toml(self.unit),
+            RESIN: material_text(self.resin),
+        }
+
+
+@attrs.frozen
+class _Settings:
+    """What export.toml says beside the unit and its resin."""
+
+    resin: str
+    path: str = ""
+    formats: tuple[str, ...] = FORMATS
+    quality: str = "export"
+    take_off_mm: tuple[float, float] = (0.0, 0.0)
+    offset_source: str = ""
+    points_mm: tuple[tuple[float, float, float], ...] = ()
+
+
+def read_job(folder: Path) -> Job:
+    """The job that a folder of `export` describes; raises InputError."""
+    path = folder / LAYOUT.inputs
+    values, _ = read_inputs(path)
+    values.pop("unit", None)
+    asked, unit = structured(_Settings, values, str(path)), read_unit(folder / UNIT)
+    along = np.array(asked.points_mm) if asked.points_mm else path_of(unit, asked.path or None)[0]
+    return Job(
+        unit=unit,
+        resin=read_resin(folder, asked.resin),
+        path=along,
+        path_name=asked.path,
+        formats=asked.formats,
+        quality=asked.quality,
+        take_off=asked.take_off_mm,
+        offset_source=asked.offset_source,
+    )
+
+
+def read_resin(folder: Path, name: str) -> Material:
+    """The resin that lies in a folder, or of an older one that of the library; raises InputError."""
+    kept = folder / RESIN
+    return read_material(kept) if kept.is_file() else load_material(name)
+
+
+def resin_of(name: str | None) -> Material:
+    """A resin of the library by name, or of a TOML file; the usual one without either. Raises InputError."""
+    chosen = name or USUAL_RESIN
+    return read_material(Path(chosen)) if chosen.endswith(".toml") else load_material(chosen)
+
+
+def path_of(unit: Unit, name: str | None, row: str | None = None) -> tuple[Window | Array | None, str]:
+    """A path and its name: a window, alpha1 .., or one of a paths.csv of `place`, its first unless named."""
+    if name is None:
+        return None, ""
+    if not name.endswith(".csv"):
+        return window(unit, name), name
+    try:
+        with Path(name).open(encoding="utf-8", newline="") as stream:
+            rows = list(csv.DictReader(stream))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"cannot read the paths: {error}", name, "give paths.csv of `place --paths graph`"
+        ) from error
+    named = [r for r in rows if row is None or r.get("path") == row]
+    if not named:
+        raise InputError(
+            f"there is no path {row!r}" if row else "there is no path", name, "see its first column"
+        )
+    try:
+        points = np.array([[float(c) for c in p.split()] for p in named[0]["points_mm"].split(";")])
+        return points.reshape(-1, 3), named[0]["path"]
+    except (KeyError, ValueError) as error:
+        raise InputError(
+            "its column points_mm is not a list of points", name, "write it again by `place`"
+        ) from error

@@ -1,0 +1,93 @@
+"""What a grasp is asked to do: the gripper, the cubes, the phases, and how finely it is computed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import attrs
+
+from ...design.gripper import Gripper, read_gripper, to_toml
+from ...design.parameters import to_toml as unit_toml
+from ...design.solid import QUALITY
+from ...errors import InputError
+from ...meshing.settings import MeshSettings
+from ...placement.inclusion import RULES
+from ...run.folder import FolderLayout
+from ...run.inputs import FORMAT, read_inputs, structured
+from ...sensing.optics import Optics
+from ...toml_writer import toml_text
+from .grasp import Cube, Grip
+from .phases import Phases, read_phases, shipped_phases
+
+GRIPPER, UNIT, PROTOCOL = "gripper.toml", "unit.toml", "protocol.csv"
+LAYOUT = FolderLayout(
+    "grip.toml",
+    "# The inputs of this grasp; gripper.toml, unit.toml and protocol.csv beside it belong to them.",
+    results=(
+        "gripper.stl",
+        "gripper.3mf",
+        "grasp_*.csv",
+        "pull_*.csv",
+        "deviation.csv",
+        "cube-*",
+        "gripper.png",
+        "frame_*.png",
+        "report.html",
+    ),
+)
+CUBES = (12.5, 25.0)
+REFINE = 0.5
+
+
+@attrs.frozen
+class Job:
+    """Inputs of a run. cubes: none leaves the grasp out; rules: none leaves the table of paths out."""
+
+    gripper: Gripper
+    cubes: tuple[Cube, ...] = tuple(Cube(side) for side in CUBES)
+    grip: Grip = attrs.field(factory=Grip)
+    phases: Phases = attrs.field(factory=shipped_phases)
+    mesh: MeshSettings = attrs.field(factory=lambda: MeshSettings(refine=REFINE))
+    rules: tuple[str, ...] = RULES
+    quality: str = attrs.field(default="interactive", validator=attrs.validators.in_(tuple(QUALITY)))
+    optics: Optics = attrs.field(factory=Optics)
+
+    def __attrs_post_init__(self) -> None:
+        self.gripper.unit.wall.require_without_memory("a grasp")
+        sides = [cube.side_mm for cube in self.cubes]
+        if len(set(sides)) < len(sides):
+            raise InputError("two cubes have the same side", "--cube", "name each side once")
+        for side in sides:
+            if side >= self.gripper.fingers.gap_mm:
+                raise InputError(
+                    f"a cube of {side:g} mm does not fit between fingers "
+                    f"{self.gripper.fingers.gap_mm:g} mm apart",
+                    "--cube",
+                    "choose a smaller cube, or a gripper with a wider gap",
+                )
+
+    def texts(self) -> dict[str, str]:
+        """Text of every file of inputs, by name; grip.toml is the first."""
+        values = {
+            "format": FORMAT,
+            "quality": self.quality,
+            "cubes": [attrs.asdict(cube) for cube in self.cubes],
+            "rules": self.rules,
+            "grip": attrs.asdict(self.grip),
+            "mesh": attrs.asdict(self.mesh),
+            "optics": attrs.asdict(self.optics),
+        }
+        return {
+            LAYOUT.inputs: toml_text(values, LAYOUT.header),
+            GRIPPER: to_toml(self.gripper, UNIT),
+            UNIT: unit_toml(self.gripper.unit),
+            PROTOCOL: self.phases.text(),
+        }
+
+
+def read_job(folder: Path) -> Job:
+    """The job that a folder of `grip` describes; raises InputError."""
+    path = folder / LAYOUT.inputs
+    values, _ = read_inputs(path)
+    given = {"gripper": read_gripper(folder / GRIPPER), "phases": read_phases(folder / PROTOCOL)}
+    return structured(Job, values, str(path), **given)

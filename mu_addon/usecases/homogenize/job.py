@@ -1,0 +1,136 @@
+"""What a homogenisation is asked to do: the unit, its resin, the block between plates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import attrs
+
+from ...design.parameters import Unit, read_unit, to_toml
+from ...design.strut_cell import StrutCell, strut_cell
+from ...errors import InputError
+from ...homogenize.cell_mesh import CellMeshSettings
+from ...homogenize.compression import STRAINS, Friction
+from ...materials.library import Material, load_material, read_material
+from ...run.folder import FolderLayout
+from ...run.inputs import FORMAT, read_inputs, structured
+from ...toml_writer import toml_text
+
+UNIT = "unit.toml"
+LAYOUT = FolderLayout(
+    "homogenize.toml",
+    "# The inputs of this homogenisation; unit.toml beside it belongs to them.",
+    results=(
+        "effective.toml",
+        "tensor.csv",
+        "cell.csv",
+        "cell.vtu",
+        "cell.png",
+        "modulus.png",
+        "specimen.stl",
+        "specimen_slide.csv",
+        "specimen_stick.csv",
+        "specimen_*.png",
+        "report.html",
+    ),
+)
+FRICTIONS: tuple[Friction, ...] = ("slide", "stick")
+RESIN = "elastic-50a-v1"
+# Elements to a strut's diameter in the block: its cell's modulus is within 2 % of a fine mesh's.
+BLOCK_PER_DIAMETER = 1.0
+
+
+@attrs.frozen
+class Resin:
+    """What struts are made of: neo-Hookean, Young's modulus in MPa and Poisson's ratio; density in g/ml."""
+
+    name: str
+    modulus_MPa: float
+    poisson: float
+    density_g_per_ml: float
+
+    @classmethod
+    def of_unit(cls, unit: Unit, known: Material) -> Resin:
+        """The unit's own: its struts are printed with its membrane, of a known resin's density."""
+        m = unit.material
+        modulus = m.membrane_modulus_MPa
+        return cls("that of the unit's membrane", modulus, m.membrane_poisson, known.density_g_per_ml)
+
+    @classmethod
+    def of(cls, known: Material) -> Resin:
+        """One of the library, or of a file."""
+        return cls(known.name, known.modulus_MPa, known.poisson, known.density_g_per_ml)
+
+
+@attrs.frozen
+class Job:
+    """Inputs of a homogenisation. cells: of the specimen, a side; frictions: none leaves it out."""
+
+    unit: Unit
+    resin: Resin
+    cells: int = 3
+    frictions: tuple[Friction, ...] = FRICTIONS
+    strain: float = 0.4
+    refine: float = 1.0
+
+    def __attrs_post_init__(self) -> None:
+        if not 1 <= self.cells <= 12:
+            raise InputError(f"a specimen of {self.cells} cells per side", "--cells", "give 1 to 12")
+        if not 0.01 <= self.strain <= 0.8:
+            raise InputError(f"a compression to {self.strain:g}", "--strain", "give a share from 0.01 to 0.8")
+        if not 0.3 <= self.refine <= 4.0:
+            raise InputError(f"refine = {self.refine:g} is out of bounds", "--refine", "give 0.3 to 4")
+
+    @property
+    def cell(self) -> StrutCell:
+        """The unit's cell, as it is printed."""
+        return strut_cell(self.unit)
+
+    @property
+    def mesh(self) -> CellMeshSettings:
+        """How fine the cell's mesh is."""
+        standard = CellMeshSettings()
+        return attrs.evolve(standard, per_diameter=standard.per_diameter * self.refine)
+
+    @property
+    def block_mesh(self) -> CellMeshSettings:
+        """How fine each cell of the block is: coarse, for there are many."""
+        return attrs.evolve(self.mesh, per_diameter=BLOCK_PER_DIAMETER * self.refine)
+
+    @property
+    def strains(self) -> tuple[float, ...]:
+        """Nominal strains of the specimen's test."""
+        return (*(s for s in STRAINS if s < self.strain - 1e-9), self.strain)
+
+    def texts(self) -> dict[str, str]:
+        """Text of every file of inputs, by name; homogenize.toml is the first."""
+        resin = attrs.asdict(self.resin)
+        values = {
+            "format": FORMAT,
+            "unit": UNIT,
+            "cells": self.cells,
+            "frictions": self.frictions,
+            "strain": self.strain,
+            "refine": self.refine,
+            "resin": {"name": resin.pop("name"), "modulus_kPa": 1e3 * resin.pop("modulus_MPa"), **resin},
+        }
+        return {LAYOUT.inputs: toml_text(values, LAYOUT.header), UNIT: to_toml(self.unit)}
+
+
+def read_job(folder: Path) -> Job:
+    """The job that a folder of `homogenize` describes; raises InputError."""
+    path = folder / LAYOUT.inputs
+    values, _ = read_inputs(path)
+    values.pop("unit", None)
+    resin = values.get("resin")
+    if isinstance(resin, dict) and isinstance(resin.get("modulus_kPa"), int | float):
+        resin["modulus_MPa"] = resin.pop("modulus_kPa") / 1e3
+    return structured(Job, values, str(path), unit=read_unit(folder / UNIT))
+
+
+def resin_of(name: str | None, unit: Unit) -> Resin:
+    """The resin of a name in the library or of a file; the unit's own without one. Raises InputError."""
+    if name is None:
+        return Resin.of_unit(unit, load_material(RESIN))
+    path = Path(name)
+    return Resin.of(read_material(path) if path.suffix == ".toml" else load_material(name))

@@ -1,0 +1,37 @@
+"""A folder of measured data as the input of a run: named by its place and the digests of its files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..errors import InputError
+from ..measured import Measured
+from ..measured.folder import FILE
+from ..run.inputs import digest
+
+
+def experiments_digest(measured: Measured) -> str:
+    """SHA-256 of the file that describes a folder's experiments."""
+    return digest((measured.folder / FILE).read_bytes())
+
+
+def described(measured: Measured) -> dict[str, list[str]]:
+    """What each experiment is, and the SHA-256 of its file, by name."""
+    return {e.name: [e.kind, e.role, e.sha256] for e in measured.experiments}
+
+
+def require_same_data(measured: Measured, before: Any, now: Mapping[str, Any]) -> None:
+    """Raise InputError where measured data are not those that a run was made with.
+
+    before: what the run's inputs say of them by name, None where they say nothing; now: what they are.
+    """
+    if before is None or before == now:
+        return
+    known = before if isinstance(before, Mapping) else {}
+    other = [name for name in {**known, **now} if known.get(name) != now.get(name)]
+    raise InputError(
+        f"the measured data are not those that the run was made with: {', '.join(other[:3])}",
+        str(measured.folder),
+        "put those back, or give these a folder of results of their own",
+    )

@@ -1,0 +1,59 @@
+"""The use case that a folder's inputs belong to, and its run from where it stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import attrs
+
+from ..errors import InputError
+from ..run.context import RunContext
+from ..run.usecase import UseCase
+
+# By the first file of inputs: whose modules hold `USE_CASE`, imported where one is wanted.
+MODULES = {
+    "study.toml": ".simulate_and_place.run",
+    "check.toml": ".check_print.run",
+    "export.toml": ".export.run",
+    "specimens.toml": ".export.specimens",
+    "homogenize.toml": ".homogenize.run",
+    "grip.toml": ".grip.run",
+    "diagnose.toml": ".diagnose.run",
+    "protocols.toml": ".diagnose.design_experiments",
+    "fit.toml": ".fit_material.run",
+    "calibrate.toml": ".sensor.calibrate",
+    "sweep.toml": ".parameter_study.run",
+    "reproduce.toml": ".reproduce.run",
+}
+
+
+def use_case_of(folder: Path) -> UseCase[Any]:
+    """The use case that a folder's inputs belong to; raises InputError where there is none."""
+    there = [module for name, module in MODULES.items() if (folder / name).is_file()]
+    cases: list[UseCase[Any]] = [import_module(module, __package__).USE_CASE for module in there]
+    if cases:
+        # One whose first line is another's is read all the same: its reader says best what is wrong with it.
+        return next((case for case in cases if case.layout.is_of(folder)), cases[0])
+    raise InputError(
+        "there is no study in this folder, nor another run",
+        str(folder),
+        f"give a folder that holds one of {', '.join(MODULES)}, as a run writes it",
+    )
+
+
+def resume(folder: Path, context: RunContext, given: Mapping[str, Any] = MappingProxyType({})) -> Any:
+    """Run what a folder's inputs say, taking from its cache what is finished; returns what was found.
+
+    given: fields of the job that take the place of the folder's, `workers` say, where its job has them.
+    Raises InputError where the inputs cannot be used or a file is missing that they name, and what the run
+    itself raises.
+    """
+    use_case = use_case_of(folder)
+    job = use_case.read(folder)
+    fields = {field.name for field in attrs.fields(type(job))}
+    job = attrs.evolve(job, **{name: value for name, value in given.items() if name in fields})
+    return use_case.start(job, folder, context)

@@ -1,0 +1,167 @@
+"""A folder's inputs are enough to run any use case again: read back, they are the job that wrote them."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from mu_addon.design.anchors import window
+from mu_addon.design.assets import asset_root
+from mu_addon.design.gripper import load_gripper
+from mu_addon.design.parameters import Chambers, Unit, load_preset
+from mu_addon.design.printing.printer import load_printer
+from mu_addon.errors import InputError
+from mu_addon.fem.protocol import Protocol
+from mu_addon.materials.library import load_material
+from mu_addon.measured import read_folder
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.run.context import RunContext
+from mu_addon.run.folder import keep_inputs, same_inputs
+from mu_addon.run.progress import Progress
+from mu_addon.usecases.check_print import job as check
+from mu_addon.usecases.diagnose import design_experiments
+from mu_addon.usecases.diagnose import job as diagnose
+from mu_addon.usecases.export import job as export
+from mu_addon.usecases.export import specimens
+from mu_addon.usecases.fit_material import job as fit
+from mu_addon.usecases.grip import job as grip
+from mu_addon.usecases.grip.grasp import Cube, Grip
+from mu_addon.usecases.homogenize import job as homogenize
+from mu_addon.usecases.parameter_study.plan import parse_plan
+from mu_addon.usecases.parameter_study.run import Job as Sweep
+from mu_addon.usecases.reproduce.settings import Settings
+from mu_addon.usecases.resume import MODULES, resume, use_case_of
+from mu_addon.usecases.simulate_and_place import job as study
+
+DATA = Path(__file__).parent.parent / "data"
+OLD = DATA / "folders"
+UNIT = Unit(name='a "quoted" unit', chambers=Chambers(wall_mm=0.95))
+
+
+def jobs(folder):
+    """A job of every use case whose inputs are its own, none with what it has by default."""
+    protocol = Protocol([0.0, 1.0, 2.0], [0.0, 0.1 + 0.2, -20.0])
+    resin = load_material("elastic-50a-v1")
+    part = folder / "part.stl"
+    part.write_bytes(b"solid none")
+    (folder / "more.csv").write_text("time_s,pressure_kPa\n0,0\n1,20\n", encoding="utf-8")
+    sweep = """
+        format = 1
+        preset = "mu-0.75x"
+        protocol = "more.csv"
+        stages = "place"
+        points = 5
+        method = "sobol"
+        [simulate]
+        times = 2
+        [simulate.mesh]
+        refine = 0.4
+        [place]
+        rules = ["intersect"]
+        [vary]
+        chambers.wall_mm = { low = 0.8, high = 1.2, log = true }
+        "simulate.protocol" = { values = ["more.csv"] }
+    """
+    measured = read_folder(DATA / "treloar")
+    paper = read_folder(asset_root() / "examples" / "paper-moduli")
+    yield study.Job(UNIT, protocol, times=3, stages=("design", "simulate"), path="alpha4")
+    yield check.Job(load_printer(), UNIT, window(UNIT, "alpha4"), "export", direction=(0.1, 0.0, 1 / 3))
+    yield check.Job(load_printer(), stl=part.read_bytes(), stl_file=part)
+    yield export.Job(
+        UNIT, resin, window(UNIT, "alpha2"), "alpha2", ("stl", "txt"), "interactive", (0.1, 1 / 3), "calipers"
+    )
+    yield export.Job(UNIT, resin, ((0.0, 0.0, 6.25), (0.0, 0.0, 1 / 3)), "bent-7")
+    yield specimens.Job(UNIT, resin)
+    yield homogenize.Job(UNIT, homogenize.resin_of("elastic-50a-v1", UNIT), 2, ("stick",), 0.25, 1 / 3)
+    yield homogenize.Job(UNIT, homogenize.resin_of(None, load_preset("mu-1.5x")), frictions=())
+    yield grip.Job(
+        load_gripper("gripper"),
+        (Cube(10.0, 1 / 3),),
+        Grip(friction=0.3),
+        mesh=MeshSettings(refine=0.4),
+        rules=(),
+    )
+    yield diagnose.Job(paper)
+    yield diagnose.Job(paper, load_preset("mu-1.5x"))
+    yield design_experiments.Job(paper, noise={**design_experiments.NOISE, "angle": 1 / 3})
+    yield fit.Job(measured, ("yeoh", "neo-hooke"), ("uniaxial",), "relative")
+    yield Sweep(parse_plan(sweep, folder), workers=2)
+    yield Settings(
+        values={"chambers.wall_mm": 0.95},
+        values_name="mine",
+        held_cells=1 / 3,
+        gripper=False,
+    )
+
+
+def test_every_job_is_read_back_from_its_folder(tmp_path):
+    seen = set()
+    for number, job in enumerate(jobs(tmp_path)):
+        folder = tmp_path / f"{number}"
+        keep_inputs(folder, job.texts())
+        found = use_case_of(folder)
+        assert found.read(folder).texts() == job.texts()
+        assert found.layout.is_of(folder)
+        seen.add(found.layout.inputs)
+    assert seen == set(MODULES) - {"calibrate.toml"}
+
+
+@pytest.mark.parametrize("name", sorted(p.name for p in OLD.iterdir()))
+def test_a_folder_of_an_older_version_says_the_same(tmp_path, name):
+    """Inputs as the version before wrote them: read, and equal to what this version writes for them."""
+    folder = shutil.copytree(OLD / name, tmp_path / name)
+    found = use_case_of(folder)
+    job = found.read(folder)
+    texts = job.texts_in(folder)[0] if hasattr(job, "texts_in") else job.texts()
+    assert same_inputs(folder, {k: v for k, v in texts.items() if k != "resin.toml"})
+
+
+def test_measured_data_that_are_gone_or_others_are_named(tmp_path):
+    data = shutil.copytree(DATA / "treloar", tmp_path / "data")
+    keep_inputs(tmp_path / "out", fit.Job(read_folder(data)).texts())
+    context = RunContext(Progress())
+    moved = data.rename(tmp_path / "elsewhere")
+    with pytest.raises(InputError, match="the folder of measured data is not where it was") as caught:
+        resume(tmp_path / "out", context)
+    assert "[run] data" in caught.value.remedy
+    shutil.copytree(moved, data)
+    table = next(data.glob("*.csv"))
+    table.write_text(table.read_text().rstrip().rpartition("\n")[0] + "\n")
+    with pytest.raises(InputError, match="not those that the run was made with") as caught:
+        resume(tmp_path / "out", context)
+    assert caught.value.where == str(data)
+    # The same data somewhere else are the same inputs.
+    assert same_inputs(tmp_path / "out", fit.Job(read_folder(moved)).texts())
+
+
+def test_an_older_diagnosis_says_how_to_go_on(tmp_path):
+    keep_inputs(
+        tmp_path, {"diagnose.toml": f'{diagnose.LAYOUT.header}\nexperiments_sha256 = "0"\n\n[data]\n'}
+    )
+    with pytest.raises(InputError, match="does not say where the folder of measured data lies") as caught:
+        resume(tmp_path, RunContext(Progress()))
+    assert "by its own command, with this folder as --out" in caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("line", "what"),
+    [
+        ("cells = 2.5", "2.5 does not fit"),
+        ("cells = 99", "a specimen of 99 cells"),
+        ("frictions = 3", "3 does not fit"),
+        ("colour = 1", "unknown key 'colour'"),
+        ("run = 1", "run is not a table"),
+        ("format = 2", "format 2"),
+        ("cells = [", "this is not TOML"),
+    ],
+)
+def test_inputs_that_were_changed_by_hand_are_named(tmp_path, line, what):
+    keep_inputs(tmp_path, homogenize.Job(UNIT, homogenize.resin_of(None, UNIT)).texts())
+    path = tmp_path / "homogenize.toml"
+    key = line.partition(" ")[0]
+    kept = [old for old in path.read_text().splitlines() if not old.startswith(f"{key} =")]
+    path.write_text("\n".join([kept[0], line, *kept[1:]]))
+    with pytest.raises(InputError) as caught:
+        resume(tmp_path, RunContext(Progress()))
+    assert what in caught.value.what
+    assert "homogenize.toml" in f"{caught.value.where} {caught.value.what}"
