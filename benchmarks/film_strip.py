@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from mu_addon.design.anchors import anchors, window
+from mu_addon.design.anchors import anchor_points, window
 from mu_addon.design.parameters import read_unit
 from mu_addon.design.surface import stl_surface
 from mu_addon.fem.kinematics import bending_angle_deg
@@ -46,7 +46,7 @@ def pictures(run: Path) -> tuple[list[np.ndarray], list[float]]:
     """A picture (h, w, 4) and the bending angle in degrees at each of the pressures."""
     unit = read_unit(run / "unit.toml")
     chosen = next(iter(json.loads((run / "summary.json").read_text())["chosen"].values()))
-    line = anchors(unit)[list(window(unit, chosen).indices)]
+    line = anchor_points(unit)[list(window(unit, chosen).indices)]
     path = np.concatenate([np.linspace(a, b, 12) for a, b in pairwise(line)])
     vertices, triangles = stl_surface((run / "unit.stl").read_bytes())
     parts = unit_parts(unit.dimensions, vertices, triangles)

@@ -16,6 +16,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 from circumstances import circumstances
+from offset_fit import fit_offset
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.strut_cell import mass_g, relative_density, strut_cell
@@ -25,7 +26,7 @@ from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh
 from mu_addon.homogenize.compression import compress
 from mu_addon.homogenize.elasticity import effective_tensor
 from mu_addon.homogenize.modulus import modulus
-from mu_addon.homogenize.offset_response import OffsetResponse, fit_offset
+from mu_addon.homogenize.offset_response import OffsetResponse
 from mu_addon.homogenize.specimen import block_specimen
 from mu_addon.materials.library import load_material
 from mu_addon.report.charts import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas

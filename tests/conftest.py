@@ -7,6 +7,8 @@ from pathlib import Path
 
 from hypothesis import HealthCheck, settings
 
+from . import costs
+
 # Read when numpy is loaded, and by every process that a test starts: one core each, also where a test runs
 # alone, since threads that wait for each other on small systems only spin.
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
@@ -22,3 +24,13 @@ unhurried = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
 settings.register_profile("tests", derandomize=True, **unhurried)
 settings.register_profile("search", **unhurried)
 settings.load_profile("tests")
+
+
+def pytest_addoption(parser):
+    parser.addoption("--measure", action="store_true", help="write what each test costs into tests/costs.csv")
+
+
+def pytest_configure(config):
+    config.pluginmanager.register(costs.Order(costs.read()))
+    if config.getoption("--measure"):
+        config.pluginmanager.register(costs.Measure(config))

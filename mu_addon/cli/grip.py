@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from ..run.context import RunContext
     from .options import Commands
 
-COARSE = 0.4
-
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `grip`."""
@@ -91,7 +89,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
     from ..meshing.settings import MeshSettings
     from ..placement.inclusion import RULES
     from ..usecases.grip.grasp import Cube, Grip
-    from ..usecases.grip.job import REFINE, Job
+    from ..usecases.grip.job import COARSE, REFINE, Job
     from ..usecases.grip.phases import read_phases, shipped_phases
     from ..usecases.grip.run import USE_CASE
 

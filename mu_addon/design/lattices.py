@@ -131,14 +131,6 @@ class LatticeKind:
         return float(_distances(first[apart], second[apart]).min(initial=np.inf)) / self.divisions
 
     @cached_property
-    def from_centre(self) -> Array:
-        """Struts (k, 3), in cells, that leave the node at the cell's centre, where the anchors are."""
-        (centre,) = np.nonzero((2 * self.grid == self.divisions).all(axis=1))
-        here = np.isin(self.struts, centre)
-        both = np.concatenate([self.struts[here[:, 0]], self.struts[here[:, 1]][:, ::-1]])
-        return np.asarray(self.nodes[both[:, 1]] - self.nodes[both[:, 0]])
-
-    @cached_property
     def mirrors(self) -> tuple[bool, bool, bool]:
         """Whether the endless lattice is its own mirror image in the cell's mid-plane across x, y and z."""
         period = self.divisions

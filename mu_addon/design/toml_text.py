@@ -1,9 +1,8 @@
-"""TOML with line numbers in every complaint, and a writer for flat tables of described values."""
+"""TOML with line numbers in every complaint, and tables of described values with their comments."""
 
 from __future__ import annotations
 
 import difflib
-import json
 import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,6 +11,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..reading import parse_toml
+from ..toml_writer import Noted, toml_text, toml_value
 from .quantity import Description
 
 
@@ -37,16 +37,22 @@ def compose(
     head: Mapping[str, Any], tables: Mapping[str, Sequence[tuple[Description, Any]]], comments: bool
 ) -> str:
     """TOML text of the top-level values and of one table a name, with the descriptions as comments."""
-    lines = [f"{key} = {_value(value)}" for key, value in head.items()]
-    for name, rows in tables.items():
-        lines += ["", f"[{name}]"]
-        for d, value in rows:
-            if comments:
-                default = "" if value == d.default else f" (of the default, {_value(d.default)})"
-                note = f"{d.text}{f', in {d.unit}' if d.unit else ''}; {d.source}{default}"
-                lines += textwrap.wrap(note, 100, initial_indent="# ", subsequent_indent="#   ")
-            lines.append(f"{d.name} = {_value(value)}")
-    return "\n".join(lines) + "\n"
+    return toml_text(
+        {
+            **head,
+            **{
+                name: {d.name: Noted(value, _notes(d, value) if comments else ()) for d, value in rows}
+                for name, rows in tables.items()
+            },
+        }
+    )
+
+
+def _notes(d: Description, value: Any) -> tuple[str, ...]:
+    """Comment lines: meaning, unit and source of a value, and the default where it is another."""
+    default = "" if value == d.default else f" (of the default, {toml_value(d.default)})"
+    note = f"{d.text}{f', in {d.unit}' if d.unit else ''}; {d.source}{default}"
+    return tuple(textwrap.wrap(note, 100, initial_indent="# ", subsequent_indent="#   "))
 
 
 @contextmanager
@@ -100,11 +106,3 @@ def _unknown(
         f"{place(origin, line_of(text, where))}, {where}",
         f"known here: {', '.join(here)}",
     )
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    return repr(value)

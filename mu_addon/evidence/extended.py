@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +14,7 @@ from ..errors import InputError
 from ..files import write_text
 from ..homogenize.offset_response import OffsetResponse
 from ..reading import file_text, is_number, parse_toml
+from ..toml_writer import Noted, toml_text
 from .effect import LIBRARY
 from .verdict import Verdict
 
@@ -55,29 +55,28 @@ class ExtendedModel:
 
     def text(self) -> str:
         """What model.toml holds."""
-        lines = ["# Effects that measured data named, with what each parameter is known to.", ""]
-        lines.append(f"verdict = {json.dumps(self.verdict)}")
-        for effect, parameters in self.effects.items():
-            lines += ["", f"# {LIBRARY[effect][0]}"]
-            for name, f in parameters.items():
-                lines += [f"[effect.{effect}.{name}]", *_lines(f)]
-        for name, f in self.nuisances.items():
-            lines += ["", f"[nuisance.{name}]", *_lines(f)]
-        if self.lattice:
-            lines += [
-                "",
-                "# The block that was compressed, by print offset at 1.0x: modulus over the resin's.",
-            ]
-            lines += ["[lattice]", *(f"{n} = {getattr(self.lattice, n).tolist()}" for n in _RESPONSE)]
-        return "\n".join(lines) + "\n"
+        effects = {
+            name: Noted({p: _numbers(f) for p, f in parameters.items()}, (LIBRARY[name][0],))
+            for name, parameters in self.effects.items()
+        }
+        nuisances = {name: _numbers(f) for name, f in self.nuisances.items()}
+        lattice = {name: getattr(self.lattice, name) for name in _RESPONSE} if self.lattice else {}
+        words = "The block that was compressed, by print offset at 1.0x: modulus over the resin's."
+        values = {
+            "verdict": self.verdict,
+            "effect": effects or None,
+            "nuisance": nuisances or None,
+            "lattice": Noted(lattice, (words,)) if lattice else None,
+        }
+        return toml_text(values, "Effects that measured data named, with what each parameter is known to.")
 
 
 _RESPONSE = tuple(a.name for a in attrs.fields(OffsetResponse))
 
 
-def _lines(f: Fitted) -> list[str]:
+def _numbers(f: Fitted) -> dict[str, float | str]:
     numbers = {"value": f.value, "sd": f.sd, "low95": f.low95, "high95": f.high95}
-    return [f"{k} = {v!r}" for k, v in numbers.items() if math.isfinite(v)] + [f"unit = {json.dumps(f.unit)}"]
+    return {k: v for k, v in numbers.items() if math.isfinite(v)} | {"unit": f.unit}
 
 
 def extended_model(verdict: Verdict, units: Mapping[str, str] = MappingProxyType({})) -> ExtendedModel:

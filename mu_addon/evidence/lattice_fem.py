@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from ..design.assets import asset_file, asset_names
 from ..design.parameters import Printing, Unit
 from ..design.strut_cell import StrutCell, relative_density, strut_cell
 from ..errors import InputError
-from ..files import read_npz, write_npz, write_text
+from ..files import write_text
 from ..homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell
 from ..homogenize.compression import Friction, compress
 from ..homogenize.modulus import modulus
@@ -21,6 +20,8 @@ from ..homogenize.offset_response import OffsetResponse
 from ..homogenize.specimen import block_specimen
 from ..measured import Experiment
 from ..reading import file_text, parse_toml
+from ..run.cache import Cache
+from ..toml_writer import toml_text
 from .prediction.lattice import KIND, ComputedCell, Scaling
 
 # Told of a block and the share that is done.
@@ -75,8 +76,8 @@ def response(block: Block, cache: Path | None = None, say: Progress = _silent) -
         kept = parse_toml(file_text(asset_file(SHIPPED, "response", name)), name)
         if kept["key"] == key:
             return OffsetResponse(kept["offset_mm"], kept["modulus"], kept["density"])
-    path = cache / f"lattice-{key}.npz" if cache else None
-    stored = read_npz(path) if path else None
+    table = Cache(cache) if cache else None
+    stored = table.get("lattice", key) if table else None
     if stored is not None and set(stored) == {"offset_mm", "modulus", "density"}:
         return OffsetResponse(stored["offset_mm"], stored["modulus"], stored["density"])
     moduli, densities = [], []
@@ -86,8 +87,9 @@ def response(block: Block, cache: Path | None = None, say: Progress = _silent) -
         moduli.append(relative)
         densities.append(density)
     found = OffsetResponse(OFFSETS_mm, moduli, densities)
-    if path:
-        write_npz(path, {"offset_mm": found.offsets_mm, "modulus": found.modulus, "density": found.density})
+    if table:
+        arrays = {"offset_mm": found.offsets_mm, "modulus": found.modulus, "density": found.density}
+        table.put("lattice", key, arrays)
     return found
 
 
@@ -108,20 +110,13 @@ def at_offset(block: Block, offset_mm: float, cache: Path | None = None) -> tupl
 
 def save(found: OffsetResponse, block: Block, path: Path) -> None:
     """Write a response as a file that `response` finds among those shipped; raises OutputError."""
-    lines = [
-        f"# Modulus over the resin's, and relative density, of {block},",
-        f"# the {block.cell.kind.name} lattice at 1.0x with a print offset of every surface.",
-        f"key = {json.dumps(block.key())}",
-        *(
-            f"{name} = {[float(f'{v:.6g}') for v in values]}"
-            for name, values in (
-                ("offset_mm", found.offsets_mm),
-                ("modulus", found.modulus),
-                ("density", found.density),
-            )
-        ),
-    ]
-    write_text(path, "\n".join(lines) + "\n")
+    arrays = {"offset_mm": found.offsets_mm, "modulus": found.modulus, "density": found.density}
+    values = {name: [float(f"{v:.6g}") for v in array] for name, array in arrays.items()}
+    head = (
+        f"Modulus over the resin's, and relative density, of {block},\n"
+        f"the {block.cell.kind.name} lattice at 1.0x with a print offset of every surface."
+    )
+    write_text(path, toml_text({"key": block.key(), **values}, head))
 
 
 def printed(print_: Printing) -> tuple[float, float]:

@@ -204,13 +204,6 @@ def similarity(found: Sequence[Sensitivity]) -> Array:
     return np.asarray(unit.T @ unit)
 
 
-def collinearity(found: Sequence[Sensitivity]) -> float:
-    """Index of Brun et al. 2001 of a set of effects: 1 if independent; above 10 to 15 they act as fewer."""
-    unit = _unit(found)
-    least = float(np.linalg.eigvalsh(unit.T @ unit)[0])
-    return 1.0 / math.sqrt(least) if least > 1e-14 else math.inf
-
-
 def _unit(found: Sequence[Sensitivity]) -> Array:
     columns = np.stack([s.column if s.unabsorbed > ABSORBED else 0.0 * s.column for s in found], axis=1)
     length = np.linalg.norm(columns, axis=0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 import attrs
@@ -121,13 +121,3 @@ def _shared(known: Parameter, other: Parameter) -> Parameter:
             f"two simulators describe {known.name} differently", "simulators", "give it one unit and one null"
         )
     return attrs.evolve(known.narrowed(other.low, other.high), spread=min(known.spread, other.spread))
-
-
-def effect_named(effects: Sequence[Effect], name: str) -> Effect:
-    """The effect of that name; raises InputError."""
-    for e in effects:
-        if e.name == name:
-            return e
-    raise InputError(
-        f"unknown effect or parameter {name!r}", "effects", f"known: {', '.join(e.name for e in effects)}"
-    )

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import math
-import multiprocessing
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,18 +15,19 @@ import numpy as np
 
 from ..design.parameters import Unit
 from ..design.quantity import in_MPa
-from ..errors import ConvergenceError, InputError, MeshingError, MuError
+from ..errors import ConvergenceError, InputError, MeshingError
 from ..fem.equilibrium import Equilibrium
 from ..fem.kinematics import TipSection
 from ..fem.lattice_law import LatticeLaw
 from ..fem.state import State
 from ..fem.trajectory import branches
-from ..files import read_npz, write_npz
 from ..measured import Experiment
 from ..meshing.mesh import AXES
 from ..meshing.settings import MeshSettings
 from ..meshing.unit import mesh_unit
-from ..run.processes import cores, ctrl_c_ignored, end_with_parent, one_thread_each
+from ..run.cache import Cache
+from ..run.pool import each
+from ..run.processes import cores
 from .markers import Marker, attached, followed
 from .prediction.unit import KIND, UnitResponse, Variant
 from .prediction.wall import NAME as WALL
@@ -278,15 +277,6 @@ def _counted_alike(responses: Sequence[UnitResponse]) -> list[UnitResponse]:
     ]
 
 
-def unit_markers(
-    unit: Unit, experiments: Sequence[Experiment], settings: UnitSettings | None = None
-) -> dict[float, tuple[Marker, ...]]:
-    """Where the markers of unit_pressure experiments sit on the unit, by scale; see `attached`."""
-    settings = settings or UnitSettings()
-    chosen = [e for e in experiments if e.kind == KIND]
-    return {s: _Plan.of(unit, chosen, s, settings, None).markers for s in sorted({e.scale for e in chosen})}
-
-
 def similar(unit: Unit) -> Unit:
     """The unit at 1.0x that moves as this one does, all lengths alike; this one where it cannot be drawn.
 
@@ -484,16 +474,17 @@ def _warn(text: str) -> None:
 
 def _found(cases: dict[str, Run], workers: int, cache: Path | None, say: Progress) -> dict[str, Result]:
     """Results by key, from the cache where they are there, and kept there as soon as one is found."""
+    table = None if cache is None else Cache(cache)
     found: dict[str, Result] = {}
     for key, case in cases.items():
-        result = _stored(cache, key, case)
+        result = None if table is None else _stored(table, key, case)
         if result is not None:
             found[key] = result
     missing = {key: case for key, case in cases.items() if key not in found}
     for key, result in _solved(missing, workers, cache):
         found[key] = result
-        if cache is not None:
-            write_npz(_path(cache, key), {"values": result.values, "why": np.array(result.why)})
+        if table is not None:
+            table.put("unit", key, {"values": result.values, "why": np.array(result.why)})
         case = cases[key]
         what = f"{case.effect} = {case.size:g}" if case.effect else "base"
         say(f"unit, {what}", len(found) / len(cases))
@@ -501,38 +492,18 @@ def _found(cases: dict[str, Run], workers: int, cache: Path | None, say: Progres
 
 
 def _solved(missing: dict[str, Run], workers: int, cache: Path | None) -> Iterator[tuple[str, Result]]:
-    rest_ = dict(missing)
+    keys, cases = list(missing), list(missing.values())
     # One run here first: it compiles what the processes then find compiled.
-    for key in list(rest_)[: 1 if workers > 1 else None]:
-        yield key, run(rest_.pop(key), cache)
-    if not rest_:
-        return
-    context = multiprocessing.get_context("spawn")
-    with one_thread_each(), ProcessPoolExecutor(workers, context, end_with_parent) as pool:
-        with ctrl_c_ignored():
-            waiting = {pool.submit(run, case, cache): key for key, case in rest_.items()}
-        try:
-            for done in as_completed(waiting):
-                yield waiting[done], done.result()
-        except BrokenProcessPool:
-            raise MuError(
-                "a process that simulated the unit ended unexpectedly",
-                "unit_pressure",
-                "run the command again, it resumes; if memory is short, use 1 worker",
-            ) from None
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+    first = 1 if workers > 1 else len(cases)
+    for key, case in zip(keys[:first], cases[:first], strict=True):
+        yield key, run(case, cache)
+    for number, result in each(partial(run, cache=cache), cases[first:], workers, "unit_pressure"):
+        yield keys[first + number], result
 
 
-def _path(cache: Path, key: str) -> Path:
-    return cache / f"unit-{key}.npz"
-
-
-def _stored(cache: Path | None, key: str, case: Run) -> Result | None:
+def _stored(table: Cache, key: str, case: Run) -> Result | None:
     """A kept result, or None where there is none that can be read whole."""
-    if cache is None:
-        return None
-    kept = read_npz(_path(cache, key))
+    kept = table.get("unit", key)
     if kept is None or not {"values", "why"} <= set(kept):
         return None
     shape = (case.rows, len(case.pressures_kPa))

@@ -63,11 +63,6 @@ class Point:
         """Whether the point is stable at its pressure."""
         return self.negative == 0
 
-    @property
-    def stable_at_volume(self) -> bool:
-        """Whether it is stable where not pressure but volume is held, by an incompressible filling."""
-        return self.negative == int(self.compliance < 0)
-
 
 @attrs.frozen(eq=False)
 class Node:

@@ -44,11 +44,6 @@ class Inertia:
         pattern = self.model.pattern
         return LDL(pattern.indptr, pattern.indices, pattern.order)
 
-    @property
-    def by_ldl(self) -> bool:
-        """Whether the last tangent took an L D L^T."""
-        return self._engine is not self.model.factor
-
     def suspect(self, mode: Array) -> None:
         """Tell a mode (free unknowns) that may be lost next: its springs are tried before an L D L^T."""
         self._suspect = mode

@@ -1,4 +1,4 @@
-"""What no arrangement of given phases can exceed: Voigt, Reuss and Hashin-Shtrikman bounds."""
+"""What no isotropic arrangement of given phases can exceed: the bounds of Hashin and Shtrikman."""
 
 from __future__ import annotations
 
@@ -28,18 +28,6 @@ class Moduli:
     def young(self) -> float:
         """Young's modulus in MPa."""
         return 9 * self.bulk * self.shear / (3 * self.bulk + self.shear) if self.shear else 0.0
-
-
-def voigt(shares: ArrayLike, bulk: ArrayLike, shear: ArrayLike) -> Moduli:
-    """Mean moduli of phases (k,), shares of the volume summing to 1: an upper bound under any strain."""
-    f, K, G = _phases(shares, bulk, shear)
-    return Moduli(float(f @ K), float(f @ G))
-
-
-def reuss(shares: ArrayLike, bulk: ArrayLike, shear: ArrayLike) -> Moduli:
-    """Harmonic mean moduli of phases (k,): a lower bound; 0 where a phase is a void."""
-    f, K, G = _phases(shares, bulk, shear)
-    return Moduli(_harmonic(f, K, 0.0), _harmonic(f, G, 0.0))
 
 
 def hashin_shtrikman(shares: ArrayLike, bulk: ArrayLike, shear: ArrayLike) -> tuple[Moduli, Moduli]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
@@ -18,6 +17,7 @@ from ..fem.lattice_law import LatticeLaw
 from ..fem.laws import Foam
 from ..files import write_text
 from ..reading import file_text, parse_toml
+from ..toml_writer import Noted, toml_text
 from .foam_fit import NAME, FoamFit, Misfit, lattice_law, require_stable, stable_pressed, stable_shear
 
 Array = np.ndarray[Any, Any]
@@ -143,10 +143,8 @@ class Effective:
             _DERIVED: ("Derived from the tables above for the reader; not read back.", derived),
             "provenance": ("Program and inputs that made this file.", self.provenance),
         }
-        lines = [_HEAD, f"format = {FORMAT}"]
-        for name, (comment, rows) in tables.items():
-            lines += ["", f"# {comment}", f"[{name}]", *(f"{k} = {_toml(v)}" for k, v in rows.items())]
-        return "\n".join(lines) + "\n"
+        noted = {name: Noted(rows, (comment,)) for name, (comment, rows) in tables.items()}
+        return toml_text({"format": FORMAT, **noted}, _HEAD)
 
     @property
     def _moduli(self) -> tuple[float, float, float]:
@@ -293,14 +291,6 @@ def _require_moduli(found: Effective) -> None:
             "[moduli] relative_density",
             "give a share of the volume, above 0 and up to 1",
         )
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    return repr(float(value)) if isinstance(value, float) else repr(int(value))
 
 
 def _version() -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +19,7 @@ from ..fem import laws
 from ..fem.materials import Layer, Materials
 from ..files import write_text
 from ..reading import file_text
+from ..toml_writer import toml_value
 from .coupon import MODES, Array
 from .stability import Stability, check_stability, whole_ranges
 
@@ -420,9 +420,9 @@ def write_material(material: Material, path: Path, head: str = "") -> None:
 def material_text(material: Material, head: str = "") -> str:
     """A material as TOML text."""
     lines = [f"# {line}".rstrip() for line in head.splitlines()]
-    lines += [f"format = {FORMAT}", f"name = {_quoted(material.name)}"]
+    lines += [f"format = {FORMAT}", f"name = {toml_value(material.name)}"]
     if material.about:
-        lines.append(f"about = {_quoted(material.about)}")
+        lines.append(f"about = {toml_value(material.about)}")
     for value in material.values.values():
         lines += ["", f"[{value.name}]", f"value = {value.value!r}"]
         lines += [
@@ -430,35 +430,33 @@ def material_text(material: Material, head: str = "") -> str:
             for key, bound in (("low", value.low), ("high", value.high))
             if bound is not None
         ]
-        lines += [f"unit = {_quoted(value.unit)}"]
-        lines += [f"confidence = {_quoted(value.confidence)}", f"source = {_quoted(value.source)}"]
+        lines += [f"unit = {toml_value(value.unit)}"]
+        lines += [f"confidence = {toml_value(value.confidence)}", f"source = {toml_value(value.source)}"]
     for point in material.points:
-        lines += ["", "[[point]]", f"mode = {_quoted(point.mode)}", f"strain = {point.strain!r}"]
-        lines += [f"stress_MPa = {point.stress_MPa!r}", f"confidence = {_quoted(point.confidence)}"]
-        lines += [f"source = {_quoted(point.source)}"]
+        lines += ["", "[[point]]", f"mode = {toml_value(point.mode)}", f"strain = {point.strain!r}"]
+        lines += [f"stress_MPa = {point.stress_MPa!r}", f"confidence = {toml_value(point.confidence)}"]
+        lines += [f"source = {toml_value(point.source)}"]
     row = dict(zip(material.law.parameter_names, material.parameters.tolist(), strict=True))
-    lines += ["", "[law]", f"name = {_quoted(material.law.name)}"]
+    lines += ["", "[law]", f"name = {toml_value(material.law.name)}"]
     tables = [("parameters", row), ("low95", material.low95), ("high95", material.high95)]
-    lines += [f"{key} = {_inline(table)}" for key, table in tables if table]
-    lines += [f"confidence = {_quoted(material.law_confidence)}", f"source = {_quoted(material.law_source)}"]
-    spans = ", ".join(f"{mode} = [{low!r}, {high!r}]" for mode, (low, high) in material.ranges.items())
-    lines += [f"ranges = {{ {spans} }}"]
+    lines += [
+        f"{key} = {toml_value({name: float(value) for name, value in table.items()})}"
+        for key, table in tables
+        if table
+    ]
+    lines += [
+        f"confidence = {toml_value(material.law_confidence)}",
+        f"source = {toml_value(material.law_source)}",
+    ]
+    lines += [f"ranges = {toml_value(material.ranges)}"]
     if material.fails:
-        lines += [f"fails = {json.dumps(list(material.fails))}"]
+        lines += [f"fails = {toml_value(material.fails)}"]
     wall = [name for name in material.wall.names if name in _WALL]
     if wall:
         lines += ["", "[wall]"]
         for name in wall:
             value = getattr(material.wall, name)
-            lines.append(f"{name} = {_quoted(value) if isinstance(value, str) else repr(value)}")
-        lines += [f"confidence = {_quoted(material.wall_confidence)}"]
-        lines += [f"source = {_quoted(material.wall_source)}"]
+            lines.append(f"{name} = {toml_value(value)}")
+        lines += [f"confidence = {toml_value(material.wall_confidence)}"]
+        lines += [f"source = {toml_value(material.wall_source)}"]
     return "\n".join(lines) + "\n"
-
-
-def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)
-
-
-def _inline(table: Mapping[str, float]) -> str:
-    return "{ " + ", ".join(f"{name} = {float(value)!r}" for name, value in table.items()) + " }"

@@ -103,10 +103,6 @@ class Influence:
         weights = polynomials(self.pressure_MPa, pressures_MPa)
         return Influence(np.asarray(pressures_MPa), np.tensordot(weights, self.displacement, axes=1))
 
-    def of_modulus(self, modulus_MPa: Array) -> Array:
-        """The map (s, p, 3, m) in mm/MPa by each element's Young's modulus (m,) in MPa."""
-        return self.displacement / modulus_MPa
-
 
 def influence_map(
     model: Model,

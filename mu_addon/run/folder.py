@@ -13,7 +13,7 @@ import attrs
 from ..errors import InputError, OutputError
 from ..files import make_folder, output_error, write_text
 from ..reading import file_bytes, parse_toml
-from .lock import LOCK
+from .lock import LOCK, FolderLock
 
 if TYPE_CHECKING:
     from .context import RunContext
@@ -82,6 +82,18 @@ def claim(folder: Path, layout: FolderLayout, inputs: Mapping[str, str]) -> None
     if any(not _same(name, text, inputs.get(name)) for name, text in before.items()):
         _set_aside(folder, (*may, *layout.results, *ALWAYS))
     keep_inputs(folder, inputs)
+
+
+def write_run(folder: Path, layout: FolderLayout, inputs: Mapping[str, str]) -> None:
+    """Write a run's inputs into its folder, for another process to `resume` it; see `claim`.
+
+    Raises InputError, also where another process works in the folder, and OutputError.
+    """
+    lock = FolderLock(folder)
+    try:
+        claim(folder, layout, inputs)
+    finally:
+        lock.release()
 
 
 def same_inputs(folder: Path, inputs: Mapping[str, str]) -> bool:

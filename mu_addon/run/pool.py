@@ -1,12 +1,14 @@
-"""Independent tasks in worker processes."""
+"""Work in processes of their own: one pool for candidates, columns and the evidence's simulations."""
 
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from typing import TypeVar
+from contextlib import closing, contextmanager
+from typing import Any, TypeVar
 
 from ..errors import MuError
 from .processes import ctrl_c_ignored, end_with_parent, one_thread_each
@@ -15,32 +17,88 @@ Task = TypeVar("Task")
 Found = TypeVar("Found")
 
 
-def each(work: Callable[[Task], Found], tasks: Sequence[Task], workers: int) -> Iterator[tuple[int, Found]]:
+class Pool:
+    """Processes of one thread each that end with this one; started when first needed, until closed.
+
+    what: names their work in errors. start, arguments: what each process calls first.
+    """
+
+    def __init__(
+        self,
+        workers: int,
+        what: str,
+        start: Callable[..., None] | None = None,
+        arguments: tuple[Any, ...] = (),
+    ) -> None:
+        self.workers, self.what = workers, what
+        self._begin = start, arguments
+        self._pool: ProcessPoolExecutor | None = None
+
+    def submit(self, work: Callable[..., Found], *arguments: Any) -> Future[Found]:
+        """Have a process do `work`, a module's own function. Raises MuError where a process has died."""
+        with one_thread_each():
+            _survive_broken_pipes()
+            if self._pool is None:
+                context = multiprocessing.get_context("spawn")
+                self._pool = ProcessPoolExecutor(self.workers, context, _start, self._begin)
+            with ctrl_c_ignored(), self._errors():
+                return self._pool.submit(work, *arguments)
+
+    def result(self, future: Future[Found]) -> Found:
+        """What was found, once it is there. Raises what the work raised, and MuError where a process died."""
+        with self._errors():
+            return future.result()
+
+    @contextmanager
+    def _errors(self) -> Iterator[None]:
+        try:
+            yield
+        except BrokenProcessPool:
+            raise MuError(
+                "a worker process ended unexpectedly",
+                self.what,
+                "run the command again, it resumes; if memory is short, use --workers 1",
+            ) from None
+
+    def close(self) -> None:
+        """End the processes, at once: whoever stops early does not wait for what nobody will read."""
+        if self._pool is None:
+            return
+        processes = list((self._pool._processes or {}).values())
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.terminate()
+            process.join()
+
+
+def each(
+    work: Callable[[Task], Found], tasks: Sequence[Task], workers: int, what: str = ""
+) -> Iterator[tuple[int, Found]]:
     """Number of each task as it is done, and what `work`, a module's own function, found.
 
-    Whoever stops listening ends the processes. Raises what `work` raises, and MuError where a process dies.
+    what: names the work in errors. Whoever stops listening ends the processes. Raises what `work` raises, and
+    MuError where a process dies.
     """
     if workers == 1 or len(tasks) < 2:
         for number, task in enumerate(tasks):
             yield number, work(task)
         return
-    context = multiprocessing.get_context("spawn")
-    with one_thread_each():
-        pool = ProcessPoolExecutor(min(workers, len(tasks)), context, end_with_parent)
-        try:
-            with ctrl_c_ignored():
-                numbers = {pool.submit(work, task): number for number, task in enumerate(tasks)}
-            for done in as_completed(numbers):
-                yield numbers[done], done.result()
-        except BrokenProcessPool:
-            raise MuError(
-                "a worker process ended unexpectedly",
-                work.__name__,
-                "run the command again, it resumes; if memory is short, use --workers 1",
-            ) from None
-        finally:
-            processes = list((pool._processes or {}).values())
-            pool.shutdown(wait=False, cancel_futures=True)
-            for process in processes:
-                process.terminate()
-                process.join()
+    with closing(Pool(min(workers, len(tasks)), what)) as pool:
+        numbers = {pool.submit(work, task): number for number, task in enumerate(tasks)}
+        for done in as_completed(numbers):
+            yield numbers[done], pool.result(done)
+
+
+def _start(start: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
+    end_with_parent()
+    if start is not None:
+        start(*arguments)
+
+
+def _survive_broken_pipes() -> None:
+    """Writing to a process that has ended must be an error, as Python has it, not the end of this one.
+
+    The compiler inside Warp resets what Python had set when it starts.
+    """
+    if hasattr(signal, "SIGPIPE"):
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)

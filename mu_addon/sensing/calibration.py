@@ -11,7 +11,6 @@ Source: Ramsay, Statistical Science 3 (1988) 425, for monotone splines by increm
 from __future__ import annotations
 
 import itertools
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,6 +25,7 @@ from scipy.special import stdtrit
 from ..errors import InputError
 from ..files import write_text
 from ..reading import file_text, is_number, parse_toml
+from ..toml_writer import Noted, toml_text
 
 Array = np.ndarray[Any, Any]
 
@@ -335,24 +335,21 @@ def write_calibration(path: Path, calibration: Calibration, about: str = "") -> 
     """Write a calibration as TOML; raises OutputError."""
     c = calibration
     low, high = c.range_deg
-    dark = repr(c.dark) if not isinstance(c.dark, str) else json.dumps(c.dark)
-    lines = [
-        f"# {line}" for line in ["A sensor's map from voltage to bending angle.", *about.splitlines()] if line
-    ]
-    lines += [
-        f"version = {VERSION}",
-        f"channel = {json.dumps(c.channel)}",
-        f"dark = {dark}  # a channel, or a level in V",
-        f"range_deg = [{low!r}, {high!r}]",
-        f"knots_deg = {c.knots.tolist()!r}",
-        f"coefficients_V = {c.coefficients.tolist()!r}",
-        f"band_V = {c.band_V!r}  # 95 %",
-        f"drift_per_h = {c.drift_per_h!r}",
-        f"gain = {c.gain!r}",
-        f"sweeps = {c.sweeps}",
-        f"error_deg = {c.error_deg!r}  # leave-one-out, root mean square",
-    ]
-    write_text(path, "\n".join(lines) + "\n")
+    values = {
+        "version": VERSION,
+        "channel": c.channel,
+        "dark": Noted(c.dark, beside="a channel, or a level in V"),
+        "range_deg": [low, high],
+        "knots_deg": c.knots,
+        "coefficients_V": c.coefficients,
+        "band_V": Noted(c.band_V, beside="95 %"),
+        "drift_per_h": c.drift_per_h,
+        "gain": c.gain,
+        "sweeps": c.sweeps,
+        "error_deg": Noted(c.error_deg, beside="root mean square, in sweeps left out"),
+    }
+    head = ["A sensor's map from voltage to bending angle.", *about.splitlines()]
+    write_text(path, toml_text(values, "\n".join(line for line in head if line)))
 
 
 def read_calibration(path: Path) -> Calibration:

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from .. import costs
+
 ROOT = Path(__file__).resolve().parents[2]
 OTHERS = [path for path in os.environ.get("MU_BPY", "").split(os.pathsep) if path]
 PASSED_ON = "PATH", "LD_LIBRARY_PATH", "LANG", "WARP_CACHE_PATH"
@@ -37,7 +39,8 @@ class Blender:
         try:
             pickle.dump((module, function, registered, arguments), self.process.stdin)
             self.process.stdin.flush()
-            failure, found = pickle.load(self.process.stdout)
+            failure, found, seconds = pickle.load(self.process.stdout)
+            costs.elsewhere += seconds
         except (EOFError, BrokenPipeError, pickle.UnpicklingError):
             status = self.close()
             failure, found = f"Blender ended with status {status} in {function}", None

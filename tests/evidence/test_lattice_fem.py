@@ -4,12 +4,12 @@ import attrs
 import numpy as np
 import pytest
 
+from benchmarks.offset_fit import fit_offset
 from mu_addon.design.parameters import Printing, load_preset
 from mu_addon.errors import InputError
 from mu_addon.evidence import lattice_fem
 from mu_addon.evidence.lattice_fem import OFFSETS_mm, at_offset, block_of, response, scalings
 from mu_addon.evidence.prediction.lattice import SLENDER, LatticeStress
-from mu_addon.homogenize.offset_response import fit_offset
 
 from .test_prediction_lattice import block
 

@@ -14,7 +14,7 @@ from mu_addon.evidence.record import record
 from mu_addon.evidence.residuals import dependence_table, strict_table, structure
 from mu_addon.evidence.selection import one_more, reselected, select
 from mu_addon.evidence.sensitivity import sensitivities
-from mu_addon.evidence.simulator import Composite, effect_named
+from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
 from tests.evidence import analytic, stand_ins
 
@@ -184,7 +184,7 @@ def both_kinds():
 
 def test_a_gain_is_told_of_every_quantity_and_first_of_one_that_changed(both_kinds):
     fitter, held = both_kinds
-    rubbing = effect_named(fitter.simulator.effects, "rate_independent_hysteresis")
+    rubbing = next(e for e in fitter.simulator.effects if e.name == "rate_independent_hysteresis")
     base, extended = fitter.fit(), fitter.best([rubbing], list(rubbing.starts()))
     assert fitter.record.groups[0].startswith("beam_deadweight")
     found = gain(fitter, base, extended, held)

@@ -18,9 +18,9 @@ from mu_addon.evidence.unit_fem import (
     Run,
     UnitResponseWarning,
     UnitSettings,
+    _Plan,
     pressures,
     run,
-    unit_markers,
     unit_responses,
 )
 from mu_addon.fem.clogged import CloggedModel
@@ -313,12 +313,16 @@ def test_without_x_a_marker_lies_in_the_sagittal_plane(mesh):
         attached(mesh, [bench(markers={4: (9.0, 20.0, 40.0)}, axes="xy")], 4.0)
 
 
+def markers_of(experiment):
+    """Where the markers of an experiment at 1.0x sit on the unit."""
+    return _Plan.of(UNIT, [experiment], 1.0, UnitSettings(), None).markers
+
+
 def test_a_marker_off_the_unit_is_named():
     with pytest.raises(InputError, match=r"marker 3 lies 11\.2 mm from the unit") as error:
-        unit_markers(UNIT, [bench("bad camera", {1: MARKERS[1], 3: (30.0, 10.0, 40.0)})])
+        markers_of(bench("bad camera", {1: MARKERS[1], 3: (30.0, 10.0, 40.0)}))
     assert error.value.where == "bad camera"
-    one = unit_markers(UNIT, [bench()])[1.0]
-    assert [m.number for m in one] == [1, 2]
+    assert [m.number for m in markers_of(bench())] == [1, 2]
 
 
 def test_a_marker_on_two_places_is_named(mesh):

@@ -28,6 +28,19 @@ def finished(tmp_path_factory):
     return folder, done
 
 
+# Linear elements show as well that a run comes to the same digits by another way.
+QUICK = (*COARSE, "--order", "1")
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory):
+    """The same run of linear elements, for what is compared with itself."""
+    folder = tmp_path_factory.mktemp("quick") / "out"
+    done = run("place", "--preset", "mu-1.0x", "--out", folder, *QUICK)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
 def rows(folder):
     with (folder / "deviation.csv").open(newline="") as file:
         return list(csv.DictReader(file))
@@ -167,22 +180,21 @@ def test_other_inputs_set_old_results_aside(finished, tmp_path):
     assert (folder / "stale" / "unit.stl").exists()
 
 
-def test_one_worker_finds_the_same(finished, tmp_path):
-    folder, _ = finished
+def test_one_worker_finds_the_same(quick, tmp_path):
     arguments = ("--rule", "volume_fraction", "--no-mesh-check", "--workers", "1")
-    done = run("place", "--preset", "mu-1.0x", "--out", tmp_path / "one", *COARSE, *arguments)
+    done = run("place", "--preset", "mu-1.0x", "--out", tmp_path / "one", *QUICK, *arguments)
     assert done.returncode == 0
-    expected = [row["J_hat_mm"] for row in rows(folder) if row["rule"] == "volume_fraction"]
+    expected = [row["J_hat_mm"] for row in rows(quick) if row["rule"] == "volume_fraction"]
     assert [row["J_hat_mm"] for row in rows(tmp_path / "one")] == expected
 
 
 @pytest.fixture(scope="module")
-def searched(finished, tmp_path_factory):
+def searched(tmp_path_factory):
     """A search of the whole lattice, with limits that leave few paths, after the same study's windows."""
     folder = tmp_path_factory.mktemp("search") / "out"
     limits = ("--paths", "graph", "--shortest-cells", "4.5", "--longest-cells", "5", "--bend-deg", "20")
     arguments = ("--rule", "volume_fraction", "--no-mesh-check", *limits)
-    done = run("place", "--preset", "mu-1.0x", "--out", folder, *COARSE, *arguments)
+    done = run("place", "--preset", "mu-1.0x", "--out", folder, *QUICK, *arguments)
     assert done.returncode == 0, done.stderr
     return folder, done
 
@@ -223,7 +235,7 @@ def test_limits_that_leave_no_path_are_refused(tmp_path):
 
 
 def started(out):
-    words = command("place", "--preset", "mu-1.0x", "--out", out, *COARSE)
+    words = command("place", "--preset", "mu-1.0x", "--out", out, *QUICK)
     return subprocess.Popen(
         words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
@@ -258,8 +270,7 @@ def test_killed_it_leaves_no_process_behind_and_does_not_pass_for_complete(tmp_p
     assert json.loads((out / "summary.json").read_text())["status"] == "running"
 
 
-def test_interrupted_it_keeps_what_it_has_and_resumes_to_the_same_digits(finished, tmp_path):
-    folder, _ = finished
+def test_interrupted_it_keeps_what_it_has_and_resumes_to_the_same_digits(quick, tmp_path):
     out = tmp_path / "out"
     process = started(out)
     wait_for_a_state_swept(process, out)
@@ -273,8 +284,8 @@ def test_interrupted_it_keeps_what_it_has_and_resumes_to_the_same_digits(finishe
     assert "Ctrl-C" in summary["reason"]["what"]
     assert "This run is partial" in (out / "report.html").read_text()
     assert (out / "unit.stl").exists()
-    assert run("place", "--preset", "mu-1.0x", "--out", out, *COARSE).returncode == 0
-    assert same_delta(out, folder)
+    assert run("place", "--preset", "mu-1.0x", "--out", out, *QUICK).returncode == 0
+    assert same_delta(out, quick)
 
 
 def same_delta(one, other):
@@ -283,18 +294,17 @@ def same_delta(one, other):
         return set(a.files) == set(b.files) and all(np.array_equal(a[n], b[n]) for n in a.files)
 
 
-def test_it_is_the_same_inside_bpy(finished, tmp_path):
+def test_it_is_the_same_inside_bpy(quick, tmp_path):
     pytest.importorskip("bpy", reason="the bpy wheel is for Python 3.11 only")
-    folder, _ = finished
     out = tmp_path / "out"
     script = f"""
 import bpy, runpy, sys
 sys.argv = ["blender", "-b", "-P", {str(RUN)!r}, "--", "place", "--preset", "mu-1.0x", "--out", {str(out)!r}]
-sys.argv += {list(COARSE)!r}
+sys.argv += {list(QUICK)!r}
 runpy.run_path({str(RUN)!r}, run_name="__main__")
 """
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=PATIENCE_S, cwd=ROOT.parent
     )
     assert done.returncode == 0, done.stderr
-    assert same_delta(out, folder)
+    assert same_delta(out, quick)

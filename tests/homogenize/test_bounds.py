@@ -10,10 +10,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mu_addon.errors import InputError
-from mu_addon.homogenize.bounds import Moduli, hashin_shtrikman, reuss, voigt
+from mu_addon.homogenize.bounds import Moduli, _harmonic, _phases, hashin_shtrikman
 
 MODULUS = st.floats(0.01, 100.0)
 PHASE = st.tuples(st.floats(0.01, 1.0), MODULUS, MODULUS)
+
+
+def voigt(shares, bulk, shear):
+    """Mean moduli of phases (k,), shares of the volume summing to 1: an upper bound under any strain."""
+    f, K, G = _phases(shares, bulk, shear)
+    return Moduli(float(f @ K), float(f @ G))
+
+
+def reuss(shares, bulk, shear):
+    """Harmonic mean moduli of phases (k,): a lower bound; 0 where a phase is a void."""
+    f, K, G = _phases(shares, bulk, shear)
+    return Moduli(_harmonic(f, K, 0.0), _harmonic(f, G, 0.0))
 
 
 def test_two_phases_as_hashin_and_shtrikman_write_them():

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from benchmarks.offset_fit import fit_offset
 from mu_addon.errors import InputError
-from mu_addon.homogenize.offset_response import OffsetResponse, fit_offset
+from mu_addon.homogenize.offset_response import OffsetResponse
 
 OFFSETS = np.linspace(-0.1, 0.4, 11)
 SCALES = [0.75, 1.0, 1.5]

@@ -16,8 +16,9 @@ from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh
 from mu_addon.homogenize.elasticity import effective_tensor
 from mu_addon.homogenize.specimen import repeated
 from mu_addon.homogenize.stretch import Stretching, StretchSettings, stretch_lattice
-from mu_addon.meshing.tiling import tiled, tiled_displacement
+from mu_addon.meshing.tiling import tiled
 from tests.fem import bodies
+from tests.homogenize.tiled_motion import tiled_displacement
 
 from . import cells
 

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from mu_addon.errors import MeshingError
 from mu_addon.meshing.mesh import TET_EDGES, boundary_faces, mirror
 from mu_addon.meshing.quality import element_volumes
-from mu_addon.meshing.tiling import box_of, tiled, tiled_displacement
+from mu_addon.meshing.tiling import box_of, tiled
 from tests.fem import bodies
+from tests.homogenize.tiled_motion import tiled_displacement
 
 COUNTS = st.tuples(*[st.integers(1, 4)] * 3)
 SIZES = st.tuples(*[st.floats(0.1, 7.3)] * 3)

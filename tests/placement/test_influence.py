@@ -154,8 +154,6 @@ def test_the_map_is_nowhere_negative_and_a_soft_lattice_element_matters_less_tha
     J = deviation_map(found, gradients, shares_of_time(baseline))
     assert J.min() >= 0
     assert J[mesh.region == LATTICE].mean() < J[mesh.region != LATTICE].mean()
-    modulus, _ = moduli(mesh)
-    np.testing.assert_allclose(found.of_modulus(modulus) * modulus, found.displacement)
 
 
 def test_shares_of_time_leave_out_rest(half):

@@ -2,7 +2,8 @@
 
 python sender.py LINK RATE_HZ SECONDS [--channels N] [--cuts N] [--cut-s S]: makes a pty, links LINK to it,
 and sends frames; with cuts, closes the pty and comes back on another one, numbering on as a device does that
-keeps its power. Says on standard output how many frames it sent: {"sent": n, "last": number of the last}.
+keeps its power. Says on standard output how many frames it sent: {"sent": n, "last": number of the last,
+"late_s": by how much the latest of them was late}.
 """
 
 from __future__ import annotations
@@ -45,8 +46,9 @@ def main() -> None:
     master, slave = plug(options.link)
     # Until the reader is there nothing is sent: a pty holds only a page.
     time.sleep(0.5)
-    start, sent, missed = time.perf_counter(), 0, 0
+    start, sent, missed, late = time.perf_counter(), 0, 0, 0.0
     while sent < total:
+        late = max(late, time.perf_counter() - start - sent / options.rate)
         due = min(total, int((time.perf_counter() - start) * options.rate) + 1)
         out = bytearray()
         for k in range(sent, due):
@@ -74,7 +76,7 @@ def main() -> None:
             sent = min(total, sent + away)
         time.sleep(0.002)
     time.sleep(0.5)
-    print(json.dumps({"sent": total - missed, "last": total - 1}), flush=True)
+    print(json.dumps({"sent": total - missed, "last": total - 1, "late_s": late}), flush=True)
     os.close(master)
     options.link.unlink(missing_ok=True)
 

@@ -41,7 +41,7 @@ def report_flaws(operator, root, found, sound):
 
 
 class MU_OT_body_check(UnitOperator, bpy.types.Operator):
-    """Examine the selected mesh: open edges, faces that cut each other, size, fit; mark the places"""
+    """Check the selected mesh for open edges, self-intersections, size and fit; mark the places"""
 
     bl_idname = "mu.body_check"
     bl_label = "Check Body"
@@ -77,7 +77,7 @@ class MU_OT_body(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_body_remove(UnitOperator, bpy.types.Operator):
-    """Take the body of your own out of the unit: the lattice fills its box again"""
+    """Remove your own body from the unit: the lattice fills its box again"""
 
     bl_idname = "mu.body_remove"
     bl_label = "Remove Body"

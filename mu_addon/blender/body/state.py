@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -13,7 +12,6 @@ from ...design.body import Body, Flaw, body_of, envelope, flaws, misfits
 from ...design.dimensions import Dimensions
 from ...design.parameters import Unit
 from ...errors import InputError
-from ...files import write_text
 
 ENVELOPE = "envelope"
 FLAWS = "flaws"
@@ -65,16 +63,6 @@ def fingerprint(root: Any) -> str:
     if obj is None:
         return ""
     return hashlib.sha256(b"".join(array.tobytes() for array in _arrays(obj.data))).hexdigest()
-
-
-def arguments(root: Any, unit: Unit, folder: Path) -> list[str]:
-    """Words of the command line that hand the user's envelope over, a file in `folder`; or OutputError."""
-    body = envelope_in(root, unit)
-    if body is None:
-        return []
-    path = folder / "body.obj"
-    write_text(path, body.text())
-    return ["--body", str(path)]
 
 
 def _part(root: Any, name: str) -> Any:

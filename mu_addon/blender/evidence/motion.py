@@ -13,7 +13,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..preview import colours as materials
+from ..preview import materials
 from ..shared.compat import set_curve
 from ..unit.object import EVIDENCE, remove_part
 from ..unit.properties import to_unit

@@ -1,11 +1,10 @@
-"""Diagnose measured data, show their motion, and give the unit what was found."""
+"""Diagnose measured data, show their motion, and apply the named effects to the unit."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
 from bpy.props import StringProperty
 
-from ...design.parameters import write_unit
 from ..jobs import start_child
 from ..jobs.operators import job_operators
 from ..shared import updates, viewports
@@ -32,7 +31,7 @@ def _current(context):
 
 
 class MU_OT_evidence_diagnose(ValidUnitOperator, bpy.types.Operator):
-    """Ask the measured data what is wrong with the simulation, why, and how much the error drops"""
+    """Compare measured data with the simulation and name the effects that explain the difference"""
 
     bl_idname = "mu.evidence_diagnose"
     bl_label = "Diagnose"
@@ -59,18 +58,15 @@ class MU_OT_evidence_diagnose(ValidUnitOperator, bpy.types.Operator):
     def execute(self, context):
         root = unit_object.active_root(context)
         studies.assign_folder(root)
-        folder = evidence.folder_of(root)
-        unit = folder / "blender" / "unit.toml"
-        write_unit(to_unit(root.mu_unit), unit)
-        data = bpy.path.abspath(root.mu_evidence.folder)
-        line = ["diagnose", data, "--unit", str(unit), "--out", str(folder), "--json"]
-        evidence.DIAGNOSIS.start(root, line, folder)
+        evidence.DIAGNOSIS.start(
+            root, evidence.folder_of(root), lambda folder: evidence.write_inputs(root, folder)
+        )
         viewports.redraw()
         return {"FINISHED"}
 
 
 class MU_OT_evidence_apply(ValidUnitOperator, bpy.types.Operator):
-    """Give the unit what was found, so that the next simulation has it: undo takes it back"""
+    """Apply the named effects to the unit and its next simulation; undo removes them"""
 
     bl_idname = "mu.evidence_apply"
     bl_label = "Apply Extended Model"
@@ -84,7 +80,7 @@ class MU_OT_evidence_apply(ValidUnitOperator, bpy.types.Operator):
         if found is not None and found.name not in ("named", "ambiguous"):
             trouble = "No effect was named that could be applied"
         if not trouble and evidence.applied(unit_object.active_root(context)):
-            trouble = "The unit has this model: undo takes it back"
+            trouble = "This model is already applied: undo removes it"
         if not trouble and start_child.missing():
             trouble = f"Not in this Blender: {', '.join(start_child.missing())}"
         if trouble:
@@ -116,7 +112,7 @@ class MU_OT_evidence_apply(ValidUnitOperator, bpy.types.Operator):
 
 
 class MU_OT_evidence_remove(UnitOperator, bpy.types.Operator):
-    """Take from the unit's simulation what was found beside its parameters: undo brings it back"""
+    """Remove the named effects from the unit's simulation; undo restores them"""
 
     bl_idname = "mu.evidence_remove"
     bl_label = "Remove Effects"
@@ -139,14 +135,14 @@ class MU_OT_evidence_remove(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_evidence_motion(UnitOperator, bpy.types.Operator):
-    """Show an experiment on the timeline beside the unit, measured and simulated; once more takes it off"""
+    """Show an experiment on the timeline beside the unit, measured and simulated; once more hides it"""
 
     bl_idname = "mu.evidence_motion"
     bl_label = "Show Measured Motion"
     bl_options = {"REGISTER", "UNDO"}
 
     experiment: StringProperty(
-        name="Experiment", description="Name of an experiment of a unit under pressure; nothing takes it off"
+        name="Experiment", description="Name of an experiment of a unit under pressure; empty hides it"
     )
 
     @reports_errors

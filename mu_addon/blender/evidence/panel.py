@@ -20,7 +20,7 @@ ICONS |= {"unidentifiable": "QUESTION", "unexplained": "ERROR"}
 
 
 class MU_PT_evidence(UnitPanel, bpy.types.Panel):
-    """Measured data against the simulation: what is wrong, why, and how much the error drops"""
+    """Diagnosis of measured data: which effect the simulation lacks, and how much the error falls with it"""
 
     bl_idname = "MU_PT_evidence"
     bl_label = "Evidence"
@@ -97,7 +97,9 @@ def _verdict(layout, root, judged):
         if cause["rivals"]:
             rivals = ", ".join(readable(name) for name in cause["rivals"])
             wrapped(
-                column, f"explained as well by {rivals}, in place of {readable(cause['effect'])}", "QUESTION"
+                column,
+                f"Equally well explained by {rivals} instead of {readable(cause['effect'])}",
+                "QUESTION",
             )
     gain = (judged.verdict.get("gain") or {}).get("held_out") or {}
     if gain.get("rmse_before") is not None and judged.verdict.get("causes"):
@@ -115,16 +117,16 @@ def _verdict(layout, root, judged):
     layout.operator("mu.evidence_apply", icon="CHECKMARK")
     words = evidence.applied(root)
     if words:
-        wrapped(layout, f"The unit has it: {words}", "INFO")
+        wrapped(layout, f"Applied to the unit: {words}", "INFO")
 
 
 def _dependence(layout, judged):
-    """What the model's residuals depend on, the surest first."""
+    """Quantities that the model's residuals depend on, the smallest p-value first."""
     rows = judged.dependence
     if not rows:
         return
     header, body = layout.panel("MU_dependence", default_closed=True)
-    header.label(text="What the Error Depends on")
+    header.label(text="Residuals Depend on")
     if body:
         for against, p, where in rows[:ROWS]:
             row = body.row()

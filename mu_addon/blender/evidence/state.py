@@ -19,6 +19,7 @@ from ...errors import InputError, MuError
 from ...files import write_csv
 from ...measured import Measured, read_folder
 from ...measured.folder import FILE
+from ...run.folder import write_run
 from ..jobs.start_child import JobKind
 from ..shared.file_cache import FileCache
 from ..shared.registration import property_group_factory
@@ -34,8 +35,8 @@ PROTOCOL = "measured-pressures.csv"
 AT_REST = 0.02
 """A record that begins within this share of its range of 0 begins at rest."""
 MODEL, REPORT, RESIDUALS = "model.toml", "report.html", "residuals.csv"
-NAMES = {"none": "Nothing wrong", "named": "Named", "ambiguous": "Ambiguous"}
-NAMES |= {"unidentifiable": "Cannot be told", "unexplained": "Unexplained"}
+NAMES = {"none": "No effect found", "named": "Named", "ambiguous": "Ambiguous"}
+NAMES |= {"unidentifiable": "Not identifiable", "unexplained": "Unexplained"}
 """Verdicts as they are headed."""
 
 
@@ -78,7 +79,7 @@ class Diagnosis:
 
     @property
     def dependence(self) -> list[tuple[str, float, str]]:
-        """What the base model's residuals depend on: name, p-value and where, the surest first."""
+        """What the base model's residuals depend on: name, p-value and where, smallest p-value first."""
         rows = self.verdict.get("residual_table") or []
         found = [(str(r["against"]), float(r["p_value"]), str(r.get("where") or "")) for r in rows]
         return sorted(found, key=lambda row: row[1])
@@ -142,6 +143,15 @@ def _read_run(
     return _json(summary), _json(verdict), named, of
 
 
+def write_inputs(root: Any, folder: Path) -> None:
+    """Write what the unit's diagnosis is asked to do into its folder; raises InputError and OutputError."""
+    # Only now: it brings in the solver's packages, which a Blender may lack.
+    from ...usecases.diagnose.job import LAYOUT, Job
+
+    measured = read_folder(Path(bpy.path.abspath(root.mu_evidence.folder)))
+    write_run(folder, LAYOUT, Job(measured, to_unit(root.mu_unit)).texts())
+
+
 def _json(path: Path) -> dict[str, Any]:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
@@ -153,15 +163,15 @@ def _json(path: Path) -> dict[str, Any]:
 def _stale(root: Any, inputs: dict[str, Any], unit: str) -> str:
     found = measured_data(root)
     if found is None or found.measured is None:
-        return "the measured data it is of are not here"
+        return "its measured data are not here"
     if any(inputs.get(key) != value for key, value in found.digest.items()):
-        return "it is of other measured data"
+        return "it belongs to other measured data"
     try:
         now = to_unit(root.mu_unit).hash()
     except MuError:
         now = ""
     # Without a unit's own file the verdict does not rest on the unit.
-    return "it is of the unit with other parameters" if unit and now != unit else ""
+    return "it belongs to other parameters" if unit and now != unit else ""
 
 
 def mark_applied(root: Any, to_unit_: str, to_simulation: str) -> None:

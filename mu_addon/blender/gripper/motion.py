@@ -9,8 +9,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...files import read_npz
-from ..preview import arrays as preview
-from ..preview import colours as materials
+from ..preview import materials, skeletons
 from ..results import motion as motion_parts
 from ..shared.compat import set_curve
 from ..unit import object as unit_object
@@ -43,8 +42,8 @@ def show(root: Any, scene: Any) -> None:
             root, root, MOVING + side, bpy.data.meshes.new(f"{side.capitalize()} Finger")
         )
         slots = np.where(data["membrane"], 0, 1)
-        skeleton = preview.Skeleton(rest.astype(float), faces=(data["triangles"],), slots=slots)
-        preview.write(obj.data, skeleton)
+        skeleton = skeletons.Skeleton(rest.astype(float), faces=(data["triangles"],), slots=slots)
+        skeletons.write(obj.data, skeleton)
         materials.assign(obj.data, "MU Membrane", "MU Lattice")
         file = found.folder / f"{side}.pc2"
         motion_parts.play(obj, file, motion_parts.step_of(file))

@@ -15,8 +15,7 @@ from mathutils import Matrix
 from ...design.gripper import Gripper
 from ...design.steps import Given
 from ...errors import MuError
-from ..preview import arrays as preview
-from ..preview import colours as materials
+from ..preview import materials, skeletons
 from ..shared import updates
 from ..shared.texts import error_text
 from ..steps import state as stack
@@ -128,7 +127,7 @@ def beyond_mm(root: Any) -> float:
 def put_box(root: Any, name: str, low: Any, high: Any, material: str) -> Any:
     """The part of that name as a box between two corners (3,) in mm."""
     obj = part(root, name) or new_part(root, root, name, bpy.data.meshes.new(name.capitalize()))
-    preview.write(obj.data, preview.box(low, high), smooth=False)
+    skeletons.write(obj.data, skeletons.box(low, high), smooth=False)
     materials.assign(obj.data, material)
     return obj
 

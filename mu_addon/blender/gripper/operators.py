@@ -1,4 +1,4 @@
-"""Add a gripper, let it grasp in a process of its own, and play the grasp."""
+"""Add a gripper, simulate its grasp in a child process, and play the grasp."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -84,7 +84,7 @@ class MU_OT_gripper_delete(GripperOperator, bpy.types.Operator):
 
 
 class MU_OT_grasp(GripperOperator, bpy.types.Operator):
-    """Do the chosen job in a process of its own; Blender stays free, and finished work is not repeated"""
+    """Run the chosen job in a child process; Blender stays usable, and finished stages are not repeated"""
 
     bl_idname = "mu.grasp"
     bl_label = "Grasp"
@@ -110,19 +110,19 @@ class MU_OT_grasp(GripperOperator, bpy.types.Operator):
         folder = grasps.folder_of(root)
         if not root.mu_gripper.folder:
             root.mu_gripper.folder = studies.relative(folder)
-        grasps.GRASP.start(root, grasps.arguments(root), folder)
+        grasps.GRASP.start(root, folder, lambda folder: grasps.write_inputs(root, folder))
         viewports.redraw()
         return {"FINISHED"}
 
 
 class MU_OT_grasp_show(GripperOperator, bpy.types.Operator):
-    """Play the grasp on the timeline, both fingers and the cube, or take it away"""
+    """Play the grasp on the timeline, both fingers and the cube, or hide it"""
 
     bl_idname = "mu.grasp_show"
     bl_label = "Show Grasp"
     bl_options = {"REGISTER", "UNDO"}
 
-    on: BoolProperty(name="Show", description="Show it, or take it away", default=True)
+    on: BoolProperty(name="Show", description="Show or hide it", default=True)
 
     @reports_errors
     def execute(self, context):

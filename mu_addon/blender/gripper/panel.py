@@ -46,7 +46,7 @@ class MU_PT_gripper(GripperPanel, bpy.types.Panel):
 
 
 class MU_PT_grasp(GripperPanel, bpy.types.Panel):
-    """A cube between the fingers: closed on, held, lifted, let go"""
+    """The grasp of a cube: closing, holding, lifting, releasing"""
 
     bl_idname = "MU_PT_grasp"
     bl_label = "Grasp"
@@ -87,8 +87,8 @@ def _found(layout, scene, root, found):
     f = found.figures
     if f:
         column.label(text=f"{f['angle_at_hold_deg']:.1f} deg, {f['normal_at_hold_N']:.2f} N a finger at hold")
-        held, icon = ("Held", "CHECKMARK") if f["held"] else ("It slips", "ERROR")
-        column.label(text=f"{held}: {f['margin']:.2g} times its weight", icon=icon)
+        held, icon = ("Held", "CHECKMARK") if f["held"] else ("Slips", "ERROR")
+        column.label(text=f"{held}: friction carries {f['margin']:.2g} times the weight", icon=icon)
         column.label(text=f"Gap error {f['gap_error_mm']:.3f} mm")
     on = bool(motion.parts(root))
     row = box.row(align=True)

@@ -6,7 +6,7 @@ import csv
 import json
 import tomllib
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -14,13 +14,16 @@ import numpy as np
 from ...design import gripper as core
 from ...design.parameters import to_toml
 from ...errors import MuError
-from ...files import write_text
+from ...run.folder import write_run
 from ..jobs.start_child import JobKind
 from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
 from ..unit.properties import exact
 from . import object as gripper_object
 from .properties import to_gripper
+
+if TYPE_CHECKING:
+    from ...usecases.grip.job import Job
 
 
 def folder_of(root: Any) -> Path:
@@ -32,24 +35,36 @@ def folder_of(root: Any) -> Path:
 GRASP = JobKind("grip", lambda root: root.mu_gripper.uuid, folder_of)
 
 
-def arguments(root: Any) -> list[str]:
-    """The command line of the job that is chosen, its inputs written; raises MuError."""
-    props, folder = root.mu_gripper, folder_of(root)
-    gripper = to_gripper(props)
-    own = folder / "blender"
-    write_text(own / "unit.toml", to_toml(gripper.unit))
-    core.write_gripper(gripper, own / "gripper.toml", "unit.toml")
-    line = ["grip", "--gripper", str(own / "gripper.toml"), "--out", str(folder), "--json"]
-    if props.detail == "part":
-        return [*line, "--solid-only"]
-    line += ["--cube", f"{_side(props):g}", "--friction", f"{exact(props.friction):g}"]
-    line += [
-        "--density",
-        f"{exact(props.density_g_per_ml):g}",
-        "--beyond",
-        f"{gripper_object.beyond_mm(root):g}",
-    ]
-    return line + {"quick": ["--coarse", "--no-paths"], "full": ["--no-paths"], "paths": []}[props.detail]
+def job_of(root: Any) -> Job:
+    """The grasp that a gripper's properties ask for; raises InputError."""
+    # Only now: they bring in the solver's packages, which a Blender may lack.
+    from ...meshing.settings import MeshSettings
+    from ...placement.inclusion import RULES
+    from ...usecases.grip.grasp import Cube, Grip
+    from ...usecases.grip.job import COARSE, REFINE, Job
+
+    props = root.mu_gripper
+    grasps, quick = props.detail != "part", props.detail == "quick"
+    grip = Grip(
+        friction=exact(props.friction),
+        beyond_mm=gripper_object.beyond_mm(root),
+        step_s=1.0 if quick else 0.5,
+    )
+    return Job(
+        gripper=to_gripper(props),
+        cubes=(Cube(_side(props), exact(props.density_g_per_ml)),) if grasps else (),
+        grip=grip if grasps else Grip(),
+        mesh=MeshSettings(refine=COARSE if quick else REFINE),
+        rules=RULES if props.detail == "paths" else (),
+    )
+
+
+def write_inputs(root: Any, folder: Path) -> None:
+    """Write what the gripper's job is asked to do into its folder; raises InputError and OutputError."""
+    job = job_of(root)
+    from ...usecases.grip.job import LAYOUT
+
+    write_run(folder, LAYOUT, job.texts())
 
 
 def _side(props: Any) -> float:

@@ -1,4 +1,4 @@
-"""What a child process runs, without bpy: `python child_main.py place --unit unit.toml --out folder --json`.
+"""What a child process runs, without bpy: `python child_main.py resume FOLDER --json`.
 
 It makes the package it lies in importable as `mu_addon`, whatever Blender calls it. The processes that it
 starts run these lines, too, and find the package the same way.
@@ -73,10 +73,18 @@ def _trouble(solves):
     return None
 
 
+def _command(arguments):
+    """Name of the command, for `resume` that of the run in its folder where it needs no solver."""
+    if arguments[0] != "resume":
+        return arguments[0]
+    runs = (name for name in WITHOUT_SOLVER if Path(arguments[1], f"{name}.toml").is_file())
+    return next(runs, arguments[0])
+
+
 def main(arguments):
     """Exit status of one command line of the core; `check` alone only tells whether the solver loads."""
     helps = not arguments or "-h" in arguments or "--help" in arguments
-    solves = not helps and (len(arguments) < 2 or arguments[0] not in WITHOUT_SOLVER)
+    solves = not helps and (len(arguments) < 2 or _command(arguments) not in WITHOUT_SOLVER)
     trouble = _trouble(solves)
     if trouble is not None:
         if "--json" in arguments or arguments == ["check"]:

@@ -68,11 +68,17 @@ class JobKind:
         """Whether the job runs."""
         return self.key(root) in running()
 
-    def start(self, root: Any, arguments: Sequence[str], folder: Path) -> Child:
-        """Start one command line of the core for the object, its run in `folder`; raises MuError."""
+    def start(
+        self, root: Any, folder: Path, write_inputs: Callable[[Path], None], options: Sequence[str] = ()
+    ) -> Child:
+        """Write the inputs of the object's job into a folder, and run it by `resume`; raises MuError.
+
+        options: of `resume`, which decide no result.
+        """
         if self.is_running(root):
             raise InputError("this job is running already", str(folder), "wait for it or cancel it")
-        return watch(self.key(root), start(arguments, folder))
+        write_inputs(folder)
+        return watch(self.key(root), start(["resume", str(folder), "--json", *options], folder))
 
     def dismiss(self, root: Any) -> None:
         """Forget an ended job, so that no panel shows it."""

@@ -1,4 +1,4 @@
-"""What the unit meets: make selected meshes its obstacles, add a box as one, examine them, take them out."""
+"""Obstacles of a unit: make selected meshes obstacles, add a box, check them, remove them."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -11,8 +11,7 @@ from ...design.body import require_sound
 from ...design.rigid_body import FRICTION
 from ...errors import InputError
 from ..body.operators import report_flaws, selected_meshes
-from ..preview import arrays as preview
-from ..preview import colours as materials
+from ..preview import materials, skeletons
 from ..shared.operators import UnitOperator, ValidUnitOperator, reports_errors
 from ..unit import object as unit_object
 from ..unit.properties import exact, to_unit
@@ -69,7 +68,7 @@ class MU_OT_obstacle(ValidUnitOperator, bpy.types.Operator):
             require_sound(body, obstacles.unsound(body), "an obstacle")
         for obj in chosen:
             obj.mu_obstacle.unit, obj.mu_obstacle.friction = root.mu_unit.uuid, self.friction
-            # What stands in the unit now may be moved: it is told, and refused by a simulation.
+            # An overlap is only reported, since the obstacle may be moved; a simulation refuses it.
             for flaw in obstacles.examined(root, obj, core):
                 self.report({"WARNING"}, f"{obj.name}: {flaw.what}: {flaw.remedy}")
         return {"FINISHED"}
@@ -103,7 +102,7 @@ class MU_OT_obstacle_box(ValidUnitOperator, bpy.types.Operator):
         d = to_unit(root.mu_unit).dimensions
         size = np.array([exact(edge) for edge in self.size])
         mesh = bpy.data.meshes.new("Obstacle")
-        preview.write(mesh, preview.box(-size / 2.0, size / 2.0), smooth=False)
+        skeletons.write(mesh, skeletons.box(-size / 2.0, size / 2.0), smooth=False)
         materials.assign(mesh, "MU Obstacle")
         obj = bpy.data.objects.new("Obstacle", mesh)
         context.collection.objects.link(obj)
@@ -115,7 +114,7 @@ class MU_OT_obstacle_box(ValidUnitOperator, bpy.types.Operator):
 
 
 class MU_OT_obstacle_check(ObstacleOperator, bpy.types.Operator):
-    """Examine obstacles: open edges, faces that cut each other, size, overlap; mark the places"""
+    """Check obstacles for open edges, self-intersections, size and overlap; mark the places"""
 
     bl_idname = "mu.obstacle_check"
     bl_label = "Check Obstacles"
@@ -126,12 +125,12 @@ class MU_OT_obstacle_check(ObstacleOperator, bpy.types.Operator):
         root = unit_object.active_root(context)
         core, chosen = to_unit(root.mu_unit), self.chosen(root)
         found = [flaw for obj in chosen for flaw in obstacles.examined(root, obj, core)]
-        report_flaws(self, root, found, f"{len(chosen)} obstacle(s), sound and off the unit")
+        report_flaws(self, root, found, f"{len(chosen)} obstacle(s), valid and clear of the unit")
         return {"FINISHED"}
 
 
 class MU_OT_obstacle_remove(ObstacleOperator, bpy.types.Operator):
-    """Let an object be no obstacle any more; the object stays"""
+    """Remove an object from the obstacles; the object stays"""
 
     bl_idname = "mu.obstacle_remove"
     bl_label = "Remove Obstacle"

@@ -1,4 +1,4 @@
-"""What the unit meets, under Simulate: a line an obstacle, with its friction."""
+"""The panel Obstacles under Simulate: rigid bodies that the unit may touch, each with its friction."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from . import state as obstacles
 
 
 class MU_PT_obstacles(UnitPanel, bpy.types.Panel):
-    """Rigid things that the unit meets while it moves"""
+    """Rigid bodies that the unit may touch while it moves"""
 
     bl_idname = "MU_PT_obstacles"
     bl_label = "Obstacles"
@@ -35,7 +35,7 @@ class MU_PT_obstacles(UnitPanel, bpy.types.Panel):
         if found:
             layout.operator("mu.obstacle_check", icon="VIEWZOOM")
         else:
-            wrapped(layout, "None: the unit moves freely. Select a closed mesh to put in its way", "INFO")
+            wrapped(layout, "None: the unit moves freely. Select a closed mesh to use as an obstacle", "INFO")
 
 
 def _troubles(root, obj):

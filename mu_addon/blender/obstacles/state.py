@@ -1,4 +1,4 @@
-"""Rigid things that a unit meets: closed meshes of the scene that the user has declared its obstacles.
+"""Obstacles of a unit: closed meshes of the scene that it may touch, rigid and fixed.
 
 They stay the user's own objects: moved, scaled or edited, they are read again, in the unit's frame, and what
 was simulated with them before is stale. Copies of an obstacle are obstacles; undo and deletion need no care.
@@ -7,7 +7,6 @@ was simulated with them before is stale. Copies of an obstacle are obstacles; un
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import re
-from pathlib import Path
 from typing import Any
 
 import attrs
@@ -17,8 +16,7 @@ from bpy.props import FloatProperty, StringProperty
 
 from ...design.body import Body, Flaw, flaws, overlaps, require_sound
 from ...design.parameters import Unit
-from ...design.rigid_body import FRICTION
-from ...files import write_text
+from ...design.rigid_body import FRICTION, RigidBody
 from ..body import state as bodies
 from ..shared.registration import property_group_factory
 from ..unit.properties import exact
@@ -30,7 +28,7 @@ ODD_SIZE_MM = (0.1, 2000.0)
 class MU_PG_obstacle(bpy.types.PropertyGroup):
     """An object as an obstacle of a unit."""
 
-    unit: StringProperty(name="Unit", description="UUID of the unit that meets it", options={"HIDDEN"})
+    unit: StringProperty(name="Unit", description="UUID of the unit that may touch it", options={"HIDDEN"})
     friction: FloatProperty(
         name="Friction",
         description="Coefficient of Coulomb friction between unit and obstacle; 0: none. The default is "
@@ -101,22 +99,19 @@ def inputs(root: Any) -> list[tuple[str, float]]:
     return sorted((placed(root, o).body.hash, exact(o.mu_obstacle.friction)) for o in of_unit(root))
 
 
-def arguments(root: Any, unit: Unit, folder: Path) -> list[str]:
-    """Words of the command line that hand a unit's obstacles over, their files in `folder`.
-
-    Raises InputError for one that cannot be an obstacle as it stands, and OutputError.
-    """
-    words: list[str] = []
+def rigid_bodies(root: Any, unit: Unit) -> tuple[RigidBody, ...]:
+    """A unit's obstacles as a simulation takes them; InputError for one that cannot be as it stands."""
+    found: dict[str, RigidBody] = {}
     for number, obj in enumerate(of_unit(root), 1):
-        require_sound(placed(root, obj).body, examined(root, obj, unit), "an obstacle")
-        # Its file's name is what reports call it.
+        body = placed(root, obj).body
+        require_sound(body, examined(root, obj, unit), "an obstacle")
+        # What reports call it.
         name = re.sub(r"[^A-Za-z0-9._-]+", "-", obj.name)
-        path = folder / f"{name}.obj"
-        if str(path) in words:
-            path = folder / f"{name}-{number}.obj"
-        write_text(path, placed(root, obj).body.text())
-        words += ["--obstacle", str(path), "--friction", f"{exact(obj.mu_obstacle.friction):g}"]
-    return words
+        name = f"{name}-{number}" if f"{name}.obj" in found else name
+        found[f"{name}.obj"] = RigidBody(
+            attrs.evolve(body, name=f"{name}.obj"), exact(obj.mu_obstacle.friction)
+        )
+    return tuple(found.values())
 
 
 def _where(root: Any, obj: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Candidate paths dressed by what the study found: colour and label say J and rank."""
+"""Candidate paths by what the study found: J and rank of each, and the colour and label of its tube."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..results import fields
+from ..results import field_colours
 from ..shared.compat import set_modifier_input
 from ..shared.texts import path_symbol
 from ..simulate import study_folder as studies
@@ -28,7 +28,7 @@ def free(root: Any) -> tuple[str, float, Any] | None:
     return (best["name"], best["J_hat_mm"], np.array(best["points_mm"])) if best else None
 
 
-def dress(root: Any, candidates: dict[str, Any]) -> None:
+def colour_and_label(root: Any, candidates: dict[str, Any]) -> None:
     """Colour and label candidate tubes, objects by path; the chosen one keeps its colour."""
     known = ranked(root)
     if not known:
@@ -45,7 +45,7 @@ def dress(root: Any, candidates: dict[str, Any]) -> None:
         set_modifier_input(modifier, "Label", label)
         if name != root.mu_unit.path:
             share = ((j - low) / (high - low)) ** 0.5 if high > low else 0.0
-            colour = _material(f"MU J {root.mu_unit.uuid[:8]} {name}", fields.of_map(share))
+            colour = _material(f"MU J {root.mu_unit.uuid[:8]} {name}", field_colours.of_map(share))
             tube.data.materials[0] = colour
             set_modifier_input(modifier, "Material", colour)
 

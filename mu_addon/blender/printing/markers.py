@@ -8,9 +8,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ..preview import arrays as preview
-from ..preview import colours as materials
-from ..preview import nodes
+from ..preview import materials, nodes, skeletons
 from ..shared import viewports
 from ..shared.compat import set_modifier_input
 from ..unit import object as unit_object
@@ -53,7 +51,7 @@ def mark(root: Any, found: Any) -> None:
         name = f"{finding['check'].capitalize()} ({finding['severity']})"
         obj = _marker(root, name, bpy.data.meshes.new(name), str(number))
         radius = np.full(len(finding["places"]), root.mu_print.marker)
-        preview.write(obj.data, preview.Skeleton(finding["places"], attributes={"radius": radius}))
+        skeletons.write(obj.data, skeletons.Skeleton(finding["places"], attributes={"radius": radius}))
         materials.assign(obj.data, MATERIAL[finding["severity"]])
         set_modifier_input(nodes.skin(obj, "MU Balls"), "Material", obj.data.materials[0])
         obj.hide_render = True

@@ -5,7 +5,6 @@
 import bpy
 from bpy.props import BoolProperty, FloatVectorProperty, IntProperty
 
-from ...design.parameters import write_unit
 from ..jobs.operators import FILES, RUN_FILES, job_operators
 from ..shared import viewports
 from ..shared.operators import UnitOperator, ValidUnitOperator, reports_errors
@@ -38,17 +37,17 @@ class _Job(ValidUnitOperator):
     def execute(self, context):
         root = unit_object.active_root(context)
         studies.assign_folder(root)
-        unit = to_unit(root.mu_unit)
-        folder = printing.folder_of(root, self.job)
-        write_unit(unit, folder / "blender" / "unit.toml")
-        line = [*printing.arguments(root, unit, self.job), "--out", str(folder), "--json"]
-        printing.PRINTING.start(root, line, folder)
+        printing.PRINTING.start(
+            root,
+            printing.folder_of(root, self.job),
+            lambda folder: printing.write_inputs(root, self.job, folder),
+        )
         viewports.redraw()
         return {"FINISHED"}
 
 
 class MU_OT_print_check(_Job, bpy.types.Operator):
-    """Check the printability and find the best build direction, in a process of its own"""
+    """Check the printability and rank the build directions, in a child process"""
 
     bl_idname = "mu.print_check"
     bl_label = "Check Print"
@@ -72,7 +71,7 @@ class MU_OT_print_export(_Job, bpy.types.Operator):
         return context.window_manager.invoke_confirm(
             self,
             event,
-            title="Export what must not be printed?",
+            title="Export a part that is not printable?",
             message=f"The check found errors: {names}",
             confirm_text="Export",
             icon="WARNING",
@@ -124,7 +123,7 @@ class MU_OT_print_marks(_OfCheck, bpy.types.Operator):
 
 
 class MU_OT_print_clear(UnitOperator, bpy.types.Operator):
-    """Take the markers of the check out of the scene"""
+    """Remove the markers of the check from the scene"""
 
     bl_idname = "mu.print_clear"
     bl_label = "Clear Markers"
@@ -197,10 +196,10 @@ class MU_OT_print_show(_OfCheck, bpy.types.Operator):
 
 
 class MU_OT_print_up(UnitOperator, bpy.types.Operator):
-    """Take this build direction; check again for what it finds"""
+    """Use this build direction; check again for its findings"""
 
     bl_idname = "mu.print_up"
-    bl_label = "Take Direction"
+    bl_label = "Use Direction"
     bl_options = {"REGISTER", "UNDO"}
 
     direction: FloatVectorProperty(

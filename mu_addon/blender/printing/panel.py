@@ -1,4 +1,4 @@
-"""The panel Print of the sidebar tab MU: the solid, the printability check, and the files."""
+"""The panel Print of the sidebar tab MU: the solid, its printability check, and the files."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class MU_PT_print(UnitPanel, bpy.types.Panel):
         child = printing.PRINTING.child(root)
         refused = child is not None and child.state == FAILED
         if refused and (child.error or {}).get("status") == NOT_PRINTABLE:
-            box = alert(layout, "Checked: do not print it, see Check")
+            box = alert(layout, "Checked: not printable, see Check")
             box.operator("mu.print_dismiss")
         else:
             where = {printing.CHECK: "see Check", printing.EXPORT: "see Files"}
@@ -68,7 +68,7 @@ class _OfPrint(UnitPanel):
 
 
 class MU_PT_print_check(_OfPrint, bpy.types.Panel):
-    """Findings of the printability check, their locations, and the best build direction"""
+    """Printability check: findings with their places, and the best build directions"""
 
     bl_idname = "MU_PT_print_check"
     bl_label = "Check"
@@ -96,7 +96,7 @@ class MU_PT_print_check(_OfPrint, bpy.types.Panel):
         if markers.marks(root):
             layout.prop(settings, "marker")
             if markers.marked(root) != found.digest:
-                wrapped(layout, "The markers are of an earlier check: mark again", "INFO")
+                wrapped(layout, "The markers belong to an earlier check: mark again", "INFO")
         _directions(layout, settings, found)
         layout.operator("mu.print_open", text="Report", icon="URL").what = "report"
 
@@ -141,7 +141,7 @@ def _in_full(box, number, place, finding) -> None:
     if finding["remedy"]:
         wrapped(box, finding["remedy"].capitalize())
     if finding["assumed"]:
-        wrapped(box, "The limit is assumed, nobody has published one: set your own", "INFO")
+        wrapped(box, "This limit is assumed, not published: set your own", "INFO")
 
 
 def _measure(finding) -> str:
@@ -158,7 +158,7 @@ def _directions(layout, settings, found) -> None:
     if not builds:
         return
     header, body = layout.panel("MU_directions", default_closed=False)
-    header.label(text="Best Way Up")
+    header.label(text="Best Build Directions")
     if not body:
         return
     choice = [build for build in builds if build["best_among"]][:DIRECTIONS]
@@ -167,7 +167,7 @@ def _directions(layout, settings, found) -> None:
         row = box.split(factor=0.66)
         row.label(text=", ".join(f"{x:.2f}" for x in build["direction"]), icon="SORT_DESC")
         same = sum(a * b for a, b in zip(build["direction"], settings.up, strict=True)) > 0.9999
-        button = row.operator("mu.print_up", text="Chosen" if same else "Take", depress=same)
+        button = row.operator("mu.print_up", text="Chosen" if same else "Use", depress=same)
         button.direction = build["direction"]
         box.label(text=f"{build['islands']} islands, cups of {build['cup_ml']:.2g} ml")
         box.label(text=f"{build['support_mm2']:.0f} mm2 to support, {build['inner_mm2']:.0f} in chambers")
@@ -194,7 +194,7 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
         path = root.mu_unit.path
         wrapped(
             layout,
-            f"With the waveguide along {path}" if path else "Without a waveguide: no path chosen",
+            f"Waveguide along {path}" if path else "Without a waveguide: no path chosen",
             "INFO",
         )
         _check_state(layout, found)
@@ -205,7 +205,7 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
         row.operator("mu.print_specimens", icon="OUTLINER_OB_LATTICE")
         row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = printing.SPECIMENS
         header, body = layout.panel("MU_printing", default_closed=True)
-        header.label(text="How It Prints")
+        header.label(text="Print Offsets")
         if body:
             parameters(body, root.mu_unit, "print")
 

@@ -70,11 +70,11 @@ class MU_PG_print(bpy.types.PropertyGroup):
     )
     compensate: EnumProperty(
         name="Compensate",
-        description="Whether the drawing is made smaller by what the printer adds",
+        description="Whether the print offset is subtracted from the nominal geometry",
         items=[
-            ("none", "Nothing", "The drawing is nominal"),
-            ("unit", "How It Prints", "The offsets of this unit, see How It Prints"),
-            ("gauge", "Gauge", "What calipers found on the printed gauge of the specimens"),
+            ("none", "Nothing", "Nominal geometry"),
+            ("unit", "Print Offsets", "The offsets of this unit, see Print Offsets"),
+            ("gauge", "Gauge", "Measured with calipers on the printed gauge of the specimens"),
         ],
     )
     gauge: StringProperty(

@@ -17,19 +17,21 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from ...design.anchors import window
 from ...design.parameters import Unit, read_unit
 from ...design.printing.printer import Printer, load_printer, printer_text
 from ...design.steps import require_whole
 from ...design.surface import stl_bytes
 from ...errors import InputError, MuError
 from ...files import write_bytes, write_json
+from ...run.folder import FolderLayout, write_run
 from ..body import state as bodies
-from ..jobs.start_child import JobKind, missing
+from ..jobs.start_child import OWN_FOLDER, JobKind, missing
 from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
 from ..steps import state as stack
 from ..unit import object as unit_object
-from ..unit.properties import to_unit
+from ..unit.properties import exact, to_unit
 from .properties import FORMATS, OWN_PRINTER
 
 CHECK, EXPORT, SPECIMENS = "check", "export", "specimens"
@@ -120,7 +122,7 @@ def trouble(root: Any, command: str) -> str:
         except MuError as error:
             return f"{error.what}: {error.remedy}"
     if command == CHECK and Vector(settings.up).length < 1e-3:
-        return "Up is no direction: give three figures, such as 0 0 1"
+        return "Up is not a direction: give three numbers, such as 0 0 1"
     if command == EXPORT:
         if not settings.formats:
             return "Choose at least one kind of file"
@@ -131,7 +133,7 @@ def trouble(root: Any, command: str) -> str:
         if settings.compensate == "unit" and not any(
             (root.mu_unit.print.offset_xy_mm, root.mu_unit.print.offset_z_mm)
         ):
-            return "The unit has no offsets to take off: set them under How It Prints"
+            return "The unit has no print offsets: set them under Print Offsets"
     return ""
 
 
@@ -140,35 +142,52 @@ def own_body(root: Any) -> bool:
     return bool(bodies.fingerprint(root))
 
 
-def arguments(root: Any, unit: Unit, command: str) -> list[str]:
-    """The command line of a job for the printer, but for its folder and --json; raises MuError.
+def write_inputs(root: Any, command: str, folder: Path) -> None:
+    """Write what a job for the printer is asked to do into its folder; raises MuError."""
+    unit = to_unit(root.mu_unit)
+    layout, job = {CHECK: _check, EXPORT: _export, SPECIMENS: _specimens}[command](root, unit, folder)
+    write_run(folder, layout, job.texts())
 
-    A unit in a body of the user's own is checked by its STL, which is built and written first.
-    """
-    settings, own = root.mu_print, folder_of(root, command) / "blender"
-    line = [command, "--unit", str(own / "unit.toml")]
-    if command == SPECIMENS:
-        return line
+
+# The core's jobs only where they are made: they bring in packages that a Blender may lack.
+
+
+def _check(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
+    """A check of the unit; one in a body of the user's own is checked by its STL, which is built first."""
+    from ...usecases.check_print.job import LAYOUT, Job
+
+    up = tuple(exact(x) for x in root.mu_print.up)
+    if own_body(root):
+        stl = _own_stl(root, unit, folder / OWN_FOLDER)
+        return LAYOUT, Job(printer_of(root), stl=stl.read_bytes(), stl_file=stl, direction=up)
     path = path_of(root, unit)
-    line += ["--path", path] if path else []
-    if command == CHECK:
-        if own_body(root):
-            line = [command, "--stl", str(_own_stl(root, unit, own))]
-        name = settings.printer
-        if name == OWN_PRINTER:
-            name = bpy.path.abspath(settings.printer_file)
-        return [*line, "--printer", name, "--up", *(f"{x:.6g}" for x in settings.up)]
-    line += [
-        "--formats",
-        *(name for name, _, _ in FORMATS if name in settings.formats),
-        "--quality",
-        settings.quality,
-    ]
-    if settings.compensate == "unit":
-        line.append("--compensate")
-    elif settings.compensate == "gauge":
-        line += ["--compensate", bpy.path.abspath(settings.gauge)]
-    return line
+    return LAYOUT, Job(printer_of(root), unit, window(unit, path) if path else None, direction=up)
+
+
+def _export(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
+    from ...usecases.export.job import LAYOUT, Job, resin_of
+    from ...usecases.export.print_offsets import taken_off
+
+    settings, path = root.mu_print, path_of(root, unit)
+    source = {"none": None, "unit": "unit", "gauge": bpy.path.abspath(settings.gauge)}[settings.compensate]
+    offsets, origin = taken_off(unit, source)
+    return LAYOUT, Job(
+        unit=unit,
+        resin=resin_of(None),
+        path=window(unit, path) if path else None,
+        path_name=path,
+        formats=tuple(name for name, _, _ in FORMATS if name in settings.formats),
+        quality=settings.quality,
+        take_off=offsets,
+        offset_source=origin,
+    )
+
+
+def _specimens(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
+    from ...usecases.export.job import resin_of
+    from ...usecases.export.specimens import LAYOUT, Job
+
+    return LAYOUT, Job(unit, resin_of(None))
 
 
 def _own_stl(root: Any, unit: Unit, folder: Path) -> Path:
@@ -191,7 +210,7 @@ def checked(root: Any) -> Checked | None:
     found, inputs, unit, limits = (
         folder / name for name in ("check.json", "check.toml", "unit.toml", "printer.toml")
     )
-    own = folder / "blender" / OWN
+    own = folder / OWN_FOLDER / OWN
 
     def read() -> Any:
         content = found.read_bytes()
@@ -215,13 +234,13 @@ def _stale(root: Any, shape: list[str], up: list[float], limits: str) -> str:
     """Why a check is not one of the unit as it is, or nothing."""
     try:
         if _shape(root, to_unit(root.mu_unit)) != shape:
-            return "it is of the unit with other parameters"
+            return "it belongs to other parameters"
         if printer_text(printer_of(root)) != limits:
-            return "it is for another printer"
+            return "it belongs to another printer"
     except MuError as error:
         return error.what
     same = (Vector(up).normalized() - Vector(root.mu_print.up).normalized()).length < 1e-3
-    return "" if same else "it is of another build direction"
+    return "" if same else "it belongs to another build direction"
 
 
 @attrs.frozen(eq=False)
@@ -249,4 +268,4 @@ def exported(root: Any) -> Exported | None:
         same = _shape(root, to_unit(root.mu_unit)) == of
     except MuError:
         same = False
-    return Exported(path.parent, "" if same else "they are of the unit with other parameters", found)
+    return Exported(path.parent, "" if same else "they belong to other parameters", found)

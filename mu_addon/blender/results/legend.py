@@ -21,7 +21,7 @@ from ..shared.overlay import Overlay
 from ..shared.texts import path_symbol
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
-from . import fields
+from . import field_colours
 from . import motion as motion_parts
 
 PIECES = 48
@@ -40,7 +40,7 @@ def ticks(low: float, high: float) -> list[float]:
 
 def lines(root: Any, motion: Any, scene: Any) -> list[str]:
     """Lines of the legend: field, time and pressure, contact forces, and whether the results are stale."""
-    field = fields.BY_NAME[root.mu_motion.field]
+    field = field_colours.BY_NAME[root.mu_motion.field]
     time = motion_parts.time_of(motion, scene)
     pressure = float(np.interp(time, motion.time_s, motion.pressure_kPa))
     found = [f"{field.label} [{field.unit}]" if field.unit else field.label]
@@ -50,7 +50,7 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
         found.append(f"{contact.name}: {force:.2f} N")
     findings = studies.findings(root)
     if findings is None or findings.stale:
-        found.append("stale: of other parameters")
+        found.append("stale: belongs to other parameters")
     elif findings.quick:
         found.append("quick look: linear elements lock")
     return found
@@ -91,7 +91,7 @@ def _ramp(root: Any, scale: float, left: float) -> None:
     low, high = settings.low, settings.high
     if not high > low:
         return
-    colours = _display(fields.colours(root, np.repeat(np.linspace(low, high, PIECES + 1), 2)))
+    colours = _display(field_colours.colours(root, np.repeat(np.linspace(low, high, PIECES + 1), 2)))
     corner = np.array([[0, 1, 3], [0, 3, 2]], np.int32)
     triangles = np.concatenate([corner + 2 * piece for piece in range(PIECES)])
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")

@@ -14,12 +14,11 @@ from bpy.app.handlers import persistent
 from mathutils import Matrix
 
 from ...errors import InputError
-from ..preview import arrays as preview
-from ..preview import colours as materials
+from ..preview import materials, skeletons
 from ..shared import handlers
 from ..unit import object as unit_object
 from ..unit.object import LEGEND, remove_part
-from . import fields, legend
+from . import field_colours, legend
 from . import motion as motion_parts
 
 BAR, HEAD, TICK = "bar", "head", "tick"
@@ -73,12 +72,12 @@ def update(root: Any) -> None:
     corners = np.array([[x, y, 0.0] for y in heights for x in (0.0, WIDTH)])
     first = 2 * np.arange(legend.PIECES)[:, None]
     values = np.repeat(low + (high - low) * heights, 2)
-    shape = preview.Skeleton(
+    shape = skeletons.Skeleton(
         corners, faces=(first + np.array([0, 1, 3, 2]),), attributes={"share": corners[:, 1]}
     )
-    preview.write(bar.data, shape, smooth=False)
-    fields.write_colours(root, bar.data, values)
-    wanted = fields.legend_material_of(root)
+    skeletons.write(bar.data, shape, smooth=False)
+    field_colours.write_colours(root, bar.data, values)
+    wanted = field_colours.legend_material_of(root)
     if not bar.data.materials:
         bar.data.materials.append(wanted)
     for text in [child for child in bar.children if child.get(LEGEND) == TICK]:

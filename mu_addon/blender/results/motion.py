@@ -28,7 +28,7 @@ from ...usecases.simulate_and_place.motion import (
     Skin,
     read_motion,
 )
-from ..preview import arrays as preview
+from ..preview import skeletons
 from ..shared import handlers
 from ..shared.file_cache import FileCache
 from ..shared.updates import Signal
@@ -36,7 +36,7 @@ from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from ..unit.object import MOTION
 from ..unit.properties import to_unit
-from . import fields
+from . import field_colours
 
 PRINT = "print"
 BODIES = (*REGIONS, PRINT)
@@ -141,7 +141,7 @@ def _show_region(root: Any, motion: Motion, name: str, region: str) -> None:
     file = motion.folder / PLAYED / f"{name}-{region}{'-cut' if cut else ''}.pc2"
     _write_cache(file, motion, rest, skin.of_nodes(*motion.sides(name)))
     part = _part(root, name, region)
-    preview.write(part.data, preview.Skeleton(rest, faces=(skin.triangles,)))
+    skeletons.write(part.data, skeletons.Skeleton(rest, faces=(skin.triangles,)))
     _play(part, motion, file)
 
 
@@ -325,7 +325,7 @@ def colour(root: Any) -> None:
     _write(root, bpy.context.scene)
     COLOURED.send(root)
     field = root.mu_motion.field
-    fields.paint(root, [(part, field in part.data.attributes) for part in parts(root)])
+    field_colours.paint(root, [(part, field in part.data.attributes) for part in parts(root)])
 
 
 def extent(root: Any, field: str) -> tuple[float, float]:
@@ -356,9 +356,9 @@ def _write(root: Any, scene: Any) -> None:
             attribute = part.data.attributes.get(name) or part.data.attributes.new(name, "FLOAT", "POINT")
             attribute.data.foreach_set("value", np.ascontiguousarray(now, np.float32))
             if name == root.mu_motion.field:
-                fields.write_colours(root, part.data, now)
+                field_colours.write_colours(root, part.data, now)
         if root.mu_motion.field not in found.fields:
-            fields.write_colours(root, part.data, None)
+            field_colours.write_colours(root, part.data, None)
         part.data.update()
 
 

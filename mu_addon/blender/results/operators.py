@@ -30,7 +30,7 @@ class MotionOperator(UnitOperator):
 
 
 class MU_OT_motion(MotionOperator, bpy.types.Operator):
-    """Show this motion beside the unit, or take it away: Model A or a sensor path, as mesh or as print"""
+    """Show or hide the motion of Model A or of a sensor path beside the unit, as mesh or as print"""
 
     bl_idname = "mu.motion"
     bl_label = "Show Motion"
@@ -47,7 +47,7 @@ class MU_OT_motion(MotionOperator, bpy.types.Operator):
             (motion_parts.PRINT, "Printable Solid", "The body to print, carried along by the mesh"),
         ],
     )
-    on: BoolProperty(name="Show", description="Show it, or take it away", default=True)
+    on: BoolProperty(name="Show", description="Show or hide it", default=True)
     timeline: BoolProperty(
         name="Fit Timeline", description="End the scene's timeline where the protocol ends", default=True
     )
@@ -81,7 +81,7 @@ class MU_OT_motion(MotionOperator, bpy.types.Operator):
 
 
 class MU_OT_motion_clear(UnitOperator, bpy.types.Operator):
-    """Take every motion of this unit out of the scene; the study's files stay"""
+    """Remove every motion of this unit from the scene; the study's files stay"""
 
     bl_idname = "mu.motion_clear"
     bl_label = "Clear Motion"
@@ -125,13 +125,13 @@ class MU_OT_motion_range(MotionOperator, bpy.types.Operator):
 
 
 class MU_OT_motion_legend(MotionOperator, bpy.types.Operator):
-    """Stand the legend in the scene beside the unit, where renders see it, or take it away"""
+    """Add the legend to the scene beside the unit, so that renders show it, or remove it"""
 
     bl_idname = "mu.motion_legend"
     bl_label = "Legend in Renders"
     bl_options = {"REGISTER", "UNDO"}
 
-    on: BoolProperty(name="Show", description="Show it, or take it away", default=True)
+    on: BoolProperty(name="Show", description="Show or hide it", default=True)
 
     @reports_errors
     def execute(self, context):
@@ -141,7 +141,7 @@ class MU_OT_motion_legend(MotionOperator, bpy.types.Operator):
 
 
 class MU_OT_picture(UnitOperator, bpy.types.Operator):
-    """Open a picture of the study in an image editor of its own"""
+    """Open a picture of the study in a new image editor"""
 
     bl_idname = "mu.picture"
     bl_label = "Enlarge"

@@ -12,7 +12,7 @@ from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.texts import path_symbol
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
-from . import fields, legend_object, thumbnails
+from . import field_colours, legend_object, thumbnails
 from . import motion as motion_parts
 from .operators import NO_MOTION
 
@@ -36,7 +36,7 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
         if found.status != "complete":
             wrapped(layout, f"The run is {found.status or 'not finished'}", "INFO")
         if found.quick:
-            wrapped(layout, "A quick look: linear elements lock, so that angles come out too small", "ERROR")
+            wrapped(layout, "Quick look: linear elements lock, so the angles are too small", "ERROR")
         column = layout.column(align=True)
         column.active = not found.stale
         for pressure, angle in found.angles:
@@ -47,7 +47,7 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
             words = (
                 f"{contact.force_N[most]:.2f} N at {contact.time_s[most]:.1f} s"
                 if contact.force_N[most]
-                else "not met"
+                else "no contact"
             )
             column.label(text=f"{contact.name}: {words}", icon="CUBE")
         ranking = found.ranking(found.rule)
@@ -58,7 +58,7 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
             if tied:
                 column.label(text=f"tied with {', '.join(tied)}")
             if root.mu_unit.path == best:
-                column.label(text="It is the chosen one", icon="CHECKMARK")
+                column.label(text="This path is chosen", icon="CHECKMARK")
             elif not found.stale:
                 layout.operator("mu.path", text=f"Use {best}", icon="CON_FOLLOWPATH").name = best
         search = found.summary.get("search")
@@ -121,7 +121,7 @@ class MU_PT_motion(_OfResults, bpy.types.Panel):
 
 
 class MU_PT_field(_OfResults, bpy.types.Panel):
-    """What the colours say, and their range"""
+    """The field shown by the colours, and its range"""
 
     bl_idname = "MU_PT_field"
     bl_label = "Colours"
@@ -138,8 +138,8 @@ class MU_PT_field(_OfResults, bpy.types.Panel):
             part.name for part in motion_parts.parts(root) if settings.field not in part.data.attributes
         ]
         if missing:
-            wrapped(layout, f"Not known of {', '.join(missing)}: grey", "INFO")
-        unit = fields.BY_NAME[settings.field].unit
+            wrapped(layout, f"Grey, without this field: {', '.join(missing)}", "INFO")
+        unit = field_colours.BY_NAME[settings.field].unit
         column = layout.column(align=True)
         column.prop(settings, "low", text=f"From ({unit})" if unit else "From")
         column.prop(settings, "high", text="To")

@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from ...errors import MuError
 from ..shared import viewports
 from ..shared.registration import property_group_factory
-from . import fields
+from . import field_colours
 from . import motion as motion_parts
 
 
@@ -42,8 +42,10 @@ class MU_PG_motion(bpy.types.PropertyGroup):
 
     field: EnumProperty(
         name="Field",
-        description="What the colours say",
-        items=[(f.name, f"{f.label} ({f.unit})" if f.unit else f.label, f.text) for f in fields.FIELDS],
+        description="Physical quantity shown by the colours",
+        items=[
+            (f.name, f"{f.label} ({f.unit})" if f.unit else f.label, f.text) for f in field_colours.FIELDS
+        ],
         update=_again,
     )
     low: FloatProperty(

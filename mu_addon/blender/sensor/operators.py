@@ -50,10 +50,10 @@ class MU_OT_sensor_ports(bpy.types.Operator):
 
 
 class MU_OT_sensor_port(UnitOperator, bpy.types.Operator):
-    """Take this port"""
+    """Use this port"""
 
     bl_idname = "mu.sensor_port"
-    bl_label = "Take Port"
+    bl_label = "Use Port"
     bl_options = {"REGISTER", "UNDO"}
 
     name: StringProperty(name="Name", description="A port's device, or usb:VID:PID[:SERIAL]")
@@ -64,7 +64,7 @@ class MU_OT_sensor_port(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_connect(UnitOperator, bpy.types.Operator):
-    """Read the sensor in a process of its own; every sample is on disk before it is shown"""
+    """Read the sensor in a child process; every sample is written to disk before it is shown"""
 
     bl_idname = "mu.sensor_connect"
     bl_label = "Connect and Record"
@@ -113,10 +113,10 @@ class MU_OT_sensor_disconnect(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_pause(SessionOperator, bpy.types.Operator):
-    """Give the port to another program, for firmware say, or take it again; the session goes on"""
+    """Release the port for another program, or open it again; the session goes on"""
 
     bl_idname = "mu.sensor_pause"
-    bl_label = "Give Port"
+    bl_label = "Release Port"
     bl_options = {"REGISTER"}
 
     def execute(self, context):
@@ -126,7 +126,7 @@ class MU_OT_sensor_pause(SessionOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_mark(SessionOperator, bpy.types.Operator):
-    """Leave words in the recording, at this moment"""
+    """Write a mark with a text into the recording, at this moment"""
 
     bl_idname = "mu.sensor_mark"
     bl_label = "Mark"
@@ -145,10 +145,10 @@ class MU_OT_sensor_mark(SessionOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_freeze(UnitOperator, bpy.types.Operator):
-    """Have the plot stand still, to read it, or go on; recording goes on in any case"""
+    """Freeze the plot, or let it go on; recording goes on in any case"""
 
     bl_idname = "mu.sensor_freeze"
-    bl_label = "Stand Still"
+    bl_label = "Freeze"
     bl_options = {"REGISTER"}
 
     def execute(self, context):
@@ -177,14 +177,14 @@ class MU_OT_sensor_channel(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_sweep(SessionOperator, bpy.types.Operator):
-    """Calibrate step by step: hold the unit at angles to and fro; a map is fitted after the last one"""
+    """Calibrate step by step: hold the unit at angles to and fro; the calibration is fitted after the last"""
 
     bl_idname = "mu.sensor_sweep"
     bl_label = "Guided Sweep"
     bl_options = {"REGISTER"}
 
     on: BoolProperty(
-        name="Begin", description="Begin a sweep, or give it up", default=True, options={"SKIP_SAVE"}
+        name="Begin", description="Begin a sweep, or stop it", default=True, options={"SKIP_SAVE"}
     )
 
     @reports_errors
@@ -206,10 +206,10 @@ class MU_OT_sensor_sweep(SessionOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_hold(SessionOperator, bpy.types.Operator):
-    """The unit is at this angle: keep it there while it is read"""
+    """The unit is at this angle: hold it there while it is read"""
 
     bl_idname = "mu.sensor_hold"
-    bl_label = "It Is There"
+    bl_label = "Angle Reached"
     bl_options = {"REGISTER"}
 
     @classmethod
@@ -221,10 +221,10 @@ class MU_OT_sensor_hold(SessionOperator, bpy.types.Operator):
             cls.poll_message_set("Begin a guided sweep first")
             return False
         if session.guide.holding:
-            cls.poll_message_set("Hold still: it is being read")
+            cls.poll_message_set("Hold still: the angle is being read")
             return False
         if not session.fresh:
-            cls.poll_message_set("No samples come")
+            cls.poll_message_set("No samples are coming")
             return False
         return True
 
@@ -235,7 +235,7 @@ class MU_OT_sensor_hold(SessionOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_calibrate(UnitOperator, bpy.types.Operator):
-    """Calibrate from a recording with angles marked, or from measured data, in a process of its own"""
+    """Calibrate from a recording with marked angles or from measured data, in a child process"""
 
     bl_idname = "mu.sensor_calibrate"
     bl_label = "Calibrate"
@@ -262,7 +262,7 @@ class MU_OT_sensor_calibrate(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_zero(SessionOperator, bpy.types.Operator):
-    """Say at which angle the unit is now, to make up for light that grew weaker or stronger"""
+    """Zero: set the present angle, to correct for a change in light intensity"""
 
     bl_idname = "mu.sensor_zero"
     bl_label = "Zero"
@@ -277,13 +277,13 @@ class MU_OT_sensor_zero(SessionOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_twin(MotionOperator, bpy.types.Operator):
-    """Show the simulated unit bending as the sensor says, beside the design, or take it away"""
+    """Show or hide the simulated unit beside the design, bent to the angle that the sensor reads"""
 
     bl_idname = "mu.sensor_twin"
     bl_label = "Show Twin"
     bl_options = {"REGISTER", "UNDO"}
 
-    on: BoolProperty(name="Show", description="Show it, or take it away", default=True)
+    on: BoolProperty(name="Show", description="Show or hide it", default=True)
 
     @reports_errors
     def execute(self, context):

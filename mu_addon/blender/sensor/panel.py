@@ -16,12 +16,12 @@ from . import state as sensor
 from . import twin
 
 STATES = {
-    "starting": ("The reader starts", "TIME"),
-    "searching": ("Looking for the sensor", "VIEWZOOM"),
-    "waiting": ("The sensor is not there; it is looked for", "ERROR"),
-    "disconnected": ("Unplugged; it is looked for until it comes", "ERROR"),
+    "starting": ("Starting", "TIME"),
+    "searching": ("Searching for the sensor", "VIEWZOOM"),
+    "waiting": ("Sensor not found; searching", "ERROR"),
+    "disconnected": ("Unplugged; waiting for it", "ERROR"),
     "connected": ("Connected", "LINKED"),
-    "paused": ("The port is free for others", "PAUSE"),
+    "paused": ("Port released", "PAUSE"),
     "ended": ("Disconnected", "UNLINKED"),
 }
 
@@ -76,7 +76,7 @@ def _session(layout, settings, session):
         paused = session.state == "paused"
         row.operator(
             "mu.sensor_pause",
-            text="Take Port" if paused else "Give Port",
+            text="Open Port" if paused else "Release Port",
             icon="PLAY" if paused else "PAUSE",
         )
     box = layout.box()
@@ -85,17 +85,17 @@ def _session(layout, settings, session):
         box.alert = True
         wrapped(box, str((session.child.error or {}).get("what", "")), "ERROR")
         wrapped(box, str((session.child.error or {}).get("where", "")))
-        wrapped(box, "What was recorded is kept. Connect again")
+        wrapped(box, "The recording is kept. Connect again")
     elif session.running and session.watched.silent_s > sensor.SILENT_S and status:
         box.alert = True
         wrapped(
             box,
-            f"The reader has said nothing for {session.watched.silent_s:.0f} s: is its folder still there?",
+            f"No status for {session.watched.silent_s:.0f} s: does the folder still exist?",
             "ERROR",
         )
     else:
         if session.state == "connected" and not session.fresh:
-            words, icon = "Connected, and nothing comes", "ERROR"
+            words, icon = "Connected, no samples", "ERROR"
         port = f": {status['port']}" if status.get("port") and session.state == "connected" else ""
         wrapped(box, f"{words}{port}", icon)
     if not status:
@@ -134,9 +134,7 @@ def _plot(layout, settings, session):
     row.use_property_split = False
     row.prop(settings, "plot", toggle=True)
     frozen = session is not None and session.frozen is not None
-    row.operator(
-        "mu.sensor_freeze", text="Go On" if frozen else "Stand Still", icon="PLAY" if frozen else "PAUSE"
-    )
+    row.operator("mu.sensor_freeze", text="Go On" if frozen else "Freeze", icon="PLAY" if frozen else "PAUSE")
     body.prop(settings, "seconds")
     if session is not None:
         hidden = settings.hidden.split(",")
@@ -157,8 +155,8 @@ def _calibration(layout, root, session):
         zeroed = "" if found.gain == 1.0 else f", light {100 * (found.gain - 1):+.1f} % since"
         wrapped(
             body,
-            f"{low:.0f} to {high:.0f}°, {found.sweeps} sweeps, {found.error_deg:.2f}° rms where not "
-            f"fitted{zeroed}",
+            f"{low:.0f} to {high:.0f}°, {found.sweeps} sweeps, {found.error_deg:.2f}° rms "
+            f"cross-validated{zeroed}",
             "CHECKMARK",
         )
     else:
@@ -167,7 +165,7 @@ def _calibration(layout, root, session):
     body.prop(settings, "channel", placeholder=light)
     body.prop(settings, "dark", placeholder=str(dark))
     body.prop(settings, "calibration")
-    job_state(body, sensor.CALIBRATION.child(root), "it is applied", "sensor_")
+    job_state(body, sensor.CALIBRATION.child(root), "now in use", "sensor_")
     guide = session.guide if session is not None and session.running else None
     if guide is None:
         column = body.column(align=True)
@@ -194,10 +192,10 @@ def _guide(layout, guide):
         wrapped(box, f"Bend to {angle:g}°, hold it there, then press", "FORWARD")
     row = box.row()
     row.scale_y = 1.6
-    text = f"It Is at {guide.angles[guide.held]:g}°" if guide.held < len(guide.angles) else "Done"
+    text = f"At {guide.angles[guide.held]:g}°" if guide.held < len(guide.angles) else "Done"
     row.operator("mu.sensor_hold", text=text, icon="PINNED")
     box.progress(factor=guide.held / len(guide.angles), text=f"{guide.held} of {len(guide.angles)}")
-    box.operator("mu.sensor_sweep", text="Give Up", icon="CANCEL").on = False
+    box.operator("mu.sensor_sweep", text="Stop", icon="CANCEL").on = False
 
 
 def _twin(layout, root):
@@ -216,7 +214,7 @@ def _twin(layout, root):
         wrapped(body, words, {twin.LIVE: "CHECKMARK", twin.OUTSIDE: "ERROR"}.get(state, "INFO"))
         found = studies.findings(root)
         if found is not None and found.stale:
-            wrapped(body, "It moves as a unit of other parameters: simulate again", "ERROR")
+            wrapped(body, "Its motion belongs to other parameters: simulate again", "ERROR")
 
 
 CLASSES = (MU_PT_sensor,)

@@ -16,6 +16,7 @@ from bpy.app.handlers import persistent
 
 from ...errors import InputError, MuError
 from ...run.child import DONE, FAILED, RUNNING
+from ...run.folder import write_run
 from ...usecases.sensor.watch import Watched
 from ..jobs import start_child
 from ..jobs.start_child import JobKind
@@ -161,14 +162,13 @@ CALIBRATION = JobKind("calibrate", lambda root: root.mu_unit.uuid, latest_calibr
 
 def calibrate(root: Any, data: Path) -> None:
     """Calibrate from a folder in a process of its own, and then apply what it finds; raises MuError."""
+    # Only now: it brings in scipy, which a Blender without the wheels lacks.
+    from ...usecases.sensor.calibrate import LAYOUT, Job
+
     folder = _unused(studies.assign_folder(root) / CALIBRATIONS)
     light, dark = chosen(root)
-    line = ["calibrate", str(data), "--out", str(folder), "--json"]
-    if light:
-        line += ["--channel", light]
-    if dark:
-        line += ["--dark", str(dark)]
-    CALIBRATION.start(root, line, folder)
+    job = Job((data,), light or None, str(dark) if dark else None)
+    CALIBRATION.start(root, folder, lambda folder: write_run(folder, LAYOUT, job.texts()))
     _calibrating[CALIBRATION.key(root)] = folder
     _tick()
 

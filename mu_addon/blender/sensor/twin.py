@@ -17,8 +17,7 @@ from bpy.app.handlers import persistent
 from ...errors import InputError
 from ...usecases.simulate_and_place.motion import REGIONS, Motion
 from ...usecases.simulate_and_place.poses import Poses, poses
-from ..preview import arrays as preview
-from ..preview import colours as materials
+from ..preview import materials, skeletons
 from ..results import motion as motion_parts
 from ..shared import handlers
 from ..simulate import study_folder as studies
@@ -83,8 +82,8 @@ def show(root: Any) -> None:
         title = f"Twin {region}"
         part = bpy.data.objects.new(title, bpy.data.meshes.new(title))
         part[TWIN] = region
-        preview.write(
-            part.data, preview.Skeleton(shape.vertices[region][rest], faces=(shape.triangles[region],))
+        skeletons.write(
+            part.data, skeletons.Skeleton(shape.vertices[region][rest], faces=(shape.triangles[region],))
         )
         for collection in root.users_collection:
             collection.objects.link(part)

@@ -8,7 +8,7 @@ from ..unit import presets
 
 
 class MU_MT_presets(bpy.types.Menu):
-    """Presets that come with the extension, then the user's own"""
+    """Presets of the extension, then your own"""
 
     bl_idname = "MU_MT_presets"
     bl_label = "Presets"
@@ -28,7 +28,7 @@ class MU_MT_presets(bpy.types.Menu):
 
 
 class MU_MT_presets_remove(bpy.types.Menu):
-    """The user's own presets, to be removed"""
+    """Remove one of your own presets"""
 
     bl_idname = "MU_MT_presets_remove"
     bl_label = "Remove Preset"

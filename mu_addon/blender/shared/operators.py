@@ -36,7 +36,7 @@ class ValidUnitOperator(UnitOperator):
             return False
         trouble = active_root(context).mu_unit.trouble
         if trouble:
-            cls.poll_message_set(f"The parameters break a rule: {trouble.splitlines()[0]}")
+            cls.poll_message_set(f"A design rule is broken: {trouble.splitlines()[0]}")
             return False
         return True
 

@@ -8,14 +8,14 @@ simulator's packages, which a Blender may lack.
 from __future__ import annotations
 
 import tomllib
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ...files import write_text
 from ..shared.texts import readable
 from ..unit.properties import exact
 
-MODEL = "model.toml"
+if TYPE_CHECKING:
+    from ...usecases.simulate_and_place.static_effects import StaticEffects
+
 WEIGHT = "gravity"
 """The effect that depends on the direction of gravity."""
 INPUTS = ("orientation_deg", "effects")
@@ -70,11 +70,9 @@ def _direction(root: Any) -> float:
     return exact(root.mu_unit.study.orientation_deg) % 360.0
 
 
-def arguments(root: Any, folder: Path) -> list[str]:
-    """Words of the command line that hand the effects over, their file in `folder`. Raises OutputError."""
-    if not _tables(root):
-        return []
-    path = folder / MODEL
-    write_text(path, root.mu_unit.study.effects)
-    turned = ["--orientation", repr(_direction(root))] if has_gravity(root) else []
-    return ["--model", str(path), *turned]
+def static_effects(root: Any) -> StaticEffects:
+    """The effects as the simulation takes them; raises InputError."""
+    from ...usecases.simulate_and_place.static_effects import StaticEffects
+
+    found = inputs(root)
+    return StaticEffects(found.get("effects", {}), found.get("orientation_deg", 0.0), "effects of the unit")

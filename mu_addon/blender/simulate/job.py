@@ -1,8 +1,66 @@
-"""The unit's simulation as a job in a child process."""
+"""The unit's simulation as a job: from the properties in Blender to the core's inputs of a study."""
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import bpy
+
+from ...errors import InputError
+from ..body import state as bodies
 from ..jobs.start_child import JobKind
+from ..obstacles import state as obstacles
+from ..unit.properties import to_unit
+from . import effects
 from . import study_folder as studies
 
+if TYPE_CHECKING:
+    from ...usecases.simulate_and_place.job import Job
+
 SIMULATION = JobKind("simulate", lambda root: root.mu_unit.uuid, studies.folder_of)
+
+
+def job_of(root: Any) -> Job:
+    """The study that a unit's properties ask for; raises InputError."""
+    # Only now: they bring in the solver's packages, which a Blender may lack.
+    try:
+        from ...fem.solver import SolverChoice
+        from ...meshing.settings import MeshSettings
+        from ...usecases.simulate_and_place.job import Job, protocol_of, require_paths_inside
+    except (ImportError, OSError, RuntimeError) as error:
+        raise InputError(
+            f"the solver cannot load: {error}", "", "install the extension built for this Blender and system"
+        ) from error
+
+    settings, unit = root.mu_unit.study, to_unit(root.mu_unit)
+    stages = ("design", "simulate", "place") if settings.command == "place" else ("design", "simulate")
+    extra: dict[str, Any] = {}
+    if settings.command == "place":
+        extra["paths"] = settings.paths
+    if settings.detail == "quick":
+        # Linear elements on a mesh of half the fineness, one rule, no second mesh.
+        extra["mesh"] = MeshSettings(order=1, refine=0.5)
+        if settings.command == "place":
+            extra |= {"rules": ("volume_fraction",), "mesh_check": False}
+    body = bodies.envelope_in(root, unit)
+    if body is not None:
+        require_paths_inside(unit, body, stages, settings.paths)
+    return Job(
+        unit=unit,
+        protocol=protocol_of(bpy.path.abspath(settings.protocol) if settings.protocol else None),
+        body=body,
+        obstacles=obstacles.rigid_bodies(root, unit),
+        effects=effects.static_effects(root),
+        stages=stages,
+        solver=SolverChoice(settings.solver, settings.device),
+        **extra,
+    )
+
+
+def write_inputs(root: Any, folder: Path) -> None:
+    """Write what the unit's simulation is asked to do into its folder; raises InputError and OutputError."""
+    job = job_of(root)
+    from ...usecases.simulate_and_place.job import write_study
+
+    write_study(job, folder)

@@ -1,29 +1,20 @@
-"""Start, cancel and look into a simulation; it runs in a process of its own."""
+"""Start a simulation in a child process, cancel it, open its files."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
 
-from ...design.parameters import write_unit
-from ..body import state as bodies
 from ..jobs import start_child
 from ..jobs.operators import job_operators
-from ..obstacles import state as obstacles
 from ..shared import viewports
 from ..shared.operators import ValidUnitOperator, reports_errors
 from ..unit import object as unit_object
-from ..unit.properties import to_unit
-from . import effects
 from . import study_folder as studies
-from .job import SIMULATION
-
-# A quick look: linear elements on a mesh of half the fineness, one rule, no second mesh.
-QUICK = ["--order", "1", "--refine", "0.5"]
-QUICK_PLACE = ["--rule", "volume_fraction", "--no-mesh-check"]
+from .job import SIMULATION, write_inputs
 
 
 class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
-    """Simulate the unit in a process of its own; Blender stays free, and finished work is not repeated"""
+    """Simulate the unit in a child process; Blender stays usable, and finished stages are not repeated"""
 
     bl_idname = "mu.simulate"
     bl_label = "Simulate"
@@ -46,26 +37,13 @@ class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
     @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
-        core, settings = to_unit(root.mu_unit), root.mu_unit.study
-        arguments = [settings.command]
-        if settings.command == "place":
-            arguments += ["--paths", settings.paths]
-        if settings.detail == "quick":
-            arguments += QUICK + (QUICK_PLACE if settings.command == "place" else [])
-        for name in ("solver", "device"):
-            if getattr(settings, name) != "auto":
-                arguments += [f"--{name}", getattr(settings, name)]
-        if settings.protocol:
-            arguments += ["--protocol", bpy.path.abspath(settings.protocol)]
-        folder = studies.assign_folder(root)
-        arguments += bodies.arguments(root, core, folder / "blender")
-        arguments += obstacles.arguments(root, core, folder / "blender")
-        arguments += effects.arguments(root, folder / "blender")
-        unit = folder / "blender" / "unit.toml"
-        write_unit(core, unit)
-        command, *options = arguments
-        line = [command, "--unit", str(unit), "--out", str(folder), "--json", *options]
-        SIMULATION.start(root, line, folder)
+        study = root.mu_unit.study
+        SIMULATION.start(
+            root,
+            studies.assign_folder(root),
+            lambda folder: write_inputs(root, folder),
+            ["--solver", study.solver, "--device", study.device],
+        )
         viewports.redraw()
         return {"FINISHED"}
 

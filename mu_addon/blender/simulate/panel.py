@@ -12,7 +12,7 @@ from .job import SIMULATION
 
 
 class MU_PT_simulate(UnitPanel, bpy.types.Panel):
-    """Motion and ranking of paths, in a process of its own"""
+    """Motion and ranking of the sensor paths, computed in a child process"""
 
     bl_idname = "MU_PT_simulate"
     bl_label = "Simulate"
@@ -56,7 +56,7 @@ def _effects(layout, root) -> None:
         return
     box = layout.box()
     row = box.row()
-    row.label(text="With what was found", icon="LIGHT")
+    row.label(text="With named effects", icon="LIGHT")
     row.operator("mu.evidence_remove", text="", icon="X")
     for line in lines:
         wrapped(box, line)

@@ -70,7 +70,7 @@ class _OfStep(UnitOperator):
             self.report({"ERROR"}, props.trouble)
             return {"CANCELLED"}
         made = [name for name in STEPS if stack.STACK.counts[name] > before[name]]
-        self.report({"INFO"}, f"Made: {', '.join(made)}; all else was there")
+        self.report({"INFO"}, f"Updated: {', '.join(made)}; all other steps unchanged")
         return {"FINISHED"}
 
 
@@ -114,7 +114,7 @@ class MU_OT_mute(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_again(UnitOperator, bpy.types.Operator):
-    """Make one step again, and of those after it only what comes out different"""
+    """Run one step again, and of the later steps those whose input changes"""
 
     bl_idname = "mu.again"
     bl_label = "Run Step Again"

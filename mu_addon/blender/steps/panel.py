@@ -31,7 +31,7 @@ class MU_UL_steps(bpy.types.UIList):
 
 
 class MU_PT_stack(UnitPanel, bpy.types.Panel):
-    """The design step by step: each can be shown, muted, changed and made again on its own"""
+    """The design step by step: each step can be shown, muted, changed and run again"""
 
     bl_idname = "MU_PT_stack"
     bl_label = "Steps"

@@ -22,10 +22,10 @@ def clip_of(context):
 
 
 class MU_OT_track(bpy.types.Operator):
-    """Follow the markers, the selected ones or all, from this frame to the clip's end"""
+    """Track the selected markers, or all, from this frame to the end of the clip"""
 
     bl_idname = "mu.track"
-    bl_label = "Follow Markers"
+    bl_label = "Track Markers"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod

@@ -72,7 +72,7 @@ def _time(layout, clip, settings):
     column = layout.column(align=True)
     column.prop(settings, "fps")
     if settings.fps == 0.0 and clip.fps > 0.0:
-        column.label(text=f"the clip says {clip.fps:g}", icon="INFO")
+        column.label(text=f"{clip.fps:g} in the clip", icon="INFO")
     column.prop(settings, "starts_s")
 
 

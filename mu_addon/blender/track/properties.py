@@ -70,7 +70,7 @@ class MU_PG_bench(bpy.types.PropertyGroup):
     tip_2: _track("Tip, Other", "Another marker on the tip's end; the farther apart, the better")
     scale_by: EnumProperty(
         name="Scale by",
-        description="What tells millimetres from pixels",
+        description="How the scale, millimetres per pixel, is known",
         items=[
             ("base", "Base", "The places of the two markers on the base"),
             ("ruler", "Ruler", "Two marks of a known distance, as far from the camera as the markers"),
@@ -92,8 +92,8 @@ class MU_PG_bench(bpy.types.PropertyGroup):
     )
     fps: FloatProperty(
         name="Frame Rate",
-        description="Frames a second. 0: as the clip says; a sequence of pictures does not say, and a film "
-        "in slow motion says the wrong rate",
+        description="Frames per second. 0: the rate stored in the clip; a sequence of pictures has none, and "
+        "a slow-motion film has a wrong one",
         min=0.0,
     )
     starts_s: FloatProperty(
@@ -152,7 +152,7 @@ def missing(clip: Any) -> str:
     if bench.scale_by == "number" and bench.mm_per_pixel == 0.0:
         return "Give the millimetres a pixel"
     if bench.fps == 0.0 and clip.fps == 0.0:
-        return "Give the frames a second: pictures do not tell them"
+        return "Give the frames per second: a sequence of pictures has none"
     for name in ("pressure", "folder"):
         if not getattr(bench, name):
             return (

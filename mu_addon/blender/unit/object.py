@@ -22,9 +22,7 @@ from ...design.solid import Solid
 from ...errors import InputError, MuError
 from ..body import state as bodies
 from ..path import ranking
-from ..preview import arrays as preview
-from ..preview import colours as materials
-from ..preview import nodes
+from ..preview import materials, nodes, skeletons
 from ..shared import updates
 from ..shared.compat import set_modifier_input
 from ..shared.texts import error_text
@@ -191,17 +189,17 @@ def _draw(root: Any, unit: Unit) -> None:
                 if skeleton is not None:
                     shapes[name] = skeleton
         if props.candidates:
-            paths = preview.candidates(unit)
+            paths = skeletons.candidates(unit)
             shapes |= {CANDIDATE + name: skeleton for name, skeleton in paths.items()}
             free = ranking.free(root)
             if free is not None:
                 name, _, points = free
-                shapes[FREE] = preview.free_path(points, name, unit.dimensions.cell)
+                shapes[FREE] = skeletons.free_path(points, name, unit.dimensions.cell)
     finally:
         for name, skeleton in shapes.items():
             _put(root, name, skeleton)
         tubes = {n.removeprefix(CANDIDATE): part(root, n) for n in shapes if n.startswith(CANDIDATE)}
-        ranking.dress(root, tubes)
+        ranking.colour_and_label(root, tubes)
         for child in list(root.children):
             name = child.get(PART)
             if name not in (None, SOLID, *bodies.PARTS, *shapes):
@@ -209,19 +207,19 @@ def _draw(root: Any, unit: Unit) -> None:
     show_parts(root)
 
 
-DRAWN: dict[str, tuple[str, Callable[[Any, Any, bool], preview.Skeleton | None]]] = {
-    "profile": ("profile", lambda value, given, cut: preview.outline(value)),
-    "chambers": ("chambers", lambda value, given, cut: preview.cavity(value, cut)),
-    "membranes": ("actuator", lambda value, given, cut: preview.actuator(value, cut)),
-    "cells": ("cells", lambda value, given, cut: preview.boxes(value)),
-    "trim": ("trim", lambda value, given, cut: preview.lines(value, cut)),
-    "struts": ("lattice", lambda value, given, cut: preview.lattice(value, cut)),
+DRAWN: dict[str, tuple[str, Callable[[Any, Any, bool], skeletons.Skeleton | None]]] = {
+    "profile": ("profile", lambda value, given, cut: skeletons.outline(value)),
+    "chambers": ("chambers", lambda value, given, cut: skeletons.cavity(value, cut)),
+    "membranes": ("actuator", lambda value, given, cut: skeletons.actuator(value, cut)),
+    "cells": ("cells", lambda value, given, cut: skeletons.boxes(value)),
+    "trim": ("trim", lambda value, given, cut: skeletons.lines(value, cut)),
+    "struts": ("lattice", lambda value, given, cut: skeletons.lattice(value, cut)),
     "anchors": (
         "anchors",
-        lambda value, given, cut: preview.anchor_skeleton(value, stack.STACK.value("struts", given)),
+        lambda value, given, cut: skeletons.anchor_skeleton(value, stack.STACK.value("struts", given)),
     ),
-    "path": ("path", lambda value, given, cut: preview.line_through(value)),
-    "wells": ("waveguide", lambda value, given, cut: preview.bar(value)),
+    "path": ("path", lambda value, given, cut: skeletons.line_through(value)),
+    "wells": ("waveguide", lambda value, given, cut: skeletons.bar(value)),
 }
 """The part that a step's value becomes, and how it is drawn: from the value, what was given, the cut."""
 
@@ -242,7 +240,7 @@ _LOOKS = {
 }
 
 
-def _put(root: Any, name: str, skeleton: preview.Skeleton) -> None:
+def _put(root: Any, name: str, skeleton: skeletons.Skeleton) -> None:
     title, colours, group = _LOOKS.get(
         name, (name.removeprefix(CANDIDATE), ("MU Candidate",), "MU Labelled Tube")
     )
@@ -251,7 +249,7 @@ def _put(root: Any, name: str, skeleton: preview.Skeleton) -> None:
         return
     if obj.data.users > 1:  # a linked duplicate's
         obj.data = bpy.data.meshes.new(title)
-    preview.write(obj.data, skeleton, smooth=name != "waveguide")
+    skeletons.write(obj.data, skeleton, smooth=name != "waveguide")
     materials.assign(obj.data, *colours)
     if name.startswith(CANDIDATE):
         chosen = name == CANDIDATE + root.mu_unit.path
@@ -259,15 +257,15 @@ def _put(root: Any, name: str, skeleton: preview.Skeleton) -> None:
     _skin(obj, group, skeleton)
 
 
-def draw_part(obj: Any, name: str, skeleton: preview.Skeleton) -> None:
+def draw_part(obj: Any, name: str, skeleton: skeletons.Skeleton) -> None:
     """Draw a skeleton as the part of that name looks, on any object with a mesh of its own."""
     _, colours, group = _LOOKS[name]
-    preview.write(obj.data, skeleton, smooth=name != "waveguide")
+    skeletons.write(obj.data, skeleton, smooth=name != "waveguide")
     materials.assign(obj.data, *colours)
     _skin(obj, group, skeleton)
 
 
-def _skin(obj: Any, group: str, skeleton: preview.Skeleton) -> None:
+def _skin(obj: Any, group: str, skeleton: skeletons.Skeleton) -> None:
     if not skeleton.attributes:
         obj.modifiers.clear()  # struts without thickness stay lines
     elif group:
@@ -290,8 +288,8 @@ def _new_part(root: Any, name: str, title: str) -> Any:
 def put_solid(root: Any, solid: Any, unit: Unit) -> Any:
     """Make the core's printable solid the root's part `solid`, with its gates and what it was built from."""
     obj = part(root, SOLID) or _new_part(root, SOLID, "Solid")
-    skeleton = preview.Skeleton(solid.vertices, faces=(solid.triangles,))
-    preview.write(obj.data, skeleton)
+    skeleton = skeletons.Skeleton(solid.vertices, faces=(solid.triangles,))
+    skeletons.write(obj.data, skeleton)
     materials.assign(obj.data, "MU Solid")
     obj["mu_unit_hash"] = unit.hash()
     obj["mu_path"] = solid.window.name if solid.window else ""
@@ -324,7 +322,7 @@ def solid_of(root: Any, unit: Unit, quality: str = "interactive") -> Solid:
 def put_envelope(root: Any, body: Body) -> Any:
     """Keep a body of the user's as the unit's envelope: a wire, hidden, since the lattice shows it."""
     obj = part(root, bodies.ENVELOPE) or _new_part(root, bodies.ENVELOPE, body.name)
-    preview.write(obj.data, preview.Skeleton(body.vertices, faces=(body.triangles,)), smooth=False)
+    skeletons.write(obj.data, skeletons.Skeleton(body.vertices, faces=(body.triangles,)), smooth=False)
     obj.display_type = "WIRE"
     obj.hide_render = True
     obj.hide_set(True)
@@ -345,7 +343,7 @@ def mark(root: Any, places: list[Any]) -> None:
         remove_part(old)
     if len(places):
         radius = np.full(len(places), 0.08 * to_unit(root.mu_unit).dimensions.cell)
-        _put(root, bodies.FLAWS, preview.Skeleton(np.array(places), attributes={"radius": radius}))
+        _put(root, bodies.FLAWS, skeletons.Skeleton(np.array(places), attributes={"radius": radius}))
         part(root, bodies.FLAWS).show_in_front = True
 
 

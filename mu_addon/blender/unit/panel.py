@@ -34,7 +34,7 @@ class MU_PT_unit(TabPanel, bpy.types.Panel):
             return
         if not in_millimetres(context.scene):
             box = layout.box()
-            wrapped(box, "The scene is not in millimetres: lengths here read wrong", "ERROR")
+            wrapped(box, "The scene is not in millimetres: lengths are shown wrong", "ERROR")
             box.operator("mu.millimetres")
         row = layout.row(align=True)
         row.menu("MU_MT_presets", text=root.mu_unit.title, icon="PRESET")

@@ -32,7 +32,7 @@ class MU_OT_preset_load(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_preset_save(UnitOperator, bpy.types.Operator):
-    """Keep the unit's parameters as a preset of your own, a TOML file that headless/run.py reads, too"""
+    """Save the unit's parameters as your own preset, a TOML file that headless/run.py also reads"""
 
     bl_idname = "mu.preset_save"
     bl_label = "Save Preset"
@@ -47,7 +47,7 @@ class MU_OT_preset_save(UnitOperator, bpy.types.Operator):
     @reports_errors
     def execute(self, context):
         kept = presets.save(to_unit(unit_object.active_root(context).mu_unit), self.name)
-        self.report({"INFO"}, f"Preset {kept.removeprefix(presets.USER)} is kept")
+        self.report({"INFO"}, f"Preset {kept.removeprefix(presets.USER)} saved")
         return {"FINISHED"}
 
 

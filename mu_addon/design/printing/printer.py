@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from pathlib import Path
+from typing import Any
 
 import attrs
 
 from ...errors import InputError
 from ...reading import file_text
+from ...toml_writer import Noted, toml_text
 from ..assets import asset_file, asset_names
 from ..toml_text import parse, place
 
@@ -89,14 +90,11 @@ def read_printer(path: str | Path) -> Printer:
 
 def printer_text(printer: Printer) -> str:
     """The printer as the text of such a file."""
-    lines = ["format = 1", f'name = "{printer.name}"', f'title = "{printer.title}"']
+    values: dict[str, Any] = {"format": 1, "name": printer.name, "title": printer.title}
     for name, limit in printer.limits.items():
-        source = limit.source.replace("\\", "\\\\").replace('"', '\\"')
-        lines += ["", f"# {MEANING[name]}", f"[{name}]", f"value = {limit.value!r}", f'source = "{source}"']
-        lines += [f"assumed = {'true' if limit.assumed else 'false'}"]
-    text = "\n".join(lines) + "\n"
-    tomllib.loads(text)
-    return text
+        table = {"value": limit.value, "source": limit.source, "assumed": limit.assumed}
+        values[name] = Noted(table, (MEANING[name],))
+    return toml_text(values)
 
 
 def _limit(name: str, table: dict[str, object], origin: str) -> Limit:

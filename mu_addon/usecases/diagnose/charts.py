@@ -241,7 +241,7 @@ def gain_chart(errors: Errors) -> str:
     bars = [
         ("base model", errors.before, BASE),
         ("extended model", errors.after, CHOSEN),
-        ("effect on permuted experiments", errors.permuted, "#B9C3CF"),
+        ("permuted effect", errors.permuted, "#B9C3CF"),
         ("black-box model", errors.black_box, "#B9C3CF"),
     ]
     bars = [bar for bar in bars if math.isfinite(bar[1])]

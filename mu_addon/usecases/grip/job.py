@@ -36,7 +36,8 @@ LAYOUT = FolderLayout(
     ),
 )
 CUBES = (12.5, 25.0)
-REFINE = 0.5
+REFINE, COARSE = 0.5, 0.4
+"""What divides the element sizes, and for a quick look."""
 
 
 @attrs.frozen

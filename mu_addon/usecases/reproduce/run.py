@@ -67,7 +67,7 @@ def _columns(
 ) -> tuple[TableColumn, ...]:
     todo = tasks(units, settings.mesh, samples, settings.held_cells)
     known: dict[int, Solved] = {}
-    for number, one in each(partial(solved, cache=cache), todo, settings.workers):
+    for number, one in each(partial(solved, cache=cache), todo, settings.workers, "columns"):
         known[number] = one
         progress.update(len(known) / len(todo))
     return tuple(
@@ -82,7 +82,7 @@ def _gripper(
     refine = min(settings.mesh.refine, gripper.REFINE)
     todo = gripper.tasks(settings.values, [p.name for p in paper.paths], refine)
     known: dict[int, Array | str] = {}
-    for number, J_hat in each(partial(gripper.solved, cache=cache), todo, settings.workers):
+    for number, J_hat in each(partial(gripper.solved, cache=cache), todo, settings.workers, "columns"):
         known[number] = J_hat
         progress.update(len(known) / len(todo))
     found: dict[str, OtherColumn] = {}

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from concurrent.futures import Future, as_completed
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import attrs
 import numpy as np
 
-from ...errors import MuError
 from ...fem.kinematics import probe
 from ...fem.materials import Materials
 from ...fem.model import Model
@@ -22,7 +17,7 @@ from ...meshing.mesh import Mesh
 from ...placement.batch import CandidateBatch
 from ...placement.candidates import Candidate, roi
 from ...placement.inclusion import sensor_share
-from ...run.processes import ctrl_c_ignored, end_with_parent, one_thread_each
+from ...run.pool import Pool
 
 if TYPE_CHECKING:
     from .job import Job
@@ -92,7 +87,6 @@ _evaluator: Evaluator | None = None
 
 def _start(setting: CandidateProblem) -> None:
     global _evaluator
-    end_with_parent()
     _evaluator = Evaluator(setting, threads=1)
 
 
@@ -111,58 +105,27 @@ def _work_in_time(job: int, time_s: Array, pressure_kPa: Array) -> Array:
     return _evaluator.simulated_in_time(job, time_s, pressure_kPa)
 
 
-def _survive_broken_pipes() -> None:
-    """Writing to a process that has ended must be an error, as Python has it, not the end of this one.
-
-    The compiler inside Warp resets what Python had set when it starts.
-    """
-    if hasattr(signal, "SIGPIPE"):
-        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
-
-
-@contextmanager
-def _worker_errors() -> Iterator[None]:
-    try:
-        yield
-    except BrokenProcessPool:
-        raise MuError(
-            "a worker process ended unexpectedly",
-            "candidates",
-            "run the command again, it resumes; if memory is short, use --workers 1",
-        ) from None
-
-
 class CandidatePool:
     """Processes that solve a setting's jobs at states of Model A; started when first needed, until closed."""
 
     def __init__(self, setting: CandidateProblem, workers: int) -> None:
         self.setting, self.workers = setting, workers
         self._alone: Evaluator | None = None
-        self._pool: ProcessPoolExecutor | None = None
+        self._pool = Pool(workers, "candidates", _start, (setting,))
         self._submitted: dict[float, Future[Moved]] = {}
 
     def submit(self, state: State) -> None:
         """Have a process solve a state; needs two workers or more."""
         if state.pressure_MPa not in self._submitted:
-            self._submitted[state.pressure_MPa] = self._submit(_work, state)
-
-    def _submit(self, work: Any, *arguments: Any) -> Future[Any]:
-        with one_thread_each():
-            _survive_broken_pipes()
-            if self._pool is None:
-                context = multiprocessing.get_context("spawn")
-                self._pool = ProcessPoolExecutor(self.workers, context, _start, (self.setting,))
-            with ctrl_c_ignored(), _worker_errors():
-                return self._pool.submit(work, *arguments)
+            self._submitted[state.pressure_MPa] = self._pool.submit(_work, state)
 
     def alone(self, tasks: Sequence[tuple[int, Array]]) -> list[Array]:
         """Anchors (s, p, 3) in mm that jobs, by number, move along their paths through pressures (s,)."""
         if self.workers == 1:
             self._alone = self._alone or Evaluator(self.setting, threads=1)
             return [self._alone.alone(*task) for task in tasks]
-        waiting = [self._submit(_work_alone, *task) for task in tasks]
-        with _worker_errors():
-            return [done.result() for done in waiting]
+        waiting = [self._pool.submit(_work_alone, *task) for task in tasks]
+        return [self._pool.result(done) for done in waiting]
 
     def simulated_in_time(
         self, jobs: Sequence[int], time_s: Array, pressure_kPa: Array
@@ -173,11 +136,9 @@ class CandidatePool:
                 self._alone = self._alone or Evaluator(self.setting, threads=1)
                 yield job, self._alone.simulated_in_time(job, time_s, pressure_kPa)
             return
-        waiting = {self._submit(_work_in_time, job, time_s, pressure_kPa): job for job in jobs}
+        waiting = {self._pool.submit(_work_in_time, job, time_s, pressure_kPa): job for job in jobs}
         for done in as_completed(waiting):
-            with _worker_errors():
-                found = done.result()
-            yield waiting[done], found
+            yield waiting[done], self._pool.result(done)
 
     def solve(self, states: Sequence[State]) -> Iterator[tuple[int, Moved]]:
         """Number of each state as it is done, and what all jobs do there.
@@ -193,16 +154,8 @@ class CandidatePool:
             self.submit(state)
         numbers = {self._submitted[s.pressure_MPa]: n for n, s in enumerate(states)}
         for done in as_completed(numbers):
-            with _worker_errors():
-                found = done.result()
-            yield numbers[done], found
+            yield numbers[done], self._pool.result(done)
 
     def close(self) -> None:
         """End the processes, at once: whoever stops early does not wait for what nobody will read."""
-        if self._pool is None:
-            return
-        processes = list((self._pool._processes or {}).values())
-        self._pool.shutdown(wait=False, cancel_futures=True)
-        for process in processes:
-            process.terminate()
-            process.join()
+        self._pool.close()

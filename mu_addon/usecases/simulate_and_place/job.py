@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -25,11 +26,13 @@ from ...homogenize.effective import Effective, read_effective
 from ...meshing.settings import MeshSettings
 from ...placement.graph import Limits
 from ...placement.inclusion import RULES
+from ...run.folder import claim, keep_inputs
 from ...run.inputs import digest
+from ...run.lock import FolderLock
 from ...sensing.optics import Optics
 from .contact_history import obstacles_of
 from .static_effects import StaticEffects
-from .study_file import FILES, NAME, STAGES, Tables, compose, holds, read_run
+from .study_file import FILES, LAYOUT, NAME, STAGES, Tables, compose, holds, read_run
 from .study_file import read as read_tables
 
 if TYPE_CHECKING:
@@ -231,11 +234,14 @@ class Job:
                 found[FILES["obstacles"]] = obstacles
         return found
 
-    def texts_in(self, folder: Path) -> tuple[dict[str, str], bool]:
+    def texts_in(
+        self, folder: Path, run: Mapping[str, Any] = MappingProxyType({})
+    ) -> tuple[dict[str, str], bool]:
         """As `texts`, for a folder: with the inputs of further stages that lie there and are still good.
 
         So `design` in the folder of a `place` of the same unit leaves what that found. And whether what lies
-        in the folder belongs to these inputs. Raises InputError for a study.toml that cannot be used.
+        in the folder belongs to these inputs. run: more for the table [run], which decides no figure. Raises
+        InputError for a study.toml that cannot be used.
         """
         own = self.tables()
         old = read_tables(folder)
@@ -246,7 +252,7 @@ class Job:
             return self.texts(), False
         merged = old | own
         tables = {stage: merged[stage] for stage in STAGES if stage in merged}
-        return {**self.texts(), **files, NAME: compose(tables, self._run)}, True
+        return {**self.texts(), **files, NAME: compose(tables, {**self._run, **run})}, True
 
     def lattice_text(self) -> str | None:
         """effective.toml: the lattice's law and where it is from, or None where it is the unit's modulus."""
@@ -298,7 +304,24 @@ def read_job(folder: Path) -> Job:
             str(folder),
             "restore it, or start a new study with it: --unit, --protocol, --lattice, --obstacle",
         )
-    return job_of(tables, folder)
+    asked = read_run(folder).get("stages", list(tables))
+    return job_of({stage: table for stage, table in tables.items() if stage in asked}, folder)
+
+
+def write_study(job: Job, folder: Path) -> None:
+    """Write a study's inputs into its folder, for another process to `resume` it.
+
+    What a job of more stages found there from the same inputs is kept; [run] names the stages of this one,
+    and is not kept. Raises InputError, also where another process works in the folder, and OutputError.
+    """
+    lock = FolderLock(folder)
+    try:
+        texts, current = job.texts_in(folder, {"stages": list(job.stages)})
+        if current:
+            keep_inputs(folder, {NAME: texts[NAME]})
+        claim(folder, LAYOUT, texts)
+    finally:
+        lock.release()
 
 
 def job_of(tables: Mapping[str, Mapping[str, Any]], folder: Path) -> Job:
@@ -381,6 +404,12 @@ def protocol_of(path: str | Path | None) -> Protocol:
 def body_for(unit: Unit, path: str | Path, stages: Sequence[str] = STAGES, paths: str = "windows") -> Body:
     """The body in a file, cut to the unit's length; raises InputError, also where a path leaves it."""
     body = envelope(read_body(path), unit.dimensions)
+    require_paths_inside(unit, body, stages, paths)
+    return body
+
+
+def require_paths_inside(unit: Unit, body: Body, stages: Sequence[str], paths: str) -> None:
+    """Raise InputError where the stages rank paths that leave a unit's body, or any path of the lattice."""
     if "place" in stages:
         if paths == "graph":
             raise InputError(
@@ -390,7 +419,6 @@ def body_for(unit: Unit, path: str | Path, stages: Sequence[str] = STAGES, paths
             )
         for window in windows(unit.chambers.count):
             require_path_inside(body, unit, window)
-    return body
 
 
 def obstacles_for(

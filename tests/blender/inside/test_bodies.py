@@ -7,11 +7,12 @@ import numpy as np
 
 from mu_addon.blender.body import state as bodies
 from mu_addon.blender.jobs import start_child
+from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
-from mu_addon.design.body import read_body
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.surface import volume
+from mu_addon.usecases.simulate_and_place.job import read_job
 
 from .acting import add, refused
 
@@ -141,15 +142,12 @@ def test_an_inside_out_or_mirrored_body_is_turned():
 
 
 def test_a_simulation_is_given_the_body(monkeypatch):
-
     root = add()
     choose(barrel(), root)
     bpy.ops.mu.body()
-    given = []
-    monkeypatch.setattr(start_child.JobKind, "start", lambda *arguments: given.append(arguments))
+    monkeypatch.setattr(start_child, "start", lambda *arguments: None)
+    monkeypatch.setattr(start_child, "watch", lambda *arguments: None)
     assert bpy.ops.mu.simulate() == {"FINISHED"}
-    ((_, _, arguments, _),) = given
-    core = to_unit(root.mu_unit)
-    path = arguments[arguments.index("--body") + 1]
-    body = read_body(path)
-    assert body.hash == bodies.envelope_in(root, core).hash
+    job = read_job(studies.folder_of(root))
+    assert job.unit == to_unit(root.mu_unit)
+    assert job.body.hash == bodies.envelope_in(root, job.unit).hash

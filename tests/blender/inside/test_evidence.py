@@ -91,7 +91,7 @@ def test_from_data_to_a_unit_that_has_what_was_found(blocks, tmp_path):
     printed = to_unit(root.mu_unit).print
     assert abs(printed.offset_xy_mm - offset) < 1e-6
     assert not unit_object.behind(root)
-    assert "The unit has it: every printed surface moves outward" in drawn().replace("  ", " ")
+    assert "Applied to the unit: every printed surface moves outward" in drawn().replace("  ", " ")
     assert not bpy.ops.mu.evidence_apply.poll(), "given twice it would count twice"
     bpy.ops.ed.undo()
     root = unit_object.active_root(bpy.context)
@@ -108,8 +108,9 @@ def test_from_data_to_a_unit_that_has_what_was_found(blocks, tmp_path):
     assert not bpy.ops.mu.evidence_apply.poll()
     table = blocks / "block_1.csv"
     table.write_text(table.read_text().replace("0.1,", "0.11,"))
-    assert "Stale: it is of other measured data" in drawn()
-    assert "The diagnosis is stale: it is of other measured data" in refused(bpy.ops.mu.evidence_apply)
+    assert "Stale: it belongs to other measured data" in drawn()
+    stale = "The diagnosis is stale: it belongs to other measured data"
+    assert stale in refused(bpy.ops.mu.evidence_apply)
 
 
 def test_a_diagnosis_that_fails_and_one_that_is_stopped(blocks):
@@ -152,8 +153,8 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
     study = root.mu_unit.study
     study.command, study.detail = "simulate", "quick"
     unit = to_unit(root.mu_unit)
-    assert effects.arguments(root, folder) == []
-    assert "With what was found" not in drawn(panels.MU_PT_simulate)
+    assert not effects.static_effects(root)
+    assert "With named effects" not in drawn(panels.MU_PT_simulate)
     assert "no effects beside" in refused(bpy.ops.mu.evidence_remove)
     bpy.ops.ed.undo_push(message="diagnosed")
     assert bpy.ops.mu.evidence_apply() == {"FINISHED"}
@@ -165,14 +166,14 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
     assert line.startswith(f"clogged chamber, share lost: {share:.4g} (")
     assert " to " in line
     said = drawn(panels.MU_PT_simulate)
-    assert "With what was found" in said, said
+    assert "With named effects" in said, said
     assert "clogged chamber, share lost: 0.5" in said, said
-    assert "The unit has it: all moduli" in said, said
+    assert "Applied to the unit: all moduli" in said, said
     assert "the last chamber lacks" in said, said
     assert not bpy.ops.mu.evidence_apply.poll()
     # Pressure alone knows no direction.
     assert not effects.has_gravity(root)
-    assert "--orientation" not in effects.arguments(root, folder)
+    assert "orientation_deg" not in effects.static_effects(root).tables
 
     bpy.ops.ed.undo()
     root = unit_object.active_root(bpy.context)
@@ -184,7 +185,7 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
     (root,) = unit_object.roots()
     asked = {"effects": {"clogged_chamber": {"share_lost": share}}}
     assert effects.inputs(root) == asked
-    assert "The unit has it" in drawn(panels.MU_PT_simulate)
+    assert "Applied to the unit" in drawn(panels.MU_PT_simulate)
 
     def simulated():
         assert bpy.ops.mu.simulate() == {"FINISHED"}
@@ -212,8 +213,8 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
     assert studies.findings(root).stale
     assert bpy.ops.mu.evidence_remove() == {"FINISHED"}
     assert studies.findings(root).stale
-    assert "With what was found" not in drawn(panels.MU_PT_simulate)
-    assert effects.arguments(root, folder) == []
+    assert "With named effects" not in drawn(panels.MU_PT_simulate)
+    assert not effects.static_effects(root)
 
 
 def opened(clogged):
@@ -299,7 +300,7 @@ def test_motion_is_kept_undone_replaced_and_leaves_nothing_behind(tmp_path, clog
     assert "measured" in evidence_motion.reading(root, bpy.context.scene)[1]
     # Other parameters: what was predicted for the unit as it was is not shown any more.
     root.mu_unit.chambers.wall_mm = 1.0
-    assert "Stale: it is of the unit with other parameters" in drawn()
+    assert "Stale: it belongs to other parameters" in drawn()
     assert bpy.ops.mu.evidence_motion(experiment=first.name) == {"FINISHED"}
     assert {mark.partition("|")[0] for mark in parts(root)} == {"", "measured"}
     assert bpy.ops.mu.evidence_motion(experiment="") == {"FINISHED"}

@@ -13,12 +13,13 @@ from mu_addon.blender.gripper import state as grasps
 from mu_addon.blender.gripper.properties import to_gripper
 from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.unit import object as unit_object
-from mu_addon.design.gripper import load_gripper, read_gripper
+from mu_addon.design.gripper import load_gripper
 from mu_addon.design.gripper import to_toml as gripper_toml
 from mu_addon.design.parameters import to_toml
 from mu_addon.files import write_npz
 from mu_addon.report.pc2 import write_pc2
 from mu_addon.usecases.grip.grasp import Grip
+from mu_addon.usecases.grip.job import read_job
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by
@@ -107,17 +108,14 @@ def test_what_a_grasp_is_asked_and_how_it_ends(tmp_path):
     props = root.mu_gripper
     props.folder, props.cube_mm, props.friction = str(tmp_path / "out"), 20.0, 0.3
     props.fingers.gap_mm = 26.5
-    line = grasps.arguments(root)
-    assert line[0] == "grip"
-    assert line[line.index("--cube") + 1] == "20"
-    assert line[line.index("--beyond") + 1] == "3"
-    assert line[line.index("--friction") + 1] == "0.3"
-    assert "--coarse" in line
-    assert "--no-paths" in line
-    assert read_gripper(line[line.index("--gripper") + 1]).fingers.gap_mm == 26.5
+    grasps.write_inputs(root, tmp_path / "asked")
+    job = read_job(tmp_path / "asked")
+    assert [cube.side_mm for cube in job.cubes] == [20.0]
+    assert (job.grip.friction, job.grip.beyond_mm, job.grip.step_s) == (0.3, 3.0, 1.0)
+    assert (job.mesh.refine, job.rules) == (0.4, ())
+    assert job.gripper.fingers.gap_mm == 26.5
     props.detail = "part"
-    assert "--solid-only" in grasps.arguments(root)
-    assert "--cube" not in grasps.arguments(root)
+    assert grasps.job_of(root).cubes == ()
     assert "was not grasped yet" in drawn()
     assert "there is no grasp" in refused(bpy.ops.mu.grasp_show)
 
@@ -179,7 +177,7 @@ def test_a_grasp_plays_on_the_timeline(tmp_path):
     found = grasps.of(root)
     assert not found.stale
     assert "12.3 deg, 0.45 N" in drawn()
-    assert "Held: 4 times its weight" in drawn()
+    assert "Held: friction carries 4 times the weight" in drawn()
     scene = bpy.context.scene
     scene.render.fps = 10
     assert bpy.ops.mu.grasp_show() == {"FINISHED"}

@@ -4,7 +4,8 @@ import bpy
 import numpy as np
 
 from mu_addon.blender.path import ranking
-from mu_addon.blender.results import fields, legend_object
+from mu_addon.blender.results import field_colours as fields
+from mu_addon.blender.results import legend_object
 from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.results import panel as results_panel
 from mu_addon.blender.shared.compat import modifier_input
@@ -281,4 +282,4 @@ def test_panels_show_the_motion(study):
     root.mu_motion.field = "dJ_by_modulus_mm_per_MPa"
     said = drawn(results_panel.CLASSES)
     assert "Play" in said
-    assert "Not known of alpha4" in said
+    assert "without this field: alpha4" in said

@@ -15,8 +15,8 @@ from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate.job import SIMULATION
 from mu_addon.blender.unit import object as unit_object
-from mu_addon.design.body import read_body
 from mu_addon.design.surface import volume
+from mu_addon.usecases.simulate_and_place.job import read_job
 
 from .acting import add, refused
 from .jobs import watch
@@ -39,9 +39,9 @@ def choose(root, *objects):
 
 
 def asked():
-    with patch.object(start_child.JobKind, "start") as start:
+    with patch.object(start_child, "start"), patch.object(start_child, "watch"):
         assert bpy.ops.mu.simulate() == {"FINISHED"}
-    return start.call_args.args[1]
+    return read_job(studies.folder_of(unit_object.active_root(bpy.context)))
 
 
 def test_what_a_simulation_is_given():
@@ -55,22 +55,20 @@ def test_what_a_simulation_is_given():
     two.mu_obstacle.friction = 0.0
     two.scale = (1.0, 1.0, -2.0)  # mirrored: turned, so that it still looks outward
     bpy.context.view_layer.update()
-    words = asked()
-    first = words.index("--obstacle")
-    assert words[first::2] == ["--obstacle", "--friction"] * 2
-    assert words[first + 3 :: 4] == ["0.3", "0"]
-    near, far = (read_body(path) for path in words[first + 1 :: 4])
+    met = asked().obstacles
+    assert [(rigid.name, rigid.friction) for rigid in met] == [("Ball.obj", 0.3), ("Far.obj", 0.0)]
+    near, far = (rigid.body for rigid in met)
     assert np.allclose(near.bounds.mean(axis=0), [0, 60, 60], atol=0.5)
     assert far.bounds.mean(axis=0).max() > 100
     assert volume(far.vertices, far.triangles) > 0
     assert obstacles.inputs(root) == sorted([(near.hash, 0.3), (far.hash, 0.0)])
 
     assert bpy.ops.mu.obstacle_remove(name="Far") == {"FINISHED"}
-    assert asked().count("--obstacle") == 1
+    assert len(asked().obstacles) == 1
     assert "Far" in bpy.data.objects
     assert "is no obstacle" in refused(bpy.ops.mu.obstacle_remove, name="Far")
     bpy.ops.mu.obstacle_remove()
-    assert "--obstacle" not in asked()
+    assert asked().obstacles == ()
     assert not bpy.ops.mu.obstacle_check.poll()
 
 
@@ -130,13 +128,13 @@ def test_flaws_are_told_and_marked():
     at = np.array([v.co for v in unit_object.part(root, bodies.FLAWS).data.vertices])
     assert len(at) == 1, at
     assert abs(at[0] - [0, 28.1, 60]).max() < 1.0, at
-    assert "stands in the unit" in refused(bpy.ops.mu.simulate)
+    assert "overlaps the unit" in refused(bpy.ops.mu.simulate)
     one.location.y = 45.0
     bpy.context.view_layer.update()
     assert obstacles.placed(root, one).flaws is None, "looked at where it stands now"
     assert bpy.ops.mu.obstacle_check() == {"FINISHED"}
     assert unit_object.part(root, bodies.FLAWS) is None
-    assert asked().count("--obstacle") == 1
+    assert len(asked().obstacles) == 1
 
 
 def test_a_box_stands_before_the_tip():

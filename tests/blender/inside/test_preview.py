@@ -6,7 +6,7 @@ import attrs
 import bpy
 import numpy as np
 
-from mu_addon.blender.preview import arrays as preview
+from mu_addon.blender.preview import skeletons
 from mu_addon.blender.shared import updates
 from mu_addon.blender.unit import live_update as live
 from mu_addon.blender.unit import object as unit_object
@@ -72,7 +72,7 @@ def test_cut_open_shows_the_wall():
 
     given, made = Given(load_preset("mu-1.0x")), Stack()
     d = given.unit.dimensions
-    cut = preview.actuator(made.value("membranes", given), cut=True)
+    cut = skeletons.actuator(made.value("membranes", given), cut=True)
     assert cut.vertices[:, 0].max() < 1e-9
     section = cut.faces[-1]
     assert (cut.slots == 1).sum() == len(section)
@@ -88,7 +88,7 @@ def test_cut_open_shows_the_wall():
     wall = area(outer_polygon(d, ALONG)) - area(cavity_polygon(d, ALONG))
     wall += d.inlet_wall * d.inlet_length - d.inlet_radius * d.base_cap
     assert abs(normals[:, 0].sum() / (2 * wall) - 1) < 1e-6, (normals[:, 0].sum(), 2 * wall)
-    assert preview.lattice(made.value("struts", given), cut=True).vertices[:, 0].max() < 1e-6
+    assert skeletons.lattice(made.value("struts", given), cut=True).vertices[:, 0].max() < 1e-6
 
 
 def test_a_broken_rule_keeps_the_last_good_preview():
@@ -106,7 +106,7 @@ def test_a_broken_rule_keeps_the_last_good_preview():
     assert (len(mesh.vertices), [v.co[:] for v in mesh.vertices][::97]) == before
     assert "wall" in refused(bpy.ops.mu.rebuild)
     for operator in (bpy.ops.mu.solid, bpy.ops.mu.export_stl, bpy.ops.mu.simulate):
-        assert "break a rule: a wall of 3 mm is too thick" in refused(operator)
+        assert "rule is broken: a wall of 3 mm is too thick" in refused(operator)
     root.mu_unit.chambers.wall_mm = 0.95
     assert root.mu_unit.trouble == ""
     assert bpy.ops.mu.rebuild() == {"FINISHED"}

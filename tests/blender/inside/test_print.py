@@ -167,7 +167,7 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
     bpy.ops.mu.print_show(finding=0)
     assert "place 1 of 2" in drawn()
     bpy.ops.mu.print_show(finding=1)
-    assert "The limit is assumed" in drawn().replace("  ", " ")
+    assert "This limit is assumed" in drawn().replace("  ", " ")
     assert "There are 4 findings" in refused(bpy.ops.mu.print_show, finding=9)
     assert "has 2 places" in refused(bpy.ops.mu.print_show, finding=0, place=2)
 
@@ -199,26 +199,26 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
     bpy.ops.mu.print_marks()
     root.mu_unit.chambers.wall_mm = 1.0  # a rebuild leaves them, and the panel says that they are old
     assert len(markers.marks(root)) == 3
-    assert "Stale: it is of the unit with other parameters" in drawn()
+    assert "Stale: it belongs to other parameters" in drawn()
     assert "The check is stale" in refused(bpy.ops.mu.print_marks)
     root.mu_unit.chambers.wall_mm = 0.9
     write_check(root, [finding("cup", "warning", [[0, 0, 0]])])
-    assert "markers are of an earlier check" in drawn().replace("  ", " ")
+    assert "markers belong to an earlier check" in drawn().replace("  ", " ")
     assert bpy.ops.mu.print_clear() == {"FINISHED"}
     assert not markers.marks(root)
 
     assert bpy.ops.mu.print_up(direction=(0.6, 0, 0.8)) == {"FINISHED"}
-    assert "Stale: it is of another build direction" in drawn()
+    assert "Stale: it belongs to another build direction" in drawn()
     bpy.ops.mu.print_up()
     assert "Stale" not in drawn()
     bpy.ops.mu.path(name="alpha4")
-    assert "Stale: it is of the unit with other parameters" in drawn()
+    assert "Stale: it belongs to other parameters" in drawn()
     bpy.ops.mu.path(name="none")
     own = tmp_path / "mine.toml"
     text = (printing.folder_of(root, "check") / "printer.toml").read_text()
     own.write_text(text.replace("value = 0.6", "value = 0.8"))
     root.mu_print.printer, root.mu_print.printer_file = "own", str(own)
-    assert "Stale: it is for another printer" in drawn()
+    assert "Stale: it belongs to another printer" in drawn()
     assert bpy.ops.mu.print_check.poll()
     own.write_text(text.replace("value = 0.6", "value = -1"))
     assert "is not a number above zero" in refused(bpy.ops.mu.print_check)
@@ -240,12 +240,12 @@ def test_an_export_as_chosen(tmp_path):
     settings.compensate = "gauge"
     assert "Choose the gauge's sheet" in refused(bpy.ops.mu.print_export)
     settings.compensate = "unit"
-    assert "set them under How It Prints" in refused(bpy.ops.mu.print_export)
+    assert "set them under Print Offsets" in refused(bpy.ops.mu.print_export)
     root.mu_unit.print.offset_xy_mm = 0.1
     bpy.ops.mu.mute(step="trim")
     assert "is not the unit" in refused(bpy.ops.mu.print_export)
     bpy.ops.mu.mute(step="trim", muted=False)
-    assert "waveguide along alpha4" in drawn().replace("  ", " ")
+    assert "Waveguide along alpha4" in drawn().replace("  ", " ")
     assert "Not checked" in drawn()
 
     write_check(root, [finding("chamber wall", "error", [[0, 0, 0]], 0.2, 0.6, "mm")])
@@ -269,7 +269,7 @@ def test_an_export_as_chosen(tmp_path):
     assert "unit.3mf" not in said
     assert "Done in" in said
     root.mu_unit.chambers.wall_mm = 1.0
-    assert "Stale: they are of the unit" in drawn()
+    assert "Stale: they belong to other parameters" in drawn()
     manifest = printing.exported(root).folder / "manifest.json"
     whole = manifest.read_text()
     manifest.write_text("{}")
@@ -294,7 +294,7 @@ def test_jobs_that_fail_and_one_that_is_stopped():
     for how, expected in {
         "told_error": "thicker wall",
         "crash": "SIGSEGV",
-        "wordless": "without a word",
+        "wordless": "without a message",
         "good": "see Check",
     }.items():
         child = start(how)
@@ -305,7 +305,7 @@ def test_jobs_that_fail_and_one_that_is_stopped():
     child = start("told_error")
     ended(child)
     child.error["status"] = print_panel.NOT_PRINTABLE
-    assert "Checked: do not print it" in drawn()
+    assert "Checked: not printable" in drawn()
     assert "thicker wall" not in drawn()
     child = start("hang")
     watch(lambda: child.progress)
@@ -336,7 +336,7 @@ def test_a_unit_that_must_not_be_printed():
     assert not found.stale
     assert abs(found.errors[0]["value"] - 0.54) < 0.02
     said = drawn()
-    assert "Checked: do not print it" in said
+    assert "Checked: not printable" in said
     assert "export asks first" in said
     assert bpy.ops.mu.print_show(finding=0) == {"FINISHED"}
 
@@ -357,4 +357,4 @@ def test_a_body_of_ones_own_is_checked_by_its_solid():
     assert not found.stale, child.error
     assert abs(found.found["figures"]["x_mm"] - 40.0) < 0.1
     bpy.ops.mu.body_remove()
-    assert "Stale: it is of the unit with other parameters" in drawn()
+    assert "Stale: it belongs to other parameters" in drawn()

@@ -102,8 +102,8 @@ def test_connect_pause_mark_and_disconnect(tmp_path):
     assert bpy.ops.mu.sensor_mark(words="valve\nopen") == {"FINISHED"}
     assert bpy.ops.mu.sensor_pause() == {"FINISHED"}
     watch(lambda: s.state == "paused")
-    assert "The port is free for others" in drawn()
-    assert "Take Port" in drawn()
+    assert "Port released" in drawn()
+    assert "Open Port" in drawn()
     rows = s.watched.status["rows"]
     assert bpy.ops.mu.sensor_pause() == {"FINISHED"}
     watch(lambda: s.state == "connected" and s.watched.status["rows"] > rows + 10)
@@ -144,7 +144,7 @@ def test_a_killed_reader_and_a_folder_that_is_gone(tmp_path, monkeypatch):
     shutil.rmtree(s.watched.folder)
     monkeypatch.setattr(sensor, "SILENT_S", 0.5)
     watch(lambda: s.watched.silent_s > 1.0 or not s.running)
-    assert "said nothing" in drawn() or s.child.state == "failed", drawn()
+    assert "No status for" in drawn() or s.child.state == "failed", drawn()
     bpy.ops.mu.sensor_disconnect()
     watch(lambda: not s.running)
     drawn()
@@ -153,7 +153,7 @@ def test_a_killed_reader_and_a_folder_that_is_gone(tmp_path, monkeypatch):
     root.mu_sensor.replay = str(tmp_path / "study" / "none")
     assert bpy.ops.mu.sensor_connect() == {"FINISHED"}
     assert ended(sensor.of(root)) == "failed"
-    assert "no recording" in drawn(), drawn()
+    assert "the recording is invalid" in drawn(), drawn()
 
 
 @pytest.mark.slow
@@ -181,7 +181,7 @@ def test_a_device_at_a_pty_that_is_unplugged_twice(tmp_path):
             "light3_V",
         ]
         watch(lambda: s.state in ("disconnected", "waiting"))
-        assert "looked for" in drawn()
+        assert "searching" in drawn() or "waiting for it" in drawn()
         bpy.ops.mu.sensor_disconnect()
         assert ended(s) == "done"
         device.kill()
@@ -389,7 +389,7 @@ def test_a_calibration_of_other_channels_or_a_broken_one_is_told_of(tmp_path):
     path = tmp_path / "other.toml"
     path.write_text("version = 1\n")
     watch(lambda: not s.trouble)
-    assert "no calibration" in drawn()
+    assert "the calibration is invalid" in drawn()
     assert s.running
     path.unlink()
     assert "There is no" in drawn()
@@ -453,7 +453,7 @@ def test_what_is_drawn_does_not_grow_with_the_rate_and_stays_in_its_axes(tmp_pat
     assert "dark_V" not in " ".join(texts)
     bpy.ops.mu.sensor_freeze()
     plotted()
-    assert "stands still" in " ".join(texts)
+    assert "plot frozen" in " ".join(texts)
 
 
 def test_without_pyserial_the_panel_says_so(monkeypatch):

@@ -54,7 +54,7 @@ def test_panels_tell_what_a_child_says():
         "good": "Done in",
         "told_error": "no equilibrium",
         "crash": "SIGSEGV",
-        "wordless": "without a word",
+        "wordless": "without a message",
         "garbage": "Done in",
     }.items():
         child = launch(root, how)
@@ -130,7 +130,7 @@ def test_two_simulations_of_one_unit_are_refused():
     root = add()
     launch(root, "hang")
     with pytest.raises(InputError, match="already"):
-        SIMULATION.start(root, ["simulate"], studies.folder_of(root))
+        SIMULATION.start(root, studies.folder_of(root), lambda folder: None)
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ...report.charts import MAP
-from ..preview import colours as materials
+from ..preview import materials
 
 STOPS = 9
 """Colours of the ramp when it is made; the user may change them, and the legend follows."""
