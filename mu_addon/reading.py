@@ -64,7 +64,7 @@ def parse_toml(text: str, origin: str, remedy: str = "correct that line") -> dic
     # Brackets that exhaust the parser's stack, whole numbers of thousands of digits.
     except (RecursionError, ValueError, OverflowError) as error:
         raise InputError(f"this is not TOML: {_short(error)}", origin or "TOML text", remedy) from error
-    _require_sense(document, origin or "TOML text", remedy)
+    _require_sense(document, text, origin or "TOML text", remedy)
     return document
 
 
@@ -74,7 +74,7 @@ def parse_json(text: str | bytes, origin: str, remedy: str = "let the program wr
         value = json.loads(text)
     except (RecursionError, ValueError, OverflowError) as error:
         raise InputError(f"this is not JSON: {_short(error)}", origin, remedy) from error
-    _require_sense(value, origin, remedy)
+    _require_sense(value, text, origin, remedy)
     return value
 
 
@@ -83,8 +83,18 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _require_sense(value: Any, origin: str, remedy: str) -> None:
+def _require_sense(value: Any, text: str | bytes, origin: str, remedy: str) -> None:
     """Raise InputError for whole numbers of more than 64 bits, and tables in tables without end."""
+
+    def at(number: int) -> str:
+        """The origin, with the number's line where it is written in decimal digits."""
+        if number.bit_length() > 8192:
+            # Python does not write longer ones out.
+            return origin
+        words = text if isinstance(text, str) else text.decode(errors="replace")
+        before, found, _ = words.partition(str(number))
+        return f"{origin}, line {before.count(chr(10)) + 1}" if found else origin
+
     level, depth = [value], 0
     while level:
         if depth > _DEEPEST:
@@ -96,7 +106,7 @@ def _require_sense(value: Any, origin: str, remedy: str) -> None:
             elif isinstance(item, list):
                 inner += item
             elif isinstance(item, int) and not -_LARGEST <= item < _LARGEST:
-                raise InputError("a whole number has more than 64 bits", origin, remedy)
+                raise InputError("a whole number of more than 64 bits is out of bounds", at(item), remedy)
         level, depth = inner, depth + 1
 
 

@@ -354,8 +354,14 @@ def write_calibration(path: Path, calibration: Calibration, about: str = "") -> 
 
 def read_calibration(path: Path) -> Calibration:
     """Read what `write_calibration` wrote; raises InputError with what is wrong."""
+    remedy = "name a calibration.toml"
     try:
         table = parse_toml(file_text(path), str(path))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read the calibration: {error}", str(path), remedy) from None
+    except InputError as error:
+        raise InputError(f"cannot read the calibration: {error.what}", error.where, remedy) from None
+    try:
         numbers = [*table["knots_deg"], *table["coefficients_V"]]
         numbers += [table[n] for n in ("version", "band_V", "drift_per_h", "gain", "error_deg", "sweeps")]
         if not all(map(is_number, [*numbers, 0 if isinstance(table["dark"], str) else table["dark"]])):
@@ -373,10 +379,6 @@ def read_calibration(path: Path) -> Calibration:
             float(table["error_deg"]),
             int(table["sweeps"]),
         )
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"cannot read the calibration: {error}", str(path), "name a calibration.toml"
-        ) from None
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(f"the calibration is invalid: {error!r}", str(path), "calibrate again") from None
     steps = np.diff(result.coefficients)
