@@ -24,7 +24,7 @@ def lattice_beams(d: Dimensions, bar: Bar | None = None, pieces: int = PIECES) -
     """
     lattice = lattice_of(d)
     t = np.linspace(0.0, 1.0, pieces + 1)
-    standing = np.ones(len(lattice.struts), bool) if bar is None else ~bar.followed
+    standing = np.ones(len(lattice.struts), bool) if bar is None else ~bar.replaced
     radii = _radii(lattice, bar, t)[standing]
     struts = lattice.struts[standing]
     first, last = lattice.nodes[struts[:, 0]], lattice.nodes[struts[:, 1]]

@@ -26,7 +26,11 @@ _FINEST = 64
 
 
 def sin_squared(t: Array, junction_radius: float, midspan_radius: float) -> Array:
-    """Radius at fractions t of a strut: narrow at both junctions, widest at mid-span, sin^2 between."""
+    """Radius at fractions t of a strut: the junction's at both ends, the mid-span's halfway, sin^2 between.
+
+    >>> sin_squared(np.array([0.0, 0.5, 1.0]), 0.75, 1.0).tolist()
+    [0.75, 1.0, 0.75]
+    """
     swell = np.sin(np.pi * np.asarray(t, dtype=float)) ** 2
     return np.asarray(junction_radius + (midspan_radius - junction_radius) * swell)
 
@@ -198,7 +202,7 @@ def kind(name: str) -> LatticeKind:
 
 
 def names() -> tuple[str, ...]:
-    """Names of all kinds, in the order in which they were registered."""
+    """Names of all kinds of lattice, in the order in which they were registered."""
     return tuple(KINDS)
 
 

@@ -11,7 +11,7 @@ from .printed import as_printed
 
 
 def check(d: Dimensions, allow_symmetric: bool = False) -> None:
-    """Raise InputError for the first rule broken; lengths that scale are told in mm at scale 1."""
+    """Raise InputError for the first rule broken; lengths that scale are given in mm at scale 1."""
     _node_apex_alignment(d)
     _profile(d)
     _sagittal_symmetry(d)

@@ -11,7 +11,11 @@ Array = NDArray[np.float64]
 
 
 def inscribed(n: int) -> float:
-    """Factor on the radius that gives an n-sided polygon its circle's area: sqrt((2 pi/n)/sin(2 pi/n))."""
+    """Factor on the radius that gives an n-sided polygon its circle's area: sqrt((2 pi/n)/sin(2 pi/n)).
+
+    >>> round(inscribed(16), 4)
+    1.013
+    """
     return float(np.sqrt((2.0 * np.pi / n) / np.sin(2.0 * np.pi / n)))
 
 
@@ -66,7 +70,11 @@ def ball(radius: float, n: int, offset: ArrayLike | None = None) -> Any:
 
 
 def ring(axis: Array, n: int) -> Array:
-    """Directions (n, 3) square to an axis (3,), evenly around it."""
+    """Unit vectors (n, 3) square to an axis (3,), evenly spaced around it.
+
+    >>> ring(np.array([0.0, 0.0, 2.0]), 4).shape
+    (4, 3)
+    """
     along = axis / np.linalg.norm(axis)
     # One faces z, so that struts mirrored in a vertical plane have mirrored facets; around upright ones, x.
     up = np.array([0.0, 0.0, 1.0]) - along[2] * along

@@ -161,9 +161,9 @@ def with_waveguide(
 
     t = np.linspace(0.0, 1.0, facets.along_strut + 1)
     radii = strut_radii(lattice, bar.met, bar.half, t)
-    raised = (radii > lattice.radius(t) + 1e-9).any(axis=1) & ~bar.followed
-    if (bar.followed | raised).any():
-        bare = lattice_solid(d, lattice, facets, offset, bar.followed | raised)
+    raised = (radii > lattice.radius(t) + 1e-9).any(axis=1) & ~bar.replaced
+    if (bar.replaced | raised).any():
+        bare = lattice_solid(d, lattice, facets, offset, bar.replaced | raised)
     parts = [bare, bar.solid(offset)]
     if raised.any():
         thicker = [

@@ -34,7 +34,11 @@ def weld(vertices: Vertices, triangles: Triangles, quantum: float) -> tuple[Vert
 
 
 def bad_edges(triangles: Triangles) -> int:
-    """Edges of triangles (m, 3) that are not shared by exactly two of them, once in each direction."""
+    """Number of edges of triangles (m, 3) not shared by two, once in each direction; 0 for a closed surface.
+
+    >>> bad_edges(np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]]))
+    0
+    """
     ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     forward = ends[:, 0] < ends[:, 1]
     index = _unique_rows(np.sort(ends, axis=1))[1]
@@ -59,7 +63,11 @@ def area(vertices: Vertices, triangles: Triangles) -> float:
 
 
 def genus(vertices: Vertices, triangles: Triangles) -> int:
-    """Genus 1 - (V - E + F)/2 of one closed connected surface."""
+    """Genus 1 - (V - E + F)/2 of one closed connected surface of triangles (m, 3).
+
+    >>> genus(np.eye(4)[:, :3], np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]]))
+    0
+    """
     return 1 - (len(vertices) - 3 * len(triangles) // 2 + len(triangles)) // 2
 
 

@@ -65,7 +65,7 @@ class Bar:
 
     points (n, 3): its axis, both ends included; normals (n - 1, 3): outward normal of each leg's outer face;
     half: half its section; wells: boxes that are cut out of it; seats: one an end, or none; met (E, 2):
-    whether the lattice's struts meet it with their first and second end; followed (E,): whether the bar takes
+    whether the lattice's struts meet it with their first and second end; replaced (E,): whether the bar takes
     a strut's place; loops: how many steps of the path no strut makes, each a loop more in the lattice's
     graph; path_mm: length between its end nodes.
     """
@@ -76,7 +76,7 @@ class Bar:
     wells: tuple[Block, ...]
     seats: tuple[Seat, ...]
     met: NDArray[np.bool_]
-    followed: NDArray[np.bool_]
+    replaced: NDArray[np.bool_]
     loops: int
     path_mm: float
 
@@ -154,8 +154,8 @@ def waveguide(unit: Unit, path: Window | ArrayLike, within: Dimensions | None = 
     _check_path(d, nodes)
     met = np.isin(lattice.struts, numbers)
     steps = {tuple(sorted(pair)) for pair in pairwise(numbers)}
-    followed = np.array([tuple(sorted(strut)) in steps for strut in lattice.struts.tolist()], bool)
-    struts = _Struts(lattice, met, followed, d.waveguide_section / 2.0)
+    replaced = np.array([tuple(sorted(strut)) in steps for strut in lattice.struts.tolist()], bool)
+    struts = _Struts(lattice, met, replaced, d.waveguide_section / 2.0)
 
     kept = np.concatenate([[0], 1 + np.flatnonzero(_bends(nodes) > 1e-6), [len(nodes) - 1]])
     nodes = nodes[kept]
@@ -178,8 +178,8 @@ def waveguide(unit: Unit, path: Window | ArrayLike, within: Dimensions | None = 
         ),
         seats=tuple(end.seat for end in ends if end.seat is not None),
         met=met,
-        followed=followed,
-        loops=len(numbers) - 1 - int(np.count_nonzero(followed)),
+        replaced=replaced,
+        loops=len(numbers) - 1 - int(np.count_nonzero(replaced)),
         path_mm=float(np.linalg.norm(np.diff(nodes, axis=0), axis=1).sum()),
     )
 
@@ -202,7 +202,7 @@ def free_bar(d: Dimensions, length: float) -> Bar:
         wells=tuple(w for w in _wells(d, points, normals, nodes) if clear < w.centre[2] < length - clear),
         seats=seats if d.seats else (),
         met=np.zeros((0, 2), bool),
-        followed=np.zeros(0, bool),
+        replaced=np.zeros(0, bool),
         loops=0,
         path_mm=length,
     )
@@ -226,10 +226,10 @@ class _Struts:
     """Struts as they stand beside a bar: where they are and how far points are from them."""
 
     def __init__(
-        self, lattice: Lattice, met: NDArray[np.bool_], followed: NDArray[np.bool_], half: float
+        self, lattice: Lattice, met: NDArray[np.bool_], replaced: NDArray[np.bool_], half: float
     ) -> None:
         self.t = np.linspace(0.0, 1.0, 33)
-        standing = ~followed
+        standing = ~replaced
         self.ends = lattice.nodes[lattice.struts[standing]]
         self.radii = strut_radii(lattice, met[standing], half, self.t)
 

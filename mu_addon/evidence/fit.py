@@ -214,19 +214,19 @@ class Fitter:
             for row, (i, p) in enumerate(known):
                 jacobian[len(f) + row, i] = 1.0 / p.spread
             gram, gradient = jacobian.T @ jacobian, jacobian.T @ r
-            gained, settled = 0.0, False
+            gained, accepted = 0.0, False
             for _ in range(8):
                 new = np.clip(x + _step(gram, gradient, damping, x, low, high), low, high)
                 f_new = self.predict(at(new))
                 r_new = np.concatenate([self.project(measured - f_new), prior(new)])
                 chi2_new = float(r_new @ r_new)
                 if chi2_new <= chi2:
-                    gained, settled = chi2 - chi2_new, True
+                    gained, accepted = chi2 - chi2_new, True
                     x, f, r, chi2 = new, f_new, r_new, chi2_new
                     damping = max(damping / 10.0, 1e-9)
                     break
                 damping = max(damping * 10.0, 1e-6)
-            if not settled or gained < GAIN:
+            if not accepted or gained < GAIN:
                 break
         return self._finished(tuple(effects), at(x), chi2 + held, r[: len(f)], f, keys, jacobian, measured)
 

@@ -95,8 +95,8 @@ def _best_served_group(base: Fit, extended: Fit, judged: Record) -> str:
         before, after = base.residual[s.at], extended.residual[s.at]
         gained[s.group] += float(before @ before - after @ after)
     about = {kind for effect in extended.effects for kind in effect.kinds}
-    told = (g for g, v in gained.items() if v > _CLEAR and g.split()[0] in about)
-    return next(told, judged.groups[0])
+    clear = (g for g, v in gained.items() if v > _CLEAR and g.split()[0] in about)
+    return next(clear, judged.groups[0])
 
 
 def _errors(fitter: Fitter, judged: Record, base: Fit, extended: Fit) -> dict[str, Errors]:

@@ -150,16 +150,16 @@ def scalings(
 ) -> tuple[dict[str, Scaling], list[str]]:
     """How each block of lattice answers to printing, by experiment; and what is taken for granted, in words.
 
-    All moduli are told against that of the first block as drawn at 1.0x; the unit's own print offset and
+    All moduli are relative to that of the first block as drawn at 1.0x; the unit's own print offset and
     skin come before any effect's.
     """
     blocks = {e.name: block_of(e, unit) for e in experiments if e.kind == KIND}
     distinct = list(dict.fromkeys(b for b in blocks.values() if b is not None))
     found = {b: response(b, cache, say) for b in distinct}
-    told = [f"lattice specimens are modelled as {b}, computed from their struts" for b in distinct]
+    assumed = [f"lattice specimens are modelled as {b}, computed from their struts" for b in distinct]
     if None in blocks.values():
-        told.append("lattice specimens without a number of cells are modelled as slender bending struts")
+        assumed.append("lattice specimens without a number of cells are modelled as slender bending struts")
     first = found[distinct[0]] if distinct else None
     return {
         n: ComputedCell(found[b], first, *printed(unit.print)) for n, b in blocks.items() if b is not None
-    }, told
+    }, assumed

@@ -75,9 +75,9 @@ def _again(e: Experiment) -> dict[int, tuple[str, Array, str]]:
 
 
 def nearest(mesh: Mesh, place: Array) -> Array:
-    """The point (3,) of the undeformed body nearest to a place (3,), in mm; itself where it is inside.
+    """The point (3,) of an undeformed body nearest to a place (3,), in mm; the place itself if it is inside.
 
-    The surface is taken flat between corners.
+    The surface is taken flat between corners of elements. Half and quarter meshes count as the whole body.
     """
     turned = np.array(
         [-1.0 if a in mesh.symmetry and x < 0 else 1.0 for a, x in zip(AXES, place, strict=True)]
@@ -107,8 +107,8 @@ def _on_surface(mesh: Mesh, place: Array) -> Array:
 
 
 @attrs.frozen(eq=False)
-class Followed:
-    """Material points (p, 3) in mm, followed by what they are woven into; sides: -1 across a mirror plane."""
+class MaterialPoints:
+    """Points (p, 3) in mm that move with a mesh; sides (p, 3): -1 beyond a mirror plane, along its normal."""
 
     points: Array
     sides: Array
@@ -119,12 +119,12 @@ class Followed:
         return np.asarray(self.points + self.sides * self.probe.displacement(u))
 
 
-def followed(mesh: Mesh, points: Array) -> Followed:
-    """Points (p, 3) of another mesh of the unit, each at the nearest place of this one."""
+def material_points(mesh: Mesh, points: Array) -> MaterialPoints:
+    """Points (p, 3) in mm of the unit, each at the nearest place of a mesh of it, to move with its states."""
     mirrored = [AXES.index(a) for a in mesh.symmetry]
     sides = np.ones((len(points), 3))
     sides[:, mirrored] = np.where(np.asarray(points)[:, mirrored] < 0, -1.0, 1.0)
     near = np.array([nearest(mesh, p) for p in points]).reshape(-1, 3)
     if not len(near):
-        return Followed(near, sides, Probe(np.empty((0, 4), int), np.empty((0, 4))))
-    return Followed(near, sides, probe(mesh, sides * near))
+        return MaterialPoints(near, sides, Probe(np.empty((0, 4), int), np.empty((0, 4))))
+    return MaterialPoints(near, sides, probe(mesh, sides * near))

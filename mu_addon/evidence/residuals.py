@@ -346,9 +346,9 @@ def _gained(gram: Array, along: Array) -> tuple[float, int]:
     if not len(size):
         return 0.0, 0
     squares, vectors = np.linalg.eigh(gram[np.ix_(kept, kept)] / np.outer(size, size))
-    told = squares > NEAR**2
+    resolved = squares > NEAR**2
     parts = vectors.T @ (along[kept] / size)
-    return float(np.sum(parts[told] ** 2 / squares[told])), int(told.sum())
+    return float(np.sum(parts[resolved] ** 2 / squares[resolved])), int(resolved.sum())
 
 
 def _unit(columns: Array) -> Array:
@@ -604,9 +604,9 @@ def _breaks(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, float
         own_, later = (np.array([m[i] for m in moments]) for i in (0, 3))
         before = [v[own_, 1 + later] + _beyond(v[:, 0])[own_] for v in (square, onto, along)]
         left = before[0] - np.sum(before[1] ** 2, axis=1)
-        told = left > 1e-6 * np.maximum(before[0], 1e-300)
-        gain = (before[2] - before[1] @ total) ** 2 / np.where(told, left, 1.0)
-        gains += np.where(told, gain, 0.0)
+        resolved = left > 1e-6 * np.maximum(before[0], 1e-300)
+        gain = (before[2] - before[1] @ total) ** 2 / np.where(resolved, left, 1.0)
+        gains += np.where(resolved, gain, 0.0)
         dof += 1
     best = int(np.argmax(gains))
     p = min(1.0, len(moments) * float(chi2.sf(gains[best] - saved, dof)))
@@ -652,8 +652,8 @@ def _ringing(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Depen
     q = _basis(fit.jacobian)
     swings -= q @ (q.T @ swings)
     length = np.linalg.norm(swings, axis=0)
-    told = length > ABSORBED * np.maximum(before, 1e-300)
-    gains = np.where(told, swings.T @ fit.residual / np.where(told, length, 1.0), 0.0) ** 2
+    resolved = length > ABSORBED * np.maximum(before, 1e-300)
+    gains = np.where(resolved, swings.T @ fit.residual / np.where(resolved, length, 1.0), 0.0) ** 2
     best = int(np.argmax(gains))
     saved = sum(spare[g] for g in {s.group for s in driven})
     p = min(1.0, len(hertz) * float(chi2.sf(gains[best] - saved, 1)))

@@ -27,7 +27,7 @@ SEEDS = 4
 DRAWS = 20000
 # What the model's own mesh does: there in every set of data, seen or not.
 NUMERICS = "mesh_error"
-# An effect is told of by one experiment alone where this share of what is known of it comes from there.
+# An effect rests on one experiment alone where this share of what is known of it comes from there.
 ALONE = 0.9
 # Chi squared that an effect must take from a fit's residual, to first order, to be fitted beside it: a small
 # part of what `FALSE_ALARM_RATE` asks for.
@@ -75,7 +75,11 @@ class Selection:
 def select(
     fitter: Fitter, seen: Sequence[Sensitivity], progress: Callable[[str], None] = lambda _: None
 ) -> Selection:
-    """Add effects while each one gains more than chance does and predicts experiments left out."""
+    """The effects that explain a record: added while each gains more than chance does and predicts better.
+
+    Predictions are judged on experiments left out of its fit. A record that nothing explains keeps the base
+    model and the structure that is left.
+    """
     base = fitter.fit()
     table_base = tuple(dependence_table(fitter, base))
     usable = {s.effect.keys: s.effect for s in seen if s.worth_a_fit}
@@ -117,7 +121,7 @@ def select(
 
 
 def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) -> Selection:
-    """A selection under another noise: no effect is added, yet any may be doubted or get rivals."""
+    """A selection repeated under another noise: no effect is added, yet any may be dropped or get rivals."""
     base = fitter.fit((), found.base.values)
     chosen = fitter.fit(found.chosen.effects, found.chosen.values)
     singles = tuple(sorted((fitter.fit(f.effects, f.values) for f in found.singles), key=_cost))
@@ -224,8 +228,8 @@ def _promises(fitter: Fitter, fit: Fit, effect: Effect) -> bool:
     before = np.linalg.norm(u, axis=0)
     u -= q @ (q.T @ u)
     length = np.linalg.norm(u, axis=0)
-    told = length > ABSORBED * np.maximum(before, 1e-300)
-    along = (u.T @ fit.residual)[told] / length[told]
+    resolved = length > ABSORBED * np.maximum(before, 1e-300)
+    along = (u.T @ fit.residual)[resolved] / length[resolved]
     return bool((along**2 > PROMISING).any())
 
 
@@ -323,9 +327,11 @@ def _share_by_experiment(fitter: Fitter, fit: Fit) -> dict[int, float]:
     every, own = np.vstack([fit.jacobian, fit.prior]), len(fit.effects[-1].keys)
     last = every[:, -own]
     q = np.linalg.qr(every[:, :-own])[0]
-    told = ((last - q @ (q.T @ last)) ** 2)[: len(record)]
+    information = ((last - q @ (q.T @ last)) ** 2)[: len(record)]
     rows = {i: record.rows(i) for i in range(len(record.experiments))}
-    return {i: float(told[r].sum() / max(told.sum(), 1e-300)) for i, r in rows.items() if r.any()}
+    return {
+        i: float(information[r].sum() / max(information.sum(), 1e-300)) for i, r in rows.items() if r.any()
+    }
 
 
 def _folds(fitter: Fitter, fit: Fit) -> list[Array]:

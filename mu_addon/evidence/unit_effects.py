@@ -94,8 +94,8 @@ class UnitEffect:
 
     body: of a body and a size; materials: of those without it, the mesh and a size; model, in place of the
     base's, and load (n, 3) in N: of a body, its mesh and a size. They act side by side: each changes what the
-    others have left. weighs: whether it depends on the direction of gravity. newton: of its runs. length:
-    the power of a length by which the size of the same change grows with the unit, at the same moduli and
+    others have left. has_gravity: whether it depends on gravity's direction. newton: of its runs. length: the
+    power of a length by which the size of the same change grows with the unit, at the same moduli and
     pressures; sizes are those at 1.0x, and larger are more of them, for units at whose scale the bound is
     beyond the last.
     """

@@ -28,7 +28,7 @@ from ..meshing.unit import mesh_unit
 from ..run.cache import Cache
 from ..run.pool import each
 from ..run.processes import cores
-from .markers import Marker, attached, followed
+from .markers import Marker, attached, material_points
 from .prediction.unit import KIND, UnitResponse, Variant
 from .prediction.wall import NAME as WALL
 from .prediction.wall import NEAREST, Side
@@ -165,7 +165,7 @@ def run(case: Run, cache: Path | None = None) -> Result:
         body, effect = case.changed
         mesh = body.meshed(cache)
         tip = TipSection.of(mesh)
-        points = followed(mesh, np.array(case.points).reshape(-1, 3))
+        points = material_points(mesh, np.array(case.points).reshape(-1, 3))
         materials, model = body.materials(mesh), body.model(mesh)
         if effect and effect.materials:
             materials = effect.materials(materials, mesh, case.size)
@@ -210,7 +210,7 @@ def _states(equilibrium: Equilibrium, pressures_kPa: Array) -> Iterator[tuple[in
 
 
 def pressures(readings_kPa: Array, count: int, margin: float) -> tuple[float, ...]:
-    """About `count` pressures in kPa, ascending, from a little below the readings to above, 0 among them."""
+    """About `count` pressures in kPa, ascending, from a little below the readings to above, 0 included."""
     low, high = min(0.0, float(np.min(readings_kPa))), max(0.0, float(np.max(readings_kPa)))
     if low == high:
         raise InputError("the pressure is always 0", "unit_pressure", "add an experiment under pressure")
@@ -232,7 +232,7 @@ def unit_responses(
     """The unit's response at each scale and orientation of the unit_pressure experiments among those given.
 
     The unit keeps its moduli at every scale, as proportional scaling has it. Its runs are kept in the folder
-    `cache` and found again there, also by another call; `progress` is told what is done and the share.
+    `cache` and found again there, also by another call; `progress` is called with what is done and the share.
     Sizes of an effect that cannot be computed are left out with a UnitResponseWarning, and so are
     pressures that the base model does not reach. Raises InputError for markers out of place (`attached`) and
     added masses, which the model lacks, and ConvergenceError where the base model reaches too few pressures.

@@ -160,9 +160,18 @@ def diagnose(
     proposal = propose_experiment(fitter, chosen, seen)
     known = chosen.chosen if chosen.causes else chosen.base
     bounds = {k: interval(fitter, known, k) for k in known.keys}
-    told = _identifiability(seen, chosen)
+    identifiability = _identifiability(seen, chosen)
     return Verdict(
-        kind, chosen, tuple(seen), sources, measured, gained, proposal, told, bounds, tuple(experiments)
+        kind,
+        chosen,
+        tuple(seen),
+        sources,
+        measured,
+        gained,
+        proposal,
+        identifiability,
+        bounds,
+        tuple(experiments),
     )
 
 

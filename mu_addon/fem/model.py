@@ -101,19 +101,24 @@ def _lists(target: Array, count: int) -> tuple[Array, Array]:
 
 
 class Model:
-    """Total Lagrangian body under follower pressure on its cavity; base fixed, mirror planes kept.
+    """A discretised body: energy, residual and tangent under follower pressure on its cavity.
 
-    mesh: tetrahedra of order 1 or 2 in mm. held: further supports, (n, 3) bool. load: dead forces on
-    the nodes, (n, 3) in N, or None. obstacles: rigid bodies it may touch. mean_dilatation, against locking of
-    nearly incompressible bodies: the part of each bulk modulus above POINTWISE_BULK shear moduli acts on the
-    mean J of an element; every law must then split the volume off. Displacements are (n, 3) in mm, pressure
-    in MPa, energy in mJ (N mm), forces in N. Free unknowns are numbered as in `free`.
+    Total Lagrangian, float64; the base is fixed and mirror planes are kept. Displacements are (n, 3) in mm,
+    pressure in MPa, energy in mJ (N mm), forces in N. Unknowns that are free are numbered as in `free`.
+
+    mesh: tetrahedra of order 1 or 2 in mm. supports: degrees of freedom fixed besides, (n, 3) bool. device:
+    "cpu" or a CUDA device of Warp. threads: on the CPU. mean_dilatation, against volumetric locking of
+    nearly incompressible bodies: the part of each bulk modulus above POINTWISE_BULK shear moduli acts on
+    the mean J of an element; every law must then split the volume off.
+
+    Attributes to set: load, dead forces on the nodes (n, 3) in N, or None; obstacles, rigid bodies that it
+    may touch.
     """
 
     def __init__(
         self,
         mesh: Mesh,
-        held: Array | None = None,
+        supports: Array | None = None,
         device: str = "cpu",
         threads: int = 2,
         mean_dilatation: bool = False,
@@ -159,7 +164,7 @@ class Model:
         self._node_lists = put(start, int), put(index, int)
         self._residual = wp.empty(n, dtype=wp.vec3d, device=device)
 
-        fixed = np.zeros((n, 3), dtype=bool) if held is None else held.copy()
+        fixed = np.zeros((n, 3), dtype=bool) if supports is None else supports.copy()
         fixed[mesh.base] = True
         for axis in mesh.symmetry:
             fixed[mesh.symmetry_nodes(axis), AXES.index(axis)] = True

@@ -27,10 +27,10 @@ def _facets(faces: Array) -> Array:
 
 @attrs.frozen(eq=False)
 class Crossing:
-    """Two pieces of a body's surface that cut each other.
+    """Two pieces of a body's surface that intersect.
 
-    place (3,): where, deformed, in mm. walls (2, 3): the middle of either piece in the undeformed body.
-    inner: whether each is a wall of the cavity. facets: how many pairs of facets cut each other.
+    place (3,) in mm: where, deformed. walls (2, 3) in mm: the middle of either piece in the undeformed
+    body. inner: whether each belongs to the cavity. facets: how many pairs of facets intersect.
     """
 
     place: Array

@@ -94,7 +94,7 @@ def _start(eq: Equilibrium, time: float) -> Instant:
 
 
 def _interval(eq: Equilibrium, start: Instant, time: float, pressure: float, max_step_s: float) -> Instant:
-    """March to an instant, in equal shares of the interval where one step is too much."""
+    """Step to an instant, in equal shares of the interval where one step is too much."""
     span, rise = time - start.time_s, pressure - start.state.pressure_MPa
     if span == 0 and rise == 0:
         return start

@@ -193,5 +193,7 @@ def require_factor(part: Part, values: Array) -> None:
         part.factorise(values)
     except IndefiniteError:
         raise MeshingError(
-            "the undeformed cell is not stable", "periodic cell", "mend its material, or let its struts meet"
+            "the undeformed cell is not stable",
+            "periodic cell",
+            "correct its material, or let its struts meet",
         ) from None

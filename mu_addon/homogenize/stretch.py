@@ -27,8 +27,8 @@ class StretchSettings:
     strains: nominal, at which points are kept; rest is always one. confined: the lateral stretches are held
     at 1, else their mean stresses are 0. buckling: also ask whether the lattice would leave the planes of
     its mirrors (octant.Octant.buckling), at some 60 factorisations a point asked. tolerance: residual over
-    the root sum of squares of all element forces; min_step: least step of strain; surprise: how far from
-    its prediction a state may lie, as a share of the predicted move. Raises InputError.
+    the root sum of squares of all element forces; min_step: least step of strain; predictor_tolerance: how
+    far from its prediction a state may lie, as a share of the predicted move. Raises InputError.
     """
 
     axis: str = attrs.field(default="z", validator=attrs.validators.in_(AXES))

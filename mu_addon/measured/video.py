@@ -21,9 +21,9 @@ Array = np.ndarray[Any, Any]
 CAMERAS = ("+x", "-x")
 # The distance of two markers on one rigid part may vary by this share; more, and one of them has slipped.
 SLIP = 0.02
-# A base that wanders by more pixels than this is told where it is taken to stand still.
+# A base that wanders by more pixels than this is reported where it is taken to stand still.
 MOVED = 1.0
-# Two ways to the scale may differ by this share before it is told.
+# Two ways to the scale may differ by this share before it is reported.
 DISAGREE = 0.02
 
 Pair = tuple[str, str]
@@ -93,22 +93,22 @@ class Motion:
 def motion(tracks: Tracks, view: View, rest: Array, time_s: Array, where: str = "") -> Motion:
     """The unit's motion from followed markers; rest (n,) marks the frames from which the angle counts.
 
-    time_s (n,): for what is told. where: of the data, for messages. Raises InputError for a view that does
+    time_s (n,): for the remarks. where: of the data, for messages. Raises InputError for a view that does
     not fit the tracks.
     """
     q = {name: _seen(tracks.of(name), view.camera) for name in tracks.names}
     _check(tracks, view, where)
-    told: list[Remark] = []
-    _tell_lost(q, time_s, told, where)
+    remarks: list[Remark] = []
+    _remark_lost_markers(q, time_s, remarks, where)
     base = np.stack([q[name] for name in view.base])
     known = np.array([complex(y, z) for y, z in view.places_mm])
-    scale = _scale(q, view, known, told, where)
+    scale = _scale(q, view, known, remarks, where)
     rigid = {"base": view.base} | ({"tip": view.tip} if view.tip else {})
-    noise = [_rigid(q, pair, part, time_s, told, where) for part, pair in rigid.items()]
+    noise = [_rigid(q, pair, part, time_s, remarks, where) for part, pair in rigid.items()]
     # The camera's turn and the base's place: of every frame, or one for all.
     turns, middles = _direction(base), base.mean(axis=0)
     if not view.follow_base:
-        _tell_moved(middles, turns, abs(base[1] - base[0]), told, where)
+        _remark_moved_base(middles, turns, abs(base[1] - base[0]), remarks, where)
     turn = turns if view.follow_base else _mean_direction(turns)
     middle = middles if view.follow_base else np.nanmean(middles)
     a = scale * _direction(known) / turn
@@ -129,7 +129,7 @@ def motion(tracks: Tracks, view: View, rest: Array, time_s: Array, where: str = 
         angle,
         scale,
         float(np.mean(noise)),
-        tuple(told),
+        tuple(remarks),
     )
 
 
@@ -165,8 +165,8 @@ def _check(tracks: Tracks, view: View, where: str) -> None:
             raise InputError(f"{name} = {value:g} is no length", where, "give a number above 0")
 
 
-def _scale(q: Mapping[str, Array], view: View, known: Array, told: list[Remark], where: str) -> float:
-    """Millimetres a pixel: as given, by the ruler, or by the base; what disagrees is told."""
+def _scale(q: Mapping[str, Array], view: View, known: Array, remarks: list[Remark], where: str) -> float:
+    """Millimetres a pixel: as given, by the ruler, or by the base; what disagrees is remarked."""
     found = {}
     if view.mm_per_pixel is not None:
         found["mm_per_pixel"] = view.mm_per_pixel
@@ -176,7 +176,7 @@ def _scale(q: Mapping[str, Array], view: View, known: Array, told: list[Remark],
     (first, chosen), *others = found.items()
     for name, value in others:
         if abs(value / chosen - 1) > DISAGREE:
-            told.append(
+            remarks.append(
                 Remark(
                     f"by {first} one pixel is {chosen:.5g} mm, by {name} {value:.5g} mm; the first "
                     "value is used",
@@ -203,11 +203,11 @@ def _mean_direction(turns: Array) -> complex:
     return mean / abs(mean)
 
 
-def _tell_lost(q: Mapping[str, Array], time_s: Array, told: list[Remark], where: str) -> None:
+def _remark_lost_markers(q: Mapping[str, Array], time_s: Array, remarks: list[Remark], where: str) -> None:
     for name, at in q.items():
         lost = np.flatnonzero(~np.isfinite(at))
         if len(lost):
-            told.append(
+            remarks.append(
                 Remark(
                     f"marker {name!r} is lost in {len(lost)} of {len(at)} frames, {_spans(lost, time_s)}",
                     where,
@@ -224,7 +224,7 @@ def _spans(lost: Array, time_s: Array) -> str:
 
 
 def _rigid(
-    q: Mapping[str, Array], pair: Pair, part: str, time_s: Array, told: list[Remark], where: str
+    q: Mapping[str, Array], pair: Pair, part: str, time_s: Array, remarks: list[Remark], where: str
 ) -> float:
     """Noise of one coordinate, in pixels, from the distance of two markers on a rigid part."""
     apart = np.abs(q[pair[1]] - q[pair[0]])
@@ -232,7 +232,7 @@ def _rigid(
     off = np.abs(apart / usual - 1)
     if np.nanmax(off) > SLIP:
         worst = int(np.nanargmax(off))
-        told.append(
+        remarks.append(
             Remark(
                 f"the {part}'s two markers, {usual:.4g} pixels apart, are {apart[worst]:.4g} apart at "
                 f"{time_s[worst]:.4g} s",
@@ -247,12 +247,12 @@ def _rigid(
     return float(1.4826 * np.median(np.abs(steps)) / 2.0) if len(steps) else math.nan
 
 
-def _tell_moved(middle: Array, turn: Array, apart: Array, told: list[Remark], where: str) -> None:
+def _remark_moved_base(middle: Array, turn: Array, apart: Array, remarks: list[Remark], where: str) -> None:
     shift = np.abs(middle - np.nanmedian(middle.real) - 1j * np.nanmedian(middle.imag))
     swing = np.abs(np.angle(turn / _mean_direction(turn))) * apart / 2
     most = max(float(np.nanmax(shift)), float(np.nanmax(swing)))
     if most > MOVED:
-        told.append(
+        remarks.append(
             Remark(
                 f"the base's markers move by up to {most:.3g} pixels, but the base is assumed fixed",
                 where,

@@ -29,16 +29,16 @@ def relieved(mesh: Mesh, bounds: Any) -> Mesh:
     straight[tets[:, 4:]] = straight[tets[:, :4][:, TET_EDGES]].mean(axis=2)
     of_membrane = np.zeros(len(mesh.nodes), bool)
     of_membrane[mesh.tets[mesh.region == MEMBRANE]] = True
-    held = of_membrane[:, None] | np.any(
+    prescribed = of_membrane[:, None] | np.any(
         [straight == planes for planes in (0.0, *np.transpose(bounds))], axis=0
     )
     moved = np.where(of_membrane[:, None], mesh.nodes - straight, 0.0)
-    bent = straight + _harmonic(straight, tets, moved, held)
+    bent = straight + _harmonic(straight, tets, moved, prescribed)
     return attrs.evolve(mesh, nodes=np.where(of_membrane[:, None], mesh.nodes, bent))
 
 
-def _harmonic(nodes: Array, tets: Array, moved: Array, held: Array) -> Array:
-    """Displacements (n, 3) in mm, prescribed as `moved` where `held` (n, 3) and harmonic elsewhere.
+def _harmonic(nodes: Array, tets: Array, moved: Array, prescribed: Array) -> Array:
+    """Displacements (n, 3) in mm, prescribed as `moved` where `prescribed` (n, 3) and harmonic elsewhere.
 
     tets (m, 10) are straight-sided. The medium is stiffer where elements are small, as in Persson and
     Peraire, AIAA 2009-949.
@@ -48,4 +48,4 @@ def _harmonic(nodes: Array, tets: Array, moved: Array, held: Array) -> Array:
     slopes = np.einsum("qnr,mrd->mqnd", gradient, np.linalg.inv((x[:, 1:] - x[:, :1]).transpose(0, 2, 1)))
     # Not weighed by the elements' volumes, so that small ones are the stiff ones.
     local = np.einsum("mqad,mqbd->mab", slopes, slopes)
-    return harmonic(len(nodes), tets, local, moved, held)
+    return harmonic(len(nodes), tets, local, moved, prescribed)

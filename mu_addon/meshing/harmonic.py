@@ -7,8 +7,8 @@ import numpy as np
 from .mesh import Array
 
 
-def harmonic(nodes: int, cells: Array, local: Array, moved: Array, held: Array) -> Array:
-    """Displacements (nodes, 3) in mm, prescribed as `moved` where `held` (nodes, 3) and harmonic elsewhere.
+def harmonic(nodes: int, cells: Array, local: Array, moved: Array, prescribed: Array) -> Array:
+    """Displacements (nodes, 3) in mm: `moved` where `prescribed` (nodes, 3) bool, harmonic elsewhere.
 
     cells (m, k): nodes of the elements; local (m, k, k): their stiffness. Nodes of no cell stay.
     """
@@ -18,11 +18,11 @@ def harmonic(nodes: int, cells: Array, local: Array, moved: Array, held: Array) 
     k = cells.shape[1]
     rows, columns = np.repeat(cells, k, axis=1).ravel(), np.tile(cells, (1, k)).ravel()
     matrix = csr_matrix((local.ravel(), (rows, columns)), shape=(nodes, nodes))
-    result = np.where(held, moved, 0.0)
+    result = np.where(prescribed, moved, 0.0)
     in_use = np.zeros(nodes, bool)
     in_use[cells] = True
     for axis in range(3):
-        free = np.flatnonzero(in_use & ~held[:, axis])
+        free = np.flatnonzero(in_use & ~prescribed[:, axis])
         load = -(matrix[free] @ result[:, axis])
         result[free, axis] = splu(matrix[free][:, free].tocsc()).solve(load)
     return result

@@ -42,10 +42,10 @@ def morphed(mesh: Mesh, drawn: Unit, other: Unit, settings: MeshSettings) -> Mes
         middles = _middles(mesh, before)
         known[middles] = True
         moved[middles] = after.middles - before.middles
-    held = known[:, None] | np.any(
+    prescribed = known[:, None] | np.any(
         [mesh.nodes == planes for planes in (0.0, *np.transpose(np.array(a.bounds)))], axis=0
     )
-    moved = _followed(mesh.nodes, mesh.corners[inside], moved, held)
+    moved = _moved_along(mesh.nodes, mesh.corners[inside], moved, prescribed)
     if mesh.order == 2:
         rest = ~known & ~corner
         moved[rest] = moved[_ends(mesh)[rest]].mean(axis=1)
@@ -104,13 +104,13 @@ def _middles(mesh: Mesh, membrane: Membrane) -> Array:
     return node[rows]
 
 
-def _followed(nodes: Array, tets: Array, moved: Array, held: Array) -> Array:
-    """Displacements (n, 3): `moved` where `held` (n, 3), harmonic in linear tets (m, 4), small ones stiff."""
+def _moved_along(nodes: Array, tets: Array, moved: Array, prescribed: Array) -> Array:
+    """Displacements (n, 3): `moved` where `prescribed`, harmonic in linear tets (m, 4), small ones stiff."""
     x = nodes[tets]
     inverse = np.linalg.inv(x[:, 1:] - x[:, :1]).transpose(0, 2, 1)
     slopes = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
     local = np.einsum("mad,mbd->mab", slopes, slopes)
-    return harmonic(len(nodes), tets, local, moved, held)
+    return harmonic(len(nodes), tets, local, moved, prescribed)
 
 
 def _failed(why: str) -> MeshingError:

@@ -142,7 +142,7 @@ def cavity_enclosed(mesh: Mesh) -> float:
 
 
 def dihedral_angles(mesh: Mesh) -> Array:
-    """The six dihedral angles (m, 6) in degrees of the elements, taken as straight-sided."""
+    """The six dihedral angles (m, 6) in degrees of each element, taken as straight-sided."""
     x = mesh.nodes[mesh.corners]
     # The gradient of a corner's barycentric coordinate is normal to the face opposite.
     inverse = np.linalg.inv(x[:, 1:] - x[:, :1])

@@ -1,4 +1,4 @@
-"""Every candidate on one mesh at once: Model A's states, each with all sensors in lockstep."""
+"""Every candidate on one mesh at once: at each state of Model A, all sensors by a batched Newton method."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ def candidate_paths(anchors: Array, windows: Any) -> list[Candidate]:
 
 
 def roi(mesh: Mesh, candidate: Candidate, radius_mm: float) -> Inclusion:
-    """The candidate's region of interest among the lattice elements of a mesh."""
+    """Region of interest of a candidate: the share of each lattice element of a mesh inside its cylinder."""
     corners, lattice = mesh.nodes[mesh.corners], mesh.region == LATTICE
     return polyline_inclusion(corners, lattice, candidate.points, radius_mm)
 
@@ -66,7 +66,7 @@ def with_sensor(materials: Materials, share: Array, sensor_MPa: float) -> Materi
 
 
 def moved_points(monitored: tuple[Array, Probe], trajectory: Trajectory) -> Array:
-    """Monitored points (k, p, 3) in mm at the k instants of a trajectory."""
+    """Positions (k, p, 3) in mm of monitored points at the k instants of a trajectory."""
     points, monitor = monitored
     return trajectory.of_time(np.array([points + monitor.displacement(s.u) for s in trajectory.states]))
 

@@ -53,7 +53,7 @@ def parities(model: Model) -> list[Parity]:
     held = np.zeros((len(mesh.nodes), 3), bool)
     held[mesh.symmetry_nodes("x"), 1:] = True
     whole = attrs.evolve(mesh, symmetry=())
-    other = Model(whole, held=held, device=model.device, threads=model.threads)
+    other = Model(whole, supports=held, device=model.device, threads=model.threads)
     return [Parity(model, (1, 2), False), Parity(other, (0,), True)]
 
 

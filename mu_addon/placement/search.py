@@ -103,9 +103,12 @@ def search_paths(
 
 
 def front(length: Array, deviation_mm: Array) -> Array:
-    """Numbers of the paths that are Pareto-optimal in length and deviation, shortest first (Pareto).
+    """Numbers of the paths that are Pareto-optimal in length (longer is better) and deviation.
 
-    Longer is better, for a longer path senses more of the unit; NaN deviations are left out.
+    length (n,) in cells or mm; deviation_mm (n,), NaN where unknown: such paths are left out.
+
+    >>> front(np.array([2.0, 3.0, 4.0]), np.array([0.2, 0.1, 0.4])).tolist()
+    [1, 2]
     """
     order = np.lexsort((deviation_mm, -np.asarray(length)))
     kept: list[int] = []

@@ -14,7 +14,10 @@ Array = np.ndarray[Any, Any]
 
 
 def whole_body(mesh: Mesh, trajectory: Trajectory) -> tuple[Mesh, Trajectory]:
-    """The mirrored mesh and trajectory: equilibria of the whole body, to rounding, without solving again."""
+    """Mesh and trajectory of the whole body, mirrored from those of its half, without solving again.
+
+    A path off the mirror plane needs both sides. Equilibria stay equilibria, to rounding.
+    """
     for axis in mesh.symmetry:
         states = (attrs.evolve(s, u=mirror_displacement(mesh, s.u, axis)) for s in trajectory.states)
         trajectory = attrs.evolve(trajectory, states=tuple(states))

@@ -30,7 +30,7 @@ def fresnel(cosine: float, n1: float, n2: float):
 
 
 @wp.kernel
-def follow(
+def trace_rays(
     mesh: wp.uint64,
     kinds: wp.array(dtype=int),
     starts: wp.array(dtype=wp.vec3),

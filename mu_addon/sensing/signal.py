@@ -163,7 +163,7 @@ def response(angle_deg: Array, share: Array, rest_deg: float = 0.0) -> Response:
 
 
 def pareto(disturbance: Sequence[float], sensitivity: Sequence[float]) -> list[bool]:
-    """Whether no other candidate disturbs less and senses more, (n,)."""
+    """Which candidates are Pareto-optimal: no other disturbs less and senses more, (n,) bool."""
     d, s = np.asarray(disturbance, float), np.abs(np.asarray(sensitivity, float))
     better = (
         (d[None] <= d[:, None]) & (s[None] >= s[:, None]) & ((d[None] < d[:, None]) | (s[None] > s[:, None]))

@@ -15,7 +15,7 @@ import warp as wp
 
 from .guide import Guide
 from .optics import Optics
-from .rays import ABSORBED, DETECTED, FATES, follow
+from .rays import ABSORBED, DETECTED, FATES, trace_rays
 
 Array = np.ndarray[Any, Any]
 
@@ -69,7 +69,7 @@ def trace(guide: Guide, optics: Optics, rays: tuple[Array, Array], seed: int = 0
     fate = wp.zeros(n, dtype=int, device="cpu")
     weight, absorbed = (wp.zeros(n, dtype=float, device="cpu") for _ in range(2))
     wp.launch(
-        follow,
+        trace_rays,
         dim=n,
         inputs=[
             mesh.id,

@@ -128,8 +128,8 @@ def test_wells_and_pockets_are_clear_of_struts(number):
     bar = bent("mu-1.5x", number)
     lattice = lattice_of(load_preset("mu-1.5x").dimensions)
     t = np.linspace(0, 1, 201)
-    ends = lattice.nodes[lattice.struts[~bar.followed]]
-    radii = strut_radii(lattice, bar.met[~bar.followed], bar.half, t)
+    ends = lattice.nodes[lattice.struts[~bar.replaced]]
+    radii = strut_radii(lattice, bar.met[~bar.replaced], bar.half, t)
     for cut in bar.cuts:
         for (start, end), radius in zip(ends, radii, strict=True):
             if np.linalg.norm((start + end) / 2 - cut.centre) > 14:
@@ -196,8 +196,8 @@ def test_struts_at_the_path_are_no_thinner_than_the_waveguide():
 def test_a_followed_strut_becomes_the_bar():
     bar = bent("mu-1.0x", 1517)
     lattice = lattice_of(load_preset("mu-1.0x").dimensions)
-    assert bar.followed.sum() == 3
-    ends = lattice.nodes[lattice.struts[bar.followed]]
+    assert bar.replaced.sum() == 3
+    ends = lattice.nodes[lattice.struts[bar.replaced]]
     for start, end in ends:
         for point in (start, end):
             assert (
@@ -249,7 +249,7 @@ def test_paths_that_cannot_be_are_refused(points, words):
 def test_an_end_without_room_is_refused_and_goes_without_a_seat():
     unit = load_preset("mu-1.0x")
     wide = attrs.evolve(unit, waveguide=attrs.evolve(unit.waveguide, part_width_mm=10.0, part_length_mm=10.0))
-    with pytest.raises(InputError, match="has no room for a seat: a strut is in the way"):
+    with pytest.raises(InputError, match="has no space for a seat: a strut is in the way"):
         waveguide(wide, window(wide, "alpha4"))
     bare = attrs.evolve(wide, waveguide=attrs.evolve(wide.waveguide, seats=False))
     bar = waveguide(bare, window(bare, "alpha4"))
@@ -270,7 +270,7 @@ def test_a_lattice_with_upright_struts_has_no_seats_but_wells(monkeypatch):
     p = anchor_points(unit)
     path = np.array([p[0], (p[0] + p[1]) / 2, p[1], (p[1] + p[2]) / 2, p[2]])
     bar = waveguide(unit, path)
-    assert bar.followed.sum() == 4
+    assert bar.replaced.sum() == 4
     assert bar.loops == 0
     assert [well.centre[2] - p[0, 2] for well in bar.wells] == pytest.approx(
         [3.125, 6.25, 9.375, 15.625, 18.75, 21.875]

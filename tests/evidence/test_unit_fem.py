@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import ConvergenceError, InputError
 from mu_addon.evidence import unit_fem
-from mu_addon.evidence.markers import attached, followed, nearest
+from mu_addon.evidence.markers import attached, material_points, nearest
 from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.unit_effects import EFFECTS, Body, down
 from mu_addon.evidence.unit_fem import (
@@ -301,7 +301,7 @@ def test_a_marker_sits_on_the_nearest_point_of_the_unit(mesh):
 
 def test_a_marker_across_the_mirror_moves_like_its_image(mesh):
     u = np.random.default_rng(0).standard_normal(mesh.nodes.shape)
-    one, other = followed(mesh, np.array([[5.0, 20.0, 40.0], [-5.0, 20.0, 40.0]])).at(u)
+    one, other = material_points(mesh, np.array([[5.0, 20.0, 40.0], [-5.0, 20.0, 40.0]])).at(u)
     np.testing.assert_allclose(other, one * [-1, 1, 1])
 
 

@@ -36,7 +36,7 @@ def _panel(n, order, options):
     mesh = bodies.cook(n, order)
     held = np.zeros(mesh.nodes.shape, bool)
     held[:, 2] = True
-    return mesh, Model(mesh, held=held, **options)
+    return mesh, Model(mesh, supports=held, **options)
 
 
 def _edge_rise(mesh, u, height):

@@ -99,7 +99,7 @@ def solve(n, order, field=WAVES, **options):
     """Mesh and displacement (k, 3) of a distorted cube of n cells a side, its boundary moved exactly."""
     mesh = bodies.box((n, n, n), order=order, jiggle=0.15)
     boundary = ((mesh.nodes == 0) | (mesh.nodes == 1)).any(axis=1)
-    model = Model(mesh, held=np.repeat(boundary[:, None], 3, axis=1), **options)
+    model = Model(mesh, supports=np.repeat(boundary[:, None], 3, axis=1), **options)
     points, weights = fine_rule()
     N = shape_functions(points, order)
     volume = 6 * reference_gradients(mesh.nodes, mesh.tets).volumes.sum(axis=1)

@@ -28,7 +28,7 @@ A, B, NU = 10.0, 11.0, 0.499
 def equilibrium(mesh, modulus, poisson, held=None, **options):
     k = len(mesh.tets)
     materials = Materials.neo_hooke(np.full(k, modulus), np.full(k, poisson))
-    return Equilibrium(Model(mesh, held=held, threads=1), materials, NewtonSettings(**options))
+    return Equilibrium(Model(mesh, supports=held, threads=1), materials, NewtonSettings(**options))
 
 
 def balloon(around=3):

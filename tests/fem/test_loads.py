@@ -54,7 +54,7 @@ def test_weight_adds_up_and_balances_about_the_centre_of_mass(order):
 def test_a_hanging_bar_grows_by_rho_g_L2_over_2E(order):
     mesh = bodies.box((1, 1, 6), (2.0, 2.0, 30.0), order=order)
     held = mesh.nodes[:, 2:] == 30.0
-    model = Model(mesh, held=np.repeat(held, 3, axis=1))
+    model = Model(mesh, supports=np.repeat(held, 3, axis=1))
     load = gravity(mesh, DENSITY, [0, 0, -1])
     expected = -DENSITY * STANDARD_GRAVITY * 30.0**2 / (2 * 0.5)
     u = linear(model, uniform(mesh, 0.5), load)
@@ -126,7 +126,7 @@ def test_weight_of_half_a_body_is_half_the_weight():
 def bar(load_factor, direction):
     """A clamped bar of silicone's weight, or so many times as heavy."""
     mesh = bodies.box((1, 1, 6), (2.0, 2.0, 30.0), order=2)
-    model = Model(mesh, held=np.repeat(mesh.nodes[:, 2:] == 0.0, 3, axis=1))
+    model = Model(mesh, supports=np.repeat(mesh.nodes[:, 2:] == 0.0, 3, axis=1))
     model.load = load_factor * gravity(mesh, DENSITY, direction)
     return Equilibrium(model, uniform(mesh, 0.5, 0.3))
 

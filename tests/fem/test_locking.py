@@ -68,7 +68,7 @@ def test_a_compressible_body_is_left_as_it_is():
 
 def linearised(mesh, held, load, poisson, mean):
     """Displacement (n, 3) of the linearised body with E = 1 MPa under nodal forces."""
-    model = Model(mesh, held=held, mean_dilatation=mean)
+    model = Model(mesh, supports=held, mean_dilatation=mean)
     u = rest(mesh).u
     model.factor.factor(model.tangent(u, 0.0, model.parameters(uniform(mesh, 1.0, poisson))))
     u.ravel()[model.free] = model.factor.solve(load.ravel()[model.free])

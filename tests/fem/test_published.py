@@ -21,7 +21,7 @@ KNOWN = cases.cases()
 def deformed(F, held, order):
     """Mean first Piola-Kirchhoff stress and displacement of a distorted unit cube pulled by F at `held`."""
     mesh = bodies.box((2, 2, 2), order=order, jiggle=0.2)
-    model = Model(mesh, held=held(mesh.nodes))
+    model = Model(mesh, supports=held(mesh.nodes))
     equilibrium = Equilibrium(model, bodies.uniform(mesh, E, NU), NewtonSettings(tolerance=1e-12))
     u = mesh.nodes @ (F - np.eye(3)).T
     # A start that is wrong inside: the solution must find its way back to homogeneity.

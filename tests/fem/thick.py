@@ -55,7 +55,7 @@ def tube(around, order, poisson, **options):
     )
     held = np.zeros(mesh.nodes.shape, bool)
     held[:, 2] = mesh.nodes[:, 2] == mesh.nodes[:, 2].max()
-    model = Model(mesh, held=held, **options)
+    model = Model(mesh, supports=held, **options)
     u = _radial_growth(mesh, model, tube_pressure(), poisson)
     inside = np.unique(mesh.cavity)
     return np.linalg.norm((mesh.nodes + u)[inside, :2], axis=1).mean() - INNER, len(model.free)

@@ -194,7 +194,7 @@ def searched(tmp_path_factory):
     folder = tmp_path_factory.mktemp("search") / "out"
     limits = ("--paths", "graph", "--shortest-cells", "4.5", "--longest-cells", "5", "--bend-deg", "20")
     arguments = ("--rule", "volume_fraction", "--no-mesh-check", *limits)
-    done = run("place", "--preset", "mu-1.0x", "--out", folder, *QUICK, *arguments)
+    done = run("place", "--preset", "mu-1.0x", "--out", folder, *COARSE, *arguments)
     assert done.returncode == 0, done.stderr
     return folder, done
 

@@ -110,8 +110,8 @@ def ranked(builds: list[Build]) -> list[Build]:
     cost = np.array([b.costs for b in builds])
     as_good = (cost[:, None, :] <= cost[None, :, :]).all(axis=2)
     better = (cost[:, None, :] < cost[None, :, :]).any(axis=2)
-    beaten = (as_good & better).any(axis=0)
-    marked = [attrs.evolve(b, best_among=not bad) for b, bad in zip(builds, beaten.tolist(), strict=True)]
+    dominated = (as_good & better).any(axis=0)
+    marked = [attrs.evolve(b, best_among=not bad) for b, bad in zip(builds, dominated.tolist(), strict=True)]
     return sorted(marked, key=lambda b: b.costs)
 
 

@@ -235,7 +235,7 @@ class UnitPressure:
 
     The gauge's reading becomes the pressure in the chambers (offset, gain, leak, lag; the last two where the
     valve behind the gauge is open), that becomes the
-    pressure at which the unmended unit would stand where the unit stands now (all moduli scaled alike are
+    pressure at which the uncorrected unit would stand where the unit stands now (all moduli scaled alike are
     the pressure scaled inversely, at rest exactly and for moduli that relax alike to first order of the
     hereditary integral), and that is looked up in the response. Each record starts in equilibrium.
     """

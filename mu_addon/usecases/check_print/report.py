@@ -137,7 +137,7 @@ def _orientation(builds: Sequence[Build]) -> str:
         ("islands", "n"),
         ("to support mm²", "n"),
         ("height mm", "n"),
-        ("unbeaten", ""),
+        ("Pareto-optimal", ""),
     ]
     rows = []
     for k, b in enumerate([*builds[:MOST_ROWS], *(b for b in builds[MOST_ROWS:] if b.best_among)]):
@@ -200,9 +200,9 @@ def trade_off(builds: Sequence[Build]) -> str:
         axes = chart.add_axes((0.15, 0.16, 0.81, 0.78))
         x = np.array([b.support_mm2 for b in builds]) / 100.0
         y = np.array([b.cup_ml for b in builds])
-        unbeaten = np.array([b.best_among for b in builds])
-        axes.plot(x[~unbeaten], y[~unbeaten], "o", color=plots.QUIET, markersize=4, alpha=0.7)
-        axes.plot(x[unbeaten], y[unbeaten], "o", color=plots.BY_LENGTH[0], markersize=6)
+        optimal = np.array([b.best_among for b in builds])
+        axes.plot(x[~optimal], y[~optimal], "o", color=plots.QUIET, markersize=4, alpha=0.7)
+        axes.plot(x[optimal], y[optimal], "o", color=plots.BY_LENGTH[0], markersize=6)
         axes.plot(x[:1], y[:1], "o", color=plots.CHOSEN, markersize=9)
         axes.annotate(
             direction_name(builds[0].direction),

@@ -132,7 +132,7 @@ class Export:
         measured = {
             "nodes": len(beams.nodes),
             "beams": len(beams.pairs),
-            "struts": int(np.count_nonzero(~solid.bar.followed)) if solid.bar else len(self._lattice.struts),
+            "struts": int(np.count_nonzero(~solid.bar.replaced)) if solid.bar else len(self._lattice.struts),
             "frusta_mm3": beams.volume,
         }
         self._add(name, "actuator and waveguide as meshes, lattice as beams, nominal size, mm", measured)
