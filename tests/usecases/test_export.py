@@ -257,7 +257,7 @@ def test_calliper_sheets_become_offsets(tmp_path):
     path.write_text(sheet().replace("0.9,\n", "0.9,9.0\n"))
     with pytest.raises(InputError, match="x1 measured as"):
         read_sheet(path)
-    with pytest.raises(InputError, match="has no offsets"):
+    with pytest.raises(InputError, match="no print offset"):
         taken_off(SMALL, "unit")
     assert taken_off(SMALL, None) == ((0.0, 0.0), "")
 

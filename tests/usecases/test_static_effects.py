@@ -287,9 +287,9 @@ GRAVITY = "[simulate.effects.gravity]\ndensity_kg_m3 = 1300.0\n"
 def test_effects_that_are_none_are_refused_with_place_and_remedy(tmp_path, old, new, what, remedy):
     keep_inputs(tmp_path, with_effects(90.0, gravity=1300.0).texts())
     path = tmp_path / "study.toml"
-    empty, found = "[simulate.effects]\n\n", path.read_text()
-    assert empty + GRAVITY in found
-    path.write_text(found.replace(empty + GRAVITY, GRAVITY.replace(old, new)))
+    found = path.read_text()
+    assert GRAVITY in found
+    path.write_text(found.replace(GRAVITY, GRAVITY.replace(old, new)))
     with pytest.raises(InputError) as caught:
         read_job(tmp_path)
     assert what in caught.value.what
