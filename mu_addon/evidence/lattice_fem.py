@@ -72,8 +72,8 @@ def _silent(what: str, share: float) -> None:
 def response(block: Block, cache: Path | None = None, report: Progress = _silent) -> OffsetResponse:
     """The block's response to a print offset: shipped, kept in the folder `cache`, or computed.
 
-    say: told the step and the share done, 0 to 1. The paper's block of 27 cells takes a minute or two to
-    compute. Raises InputError for a cell that cannot be printed so, MeshingError and ConvergenceError.
+    report: called with the step and the share done, 0 to 1. The paper's block of 27 cells takes a minute or
+    two to compute. Raises InputError for a cell that cannot be printed so, MeshingError and ConvergenceError.
     """
     key = block.key()
     for name in asset_names(SHIPPED):

@@ -81,8 +81,8 @@ def select(
 
     Each must gain more chi squared than noise would at `FALSE_ALARM_RATE`, over the whole library, and must
     reduce the leave-one-experiment-out error. seen: sensitivities of the effects; those not worth a fit are
-    not tried. progress: told the effects that are fitted. A record that nothing explains keeps the base model
-    and the structure that is left.
+    not tried. progress: called with the names of the effects that are fitted. A record that nothing explains
+    keeps the base model and the structure that is left.
     """
     base = fitter.fit()
     table_base = tuple(dependence_table(fitter, base))
