@@ -21,7 +21,10 @@ from .verdict import Verdict
 
 @attrs.frozen
 class Fitted:
-    """A value with its standard deviation and the bounds of 95 %, in `unit`."""
+    """A fitted value with its standard deviation and the ends of its 95 % interval, all in `unit`.
+
+    An empty unit means a pure number; what is not known is nan.
+    """
 
     value: float
     sd: float
@@ -32,10 +35,10 @@ class Fitted:
 
 @attrs.frozen
 class ExtendedModel:
-    """What a verdict found, for simulations: fitted parameters by effect and name, and nuisances by name.
+    """The parameters that a verdict leaves for simulations: of effects by effect and name, nuisances by name.
 
-    verdict: how sure the effects are. lattice: response of the printed lattice, from virtual tests, to a
-    print offset; None where a power law of slender struts was used.
+    verdict: kind of the verdict, one of `verdict.KINDS`. lattice: response of the printed lattice to a print
+    offset, from virtual tests; None where a power law of slender struts was used.
     """
 
     verdict: str
@@ -45,16 +48,16 @@ class ExtendedModel:
 
     @property
     def values(self) -> dict[str, float]:
-        """What a simulator's `predict` takes."""
+        """Values for a simulator's `predict`: by "effect.parameter" or nuisance, each in its own unit."""
         named = {f"{e}.{p}": f.value for e, ps in self.effects.items() for p, f in ps.items()}
         return {**{n: f.value for n, f in self.nuisances.items()}, **named}
 
     def save(self, path: Path) -> None:
-        """Write model.toml; raises OutputError."""
+        """Write `text` to the file `path`; raises OutputError where that fails."""
         write_text(path, self.text())
 
     def text(self) -> str:
-        """What model.toml holds."""
+        """The text of model.toml: each value with sd, low95, high95 and unit; nan is left out."""
         effects = {
             name: Noted({p: _numbers(f) for p, f in parameters.items()}, (LIBRARY[name][0],))
             for name, parameters in self.effects.items()
@@ -80,9 +83,10 @@ def _numbers(f: Fitted) -> dict[str, float | str]:
 
 
 def extended_model(verdict: Verdict, units: Mapping[str, str] = MappingProxyType({})) -> ExtendedModel:
-    """The model that a verdict leaves: the base with the named effects, else with its nuisances fitted.
+    """The model that a verdict leaves: the base with the named effects, or alone where none is named.
 
-    units: of the nuisances, by name.
+    units: of the nuisances, by name; empty where one is missing. Intervals are the verdict's 95 % ones, nan
+    where it has none.
     """
     found = verdict.selection
     fit = found.chosen if verdict.names else found.base
@@ -100,7 +104,11 @@ def extended_model(verdict: Verdict, units: Mapping[str, str] = MappingProxyType
 
 
 def load_model(path: Path) -> ExtendedModel:
-    """Read model.toml; raises InputError that names the table it cannot use."""
+    """Read a model.toml.
+
+    Raises InputError where the file cannot be read or is not TOML, for an effect that `LIBRARY` lacks, for a
+    parameter without a finite value and for an unusable table [lattice].
+    """
     try:
         text = file_text(path)
     except OSError as error:

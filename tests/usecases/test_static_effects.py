@@ -88,10 +88,10 @@ def moved(job, mesh):
 
 def ran(job, folder):
     """Its summary; the report, which takes longest, is left out."""
-    told = []
-    with run_to_end(Progress([told.append])) as context:
+    messages = []
+    with run_to_end(Progress([messages.append])) as context:
         run_stages(Study.open(job, folder, context))
-    assert context.status == 0, told[-1]
+    assert context.status == 0, messages[-1]
     return json.loads((folder / "summary.json").read_text())
 
 
@@ -328,12 +328,12 @@ def test_the_command_line_simulates_what_a_diagnosis_found(tmp_path, capsys, mes
 
 def given(unit_of, *words):
     """What a command makes of its options --preset and --model, its summary, and what it warns of."""
-    told = []
+    messages = []
     options = parser().parse_args([str(w) for w in [*words, "--preset", "mu-1.0x", "--out", "out"]])
-    with run_to_end(Progress([told.append])) as context:
+    with run_to_end(Progress([messages.append])) as context:
         found = unit_of(options, context)
-    assert context.status == 0, told[-1]
-    return found, context.summary, [m["what"] for m in told if m.get("type") == "warning"]
+    assert context.status == 0, messages[-1]
+    return found, context.summary, [m["what"] for m in messages if m.get("type") == "warning"]
 
 
 def test_a_direction_of_nothing_that_weighs_is_told(tmp_path):
