@@ -32,7 +32,7 @@ STEP_SIZE = 4
 
 @attrs.frozen(eq=False)
 class Rows:
-    """A sparse matrix (n, n) by rows on a device."""
+    """A sparse matrix (n, n) by rows (CSR) on a device: offsets (n + 1,), columns and values (nnz,)."""
 
     offsets: wp.array
     columns: wp.array
@@ -48,7 +48,7 @@ class Rows:
 
 @attrs.frozen(eq=False)
 class Change:
-    """What a variant adds to the tangent: `matrix` (c, c) on the free unknowns (c,)."""
+    """What a variant adds to the tangent: `matrix` (c, c) in N/mm on the free unknowns `unknowns` (c,)."""
 
     unknowns: Array
     matrix: sparse.csr_matrix
@@ -141,7 +141,9 @@ class ConjugateGradients:
     """Solves with a symmetric positive definite matrix of one pattern, as `factor.Cholesky` does.
 
     The preconditioner is a factorised sparse approximate inverse, by Warp (Kolotilina and Yeremin, SIAM
-    J. Matrix Anal. Appl. 14 (1993) 45). tolerance: residual over right-hand side of every solution.
+    J. Matrix Anal. Appl. 14 (1993) 45). indptr (n + 1,), indices (nnz,): the lower triangle by columns; order
+    (n,): in which the unknowns are kept on the device. tolerance: residual over right-hand side of every
+    solution.
     """
 
     # A residual below this share of a random right-hand side proves the matrix definite but for about
@@ -176,7 +178,10 @@ class ConjugateGradients:
         return wp.array(np.ascontiguousarray(a, kind), dtype=dtype, device=self.device)
 
     def factor(self, values: Array) -> ConjugateGradients:
-        """Take the values (nnz,) of the lower triangle by columns. Raises IndefiniteError."""
+        """Take the values (nnz,) of the lower triangle by columns, and make the preconditioner.
+
+        Raises IndefiniteError where the matrix is not proved positive definite.
+        """
         inputs = [self._number, self._put(values, wp.float64), self._rows.values]
         wp.launch(kernels.pick, len(self._number), inputs, device=self.device)
         self.diagonal = values[self._diagonal_at]
@@ -222,21 +227,28 @@ class ConjugateGradients:
             )
 
     def solve(self, b: Array) -> Array:
-        """Solve for one (n,) or several (n, k) right-hand sides. Raises ConvergenceError."""
+        """Solve for one (n,) or several (n, k) right-hand sides; the result has the same shape.
+
+        Raises ConvergenceError where one is not solved within the tolerance.
+        """
         x, solved = self.solve_changed(b.T.reshape(-1, self.size), None)
         if not solved.all():
             raise ConvergenceError(f"conjugate gradients stopped after {self.iterations} iterations")
         return x.reshape(b.T.shape).T
 
     def changes(self, changes: Sequence[Change]) -> Changes:
-        """Put what systems add to the matrix on the device."""
+        """Put what several systems add to the matrix on the device, for `solve_changed`; after `factor`."""
         place = np.empty(self.size, dtype=np.int64)
         place[self._order] = np.arange(self.size)
         turned = [attrs.evolve(c, unknowns=place[c.unknowns]) for c in changes]
         return Changes(turned, self.diagonal[self._order], self.device)
 
     def solve_changed(self, b: Array, changes: Changes | None) -> tuple[Array, Array]:
-        """Solutions (k, n) of k systems that each add a change to the matrix, and which are solved (k,)."""
+        """Solutions (k, n) of k systems with right-hand sides b (k, n), and which are solved, (k,) bool.
+
+        Each system is the matrix plus its own change, or the matrix alone where changes is None. `iterations`
+        then holds how many were needed.
+        """
         found = self._run(self._put(b[:, self._order], wp.float64), changes, self.tolerance)
         self.iterations = found.iterations
         solution = np.empty(b.shape)

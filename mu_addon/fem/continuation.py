@@ -48,17 +48,17 @@ class Branch:
 
     @property
     def pressure_MPa(self) -> Array:
-        """Pressure of every point, (k,)."""
+        """Pressure in MPa of every point, (k,)."""
         return np.array([p.state.pressure_MPa for p in self.points])
 
     @property
     def volume_mm3(self) -> Array:
-        """Cavity volume of every point, (k,)."""
+        """Cavity volume in mm3 of every point, (k,)."""
         return np.array([p.volume_mm3 for p in self.points])
 
     @property
     def negative(self) -> Array:
-        """Negative eigenvalues of the tangent at every point, (k,)."""
+        """Number of negative eigenvalues of the tangent at every point, (k,); 0 is stable."""
         return np.array([p.negative for p in self.points])
 
 

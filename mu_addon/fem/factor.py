@@ -48,7 +48,11 @@ def _minimum_degree(graph: sparse.csr_matrix) -> Array:
 
 
 class Cholesky:
-    """Cholesky factor of a symmetric positive definite matrix whose lower triangle keeps one pattern."""
+    """Cholesky factor, by CHOLMOD, of symmetric positive definite matrices of one pattern.
+
+    indptr (n + 1,), indices (nnz,): the lower triangle by columns; order (n,): a fill-reducing permutation.
+    Raises ImportError where cvxopt is missing.
+    """
 
     def __init__(self, indptr: Array, indices: Array, order: Array) -> None:
         # Read when cvxopt loads its own OpenBLAS. Its threads spin while they wait for each other on
@@ -86,7 +90,7 @@ class Cholesky:
         return self
 
     def solve(self, b: Array) -> Array:
-        """Solve for one (n,) or several (n, k) right-hand sides."""
+        """Solve for one (n,) or several (n, k) right-hand sides; the result has the same shape."""
         from cvxopt import cholmod, matrix
 
         x = matrix(np.asfortranarray(b if b.ndim == 2 else b[:, None]))
@@ -109,7 +113,7 @@ class Cholesky:
 
 
 class SuperLU:
-    """LU of the same matrix by scipy: several times slower, always installed."""
+    """LU of the same matrix by scipy, with the same arguments: several times slower, always installed."""
 
     def __init__(self, indptr: Array, indices: Array, order: Array) -> None:
         self._indptr, self._indices = indptr, indices
@@ -133,7 +137,7 @@ class SuperLU:
         return self
 
     def solve(self, b: Array) -> Array:
-        """Solve for one (n,) or several (n, k) right-hand sides."""
+        """Solve for one (n,) or several (n, k) right-hand sides; the result has the same shape."""
         x = np.empty_like(b)
         x[self._order] = self._lu.solve(np.ascontiguousarray(b[self._order]))
         return x
@@ -164,7 +168,10 @@ class LDL:
         self.negative = 0
 
     def factor(self, values: Array) -> LDL:
-        """Factorise for the values (nnz,) of the lower triangle by columns. Raises ArithmeticError."""
+        """Factorise for the values (nnz,) of the lower triangle by columns, and count `negative` eigenvalues.
+
+        Raises ArithmeticError where a pivot vanishes.
+        """
         from scipy.sparse.linalg import splu
 
         lower = sparse.csc_matrix((values, self._indices, self._indptr), shape=(self.size, self.size))
@@ -184,7 +191,7 @@ class LDL:
         return self
 
     def solve(self, b: Array) -> Array:
-        """Solve for one (n,) or several (n, k) right-hand sides."""
+        """Solve for one (n,) or several (n, k) right-hand sides, refined up to `refinements` times."""
         b = np.ascontiguousarray(b[self._order])
         y = self._lu.solve(b)
         for _ in range(self.refinements):
@@ -198,7 +205,11 @@ class LDL:
 
 
 def make_factor(indptr: Array, indices: Array, order: Array) -> Cholesky | SuperLU:
-    """The best factorisation installed here."""
+    """The fastest factorisation installed: `Cholesky`, or `SuperLU` where cvxopt is missing.
+
+    indptr (n + 1,), indices (nnz,): lower triangle of the (n, n) matrix by columns; order (n,): permutation
+    that reduces fill.
+    """
     try:
         return Cholesky(indptr, indices, order)
     except ImportError:

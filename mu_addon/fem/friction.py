@@ -78,7 +78,10 @@ def traction(e: Array, bound: Array, stiffness: float) -> Array:
 
 
 def kept(e: Array, bound: Array, stiffness: float) -> Array:
-    """Share (...) of slip e that is elastic: 1 where it sticks, 0 without pressure."""
+    """Share (...) of slip e (..., 3) in mm that is elastic: 1 where it sticks, 0 without pressure.
+
+    bound (...) of the traction in MPa, stiffness in MPa/mm; beyond a slip of bound/stiffness it slides.
+    """
     size = np.linalg.norm(e, axis=-1)
     least = bound / stiffness
     return np.where(size > least, least / np.maximum(size, 1e-300), np.where(bound > 0, 1.0, 0.0))

@@ -57,9 +57,10 @@ class SolverChoice:
             )
 
     def resolved(self, mesh: Mesh, needs_factor: bool = False) -> tuple[str, str]:
-        """Device and solver of a mesh, as `Model` takes them. Raises InputError as `require_device`.
+        """Device and solver of a mesh, as `Model` takes them: names such as ("cpu", "factorisation").
 
-        needs_factor: whether a job asks for a factor besides solutions, as the ranking of paths does.
+        needs_factor: whether a job asks for a factor besides solutions, as the ranking of paths does. Raises
+        InputError as `require_device`.
         """
         self.require_device()
         unknowns = 3 * len(mesh.nodes)
@@ -82,7 +83,7 @@ def factor_bytes(unknowns: int) -> float:
 
 
 def free_memory_bytes() -> float | None:
-    """Memory that a process may still take, or None where the system does not say."""
+    """Memory in bytes that a process may still take, or None where the system does not say."""
     try:
         with open("/proc/meminfo", encoding="ascii") as stream:
             found = re.search(r"^MemAvailable:\s+(\d+) kB", stream.read(), re.MULTILINE)

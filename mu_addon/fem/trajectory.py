@@ -35,8 +35,9 @@ class Trajectory:
 
 
 def branches(pressure_kPa: Array) -> tuple[Array, list[Array]]:
-    """Distinct pressures ascending, and the order in which to visit them: outward from 0 to either side.
+    """Distinct pressures (d,) in kPa ascending, and the order in which to visit them: outward from 0.
 
+    The second result has one array for each side of 0 that occurs, negative first. pressure_kPa: (k,).
     An elastic body under pressure alone has no memory: as long as its path is stable, the state depends on
     the pressure only, so that a pressure met twice is solved once.
 

@@ -19,7 +19,10 @@ WIDTHS = (8, 16, 32)
 
 @attrs.frozen(eq=False)
 class Lower:
-    """L of P A P^T = L L^T by columns, diagonal first: row i of P A P^T is row order[i] of A."""
+    """Cholesky factor L of P A P^T = L L^T: row i of P A P^T is row order[i] of A.
+
+    order (n,); indptr (n + 1,), indices and values (nnz,): L by columns, the diagonal first in each.
+    """
 
     order: Array
     indptr: Array

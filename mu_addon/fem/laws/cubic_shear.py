@@ -57,7 +57,7 @@ class CubicShear(Law):
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless G is 0 or more and finite."""
+        """Raise InputError unless G in MPa of every row (k, 1) is 0 or more and finite."""
         G = parameters[:, 0]
         good = np.isfinite(G) & (G >= 0)
         require(good, CubicShear, "G_MPa", G, "0 or more and finite", "give a G_MPa from 0")

@@ -53,7 +53,7 @@ class DiagonalStretch(Law):
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless C is 0 or more and finite."""
+        """Raise InputError unless C in MPa of every row (k, 1) is 0 or more and finite."""
         C = parameters[:, 0]
         good = np.isfinite(C) & (C >= 0)
         require(good, DiagonalStretch, "C_MPa", C, "0 or more and finite", "give a C_MPa from 0")

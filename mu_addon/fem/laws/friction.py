@@ -101,5 +101,5 @@ class Friction(Law):
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless modulus and yield stress are positive."""
+        """Raise InputError unless modulus and yield stress in MPa of every row (k, 2) are > 0 and finite."""
         require_positive(Friction, parameters, *Friction.parameter_names)

@@ -76,5 +76,5 @@ class NeoHooke(Law):
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless both moduli are positive."""
+        """Raise InputError unless mu and kappa in MPa of every row (k, 2) are positive and finite."""
         require_positive(NeoHooke, parameters, *NeoHooke.parameter_names)
