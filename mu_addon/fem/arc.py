@@ -135,7 +135,7 @@ class Arc:
         return self._node(z, np.append(per_MPa, 1.0), self._start.residual, 0, 1)
 
     def advance(self, node: Node, length: float) -> Node:
-        """The node a length in mm ahead of a node, negative for behind.
+        """The node a positive length in mm ahead of a node.
 
         Raises ConvergenceError where the correction fails, or ends farther from its prediction than the
         predictor tolerance times the length.

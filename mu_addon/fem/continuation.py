@@ -40,7 +40,10 @@ class Critical:
 
 @attrs.frozen(eq=False)
 class Branch:
-    """Points of a branch in order from its start, the critical points passed, and why it ends."""
+    """Points of a branch in order from its start, the critical points passed, and why it ends.
+
+    ended: "pressure reached", "volume reached", "critical point" or "most points".
+    """
 
     points: tuple[Point, ...]
     criticals: tuple[Critical, ...]

@@ -45,7 +45,10 @@ def triangle_quadrature(order: int) -> tuple[Array, Array]:
 
 
 def triangle_shapes(order: int) -> tuple[Array, Array, Array]:
-    """Shape functions (q, n), their reference derivatives (q, n, 2) and weights (q,) of a face."""
+    """Shape functions (q, n), their reference derivatives (q, n, 2) and weights (q,) of a face.
+
+    n: 3 nodes for order 1, 6 for order 2; the q points are those of `triangle_quadrature`.
+    """
     points, weights = triangle_quadrature(order)
     return (
         *shapes(points, TRIANGLE_EDGES, order),
@@ -93,5 +96,8 @@ def shape_functions(barycentric: Array, order: int) -> Array:
 
 
 def shape_gradients(barycentric: Array, order: int) -> Array:
-    """Derivatives (q, n, 3) of a tetrahedron's shape functions by its reference coordinates."""
+    """Derivatives (q, n, 3) of a tetrahedron's shape functions by its three reference coordinates.
+
+    barycentric: points (q, 4); n: 4 nodes for order 1, 10 for order 2.
+    """
     return shapes(barycentric, TET_EDGES, order)[1]

@@ -33,7 +33,7 @@ class Embedding(Probe):
     mirrored: Array
 
     def displacement(self, u: Array) -> Array:
-        """Displacements (p, 3) in mm of the points, of nodal displacements (n, 3)."""
+        """Displacements (p, 3) in mm of the points, of nodal displacements u (n, 3) in mm."""
         found = super().displacement(u)
         found[self.mirrored, 0] *= -1.0
         return found

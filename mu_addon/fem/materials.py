@@ -104,7 +104,11 @@ class Materials:
         return Materials(tuple(layers))
 
     def small_strain(self, count: int) -> tuple[Array, Array]:
-        """Young's modulus in MPa and Poisson's ratio, (m,) each, of a body of `count` isotropic elements."""
+        """Young's modulus (m,) in MPa and Poisson's ratio (m,) of a body of `count` elements at small strain.
+
+        Of the sum of the layers' shear and bulk moduli by their weights; laws that depend on direction count
+        with their mean over directions.
+        """
         moduli = np.zeros((count, 2))
         for layer in self.layers:
             moduli[layer.elements] += layer.weight[:, None] * layer.law.small_strain(layer.parameters)

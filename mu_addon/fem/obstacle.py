@@ -46,7 +46,7 @@ class Contact:
 
     @property
     def force_N(self) -> Array:
-        """Both forces together, (3,)."""
+        """Normal and tangential force together, (3,) in N."""
         return np.asarray(self.normal_N + self.tangential_N)
 
 
@@ -118,7 +118,7 @@ class Obstacle:
             self.pose = self.path(time_s)
 
     def begin(self, u: Array | None = None) -> None:
-        """Forget what was: the body comes to displacement (n, 3), else to rest, without any slip there."""
+        """Start friction's memory anew at displacement u (n, 3) in mm, else at rest, without any slip."""
         if not self.friction:
             return
         y, g, n, _ = self._points(np.zeros_like(self._rest) if u is None else u)
@@ -232,7 +232,10 @@ class Obstacle:
         return float((self._area[face] * density).sum())
 
     def forces(self, u: Array) -> tuple[Array, Array]:
-        """Nodes (j,) of faces in contact, and the energy's derivative by their displacement (j, 3) in N."""
+        """Nodes (j,) of the faces in contact, and the contact energy's derivative by them, (j, 3) in N.
+
+        u: displacements (n, 3) in mm. A node is listed once for every face that it belongs to.
+        """
         face, y, g, n, _ = self._contact_candidates(u)
         at_points = -self._pressure(g)[0][..., None] * n
         if self.friction:

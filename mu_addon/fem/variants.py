@@ -20,7 +20,7 @@ class SharedTangent(Protocol):
     """What solves for variants: the tangent they share, each one's change, then all of them at once."""
 
     def factor(self, values: Array) -> None:
-        """Take the shared tangent's values (nnz,). Raises IndefiniteError."""
+        """Take the shared tangent's values (nnz,) in N/mm; raises IndefiniteError."""
 
     def take(self, change: Change) -> Any:
         """Prepare a variant's change for `solve`. Raises IndefiniteError."""
