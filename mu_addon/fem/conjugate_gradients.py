@@ -39,7 +39,7 @@ class Rows:
     values: wp.array
 
     def multiply(self, x: wp.array, y: wp.array) -> None:
-        """y = A x for vectors (k, n)."""
+        """y = A x for k vectors on the device, x and y (k, n); y is overwritten."""
         k, n = x.shape
         width = next((w for w in WIDTHS if k <= w), WIDTHS[-1])
         inputs = [self.offsets, self.columns, self.values, x, y]
@@ -77,17 +77,21 @@ class Changes:
         self._scale = wp.array(np.sqrt(shared / changed), dtype=wp.float64, device=device)
 
     def add(self, x: wp.array, y: wp.array) -> None:
-        """y += change x for vectors (k, n)."""
+        """y += change x for k vectors on the device, (k, n), each with its own system's change."""
         wp.launch(kernels.add_changes, self._count, [*self._where, *self._entries, x, y], device=x.device)
 
     def scale(self, x: wp.array) -> None:
-        """Divide x (k, n), in place, by the root of what the changes do to the diagonal."""
+        """Multiply x (k, n), in place, by the root of the shared diagonal over the changed one."""
         wp.launch(kernels.scale_rows, self._count, [*self._where, self._scale, x], device=x.device)
 
 
 @attrs.frozen(eq=False)
 class Solution:
-    """Of k systems: x (k, n) on the device, which are solved (k,), and which showed no negative curvature."""
+    """Result of `conjugate_gradients` for k systems.
+
+    x (k, n): on the device; solved (k,) bool: residual within the tolerance; definite (k,) bool: no direction
+    of negative curvature was met; iterations: those made, the same for all.
+    """
 
     x: wp.array
     solved: Array

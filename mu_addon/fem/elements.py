@@ -58,7 +58,10 @@ def triangle_shapes(order: int) -> tuple[Array, Array, Array]:
 
 @attrs.frozen(eq=False)
 class ReferenceGradients:
-    """Shape gradients by reference coordinates in mm, (m, q, n, 3), and volumes in mm3, (m, q)."""
+    """Shape functions' gradients (m, q, n, 3) in 1/mm by the undeformed place, and volumes (m, q) in mm3.
+
+    Of m elements with n nodes, at q quadrature points; a volume is that which its point stands for.
+    """
 
     gradients: Array
     volumes: Array

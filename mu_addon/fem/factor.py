@@ -79,7 +79,10 @@ class Cholesky:
             del cholmod.options["nmethods"]
 
     def factor(self, values: Array) -> Cholesky:
-        """Factorise for the values (nnz,) of the lower triangle by columns. Raises IndefiniteError."""
+        """Factorise for the values (nnz,) of the lower triangle by columns, in the pattern's order.
+
+        Returns itself. Raises IndefiniteError where the matrix is not positive definite.
+        """
         from cvxopt import cholmod, matrix
 
         self._matrix.V = matrix(values)
@@ -98,7 +101,7 @@ class Cholesky:
         return np.array(x).reshape(b.shape) if b.ndim == 1 else np.array(x)
 
     def lower(self) -> Lower:
-        """Hand over the factor; it must be made anew before `solve` is called again."""
+        """The factor L with its order, as `Lower`; `factor` must be called again before `solve`."""
         from cvxopt import cholmod, matrix
 
         places = matrix(np.arange(self.size, dtype=float))
@@ -121,7 +124,10 @@ class SuperLU:
         self.size = len(indptr) - 1
 
     def factor(self, values: Array) -> SuperLU:
-        """Factorise for the values (nnz,) of the lower triangle by columns. Raises IndefiniteError."""
+        """Factorise for the values (nnz,) of the lower triangle by columns, in the pattern's order.
+
+        Returns itself. Raises IndefiniteError where the matrix is singular or a pivot is not positive.
+        """
         from scipy.sparse.linalg import splu
 
         lower = sparse.csc_matrix((values, self._indices, self._indptr), shape=(self.size, self.size))
@@ -143,7 +149,7 @@ class SuperLU:
         return x
 
     def lower(self) -> Lower:
-        """The Cholesky factor that the LU of a symmetric matrix holds."""
+        """The Cholesky factor L with its order, from the LU of a symmetric matrix: L sqrt(diag U)."""
         order = np.empty(self.size, dtype=np.int64)
         order[self._lu.perm_r] = self._order
         scaled = sparse.csc_matrix(self._lu.L @ sparse.diags(np.sqrt(self._lu.U.diagonal())))

@@ -238,7 +238,11 @@ class Model:
         return make_factor(indptr, indices, order)
 
     def parameters(self, materials: Materials) -> MaterialData:
-        """A body's materials on the device, without history; raises InputError where an element has none."""
+        """A body's materials on the device, without history.
+
+        Raises InputError where an element has none, or where with mean_dilatation a law does not split the
+        volume off.
+        """
         covered = np.zeros(len(self.mesh.tets), dtype=np.int32)
         stiffness = np.zeros(len(self.mesh.tets))
         points = self._dV.shape[1]

@@ -145,7 +145,10 @@ class Obstacle:
         return {"point": at, "lost_mJ": np.array(m.lost_mJ), **found}
 
     def restore(self, u: Array, kept: dict[str, Array]) -> None:
-        """The memory as it was when `kept` was stored and displacement u (n, 3) the last committed one."""
+        """Set the memory to what it was when `kept` was stored.
+
+        u (n, 3) in mm: displacement that was the last committed one then. Nothing happens without friction.
+        """
         if not self.friction:
             return
         y, g, n, _ = self._points(u)
@@ -155,7 +158,7 @@ class Obstacle:
         self.recall(Memory(y, g, n, pressure, slip, slid, float(kept["lost_mJ"])))
 
     def lag_from_memory(self) -> None:
-        """Let friction's bound be the last committed state's."""
+        """Take pressure and normal that bound friction from the last committed state."""
         if self.friction:
             m = self.memory
             self.lag = Lag(m.pressure, m.normal, np.ones_like(m.pressure))
@@ -219,7 +222,7 @@ class Obstacle:
         )
 
     def energy_mJ(self, u: Array) -> float:
-        """Energy stored in the contact at displacement (n, 3) in mm, with what sliding costs in this step."""
+        """Energy in mJ stored in the contact at u (n, 3) in mm, with what sliding costs in this step."""
         face = self._near(u)
         y, g, _, _ = self._points(u, face)
         s = np.maximum(-g, 0.0)
@@ -321,7 +324,10 @@ class Obstacle:
         return max(0.0, -float(self._points(u, self._near(u))[1].min(initial=np.inf)))
 
     def deepest_place(self, u: Array) -> Array:
-        """Place (3,) in mm of the surface's point that is deepest in the obstacle, or nearest to it."""
+        """Place (3,) in mm, deformed, of the surface's point deepest in the obstacle, or nearest to it.
+
+        u: displacements (n, 3) in mm.
+        """
         return np.asarray(self.places(u).reshape(-1, 3)[self._points(u)[1].argmin()])
 
     def pressures_MPa(self, u: Array) -> tuple[Array, Array]:

@@ -30,7 +30,7 @@ class Trajectory:
     index: Array
 
     def of_time(self, values: Array) -> Array:
-        """Values (k, ...) at every instant of values (s, ...) at every state."""
+        """Values (k, ...) at every instant of values (s, ...) at every state, in their unit."""
         return np.asarray(values)[self.index]
 
 

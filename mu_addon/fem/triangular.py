@@ -31,7 +31,10 @@ class Lower:
 
 
 def column_blocks(lower: Lower, last: int) -> Array:
-    """First columns (b,) of blocks of up to four columns with the same rows below; `last` starts one."""
+    """First columns (b,) of blocks of up to four columns of a factor with the same rows below them.
+
+    last: number of a column that starts a block in any case.
+    """
     count = np.diff(lower.indptr)
     inner = np.minimum(lower.indptr[:-1] + 1, len(lower.indices) - 1)
     n = len(count)

@@ -278,7 +278,8 @@ def require_stable(law: LatticeLaw) -> None:
 def stable_shear(law: LatticeLaw) -> float:
     """The simple shear between two axes, up to 0.6, up to which a lattice's law stays strongly elliptic.
 
-    Shear puts the struts of one diagonal under compression, and what holds them there is the foam alone.
+    In steps of 0.005. Shear puts the struts of one diagonal under compression, and what holds them there is
+    the foam alone.
     """
     amounts = np.linspace(0, _FARTHEST, _STEPS)
     F = np.tile(np.eye(3), (len(amounts), 1, 1))
@@ -287,7 +288,10 @@ def stable_shear(law: LatticeLaw) -> float:
 
 
 def stable_pressed(law: LatticeLaw) -> float:
-    """The equal compression on all sides, a strain up to 0.6, up to which a law stays strongly elliptic."""
+    """The equal compression on all sides up to which a law stays strongly elliptic.
+
+    A nominal strain, up to 0.6, in steps of 0.005.
+    """
     amounts = np.linspace(0, _FARTHEST, _STEPS)
     return _first_lost(law, amounts, (1 - amounts)[:, None, None] * np.eye(3))
 

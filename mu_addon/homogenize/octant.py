@@ -39,7 +39,10 @@ class Part:
     factor: Cholesky | SuperLU
 
     def factorise(self, values: Array) -> None:
-        """Factorise the part of a tangent's values (nnz,); raises IndefiniteError."""
+        """Factorise the part of a tangent's values (nnz,), all in N/mm.
+
+        Raises IndefiniteError where it is not positive definite.
+        """
         self.factor.factor(values[self.entries])
 
     def solve(self, force: Array) -> Array:
@@ -181,7 +184,7 @@ class Octant:
 
 
 def pieces(mesh: Mesh) -> Array:
-    """The connected piece (n,) that each node of a mesh belongs to, numbered from 0."""
+    """Number (n,), from 0, of the connected piece that each node of a mesh belongs to."""
     from scipy.sparse.csgraph import connected_components
 
     first, other = mesh.tets[:, :1].repeat(mesh.tets.shape[1] - 1, axis=1), mesh.tets[:, 1:]

@@ -75,7 +75,7 @@ class Motions:
         self._order = list(_BREAKING)
 
     def lost(self, u: Array) -> Signs | None:
-        """A part that meets no resistance at a displacement (n, 3) in mm, or None where all do."""
+        """Signs of a part whose tangent is not positive definite at u (n, 3) in mm, or None where all are."""
         values = self.model.tangent(u, 0.0, self.parameters)
         for signs in self._order:
             try:

@@ -65,7 +65,10 @@ class Point:
 
 @attrs.frozen(eq=False)
 class Stretched:
-    """What a virtual test gave: the curve, its points, and where and why it stops short; "" where not."""
+    """What a virtual test gave: the curve, its points in the order of the curve, and why it stops short.
+
+    stopped: where and why, "" where it reaches both ends.
+    """
 
     curve: Curve
     points: tuple[Point, ...]

@@ -135,14 +135,20 @@ def oriented(nodes: Array, tets: Array) -> Array:
 
 
 def edges_of(tets: Array) -> tuple[Array, Array]:
-    """Unique edges (e, 2), ends ascending, and the six edges of each tetrahedron (m, 6) in VTK's order."""
+    """Unique edges (e, 2), ends ascending, and the numbers (m, 6) of each element's edges among them.
+
+    tets (m, 4 | 10), of which the corners count; the six are in VTK's order, `TET_EDGES`.
+    """
     pairs = np.sort(tets[:, :4][:, TET_EDGES].reshape(-1, 2), axis=1)
     edges, inverse = np.unique(pairs, axis=0, return_inverse=True)
     return edges, np.reshape(inverse, (-1, 6))
 
 
 def boundary_faces(tets: Array) -> tuple[Array, Array]:
-    """Faces that belong to one tetrahedron only, (f, 3) with normals outward, and that tetrahedron, (f,)."""
+    """Faces that belong to one tetrahedron only, (f, 3) with normals outward, and its number (f,).
+
+    tets (m, 4 | 10), of which the corners count.
+    """
     faces = tets[:, :4][:, TET_FACES].reshape(-1, 3)
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     single = np.sort(first[count == 1])

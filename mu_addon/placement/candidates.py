@@ -71,7 +71,10 @@ def with_sensor(materials: Materials, share: Array, sensor_MPa: float) -> Materi
 
 
 def moved_points(monitored: tuple[Array, Probe], trajectory: Trajectory) -> Array:
-    """Positions (k, p, 3) in mm of monitored points at the k instants of a trajectory."""
+    """Positions (k, p, 3) in mm of monitored points at the k instants of a trajectory.
+
+    monitored: the points (p, 3) in mm at rest, and their probe.
+    """
     points, monitor = monitored
     return trajectory.of_time(np.array([points + monitor.displacement(s.u) for s in trajectory.states]))
 

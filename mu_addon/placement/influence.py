@@ -171,13 +171,16 @@ def mean_deviation(gradients: Array, moved: Array, weights: Array) -> Array:
 
 
 def shares_of_time(trajectory: Trajectory) -> Array:
-    """Share (s,) of the instants at which each loaded state holds."""
+    """Share (s,), 0 to 1, of a trajectory's instants at which each loaded state holds."""
     count = np.bincount(trajectory.index, minlength=len(trajectory.states)) / len(trajectory.index)
     return count[[state.loaded for state in trajectory.states]]
 
 
 def gradients_of(trajectory: Trajectory, points: Array, monitor: Probe, stations: int) -> Array:
-    """`centreline_gradient` (s, j, 3, p, 3) about the baseline's monitored points in every loaded state."""
+    """`centreline_gradient` (s, j, 3, p, 3) about the monitored points of every loaded state.
+
+    points (p, 3) in mm at rest, monitor their probe; stations: the number j.
+    """
     return np.array(
         [centreline_gradient(points + monitor.displacement(s.u), stations) for s in loaded(trajectory)]
     )

@@ -51,7 +51,7 @@ class CubicShear(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear modulus, averaged over directions (3/5 of G), and bulk modulus 0 (k, 2) in MPa."""
+        """Shear modulus, averaged over directions (3/5 of G), and bulk modulus 0, (k, 2) in MPa."""
         G = parameters[:, 0]
         return np.stack([0.6 * G, np.zeros_like(G)], axis=1)
 

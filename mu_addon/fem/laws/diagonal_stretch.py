@@ -47,7 +47,7 @@ class DiagonalStretch(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear modulus 0 and bulk modulus (k, 2) in MPa."""
+        """Shear modulus 0 and bulk modulus C, (k, 2) in MPa."""
         C = parameters[:, 0]
         return np.stack([np.zeros_like(C), C], axis=1)
 

@@ -11,7 +11,7 @@ from .valid import require
 
 
 def unit(directions: Array) -> Array:
-    """Directions (3,) or (k, 3) as unit vectors (k, 3)."""
+    """Directions (3,) or (k, 3) of any length but 0 as unit vectors (k, 3)."""
     directions = np.atleast_2d(np.asarray(directions, float))
     return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 

@@ -138,7 +138,10 @@ class Foam(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear modulus, the mean of tension and compression, and bulk modulus (k, 2) in MPa."""
+        """Shear modulus, mu as the mean of tension and compression, and bulk modulus, (k, 2) in MPa.
+
+        The bulk modulus is lambda + 2/3 mu.
+        """
         mu = (parameters[:, 0] + parameters[:, 2]) / 2
         return np.stack([mu, parameters[:, 4] + 2 / 3 * mu], axis=1)
 
