@@ -65,7 +65,7 @@ def _silent(what: str, share: float) -> None:
     pass
 
 
-def response(block: Block, cache: Path | None = None, say: Progress = _silent) -> OffsetResponse:
+def response(block: Block, cache: Path | None = None, report: Progress = _silent) -> OffsetResponse:
     """The block's response to a print offset: shipped, kept in the folder `cache`, or computed.
 
     The paper's block of 27 cells takes a minute or two. Raises InputError for a cell that cannot be printed
@@ -82,7 +82,7 @@ def response(block: Block, cache: Path | None = None, say: Progress = _silent) -
         return OffsetResponse(stored["offset_mm"], stored["modulus"], stored["density"])
     moduli, densities = [], []
     for done, offset in enumerate(OFFSETS_mm):
-        say(f"block of {block} with {offset:g} mm of print offset", done / len(OFFSETS_mm))
+        report(f"block of {block} with {offset:g} mm of print offset", done / len(OFFSETS_mm))
         relative, density = at_offset(block, offset, cache)
         moduli.append(relative)
         densities.append(density)
@@ -146,7 +146,7 @@ def scalings(
     experiments: Sequence[Experiment],
     unit: Unit,
     cache: Path | None = None,
-    say: Progress = _silent,
+    report: Progress = _silent,
 ) -> tuple[dict[str, Scaling], list[str]]:
     """How each block of lattice answers to printing, by experiment; and what is taken for granted, in words.
 
@@ -155,7 +155,7 @@ def scalings(
     """
     blocks = {e.name: block_of(e, unit) for e in experiments if e.kind == KIND}
     distinct = list(dict.fromkeys(b for b in blocks.values() if b is not None))
-    found = {b: response(b, cache, say) for b in distinct}
+    found = {b: response(b, cache, report) for b in distinct}
     assumed = [f"lattice specimens are modelled as {b}, computed from their struts" for b in distinct]
     if None in blocks.values():
         assumed.append("lattice specimens without a number of cells are modelled as slender bending struts")

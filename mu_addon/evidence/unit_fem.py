@@ -238,7 +238,7 @@ def unit_responses(
     added masses, which the model lacks, and ConvergenceError where the base model reaches too few pressures.
     """
     settings = settings or UnitSettings()
-    say = progress or (lambda stage, share: None)
+    report = progress or (lambda stage, share: None)
     chosen = [e for e in experiments if e.kind == KIND]
     for e in chosen:
         if e.added_mass_g:
@@ -246,14 +246,16 @@ def unit_responses(
     plans = [_Plan.of(unit, chosen, scale, settings, cache) for scale in sorted({e.scale for e in chosen})]
     for plan in plans:
         for m in plan.markers:
-            say(f"marker {m.number} at {plan.scale:g}x lies {m.distance_mm:.2f} mm from its point", 0.0)
+            report(f"marker {m.number} at {plan.scale:g}x lies {m.distance_mm:.2f} mm from its point", 0.0)
     cases = {case.key(): case for plan in plans for case in plan.runs(settings)}
     walled_too = WALL in settings.effects
     part = 1 - WALLS if walled_too else 1.0
-    found = _found(cases, settings.workers, cache, lambda what, share: say(what, share * part))
+    found = _found(cases, settings.workers, cache, lambda what, share: report(what, share * part))
     if walled_too:
         walls = {c.key(): c for plan in plans for _, _, c in plan.walls(found)}
-        more = _found(walls, settings.workers, cache, lambda what, share: say(what, 1 + WALLS * (share - 1)))
+        more = _found(
+            walls, settings.workers, cache, lambda what, share: report(what, 1 + WALLS * (share - 1))
+        )
         found |= more
     responses = _counted_alike([r for plan in plans for r in plan.responses(settings, found)])
     # Whoever asks for the channels of all looks at the first.
@@ -472,7 +474,7 @@ def _warn(text: str) -> None:
     warnings.warn(text, UnitResponseWarning, stacklevel=4)
 
 
-def _found(cases: dict[str, Run], workers: int, cache: Path | None, say: Progress) -> dict[str, Result]:
+def _found(cases: dict[str, Run], workers: int, cache: Path | None, report: Progress) -> dict[str, Result]:
     """Results by key, from the cache where they are there, and kept there as soon as one is found."""
     table = None if cache is None else Cache(cache)
     found: dict[str, Result] = {}
@@ -487,7 +489,7 @@ def _found(cases: dict[str, Run], workers: int, cache: Path | None, say: Progres
             table.put("unit", key, {"values": result.values, "why": np.array(result.why)})
         case = cases[key]
         what = f"{case.effect} = {case.size:g}" if case.effect else "base"
-        say(f"unit, {what}", len(found) / len(cases))
+        report(f"unit, {what}", len(found) / len(cases))
     return found
 
 

@@ -65,10 +65,10 @@ def read_folder(folder: Path) -> Measured:
         at = _Place(path, text, number)
         if not isinstance(entry, dict):
             raise InputError("an experiment is not a table", at(), "begin each with a line [[experiment]]")
-        found, told = _experiment(entry, at)
+        found, notes = _experiment(entry, at)
         _check_apart(found, experiments, at)
         experiments.append(found)
-        remarks += told
+        remarks += notes
     return Measured(Path(folder), _as_run(experiments, path), tuple(remarks))
 
 

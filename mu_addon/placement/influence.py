@@ -81,7 +81,7 @@ def loaded(trajectory: Trajectory, pressures_MPa: Array | None = None) -> list[S
     return [s for s in states if np.isclose(s.pressure_MPa, pressures_MPa, rtol=1e-9).any()]
 
 
-def telling_pressures(trajectory: Trajectory) -> Array:
+def representative_pressures(trajectory: Trajectory) -> Array:
     """Pressures (t,) in MPa, ascending, of three of a trajectory's loaded states that stand for all.
 
     The least, the largest, and the one nearest two thirds of the way between; 0 as well, where the unit's

@@ -18,7 +18,7 @@ class SearchSettings:
     """How many paths are checked at first, at most and at a time, and the risk left when it ends.
 
     spread: of the first checks, how many are taken from the whole range of predictions, so that the
-    prediction's error is known there too. risk: a probability, see `chance_of_better`.
+    prediction's error is known there too. risk: a probability, see `probability_of_better`.
     """
 
     first: int = 12
@@ -32,8 +32,8 @@ class SearchSettings:
 class Search:
     """A search's outcome over n paths, in mm: predicted J_hat, exact J_hat (NaN where unchecked), the best.
 
-    risk: probability that an unchecked path beats the best, as `chance_of_better` has it; complete: whether
-    every path was checked or the risk is as small as was asked for.
+    risk: probability that an unchecked path beats the best, as `probability_of_better` has it; complete:
+    whether every path was checked or the risk is as small as was asked for.
     """
 
     predicted_mm: Array
@@ -49,11 +49,11 @@ class Search:
         return order[: np.count_nonzero(np.isfinite(self.exact_mm))]
 
 
-def chance_of_better(predicted_mm: Array, exact_mm: Array) -> float:
+def probability_of_better(predicted_mm: Array, exact_mm: Array) -> float:
     """Upper bound of the probability that some unchecked path beats the best checked one.
 
     predicted_mm, exact_mm (n,): J_hat of every path, exact NaN where unchecked. The logarithm of exact over
-    predicted is taken as normal with the checked paths' mean and variance; Student's t gives the chance of
+    predicted is taken as normal with the checked paths' mean and variance; Student's t gives that of
     each unchecked path, and their sum bounds that of any. This is what was observed, not a proof: it holds as
     far as unchecked paths err as checked ones do.
     """
@@ -95,7 +95,7 @@ def search_paths(
     while True:
         exact[now] = check(now)
         checked = int(np.isfinite(exact).sum())
-        risk = chance_of_better(predicted_mm, exact)
+        risk = probability_of_better(predicted_mm, exact)
         on_check(checked, risk)
         if risk <= s.risk or checked >= s.most:
             return Search(predicted_mm, exact, int(np.nanargmin(exact)), risk, risk <= s.risk)

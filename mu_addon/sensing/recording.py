@@ -78,7 +78,7 @@ class Recorder:
             self._index = (folder / INDEX).open("ab", buffering=0)
         except OSError as error:
             raise output_error(error, folder / INDEX) from error
-        self._say({"type": "recording", "version": VERSION, **about})
+        self._index_line({"type": "recording", "version": VERSION, **about})
 
     def write(self, samples: Samples, start_s: float) -> None:
         """Append samples, host times counted from start_s; they are the system's when this returns."""
@@ -124,12 +124,14 @@ class Recorder:
             return
         self._indexed = time_s
         place = 0 if self._file is None else self._file.tell()
-        self._say({"type": "place", "time_s": time_s, "row": self._row, "byte": place, **counters})
+        self._index_line({"type": "place", "time_s": time_s, "row": self._row, "byte": place, **counters})
         self._sync()
 
     def event(self, name: str, time_s: float, **details: Any) -> None:
         """A line in the index: what happened, when in s from the start, and details of it."""
-        self._say({"type": "event", "event": name, "time_s": round(time_s, 6), "row": self._row, **details})
+        self._index_line(
+            {"type": "event", "event": name, "time_s": round(time_s, 6), "row": self._row, **details}
+        )
 
     def close(self) -> None:
         """Everything to the disk, and the end."""
@@ -151,7 +153,7 @@ class Recorder:
         except OSError as error:
             raise output_error(error, path) from error
         self._write((",".join(columns) + "\n").encode())
-        self._say({"type": "file", "file": path.name, "columns": columns})
+        self._index_line({"type": "file", "file": path.name, "columns": columns})
 
     def _write(self, data: bytes) -> None:
         assert self._file is not None
@@ -166,7 +168,7 @@ class Recorder:
         while data:
             data = data[stream.write(data) or 0 :]
 
-    def _say(self, message: Mapping[str, Any]) -> None:
+    def _index_line(self, message: Mapping[str, Any]) -> None:
         try:
             self._index.write(json.dumps(plain(message)).encode() + b"\n")
         except OSError as error:

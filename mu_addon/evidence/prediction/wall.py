@@ -102,7 +102,7 @@ def effect(sides: Sequence[tuple[int, Side]], kind: str) -> Effect:
         for s in (1, -1)
     }
     starts = [round(s * share * near, 3) for s, near in nearest.items() for share in (0.3, 0.7) if near]
-    said = " or ".join(
+    reaches = " or ".join(
         f"{far:.1f} mm beyond its outline at rest toward {'+' if s > 0 else '-'}y"
         for s, far in farthest.items()
         if far
@@ -114,10 +114,10 @@ def effect(sides: Sequence[tuple[int, Side]], kind: str) -> Effect:
         float(nearest[1]),
         0.0,
         tuple(starts),
-        f"how far a wall stands inside the farthest place of the free unit, {said}; below 0 toward -y",
+        f"how far a wall stands inside the farthest place of the free unit, {reaches}; below 0 toward -y",
     )
     mechanism = (
         "the unit touches a flat wall parallel to its axis, reach_mm inside the outline it would "
-        f"reach without the wall: {said}"
+        f"reach without the wall: {reaches}"
     )
     return Effect(NAME, (size,), (kind,), mechanism)

@@ -62,17 +62,17 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | No
     if "verdict" in context.summary:
         with progress.stage("verdict of the same data, from the cache"):
             return None
-    simulators, told = simulators_of(measured.experiments, unit, folder / "cache", progress, job.settings)
+    simulators, notes = simulators_of(measured.experiments, unit, folder / "cache", progress, job.settings)
     simulator = Composite(simulators)
-    with _stages(progress, simulator) as tell:
-        verdict = diagnose(measured.experiments, simulator, tell)
+    with _stages(progress, simulator) as on_model:
+        verdict = diagnose(measured.experiments, simulator, on_model)
     model, block = _extended_model(verdict, simulator), simulators.get(lattice.KIND)
     if isinstance(block, lattice.LatticeStress) and block.computed:
         model = attrs.evolve(model, lattice=block.computed)
-        told += _resin(model, unit)
-    told += _bounds_met(verdict, simulator)
-    told += _noisy_gauges(measured, verdict)
-    remarks = [*(f"{r.what} ({_place(r.where)})" for r in measured.remarks), *told]
+        notes += _resin(model, unit)
+    notes += _bounds_met(verdict, simulator)
+    notes += _noisy_gauges(measured, verdict)
+    remarks = [*(f"{r.what} ({_place(r.where)})" for r in measured.remarks), *notes]
     unknown = dict.fromkeys(e.kind for e in measured.experiments if not simulator.knows(e))
     remarks += [f"there is no model for {kind}: its experiments were left out" for kind in unknown]
     found = Diagnosis(measured, simulator, verdict, model, unit, tuple(remarks))
@@ -136,7 +136,7 @@ def _stages(progress: Progress, simulator: Composite) -> Iterator[Callable[[str]
     with ExitStack() as stack:
         now, done = "", 0
 
-        def tell(what: str) -> None:
+        def on_model(what: str) -> None:
             nonlocal now, done
             stage = what
             if what not in ("noise", "sensitivities", "gain"):
@@ -148,7 +148,7 @@ def _stages(progress: Progress, simulator: Composite) -> Iterator[Callable[[str]
             # Later steps try up to four models with each effect.
             progress.update(done / (many if stage == "single effects" else 4 * many))
 
-        yield tell
+        yield on_model
 
 
 def _place(where: str) -> str:

@@ -56,7 +56,7 @@ from .study_file import LAYOUT, NAME, STAGES
 Array = np.ndarray[Any, Any]
 
 # Figures of summary.json that tell that a stage was run.
-_TELLS = {"design": "gates", "simulate": "angle_deg", "place": "chosen"}
+_FIGURE_OF_STAGE = {"design": "gates", "simulate": "angle_deg", "place": "chosen"}
 # What a study writes, with as much to spare: so much anyway, and so much a node and distinct pressure.
 _BYTES = {"interactive": 30_000_000, "export": 150_000_000}
 _BYTES_A_NODE = {"simulate": 300, "place": 1000}
@@ -105,7 +105,7 @@ class Study:
             low, high = job.body.bounds.tolist()
             context.summary["body"] = {"low_mm": low, "high_mm": high, "triangles": len(job.body.triangles)}
         if "simulate" in job.stages:
-            study._tell_settings()
+            study._summarise_settings()
         return study
 
     @property
@@ -113,7 +113,7 @@ class Study:
         """Where the run says how it goes."""
         return self.context.progress
 
-    def _tell_settings(self) -> None:
+    def _summarise_settings(self) -> None:
         """Settings of the simulation in the summary, and warnings of what they leave out."""
         job, summary = self.job, self.context.summary
         summary["study"] = {"times": job.times, "stations": job.stations, "rules": job.rules}
@@ -146,7 +146,7 @@ class Study:
     def has_more(self) -> bool:
         """Whether the folder has the results of a further stage than this job's, from the same inputs."""
         further = STAGES[len(self.job.stages) :]
-        return any(_TELLS[stage] in self.context.summary for stage in further)
+        return any(_FIGURE_OF_STAGE[stage] in self.context.summary for stage in further)
 
     @property
     def cache(self) -> Cache:

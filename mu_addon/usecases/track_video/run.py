@@ -240,7 +240,7 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
     clock, kPa = pressure
     slack = 0.5 / fps
     inside = (time >= clock[0] - slack) & (time <= clock[-1] + slack)
-    told = []
+    remarks = []
     if inside.sum() < 2:
         raise InputError(
             f"the clip lasts from {time[0]:.4g} to {time[-1]:.4g} s, the pressure record from "
@@ -249,7 +249,7 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
             "give starts_s, the pressure's clock at the first frame",
         )
     if not inside.all():
-        told.append(
+        remarks.append(
             Remark(
                 f"{(~inside).sum()} of {len(inside)} frames are outside the pressure record and were left "
                 "out",
@@ -266,7 +266,7 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
     if not rest.any() and seen.all(axis=0).any():
         first = int(np.argmax(seen.all(axis=0)))
         rest[first] = True
-        told.append(
+        remarks.append(
             Remark(
                 f"no frame shows the unit at rest; the angle is relative to {p[first]:.4g} kPa at "
                 f"{time[first]:.4g} s",
@@ -275,7 +275,7 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
             )
         )
     found = motion(kept, bench.view, rest, time, where)
-    return Filmed(kept, time, p, found, (*told, *found.remarks))
+    return Filmed(kept, time, p, found, (*remarks, *found.remarks))
 
 
 def write_experiment(found: Filmed, bench: Bench, name: str, folder: Path) -> tuple[Path, tuple[Remark, ...]]:
