@@ -53,9 +53,9 @@ def probability_of_better(predicted_mm: Array, exact_mm: Array) -> float:
     """Upper bound of the probability that some unchecked path beats the best checked one.
 
     predicted_mm, exact_mm (n,): J_hat of every path, exact NaN where unchecked. The logarithm of exact over
-    predicted is taken as normal with the checked paths' mean and variance; Student's t gives that of
-    each unchecked path, and their sum bounds that of any. This is what was observed, not a proof: it holds as
-    far as unchecked paths err as checked ones do.
+    predicted is taken as normal with the checked paths' mean and variance; Student's t gives the probability
+    for each unchecked path, and their sum bounds that for any. This is what was observed, not a proof: it
+    holds as far as unchecked paths err as checked ones do.
     """
     from scipy.stats import t
 
