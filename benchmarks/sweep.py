@@ -31,7 +31,7 @@ from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.candidates import Candidate, candidate_paths, moved_points, roi, with_sensor
 from mu_addon.placement.inclusion import sensor_share
 from mu_addon.placement.influence import influence_map, representative_pressures
-from mu_addon.placement.sampling import rounds
+from mu_addon.placement.sampling import solution_order
 from mu_addon.usecases.simulate_and_place.candidate_pool import CandidatePool, CandidateProblem
 
 RADIUS_MM, SENSOR_MPA, RULE = 1.0, 2.5, "volume_fraction"
@@ -92,7 +92,7 @@ def main():
         return Equilibrium(model, materials)
 
     distinct = np.array([s.pressure_MPa for s in baseline.states])
-    few = [baseline.states[i] for pair in rounds(distinct)[:2] for i in pair]
+    few = [baseline.states[i] for pair in solution_order(distinct)[:2] for i in pair]
     wanted = {s.pressure_MPa for s in few}
     for name, every in (("ten", candidate_paths(points, windows(6))), ("a hundred", hundred(points))):
         jobs = tuple((c, RULE) for c in every)

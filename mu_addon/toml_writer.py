@@ -12,7 +12,7 @@ import attrs
 
 
 @attrs.frozen
-class Noted:
+class Commented:
     """A value or table with comments: lines `above` it, and words `beside` a value on its line."""
 
     value: Any
@@ -33,7 +33,7 @@ def toml_key(name: str) -> str:
 
 
 def toml_text(values: Mapping[str, Any], head: str = "") -> str:
-    """TOML text of values and tables, each of which may be `Noted`; head: comment lines at its beginning."""
+    """TOML text of values and tables, which may be `Commented`; head: comment lines at its beginning."""
     lines = [_comment(line) for line in head.splitlines()]
     return "\n".join([*lines, *_lines(values, ())]).lstrip("\n") + "\n"
 
@@ -63,8 +63,8 @@ def _lines(values: Mapping[str, Any], path: tuple[str, ...]) -> list[str]:
     return lines
 
 
-def _noted(value: Any) -> Noted:
-    return value if isinstance(value, Noted) else Noted(value)
+def _noted(value: Any) -> Commented:
+    return value if isinstance(value, Commented) else Commented(value)
 
 
 def _comment(line: str) -> str:

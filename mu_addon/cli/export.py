@@ -67,12 +67,12 @@ def add(commands: Commands[Any]) -> None:
 def run(options: argparse.Namespace, context: RunContext) -> None:
     """Export the unit."""
     from ..usecases.export.job import Job, path_of, resin_of
-    from ..usecases.export.print_offsets import taken_off
+    from ..usecases.export.print_offsets import compensation_offsets
     from ..usecases.export.run import USE_CASE
 
     unit = modelled_unit(options, context)
     path, name = path_of(unit, options.path, options.path_row)
-    offsets, source = taken_off(unit, options.compensate)
+    offsets, source = compensation_offsets(unit, options.compensate)
     job = Job(
         unit=unit,
         resin=resin_of(options.resin),

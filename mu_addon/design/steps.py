@@ -44,7 +44,7 @@ KEPT = 12
 
 
 @attrs.frozen
-class Given:
+class StepInputs:
     """What the steps are made from: a unit, the name of a path or nothing, and the muted steps.
 
     body: a sound body in place of the lattice's box, see `body.envelope`, or None.
@@ -79,7 +79,7 @@ class Section:
 
 
 @attrs.frozen(eq=False)
-class Trimmed:
+class TrimmedStruts:
     """Struts that show: their ends (e, 2, 3) in mm, and the fractions (e,) first .. last left of each."""
 
     graph: Graph
@@ -92,7 +92,7 @@ class Trimmed:
 class Struts:
     """Trimmed struts and the lattice that knows their radii; without a lattice they are bare lines."""
 
-    trimmed: Trimmed
+    trimmed: TrimmedStruts
     lattice: Lattice | None
 
 
@@ -136,13 +136,13 @@ class Stack:
         factory=lambda: {name: OrderedDict() for name in STEPS}
     )
 
-    def value(self, name: str, given: Given) -> Any:
+    def value(self, name: str, given: StepInputs) -> Any:
         """What a step gives, made where it is not there yet; raises InputError and what the step raises."""
         if name not in STEPS:
             raise _unknown(name)
         return self._value(name, given, keys(given))
 
-    def again(self, name: str, given: Given) -> Any:
+    def again(self, name: str, given: StepInputs) -> Any:
         """What a step gives, made anew even if it is there; those before it only where they are not."""
         if name not in STEPS:
             raise _unknown(name)
@@ -150,7 +150,7 @@ class Stack:
         self._values[name].pop(key[name], None)
         return self._value(name, given, key)
 
-    def _value(self, name: str, given: Given, key: dict[str, str]) -> Any:
+    def _value(self, name: str, given: StepInputs, key: dict[str, str]) -> Any:
         kept = self._values[name]
         if key[name] not in kept:
             step = STEPS[name]
@@ -165,7 +165,7 @@ class Stack:
         return kept[key[name]]
 
 
-def keys(given: Given) -> dict[str, str]:
+def keys(given: StepInputs) -> dict[str, str]:
     """Hash, by step, of everything that its value is made from."""
     found: dict[str, str] = {}
     for step in STEPS.values():
@@ -196,7 +196,7 @@ def downstream(name: str) -> tuple[str, ...]:
     return tuple(step for step in STEPS if step in found and step != name)
 
 
-def require_whole(given: Given) -> None:
+def require_whole(given: StepInputs) -> None:
     """Raise InputError where a muted step leaves out what the print needs; a path may be left out."""
     needed = set(STEPS) - {"path", "solid"}
     if not given.path or "path" in given.muted:
@@ -221,15 +221,15 @@ def _unknown(name: str) -> InputError:
 # What the steps do. Each reads only what its Step says, which a test checks by watching it.
 
 
-def _profile(given: Given) -> Array:
+def _profile(given: StepInputs) -> Array:
     return outer_polygon(given.unit.dimensions, ALONG)
 
 
-def _chambers(given: Given, profile: Array) -> Array:
+def _chambers(given: StepInputs, profile: Array) -> Array:
     return cavity_polygon(given.unit.dimensions, ALONG)
 
 
-def _membranes(given: Given, profile: Array, cavity: Array | None) -> Section:
+def _membranes(given: StepInputs, profile: Array, cavity: Array | None) -> Section:
     d = given.unit.dimensions
     boss = d.inlet_radius + d.inlet_wall
     bore = [[d.inlet_radius, d.base_cap], [d.inlet_radius, -d.inlet_length]]
@@ -237,12 +237,12 @@ def _membranes(given: Given, profile: Array, cavity: Array | None) -> Section:
     return Section(profile, inlet, cavity)
 
 
-def _cells(given: Given, profile: Array) -> Graph:
+def _cells(given: StepInputs, profile: Array) -> Graph:
     d = given.unit.dimensions
     return graph_of(d if given.body is None else covering(d, given.body))
 
 
-def _trim(given: Given, profile: Array, graph: Graph | None) -> Trimmed | None:
+def _trim(given: StepInputs, profile: Array, graph: Graph | None) -> TrimmedStruts | None:
     if graph is None:
         return None
     d = given.unit.dimensions
@@ -254,51 +254,51 @@ def _trim(given: Given, profile: Array, graph: Graph | None) -> Trimmed | None:
     left = shown.any(axis=1)
     ends, shown = ends[left], shown[left]
     last = FINE[len(FINE) - 1 - shown[:, ::-1].argmax(axis=1)]
-    return Trimmed(graph, ends, FINE[shown.argmax(axis=1)], last)
+    return TrimmedStruts(graph, ends, FINE[shown.argmax(axis=1)], last)
 
 
-def _untrimmed(given: Given, profile: Array, graph: Graph | None) -> Trimmed | None:
+def _untrimmed(given: StepInputs, profile: Array, graph: Graph | None) -> TrimmedStruts | None:
     if graph is None:
         return None
     ends = graph.nodes[graph.struts]
-    return Trimmed(graph, ends, np.zeros(len(ends)), np.ones(len(ends)))
+    return TrimmedStruts(graph, ends, np.zeros(len(ends)), np.ones(len(ends)))
 
 
-def _struts(given: Given, trimmed: Trimmed | None) -> Struts | None:
+def _struts(given: StepInputs, trimmed: TrimmedStruts | None) -> Struts | None:
     if trimmed is None:
         return None
     d = given.unit.dimensions
     return Struts(trimmed, thickened(trimmed.graph, d.junction_diameter / 2.0, d.midspan_diameter / 2.0))
 
 
-def _lines(given: Given, trimmed: Trimmed | None) -> Struts | None:
+def _lines(given: StepInputs, trimmed: TrimmedStruts | None) -> Struts | None:
     return None if trimmed is None else Struts(trimmed, None)
 
 
-def _anchors(given: Given, graph: Graph | None) -> Array:
+def _anchors(given: StepInputs, graph: Graph | None) -> Array:
     return anchor_points(given.unit)
 
 
-def _path(given: Given, points: Array | None) -> Path | None:
+def _path(given: StepInputs, points: Array | None) -> Path | None:
     if not given.path or points is None:
         return None
     found = window(given.unit, given.path)
     return Path(found, points[list(found.indices)])
 
 
-def _wells(given: Given, path: Path | None) -> Bar | None:
+def _wells(given: StepInputs, path: Path | None) -> Bar | None:
     if path is None:
         return None
     d = given.unit.dimensions
     return waveguide(given.unit, path.window, d if given.body is None else covering(d, given.body))
 
 
-def _without_wells(given: Given, path: Path | None) -> Bar | None:
+def _without_wells(given: StepInputs, path: Path | None) -> Bar | None:
     bar = _wells(given, path)
     return None if bar is None else attrs.evolve(bar, wells=bar.wells[:0])
 
 
-def _solid(given: Given, *_: Any) -> Solid:
+def _solid(given: StepInputs, *_: Any) -> Solid:
     require_whole(given)
     chosen = bool(given.path) and "path" not in given.muted
     path = window(given.unit, given.path) if chosen else None

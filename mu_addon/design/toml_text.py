@@ -11,7 +11,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..reading import parse_toml
-from ..toml_writer import Noted, toml_text, toml_value
+from ..toml_writer import Commented, toml_text, toml_value
 from .quantity import Description
 
 
@@ -41,7 +41,7 @@ def compose(
         {
             **head,
             **{
-                name: {d.name: Noted(value, _notes(d, value) if comments else ()) for d, value in rows}
+                name: {d.name: Commented(value, _notes(d, value) if comments else ()) for d, value in rows}
                 for name, rows in tables.items()
             },
         }

@@ -49,7 +49,7 @@ def reading_noise(values: Array) -> float:
     return min(found, default=0.0)
 
 
-def quietened(time_s: Array, values: Array, sd: float | None = None) -> Array:
+def denoised(time_s: Array, values: Array, sd: float | None = None) -> Array:
     """Readings (n,), in their unit, freed of white noise by local straight lines; corners are kept.
 
     time_s (n,): times in s. sd: standard deviation of the noise in the unit of the readings, that of
@@ -108,13 +108,13 @@ def _lines(time_s: Array, values: Array, before: int, after: int) -> tuple[Array
     return values.mean() + mean_y + slope * away, np.minimum(variance, 1.0)
 
 
-def without_noise(
+def denoised_drives(
     experiments: Sequence[Experiment], simulator: Composite
 ) -> tuple[list[Experiment], list[Experiment] | None]:
-    """The experiments with their drives freed of gauge noise (`quietened`), and a copy with noise added anew.
+    """The experiments with their drives freed of gauge noise (`denoised`), and a copy with noise added anew.
 
     Drives are the columns of `DRIVES` that no simulator predicts, in experiments with time_s, at least
-    `FEWEST` rows and finite values. The copy holds the same drives with as much simulated noise, quietened
+    `FEWEST` rows and finite values. The copy holds the same drives with as much simulated noise, denoised
     again: what a model driven by the copy misses of data made with the first list is due to the gauge's noise
     alone. None in its place where no drive is noisy.
     """
@@ -129,8 +129,8 @@ def without_noise(
         for c in drives:
             sd = reading_noise(e[c])
             if sd > NEGLIGIBLE * float(np.ptp(e[c])):
-                once[c] = quietened(e["time_s"], e[c], sd)
-                twice[c] = quietened(e["time_s"], once[c] + rng.normal(0.0, sd, len(e)))
+                once[c] = denoised(e["time_s"], e[c], sd)
+                twice[c] = denoised(e["time_s"], once[c] + rng.normal(0.0, sd, len(e)))
         noisy = any(once[c] is not e.columns[c] for c in drives)
         found.append(attrs.evolve(e, columns=once) if noisy else e)
         again.append(attrs.evolve(e, columns=twice) if noisy else e)

@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..files import write_text
 from ..homogenize.offset_response import OffsetResponse
 from ..reading import file_text, is_number, parse_toml
-from ..toml_writer import Noted, toml_text
+from ..toml_writer import Commented, toml_text
 from .effect import LIBRARY
 from .verdict import Verdict
 
@@ -59,7 +59,7 @@ class ExtendedModel:
     def text(self) -> str:
         """The text of model.toml: each value with sd, low95, high95 and unit; nan is left out."""
         effects = {
-            name: Noted({p: _numbers(f) for p, f in parameters.items()}, (LIBRARY[name][0],))
+            name: Commented({p: _numbers(f) for p, f in parameters.items()}, (LIBRARY[name][0],))
             for name, parameters in self.effects.items()
         }
         nuisances = {name: _numbers(f) for name, f in self.nuisances.items()}
@@ -69,7 +69,7 @@ class ExtendedModel:
             "verdict": self.verdict,
             "effect": effects or None,
             "nuisance": nuisances or None,
-            "lattice": Noted(lattice, (words,)) if lattice else None,
+            "lattice": Commented(lattice, (words,)) if lattice else None,
         }
         return toml_text(values, "Effects that measured data named, with what each parameter is known to.")
 

@@ -81,7 +81,7 @@ class Record:
     """Series of several experiments, their measured values (N,) as one vector, groups together.
 
     values: in the unit of each channel, in standard deviations where a record's spread is given. again: the
-    experiments as driven by a second reading of the same gauges, see `drive.without_noise`.
+    experiments as driven by a second reading of the same gauges, see `drive.denoised_drives`.
     """
 
     experiments: tuple[Experiment, ...]

@@ -17,7 +17,7 @@ from ..measured.rest import at_rest
 from .fit import Fit, Fitter
 from .noise import cycle_s, harmonics
 from .prediction.unit import KIND as UNIT
-from .prediction.unit import cycles, play
+from .prediction.unit import cycles, play_operator
 from .record import KNOWN, Record, Series
 from .ringing import modes, ringing
 
@@ -58,7 +58,7 @@ def _rate(e: Experiment) -> Array:
 
 
 def _direction(e: Experiment) -> Array:
-    return np.sign(np.gradient(play(e["pressure_kPa"], 0.2)))
+    return np.sign(np.gradient(play_operator(e["pressure_kPa"], 0.2)))
 
 
 def _most(e: Experiment) -> Array:

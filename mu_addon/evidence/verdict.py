@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
-from .drive import without_noise
+from .drive import denoised_drives
 from .fit import Fitter
 from .gain import Gain, gain
 from .next_experiment import Proposal, propose_experiment
@@ -34,7 +34,7 @@ class Verdict:
     """What the data say of the model: the causes named, their rivals, the gain, and what to measure next.
 
     kind: one of `KINDS` (none, named, ambiguous, unidentifiable, unexplained). experiments: all of them,
-    their drives freed of gauge noise (`drive.without_noise`). sources: noise by group of series. intervals:
+    their drives freed of gauge noise (`drive.denoised_drives`). sources: noise by group of series. intervals:
     95 % bounds by key, in the parameters' units. identifiability: effects that these data cannot show, with
     the reason. `as_json` is the content of verdict.json.
     """
@@ -140,7 +140,7 @@ def diagnose(
     it is significant, predicts left-out experiments better and leaves no structure. Raises InputError where
     no experiment can be predicted.
     """
-    experiments, again = without_noise(experiments, simulator)
+    experiments, again = denoised_drives(experiments, simulator)
     measured = record([e for e in experiments if e.role == "fit"], simulator)
     if again:
         other = {e.name: e for e in again}

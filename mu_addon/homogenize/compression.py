@@ -14,7 +14,7 @@ from ..fem.factor import IndefiniteError
 from ..fem.model import Model
 from .curve import Curve
 from .specimen import Specimen
-from .stability import Loss, Motions, first_loss, interpolated
+from .stability import Loss, SymmetryBreakingModes, first_loss, interpolated
 from .strut_contact import StrutContact, first_strut_contact
 
 Array = np.ndarray[Any, Any]
@@ -152,7 +152,7 @@ def compress(
     if stability:
         # Only what comes before is of interest.
         count = len(states) if touch is None else int(np.searchsorted(reached, touch.strain)) + 1
-        motions = Motions(specimen, held, threads, mean_dilatation)
+        motions = SymmetryBreakingModes(specimen, held, threads, mean_dilatation)
         loss = first_loss(motions, reached[:count], moves[:count])
     return Compression(specimen, friction, tuple(states), touch, loss, ended)
 

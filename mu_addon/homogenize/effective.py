@@ -17,7 +17,7 @@ from ..fem.lattice_law import LatticeLaw
 from ..fem.laws import Foam
 from ..files import write_text
 from ..reading import file_text, parse_toml
-from ..toml_writer import Noted, toml_text
+from ..toml_writer import Commented, toml_text
 from .foam_fit import NAME, FoamFit, Misfit, lattice_law, require_stable, stable_pressed, stable_shear
 
 Array = np.ndarray[Any, Any]
@@ -143,7 +143,7 @@ class Effective:
             _DERIVED: ("Derived from the tables above for the reader; not read back.", derived),
             "provenance": ("Program and inputs that made this file.", self.provenance),
         }
-        noted = {name: Noted(rows, (comment,)) for name, (comment, rows) in tables.items()}
+        noted = {name: Commented(rows, (comment,)) for name, (comment, rows) in tables.items()}
         return toml_text({"format": FORMAT, **noted}, _HEAD)
 
     @property

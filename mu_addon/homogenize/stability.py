@@ -58,7 +58,7 @@ class Loss:
         )
 
 
-class Motions:
+class SymmetryBreakingModes:
     """The small motions of a specimen's eighth in the seven parts that break its symmetry.
 
     held (n, 3) bool: the supports on the plates. threads, mean_dilatation: as `Model` has them.
@@ -100,7 +100,9 @@ class Motions:
         return fixed
 
 
-def first_loss(motions: Motions, strains: Sequence[float], moves: Sequence[Array]) -> Loss | None:
+def first_loss(
+    motions: SymmetryBreakingModes, strains: Sequence[float], moves: Sequence[Array]
+) -> Loss | None:
     """Where along displacements (n, 3) in mm at ascending strains, the first at rest, stability is lost.
 
     None where it is not. Found by halving, first among the states and then between two, where equilibria are

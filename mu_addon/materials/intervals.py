@@ -11,7 +11,7 @@ from scipy.special import stdtrit
 
 from .coupon import Array
 from .forms import EXPONENTS, Form
-from .regression import Problem, apart, linear
+from .regression import Problem, linear, nonzero_exponents
 
 # The profile is followed until it is this close to its limit.
 CLOSE = 0.02
@@ -156,7 +156,7 @@ def _fixed_exponent(problem: Problem, exponents: Array, p: int) -> Callable[[flo
         nonlocal last
 
         def residual(others: Array) -> Array:
-            return problem.solve(apart(np.insert(others, p, value)))[1]
+            return problem.solve(nonzero_exponents(np.insert(others, p, value)))[1]
 
         if not len(last):
             r = residual(last)
@@ -180,7 +180,7 @@ def _fixed_factor(problem: Problem, exponents: Array, p: int, mu: float) -> Call
         nonlocal last
 
         def residual(a: Array) -> Array:
-            terms = problem.terms(apart(a))
+            terms = problem.terms(nonzero_exponents(a))
             own = terms[:, p] * (mu * np.exp(ratio) * a[p] / 2)
             if not others.any():
                 return own - problem.target

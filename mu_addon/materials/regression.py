@@ -88,7 +88,7 @@ def best_exponents(problem: Problem) -> Array:
         start = GRID[list(chosen)]
         # Two equal exponents are one term, and 0 is a limit that the law cannot be given.
         result = optimize.least_squares(
-            lambda a: problem.solve(apart(a))[1],
+            lambda a: problem.solve(nonzero_exponents(a))[1],
             start,
             bounds=EXPONENTS,
             xtol=1e-10,
@@ -98,11 +98,11 @@ def best_exponents(problem: Problem) -> Array:
             max_nfev=200,
         )
         if result.cost < best:
-            best, found = result.cost, apart(result.x)
+            best, found = result.cost, nonzero_exponents(result.x)
     return found
 
 
-def apart(exponents: Array) -> Array:
+def nonzero_exponents(exponents: Array) -> Array:
     """The exponents, none of them 0."""
     small = np.abs(exponents) < 1e-3
     return np.where(small, np.where(exponents < 0, -1e-3, 1e-3), exponents)

@@ -10,7 +10,7 @@ import numpy as np
 Array = np.ndarray[Any, Any]
 
 
-def rounds(pressure: Array, has_gravity: bool = False) -> list[list[int]]:
+def solution_order(pressure: Array, has_gravity: bool = False) -> list[list[int]]:
     """Numbers of distinct pressures (s,) in the order to solve them: two at a time, the extremes first.
 
     Each later pressure is the one farthest from those before it and from 0, where nothing deviates. Where
@@ -57,7 +57,7 @@ def between(pressure: Array, known: Mapping[int, Array]) -> Array:
     return found
 
 
-def estimate(fuller: Array, sparser: Array, weight: Array) -> float:
+def relative_error(fuller: Array, sparser: Array, weight: Array) -> float:
     """Relative error of the sparser of two sets of differences (s, jobs, p, 3) in mm against the fuller.
 
     weight (s,): instants at each pressure. The largest of any job, over its mean deviation; by the triangle

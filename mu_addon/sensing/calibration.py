@@ -25,7 +25,7 @@ from scipy.special import stdtrit
 from ..errors import InputError
 from ..files import write_text
 from ..reading import file_text, is_number, parse_toml
-from ..toml_writer import Noted, toml_text
+from ..toml_writer import Commented, toml_text
 
 Array = np.ndarray[Any, Any]
 
@@ -342,15 +342,15 @@ def write_calibration(path: Path, calibration: Calibration, about: str = "") -> 
     values = {
         "version": VERSION,
         "channel": c.channel,
-        "dark": Noted(c.dark, beside="a channel, or a level in V"),
+        "dark": Commented(c.dark, beside="a channel, or a level in V"),
         "range_deg": [low, high],
         "knots_deg": c.knots,
         "coefficients_V": c.coefficients,
-        "band_V": Noted(c.band_V, beside="95 %"),
+        "band_V": Commented(c.band_V, beside="95 %"),
         "drift_per_h": c.drift_per_h,
         "gain": c.gain,
         "sweeps": c.sweeps,
-        "error_deg": Noted(c.error_deg, beside="root mean square, in sweeps left out"),
+        "error_deg": Commented(c.error_deg, beside="root mean square, in sweeps left out"),
     }
     head = ["A sensor's map from voltage to bending angle.", *about.splitlines()]
     write_text(path, toml_text(values, "\n".join(line for line in head if line)))

@@ -10,7 +10,7 @@ import numpy as np
 Array = np.ndarray[Any, Any]
 
 
-class Endless:
+class UnwrappedCounter:
     """Readings of a counter that begins again at `modulus`, as one that never does.
 
     A reading less than half the modulus ahead of the last is later; anything else came out of order, or its

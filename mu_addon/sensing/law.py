@@ -19,7 +19,7 @@ from ..design.waveguide import STRUT_GAP
 from ..errors import InputError
 from .embedded_waveguide import WaveguideShape
 from .guide import Centreline, swept
-from .notched import kinks, notched
+from .notched import well_angles, with_wells
 from .optics import Optics
 from .tracing import Light, lambertian, trace
 
@@ -46,10 +46,10 @@ CHANGE_MISFIT = 0.45
 def traced(shape: WaveguideShape, line: Centreline, optics: Optics, rays: int = RAYS, seed: int = 0) -> Light:
     """Where a diffuse source's light ends in the bent guide, by traced rays.
 
-    line: of the bar as if it had no wells, straight or with one leg at rest; see `notched`.
+    line: of the bar as if it had no wells, straight or with one leg at rest; see `with_wells`.
     """
     guide = swept(
-        notched(shape, line),
+        with_wells(shape, line),
         shape.width,
         shape.height,
         shape.wells,
@@ -72,7 +72,7 @@ def features(shape: WaveguideShape, legs: Sequence[Centreline]) -> Array:
         curvature = leg.curvature
         here = wells[(wells >= leg.s[0]) & ((wells < leg.s[-1]) | (k == len(legs) - 1))]
         stretched += _area(leg.stretch - 1, leg.s)
-        kinked += float((np.hypot(kinks(shape, leg), _SMALLEST_KINK) - _SMALLEST_KINK).sum())
+        kinked += float((np.hypot(well_angles(shape, leg), _SMALLEST_KINK) - _SMALLEST_KINK).sum())
         signed += float(np.interp(here, leg.s, curvature).sum())
         bent += _area(curvature**2, leg.s)
     length, junctions = float(legs[-1].s[-1]), len(shape.junctions)

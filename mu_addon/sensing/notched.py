@@ -20,7 +20,7 @@ Array = np.ndarray[Any, Any]
 _STEPS_A_MM = 8
 
 
-def notched(shape: WaveguideShape, line: Centreline) -> Centreline:
+def with_wells(shape: WaveguideShape, line: Centreline) -> Centreline:
     """The axis of a bar with wells whose mean curvature and stretch are those of `line`.
 
     The mean is over what struts hold, from the line's first junction to its last; beyond them it is as it
@@ -37,7 +37,7 @@ def notched(shape: WaveguideShape, line: Centreline) -> Centreline:
     return Centreline(s, line.points[0] + np.vstack([np.zeros(3), np.cumsum(way, axis=0)]), normals)
 
 
-def kinks(shape: WaveguideShape, line: Centreline) -> Array:
+def well_angles(shape: WaveguideShape, line: Centreline) -> Array:
     """By how much each well (n,) on the line bends the bar beyond the line's own curvature, in radians."""
     s, _, curvature, before = _given_way(shape, line)
     return shape.well_width * np.interp(

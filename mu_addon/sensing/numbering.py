@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import attrs
 
-from .clock import Endless
+from .clock import UnwrappedCounter
 
 
 class Row(NamedTuple):
@@ -67,8 +67,8 @@ class Numbering:
     def __init__(self) -> None:
         self.tally = Tally()
         self.tick_s = 1.0
-        self.clock = Endless(None)
-        self.numbers = Endless(None)
+        self.clock = UnwrappedCounter(None)
+        self.numbers = UnwrappedCounter(None)
         self.left_out: list[Row] = []
         """Repeats, for the caller to keep and to clear."""
         self._sequence: int | None = None
@@ -104,7 +104,7 @@ class Numbering:
     def forget(self) -> list[Numbered]:
         """Another format begins: its numbers and clock have nothing to do with those before."""
         settled = self.finish()
-        self.numbers, self.clock = Endless(None), Endless(None)
+        self.numbers, self.clock = UnwrappedCounter(None), UnwrappedCounter(None)
         self._odd = 0
         self._recent.clear()
         return settled

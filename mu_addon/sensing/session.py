@@ -22,7 +22,7 @@ from ..files import plain
 from .decoder import Decoder, Samples
 from .recording import Recorder, columns_of
 from .ring import Ring
-from .sources import Ended, Gone, Source
+from .sources import ConnectionLost, EndOfStream, Source
 
 Array = np.ndarray[Any, Any]
 EventHandler = Callable[[str, dict[str, Any]], None]
@@ -139,7 +139,7 @@ def _read(source: Source, pieces: queue.SimpleQueue[_Piece], control: Control, c
                     connected, tries = True, 0
                     pieces.put(_Piece(clock.now(), event="connected", detail=words))
                 data = source.read()
-            except Gone as gone:
+            except ConnectionLost as gone:
                 source.close()
                 if connected or tries == 0:
                     event = "disconnected" if connected else "waiting"
@@ -151,7 +151,7 @@ def _read(source: Source, pieces: queue.SimpleQueue[_Piece], control: Control, c
             if data:
                 pieces.put(_Piece(clock.now(), data))
         source.close()
-    except Ended:
+    except EndOfStream:
         pieces.put(_Piece(clock.now(), event="ended"))
     # Whatever else stops the reading ends the session with its own words.
     except Exception as error:  # noqa: BLE001 - handed to the thread that can raise it

@@ -19,11 +19,11 @@ Array = np.ndarray[Any, Any]
 _WAIT_S = 0.02
 
 
-class Gone(Exception):
+class ConnectionLost(Exception):
     """The line is cut; it may come back."""
 
 
-class Ended(Exception):
+class EndOfStream(Exception):
     """There is nothing more to come, ever."""
 
 
@@ -100,12 +100,12 @@ class SerialLine:
         serial = _serial()
         port = find(self.name, self._list_ports())
         if port is None and self.name.startswith("usb:"):
-            raise Gone(f"{self.name} is not plugged in")
+            raise ConnectionLost(f"{self.name} is not plugged in")
         device = self.name if port is None else port.device
         try:
             self._line = serial.Serial(device, self.baud, timeout=_WAIT_S, exclusive=True)
         except (OSError, ValueError) as error:
-            raise Gone(str(error)) from None
+            raise ConnectionLost(str(error)) from None
         if port is not None and port.identity is not None:
             # From now on it is this device that is meant, not the place where it was plugged in.
             self.name = port.identity
@@ -119,7 +119,7 @@ class SerialLine:
             return bytes(data + self._line.read(waiting)) if waiting else bytes(data)
         # TypeError: pyserial's, when another thread closes the port under it.
         except (OSError, TypeError) as error:
-            raise Gone(str(error)) from None
+            raise ConnectionLost(str(error)) from None
 
     def close(self) -> None:
         """See Source."""
@@ -158,7 +158,7 @@ class Replay:
             if self._ahead is None:
                 if out:
                     break
-                raise Ended
+                raise EndOfStream
             if self._ahead[0] > until:
                 break
             out.append(self._ahead[1])

@@ -23,7 +23,7 @@ from mu_addon.placement.inclusion import RULES
 from mu_addon.usecases.reproduce.published import published
 from mu_addon.usecases.reproduce.report import report
 from mu_addon.usecases.reproduce.settings import Settings
-from mu_addon.usecases.reproduce.values import column_unit, with_values
+from mu_addon.usecases.reproduce.values import unit_of_table_column, with_values
 from tests.usecases.test_reproduce import shown
 
 PAPER = published()
@@ -32,7 +32,7 @@ COARSE = MeshSettings(order=1, refine=0.4)
 
 def test_the_objective_is_zero_for_the_paper_itself():
     wanted = np.array([PAPER.bending_deg[s] for s in PAPER.scales])
-    own = np.array([PAPER.column(s) for s in PAPER.scales])
+    own = np.array([PAPER.table_column(s) for s in PAPER.scales])
     assert objective(own, own, wanted, wanted) == pytest.approx(0.0)
     factor_of_two = 0.1 * np.log(2) ** 2
     assert objective(own / 2, own, wanted, wanted) == pytest.approx(factor_of_two)
@@ -86,12 +86,12 @@ def test_drawn_meshes_survive_their_table():
 
 
 def test_a_scatter_counts_each_mesh_of_1x_for_both_families():
-    units = [column_unit(Unit(), s, E) for s, E in PAPER.modulus_kPa.items()]
+    units = [unit_of_table_column(Unit(), s, E) for s, E in PAPER.modulus_kPa.items()]
     families = [(d.family.name, d.unit.scale) for d in scatter.draws(units, 1)]
     assert ("same", 1.0) not in families
     assert len(families) == len(set(families)) == 8
-    drawn = [scatter.Drawn("grown", 1.0, "intersect", i, PAPER.column(1.0), 1.0) for i in range(2)]
-    found = scatter.scatters(drawn, {1.0: PAPER.column(1.0)})
+    drawn = [scatter.Drawn("grown", 1.0, "intersect", i, PAPER.table_column(1.0), 1.0) for i in range(2)]
+    found = scatter.scatters(drawn, {1.0: PAPER.table_column(1.0)})
     assert set(found) == {("grown", "intersect", 1.0), ("same", "intersect", 1.0)}
 
 
@@ -100,7 +100,7 @@ def synthetic(count=48):
     points = []
     for values in design(count):
         wall = values["chambers.wall_mm"]
-        J = np.array([PAPER.column(s) for s in PAPER.scales]) * wall
+        J = np.array([PAPER.table_column(s) for s in PAPER.scales]) * wall
         bending = np.array([(-20 / wall, 30 / wall, 35 / wall)] * 3)
         row = np.array([values[o.name] for o in OPEN])
         points.append(open_study.OpenPoint("", row, "", bending, np.full((3, 2), np.nan), J))
@@ -213,7 +213,7 @@ def test_settings_say_all_and_refuse_what_is_out_of_bounds():
 def long_found():
     """What a run would hand to its report, with meshes and points made up."""
     drawn = [
-        scatter.Drawn("grown", scale, rule, seed, PAPER.column(scale) * (1 + 0.1 * seed), 10.0)
+        scatter.Drawn("grown", scale, rule, seed, PAPER.table_column(scale) * (1 + 0.1 * seed), 10.0)
         for seed in range(3)
         for scale in PAPER.scales
         for rule in RULES

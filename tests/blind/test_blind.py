@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import blind
-from mu_addon.evidence.prediction.unit import lagged
+from mu_addon.evidence.prediction.unit import first_order_lag
 from tests.blind import judge, truth, unit_runs
 from tests.blind.judge import CHANGES, IN_SET, judged
 
@@ -101,7 +101,7 @@ def test_the_bench_integrates_by_a_rule_of_its_own_that_agrees_where_both_are_ex
     t = np.arange(0.0, 20.0, 0.02)
     p = np.interp(t, [0, 5, 10, 20], [0, 30, 30, 0])
     for time_s in (0.005, 0.3, 4.0):
-        np.testing.assert_allclose(truth.first_order(t, p, time_s), lagged(t, p, time_s), atol=2e-4)
+        np.testing.assert_allclose(truth.first_order(t, p, time_s), first_order_lag(t, p, time_s), atol=2e-4)
     step = truth.first_order(t, np.where(t > 0, 1.0, 0.0), 2.0)
     # The first sample's ramp delays the step by half of it.
     np.testing.assert_allclose(step[1:], 1.0 - np.exp(-(t[1:] - 0.01) / 2.0), atol=1e-4)

@@ -20,7 +20,7 @@ from mu_addon.design.body import (
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.solid import build_solid
-from mu_addon.design.steps import Given, Stack, along
+from mu_addon.design.steps import Stack, StepInputs, along
 from mu_addon.design.surface import stl_bytes, volume
 from mu_addon.errors import InputError
 
@@ -216,9 +216,9 @@ def test_a_path_outside_the_body_is_refused():
 
 def test_steps_take_the_body(ellipse):
     cut, stack = envelope(ellipse, D), Stack()
-    trimmed = stack.value("trim", Given(UNIT, body=cut))
+    trimmed = stack.value("trim", StepInputs(UNIT, body=cut))
     ends = np.concatenate([along(trimmed.ends, t[:, None])[:, 0] for t in (trimmed.first, trimmed.last)])
     assert ((ends[:, 0] / 18.75) ** 2 + ((ends[:, 1] - 6.25) / 25.0) ** 2).max() <= 1.0
     before = dict(stack.counts)
-    stack.value("trim", Given(UNIT))
+    stack.value("trim", StepInputs(UNIT))
     assert {name for name in stack.counts if stack.counts[name] > before[name]} == {"cells", "trim"}

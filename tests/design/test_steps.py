@@ -12,7 +12,7 @@ from mu_addon.design.dimensions import Dimensions
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import SECTIONS, Unit, load_preset
 from mu_addon.design.quantity import describe
-from mu_addon.design.steps import STEPS, Given, Stack, downstream
+from mu_addon.design.steps import STEPS, Stack, StepInputs, downstream
 from mu_addon.errors import InputError
 
 UNIT = load_preset("mu-1.0x")
@@ -38,13 +38,13 @@ def draw(stack, given):
 @pytest.fixture
 def stack():
     made = Stack()
-    draw(made, Given(UNIT, "alpha4"))
+    draw(made, StepInputs(UNIT, "alpha4"))
     return made
 
 
 def test_each_step_is_made_once(stack):
     assert stack.counts == Counter(dict.fromkeys([name for name in STEPS if name != "solid"], 1))
-    assert draw(stack, Given(UNIT, "alpha4")) == set()
+    assert draw(stack, StepInputs(UNIT, "alpha4")) == set()
 
 
 @pytest.mark.parametrize(
@@ -65,20 +65,20 @@ def test_each_step_is_made_once(stack):
     ],
 )
 def test_only_what_depends_on_a_parameter_is_made_again(stack, parameters, made):
-    assert draw(stack, Given(changed(UNIT, **parameters), "alpha4")) == made
+    assert draw(stack, StepInputs(changed(UNIT, **parameters), "alpha4")) == made
     # Back again, as by undo: everything is still there.
-    assert draw(stack, Given(UNIT, "alpha4")) == set()
+    assert draw(stack, StepInputs(UNIT, "alpha4")) == set()
 
 
 def test_another_path_makes_path_and_wells_again(stack):
-    assert draw(stack, Given(UNIT, "alpha5")) == {"path", "wells"}
+    assert draw(stack, StepInputs(UNIT, "alpha5")) == {"path", "wells"}
     assert downstream("anchors") == ("path", "wells", "solid")
 
 
 def test_old_values_are_let_go(stack):
     for count in range(steps.KEPT + 1):
-        draw(stack, Given(changed(UNIT, chambers__wall_mm=1.0 + 0.01 * count), "alpha4"))
-    assert draw(stack, Given(UNIT, "alpha4")) == {"chambers", "membranes", "wells"}
+        draw(stack, StepInputs(changed(UNIT, chambers__wall_mm=1.0 + 0.01 * count), "alpha4"))
+    assert draw(stack, StepInputs(UNIT, "alpha4")) == {"chambers", "membranes", "wells"}
 
 
 def test_every_parameter_of_the_geometry_belongs_to_one_step():
@@ -116,7 +116,7 @@ def test_a_step_reads_nothing_that_is_not_in_its_key(monkeypatch):
         return attrs.evolve(step, make=make)
 
     monkeypatch.setattr(steps, "STEPS", {name: watch(step) for name, step in STEPS.items()})
-    Stack().value("solid", Given(UNIT, "alpha4"))
+    Stack().value("solid", StepInputs(UNIT, "alpha4"))
     monkeypatch.undo()
     assert set(reads) == set(STEPS)
 
@@ -148,7 +148,7 @@ def test_a_step_reads_nothing_that_is_not_in_its_key(monkeypatch):
 
 
 def test_values_are_the_cores(stack):
-    given = Given(UNIT, "alpha4")
+    given = StepInputs(UNIT, "alpha4")
     struts = stack.value("struts", given)
     whole = lattice_of(UNIT.dimensions)
     assert np.array_equal(struts.lattice.nodes, whole.nodes)
@@ -171,7 +171,7 @@ def test_muted_steps_pass_on_what_they_would_change():
     stack = Stack()
 
     def value(name, *muted, path="alpha4"):
-        return stack.value(name, Given(UNIT, path, muted))
+        return stack.value(name, StepInputs(UNIT, path, muted))
 
     whole = lattice_of(UNIT.dimensions)
     assert value("membranes", "chambers").cavity is None
@@ -196,33 +196,33 @@ def test_muted_steps_pass_on_what_they_would_change():
 @pytest.mark.parametrize("name", ["chambers", "membranes", "cells", "trim", "struts", "anchors", "wells"])
 def test_no_solid_is_built_without_what_it_needs(name):
     with pytest.raises(InputError, match=f"without {name} is not the unit") as error:
-        Stack().value("solid", Given(UNIT, "alpha4", {name}))
+        Stack().value("solid", StepInputs(UNIT, "alpha4", {name}))
     assert name in error.value.remedy
 
 
 def test_a_muted_path_gives_the_solid_without_a_waveguide():
     unit = changed(UNIT, chambers__count=3, waveguide__row=2)
     stack = Stack()
-    with_path = stack.value("solid", Given(unit, "alpha1"))
-    without = stack.value("solid", Given(unit, "alpha1", {"path"}))
+    with_path = stack.value("solid", StepInputs(unit, "alpha1"))
+    without = stack.value("solid", StepInputs(unit, "alpha1", {"path"}))
     assert (with_path.window.name, without.window) == ("alpha1", None)
     # Anchors and wells serve the path alone.
-    assert stack.value("solid", Given(unit, "", {"anchors", "wells"})).gates.volume_mm3 == (
+    assert stack.value("solid", StepInputs(unit, "", {"anchors", "wells"})).gates.volume_mm3 == (
         without.gates.volume_mm3
     )
-    assert stack.value("solid", Given(unit, "alpha1")) is with_path
+    assert stack.value("solid", StepInputs(unit, "alpha1")) is with_path
 
 
 @pytest.mark.parametrize("name", ["profile", "solid"])
 def test_what_everything_is_made_from_cannot_be_muted(name):
     with pytest.raises(InputError, match="cannot be muted"):
-        Given(UNIT, "", {name})
+        StepInputs(UNIT, "", {name})
 
 
 def test_unknown_names_are_refused():
     with pytest.raises(InputError, match="no step 'polish'"):
-        Given(UNIT, "", {"polish"})
+        StepInputs(UNIT, "", {"polish"})
     with pytest.raises(InputError, match="no step 'polish'"):
-        Stack().value("polish", Given(UNIT))
+        Stack().value("polish", StepInputs(UNIT))
     with pytest.raises(InputError, match="no path 'alpha99'"):
-        Stack().value("wells", Given(UNIT, "alpha99"))
+        Stack().value("wells", StepInputs(UNIT, "alpha99"))

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mu_addon.evidence.drive import quietened, reading_noise, without_noise
+from mu_addon.evidence.drive import denoised, denoised_drives, reading_noise
 from mu_addon.evidence.verdict import diagnose
 from tests.evidence import analytic
 
@@ -24,17 +24,17 @@ def test_noise_is_told_from_what_is_read(sd, many, seed):
 
 def test_what_is_read_without_noise_stays():
     for _, t, p, _ in analytic.protocols(0.25, 8):
-        np.testing.assert_allclose(quietened(t, p), p, atol=1e-9)
+        np.testing.assert_allclose(denoised(t, p), p, atol=1e-9)
     t = np.arange(400) * 0.1
     wave = 20.0 * np.sin(2 * np.pi * t / 0.8)
     # Eight samples a turn: what their differences leave is not noise, and hardly changes them.
-    np.testing.assert_allclose(quietened(t, wave), wave, atol=0.02)
+    np.testing.assert_allclose(denoised(t, wave), wave, atol=0.02)
 
 
 def test_noise_is_averaged_and_corners_are_kept():
     rng = np.random.default_rng(3)
     for _, t, p, _ in analytic.protocols(0.25, 8):
-        found = quietened(t, p + rng.normal(0.0, 0.05, len(p)))
+        found = denoised(t, p + rng.normal(0.0, 0.05, len(p)))
         assert np.sqrt(np.mean((found - p) ** 2)) < 0.6 * 0.05
         assert np.abs(found - p).max() < 2.5 * 0.05
 
@@ -69,11 +69,11 @@ def test_a_gauge_too_noisy_for_such_data_is_no_cause():
 
 def test_what_is_predicted_is_left_as_it_was_read():
     made = noisy(analytic.measured(np.random.default_rng(1), {}, dt=0.25, count=2), 0.05)
-    once, again = without_noise(made, analytic.simulator(made))
+    once, again = denoised_drives(made, analytic.simulator(made))
     for raw, quiet, other in zip(made, once, again, strict=True):
         np.testing.assert_array_equal(quiet["angle_deg"], raw["angle_deg"])
         assert not np.array_equal(quiet["pressure_kPa"], raw["pressure_kPa"])
         assert not np.array_equal(quiet["pressure_kPa"], other["pressure_kPa"])
     still = [attrs.evolve(e, columns=e.columns | {"pressure_kPa": np.round(e["time_s"])}) for e in made]
     exact = analytic.measured(np.random.default_rng(1), {}, dt=0.25, count=2)
-    assert without_noise(exact, analytic.simulator(still))[1] is None
+    assert denoised_drives(exact, analytic.simulator(still))[1] is None

@@ -6,7 +6,7 @@ import pytest
 from mu_addon.errors import InputError
 from mu_addon.evidence.prediction.coupon import CouponStress, yeoh
 from mu_addon.evidence.prediction.specimen import recorded
-from mu_addon.evidence.prediction.unit import lagged
+from mu_addon.evidence.prediction.unit import first_order_lag
 from mu_addon.fem.laws import Yeoh
 from mu_addon.materials import incompressible
 
@@ -138,7 +138,9 @@ def test_a_frame_in_series_with_a_specimen_that_relaxes():
     found = SIMULATOR.predict(e, values)[0]
     own = strain - 0.05 * found * 1e-3 * 40.0 / 20.0
     rest = predict(coupon(own))
-    np.testing.assert_allclose(found, rest - 0.3 * lagged(e["time_s"], rest, 10.0), rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(
+        found, rest - 0.3 * first_order_lag(e["time_s"], rest, 10.0), rtol=1e-8, atol=1e-8
+    )
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mu_addon.errors import InputError
-from mu_addon.evidence.prediction.unit import UnitPressure, cycles, histories, lagged, play
+from mu_addon.evidence.prediction.unit import (
+    UnitPressure,
+    cycles,
+    first_order_lag,
+    play_operator,
+    pressure_histories,
+)
 from tests.evidence import analytic
 
 
@@ -66,10 +72,10 @@ def test_behind_a_shut_valve_the_gauge_sees_what_leaks():
 def test_a_ramp_is_followed_at_the_lag(time_s, dt):
     t = np.arange(0.0, 30.0, dt)
     expected = t - time_s * (1.0 - np.exp(-t / time_s))
-    np.testing.assert_allclose(lagged(t, t, time_s), expected, atol=1e-9)
+    np.testing.assert_allclose(first_order_lag(t, t, time_s), expected, atol=1e-9)
     jittered = np.sort(t + 0.3 * dt * np.sin(37.0 * t))
     expected = jittered - jittered[0] - time_s * (1.0 - np.exp(-(jittered - jittered[0]) / time_s))
-    np.testing.assert_allclose(lagged(jittered, jittered - jittered[0], time_s), expected, atol=1e-9)
+    np.testing.assert_allclose(first_order_lag(jittered, jittered - jittered[0], time_s), expected, atol=1e-9)
 
 
 def test_a_held_pressure_creeps_as_a_standard_linear_solid():
@@ -89,10 +95,10 @@ def test_a_held_pressure_creeps_as_a_standard_linear_solid():
 @given(st.lists(st.floats(-40, 40), min_size=2, max_size=30), st.floats(0.1, 20))
 def test_play_stays_within_its_width_and_forgets_the_rate(levels, width):
     p = np.array(levels)
-    x = play(p, width)
+    x = play_operator(p, width)
     assert (np.abs(x - p) <= width + 1e-12).all()
     slowly = np.interp(np.arange(0, len(p) - 1 + 1e-9, 0.25), np.arange(len(p)), p)
-    np.testing.assert_allclose(play(slowly, width)[::4], x, atol=1e-9)
+    np.testing.assert_allclose(play_operator(slowly, width)[::4], x, atol=1e-9)
 
 
 @pytest.mark.parametrize("digits", [0, 3])
@@ -103,7 +109,7 @@ def test_play_is_followed_value_by_value(digits):
     for v in p:
         x = min(max(x, v - 1.5), v + 1.5)
         followed.append(x)
-    np.testing.assert_array_equal(play(p, 1.5), followed)
+    np.testing.assert_array_equal(play_operator(p, 1.5), followed)
 
 
 def test_a_friction_loop_has_the_area_of_its_slip():
@@ -135,7 +141,7 @@ def test_softening_needs_a_larger_past_and_ends_where_it_was():
 
 def test_specimens_remember_apart():
     e = [blank(T, P, "a", specimen="A"), blank(T, P, "b", specimen="B"), blank(T, P, "c", specimen="A")]
-    past = histories(e)
+    past = pressure_histories(e)
     assert past["a"].cycles == past["b"].cycles == 0.0
     assert past["c"].cycles == pytest.approx(float(cycles(P)[-1]))
     assert (past["c"].trough_kPa, past["c"].peak_kPa) == (P.min(), P.max())

@@ -47,6 +47,17 @@ IDENTIFIERS = {
     "surprise": "predictor_tolerance",
     "march": "simulate_in_time",
     "spoken": "what it prints",
+    "told": "message, lines or output",
+    "said": "message, lines or output",
+    "untold": "unrecognised",
+    "heard": "received",
+    "chance": "probability",
+    "telling": "representative",
+    "quietened": "denoised",
+    "walled": "with_flat_obstacle",
+    "pasts": "strain_histories",
+    "endless": "unwrapped_counter",
+    "kinks": "well_angles",
 }
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from mu_addon.errors import InputError
-from mu_addon.evidence.prediction.unit import histories
+from mu_addon.evidence.prediction.unit import pressure_histories
 from mu_addon.measured import read_folder
 
 CSV = "time_s,pressure_kPa,angle_deg\n0,0,0\n1,10,3\n2,20,7\n3,{peak},8\n"
@@ -28,7 +28,7 @@ def test_without_run_order_the_file_s_order_is_taken(tmp_path):
 def test_run_order_decides_what_a_specimen_remembers(tmp_path):
     found = read_folder(folder(tmp_path, [30, 10.5, -2])).experiments
     assert [e.name for e in found] == ["run 2", "run 1", "run 0"]
-    past = histories(found)
+    past = pressure_histories(found)
     assert [past[f"run {k}"].peak_kPa for k in (2, 1, 0)] == [0.0, 32.0, 32.0]
 
 

@@ -5,26 +5,30 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mu_addon.placement.sampling import between, estimate, rounds
+from mu_addon.placement.sampling import between, relative_error, solution_order
 
 PRESSURE = np.array([-20.0, -10, 0, 10, 20, 30, 40])
 
 
 def test_extremes_come_first_then_what_is_farthest_from_all_known():
-    assert [[PRESSURE[i] for i in pair] for pair in rounds(PRESSURE)] == [[-20, 40], [20, -10], [10, 30]]
+    assert [[PRESSURE[i] for i in pair] for pair in solution_order(PRESSURE)] == [
+        [-20, 40],
+        [20, -10],
+        [10, 30],
+    ]
 
 
 @given(st.lists(st.floats(-50, 50).filter(lambda p: abs(p) > 1e-3), min_size=1, max_size=9, unique=True))
 def test_every_pressure_but_zero_is_met_once(values):
     pressure = np.unique([0.0, *values])
-    met = [i for pair in rounds(pressure) for i in pair]
+    met = [i for pair in solution_order(pressure) for i in pair]
     assert sorted(met) == [i for i, p in enumerate(pressure) if p]
 
 
 @given(st.lists(st.floats(-50, 50).filter(lambda p: abs(p) > 1e-3), min_size=1, max_size=9, unique=True))
 def test_where_the_unit_weighs_something_no_pressure_is_solved_beside_the_extremes(values):
     pressure = np.unique([0.0, *values])
-    order = rounds(pressure, has_gravity=True)
+    order = solution_order(pressure, has_gravity=True)
     assert sorted(i for batch in order for i in batch) == list(range(len(pressure)))
     met = [pressure[i] for i in order[0]]
     assert {0.0, pressure.min(), pressure.max()} <= set(met)
@@ -59,7 +63,7 @@ def test_the_estimate_bounds_how_far_two_mean_deviations_lie_apart():
     def J(values):
         return np.einsum("sjp,s->j", np.linalg.norm(values, axis=3), weight)
 
-    assert (np.abs(J(fuller) - J(sparser)) / J(fuller)).max() <= estimate(fuller, sparser, weight)
-    assert estimate(fuller, fuller, weight) == 0
-    assert estimate(np.zeros_like(fuller), np.zeros_like(fuller), weight) == 0
-    assert estimate(fuller, 0.9 * fuller, weight) == pytest.approx(0.1)
+    assert (np.abs(J(fuller) - J(sparser)) / J(fuller)).max() <= relative_error(fuller, sparser, weight)
+    assert relative_error(fuller, fuller, weight) == 0
+    assert relative_error(np.zeros_like(fuller), np.zeros_like(fuller), weight) == 0
+    assert relative_error(fuller, 0.9 * fuller, weight) == pytest.approx(0.1)

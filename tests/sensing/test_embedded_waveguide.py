@@ -14,7 +14,7 @@ from mu_addon.placement.graph import Limits, lattice_graph
 from mu_addon.sensing.embedded_waveguide import Joints, WaveguideShape, embed_waveguide
 from mu_addon.sensing.guide import Centreline
 from mu_addon.sensing.law import straight_guide
-from mu_addon.sensing.notched import kinks, notched
+from mu_addon.sensing.notched import well_angles, with_wells
 
 from .bars import bent_to_a_circle, body, of_window
 
@@ -86,12 +86,12 @@ def test_a_bar_gives_way_at_its_wells() -> None:
     pulled = Centreline(
         s, np.column_stack([0 * s, 0 * s, s + np.cumsum(along) * s[1]]), np.tile([0, 1.0, 0], (1201, 1))
     )
-    assert (kinks(shape, pulled) > 0.02).all()
-    found = notched(shape, pulled)
+    assert (well_angles(shape, pulled) > 0.02).all()
+    found = with_wells(shape, pulled)
     assert found.points[-1, 2] == pytest.approx(pulled.points[-1, 2], abs=0.02)
     np.testing.assert_allclose(found.normals[-1], [0, 1, 0], atol=0.01)
     bare = WaveguideShape(1.5, 1.5, (), 1.0, 0.65, shape.junctions)
-    np.testing.assert_allclose(notched(bare, pulled).curvature, 0, atol=1e-9)
+    np.testing.assert_allclose(with_wells(bare, pulled).curvature, 0, atol=1e-9)
 
 
 @pytest.mark.parametrize(("pull", "turn"), [(0.5, 0.0), (0.0, 0.2)])
@@ -108,7 +108,7 @@ def test_how_far_wells_open_against_plane_elasticity(pull: float, turn: float) -
     points = np.column_stack([0 * s, -np.cumsum(np.sin(angle) * steps), np.cumsum(np.cos(angle) * steps)])
     line = Centreline(s, points, np.column_stack([0 * s, np.cos(angle), np.sin(angle)]))
     shape = of_window("alpha4").shape
-    found = notched(shape, line)
+    found = with_wells(shape, line)
     opened = np.interp(wells, found.s, found.stretch - 1) + 0.75 * np.interp(wells, found.s, found.curvature)
     np.testing.assert_allclose(opened / exact, 0.84, atol=0.07)
     # Sections that stay as they are along the bar would open them by a third of that or less.

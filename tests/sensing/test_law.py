@@ -12,7 +12,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.sensing.guide import Centreline, arc
 from mu_addon.sensing.law import FEATURES, MISFIT, Law, features, fit_law, straight_guide, traced
-from mu_addon.sensing.notched import kinks
+from mu_addon.sensing.notched import well_angles
 from mu_addon.sensing.optics import Optics
 
 D = load_preset("mu-1.0x").dimensions
@@ -58,7 +58,7 @@ def test_a_law_of_known_coefficients_is_exact() -> None:
     kappa = np.radians(20) / 30
     law = Law(np.array([0.1, 0.02, 0.3, 0.05, 0.2, 2.0, 4.0, 60.0]), np.eye(8), 0.0)
     n, m = len(shape.wells), len(shape.junctions)
-    kink = (np.hypot(kinks(shape, line), 0.1) - 0.1).sum()
+    kink = (np.hypot(well_angles(shape, line), 0.1) - 0.1).sum()
     expected = 0.1 + 0.02 * 30 + 0.3 * np.log1p(n) + 0.05 * m
     expected += 0.2 * 0.02 * 30 + 2 * kink + 4 * n * kappa + 60 * kappa**2 * 30
     assert -np.log(law.transmitted(shape, [line])) == pytest.approx(expected, rel=2e-3)

@@ -22,7 +22,7 @@ from mu_addon.sensing.framing import info_frame, sample_frame
 from mu_addon.sensing.recording import read_recording
 from mu_addon.sensing.ring import Ring
 from mu_addon.sensing.session import Control, run_session
-from mu_addon.sensing.sources import Ended, Gone, Port, Replay, SerialLine, find
+from mu_addon.sensing.sources import ConnectionLost, EndOfStream, Port, Replay, SerialLine, find
 
 ROOT = Path(__file__).parents[2]
 SENDER = Path(__file__).with_name("sender.py")
@@ -271,7 +271,7 @@ def test_a_device_is_followed_to_another_socket(tmp_path: Path) -> None:
     assert names[1] in line.open()
     line.close()
     present[:] = present[:1]
-    with pytest.raises(Gone, match="not plugged in"):
+    with pytest.raises(ConnectionLost, match="not plugged in"):
         line.open()
     for pair in masters:
         for end in pair:
@@ -289,7 +289,7 @@ class _Scripted:
 
     def read(self) -> bytes:
         if not self.steps:
-            raise Ended
+            raise EndOfStream
         step = self.steps.pop(0)
         if isinstance(step, Exception):
             raise step
@@ -307,7 +307,9 @@ def test_half_a_frame_before_a_cut_is_not_joined_to_what_follows(tmp_path: Path)
     info = info_frame({"channels": ["light"], "unit_per_count": 1})
     half = sample_frame(10, 10_000, (10,))[:6]
     status = run_session(
-        _Scripted(info + _frames(0, 10) + half, Gone("pulled"), _frames(12, 10)), tmp_path / "r", about={}
+        _Scripted(info + _frames(0, 10) + half, ConnectionLost("pulled"), _frames(12, 10)),
+        tmp_path / "r",
+        about={},
     )
     np.testing.assert_array_equal(table(tmp_path / "r")["sequence"], [*range(10), *range(12, 22)])
     assert status["lost"] == 2

@@ -26,7 +26,7 @@ from mu_addon.run.progress import Progress
 from mu_addon.usecases.export import run as exporting
 from mu_addon.usecases.export import specimens
 from mu_addon.usecases.export.job import Job, path_of
-from mu_addon.usecases.export.print_offsets import read_sheet, sheet, taken_off
+from mu_addon.usecases.export.print_offsets import compensation_offsets, gauge_sheet, read_sheet
 from mu_addon.usecases.export.run import USE_CASE as EXPORT
 from mu_addon.usecases.export.specimens import USE_CASE as SPECIMENS
 
@@ -243,23 +243,23 @@ def test_a_path_is_a_window_or_a_row_of_the_search(tmp_path):
 
 def test_calliper_sheets_become_offsets(tmp_path):
     path = tmp_path / "gauge.csv"
-    rows = [line.split(",") for line in sheet().splitlines()]
+    rows = [line.split(",") for line in gauge_sheet().splitlines()]
     for row in rows[1:]:
         offset = 0.08 if row[2] == "z" else 0.15
         row[4] = f"{float(row[3]) + (2 if row[1] == 'solid' else -2) * offset:.3f}"
     path.write_text("\n".join(",".join(row) for row in rows))
-    found, source = taken_off(SMALL, str(path))
+    found, source = compensation_offsets(SMALL, str(path))
     assert found == pytest.approx((0.15, 0.08), abs=1e-3)
     assert source.startswith("gauge.csv: 0.150 +- 0.00")
-    path.write_text(sheet())
+    path.write_text(gauge_sheet())
     with pytest.raises(InputError, match="0 sizes were measured"):
         read_sheet(path)
-    path.write_text(sheet().replace("0.9,\n", "0.9,9.0\n"))
+    path.write_text(gauge_sheet().replace("0.9,\n", "0.9,9.0\n"))
     with pytest.raises(InputError, match="x1 measured as"):
         read_sheet(path)
     with pytest.raises(InputError, match="no print offset"):
-        taken_off(SMALL, "unit")
-    assert taken_off(SMALL, None) == ((0.0, 0.0), "")
+        compensation_offsets(SMALL, "unit")
+    assert compensation_offsets(SMALL, None) == ((0.0, 0.0), "")
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from mu_addon.run.folder import keep_inputs, same_inputs
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.parameter_study.sampling import sample
 from mu_addon.usecases.parameter_study.sensitivity import main_effect, pareto_front
-from mu_addon.usecases.parameter_study.variable import Variable, names
+from mu_addon.usecases.parameter_study.variable import Variable, variable_names
 
 GOOD = """
 format = 1
@@ -73,7 +73,7 @@ def test_two_to_the_m_sobol_points_are_balanced():
 
 
 def test_every_input_has_its_name():
-    known = names()
+    known = variable_names()
     for name in (
         "scale",
         "chambers.wall_mm",

@@ -13,7 +13,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...design.gripper import Gripper
-from ...design.steps import Given
+from ...design.steps import StepInputs
 from ...errors import MuError
 from ..preview import materials, skeletons
 from ..shared import updates
@@ -88,7 +88,7 @@ def rebuild(root: Any) -> bool:
 
 
 def _draw(root: Any, gripper: Gripper) -> None:
-    given = Given(gripper.unit, gripper.path)
+    given = StepInputs(gripper.unit, gripper.path)
     drawn = {}
     for step in SHOWN:
         name, draw = unit_object.DRAWN[step]

@@ -15,7 +15,7 @@ from ...design.anchors import anchor_points, windows
 from ...design.block import FACES
 from ...design.lattice import Graph
 from ...design.parameters import Unit
-from ...design.steps import Path, Section, Struts, Trimmed, along
+from ...design.steps import Path, Section, Struts, TrimmedStruts, along
 from ...design.waveguide import Bar
 from ..shared.texts import path_symbol
 
@@ -85,7 +85,7 @@ def boxes(graph: Graph | None) -> Skeleton | None:
     return Skeleton(points * (graph.cell / whole), np.unique(np.sort(edges, axis=1), axis=0))
 
 
-def lines(trimmed: Trimmed | None, cut: bool) -> Skeleton | None:
+def lines(trimmed: TrimmedStruts | None, cut: bool) -> Skeleton | None:
     """Axes of the struts that show; with `cut`, those at x <= 0."""
     return None if trimmed is None else lattice(Struts(trimmed, None), cut)
 

@@ -166,11 +166,11 @@ def _check(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
 
 def _export(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
     from ...usecases.export.job import LAYOUT, Job, resin_of
-    from ...usecases.export.print_offsets import taken_off
+    from ...usecases.export.print_offsets import compensation_offsets
 
     settings, path = root.mu_print, path_of(root, unit)
     source = {"none": None, "unit": "unit", "gauge": bpy.path.abspath(settings.gauge)}[settings.compensate]
-    offsets, origin = taken_off(unit, source)
+    offsets, origin = compensation_offsets(unit, source)
     return LAYOUT, Job(
         unit=unit,
         resin=resin_of(None),

@@ -6,7 +6,7 @@ from typing import Any
 
 from ...design.anchors import windows
 from ...design.parameters import Unit
-from ...design.steps import STEPS, Given, Stack, Step
+from ...design.steps import STEPS, Stack, Step, StepInputs
 from ..body import state as bodies
 
 STACK = Stack()
@@ -38,13 +38,13 @@ def can_be_muted(name: str) -> bool:
     return name in STEPS and bool(STEPS[name].muting)
 
 
-def given(root: Any, unit: Unit, quality: str = "interactive") -> Given:
+def given(root: Any, unit: Unit, quality: str = "interactive") -> StepInputs:
     """What the steps of a unit in the scene are made from; raises InputError for a body that does not fit."""
     # A unit of fewer chambers has fewer paths: the chosen one waits until it is there again.
     path = root.mu_unit.path
     known = path in {window.name for window in windows(unit.chambers.count)}
     body = bodies.envelope_in(root, unit)
-    return Given(unit, path if known else "", muted(root.mu_unit), quality, body)
+    return StepInputs(unit, path if known else "", muted(root.mu_unit), quality, body)
 
 
 def own_parameters(step: Step) -> list[tuple[str, str]]:

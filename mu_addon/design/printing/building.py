@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from . import layers
 from .drain import Chambers
-from .finding import MOST_PLACES, Finding, Points, Severity, gathered, numbered
+from .finding import MOST_PLACES, Finding, Points, Severity, clustered, counted
 from .printer import Printer
 from .voxels import VoxelColumns
 
 
-def building(
+def build_findings(
     built: VoxelColumns, chambers: Chambers, printer: Printer
 ) -> tuple[list[Finding], dict[str, float]]:
     """Findings of a build, its columns along the build direction a layer high, and its cups in ml."""
@@ -45,7 +45,7 @@ def _islands(name: str, places: Points, printer: Printer, severity: Severity, re
     return Finding(
         name,
         severity if len(places) else "pass",
-        numbered(
+        counted(
             len(places), "region starts without support (island)", "regions start without support (islands)"
         ),
         float(len(places)),
@@ -84,7 +84,7 @@ def _spans(
     limit = printer.limits[key]
     bad = mine & (size > limit.value)
     most = float(size[mine].max(initial=0.0))
-    worst = gathered(places[bad], size[bad])
+    worst = clustered(places[bad], size[bad])
     where = "between supports" if name == "bridge" else "beyond support"
     return Finding(
         name,

@@ -15,14 +15,14 @@ from ..parameters import Unit
 from ..surface import Triangles, Vertices, stl_bytes, stl_surface, volume
 from ..waveguide import waveguide
 from . import faces
-from .building import building
+from .building import build_findings
 from .crossing import crossings
-from .drain import chambers, room
-from .finding import NOWHERE, Finding, Severity, at_least, gathered, none_of
-from .leaks import drains
+from .drain import chambers, distance_field
+from .finding import NOWHERE, Finding, Severity, at_least, clustered, none_of
+from .leaks import drainage_findings
 from .orientation import Build, fits, orientations
 from .printer import Printer
-from .thickness import across, samples
+from .thickness import cast_rays, samples
 from .voxels import frame_along, voxel_columns
 from .walls import chamber_walls, narrowest, thinnest
 
@@ -101,14 +101,14 @@ def check(
     if "thickness" in stages:
         with stage("thickness and gaps"):
             surface = samples(vertices, triangles, SPACING)
-            inward = across(solid, surface, -1, max(3.0, 2.0 * printer["wall_mm"]))
-            outward = across(solid, surface, 1, 2.0 * printer["gap_mm"])
+            inward = cast_rays(solid, surface, -1, max(3.0, 2.0 * printer["wall_mm"]))
+            outward = cast_rays(solid, surface, 1, 2.0 * printer["gap_mm"])
             found += [thinnest(surface, inward, printer), narrowest(surface, outward, printer)]
     if "chambers" in stages:
         with stage("chambers and drains"):
             step = _step(STEP, vertices)
-            pockets = chambers(room(voxel_columns(*seen, step)))
-            found += drains(solid, pockets, unit, printer)
+            pockets = chambers(distance_field(voxel_columns(*seen, step)))
+            found += drainage_findings(solid, pockets, unit, printer)
             figures["chamber_ml"] = sum(p.volume for p in pockets.found) / 1e3
             if "thickness" in stages:
                 lit = pockets.hold(surface.points + step * surface.normals)
@@ -117,7 +117,7 @@ def check(
     if "layers" in stages:
         with stage("layers"):
             built = voxel_columns(*seen, _step(STEP, vertices), printer["layer_mm"], frame_along(up))
-            more, ml = building(built, pockets, printer)
+            more, ml = build_findings(built, pockets, printer)
             found += more
             figures |= ml
     builds: list[Build] = []
@@ -134,7 +134,7 @@ def _faces(vertices: Vertices, triangles: Triangles) -> tuple[list[Finding], Tri
     middles = vertices[triangles].mean(axis=1)
     twice = faces.doubled(triangles)
     words = ("triangle lies on another", "triangles lie on others")
-    places = gathered(middles[twice])
+    places = clustered(middles[twice])
     found = [none_of("doubled faces", int(twice.sum()), places, words, "remove one of each pair")]
     triangles, middles = triangles[~twice], middles[~twice]
     places, count = faces.open_places(vertices, triangles)
@@ -142,12 +142,12 @@ def _faces(vertices: Vertices, triangles: Triangles) -> tuple[list[Finding], Tri
     found.append(none_of("open edges", count, places, words, "close the holes"))
     over = faces.turned(vertices, triangles)
     words = ("triangle is flipped", "triangles are flipped")
-    found.append(none_of("flipped faces", int(over.sum()), gathered(middles[over]), words, "flip them"))
+    found.append(none_of("flipped faces", int(over.sum()), clustered(middles[over]), words, "flip them"))
     triangles = np.where(over[:, None], triangles[:, ::-1], triangles)
     cut = crossings(vertices, triangles)
     words = ("edge passes through another triangle", "edges pass through other triangles")
     remedy = "unite the parts before export"
-    found.append(none_of("self-intersection", len(cut), gathered(cut), words, remedy))
+    found.append(none_of("self-intersection", len(cut), clustered(cut), words, remedy))
     if count:
         return found, triangles, False
     shells = faces.pieces(vertices, triangles)

@@ -45,7 +45,7 @@ class Chamber:
 
 
 @attrs.frozen(eq=False)
-class Room:
+class DistanceField:
     """Distance in mm, up to DEEP, from the centre of every free cell to the surface; 0 in the solid.
 
     A cell's distance is to the nearest solid cell's centre less half a cell: within half a cell of true.
@@ -80,7 +80,7 @@ class Chambers:
         return tuple(np.clip(cell, 0, np.array(grid.shape) - 1).T)
 
 
-def room(columns: VoxelColumns) -> Room:
+def distance_field(columns: VoxelColumns) -> DistanceField:
     """Distances of a grid of cubes, slab by slab, so that memory beside the answer does not grow."""
     from scipy.ndimage import distance_transform_edt
 
@@ -103,10 +103,10 @@ def room(columns: VoxelColumns) -> Room:
     # The grid ends two cells beside the part: its rim stands for all the room beyond.
     for side in (0, -1):
         distance[side] = distance[:, side] = distance[:, :, side] = DEEP
-    return Room(columns, distance)
+    return DistanceField(columns, distance)
 
 
-def chambers(space: Room, smallest_radius: float = 1.0) -> Chambers:
+def chambers(space: DistanceField, smallest_radius: float = 1.0) -> Chambers:
     """Pockets that narrow toward the outside, the largest first, with every way out that the grid shows.
 
     Ways out are found down to a radius of about 0.87 of a cell: what passes through a wall of cells.
@@ -278,7 +278,7 @@ def _passage(
     return np.stack(np.unravel_index(np.array(way), free.shape), axis=1) - 1
 
 
-def _opening(space: Room, cells: NDArray[np.int64], radius: float) -> Opening:
+def _opening(space: DistanceField, cells: NDArray[np.int64], radius: float) -> Opening:
     """The opening where a way of cells (n, 3) is narrowest, halfway if it is so for a while."""
     width = space.distance[tuple(cells.T)]
     narrowest = np.flatnonzero(width <= width.min() + 1e-3)

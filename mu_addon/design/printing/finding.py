@@ -47,7 +47,7 @@ class Finding:
         return attrs.asdict(self)
 
 
-def gathered(points: Points, badness: NDArray[np.float64] | None = None, reach: float = 1.0) -> Points:
+def clustered(points: Points, badness: NDArray[np.float64] | None = None, reach: float = 1.0) -> Points:
     """One place (k, 3) for each group of points (n, 3) that lie within `reach` mm of one another.
 
     It is the group's worst point, of the greatest badness (n,), or its middle; the worst group comes first,
@@ -79,7 +79,7 @@ def none_of(name: str, number: int, places: Points, what: tuple[str, str], remed
     return Finding(
         name,
         "error" if number else "pass",
-        numbered(number, *what),
+        counted(number, *what),
         float(number),
         0.0,
         "",
@@ -118,6 +118,6 @@ def at_least(
     )
 
 
-def numbered(number: int, one: str, several: str) -> str:
+def counted(number: int, one: str, several: str) -> str:
     """`1 triangle lies on another`, `3 triangles lie on others`."""
     return f"{number} {one if number == 1 else several}"

@@ -10,13 +10,13 @@ from .. import shapes
 from ..dimensions import Dimensions
 from ..parameters import Unit
 from .drain import Chambers, Opening
-from .finding import NOWHERE, Finding, Points, numbered
+from .finding import NOWHERE, Finding, Points, counted
 from .neck import necks
 from .printer import Printer
 from .voxels import frame_along
 
 
-def drains(solid: Any, chambers: Chambers, unit: Unit | None, printer: Printer) -> list[Finding]:
+def drainage_findings(solid: Any, chambers: Chambers, unit: Unit | None, printer: Printer) -> list[Finding]:
     """Whether every chamber of a Manifold drains through its inlet, and through nothing else.
 
     Without a unit a chamber's widest way out is taken for its inlet, and others are warned of.
@@ -45,7 +45,7 @@ def drains(solid: Any, chambers: Chambers, unit: Unit | None, printer: Printer) 
         Finding(
             "leaks",
             ("error" if unit is not None else "warning") if leaks else "pass",
-            numbered(len(leaks), "way", "ways")
+            counted(len(leaks), "way", "ways")
             + f" out of chambers beside their inlet{wide}; leaks: holes below {1.75 * step:.2g} "
             "mm are too small for this test",
             float(len(leaks)),
@@ -64,7 +64,7 @@ def drains(solid: Any, chambers: Chambers, unit: Unit | None, printer: Printer) 
             Finding(
                 "drain",
                 "error",
-                numbered(len(closed), "chamber does not drain", "chambers do not drain"),
+                counted(len(closed), "chamber does not drain", "chambers do not drain"),
                 0.0,
                 limit.value,
                 "mm",
@@ -107,7 +107,7 @@ def _leak_test(solid: Any, chambers: Chambers, unit: Unit, leaks: Points) -> Fin
     volumes = [shell.volume() for shell in stopped.decompose() if shell.volume() < 0.0]
     sealed = len(volumes) - before
     tight = sealed == 1
-    words = f"with the inlet plugged {numbered(sealed, 'chamber is', 'chambers are')} sealed off"
+    words = f"with the inlet plugged {counted(sealed, 'chamber is', 'chambers are')} sealed off"
     if tight:
         words += f", of {-sum(volumes) / 1e3:.4g} ml"
     elif not len(leaks) and not before:

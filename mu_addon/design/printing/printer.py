@@ -10,7 +10,7 @@ import attrs
 
 from ...errors import InputError
 from ...reading import file_text
-from ...toml_writer import Noted, toml_text
+from ...toml_writer import Commented, toml_text
 from ..assets import asset_file, asset_names
 from ..toml_text import parse, place
 
@@ -93,7 +93,7 @@ def printer_text(printer: Printer) -> str:
     values: dict[str, Any] = {"format": 1, "name": printer.name, "title": printer.title}
     for name, limit in printer.limits.items():
         table = {"value": limit.value, "source": limit.source, "assumed": limit.assumed}
-        values[name] = Noted(table, (MEANING[name],))
+        values[name] = Commented(table, (MEANING[name],))
     return toml_text(values)
 
 

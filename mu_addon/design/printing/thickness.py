@@ -27,7 +27,7 @@ class Samples:
 
 
 @attrs.frozen(eq=False)
-class Across:
+class RayHits:
     """What rays from samples met: distance (s,) in mm, inf beyond reach; where (s, 3); and the cosine (s,)
     between the sample's normal and that of the triangle met, -1 where the two faces are parallel."""
 
@@ -56,7 +56,7 @@ def samples(vertices: Vertices, triangles: Triangles, spacing: float) -> Samples
     return Samples(points, (normal / np.maximum(double, 1e-300)[:, None])[owner], owner, area)
 
 
-def across(solid: Any, surface: Samples, side: int, reach: float) -> Across:
+def cast_rays(solid: Any, surface: Samples, side: int, reach: float) -> RayHits:
     """Rays through a Manifold from every sample, inward (side = -1) or outward (+1), `reach` mm long.
 
     Thickness and gap are exact for parallel faces, cylinders and balls met through their centres; a wedge
@@ -74,4 +74,4 @@ def across(solid: Any, surface: Samples, side: int, reach: float) -> Across:
             break
     distance = START + reach * share
     at = surface.points + np.where(np.isfinite(distance), distance, 0.0)[:, None] * direction
-    return Across(distance, at, np.einsum("ij,ij->i", normal, surface.normals))
+    return RayHits(distance, at, np.einsum("ij,ij->i", normal, surface.normals))

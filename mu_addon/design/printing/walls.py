@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .finding import MOST_PLACES, NOWHERE, Finding, Severity, gathered
+from .finding import MOST_PLACES, NOWHERE, Finding, Severity, clustered
 from .printer import Printer
-from .thickness import Across, Samples
+from .thickness import RayHits, Samples
 
 OPPOSED = -0.9
 """Cosine between two faces up to which what lies between them is a wall or a gap and not a wedge."""
 
 
-def thinnest(surface: Samples, inward: Across, printer: Printer) -> Finding:
+def thinnest(surface: Samples, inward: RayHits, printer: Printer) -> Finding:
     """The thinnest solid, by rays into it."""
     return _measured(
         "thinnest solid",
@@ -28,7 +28,7 @@ def thinnest(surface: Samples, inward: Across, printer: Printer) -> Finding:
     )
 
 
-def narrowest(surface: Samples, outward: Across, printer: Printer) -> Finding:
+def narrowest(surface: Samples, outward: RayHits, printer: Printer) -> Finding:
     """The narrowest gap, by rays out of the solid."""
     remedy = "widen it, or close it in the drawing: resin may close it in print"
     facing = outward.cosine < OPPOSED
@@ -38,7 +38,7 @@ def narrowest(surface: Samples, outward: Across, printer: Printer) -> Finding:
 def _measured(
     name: str,
     surface: Samples,
-    rays: Across,
+    rays: RayHits,
     counts: NDArray[np.bool_],
     printer: Printer,
     key: str,
@@ -56,7 +56,7 @@ def _measured(
             name, "pass", words, np.nan, limit.value, "mm", NOWHERE, 0, limit.source, limit.assumed
         )
     middle = 0.5 * (surface.points + rays.at)
-    places = gathered(middle[bad], -width[bad]) if bad.any() else middle[[int(width.argmin())]]
+    places = clustered(middle[bad], -width[bad]) if bad.any() else middle[[int(width.argmin())]]
     return Finding(
         name,
         severity if bad.any() else "pass",
@@ -74,7 +74,7 @@ def _measured(
 
 
 def chamber_walls(
-    surface: Samples, inward: Across, between: NDArray[np.bool_], printer: Printer
+    surface: Samples, inward: RayHits, between: NDArray[np.bool_], printer: Printer
 ) -> list[Finding]:
     """The wall between chambers and the outside; nothing where there is no chamber."""
     if not between.any():

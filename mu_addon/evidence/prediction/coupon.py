@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import InputError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
-from .specimen import NEW, machine, pasts, recorded
+from .specimen import NEW, machine, recorded, strain_histories
 
 Array = np.ndarray[Any, Any]
 
@@ -50,7 +50,7 @@ class CouponStress:
     effects = EFFECTS
 
     def __init__(self, experiments: Sequence[Experiment] = ()) -> None:
-        self._pasts = pasts(experiments, KIND)
+        self._histories = strain_histories(experiments, KIND)
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
         """The predicted column: nominal stress in kPa."""
@@ -70,7 +70,7 @@ class CouponStress:
             stress = yeoh(c1, c2, mode, 1 + strain)
             return stress * np.where(strain < 0, 1 + excess, 1.0) if excess else stress
 
-        return recorded(experiment, law, values, self._pasts.get(experiment.name, NEW))[None]
+        return recorded(experiment, law, values, self._histories.get(experiment.name, NEW))[None]
 
 
 def yeoh(c1: float, c2: float, mode: str, stretch: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...measured import Experiment
 from ..effect import Effect, Parameter
-from .unit import TIMED, lagged
+from .unit import TIMED, first_order_lag
 
 Array = np.ndarray[Any, Any]
 
@@ -97,7 +97,7 @@ class ChamberPressure:
         initial = get(_initial(experiment), None)
         initial = beginning_kPa(experiment) if initial is None else initial
         time = experiment["time_s"] - experiment["time_s"][0] - get(_shut(experiment), 0.0)
-        p = held(
+        p = chamber_pressure(
             time,
             initial,
             loss_per_s=get("leak.loss_per_s", 0.0),
@@ -126,7 +126,7 @@ def _shut(experiment: Experiment) -> str:
     return f"shut_s of {experiment.name}"
 
 
-def held(
+def chamber_pressure(
     time_s: Array,
     initial_kPa: float,
     *,
@@ -164,7 +164,8 @@ def held(
         before = p
         if creep_per_kPa:
             grown = creep_per_kPa * sum(
-                lagged(t, p, tau) - p[0] * np.exp(-t / tau) for tau in onset_s * 10.0 ** np.arange(DECADES)
+                first_order_lag(t, p, tau) - p[0] * np.exp(-t / tau)
+                for tau in onset_s * 10.0 ** np.arange(DECADES)
             )
         gas = np.ones_like(t)
         if loss_per_s:

@@ -13,7 +13,7 @@ import numpy as np
 from ...homogenize.offset_response import OffsetResponse
 from ...measured import Experiment
 from ..effect import Effect, Parameter
-from .specimen import NEW, machine, pasts, recorded
+from .specimen import NEW, machine, recorded, strain_histories
 
 Array = np.ndarray[Any, Any]
 
@@ -192,7 +192,7 @@ class LatticeStress:
         scalings: Mapping[str, Scaling] = MappingProxyType({}),
         curve: Callable[[Array], Array] = _linear,
     ) -> None:
-        self._pasts = pasts(experiments, KIND)
+        self._histories = strain_histories(experiments, KIND)
         self.scalings = scalings
         most = min(
             (self._scaling(e).largest_offset_mm(e.scale) for e in experiments if e.kind == KIND),
@@ -229,7 +229,7 @@ class LatticeStress:
             # Slope 1 at first; a strain near 1/closing would be beyond the last gap between struts.
             return stress / np.maximum(1 - closing * strain, 0.02) if closing else stress
 
-        found = [recorded(experiment, law, values, self._pasts.get(experiment.name, NEW))]
+        found = [recorded(experiment, law, values, self._histories.get(experiment.name, NEW))]
         if "mass_g" in self.channels(experiment):
             mass = values.get(DENSITY.name, DENSITY.null) * (_volume_cm3(experiment) or 0.0)
             mass *= scaling.mass(experiment.scale, offset)

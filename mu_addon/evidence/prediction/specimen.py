@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import ConvergenceError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
-from .unit import REFERENCE_C, TIMED, lagged
+from .unit import REFERENCE_C, TIMED, first_order_lag
 
 Array = np.ndarray[Any, Any]
 # Stress (n,) in kPa of strain (n,) at rest: 0 at 0, and rising.
@@ -65,35 +65,37 @@ def machine(kind: str) -> tuple[Effect, ...]:
 
 
 @attrs.frozen
-class Past:
+class StrainHistory:
     """History of a specimen before an experiment: number of tests, largest absolute strain (no unit)."""
 
     tests: int = 0
     strain: float = 0.0
 
 
-NEW = Past()
+NEW = StrainHistory()
 
 
-def pasts(experiments: Sequence[Experiment], kind: str) -> dict[str, Past]:
+def strain_histories(experiments: Sequence[Experiment], kind: str) -> dict[str, StrainHistory]:
     """The history of each experiment of a kind, by its name.
 
     experiments: in the order they were run. Those of one specimen and scale follow one another; an experiment
     without a specimen's name has a new one.
     """
-    found: dict[str, Past] = {}
-    now: dict[Any, Past] = {}
+    found: dict[str, StrainHistory] = {}
+    now: dict[Any, StrainHistory] = {}
     for e in experiments:
         if e.kind != kind:
             continue
         # A specimen without a name is taken for a fresh one.
         whose = (e.specimen or e.name, e.scale)
         past = found[e.name] = now.get(whose, NEW)
-        now[whose] = Past(past.tests + 1, max(past.strain, float(np.abs(e["strain"]).max())))
+        now[whose] = StrainHistory(past.tests + 1, max(past.strain, float(np.abs(e["strain"]).max())))
     return found
 
 
-def recorded(experiment: Experiment, law: Law, values: Mapping[str, float], past: Past = NEW) -> Array:
+def recorded(
+    experiment: Experiment, law: Law, values: Mapping[str, float], past: StrainHistory = NEW
+) -> Array:
     """Nominal stress (n,) in kPa that the machine records at the experiment's strains.
 
     law: stress (n,) in kPa of strain (n,) in slow loading. Faces close a gap g while the load builds up: the
@@ -124,7 +126,7 @@ def recorded(experiment: Experiment, law: Law, values: Mapping[str, float], past
     )
 
 
-def _factor(experiment: Experiment, values: Mapping[str, float], past: Past) -> float:
+def _factor(experiment: Experiment, values: Mapping[str, float], past: StrainHistory) -> float:
     """What the modulus is multiplied by: direction, temperature, tests before."""
     factor = 1.0
     if experiment.axis in ("x", "y"):
@@ -160,7 +162,7 @@ def _seated(experiment: Experiment, law: Law, values: Mapping[str, float]) -> La
 
 
 def _remembering(
-    experiment: Experiment, law: Law, strain: Array, values: Mapping[str, float], past: Past
+    experiment: Experiment, law: Law, strain: Array, values: Mapping[str, float], past: StrainHistory
 ) -> Array:
     """Stress (n,) of a specimen whose strain (n,) is known, with what it remembers of earlier strain."""
     stress = law(strain)
@@ -174,7 +176,7 @@ def _remembering(
         stress = stress * (1 - softening * erf((most - energy) / width))
     if (share := values.get("viscoelasticity.share", 0.0)) and "time_s" in experiment.columns:
         # Relaxing from equilibrium: sigma = sigma_0 - share of what the dashpot has given way.
-        stress = stress - share * lagged(
+        stress = stress - share * first_order_lag(
             experiment["time_s"], stress, values.get("viscoelasticity.time_s", 1.0)
         )
     return stress

@@ -130,7 +130,7 @@ class UnitResponse:
 
 
 @attrs.frozen
-class Past:
+class PressureHistory:
     """History of a specimen before an experiment: pressure cycles, lowest and highest pressure in kPa."""
 
     cycles: float = 0.0
@@ -138,21 +138,21 @@ class Past:
     peak_kPa: float = 0.0
 
 
-def histories(experiments: Sequence[Experiment]) -> dict[str, Past]:
+def pressure_histories(experiments: Sequence[Experiment]) -> dict[str, PressureHistory]:
     """The history of each unit_pressure experiment, by its name.
 
     experiments: in the order they were run; those of one specimen and scale follow one another.
     """
-    found: dict[str, Past] = {}
-    now: dict[tuple[str, float], Past] = {}
+    found: dict[str, PressureHistory] = {}
+    now: dict[tuple[str, float], PressureHistory] = {}
     for e in experiments:
         if e.kind != KIND:
             continue
         p = e["pressure_kPa"]
         whose = (e.specimen, e.scale)
-        past = now.get(whose, Past())
+        past = now.get(whose, PressureHistory())
         found[e.name] = past
-        now[whose] = Past(
+        now[whose] = PressureHistory(
             past.cycles + float(cycles(p)[-1]),
             min(past.trough_kPa, float(p.min())),
             max(past.peak_kPa, float(p.max())),
@@ -253,7 +253,7 @@ class UnitPressure:
         if not responses:
             raise InputError("no response of the unit is given", "unit_pressure", "simulate the unit first")
         self._responses = tuple(responses)
-        self._past = histories(experiments)
+        self._past = pressure_histories(experiments)
         self._nearest: dict[tuple[float, float], UnitResponse] = {}
         self._zeros = {r.channels: tuple(map(_zero, r.channels)) for r in self._responses}
         self.channels_known = self._responses[0].channels
@@ -316,7 +316,7 @@ class UnitPressure:
     def effective_kPa(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
         """Pressure (n,) in kPa at which the base unit would stand where the unit of these values stands."""
         t, p = experiment["time_s"], experiment["pressure_kPa"]
-        past = self._past.get(experiment.name, Past())
+        past = self._past.get(experiment.name, PressureHistory())
         get = values.get
         if delay := get("clock_offset.offset_s", 0.0):
             p = np.interp(t - delay, t, p)
@@ -328,7 +328,7 @@ class UnitPressure:
         if leak:
             # The line feeds the leak: tau dp_c/dt = p - p_c - leak p_c.
             p, lag = p / (1.0 + leak), lag / (1.0 + leak)
-        p = lagged(t, p, lag)
+        p = first_order_lag(t, p, lag)
         modulus: Any = get("modulus_factor", 1.0)
         if per_K := get("temperature_drift.per_K", 0.0):
             kelvin = experiment.temperature_C - REFERENCE_C
@@ -339,13 +339,15 @@ class UnitPressure:
         p = p / modulus
         if share := get("viscoelasticity.share", 0.0):
             time = get("viscoelasticity.time_s", 1.0) / (1.0 - share)
-            p = (1.0 - share) * p + share * lagged(t, p, time)
+            p = (1.0 - share) * p + share * first_order_lag(t, p, time)
         if share := get("rate_independent_hysteresis.share", 0.0):
-            p = (1.0 - share) * p + share * play(p, get("rate_independent_hysteresis.threshold_kPa", 2.0))
+            p = (1.0 - share) * p + share * play_operator(
+                p, get("rate_independent_hysteresis.threshold_kPa", 2.0)
+            )
         if softening := get("mullins_softening.softening", 0.0):
             width = get("mullins_softening.energy_share", 0.3) * self._reference_kPa**2
             before = max(past.peak_kPa, -past.trough_kPa) / get("modulus_factor", 1.0)
-            p = p / softened(p, before, softening, width)
+            p = p / mullins_softening(p, before, softening, width)
         return p
 
     def _response(self, experiment: Experiment) -> UnitResponse:
@@ -374,7 +376,7 @@ def _turn(degrees: float) -> float:
     return (degrees + 180.0) % 360.0 - 180.0
 
 
-def lagged(t: Array, p: Array, time_s: float) -> Array:
+def first_order_lag(t: Array, p: Array, time_s: float) -> Array:
     """Solution (n,) of time_s dx/dt + x = p from equilibrium, in the unit of p.
 
     t (n,): times in s. Exact for p (n,) linear between its samples; p itself where time_s is not positive.
@@ -402,7 +404,7 @@ def _weights(h: Any, time_s: float) -> tuple[Any, Any, Any]:
     return a, mean - a, 1.0 - mean
 
 
-def play(p: Array, threshold: float) -> Array:
+def play_operator(p: Array, threshold: float) -> Array:
     """Play operator (n,) of p (n,) with half-width `threshold`, in the unit of p; it begins in the middle."""
     moves = np.diff(p)
     at = np.flatnonzero(moves)
@@ -418,7 +420,7 @@ def play(p: Array, threshold: float) -> Array:
     return np.minimum(np.maximum(held, p - threshold), p + threshold)
 
 
-def softened(p: Array, before_kPa: float, softening: float, width: float) -> Array:
+def mullins_softening(p: Array, before_kPa: float, softening: float, width: float) -> Array:
     """Share (n,) of the virgin modulus left, 1 - softening erf((W_max - W)/width), Ogden and Roxburgh 1999.
 
     p (n,): pressure in kPa. W and width, in kPa^2: W is the square of the pressure, as the energy of the
@@ -436,7 +438,7 @@ def cycles(p: Array) -> Array:
 
     Reversals smaller than `DEADBAND_kPa` are ignored.
     """
-    smooth = play(p, DEADBAND_kPa)
+    smooth = play_operator(p, DEADBAND_kPa)
     travel = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(smooth)))])
     extent = float(np.ptp(smooth))
     return travel / (2.0 * extent) if extent else travel

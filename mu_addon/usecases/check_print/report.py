@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...design.printing.check import PrintCheck
-from ...design.printing.finding import Finding, numbered
+from ...design.printing.finding import Finding, counted
 from ...design.printing.orientation import Build, directions
 from ...design.printing.printer import MEANING
 from ...design.surface import Triangles, Vertices
@@ -238,7 +238,7 @@ def places_picture(
     camera = fit(parts, towards, aspect=aspect)
     image = render(parts, camera, width, round(width / aspect), background=(1.0, 1.0, 1.0), layers=4)
     caption = (
-        f"{numbered(count, 'place', 'places')}; the arrow is the build direction, away from the platform."
+        f"{counted(count, 'place', 'places')}; the arrow is the build direction, away from the platform."
     )
     return Picture(png(image), caption, "Transparent view of the part with spheres at the findings")
 

@@ -14,7 +14,7 @@ from ...errors import InputError
 COLUMNS = ("feature", "kind", "axis", "nominal_mm", "measured_mm")
 
 
-def sheet() -> str:
+def gauge_sheet() -> str:
     """The gauge's sheet as CSV text, its last column to be filled in."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -64,7 +64,7 @@ def read_sheet(path: Path) -> dict[str, tuple[float, float, float]]:
     return found
 
 
-def taken_off(unit: Unit, source: str | None) -> tuple[tuple[float, float], str]:
+def compensation_offsets(unit: Unit, source: str | None) -> tuple[tuple[float, float], str]:
     """Offsets in mm, in the plane and along z, to take off a drawing, and where they are from.
 
     source: None for nothing, "unit" for the unit's [print], else the gauge's filled sheet. Raises InputError.

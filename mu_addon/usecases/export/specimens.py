@@ -26,7 +26,7 @@ from ...run.inputs import FORMAT, read_inputs
 from ...run.usecase import UseCase
 from ...toml_writer import toml_text, toml_value
 from .job import RESIN, UNIT, read_resin
-from .print_offsets import sheet
+from .print_offsets import gauge_sheet
 
 SCALES = (0.75, 1.0, 1.5)
 CELLS = 3
@@ -175,7 +175,7 @@ def make_specimens(job: Job, folder: Path, context: RunContext) -> None:
         for done, specimen in enumerate(every, 1):
             rows.append(_written(specimen, folder, resin))
             progress.update(done / len(every))
-    write_text(folder / "gauge.csv", sheet())
+    write_text(folder / "gauge.csv", gauge_sheet())
     _write_template(every, folder / TEMPLATE)
     context.summary |= {"resin": resin.name, "density_g_per_ml": resin.density_g_per_ml, "specimens": rows}
     write_json(folder / "manifest.json", context.summary)

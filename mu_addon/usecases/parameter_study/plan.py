@@ -21,7 +21,7 @@ from ...toml_writer import toml_text
 from ..simulate_and_place.job import OF_FILES, Job, job_with, protocol_of, protocol_text
 from ..simulate_and_place.study_file import FILES, STAGES
 from .sampling import METHODS, sample
-from .variable import FILE, Inputs, Variable, put, variable
+from .variable import FILE, Inputs, Variable, changed_inputs, variable
 
 Array = np.ndarray[Any, Any]
 
@@ -100,7 +100,7 @@ class Plan:
         found = []
         for number, values in enumerate(rows, 1):
             try:
-                with_them = put(self.inputs, values, self.folder)
+                with_them = changed_inputs(self.inputs, values, self.folder)
                 job = job_with(
                     with_them.tables, "[vary]", unit=with_them.unit, protocol=with_them.protocol, workers=1
                 )

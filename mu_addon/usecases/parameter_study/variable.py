@@ -79,9 +79,9 @@ class Variable:
 def variable(name: str, given: Any, where: str) -> Variable:
     """A variable from its table in sweep.toml; raises InputError."""
     where = f"{where}, [vary] {name}"
-    if name not in names():
+    if name not in variable_names():
         raise InputError(
-            f"unknown input {name!r}{nearest(name, names())}",
+            f"unknown input {name!r}{nearest(name, variable_names())}",
             where,
             "name it as in unit.toml (chambers.wall_mm) or in study.toml (simulate.mesh.refine)",
         )
@@ -118,7 +118,7 @@ def variable(name: str, given: Any, where: str) -> Variable:
     return Variable(name, low, high, log=log, steps=steps)
 
 
-def names() -> list[str]:
+def variable_names() -> list[str]:
     """Every input that can be varied, as unit.toml and study.toml name them."""
     unit = [f"{s.section}.{d.name}" for s in SECTIONS for d in describe(s)]  # type: ignore[attr-defined]
     study = [f"{stage}.{key}" for stage, keys in SETTINGS.items() for key in keys]
@@ -136,7 +136,7 @@ class Inputs:
     tables: Mapping[str, Mapping[str, Any]]
 
 
-def put(inputs: Inputs, values: Mapping[str, Any], folder: Path) -> Inputs:
+def changed_inputs(inputs: Inputs, values: Mapping[str, Any], folder: Path) -> Inputs:
     """Inputs with some of them changed; raises InputError where the unit breaks a rule with them.
 
     folder: where a file lies that a value names.

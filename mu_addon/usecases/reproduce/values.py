@@ -11,7 +11,7 @@ import numpy as np
 
 from ...design.parameters import Unit
 from ...fem.protocol import Protocol
-from ..parameter_study.variable import Inputs, put
+from ..parameter_study.variable import Inputs, changed_inputs
 
 # The rule that keeps the sensor's volume: what the other gives is its mesh's.
 RULE = "volume_fraction"
@@ -20,7 +20,7 @@ _REST = Protocol(np.array([0.0, 1.0]), np.array([0.0, 1.0]))
 
 def with_values(unit: Unit, values: Mapping[str, Any]) -> Unit:
     """The unit with some values of other than its own, named as in unit.toml. Raises InputError."""
-    return put(Inputs(unit, _REST, {}), values, Path()).unit
+    return changed_inputs(Inputs(unit, _REST, {}), values, Path()).unit
 
 
 def unit_of_table_column(unit: Unit, scale: float, lattice_modulus_kPa: float) -> Unit:

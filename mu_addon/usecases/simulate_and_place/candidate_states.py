@@ -14,7 +14,7 @@ from ...fem.state import State
 from ...fem.trajectory import Trajectory
 from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, Evaluation, evaluation
-from ...placement.sampling import between, estimate, rounds
+from ...placement.sampling import between, relative_error, solution_order
 from ...run.cache import Cache, key
 from .candidate_pool import CandidatePool, CandidateProblem
 from .job import Job
@@ -75,7 +75,7 @@ class CandidateSolver:
         self.path_difference_mm = 0.0
 
     def _rounds(self, distinct: Array) -> list[list[int]]:
-        return rounds(distinct, self._job.effects.has_gravity)
+        return solution_order(distinct, self._job.effects.has_gravity)
 
     def _name(self, state: State) -> str:
         return key(self._key, state.pressure_MPa)
@@ -114,7 +114,7 @@ class CandidateSolver:
             if len(known) < loaded:
                 without_last = {n: d for n, d in known.items() if n != pair[-1]}
                 full, sparse = between(distinct, known), between(distinct, without_last)
-                self.error = estimate(full, sparse, weight)
+                self.error = relative_error(full, sparse, weight)
             if self.error <= SAMPLING_ERROR:
                 break
         if verify and known and not self._independent_of_path(distinct, known, still):

@@ -14,7 +14,7 @@ from mu_addon.design.anchors import anchor_points
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.profile import cavity_polygon, outer_polygon, outer_volume
-from mu_addon.design.steps import ALONG, Given, Stack
+from mu_addon.design.steps import ALONG, Stack, StepInputs
 from mu_addon.design.surface import volume
 from mu_addon.errors import InputError
 
@@ -70,7 +70,7 @@ def test_parts_show_the_cores_geometry():
 
 def test_cut_open_shows_the_wall():
 
-    given, made = Given(load_preset("mu-1.0x")), Stack()
+    given, made = StepInputs(load_preset("mu-1.0x")), Stack()
     d = given.unit.dimensions
     cut = skeletons.actuator(made.value("membranes", given), cut=True)
     assert cut.vertices[:, 0].max() < 1e-9

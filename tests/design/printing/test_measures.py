@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from mu_addon.design import shapes
 from mu_addon.design.printing import drain, faces, layers
 from mu_addon.design.printing.crossing import crossings, near_pairs
-from mu_addon.design.printing.finding import gathered
+from mu_addon.design.printing.finding import clustered
 from mu_addon.design.printing.neck import necks
 from mu_addon.design.printing.orientation import Build, directions, fits, ranked, tilted
-from mu_addon.design.printing.thickness import across, samples
+from mu_addon.design.printing.thickness import cast_rays, samples
 from mu_addon.design.printing.voxels import frame_along, voxel_columns
 
 from .parts import arrays
@@ -20,7 +20,7 @@ from .parts import arrays
 def rays(body, side, reach=6.0):
     vertices, triangles = arrays(body)
     surface = samples(vertices, triangles, 0.3)
-    return surface, across(body, surface, side, reach)
+    return surface, cast_rays(body, surface, side, reach)
 
 
 def box(*size):
@@ -197,7 +197,7 @@ def test_a_chamber_and_its_ways_out():
     """A ball's hollow with a bore of 2 mm to the top and one of 1 mm to the side."""
     hollow = box(14, 14, 14) - shapes.ball(5.0, 64)
     body = hollow - shapes.cylinder(1.0, 0, 9, 32) - shapes.cylinder(0.5, 0, 9, 32).rotate([0, 90, 0])
-    found = drain.chambers(drain.room(voxel_columns(*arrays(body), 0.2))).found
+    found = drain.chambers(drain.distance_field(voxel_columns(*arrays(body), 0.2))).found
     assert len(found) == 1
     assert found[0].volume == pytest.approx(4 / 3 * np.pi * 125, rel=0.02)
     assert np.linalg.norm(found[0].place) < 0.7
@@ -215,7 +215,7 @@ def test_a_way_out_is_the_widest_however_far_it_leads(near, monkeypatch):
     monkeypatch.setattr(drain, "NEAR", near)
     hollow = box(12, 12, 42).translate([0, 0, 14]) - shapes.ball(4.0, 48)
     body = hollow - shapes.cylinder(1.0, 0, 40, 24) - shapes.cylinder(0.5, 0, 9, 24).rotate([0, 90, 0])
-    (found,) = drain.chambers(drain.room(voxel_columns(*arrays(body), 0.25))).found
+    (found,) = drain.chambers(drain.distance_field(voxel_columns(*arrays(body), 0.25))).found
     far, side = found.openings
     assert [far.radius, side.radius] == pytest.approx([1.0, 0.5], abs=0.2)
     assert far.place[:2] == pytest.approx([0, 0], abs=0.3)
@@ -226,11 +226,13 @@ def test_a_way_out_is_the_widest_however_far_it_leads(near, monkeypatch):
 
 
 def test_a_sealed_chamber_has_no_way_out_and_an_open_frame_is_no_chamber():
-    sealed = drain.chambers(drain.room(voxel_columns(*arrays(box(12, 12, 12) - shapes.ball(4.0, 48)), 0.25)))
+    sealed = drain.chambers(
+        drain.distance_field(voxel_columns(*arrays(box(12, 12, 12) - shapes.ball(4.0, 48)), 0.25))
+    )
     assert [len(chamber.openings) for chamber in sealed.found] == [0]
     assert sealed.hold(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 5.0]])).tolist() == [True, False]
     frame = box(12, 12, 12) - box(9, 9, 14) - box(9, 14, 9) - box(14, 9, 9)
-    assert drain.chambers(drain.room(voxel_columns(*arrays(frame), 0.25))).found == []
+    assert drain.chambers(drain.distance_field(voxel_columns(*arrays(frame), 0.25))).found == []
 
 
 def test_the_shortest_cut_of_a_surface_is_its_waist():
@@ -298,8 +300,8 @@ def test_crossing_bodies_cross_along_a_known_curve():
 
 def test_places_are_gathered_by_groups_the_worst_first():
     points = np.array([[0, 0, 0], [0.3, 0, 0], [5, 0, 0], [5.2, 0, 0], [5.4, 0, 0.0]])
-    assert gathered(points) == pytest.approx(np.array([[5.2, 0, 0], [0.15, 0, 0]]))
-    assert gathered(points, np.array([1.0, 9, 2, 3, 1])) == pytest.approx(
+    assert clustered(points) == pytest.approx(np.array([[5.2, 0, 0], [0.15, 0, 0]]))
+    assert clustered(points, np.array([1.0, 9, 2, 3, 1])) == pytest.approx(
         np.array([[0.3, 0, 0], [5.2, 0, 0]])
     )
 
