@@ -75,8 +75,8 @@ def start(folder, **options):
 def finish(folder, **options):
     """Exit status of a run to its end, and its last message."""
     process = start(folder, **options)
-    said, _ = process.communicate()
-    lines = said.splitlines()
+    output, _ = process.communicate()
+    lines = output.splitlines()
     return process.returncode, json.loads(lines[-1]) if lines else {}
 
 
@@ -171,22 +171,22 @@ def disk(work, reference):
         return
     try:
         (mount / "filler").write_bytes(b"x" * 40_000_000)
-        status, told = finish(new(mount / "study"))
-        yield "20 MB free before it starts", f'exit {status} at once, "{told["what"]}"'
+        status, message = finish(new(mount / "study"))
+        yield "20 MB free before it starts", f'exit {status} at once, "{message["what"]}"'
         (mount / "filler").unlink()
         subprocess.run(["mount", "-o", "remount,ro", mount], check=True)
-        status, told = finish(mount / "study")
+        status, message = finish(mount / "study")
         subprocess.run(["mount", "-o", "remount,rw", mount], check=True)
-        yield "the disk is read-only before it starts", f'exit {status}, "{told["what"]}"'
+        yield "the disk is read-only before it starts", f'exit {status}, "{message["what"]}"'
         for pattern, what in (("cache/mesh-*", "after the mesh"), ("cache/sweep-*", "among the candidates")):
             folder = new(mount / what.split()[-1])
             process = start(folder)
             wait_for(process, folder, pattern)
             fill(mount / "filler")
-            told = json.loads(process.communicate()[0].splitlines()[-1])
+            message = json.loads(process.communicate()[0].splitlines()[-1])
             half = [p.name for p in folder.rglob("*.part*")]
             (mount / "filler").unlink()
-            outcome = f'exit {process.returncode}, "{told["what"]}"; {len(half)} half files'
+            outcome = f'exit {process.returncode}, "{message["what"]}"; {len(half)} half files'
             yield f"the disk is full {what}", f"{outcome}; then {mended(folder, reference)}"
             shutil.rmtree(folder)
         folder = new(mount / "again")
@@ -197,11 +197,11 @@ def disk(work, reference):
             time.sleep(0.005)
             if process.poll() is not None:
                 break
-        told = json.loads(process.communicate()[0].splitlines()[-1])
+        message = json.loads(process.communicate()[0].splitlines()[-1])
         subprocess.run(["mount", "-o", "remount,rw", mount], check=True)
         yield (
             "the disk is made read-only while it runs",
-            f'exit {process.returncode}, "{told["what"]}"; then {mended(folder, reference)}',
+            f'exit {process.returncode}, "{message["what"]}"; then {mended(folder, reference)}',
         )
     finally:
         subprocess.run(["umount", mount], check=False)
@@ -220,10 +220,10 @@ def small_files(work, reference):
     """A limit on the size of a file, below what the solid needs."""
     folder = new(work / "small")
     limit = 1_000_000
-    status, told = finish(
+    status, message = finish(
         folder, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
     )
-    yield "no file may exceed 1 MB", f'exit {status}, "{told["what"]}"; then {mended(folder, reference)}'
+    yield "no file may exceed 1 MB", f'exit {status}, "{message["what"]}"; then {mended(folder, reference)}'
 
 
 def damage(work, reference):
@@ -268,11 +268,11 @@ def two_at_once(work, reference):
     folder = new(work / "two")
     first = start(folder)
     wait_for(first, folder, "cache/mesh-*")
-    status, told = finish(folder)
+    status, message = finish(folder)
     first.communicate()
     yield (
         "a second run in the same folder",
-        f'exit {status}, "{told["what"].split(":")[0]}"; the first: {mended(folder, reference)}',
+        f'exit {status}, "{message["what"].split(":")[0]}"; the first: {mended(folder, reference)}',
     )
 
 
@@ -297,8 +297,8 @@ def main():
         work = Path(name)
         if given.reference is None:
             before = time.monotonic()
-            status, told = finish(new(work / "reference"))
-            assert status == 0, told
+            status, message = finish(new(work / "reference"))
+            assert status == 0, message
             print(f"A run that nothing happens to takes {time.monotonic() - before:.0f} s.\n")
         else:
             shutil.copytree(given.reference, work / "reference")

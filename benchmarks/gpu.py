@@ -69,7 +69,7 @@ class Clock:
         wp.synchronize_device(self.device)
         self.since = time.perf_counter()
 
-    def tell(self, what):
+    def lap(self, what):
         wp.synchronize_device(self.device)
         if not self.quiet:
             print(f"| {what} | {time.perf_counter() - self.since:.2f} |", flush=True)
@@ -83,20 +83,20 @@ def run(unit, mesh, device, pressure_kPa, quiet=False):
     model = Model(mesh, device=device)
     # On a CUDA device it is so from the start.
     model.solver = "conjugate gradients"
-    clock.tell(f"model, {len(model.free)} unknowns, {len(mesh.tets)} elements")
+    clock.lap(f"model, {len(model.free)} unknowns, {len(mesh.tets)} elements")
     steps = int(np.ceil(abs(pressure_kPa) / STEP_KPA))
     pressures = np.linspace(0, pressure_kPa * 1e-3, steps + 1)[1:]
     states = Equilibrium(model, materials, SETTINGS).path(pressures, rest(mesh))
     factors = sum(s.factorisations for s in states)
-    clock.tell(f"Model A, {steps} pressures, {factors} tangents")
+    clock.lap(f"Model A, {steps} pressures, {factors} tangents")
     ten = candidate_paths(anchor_points(unit), windows(6))
     shares = [sensor_share("volume_fraction", roi(mesh, one, 1.0)) for one in ten]
     points = anchor_points(unit)
     sweep = CandidateBatch(model, materials, (points, probe(mesh, points)), shares, SENSOR_MPA)
-    clock.tell(f"{len(ten)} candidates: inclusions")
+    clock.lap(f"{len(ten)} candidates: inclusions")
     for state in states:
         sweep.at(state)
-        clock.tell(f"{len(ten)} candidates at {state.pressure_MPa * 1e3:g} kPa")
+        clock.lap(f"{len(ten)} candidates at {state.pressure_MPa * 1e3:g} kPa")
     if not quiet:
         print(f"\nbending angle at {pressure_kPa:g} kPa: {bending_angle_deg(mesh, states[-1].u):.4f} degrees")
 

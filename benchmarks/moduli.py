@@ -73,8 +73,8 @@ def responses(cell, cache):
         for name, found in moduli_of(printed, cache).items():
             values[name].append(found / RESIN_MPa)
         density.append(relative_density(printed))
-        said = ", ".join(f"{n} {1e3 * RESIN_MPa * v[-1]:.3g} kPa" for n, v in values.items())
-        print(f"offset {offset:+.2f} mm: {said}; {time.perf_counter() - start:.0f} s", flush=True)
+        values_text = ", ".join(f"{n} {1e3 * RESIN_MPa * v[-1]:.3g} kPa" for n, v in values.items())
+        print(f"offset {offset:+.2f} mm: {values_text}; {time.perf_counter() - start:.0f} s", flush=True)
     return {name: OffsetResponse(OFFSETS_mm, v, density) for name, v in values.items()}
 
 

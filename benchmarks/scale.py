@@ -73,14 +73,14 @@ def child(path, kinds):
     solve_s, _ = timed(lambda: factor.solve(b))
     step_s, states = timed(lambda: Equilibrium(model, materials).path([PRESSURE_MPA], rest(problem.mesh)))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    told = {
+    figures = {
         "unknowns": len(model.free),
         "seconds": [model_s, analyse_s, factor_s, solve_s, tangent_s, residual_s, step_s],
         "cost": [states[-1].factorisations, states[-1].iterations],
         "peak": peak,
         "iterative": {kind: measure(kind, model, values, b) for kind in kinds},
     }
-    print(json.dumps(told))
+    print(json.dumps(figures))
 
 
 def exponents(unknowns, columns):

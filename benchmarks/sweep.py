@@ -30,7 +30,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.candidates import Candidate, candidate_paths, moved_points, roi, with_sensor
 from mu_addon.placement.inclusion import sensor_share
-from mu_addon.placement.influence import influence_map, telling_pressures
+from mu_addon.placement.influence import influence_map, representative_pressures
 from mu_addon.placement.sampling import rounds
 from mu_addon.usecases.simulate_and_place.candidate_pool import CandidatePool, CandidateProblem
 
@@ -105,7 +105,7 @@ def main():
         row(f"{name} paths at every pressure, after Model A, the processes' start included", took)
         swept[name] = found
     took, _ = seconds(
-        lambda: influence_map(model, materials, baseline, monitored[1], telling_pressures(baseline))
+        lambda: influence_map(model, materials, baseline, monitored[1], representative_pressures(baseline))
     )
     row("map of every element, in three of its states", took)
     for candidate in candidate_paths(points, windows(6))[: given.alone]:

@@ -34,7 +34,7 @@ from mu_addon.usecases.parameter_study.run import USE_CASE, Job  # noqa: E402
 POINTS = 200
 # What a real study of this sweep answers, so that as many bytes travel back.
 SUMMARY = ROOT / "tests" / "data" / "studies" / "format-1" / "summary.json"
-SAYS = "import sys; print(open(sys.argv[1] + '/answer.json').read())"
+PRINT_ANSWER = "import sys; print(open(sys.argv[1] + '/answer.json').read())"
 TEXT = """
 format = 1
 preset = "mu-1.0x"
@@ -58,7 +58,7 @@ def tasks(seconds=0.0):
     summary = json.loads(SUMMARY.read_text())
     answer = json.dumps({"type": "result", "summary": summary})
     extra = {"answer.json": answer, "seconds.txt": str(seconds)}
-    return [Task(p.job.texts() | extra, 2000, 1.0, version(), ("-c", SAYS)) for p in points]
+    return [Task(p.job.texts() | extra, 2000, 1.0, version(), ("-c", PRINT_ANSWER)) for p in points]
 
 
 def at_once(task):
@@ -190,8 +190,8 @@ def traffic():
             process.kill()
     task, row = tasks()[0], at_once(tasks()[0])
     print("\n| bytes a point | |\n| --- | --- |")
-    asked, told = len(json.dumps(dict(task.files))), len(json.dumps(row))
-    print(f"| inputs of a study, and its answer | {asked} and {told} |")
+    asked, answered = len(json.dumps(dict(task.files))), len(json.dumps(row))
+    print(f"| inputs of a study, and its answer | {asked} and {answered} |")
     print(f"| into the scheduler | {up / POINTS:.0f} |\n| out of the scheduler | {down / POINTS:.0f} |")
     print(f"| of these, what an idle cluster says in the meantime | {idle / 10 * taken / POINTS:.0f} |")
 

@@ -94,10 +94,10 @@ class Result:
 
     def save(self, folder: Path, name: str):
         np.save(folder / f"{name}.npy", self.u)
-        told = attrs.asdict(self, filter=lambda field, _: field.name != "u")
-        (folder / f"{name}.json").write_text(json.dumps(told, indent=1))
+        fields = attrs.asdict(self, filter=lambda field, _: field.name != "u")
+        (folder / f"{name}.json").write_text(json.dumps(fields, indent=1))
 
     @staticmethod
     def load(folder: Path, name: str):
-        told = json.loads((folder / f"{name}.json").read_text())
-        return Result(**told, u=np.load(folder / f"{name}.npy"))
+        fields = json.loads((folder / f"{name}.json").read_text())
+        return Result(**fields, u=np.load(folder / f"{name}.npy"))

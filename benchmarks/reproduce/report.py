@@ -100,13 +100,13 @@ def _open(found: LongFound) -> str:
     rows = [([o.name, f"{o.variable.low:g} to {o.variable.high:g}", o.why], False) for o in OPEN]
     html += table(f"From: {found.origin['points']}.", [("parameter", ""), ("range", ""), ("why", "")], rows)
     found_effects = effects(solved, paper)
-    told = [e for e in found_effects if e.Q2 >= _PREDICTED]
+    predicted = [e for e in found_effects if e.Q2 >= _PREDICTED]
     words = (
         "Share in percent of a result's variance due to a parameter, alone and in interaction (Sobol "
         "total index)."
     )
-    if told:
-        html += figure(charts.shares(told), words, words)
+    if predicted:
+        html += figure(charts.shares(predicted), words, words)
     head = [("figure", ""), ("least", "n"), ("most", "n"), ("variance predicted", "n")]
     rows = [
         ([signed(e.name), f"{e.low:.3g}", f"{e.high:.3g}", f"{e.Q2:.0%}" if e.Q2 > 0 else "none"], False)

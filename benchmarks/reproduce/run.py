@@ -151,7 +151,7 @@ def shipped(paper: Published) -> tuple[list[scatter.Drawn], list[OpenPoint], dic
             str(folder),
             "check out the whole repository",
         ) from error
-    origin = {"meshes": _first_words(meshes), "points": _first_words(opened)}
+    origin = {"meshes": _first_line(meshes), "points": _first_line(opened)}
     return (
         scatter.from_text(meshes, folder / MESHES),
         open_study.from_text(opened, paper.scales, names, folder / OPEN_TABLE),
@@ -159,7 +159,7 @@ def shipped(paper: Published) -> tuple[list[scatter.Drawn], list[OpenPoint], dic
     )
 
 
-def _first_words(text: str) -> str:
+def _first_line(text: str) -> str:
     lines = [line[1:].strip() for line in text.splitlines() if line.startswith("#")]
     return " ".join(lines)
 

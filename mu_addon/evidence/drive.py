@@ -50,11 +50,12 @@ def reading_noise(values: Array) -> float:
 
 
 def quietened(time_s: Array, values: Array, sd: float | None = None) -> Array:
-    """Readings (n,) with their white noise averaged away as far as they run straight, corners kept.
+    """Readings (n,), in their unit, freed of white noise by local straight lines; corners are kept.
 
-    At each sample a straight line is fitted to windows before it, after it and around it, each as wide as
-    agrees with the narrower ones; what they say is averaged by their variances. sd: of the noise, that of
-    `reading_noise` where it is not given.
+    time_s (n,): times in s. sd: standard deviation of the noise in the unit of the readings, that of
+    `reading_noise` where it is None. At each sample a line is fitted to windows before it, after it and
+    around it, each as wide as agrees with all narrower ones; the three estimates are averaged with weights of
+    one over their variances. Source: Goldenshluger and Nemirovski 1997 (intersecting confidence intervals).
     """
     sd = reading_noise(values) if sd is None else sd
     weight, total = np.zeros(len(values)), np.zeros(len(values))
@@ -110,11 +111,12 @@ def _lines(time_s: Array, values: Array, before: int, after: int) -> tuple[Array
 def without_noise(
     experiments: Sequence[Experiment], simulator: Composite
 ) -> tuple[list[Experiment], list[Experiment] | None]:
-    """The experiments with their drives `quietened`: timed columns that no simulator predicts.
+    """The experiments with their drives freed of gauge noise (`quietened`), and a copy with noise added anew.
 
-    And once more, with as much noise added to what was found and treated the same: what a model that is
-    driven by the second says of data that follow the first, it says by the gauge's noise alone. None where
-    there is no noise.
+    Drives are the columns of `DRIVES` that no simulator predicts, in experiments with time_s, at least
+    `FEWEST` rows and finite values. The copy holds the same drives with as much simulated noise, quietened
+    again: what a model driven by the copy misses of data made with the first list is due to the gauge's noise
+    alone. None in its place where no drive is noisy.
     """
     rng = np.random.default_rng(0)
     found, again = [], []

@@ -62,11 +62,13 @@ LIBRARY = {
 
 @attrs.frozen
 class Parameter:
-    """A number that a model can be fitted by: unit, bounds, source, and the `null` where it changes nothing.
+    """A parameter of a model that can be fitted: unit, bounds, source, and `null`, where it has no effect.
 
-    starts: values from which a fit begins. linear: the prediction is affine in it, with one slope whatever
-    the other values are. spread: standard deviation of what is known before any data; inf where nothing is.
-    experiment: name of the only experiment whose prediction depends on it; empty where any may.
+    low, high, null and starts are in `unit`. starts: values from which a fit begins. linear: the prediction
+    is affine in it, with one slope whatever the other values are. spread: standard deviation of what is known
+    before any data, in `unit`; inf where nothing is. experiment: name of the only experiment whose prediction
+    depends on it; empty where any may. Raises InputError where low is not below high, or the null or a start
+    is out of bounds.
     """
 
     name: str
@@ -90,7 +92,11 @@ class Parameter:
             )
 
     def narrowed(self, low: float, high: float) -> Parameter:
-        """The same between closer bounds; raises InputError where they leave the null out."""
+        """The same parameter within [low, high] and its own bounds, in its unit.
+
+        Starts outside are dropped; if none is left, the middle of the new bounds takes their place. Raises
+        InputError where the null is out of the new bounds.
+        """
         low, high = max(self.low, low), min(self.high, high)
         starts = tuple(v for v in self.starts if low <= v <= high)
         if self.starts and not starts:
@@ -99,7 +105,10 @@ class Parameter:
 
     @property
     def step(self) -> float:
-        """A change small enough for a derivative at the null, away from the nearer bound."""
+        """Step of a finite difference at the null, in the parameter's unit; negative if `high` is near.
+
+        A thousandth of the range or, if smaller, of the distance from the null to the nearest start.
+        """
         away = [abs(v - self.null) for v in self.starts if v != self.null]
         size = 1e-3 * min(self.high - self.low, *away) if away else 1e-3 * (self.high - self.low)
         return size if self.null + size <= self.high else -size
@@ -135,18 +144,24 @@ class Effect:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Names of its parameters among the values of a prediction."""
+        """Keys of its parameters in the values of a prediction, "effect.parameter"; the size comes first."""
         return tuple(f"{self.name}.{p.name}" for p in self.parameters)
 
     def starts(self) -> tuple[dict[str, float], ...]:
-        """Every combination of the starts of its parameters, the nulls of those that have none."""
+        """Values, by key, from which fits begin: every combination of its parameters' starts.
+
+        A parameter without starts takes its null. Each value is in its parameter's unit.
+        """
         combined: list[dict[str, float]] = [{}]
         for key, p in zip(self.keys, self.parameters, strict=True):
             combined = [{**c, key: v} for c in combined for v in (p.starts or (p.null,))]
         return tuple(combined)
 
     def shapes(self) -> tuple[dict[str, float], ...]:
-        """Every combination of the starts of its shape, its size at null."""
+        """The combinations of `starts` with the size (first parameter) at its null, each once, by key.
+
+        Each value is in its parameter's unit.
+        """
         key, size = self.keys[0], self.parameters[0]
         found = []
         for start in self.starts():

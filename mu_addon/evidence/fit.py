@@ -25,11 +25,13 @@ PRIOR = "known before"
 
 @attrs.frozen(eq=False)
 class Fit:
-    """A model fitted to a record: its effects, values of all that was free, and what it leaves.
+    """A model fitted to a record of N values: its effects, its fitted values and the residual.
 
-    chi2: of the whitened residual (N,), into which the zeros have been fitted. jacobian (N, k): whitened,
-    zeros projected out, in the coordinates of the fit; covariance (k, k) of those; keys (k,). prior (m, k):
-    derivative of what was known of values before, in spreads; nuisances come first.
+    values: by key, each in its parameter's unit. chi2: sum of squares of the whitened residual (N,), with the
+    linear nuisances (zeros) fitted, and of deviations from prior knowledge in standard deviations. keys (k,):
+    free parameters. jacobian (N, k): whitened derivatives in the coordinates of the fit (logarithms where
+    `logarithmic`), zeros projected out; covariance (k, k): of those coordinates. prior (m, k): derivatives of
+    the m deviations from prior knowledge. Nuisances come before effects.
     """
 
     effects: tuple[Effect, ...]
@@ -43,11 +45,14 @@ class Fit:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of its effects."""
+        """Names of its effects, in the order of `effects`."""
         return tuple(e.name for e in self.effects)
 
     def sd(self, key: str) -> float:
-        """Standard deviation of a value, by the curvature at the fit."""
+        """Standard deviation of a free value, in its parameter's unit, by the curvature of chi squared.
+
+        Raises ValueError for a key that was not free.
+        """
         i = self.keys.index(key)
         slope = self.values[key] if self._logarithmic(key) else 1.0
         return abs(slope) * math.sqrt(max(float(self.covariance[i, i]), 0.0))
@@ -61,14 +66,17 @@ class Fit:
 
 
 def logarithmic(p: Parameter) -> bool:
-    """Whether a parameter is fitted by its logarithm: positive, with bounds decades apart."""
+    """Whether a parameter is fitted by its logarithm: low and null positive, high more than 30 times low."""
     return p.low > 0 and p.high / p.low > 30 and p.null > 0
 
 
 class Fitter:
-    """Fits models to one record under one noise; `kept` (N,) are the values that count, all by default.
+    """Fits models to one record of N values by generalised least squares under given noise.
 
-    zeros_basis (N, z): orthonormal columns that span what zeros of channels can do, whitened.
+    sources: noise by group of series. kept (N,) bool: values that count, all by default. whitening: of the
+    record by these sources, where it is at hand. Attributes: curved, nuisances that are not linear; known,
+    those of them with prior knowledge; zeros_basis (N, z), orthonormal whitened columns that span what linear
+    nuisances (zeros of channels) can do.
     """
 
     def __init__(
@@ -102,24 +110,28 @@ class Fitter:
         self._own: dict[Fit, tuple[Fitter, Fit]] = {}
 
     def without(self, left_out: Array) -> Fitter:
-        """The same, for what is left when some of the N values (N,) are left out."""
+        """A fitter to the same record and noise that ignores the values where left_out (N,) is True."""
         kept = ~left_out if self._kept is None else self._kept & ~left_out
         return Fitter(self.record, self.simulator, self.sources, kept, self.whitening)
 
     def whitened(self, columns: Array) -> Array:
-        """Whitened columns (N,) or (N, k), 0 where values do not count."""
+        """Columns (N,) or (N, k) in the record's units, whitened; 0 where values do not count."""
         w = self.whitening(columns)
         if self._kept is not None:
             w[~self._kept] = 0.0
         return w
 
     def project(self, columns: Array, zeros: bool = True) -> Array:
-        """Columns (N,) or (N, k) whitened, and freed of what zeros of channels can do."""
+        """Columns (N,) or (N, k) whitened and, if `zeros`, orthogonal to what linear nuisances can do."""
         w = self.whitened(columns)
         return w - self.zeros_basis @ (self.zeros_basis.T @ w) if zeros and self.zeros_basis.shape[1] else w
 
     def deviance(self, fit: Fit) -> dict[str, float]:
-        """-2 log likelihood of a fit by group of series and of `PRIOR`, but for a constant."""
+        """-2 log likelihood of a fit, by group of series and of `PRIOR` (knowledge before any data).
+
+        Without the constant of the normal density: log determinant of the covariance plus squared whitened
+        residual.
+        """
         found = dict(self.whitening.log_dets)
         # What was known before any data has a likelihood as well.
         found[PRIOR] = fit.chi2 - float(fit.residual @ fit.residual)
@@ -129,7 +141,10 @@ class Fitter:
         return found
 
     def under_its_own_noise(self, fit: Fit) -> tuple[Fitter, Fit]:
-        """The fit under the noise that its residual shows if nothing in it has a cause."""
+        """A fitter with the noise that a fit's residual shows if it has no cause, and the fit redone by it.
+
+        Only a constant is set aside in each series (`noise.estimate`). Results are kept by fit.
+        """
         if fit not in self._own:
             left = self.record.values - self.predict(fit.values)
             constant = [np.ones((s.at.stop - s.at.start, 1)) for s in self.record.series]
@@ -138,9 +153,10 @@ class Fitter:
         return self._own[fit]
 
     def driven_again(self, fit: Fit) -> Fitter | None:
-        """A fitter to what a fit predicts, free of noise, for a model that other readings of the gauge drive.
+        """A fitter to a fit's noise-free prediction, whose model is driven by a second reading of the gauges.
 
-        Whatever gains there does so by the gauge's noise. None where gauges have none.
+        The second reading is `Record.again`. A gain in chi squared there is due to the gauges' noise alone.
+        None where the gauges have no noise.
         """
         record = self.record
         if record.again is None:
@@ -150,14 +166,17 @@ class Fitter:
         return Fitter(other, self.simulator, self.sources, self._kept, self.whitening)
 
     def zeros(self, left: Array) -> dict[str, float]:
-        """Values of the linear nuisances that take most of what is left (N,), not whitened."""
+        """Values of the linear nuisances, by name and in their units, that fit `left` best.
+
+        left (N,): residual, not whitened, in the units of the record.
+        """
         if not self._linear:
             return {}
         found = self._of_zeros @ (self.zeros_basis.T @ self.whitened(left))
         return {p.name: p.null + float(z) for p, z in zip(self._linear, found, strict=True)}
 
     def predict(self, values: Mapping[str, float]) -> Array:
-        """Prediction (N,), not whitened."""
+        """Prediction (N,) in the record's units, not whitened, for values by key; nulls where missing."""
         return self.record.predict(self.simulator, values)
 
     def fit(
@@ -166,9 +185,12 @@ class Fitter:
         start: Mapping[str, float] | None = None,
         fixed: Mapping[str, float] | None = None,
     ) -> Fit:
-        """The model with these effects, from one start (missing: null, or the first start of an effect).
+        """Minimise chi squared over the nuisances and the parameters of `effects`, from one start.
 
-        fixed: values that are not fitted.
+        start: values by key; where one is missing, the first start of its parameter, else its null. fixed:
+        values by key that are held; holding one costs its deviation from prior knowledge. Values are in the
+        parameters' units. Damped Gauss-Newton steps (Levenberg and Marquardt) within the bounds, with
+        finite-difference derivatives and at most `ITERATIONS` steps.
         """
         start, fixed = start or {}, dict(fixed or {})
         free: list[tuple[str, Parameter]] = [(p.name, p) for p in self.curved]
@@ -253,7 +275,7 @@ class Fitter:
         return Fit(effects, values, chi2, residual, keys, jacobian[:n], covariance, jacobian[n:])
 
     def best(self, effects: Sequence[Effect], starts: Sequence[Mapping[str, float]]) -> Fit:
-        """The best of the fits from several starts."""
+        """The fit of least chi squared among those from each of the starts (see `fit`), one or more."""
         return min((self.fit(effects, s) for s in starts), key=lambda found: found.chi2)
 
 

@@ -20,10 +20,12 @@ RESAMPLES = 400
 
 @attrs.frozen
 class Errors:
-    """Root mean squares of what the base and the extended model leave, in `unit`; bounds are of the drop.
+    """Root mean square residuals of the base model and the extended one, in `unit`.
 
-    permuted, black_box: of the same effects put on the wrong experiments, and of as many parameters that
-    mean nothing; nan where there is no such model.
+    low95, high95: 95 % interval of before - after, by bootstrap. permuted, black_box: residuals of the base
+    with the effects' changes taken from the wrong experiments, and with as many arbitrary correction terms as
+    the effects have parameters. All are in `unit` and nan where there is no such model. unit: last part of a
+    column's name, or "spreads" for records whose uncertainty is given.
     """
 
     before: float
@@ -35,7 +37,7 @@ class Errors:
     black_box: float = math.nan
 
     def as_json(self) -> dict[str, Any]:
-        """As in verdict.json; nan becomes null."""
+        """The entries of verdict.json by their names there; nan becomes null when written."""
         return {
             "rmse_before": self.before,
             "rmse_after": self.after,
@@ -49,10 +51,11 @@ class Errors:
 
 @attrs.frozen
 class Gain:
-    """Errors on the experiments that were fitted, and on those held out, if there are any.
+    """Errors on the experiments that were fitted, and on those held out (None without any).
 
-    Of the first quantity, an angle before markers, that tells of the effects; by_quantity holds every one
-    ("unit_pressure angle"), fitted and held out, None where nothing of it was held out.
+    fit and held_out are of one quantity: the first that an effect is about and that is clearly served better,
+    an angle before markers. by_quantity: fitted and held-out errors of every group of series ("unit_pressure
+    angle"), None where nothing of it was held out.
     """
 
     fit: Errors
@@ -60,7 +63,7 @@ class Gain:
     by_quantity: Mapping[str, tuple[Errors, Errors | None]] = attrs.field(factory=dict)
 
     def as_json(self) -> dict[str, Any]:
-        """As in verdict.json."""
+        """The entry "gain" of verdict.json."""
         every = {
             name: {"fit": fit.as_json(), "held_out": held.as_json() if held else None}
             for name, (fit, held) in self.by_quantity.items()
@@ -70,7 +73,11 @@ class Gain:
 
 
 def gain(fitter: Fitter, base: Fit, extended: Fit, held_out: Sequence[Experiment]) -> Gain:
-    """Errors of the base and extended fits, on the record and on experiments held out, by quantity."""
+    """Root mean square errors of the base and extended fits, on the record and on held-out experiments.
+
+    held_out: experiments that were not fitted; kinds without a simulator are ignored. See `Gain` and
+    `Errors`.
+    """
     fitted = _errors(fitter, fitter.record, base, extended)
     known = [e for e in held_out if fitter.simulator.knows(e)]
     unseen = _errors(fitter, record(known, fitter.simulator), base, extended) if known else {}

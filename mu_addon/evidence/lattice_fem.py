@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from ..homogenize.modulus import modulus
 from ..homogenize.offset_response import OffsetResponse
 from ..homogenize.specimen import block_specimen
 from ..measured import Experiment
+from ..reading import file_text, parse_toml
 from ..run.cache import Cache
 from ..toml_writer import toml_text
 from .prediction.lattice import KIND, ComputedCell, Scaling
@@ -43,7 +43,11 @@ HELD = "hold"
 
 @attrs.frozen
 class Block:
-    """A test to compute: the cell at 1.0x as drawn, cells a side, plates, Poisson's ratio of the resin."""
+    """A compression test to compute: a cube of `cells` cells a side between two plates.
+
+    cell: at 1.0x, as drawn. plates: "hold" (bonded faces) or "slide" (frictionless). poisson: Poisson's ratio
+    of the resin.
+    """
 
     cell: StrutCell
     cells: int
@@ -51,7 +55,7 @@ class Block:
     poisson: float
 
     def key(self) -> str:
-        """Hash of all that the response depends on."""
+        """Hash (32 hex digits) of all that the response depends on: cell, count, plates, mesh, offsets."""
         cell = {a.name: getattr(self.cell, a.name) for a in attrs.fields(StrutCell) if a.name != "kind"}
         mesh = attrs.asdict(MESH)
         parts = [REVISION, self.cell.kind.name, cell, self.cells, self.plates, self.poisson]
@@ -65,15 +69,15 @@ def _silent(what: str, share: float) -> None:
     pass
 
 
-def response(block: Block, cache: Path | None = None, say: Progress = _silent) -> OffsetResponse:
+def response(block: Block, cache: Path | None = None, report: Progress = _silent) -> OffsetResponse:
     """The block's response to a print offset: shipped, kept in the folder `cache`, or computed.
 
-    The paper's block of 27 cells takes a minute or two. Raises InputError for a cell that cannot be printed
-    so, MeshingError and ConvergenceError.
+    report: called with the step and the share done, 0 to 1. The paper's block of 27 cells takes a minute or
+    two to compute. Raises InputError for a cell that cannot be printed so, MeshingError and ConvergenceError.
     """
     key = block.key()
     for name in asset_names(SHIPPED):
-        kept = tomllib.loads(asset_file(SHIPPED, "response", name).read_text(encoding="utf-8"))
+        kept = parse_toml(file_text(asset_file(SHIPPED, "response", name)), name)
         if kept["key"] == key:
             return OffsetResponse(kept["offset_mm"], kept["modulus"], kept["density"])
     table = Cache(cache) if cache else None
@@ -82,7 +86,7 @@ def response(block: Block, cache: Path | None = None, say: Progress = _silent) -
         return OffsetResponse(stored["offset_mm"], stored["modulus"], stored["density"])
     moduli, densities = [], []
     for done, offset in enumerate(OFFSETS_mm):
-        say(f"block of {block} with {offset:g} mm of print offset", done / len(OFFSETS_mm))
+        report(f"block of {block} with {offset:g} mm of print offset", done / len(OFFSETS_mm))
         relative, density = at_offset(block, offset, cache)
         moduli.append(relative)
         densities.append(density)
@@ -94,7 +98,12 @@ def response(block: Block, cache: Path | None = None, say: Progress = _silent) -
 
 
 def at_offset(block: Block, offset_mm: float, cache: Path | None = None) -> tuple[float, float]:
-    """Initial modulus of a block over the resin's, and its density, with an offset of every surface."""
+    """Initial modulus over the resin's, and relative density, of a block with a print offset.
+
+    offset_mm: of every surface, outward, at 1.0x. The modulus is the initial tangent of a finite-element
+    compression to a strain of `STRAIN`; both results are ratios. Raises InputError, MeshingError and
+    ConvergenceError.
+    """
     cell = attrs.evolve(
         block.cell,
         offset_xy_mm=block.cell.offset_xy_mm + offset_mm,
@@ -109,7 +118,10 @@ def at_offset(block: Block, offset_mm: float, cache: Path | None = None) -> tupl
 
 
 def save(found: OffsetResponse, block: Block, path: Path) -> None:
-    """Write a response as a file that `response` finds among those shipped; raises OutputError."""
+    """Write a block's response as a TOML file that `response` finds among those shipped; raises OutputError.
+
+    Values keep six significant digits.
+    """
     arrays = {"offset_mm": found.offsets_mm, "modulus": found.modulus, "density": found.density}
     values = {name: [float(f"{v:.6g}") for v in array] for name, array in arrays.items()}
     head = (
@@ -120,15 +132,15 @@ def save(found: OffsetResponse, block: Block, path: Path) -> None:
 
 
 def printed(print_: Printing) -> tuple[float, float]:
-    """Mean outward move of a print's surfaces in mm, and depth times excess modulus of its skin in mm."""
+    """Mean outward print offset in mm, (2 xy + z)/3, and skin depth times (skin factor - 1) in mm."""
     offset = (2 * print_.offset_xy_mm + print_.offset_z_mm) / 3
     return offset, print_.skin_depth_mm * (print_.skin_factor - 1)
 
 
 def block_of(experiment: Experiment, unit: Unit) -> Block | None:
-    """The block that an experiment compressed, of a unit's lattice; None where it says no count of cells.
+    """The block of a unit's lattice that an experiment compressed; None where it gives no count of cells.
 
-    Plates hold the faces where nothing else is said. Raises InputError for a block that is no cube.
+    Plates hold the faces where the experiment does not say. Raises InputError for a block that is no cube.
     """
     if experiment.cells is None:
         return None
@@ -146,16 +158,17 @@ def scalings(
     experiments: Sequence[Experiment],
     unit: Unit,
     cache: Path | None = None,
-    say: Progress = _silent,
+    report: Progress = _silent,
 ) -> tuple[dict[str, Scaling], list[str]]:
-    """How each block of lattice answers to printing, by experiment; and what is taken for granted, in words.
+    """How stiffness and mass of each compressed block respond to printing, by name of the experiment.
 
-    All moduli are relative to that of the first block as drawn at 1.0x; the unit's own print offset and
-    skin come before any effect's.
+    Also returns the modelling assumptions, in words. All moduli are relative to that of the first block as
+    drawn at 1.0x; the unit's own print offset and skin come before any effect's. Experiments without a count
+    of cells have no entry. Raises what `block_of` and `response` raise.
     """
     blocks = {e.name: block_of(e, unit) for e in experiments if e.kind == KIND}
     distinct = list(dict.fromkeys(b for b in blocks.values() if b is not None))
-    found = {b: response(b, cache, say) for b in distinct}
+    found = {b: response(b, cache, report) for b in distinct}
     assumed = [f"lattice specimens are modelled as {b}, computed from their struts" for b in distinct]
     if None in blocks.values():
         assumed.append("lattice specimens without a number of cells are modelled as slender bending struts")

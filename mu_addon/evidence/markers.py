@@ -36,8 +36,9 @@ class Marker:
 def attached(mesh: Mesh, experiments: Sequence[Experiment], farthest_mm: float) -> tuple[Marker, ...]:
     """Markers of experiments of one scale, each on the nearest point of the undeformed mesh.
 
-    Raises InputError for a marker farther than farthest_mm from the unit, see also `at_rest`, and for one
-    that lies farther than that from its place in another of the experiments.
+    farthest_mm: largest distance admitted, in mm. Raises InputError for a marker farther than that from the
+    unit, for one that lies farther than that from its place in another of the experiments, and where
+    `at_rest` does.
     """
     every = at_rest(experiments)
     found = []
@@ -75,7 +76,7 @@ def _again(e: Experiment) -> dict[int, tuple[str, Array, str]]:
 
 
 def nearest(mesh: Mesh, place: Array) -> Array:
-    """The point (3,) of an undeformed body nearest to a place (3,), in mm; the place itself if it is inside.
+    """The point (3,) in mm of an undeformed body nearest to `place` (3,) in mm, itself if it is inside.
 
     The surface is taken flat between corners of elements. Half and quarter meshes count as the whole body.
     """
@@ -108,19 +109,26 @@ def _on_surface(mesh: Mesh, place: Array) -> Array:
 
 @attrs.frozen(eq=False)
 class MaterialPoints:
-    """Points (p, 3) in mm that move with a mesh; sides (p, 3): -1 beyond a mirror plane, along its normal."""
+    """Material points (p, 3) in mm that move with a mesh.
+
+    sides (p, 3): -1 in the directions in which a point lies beyond a mirror plane of a half or quarter mesh,
+    else 1. probe: interpolates displacements at the mirrored points.
+    """
 
     points: Array
     sides: Array
     probe: Probe
 
     def at(self, u: Array) -> Array:
-        """Places (p, 3) in mm of the points under nodal displacements (n, 3)."""
+        """Positions (p, 3) in mm of the points under nodal displacements u (n, 3) in mm."""
         return np.asarray(self.points + self.sides * self.probe.displacement(u))
 
 
 def material_points(mesh: Mesh, points: Array) -> MaterialPoints:
-    """Points (p, 3) in mm of the unit, each at the nearest place of a mesh of it, to move with its states."""
+    """Material points at the places of a mesh nearest to `points` (p, 3), in mm.
+
+    The mesh may be a half or quarter of the unit; see `MaterialPoints`.
+    """
     mirrored = [AXES.index(a) for a in mesh.symmetry]
     sides = np.ones((len(points), 3))
     sides[:, mirrored] = np.where(np.asarray(points)[:, mirrored] < 0, -1.0, 1.0)

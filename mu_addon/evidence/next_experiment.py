@@ -21,7 +21,10 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen
 class Proposal:
-    """An experiment in words, the effects it separates, and the delta chi squared expected between them."""
+    """An experiment in words, the effects that it separates, and the expected difference in chi squared.
+
+    expected: least difference between any two of the rival fits (no unit).
+    """
 
     what: str
     separates: tuple[str, ...]
@@ -31,11 +34,12 @@ class Proposal:
 def propose_experiment(
     fitter: Fitter, found: Selection, seen: Sequence[Sensitivity], feasible: Sequence[Experiment] = ()
 ) -> Proposal | None:
-    """The experiment that best separates the effects that are still in doubt; None where nothing is in doubt.
+    """The experiment that best separates the effects still in doubt; None where no cause has a rival.
 
-    feasible: experiments that the bench can make, with the columns that drive them; what would be measured
-    may hold anything but nan. Without any, variations of those already made are tried. Best means the
-    largest expected difference in chi squared between the rival fits.
+    feasible: experiments that the bench can make, with the columns that drive them; measured columns may hold
+    anything but nan. Without any, variations of those already made are tried. Best is the largest expected
+    chi squared between the two rival fits that are nearest to each other, nuisances held. Below 1 the
+    proposal is what the rival effects' library entries recommend.
     """
     rivals = [c for c in found.causes if c.rivals]
     if not rivals:

@@ -18,9 +18,11 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen
 class Source:
-    """Noise of a group of series: white of standard deviation `white` a sample, slow of `slow` and `time_s`.
+    """Noise of a group of series, in the unit of its channel: a white part and a slow part.
 
-    The slow part is an Ornstein-Uhlenbeck process: an AR(1) series of rho = exp(-dt/time_s) when sampled.
+    white: standard deviation of one sample's independent noise. slow: standard deviation of an
+    Ornstein-Uhlenbeck process with correlation time time_s in s: an AR(1) series of rho = exp(-dt/time_s)
+    when sampled.
     """
 
     white: float
@@ -29,11 +31,12 @@ class Source:
 
 
 class Whitening:
-    """Turns series of a record into series of unit white noise, by sources a group.
+    """Linear map from the series of a record to series of independent noise of unit variance.
 
-    The means of blocks of such noise, apart by their clock, are again a first-order process beside a white
-    one; what remains of each after the part of the last that persists is correlated with its neighbour
-    only, so the factor has one diagonal beside the main one. log_dets: of the covariance, by group.
+    sources: noise by group; groups: those to whiten, all by default. Block means of white plus first-order
+    noise have, after an AR(1) difference within each clock, a tridiagonal covariance, which is factored by
+    its band. log_dets: logarithm of the covariance's determinant, by group. Values of known spread are in
+    units of it already and stay.
     """
 
     def __init__(self, record: Record, sources: Mapping[str, Source], groups: Sequence[str] = ()) -> None:
@@ -57,7 +60,7 @@ class Whitening:
         return found
 
     def series(self, series: Series, columns: Array) -> Array:
-        """Whitened columns (b, k) of one series."""
+        """Columns (b,) or (b, k) of one series, whitened; unchanged for a series of known spread."""
         if series.group == KNOWN:
             return columns
         key = series.group, series.clock
@@ -165,11 +168,12 @@ def _block(count: Array, step: Array) -> tuple[Array, Array]:
 
 
 def estimate(record: Record, residual: Array, columns: Sequence[Array]) -> dict[str, Source]:
-    """Sources by restricted maximum likelihood, so that nothing in the span of `columns` counts as noise.
+    """White and slow noise of each group of series, by restricted maximum likelihood.
 
-    residual (N,): of the base model; columns: of each series (b, k), each free in every series. What any
-    effect of the library can do is in the span, so that an effect neither swells the noise nor is whitened
-    away; what degrees of freedom the span costs, the restricted likelihood accounts for.
+    residual (N,): of the base model, in the record's units. columns: of each series an array (b, k), each
+    column with a free size in that series: nothing in their span counts as noise, so that an effect neither
+    swells the noise nor is whitened away; the restricted likelihood accounts for the degrees of freedom
+    spent. Groups of known spread are left out.
     """
     found = {}
     for group in record.groups:
@@ -309,12 +313,12 @@ def _source(x: Array, sample_s: float, longest_s: float, size: float = 1.0) -> S
 
 
 def span(record: Record, signatures: Array) -> list[Array]:
-    """Orthonormal columns (b, k) a series: what causes, known or not, may do to it smoothly.
+    """Orthonormal columns (b, k) for each series that span what causes, known or not, may do to it smoothly.
 
-    signatures (N, m): changes of the prediction by effects and nuisances. Beside them stand a drift, powers
-    of the base's own response, and, where the record repeats a cycle, the cycle's harmonics. Directions that
-    hold less than a hundredth of a signature's size are left out, and never more than a fifth of a series
-    is spent.
+    signatures (N, m): changes of the prediction by effects and nuisances. Beside them stand a constant, a
+    linear drift of timed series, and the harmonics of a cycle that the record repeats. Directions with less
+    than a hundredth of a signature's size are left out, and never more than a fifth of a timed series (half
+    of one without a clock) is spent.
     """
     found = []
     for s in record.series:
@@ -347,7 +351,11 @@ def _centred(columns: Array) -> Array:
 
 
 def harmonics(record: Record, s: Series, orders: int = 12) -> Array | None:
-    """Sines and cosines (b, 2 orders) of the cycle that a record's input repeats; None where it does not."""
+    """Sines and cosines (b, 2 k) of the pressure cycle that a series' experiment repeats, of amplitude 1.
+
+    k is at most `orders`, and less where samples are too far apart. None where no cycle is repeated, pressure
+    is not the drive or there is no clock.
+    """
     e = record.experiments[s.experiment]
     if math.isnan(s.sample_s) or not record.driven(s.experiment, "pressure_kPa"):
         return None
@@ -361,12 +369,16 @@ def harmonics(record: Record, s: Series, orders: int = 12) -> Array | None:
 
 @functools.lru_cache(maxsize=256)
 def cycle_s(e: Experiment) -> float | None:
-    """Period in s of an experiment's pressure, or None."""
+    """Period in s of an experiment's pressure cycle (see `repeated`), or None."""
     return repeated(e["time_s"], e["pressure_kPa"])
 
 
 def repeated(time_s: Array, signal: Array) -> float | None:
-    """Period in s that a signal (n,) goes through twice or more, by its autocorrelation, or None."""
+    """Period in s that a signal (n,) repeats at least twice, or None.
+
+    By the first return of its normalised autocorrelation to above 0.75, after it fell below 0.2. time_s (n,):
+    ascending; the signal is resampled evenly in time, its unit does not matter.
+    """
     n = len(signal)
     x = np.interp(np.linspace(time_s[0], time_s[-1], n), time_s, signal)
     x = x - x.mean()

@@ -23,10 +23,11 @@ KNOWN = "spread known"
 
 @attrs.frozen(eq=False)
 class Series:
-    """One channel of one experiment: rows `at` (slice) of the long vector.
+    """One channel of one experiment: rows `at` (slice) of the record's long vector of values.
 
-    group: series that share their noise; time_s (b,) of blocks, nan where the record has no clock; count
-    (b,) samples a block; sample_s: between samples. row: of the prediction.
+    experiment: its number in the record. group: name that series of the same noise share. row: of the
+    prediction (channels, n). time_s (b,): mean times of the b blocks in s, nan where the record has no clock;
+    count (b,): samples in each block; sample_s: median time between samples in s, or nan.
     """
 
     experiment: int
@@ -44,7 +45,10 @@ class Series:
 
     @cached_property
     def clock(self) -> tuple[Any, ...]:
-        """What tells the times between its blocks from those of other series, to rounding."""
+        """Hashable key: equal for series whose blocks have the same sizes and distances in time, to rounding.
+
+        Without a clock it depends on the number of blocks alone.
+        """
         if math.isnan(self.sample_s):
             return (len(self.time_s),)
         apart = np.round(np.diff(self.time_s) / self.sample_s, 9)
@@ -52,12 +56,16 @@ class Series:
 
     @cached_property
     def blocks(self) -> tuple[Any, ...]:
-        """What tells how samples become blocks from how they do in other series of its experiment."""
+        """Hashable key: equal for series of an experiment whose samples are averaged over the same blocks."""
         spread = None if self._spread is None else self._spread.tobytes()
         return self._seen.tobytes(), spread
 
     def mean(self, values: Array) -> Array:
-        """Block means (..., b) of samples (..., n)."""
+        """Block means (..., b) of samples (..., n), missing samples left out.
+
+        For a record whose spread is given, one number: the amplitude of the spread that fits the samples
+        best.
+        """
         if self._spread is not None:
             # The whole record lies too high or too low together: it is one number, in units of its spread.
             return np.asarray(values @ self._spread / (self._spread @ self._spread))[..., None]
@@ -70,9 +78,10 @@ class Series:
 
 @attrs.frozen(eq=False)
 class Record:
-    """Series of several experiments, their measured values (N,) as one vector, series of a group together.
+    """Series of several experiments, their measured values (N,) as one vector, groups together.
 
-    again: the experiments as gauges of the same noise might have read them, see `drive.without_noise`.
+    values: in the unit of each channel, in standard deviations where a record's spread is given. again: the
+    experiments as driven by a second reading of the same gauges, see `drive.without_noise`.
     """
 
     experiments: tuple[Experiment, ...]
@@ -85,11 +94,11 @@ class Record:
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """Groups of series, in their order."""
+        """Names of the groups of series, in their order."""
         return tuple(dict.fromkeys(s.group for s in self.series))
 
     def predict(self, simulator: Composite, values: Mapping[str, float]) -> Array:
-        """Prediction (N,) of the measured values."""
+        """Prediction (N,) of the measured values, in their units, for parameters by key."""
         known = {i: simulator.predict(e, values) for i, e in enumerate(self.experiments)}
         found = np.empty(len(self))
         for s, rows, at in self._together:
@@ -108,7 +117,7 @@ class Record:
         ]
 
     def rows(self, experiment: int) -> Array:
-        """Which of the N values (N,) an experiment gave."""
+        """Boolean mask (N,) of the values that an experiment, by its number, gave."""
         chosen = np.zeros(len(self), bool)
         for s in self.series:
             if s.experiment == experiment:
@@ -116,17 +125,17 @@ class Record:
         return chosen
 
     def driven(self, experiment: int, column: str) -> bool:
-        """Whether a column of an experiment says what was done to it, rather than what came of it."""
+        """Whether a column of an experiment is a drive: present and not predicted."""
         predicted = {s.channel for s in self.series if s.experiment == experiment}
         return column in self.experiments[experiment].columns and column not in predicted
 
     def covariate(self, of: Any) -> Array:
-        """A quantity (N,) of every value: `of(experiment)` gives it for its samples (n,)."""
+        """Block means (N,) of a quantity; `of(experiment)` gives it for the samples (n,), in any unit."""
         columns = [np.asarray(of(e), float) * np.ones((1, len(e))) for e in self.experiments]
         return np.asarray(self.laid_out(columns.__getitem__)[:, 0])
 
     def laid_out(self, columns: Callable[[int], Array]) -> Array:
-        """Quantities (N, d) of every value: `columns(experiment)` gives them for its samples (d, n)."""
+        """Block means (N, d) of d quantities; `columns(i)` gives them for experiment i's samples (d, n)."""
         parts = [(s.mean(columns(s.experiment)), at) for s, _, at in self._together]
         found = np.empty((len(self), len(parts[0][0])), order="F")
         for means, at in parts:
@@ -135,7 +144,7 @@ class Record:
 
     @cached_property
     def of_experiment(self) -> Array:
-        """The number (N,) of the experiment that gave each value."""
+        """Number (N,) of the experiment that gave each value."""
         found = np.empty(len(self), int)
         for s in self.series:
             found[s.at] = s.experiment
@@ -143,10 +152,11 @@ class Record:
 
 
 def record(experiments: Sequence[Experiment], simulator: Composite, blocks: int = BLOCKS) -> Record:
-    """What the simulator predicts of the experiments, as measured.
+    """The predicted channels of the experiments as one vector of block means.
 
-    A channel that repeats another one of its experiment to the last digit brings nothing and is left out.
-    Raises InputError where nothing is left.
+    blocks: most blocks a series may have. Experiments of unknown kinds are left out, and so is a channel that
+    equals another one of its experiment to the last digit. Raises InputError where nothing is left or a given
+    spread is 0 throughout.
     """
     kept = tuple(e for e in experiments if simulator.knows(e))
     parts: list[tuple[str, Any]] = []

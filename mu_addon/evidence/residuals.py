@@ -39,9 +39,10 @@ PERIODS = 10.0
 
 @attrs.frozen
 class Dependence:
-    """One test of a whitened residual: `statistic` is a chi squared or a deviate, `where` it is strongest.
+    """One test of a whitened residual against a quantity that it must not depend on.
 
-    p_value: of that test alone, for noise that is white once whitened, so that it accounts for correlation.
+    statistic: a chi squared with `dof` degrees of freedom, or a standard normal deviate. p_value: of that
+    test alone, for noise that is white once whitened. where: in words, where the dependence is strongest.
     """
 
     against: str
@@ -85,20 +86,20 @@ CONDITIONS = (
 
 
 def dependence_table(fitter: Fitter, fit: Fit) -> list[Dependence]:
-    """Every test of what a fit leaves, in a fixed order; what cannot vary in these data is left out.
+    """Every test of a fit's residual, in a fixed order, but for quantities that do not vary.
 
-    By the noise of the fitter, which was estimated with every smooth cause set aside: it shows what a model
-    misses, and now and then the slowest part of the noise, of which such data tell little.
+    The noise is the fitter's, which was estimated with every smooth cause set aside: a test shows what a
+    model misses, and now and then the slowest part of the noise, of which such data tell little.
     """
     spare = dict.fromkeys(fitter.deviance(fit), 0.0)
     return [*_fitted_tests(fitter, fit, spare), *_plain_tests(fitter, fit)]
 
 
 def strict_table(fitter: Fitter, fit: Fit) -> list[Dependence]:
-    """The same tests, of what cannot be noise: each is made twice, and the larger p counts.
+    """The tests of `dependence_table` under two estimates of the noise; the larger p-value of each counts.
 
     A dependence must gain more likelihood than the noise does when it is estimated from the residual itself,
-    as if nothing in it had a cause. And, where a test is no fit, it is made under that second noise, too.
+    as if nothing in it had a cause. Tests that fit nothing are made again under that second noise.
     """
     own, refitted = fitter.under_its_own_noise(fit)
     before, after = fitter.deviance(fit), own.deviance(refitted)
@@ -156,7 +157,10 @@ def _plain_tests(fitter: Fitter, fit: Fit) -> list[Dependence]:
 
 
 def structure(table: Sequence[Dependence]) -> tuple[str, ...]:
-    """What the residual depends on, too strongly for chance, `FALSE_ALARM` shared by all tests."""
+    """Names of what the residual depends on, strongest first, at a false-alarm rate of `FALSE_ALARM`.
+
+    The rate is divided by the number of tests (Bonferroni).
+    """
     level = FALSE_ALARM / max(len(table), 1)
     return tuple(d.against for d in sorted(table, key=lambda d: d.p_value) if d.p_value < level)
 
@@ -471,7 +475,10 @@ def _repeats_alike(record: Record, r: Array) -> list[Dependence]:
 
 
 def same_protocol(a: Experiment, b: Experiment) -> bool:
-    """Whether two experiments put the same pressures on the same design in the same way."""
+    """Whether two experiments of one kind, scale, orientation and mass have the same pressures over time.
+
+    Times must agree to a sample, pressures to 5 % of their range.
+    """
     if a.kind != b.kind or len(a) != len(b) or "pressure_kPa" not in a.columns or "time_s" not in a.columns:
         return False
     if (a.scale, a.orientation_deg, a.added_mass_g) != (b.scale, b.orientation_deg, b.added_mass_g):

@@ -16,7 +16,11 @@ APART = 1.5
 
 
 def modes(low_Hz: float, high_Hz: float) -> tuple[Array, Array]:
-    """Frequencies (k,) in Hz and dampings (k,), so close that any mode between the bounds is near one."""
+    """Frequencies (k,) in Hz and damping ratios (k,), so close that any mode between the bounds is near one.
+
+    Damping ratios are `DAMPINGS`, shares of the critical damping; with high_Hz not above low_Hz the result is
+    empty.
+    """
     found: list[tuple[float, float]] = []
     for damping in DAMPINGS:
         many = math.ceil(math.log(high_Hz / low_Hz) / (APART * damping)) + 1 if high_Hz > low_Hz else 0
@@ -26,9 +30,11 @@ def modes(low_Hz: float, high_Hz: float) -> tuple[Array, Array]:
 
 
 def ringing(time_s: Array, still: Array, hertz: Array, damping: Array) -> Array:
-    """What inertia adds (n, c, k) to signals (n, c), by k modes that start at rest.
+    """What inertia adds (n, c, k) to signals (n, c), by k modes that start at rest, in the signals' unit.
 
-    Of x'' + 2 damping w x' + w^2 x = w^2 still, exact for signals straight between their samples, x - still.
+    time_s (n,): ascending, in s; still (n, c): the signals without inertia; hertz (k,), damping (k,): as from
+    `modes`. Solves x'' + 2 damping w x' + w^2 x = w^2 still and returns x - still; exact for signals linear
+    between their samples.
     """
     w = 2.0 * np.pi * hertz
     rate = w * (-damping + 1j * np.sqrt(1.0 - damping**2))

@@ -36,10 +36,11 @@ PROMISING = 4.0
 
 @attrs.frozen(eq=False)
 class Cause:
-    """One effect of the chosen model; p_value: of a gain as large by chance, over the whole library.
+    """One effect of the chosen model.
 
-    loss: chi squared lost on experiments left out in turn when the effect is taken away; rivals: effects
-    that would do in its place.
+    p_value: probability that noise alone lets any effect of the library gain as much. loss: rise of chi
+    squared when the effect is taken away and the rest fitted anew. rivals: names of effects whose fit in its
+    place is not distinguishable, best first.
     """
 
     effect: Effect
@@ -50,11 +51,12 @@ class Cause:
 
 @attrs.frozen(eq=False)
 class Selection:
-    """The base model, the chosen one, its causes, and what either leaves; p_best: of the best effect tried.
+    """The base model, the chosen one, its causes, and what either leaves.
 
-    singles: the fit of every single effect, best first. doubted: why the best was not accepted, if so.
-    table: what cannot be noise in what the chosen model leaves. table_base: all that the base model misses,
-    where anything is wrong; by the strict tests, as table, where nothing is.
+    singles: the fit of every single effect, best first. p_best: p-value of the best single effect. doubted:
+    why a model was not accepted, empty if it was. table: tests that `strict_table` makes of the chosen
+    model's residual. table_base: `dependence_table` of the base model; by the strict tests where nothing is
+    wrong.
     """
 
     base: Fit
@@ -68,17 +70,19 @@ class Selection:
 
     @property
     def left(self) -> tuple[str, ...]:
-        """What the residual of the chosen model still depends on."""
+        """Names of what the residual of the chosen model still depends on (`structure`)."""
         return structure(self.table)
 
 
 def select(
     fitter: Fitter, seen: Sequence[Sensitivity], progress: Callable[[str], None] = lambda _: None
 ) -> Selection:
-    """The effects that explain a record: added while each gains more than chance does and predicts better.
+    """The effects that explain a record, added one at a time.
 
-    Predictions are judged on experiments left out of its fit. A record that nothing explains keeps the base
-    model and the structure that is left.
+    Each must gain more chi squared than noise would at `FALSE_ALARM_RATE`, over the whole library, and must
+    reduce the leave-one-experiment-out error. seen: sensitivities of the effects; those not worth a fit are
+    not tried. progress: called with the names of the effects that are fitted. A record that nothing explains
+    keeps the base model and the structure that is left.
     """
     base = fitter.fit()
     table_base = tuple(dependence_table(fitter, base))
@@ -121,7 +125,11 @@ def select(
 
 
 def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) -> Selection:
-    """A selection repeated under another noise: no effect is added, yet any may be dropped or get rivals."""
+    """A selection repeated under the noise of another fitter: no effect is added.
+
+    Each effect's p-value is computed again, and rivals anew; an effect no longer significant is reported in
+    `doubted`.
+    """
     base = fitter.fit((), found.base.values)
     chosen = fitter.fit(found.chosen.effects, found.chosen.values)
     singles = tuple(sorted((fitter.fit(f.effects, f.values) for f in found.singles), key=_cost))
@@ -152,11 +160,12 @@ def one_more(
     found: Selection,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Selection:
-    """A selection that left structure, with the effect added that takes all of it; as it was without such.
+    """A selection that left structure, with the effect added that takes all of it; unchanged without such.
 
-    For noise that was estimated anew around the causes: what is smaller than the noise believed before may
-    be seen now. An effect that leaves structure too is one more name without a reason, so it is not taken;
-    nor is one that a single experiment tells of, since some effect bends as whatever that one leaves.
+    For noise that was estimated anew around the causes: what is smaller than the noise assumed before may now
+    be significant. An effect is not taken if its p-value reaches `FALSE_ALARM_RATE`, if structure is left, if
+    it does not predict left-out experiments better, if a step change explains more or if one experiment alone
+    (a share above `ALONE`) tells of it.
     """
     if found.doubted or not found.left or len(found.chosen.effects) >= MOST_EFFECTS:
         return found
@@ -416,7 +425,11 @@ def _by_numerics(
 
 
 def interval(fitter: Fitter, fit: Fit, key: str, rise: float = 3.84) -> tuple[float, float]:
-    """Bounds of a value: chi squared, all else fitted anew, has risen by `rise` (95 %), or its own bounds."""
+    """Confidence interval (low, high) of a fitted value, in its parameter's unit, by profile likelihood.
+
+    The ends are where chi squared, all else fitted anew, has risen by `rise` (3.84: 95 %), or the parameter's
+    bounds if those come first or the value has no finite standard deviation.
+    """
     p = next(
         (p for e in fit.effects for name, p in zip(e.keys, e.parameters, strict=True) if name == key),
         None,

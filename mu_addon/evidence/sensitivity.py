@@ -28,7 +28,8 @@ ABSORBED = 2e-3
 def signatures(record: Record, simulator: Composite, values: Mapping[str, float]) -> Array:
     """Changes (N, m) of the prediction by every effect, small and at its starts, and by every nuisance.
 
-    Around values that hold an effect its own columns are the derivatives by its parameters.
+    In the record's units (slopes also over the parameter's). values: by key; around values that hold an
+    effect, its own columns are the derivatives by its parameters. Columns of zeros are left out.
     """
     base = record.predict(simulator, values)
     columns = [
@@ -90,7 +91,11 @@ class Sensitivity:
 
 
 def sensitivities(fitter: Fitter, values: Mapping[str, float]) -> list[Sensitivity]:
-    """Of every effect of the simulator and of each of its shapes, around nuisances of given values."""
+    """Sensitivity of the data to every effect of the simulator, in each of its shapes, at its null.
+
+    values: of the nuisances, by name and in their units, around which derivatives are taken. A nuisance at a
+    bound absorbs nothing.
+    """
     simulator = fitter.simulator
     base = fitter.predict(values)
     nuisances = []
@@ -131,9 +136,10 @@ def sensitivities(fitter: Fitter, values: Mapping[str, float]) -> list[Sensitivi
 
 
 def at_bounds(fitter: Fitter, values: Mapping[str, float], found: Sequence[Sensitivity]) -> list[Sensitivity]:
-    """The same, with what effects that a linear step cannot make large enough do at their bounds.
+    """The same sensitivities, with `at_bounds` computed for effects that are not visible to first order.
 
-    A bound's prediction is taken for measured, and the base model is fitted to it.
+    The prediction at each bound of the size is taken for measured and the base model fitted to it; the root
+    of chi squared (no unit) that this leaves counts. Bounds without a solution are skipped.
     """
     judged = []
     for s in found:
@@ -189,7 +195,7 @@ def _absorbers(n: Array, names: Sequence[Parameter], lengths: Array, j: Array) -
 
 
 def best_seen(found: Sequence[Sensitivity]) -> dict[str, Sensitivity]:
-    """The shape of each effect that is seen best, by the effect's name."""
+    """The best visible shape of each effect, by its name: identifiable first, then least absorbed."""
     best: dict[str, Sensitivity] = {}
     for s in found:
         known = best.get(s.effect.name)
@@ -199,7 +205,10 @@ def best_seen(found: Sequence[Sensitivity]) -> dict[str, Sensitivity]:
 
 
 def similarity(found: Sequence[Sensitivity]) -> Array:
-    """Cosines (m, m) between what nuisances leave of effects; 0 with one that they leave nothing of."""
+    """Cosines (m, m) between the whitened signatures of m sensitivities, after nuisances were projected out.
+
+    0 for an effect of which nuisances leave nothing.
+    """
     unit = _unit(found)
     return np.asarray(unit.T @ unit)
 

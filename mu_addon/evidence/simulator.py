@@ -25,28 +25,33 @@ class Simulator(Protocol):
 
     @property
     def nuisances(self) -> tuple[Parameter, ...]:
-        """What is fitted in every model."""
+        """Parameters that are fitted in every model."""
         ...
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        """What may be added to the base."""
+        """Mechanisms that may be added to the base model."""
         ...
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
-        """Columns of the experiment that are predicted."""
+        """Names of the experiment's columns that are predicted; their last part is the unit."""
         ...
 
     def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
-        """Prediction (channels, n); `values` by "effect.parameter" or nuisance, null where missing."""
+        """Prediction (channels, n) in the channels' units, at the experiment's n samples.
+
+        values: by "effect.parameter" or name of a nuisance, in the parameter's unit; the null where one is
+        missing.
+        """
         ...
 
 
 class Composite:
     """Simulators of several kinds of experiment as one; they share parameters by name, and cache predictions.
 
-    An effect whose parameters differ from kind to kind counts as several effects of one name. calls:
-    predictions that were computed; remembered: predictions kept, the oldest are dropped.
+    simulators: by kind. An effect whose parameters differ from kind to kind counts as several effects of one
+    name. remembered: most predictions kept, the oldest are dropped; calls: predictions that were computed.
+    Raises InputError where two simulators give a parameter another unit, null or disjoint bounds.
     """
 
     def __init__(self, simulators: Mapping[str, Simulator], remembered: int = 1024) -> None:
@@ -75,15 +80,19 @@ class Composite:
         }
 
     def knows(self, experiment: Experiment) -> bool:
-        """Whether there is a simulator of that kind of experiment."""
+        """Whether there is a simulator for that experiment's kind."""
         return experiment.kind in self._simulators
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
-        """Columns of the experiment that are predicted."""
+        """Names of the experiment's predicted columns; raises InputError for a kind without a simulator."""
         return self._of(experiment).channels(experiment)
 
     def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
-        """Prediction (channels, n), from memory where it was made before; InputError for other kinds."""
+        """Prediction (channels, n) in the channels' units, read-only, from the cache where possible.
+
+        values: as in `Simulator.predict`; those the kind does not know are ignored. Raises InputError for a
+        kind without a simulator.
+        """
         simulator = self._of(experiment)
         knows = self._knows[experiment.kind]
         own = {k: v for k, v in values.items() if k in knows and self._heeds(experiment, k)}

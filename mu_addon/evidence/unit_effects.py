@@ -54,9 +54,9 @@ class Body:
     """What a run of the unit is made from, before it has a mesh.
 
     finer: the mesh that mesh_error compares with. distal: how many chambers, from the tip, a clog cuts off.
-    lattice: a law for the lattice in place of the unit's moduli. drawn: the unit whose mesh is moved to this
-    one's dimensions, since another mesh would bring noise as large as a small effect. device: Warp's, of a
-    model.
+    lattice: a law for the lattice in place of the unit's moduli. orientation_deg: see `down`. drawn: the unit
+    whose mesh is moved to this one's dimensions, since another mesh would bring noise as large as a small
+    effect. device: Warp's, of a model.
     """
 
     unit: Unit
@@ -74,7 +74,7 @@ class Body:
         return morphed(mesh, self.drawn, self.unit, self.mesh) if self.drawn else mesh
 
     def materials(self, mesh: Mesh) -> Materials:
-        """The base model's materials; raises InputError where the unit's wall has a law of its own."""
+        """The base model's materials on a mesh; raises InputError if the unit's wall has a law of its own."""
         if self.unit.wall.names:
             raise InputError(
                 "evidence takes a neo-Hookean wall: what a wall does beyond that is what it looks for",
@@ -84,20 +84,21 @@ class Body:
         return materials_of(self.unit, mesh, self.lattice)
 
     def model(self, mesh: Mesh) -> Model:
-        """The base model, under pressure alone."""
+        """The base model of a mesh, loaded by pressure alone."""
         return Model(mesh, device=self.device, threads=1)
 
 
 @attrs.frozen
 class UnitEffect:
-    """A static effect: its parameter, the sizes (ascending, the null among them) that are run, what changes.
+    """A static effect of the unit: its parameter, the sizes that are run, and what of the model it changes.
 
-    body: of a body and a size; materials: of those without it, the mesh and a size; model, in place of the
-    base's, and load (n, 3) in N: of a body, its mesh and a size. They act side by side: each changes what the
-    others have left. has_gravity: whether it depends on gravity's direction. newton: of its runs. length: the
-    power of a length by which the size of the same change grows with the unit, at the same moduli and
-    pressures; sizes are those at 1.0x, and larger are more of them, for units at whose scale the bound is
-    beyond the last.
+    sizes: at 1.0x, in the parameter's unit, ascending, the null among them; larger: more of them, for units
+    at whose scale the bound is beyond the last. body: of a body and a size; materials: of those without it,
+    the mesh and a size; model, in place of the base's, and load (n, 3) in N: of a body, its mesh and a size.
+    They act side by side: each changes what the others have left. has_gravity: whether it depends on
+    gravity's direction. newton: of its runs. length: the power of a length by which the size of the same
+    change grows with the unit, at the same moduli and pressures. Raises InputError where sizes lack the null
+    or leave the bounds.
     """
 
     name: str
@@ -118,7 +119,7 @@ class UnitEffect:
             raise InputError(f"{self.name}: sizes miss the null or leave the bounds", "unit effects")
 
     def sizes_at(self, enlarged: float) -> tuple[float, ...]:
-        """Sizes at 1.0x that a unit so many times as large needs to reach the bound at its own."""
+        """Sizes at 1.0x, in the parameter's unit, up to the bound of a unit `enlarged` times as large."""
         every = (*self.sizes, *self.larger)
         needed = self.parameter.high / enlarged**self.length
         beyond = sum(s < needed * (1 - 1e-9) for s in every)
@@ -150,7 +151,10 @@ def _clogged(body: Body, mesh: Mesh, share_lost: float) -> Model:
 
 
 def walled(body: Body, mesh: Mesh, gap_mm: float) -> Model:
-    """The unit beside a flat wall along its axis, `gap_mm` from its outline at rest; below 0 toward -y."""
+    """The unit beside a flat frictionless wall along its axis, on the side +y, or -y for gap_mm < 0.
+
+    |gap_mm|: distance in mm of the wall from the outline at rest.
+    """
     model = body.model(mesh)
     away = math.copysign(1.0, gap_mm)
     farthest = float((away * mesh.nodes[:, 1]).max())
@@ -187,7 +191,7 @@ def _refined(body: Body, share: float) -> Body:
 
 
 def parted(materials: Materials, mesh: Mesh, region: int) -> tuple[tuple[Layer, ...], tuple[Layer, ...]]:
-    """The layers of a region of the mesh, and those of the rest."""
+    """The material layers of the elements in a region of the mesh, and those of all others."""
     inside = mesh.region == region
     found: tuple[list[Layer], list[Layer]] = ([], [])
     for layer in materials.layers:

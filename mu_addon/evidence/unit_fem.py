@@ -100,9 +100,10 @@ def _effect(name: str) -> UnitEffect:
 
 @attrs.frozen
 class Run:
-    """One quasi-static run: a body, the effect on it and its size, pressures in kPa, points (p, 3) in mm.
+    """One quasi-static simulation: a body, an effect and its size, pressures in kPa, points in mm.
 
-    outline: of the free unit, how far its outline moves toward +y and -y beside angle and places.
+    points: p of (x, y, z). effect: empty for the base model. size: in the effect's unit. outline: whether to
+    find, beside angle and places, how far the outline moves toward +y and -y, in mm.
     """
 
     body: Body
@@ -114,12 +115,15 @@ class Run:
 
     @property
     def rows(self) -> int:
-        """How many values a pressure has."""
+        """Number of values at each pressure: angle, three coordinates a point, two moves of the outline."""
         return 1 + 3 * len(self.points) + 2 * self.outline
 
     @property
     def changed(self) -> tuple[Body, UnitEffect | None]:
-        """The body with the effect on it, and the effect where it does more than that."""
+        """The body with the effect on it, and the effect, or None where it changes the body alone.
+
+        Raises InputError where the body cannot be drawn with the effect.
+        """
         if not self.effect:
             return self.body, None
         effect = _effect(self.effect)
@@ -127,7 +131,7 @@ class Run:
         return body, effect if effect.materials or effect.model or effect.load else None
 
     def key(self) -> str:
-        """Hash of all that the result depends on."""
+        """Hash (32 hex digits) of all that the result depends on."""
         try:
             body, effect = self.changed
         except InputError:
@@ -148,16 +152,19 @@ class Run:
 
 @attrs.frozen(eq=False)
 class Result:
-    """What a run found: values (rows, k), an angle in degrees and places in mm; where nan, why."""
+    """What a run found: values (rows, k) at k pressures, in degrees and mm; nan where not reached.
+
+    why: the reason where values are nan, else empty.
+    """
 
     values: Array
     why: str = ""
 
 
 def run(case: Run, cache: Path | None = None) -> Result:
-    """Angle and places of points at every pressure, from rest outward, and moves of the outline, see Run.
+    """Angle in degrees and places of points in mm at every pressure, from rest outward.
 
-    cache: where a mesher that is not repeatable keeps its meshes. A pressure that cannot be reached, with
+    cache: folder where a mesher that is not repeatable keeps its meshes. A pressure that is not reached, with
     those beyond it, is nan; so is all where the body cannot be drawn or meshed.
     """
     values = np.full((case.rows, len(case.pressures_kPa)), np.nan)
@@ -210,7 +217,11 @@ def _states(equilibrium: Equilibrium, pressures_kPa: Array) -> Iterator[tuple[in
 
 
 def pressures(readings_kPa: Array, count: int, margin: float) -> tuple[float, ...]:
-    """About `count` pressures in kPa, ascending, from a little below the readings to above, 0 included."""
+    """About `count` pressures in kPa, ascending through 0, from a little below the readings to above.
+
+    margin: how far beyond the readings, as a share of their range. Raises InputError where all readings are
+    0.
+    """
     low, high = min(0.0, float(np.min(readings_kPa))), max(0.0, float(np.max(readings_kPa)))
     if low == high:
         raise InputError("the pressure is always 0", "unit_pressure", "add an experiment under pressure")
@@ -238,7 +249,7 @@ def unit_responses(
     added masses, which the model lacks, and ConvergenceError where the base model reaches too few pressures.
     """
     settings = settings or UnitSettings()
-    say = progress or (lambda stage, share: None)
+    report = progress or (lambda stage, share: None)
     chosen = [e for e in experiments if e.kind == KIND]
     for e in chosen:
         if e.added_mass_g:
@@ -246,14 +257,16 @@ def unit_responses(
     plans = [_Plan.of(unit, chosen, scale, settings, cache) for scale in sorted({e.scale for e in chosen})]
     for plan in plans:
         for m in plan.markers:
-            say(f"marker {m.number} at {plan.scale:g}x lies {m.distance_mm:.2f} mm from its point", 0.0)
+            report(f"marker {m.number} at {plan.scale:g}x lies {m.distance_mm:.2f} mm from its point", 0.0)
     cases = {case.key(): case for plan in plans for case in plan.runs(settings)}
     walled_too = WALL in settings.effects
     part = 1 - WALLS if walled_too else 1.0
-    found = _found(cases, settings.workers, cache, lambda what, share: say(what, share * part))
+    found = _found(cases, settings.workers, cache, lambda what, share: report(what, share * part))
     if walled_too:
         walls = {c.key(): c for plan in plans for _, _, c in plan.walls(found)}
-        more = _found(walls, settings.workers, cache, lambda what, share: say(what, 1 + WALLS * (share - 1)))
+        more = _found(
+            walls, settings.workers, cache, lambda what, share: report(what, 1 + WALLS * (share - 1))
+        )
         found |= more
     responses = _counted_alike([r for plan in plans for r in plan.responses(settings, found)])
     # Whoever asks for the channels of all looks at the first.
@@ -281,7 +294,8 @@ def similar(unit: Unit) -> Unit:
     """The unit at 1.0x that moves as this one does, all lengths alike; this one where it cannot be drawn.
 
     An elastic body has no length of its own: enlarged as a whole, at the same pressures and moduli, it turns
-    by the same angles. The printer's lengths do not grow with the unit, so here they shrink.
+    by the same angles. The print's offsets and skin depth in mm do not grow with the unit, so here they are
+    divided by its scale.
     """
     p, s = unit.print, unit.scale
     try:
@@ -472,7 +486,7 @@ def _warn(text: str) -> None:
     warnings.warn(text, UnitResponseWarning, stacklevel=4)
 
 
-def _found(cases: dict[str, Run], workers: int, cache: Path | None, say: Progress) -> dict[str, Result]:
+def _found(cases: dict[str, Run], workers: int, cache: Path | None, report: Progress) -> dict[str, Result]:
     """Results by key, from the cache where they are there, and kept there as soon as one is found."""
     table = None if cache is None else Cache(cache)
     found: dict[str, Result] = {}
@@ -487,7 +501,7 @@ def _found(cases: dict[str, Run], workers: int, cache: Path | None, say: Progres
             table.put("unit", key, {"values": result.values, "why": np.array(result.why)})
         case = cases[key]
         what = f"{case.effect} = {case.size:g}" if case.effect else "base"
-        say(f"unit, {what}", len(found) / len(cases))
+        report(f"unit, {what}", len(found) / len(cases))
     return found
 
 

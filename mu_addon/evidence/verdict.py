@@ -34,7 +34,9 @@ class Verdict:
     """What the data say of the model: the causes named, their rivals, the gain, and what to measure next.
 
     kind: one of `KINDS` (none, named, ambiguous, unidentifiable, unexplained). experiments: all of them,
-    their drives freed of gauge noise (`drive.without_noise`). `as_json` is the content of verdict.json.
+    their drives freed of gauge noise (`drive.without_noise`). sources: noise by group of series. intervals:
+    95 % bounds by key, in the parameters' units. identifiability: effects that these data cannot show, with
+    the reason. `as_json` is the content of verdict.json.
     """
 
     kind: str
@@ -57,7 +59,7 @@ class Verdict:
 
     @property
     def ambiguity(self) -> frozenset[str]:
-        """Every effect named, or a rival of one that is."""
+        """Names of the effects named and their rivals; empty unless the verdict is `named` or `ambiguous`."""
         if self.kind not in ("named", "ambiguous"):
             return frozenset()
         return frozenset(self.names) | {r for c in self.selection.causes for r in c.rivals}
@@ -67,7 +69,10 @@ class Verdict:
         return {"value": self.selection.chosen.values[key], "low95": low, "high95": high}
 
     def as_json(self) -> dict[str, Any]:
-        """verdict.json; partly_explained_by: what an unexplained verdict found, which is not the cause."""
+        """The content of verdict.json.
+
+        partly_explained_by: effects of the chosen model where the verdict names none; they are not the cause.
+        """
         causes = [
             {
                 "effect": c.effect.name,
@@ -104,7 +109,11 @@ class Verdict:
 def noise_of(
     measured: Record, simulator: Composite, values: Mapping[str, float] | None = None
 ) -> dict[str, Source]:
-    """Noise of a record, whatever effect of the library it may hold; around the base model, or `values`."""
+    """White and slow noise of a record, by group of series, whatever effect of the library it may hold.
+
+    values: of nuisances and effects by key, around which the noise is estimated; the base model's fit where
+    None.
+    """
     if values is None:
         rough = Fitter(measured, simulator, {g: _rough(measured, g) for g in measured.groups})
         values = rough.fit().values

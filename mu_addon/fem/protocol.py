@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
+from ..reading import file_text
 
 Array = np.ndarray[Any, Any]
 
@@ -43,7 +44,7 @@ def read_protocol(path: Path) -> Protocol:
     finite number, time does not increase, or the protocol does not start at atmospheric pressure.
     """
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = file_text(path).splitlines()
     except OSError as error:
         raise InputError(f"cannot read the protocol: {error.strerror}", str(path), "check the path") from None
     except UnicodeDecodeError:

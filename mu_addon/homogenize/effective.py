@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import tomllib
 from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
@@ -17,6 +16,7 @@ from ..errors import InputError
 from ..fem.lattice_law import LatticeLaw
 from ..fem.laws import Foam
 from ..files import write_text
+from ..reading import file_text, parse_toml
 from ..toml_writer import Noted, toml_text
 from .foam_fit import NAME, FoamFit, Misfit, lattice_law, require_stable, stable_pressed, stable_shear
 
@@ -196,7 +196,7 @@ def read_effective(path: str | Path) -> Effective:
     """Read effective.toml; `parse_effective` says what it raises."""
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = file_text(path)
     except OSError as error:
         raise InputError(
             f"cannot read the lattice's law: {error.strerror}", str(path), "give an effective.toml"
@@ -212,10 +212,7 @@ def parse_effective(text: str, origin: str = "effective.toml") -> Effective:
     Raises InputError that names file and key where the format is unknown, a key is missing, strange or no
     number, or the law is not admissible or not stable.
     """
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"this is not TOML: {error}", origin, "correct that line") from None
+    document = parse_toml(text, origin)
     found = document.get("format")
     if found != FORMAT or isinstance(found, bool):
         what = "it states no format" if found is None else f"its format is {found!r}"

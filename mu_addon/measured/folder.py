@@ -6,7 +6,6 @@ import difflib
 import hashlib
 import math
 import re
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
+from ..reading import file_text, parse_toml
 from .experiment import Array, Experiment
 from .kinds import AXES, KINDS, MODES, PLATES, ROLES, VALVES, Kind
 from .table import Remark, read_table
@@ -30,25 +30,26 @@ PRELOAD = 0.05
 
 @attrs.frozen
 class Measured:
-    """The experiments of a folder in the order they were made, and what is to know about them."""
+    """The experiments of a folder in the order they were made, and remarks on data that can be used."""
 
     folder: Path
     experiments: tuple[Experiment, ...]
     remarks: tuple[Remark, ...]
 
     def of(self, kind: str, role: str | None = None) -> tuple[Experiment, ...]:
-        """Experiments of a kind and, where it is given, of a role."""
+        """The experiments of a kind and, where it is given, of a role ("fit" or "held_out")."""
         return tuple(e for e in self.experiments if e.kind == kind and role in (None, e.role))
 
 
 def read_folder(folder: Path) -> Measured:
-    """Read and check a folder of measured data; raises InputError with file, row and what to do."""
+    """Read and check a folder of measured data: experiments.toml and the CSV files that it names.
+
+    Strain and stress are computed from displacement and force where needed. Raises InputError with file, row
+    or key, and what to do.
+    """
     path = Path(folder) / FILE
     text = _text(path, f"a folder of measured data holds {FILE}, which names its CSV files")
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"this is not TOML: {error}", str(path), "correct that line") from error
+    document = parse_toml(text, str(path))
     entries = document.pop("experiment", None)
     if document:
         key = next(iter(document))
@@ -65,10 +66,10 @@ def read_folder(folder: Path) -> Measured:
         at = _Place(path, text, number)
         if not isinstance(entry, dict):
             raise InputError("an experiment is not a table", at(), "begin each with a line [[experiment]]")
-        found, told = _experiment(entry, at)
+        found, notes = _experiment(entry, at)
         _check_apart(found, experiments, at)
         experiments.append(found)
-        remarks += told
+        remarks += notes
     return Measured(Path(folder), _as_run(experiments, path), tuple(remarks))
 
 
@@ -310,7 +311,7 @@ def _file(name: str, at: _Place) -> Path:
 
 def _text(path: Path, remedy: str) -> str:
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        return file_text(path)
     except UnicodeDecodeError as error:
         raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
     except OSError as error:

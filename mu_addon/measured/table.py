@@ -120,9 +120,10 @@ def _header(
                 kept[i] = wanted, units[quantity[1]]
                 continue
             unit, *others = units
-            told = f"in {quantity[1]!r}" if quantity[1] else "without a unit"
+            unit_text = f"in {quantity[1]!r}" if quantity[1] else "without a unit"
             raise InputError(
-                f"column {name!r} is {told}; it is read " + (f"in {unit}" if unit else "as a bare number"),
+                f"column {name!r} is {unit_text}; it is read "
+                + (f"in {unit}" if unit else "as a bare number"),
                 _at(path, None, name),
                 f"name it {wanted}, or end its name with {' or '.join(others)}, in which it is read as well",
             )

@@ -219,8 +219,8 @@ def _remark_lost_markers(q: Mapping[str, Array], time_s: Array, remarks: list[Re
 def _spans(lost: Array, time_s: Array) -> str:
     """Runs of frames as times, the first three of them."""
     runs = np.split(lost, np.flatnonzero(np.diff(lost) > 1) + 1)
-    said = [f"{time_s[run[0]]:.4g} to {time_s[run[-1]]:.4g} s" for run in runs[:3]]
-    return ", ".join(said) + (f" and {len(runs) - 3} more gaps" if len(runs) > 3 else "")
+    intervals = [f"{time_s[run[0]]:.4g} to {time_s[run[-1]]:.4g} s" for run in runs[:3]]
+    return ", ".join(intervals) + (f" and {len(runs) - 3} more gaps" if len(runs) > 3 else "")
 
 
 def _rigid(

@@ -66,12 +66,12 @@ def mesh_unit(
     `mesh_unit(load_preset("mu-1.0x"), MeshSettings(order=1, refine=0.5))`.
     """
     settings = settings or MeshSettings()
-    say = progress or (lambda stage, share: None)
+    report = progress or (lambda stage, share: None)
     if mesher not in MESHERS:
         raise InputError(f"mesher {mesher!r} is not known", "mesher", f"one of: {', '.join(MESHERS)}")
     d = unit.printed
     if body is not None:
-        return _within(body, d, settings, say, mesher, cache)
+        return _within(body, d, settings, report, mesher, cache)
     _, (y0, y1), _ = d.bounds
     if settings.fraction == "quarter" and y0 != -y1:
         raise InputError(
@@ -82,10 +82,10 @@ def mesh_unit(
     quarter = settings.fraction == "quarter"
     part = (math.pi / 2, ("x", "y")) if quarter else (math.pi, ("x",))
     if mesher == "pytetwild":
-        mesh = _from_surfaces(d, settings, say, cache, *part)
+        mesh = _from_surfaces(d, settings, report, cache, *part)
     else:
         try:
-            mesh = _structured(d, settings, say)
+            mesh = _structured(d, settings, report)
         except GmshUnavailable as error:
             if mesher == "gmsh":
                 raise
@@ -95,21 +95,21 @@ def mesh_unit(
                 MeshingWarning,
                 stacklevel=2,
             )
-            mesh = _from_surfaces(d, settings, say, cache, *part)
+            mesh = _from_surfaces(d, settings, report, cache, *part)
     check_positive(mesh)
     if settings.fraction == "full":
         mesh = mirror(mesh, "x")
-    say("mesh", 1.0)
+    report("mesh", 1.0)
     return mesh
 
 
-def _structured(d: Dimensions, settings: MeshSettings, say: Progress) -> Mesh:
+def _structured(d: Dimensions, settings: MeshSettings, report: Progress) -> Mesh:
     """Half or quarter mesh: a revolved membrane in a lattice region filled by gmsh."""
     size = d.cell / CELL_MM / settings.refine
     quarter = settings.fraction == "quarter"
     quarters, symmetry = (1, ("x", "y")) if quarter else (2, ("x",))
     meridian = Meridian.of(d)
-    say("mesh of the membrane", 0.0)
+    report("mesh of the membrane", 0.0)
     membrane = membrane_mesh(
         meridian,
         turn=quarters * math.pi / 2,
@@ -119,13 +119,13 @@ def _structured(d: Dimensions, settings: MeshSettings, say: Progress) -> Mesh:
         layers=max(1, int(settings.through_wall * settings.refine + 0.5)),
         rings=division(d.r, settings.hoop_mm * size),
     )
-    say("mesh of the lattice", 0.2)
+    report("mesh of the lattice", 0.2)
     added, tets = _lattice(d, settings, membrane)
     nodes = np.vstack([membrane.nodes, added])
     for column, planes in enumerate(d.bounds):
         for plane in (0.0, *planes):
             nodes[np.abs(nodes[:, column] - plane) < 1e-7 * d.cell, column] = plane
-    say("mesh of the lattice", 0.9)
+    report("mesh of the lattice", 0.9)
     mesh = _joined(membrane, nodes, oriented(nodes, tets), d.height, symmetry, settings.order)
     for _ in range(3):
         chords = _flattening_chords(mesh, membrane.outside)
@@ -198,7 +198,7 @@ def _flattening_chords(mesh: Mesh, outside: Array) -> Array:
 
 
 def _within(
-    body: Body, d: Dimensions, settings: MeshSettings, say: Progress, mesher: str, cache: Path | None
+    body: Body, d: Dimensions, settings: MeshSettings, report: Progress, mesher: str, cache: Path | None
 ) -> Mesh:
     """Mesh of a unit with a body for its envelope."""
     if mesher == "gmsh" or settings.fraction == "quarter":
@@ -211,18 +211,18 @@ def _within(
     envelope = body if right is None else right
     surface = Surface(envelope.vertices, envelope.triangles.astype(np.int32), LATTICE)
     turn, symmetry = (2.0 * math.pi, ()) if right is None else (math.pi, ("x",))
-    mesh = _from_surfaces(d, settings, say, cache, turn, symmetry, surface)
+    mesh = _from_surfaces(d, settings, report, cache, turn, symmetry, surface)
     check_positive(mesh)
     if settings.fraction == "full" and symmetry:
         mesh = mirror(mesh, "x")
-    say("mesh", 1.0)
+    report("mesh", 1.0)
     return mesh
 
 
 def _from_surfaces(
     d: Dimensions,
     settings: MeshSettings,
-    say: Progress,
+    report: Progress,
     cache: Path | None,
     turn: float,
     symmetry: tuple[str, ...],
@@ -232,7 +232,7 @@ def _from_surfaces(
     size = d.cell / CELL_MM / settings.refine
     box, profile, cavity = unit_surfaces(d, turn, settings.meridian_mm * size)
     envelope = envelope or box
-    say("mesh by pytetwild", 0.0)
+    report("mesh by pytetwild", 0.0)
     mesh = mesh_surface(
         envelope.vertices,
         envelope.triangles,

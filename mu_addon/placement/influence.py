@@ -75,7 +75,7 @@ def loaded(trajectory: Trajectory, pressures_MPa: Array | None = None) -> list[S
     return [s for s in states if np.isclose(s.pressure_MPa, pressures_MPa, rtol=1e-9).any()]
 
 
-def telling_pressures(trajectory: Trajectory) -> Array:
+def representative_pressures(trajectory: Trajectory) -> Array:
     """Three of a trajectory's pressures in MPa that stand for all: the extremes, and one between.
 
     And none, where the unit's weight makes it deviate there, too. Over the grasp protocol J_hat by

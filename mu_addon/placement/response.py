@@ -29,7 +29,7 @@ from ..fem.triangular import Triangular
 from ..meshing.mesh import LATTICE, Mesh
 from .graph import Graph
 from .inclusion import Inclusion, sensor_share, straight_inclusion
-from .influence import Parity, loaded, parities, probe_loads, telling_pressures
+from .influence import Parity, loaded, parities, probe_loads, representative_pressures
 from .sampling import polynomials
 
 Array = np.ndarray[Any, Any]
@@ -135,12 +135,14 @@ def reduced_response(
 
     model, materials, trajectory: Model A. sensor_MPa, rule, radius_mm: of the sensor, as in `evaluate`.
     monitor: probe of the backbone's points. pressures_MPa: the states, by default those of
-    `telling_pressures`. Raises InputError where a step meets no element, IndefiniteError at an unstable
-    state.
+    `representative_pressures`. Raises InputError where a step meets no element, IndefiniteError at an
+    unstable state.
     """
     mesh = model.mesh
     sides = parities(model) if sides is None else sides
-    states = loaded(trajectory, telling_pressures(trajectory) if pressures_MPa is None else pressures_MPa)
+    states = loaded(
+        trajectory, representative_pressures(trajectory) if pressures_MPa is None else pressures_MPa
+    )
     step, side, kept = _represented(graph, mirrored=len(sides) > 1)
     patterns = _patterns(model, materials, sensor_MPa, graph, kept, rule, radius_mm)
     k = patterns[0].force.shape[2]

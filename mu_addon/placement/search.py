@@ -32,8 +32,8 @@ class SearchSettings:
 class Search:
     """A search's outcome over n paths, in mm: predicted J_hat, exact J_hat (NaN where unchecked), the best.
 
-    risk: probability that an unchecked path beats the best, as `chance_of_better` has it; complete: whether
-    every path was checked or the risk is as small as was asked for.
+    risk: probability that an unchecked path beats the best, as `probability_of_better` has it; complete:
+    whether every path was checked or the risk is as small as was asked for.
     """
 
     predicted_mm: Array
@@ -49,11 +49,11 @@ class Search:
         return order[: np.count_nonzero(np.isfinite(self.exact_mm))]
 
 
-def chance_of_better(predicted_mm: Array, exact_mm: Array) -> float:
+def probability_of_better(predicted_mm: Array, exact_mm: Array) -> float:
     """Probability, at most, that some unchecked path (NaN in exact_mm) beats the best checked one.
 
     The logarithm of exact over predicted J_hat is taken as normal with the checked paths' mean and
-    variance; Student's t gives the chance of each unchecked path, and their sum bounds that of any. This
+    variance; Student's t gives the probability of each unchecked path, and their sum bounds that of any. This
     is what was observed, not a proof: it holds as far as unchecked paths err as checked ones do.
     """
     from scipy.stats import t
@@ -94,7 +94,7 @@ def search_paths(
     while True:
         exact[now] = check(now)
         checked = int(np.isfinite(exact).sum())
-        risk = chance_of_better(predicted_mm, exact)
+        risk = probability_of_better(predicted_mm, exact)
         on_check(checked, risk)
         if risk <= s.risk or checked >= s.most:
             return Search(predicted_mm, exact, int(np.nanargmin(exact)), risk, risk <= s.risk)

@@ -108,7 +108,7 @@ class Child:
             self._asked = time.monotonic()
             self._process.terminate()
 
-    def tell(self, words: str) -> None:
+    def send(self, words: str) -> None:
         """Write a line to its standard input, which `ends_with_parent` holds open; the ended hear nothing."""
         if self.state == RUNNING and self._process.stdin is not None:
             # It ended this moment: the next poll says so.
@@ -126,15 +126,15 @@ class Child:
         added = self._stream.read()
         *lines, self._rest = (self._rest + added).split(b"\n")
         for line in lines:
-            self._hear(line)
+            self._read_message(line)
         return bool(added)
 
-    def _hear(self, line: bytes) -> None:
+    def _read_message(self, line: bytes) -> None:
         if not line.strip():
             return
         try:
             message = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             message = None
         kind = message.get("type") if isinstance(message, dict) else None
         if kind == "progress":
@@ -162,9 +162,9 @@ class Child:
         else:
             self.state = FAILED
             if self.error is None:
-                self.error = self._wordless(status)
+                self.error = self._without_message(status)
 
-    def _wordless(self, status: int) -> dict[str, Any]:
+    def _without_message(self, status: int) -> dict[str, Any]:
         tail = " / ".join(_last_lines(self.folder / ERRORS, 3)) or "it left no message"
         return {
             "what": f"the process ended without a message ({_context(status)}): {tail}",

@@ -49,9 +49,9 @@ class Progress:
             raise ValueError(f"stage {name!r} inside stage {self._stage!r}")
         self._stage, self._start, self._expected = name, self._clock(), expected_s
         try:
-            self._tell("start", 0.0 if expected_s else None)
+            self._emit_progress("start", 0.0 if expected_s else None)
             yield
-            self._tell("end", 1.0)
+            self._emit_progress("end", 1.0)
         finally:
             elapsed = self._clock() - self._start
             self.seconds[name] = self.seconds.get(name, 0.0) + elapsed
@@ -63,7 +63,7 @@ class Progress:
         detail: a few words on what was just done, a load step and its residual, say.
         """
         if self._stage:
-            self._tell("run", min(max(float(fraction), 0.0), 1.0), detail)
+            self._emit_progress("run", min(max(float(fraction), 0.0), 1.0), detail)
 
     def warning(self, what: str, where: str = "", what_to_do: str = "") -> None:
         """Tell something the user should know that does not end the run."""
@@ -94,7 +94,7 @@ class Progress:
         for sink in self.sinks:
             sink(message)
 
-    def _tell(self, state: str, fraction: float | None, detail: str = "") -> None:
+    def _emit_progress(self, state: str, fraction: float | None, detail: str = "") -> None:
         elapsed = self._clock() - self._start
         self.emit(
             {

@@ -24,17 +24,17 @@ Array = np.ndarray[Any, Any]
 
 FORMATS = ("frames", "json", "labels", "csv")
 # Without a format found: enough for a few of the longest lines, little enough for any memory.
-_MOST_UNTOLD = 16384
+_MOST_UNREAD_BYTES = 16384
 _LONGEST_LINE = 4096
 _ENOUGH = 3
 # The format is told by the latest lines: what a device says while it starts is soon past.
-_TELLING = 20
+_LATEST_LINES = 20
 # Pieces in a row that mean nothing in the format found: the device speaks another one now.
 _LOST_THREAD = 50
 # A name that is new must come this often within so many lines; more, if its line lacks nothing else.
 _NEW_WITHIN, _MORE_WITHIN = 12, 64
 # So many bytes without a format are enough to say what is wrong with them.
-_TELLING_BYTES = 400
+_COMPLAINT_BYTES = 400
 # A text's share of characters that can be printed; half of all bytes can, in noise a third.
 _TEXT = 0.9
 # A device says what its frames hold about once a second; samples that come before wait for it.
@@ -134,8 +134,8 @@ class Decoder:
         self._numbering = Numbering()
         self._layouts: deque[Layout] = deque()
         self._host = HostTime()
-        self._told = -math.inf
-        self._untold = bytearray()
+        self._last_host_s = -math.inf
+        self._unrecognised = bytearray()
         # CSV: the names of columns, a header that waits for its first row, the width of most rows.
         self._columns: list[str] | None = None
         self._header: tuple[list[str], bytes] | None = None
@@ -164,10 +164,10 @@ class Decoder:
         self._buffer += data
         self._at = at
         if self.format is None:
-            self._tell()
+            self._detect_format()
         self._take_pieces()
         if self.format is None:
-            self._trim_untold()
+            self._trim_unrecognised()
         if self._bad_in_a_row >= _LOST_THREAD:
             self.format, self._bad_in_a_row = None, 0
         return self._timed_groups()
@@ -176,7 +176,7 @@ class Decoder:
         """What still waits for a device to name its channels, for the rest of a sample, or for an end."""
         self._at = at
         if self.format is None:
-            self._tell(enough=1)
+            self._detect_format(enough=1)
             self._take_pieces()
         self._flush_buffer()
         self._first = True
@@ -190,9 +190,9 @@ class Decoder:
         """What is wrong with bytes of which none can be read, and what to do; None while some can."""
         counted = self.counters
         unread = counted.bytes - counted.read_bytes
-        if self.format is not None or unread < _TELLING_BYTES or 20 * counted.read_bytes > counted.bytes:
+        if self.format is not None or unread < _COMPLAINT_BYTES or 20 * counted.read_bytes > counted.bytes:
             return None
-        seen = bytes(self._untold[-4096:] + self._buffer[-4096:])
+        seen = bytes(self._unrecognised[-4096:] + self._buffer[-4096:])
         shown = sum(32 <= byte < 127 or byte in b"\t\r\n" for byte in seen)
         if shown < _TEXT * len(seen):
             return (
@@ -241,17 +241,17 @@ class Decoder:
 
     def _reject_lines(self, lines: Iterable[bytes]) -> None:
         for line in lines:
-            self._untold = (self._untold + line + b"\n")[-4096:]
+            self._unrecognised = (self._unrecognised + line + b"\n")[-4096:]
             if line.strip():
                 self._reject(line + b"\n", "malformed")
             else:
                 self._read_piece(line + b"\n")
 
-    def _trim_untold(self) -> None:
+    def _trim_unrecognised(self) -> None:
         """Keep the latest half of bytes in which no format is found."""
-        if len(self._buffer) <= _MOST_UNTOLD:
+        if len(self._buffer) <= _MOST_UNREAD_BYTES:
             return
-        excess = len(self._buffer) - _MOST_UNTOLD // 2
+        excess = len(self._buffer) - _MOST_UNREAD_BYTES // 2
         end = self._buffer.rfind(b"\n", 0, excess) + 1
         if end:
             self._reject_lines(bytes(self._buffer[: end - 1]).split(b"\n"))
@@ -268,7 +268,7 @@ class Decoder:
             self._bad_in_a_row = _LOST_THREAD
 
     def _drop(self, count: int) -> None:
-        self._untold = (self._untold + self._buffer[:count])[-4096:]
+        self._unrecognised = (self._unrecognised + self._buffer[:count])[-4096:]
         self._unended(bytes(self._buffer[:count]))
         del self._buffer[:count]
 
@@ -280,7 +280,7 @@ class Decoder:
         elif self.format is not None:
             self._lines()
 
-    def _tell(self, enough: int = _ENOUGH) -> None:
+    def _detect_format(self, enough: int = _ENOUGH) -> None:
         """Find the format by what most of the latest whole pieces can be read as."""
         found = self._most_read(enough)
         if found is None:
@@ -301,7 +301,7 @@ class Decoder:
         framed = sum(payload_of(p) is not None for p in frames)
         if framed >= enough or (framed and self._last_format == "frames"):
             return "frames"
-        lines = self._whole_lines()[-_TELLING:]
+        lines = self._whole_lines()[-_LATEST_LINES:]
         read = {
             name: sum(reader(line) is not None for line in lines if line) for name, reader in _READERS.items()
         }
@@ -585,8 +585,8 @@ class Decoder:
             host[timed] = self._host.of(device[timed])
         # A mapping that has learned better may be a little behind what was told before.
         rising = _TICK_S * np.arange(len(rows))
-        host = np.maximum.accumulate(np.maximum(host - rising, self._told)) + rising
-        self._told = float(host[-1]) + _TICK_S
+        host = np.maximum.accumulate(np.maximum(host - rising, self._last_host_s)) + rising
+        self._last_host_s = float(host[-1]) + _TICK_S
         table = np.array([numbered.row.values for numbered in rows], dtype=float)
         return Samples(layout, host, device, sequence, table.reshape(len(rows), len(layout.channels)))
 

@@ -22,6 +22,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..files import make_folder, output_error, plain
+from ..reading import file_bytes
 from .decoder import Reject, Samples
 
 Array = np.ndarray[Any, Any]
@@ -78,7 +79,7 @@ class Recorder:
             self._index = (folder / INDEX).open("ab", buffering=0)
         except OSError as error:
             raise output_error(error, folder / INDEX) from error
-        self._say({"type": "recording", "version": VERSION, **about})
+        self._index_line({"type": "recording", "version": VERSION, **about})
 
     def write(self, samples: Samples, start_s: float) -> None:
         """Append samples, host times counted from start_s; they are the system's when this returns."""
@@ -124,12 +125,14 @@ class Recorder:
             return
         self._indexed = time_s
         place = 0 if self._file is None else self._file.tell()
-        self._say({"type": "place", "time_s": time_s, "row": self._row, "byte": place, **counters})
+        self._index_line({"type": "place", "time_s": time_s, "row": self._row, "byte": place, **counters})
         self._sync()
 
     def event(self, name: str, time_s: float, **details: Any) -> None:
         """A line in the index: what happened, when in s from the start, and details of it."""
-        self._say({"type": "event", "event": name, "time_s": round(time_s, 6), "row": self._row, **details})
+        self._index_line(
+            {"type": "event", "event": name, "time_s": round(time_s, 6), "row": self._row, **details}
+        )
 
     def close(self) -> None:
         """Everything to the disk, and the end."""
@@ -151,7 +154,7 @@ class Recorder:
         except OSError as error:
             raise output_error(error, path) from error
         self._write((",".join(columns) + "\n").encode())
-        self._say({"type": "file", "file": path.name, "columns": columns})
+        self._index_line({"type": "file", "file": path.name, "columns": columns})
 
     def _write(self, data: bytes) -> None:
         assert self._file is not None
@@ -166,7 +169,7 @@ class Recorder:
         while data:
             data = data[stream.write(data) or 0 :]
 
-    def _say(self, message: Mapping[str, Any]) -> None:
+    def _index_line(self, message: Mapping[str, Any]) -> None:
         try:
             self._index.write(json.dumps(plain(message)).encode() + b"\n")
         except OSError as error:
@@ -199,7 +202,7 @@ def read_recording(folder: Path) -> list[Recording]:
     folder = Path(folder)
     messages = []
     try:
-        lines = (folder / INDEX).read_bytes().split(b"\n")
+        lines = file_bytes(folder / INDEX, 1 << 32).split(b"\n")
     except OSError as error:
         raise InputError(
             f"the recording is invalid: {error.strerror}", str(folder), f"name a folder with {INDEX}"
@@ -207,7 +210,7 @@ def read_recording(folder: Path) -> list[Recording]:
     for line in lines:
         try:
             message = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             continue
         if isinstance(message, dict):
             messages.append(message)
@@ -217,7 +220,7 @@ def read_recording(folder: Path) -> list[Recording]:
 
 def _read_file(path: Path, messages: tuple[dict[str, Any], ...]) -> Recording | None:
     try:
-        text = path.read_bytes().decode()
+        text = file_bytes(path, 1 << 32).decode()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"cannot read {path.name}: {error}", str(path), "restore it from a copy") from None
     head, _, body = text.partition("\n")

@@ -25,7 +25,7 @@ from .ring import Ring
 from .sources import Ended, Gone, Source
 
 Array = np.ndarray[Any, Any]
-Tell = Callable[[str, dict[str, Any]], None]
+EventHandler = Callable[[str, dict[str, Any]], None]
 # Values (n, c) in the channels' units -> further columns (n, d), shown beside them and not recorded.
 Derive = Callable[[tuple[str, ...], Array], tuple[tuple[str, ...], Array]]
 
@@ -74,20 +74,20 @@ def run_session(
     seconds: float | None = None,
     derive: Derive | None = None,
     keep_time: bool = False,
-    tell: Tell = lambda event, details: None,
+    on_event: EventHandler = lambda event, details: None,
 ) -> dict[str, Any]:
     """Record a source into `folder` until it ends, `seconds` have passed, or it is asked to stop.
 
     Beside the recording, status.json says five times a second how it goes, and names the file of the latest
-    samples (a Ring: time_s, device_s, sequence, channels, what `derive` makes of them). `tell` hears of
-    events, and of "status" as often. keep_time: the source's clock is the time that is recorded, as for a
-    recording that is played again. Returns the last status. Raises InputError and OutputError.
+    samples (a Ring: time_s, device_s, sequence, channels, what `derive` makes of them). `on_event` is called
+    with events, and with "status" as often. keep_time: the source's clock is the time that is recorded, as
+    for a recording that is played again. Returns the last status. Raises InputError and OutputError.
     """
     control = control or Control()
     clock = _Clock()
     pieces: queue.SimpleQueue[_Piece] = queue.SimpleQueue()
     recorder = Recorder(folder, {**about, "started": time.strftime("%Y-%m-%dT%H:%M:%S%z")})
-    view = _View(folder, recorder, clock.start, derive, keep_time, tell)
+    view = _View(folder, recorder, clock.start, derive, keep_time, on_event)
     reader = threading.Thread(target=_read, args=(source, pieces, control, clock), daemon=True)
     reader.start()
     try:
@@ -196,11 +196,11 @@ class _View:
         start: float,
         derive: Derive | None,
         keep_time: bool,
-        tell: Tell,
+        on_event: EventHandler,
     ) -> None:
         self.decoder = Decoder()
         self.folder, self.recorder, self.start = folder, recorder, start
-        self.derive, self.keep_time, self.tell = derive, keep_time, tell
+        self.derive, self.keep_time, self.on_event = derive, keep_time, on_event
         self.state, self.port = "searching", ""
         self.reconnects = -1
         self._ring: Ring | None = None
@@ -209,7 +209,7 @@ class _View:
         self._latest: Array = np.empty(0)
         self._format: str | None = None
         self._complaint: tuple[str, str] | None = None
-        self._said = -np.inf
+        self._last_status_s = -np.inf
         self._rate: list[tuple[float, int]] = []
 
     def take(self, groups: list[Samples], at: float) -> None:
@@ -254,18 +254,18 @@ class _View:
         elif name in ("disconnected", "paused", "waiting", "ended"):
             self.state = name
         self.recorder.event(name, at - self.start, **details)
-        self.tell(name, details)
-        self._said = -np.inf
+        self.on_event(name, details)
+        self._last_status_s = -np.inf
 
     def tick(self, now: float) -> None:
         """Index once a second, status five times; called often."""
         self.recorder.tick(now - self.start, attrs.asdict(self.decoder.counters))
-        if now - self._said >= _STATUS_S:
-            self._said = now
+        if now - self._last_status_s >= _STATUS_S:
+            self._last_status_s = now
             self._rate = [*self._rate, (now, self.decoder.counters.samples)][-10:]
             status = self.status(now)
             self._write_status(status)
-            self.tell("status", status)
+            self.on_event("status", status)
 
     def status(self, now: float) -> dict[str, Any]:
         rate = 0.0

@@ -14,10 +14,10 @@ if not session.OTHERS:
 
 def _version(python):
     """`bpy 4.5`: what a Python has."""
-    asked = "import bpy, os; print('version %d.%d' % bpy.app.version[:2], flush=True); os._exit(0)"
-    told = subprocess.run([python, "-c", asked], capture_output=True, text=True, check=False)
-    assert "version " in told.stdout, f"MU_BPY: {python} has no bpy that loads\n{told.stderr}"
-    return f"bpy {told.stdout.split('version ')[1].split()[0]}"
+    script = "import bpy, os; print('version %d.%d' % bpy.app.version[:2], flush=True); os._exit(0)"
+    result = subprocess.run([python, "-c", script], capture_output=True, text=True, check=False)
+    assert "version " in result.stdout, f"MU_BPY: {python} has no bpy that loads\n{result.stderr}"
+    return f"bpy {result.stdout.split('version ')[1].split()[0]}"
 
 
 @pytest.fixture(

@@ -27,7 +27,7 @@ class Blender:
 
     def __init__(self, python, folder):
         self.python, self.folder = python, Path(folder)
-        self.process, self.log = None, self.folder / "said.txt"
+        self.process, self.log = None, self.folder / "output.txt"
 
     def call(self, module, function, *, registered=True, **arguments):
         """What `function` returns in a Blender as new; a failure there is a failure here."""
@@ -49,8 +49,8 @@ class Blender:
         if failure:
             with self.log.open("rb") as file:
                 file.seek(start)
-                said = file.read().decode(errors="replace")
-            pytest.fail(f"{failure}\n-- what Blender printed --\n{said}", pytrace=False)
+                output = file.read().decode(errors="replace")
+            pytest.fail(f"{failure}\n-- what Blender printed --\n{output}", pytrace=False)
         return found
 
     def _start(self):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-TOLD = Path(os.environ["MU_TEST_FOLDER"]) / "told.txt"
+OUTCOME = Path(os.environ["MU_TEST_FOLDER"]) / "outcome.txt"
 (package,) = (name for name, _ in bpy.context.preferences.addons.items() if name.endswith(".mu_addon"))
 place = [800, 400]
 
@@ -58,9 +58,9 @@ def run(session):
         try:
             return next(steps)
         except StopIteration:
-            TOLD.write_text("all went well")
+            OUTCOME.write_text("all went well")
         except Exception:  # noqa: BLE001 - told to the test, which fails with it
-            TOLD.write_text(traceback.format_exc())
+            OUTCOME.write_text(traceback.format_exc())
         bpy.ops.wm.quit_blender()
         return None
 

@@ -53,8 +53,8 @@ def call(home, *arguments, command=BLENDER):
 
 @pytest.fixture(scope="module")
 def archive(home, tmp_path_factory):
-    told = call(home, "-b", "--python-expr", "import sys; print('Python %d.%d.' % sys.version_info[:2])")
-    python = told.split("Python ")[1].split(".\n")[0]
+    output = call(home, "-b", "--python-expr", "import sys; print('Python %d.%d.' % sys.version_info[:2])")
+    python = output.split("Python ")[1].split(".\n")[0]
     out = tmp_path_factory.mktemp("built")
     build = [ROOT / ".ci" / "extension.py", out, "--bundle", "--platform", "linux-x64", "--python", python]
     done = subprocess.run([sys.executable, *build], capture_output=True, text=True, check=False)
@@ -78,8 +78,8 @@ def test_wheels_are_inside_and_numpy_is_not(archive):
 
 
 def test_a_designers_day(installed, home, tmp_path):
-    said = call(home, "-b", "--python-exit-code", "4", "-P", HERE / "designers_day.py", "--", tmp_path)
-    assert "the day is over" in said, said
+    output = call(home, "-b", "--python-exit-code", "4", "-P", HERE / "designers_day.py", "--", tmp_path)
+    assert "the day is over" in output, output
     assert (tmp_path / "unit.stl").stat().st_size > 1_000_000
 
 
@@ -128,7 +128,7 @@ def test_an_upgrade_keeps_the_users_presets(installed, home, archive):
 def test_mouse_and_keys(script, installed, home, tmp_path):
     os.environ["MU_TEST_FOLDER"] = str(tmp_path)
     call(home, HERE / script, tmp_path / "screen.png", 300, command=WINDOW)
-    assert (tmp_path / "told.txt").read_text() == "all went well", (tmp_path / "told.txt").read_text()
+    assert (tmp_path / "outcome.txt").read_text() == "all went well", (tmp_path / "outcome.txt").read_text()
 
 
 def test_removed_without_residue(installed, home):

@@ -58,7 +58,7 @@ def injector():
         )
 
 
-def said(bench, words):
+def reply(bench, words):
     """The line that the injector answers a line with."""
     bench.stdin.write((words if isinstance(words, str) else json.dumps(words)) + "\n")
     bench.stdin.flush()
@@ -70,19 +70,19 @@ def said(bench, words):
 
 
 def hidden(order, judge):
-    """What `judge(folder)` says of an ordered bench, the answer, and `told_apart`.
+    """What `judge(folder)` says of an ordered bench, the answer, and `nearest_rival`.
 
     The commitment made before the verdict is checked.
     """
     bench = injector()
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place) / "measured"
-        commitment = json.loads(said(bench, {**order, "folder": str(folder)}))["commitment"]
+        commitment = json.loads(reply(bench, {**order, "folder": str(folder)}))["commitment"]
         verdict = judge(folder)
-        sealed = said(bench, "reveal").strip()
+        sealed = reply(bench, "reveal").strip()
         assert hashlib.sha256(sealed.encode()).hexdigest() == commitment
         answer = json.loads(sealed)
-        nearest = told_apart(order, Path(place) / "measured-bare", verdict, answer)
+        nearest = nearest_rival(order, Path(place) / "measured-bare", verdict, answer)
     return verdict, answer, nearest
 
 
@@ -107,7 +107,7 @@ def verdict_of(folder, order, change=None):
     return diagnose(experiments, simulator_of(order, experiments))
 
 
-def told_apart(order, bare, verdict, answer):
+def nearest_rival(order, bare, verdict, answer):
     """The explanation that comes next to the truth in data without noise: chi squared left, and its names.
 
     By the noise of the verdict; of single effects for one true effect, and of any for a cause that the
@@ -154,7 +154,7 @@ def changed(experiments, change):
 
 
 # Of an answer, what rates are counted by.
-TOLD = ("effect", "times", "count", "dt", "rho", "level", "gauge", "impossible")
+COUNTED_BY = ("effect", "times", "count", "dt", "rho", "level", "gauge", "impossible")
 
 
 def judged(order):
@@ -179,7 +179,7 @@ def judged(order):
             inside.append((key, value, chosen.values[key], (low, high), low <= value <= high))
     held = verdict.gain.held_out
     return {
-        **{k: answer.get(k) for k in TOLD},
+        **{k: answer.get(k) for k in COUNTED_BY},
         "part": order.get("part", ""),
         "unit": order.get("unit", "written"),
         "seed": order["seed"],

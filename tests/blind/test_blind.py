@@ -88,9 +88,9 @@ def test_what_does_not_matter_does_not_change_the_verdict_and_the_gain_is_on_wha
 
 
 def test_a_broken_commitment_is_noticed(monkeypatch):
-    honest = judge.said
+    honest = judge.reply
     monkeypatch.setattr(
-        judge, "said", lambda bench, words: honest(bench, words).replace('"dt": 0.3', '"dt": 0.4')
+        judge, "reply", lambda bench, words: honest(bench, words).replace('"dt": 0.3', '"dt": 0.4')
     )
     monkeypatch.setattr(judge, "verdict_of", lambda folder, order, change=None: None)
     with pytest.raises(AssertionError):

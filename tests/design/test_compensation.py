@@ -126,8 +126,8 @@ def test_the_standard_error_is_that_of_repeats():
     ]
     for direction in ("xy", "z"):
         values = np.array([run[direction][0] for run in runs])
-        said = np.sqrt(np.mean([run[direction][1] ** 2 for run in runs]))
-        assert values.std() == pytest.approx(said, rel=0.25)
+        stated = np.sqrt(np.mean([run[direction][1] ** 2 for run in runs]))
+        assert values.std() == pytest.approx(stated, rel=0.25)
 
 
 def test_the_gauge_has_the_sizes_of_its_sheet():

@@ -79,12 +79,12 @@ def test_another_unit_is_computed_once(tmp_path, monkeypatch):
 def test_counts_of_cells_share_one_modulus_as_drawn():
     """Two cells a side between plates that hold are stiffer than three, by 12.6 to 9.8 kPa."""
     tests = [THREE, block(name="two", cells=(2, 2, 2))]
-    found, told = scalings(tests, UNIT)
+    found, remarks = scalings(tests, UNIT)
     model = LatticeStress(tests, found)
     first, second = (model.predict(e, {"lattice_modulus_kPa": 10.0})[0][-1] / 0.4 for e in tests)
     assert first == pytest.approx(10.0)
     assert second / first == pytest.approx(12.6 / 9.8, rel=0.02)
-    assert "3 x 3 x 3 cells between plates that hold" in told[0]
+    assert "3 x 3 x 3 cells between plates that hold" in remarks[0]
 
 
 @pytest.mark.usefixtures("no_test")
@@ -97,9 +97,9 @@ def test_an_offset_that_the_unit_has_already_comes_before_the_effects():
 
 
 def test_a_specimen_without_a_count_is_of_slender_struts_and_that_is_told():
-    found, told = scalings([block()], UNIT)
+    found, remarks = scalings([block()], UNIT)
     assert found == {}
-    assert "slender struts" in told[0]
+    assert "slender struts" in remarks[0]
     e = block()
     model = LatticeStress([e])
     assert model.computed is None

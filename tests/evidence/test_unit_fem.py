@@ -146,7 +146,7 @@ def test_what_was_run_is_found_again(responses, cache, monkeypatch):
     def refuse(*_):
         raise AssertionError("ran again")
 
-    told = []
+    reports = []
     with monkeypatch.context() as patch:
         patch.setattr(unit_fem, "run", refuse)
         again = unit_responses(UNIT, [bench(orientation_deg=90.0)], QUICK, cache)
@@ -159,10 +159,10 @@ def test_what_was_run_is_found_again(responses, cache, monkeypatch):
     base = Run(Body(UNIT, ROUGH, FINER), tuple(responses[0].pressures_kPa), tuple(MARKERS.values()))
     path = cache / f"unit-{base.key()}.npz"
     path.write_bytes(path.read_bytes()[:-40])
-    one = unit_responses(UNIT, [bench()], QUICK, cache, lambda stage, share: told.append((stage, share)))
+    one = unit_responses(UNIT, [bench()], QUICK, cache, lambda stage, share: reports.append((stage, share)))
     np.testing.assert_array_equal(one[0].values, responses[0].values)
-    assert [t for t in told if t[0].startswith("unit")] == [("unit, base", 1.0)]
-    assert any("marker 1 at 1x lies 0.00 mm" in stage for stage, _ in told)
+    assert [t for t in reports if t[0].startswith("unit")] == [("unit, base", 1.0)]
+    assert any("marker 1 at 1x lies 0.00 mm" in stage for stage, _ in reports)
 
 
 def test_what_changes_a_result_changes_its_key():

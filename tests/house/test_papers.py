@@ -94,7 +94,7 @@ def test_no_file_mentions_a_machine():
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "expected"),
     [
         ("see " + "/ro" + "ot/x", True),
         ('"' + "/ho" + 'me/anna/mesh.vtu"', True),
@@ -102,8 +102,8 @@ def test_no_file_mentions_a_machine():
         ("homework/abc, ~/x and a/work-around", False),
     ],
 )
-def test_the_search_for_machines_can_find_one(text, told):
-    assert bool(_MACHINE.search(text)) == told
+def test_the_search_for_machines_can_find_one(text, expected):
+    assert bool(_MACHINE.search(text)) == expected
 
 
 def test_no_large_file():

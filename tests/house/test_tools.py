@@ -27,8 +27,8 @@ def tool(name):
     ids=" ".join,
 )
 def test_tool_is_content(command):
-    status, said = run(tool(command[0]), *command[1:])
-    assert status == 0, said
+    status, output = run(tool(command[0]), *command[1:])
+    assert status == 0, output
 
 
 @pytest.mark.parametrize(
@@ -49,10 +49,10 @@ def test_the_import_contracts_can_fail(tmp_path, module, line, contract):
     for name in ("errors.py", "files.py", "usecases/report.py"):
         (tmp_path / "mu_addon" / name).write_text("")
     (tmp_path / "mu_addon" / module / "new.py").write_text(line + "\n")
-    status, said = run(tool("lint-imports"), "--no-cache", cwd=tmp_path)
+    status, output = run(tool("lint-imports"), "--no-cache", cwd=tmp_path)
     assert status == 1
-    broken = [text for text in said.splitlines() if "BROKEN" in text]
-    assert len(broken) == 1, said
+    broken = [text for text in output.splitlines() if "BROKEN" in text]
+    assert len(broken) == 1, output
     assert contract in broken[0]
 
 

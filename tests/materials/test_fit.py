@@ -71,9 +71,9 @@ def test_the_tables_of_the_documentation_are_what_comes_out(to_all_modes, to_uni
             if len(cells := line.strip("| ").split(" | ")) == 5
         }
         for found in fits.values():
-            told = rows[found.form.title]
-            assert told[3].startswith("yes") == found.stable
-            for e, number in zip(found.errors, told, strict=False):
+            row = rows[found.form.title]
+            assert row[3].startswith("yes") == found.stable
+            for e, number in zip(found.errors, row, strict=False):
                 assert number.startswith("**") == (e.mode in found.fails)
                 # Powers of ten and rounded thousands are told to a figure or two.
                 if (plain := number.strip("*").replace(" ", "")) and "⁶" not in plain and "⁹" not in plain:

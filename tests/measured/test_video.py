@@ -84,8 +84,8 @@ def test_scale_from_a_ruler_from_a_number_and_what_disagrees():
     assert motion(filmed, ruler, REST, TIME).mm_per_pixel == pytest.approx(0.25)
     wrong = motion(filmed, attrs.evolve(ruler, ruler_mm=55.0), REST, TIME)
     assert wrong.mm_per_pixel == pytest.approx(0.275)
-    (told,) = wrong.remarks
-    assert "by the ruler one pixel is 0.275 mm, by the places of the base 0.25 mm" in told.what
+    (remark,) = wrong.remarks
+    assert "by the ruler one pixel is 0.275 mm, by the places of the base 0.25 mm" in remark.what
     number = motion(filmed, attrs.evolve(VIEW, mm_per_pixel=0.25), REST, TIME)
     assert number.mm_per_pixel == 0.25
     assert number.remarks == ()
@@ -108,9 +108,9 @@ def test_what_was_lost_stays_empty_and_is_told():
 def test_a_marker_that_slips_is_told():
     pixels = picture(arc(BEND))
     pixels[3, 28:] += [6.0, 3.0]
-    (told,) = motion(tracks(pixels), VIEW, REST, TIME).remarks
-    assert "tip's two markers, 120 pixels apart" in told.what
-    assert float(told.what.rpartition(" at ")[2].removesuffix(" s")) >= 2.8
+    (remark,) = motion(tracks(pixels), VIEW, REST, TIME).remarks
+    assert "tip's two markers, 120 pixels apart" in remark.what
+    assert float(remark.what.rpartition(" at ")[2].removesuffix(" s")) >= 2.8
 
 
 def test_a_camera_that_moves_is_told_and_taken_out_where_asked():

@@ -265,11 +265,11 @@ def test_refine_raises_every_count(coarse: Mesh, half: Mesh) -> None:
 
 
 def test_progress_is_told(unit: Unit) -> None:
-    told: list[tuple[str, float]] = []
+    reports: list[tuple[str, float]] = []
     mesh_unit(
-        unit, MeshSettings(refine=0.5, order=1), progress=lambda stage, share: told.append((stage, share))
+        unit, MeshSettings(refine=0.5, order=1), progress=lambda stage, share: reports.append((stage, share))
     )
-    shares = [share for _, share in told]
+    shares = [share for _, share in reports]
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
 

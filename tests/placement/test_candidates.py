@@ -129,8 +129,8 @@ model = Model(mesh)
 baseline = simulate(Equilibrium(model, materials(mesh)), np.arange(2.0), PRESSURES[2:])
 points = anchor_points(UNIT)
 every = candidate_paths(points, windows(6))
-sweep = Sweep(model, materials(mesh), (points, probe(mesh, points)), sensors(mesh, JOBS[2:4]), 2.5)
-moved = sweep.at(baseline.states[-1])
+batch = CandidateBatch(model, materials(mesh), (points, probe(mesh, points)), sensors(mesh, JOBS[2:4]), 2.5)
+moved = batch.at(baseline.states[-1])
 sys.stdout.write(mesh.hash() + " " + moved.tobytes().hex())
 """
     answers = [

@@ -25,8 +25,8 @@ from mu_addon.placement.influence import (
     loaded,
     mean_deviation,
     parities,
+    representative_pressures,
     shares_of_time,
-    telling_pressures,
 )
 from mu_addon.placement.whole import whole_body
 
@@ -180,16 +180,18 @@ def test_the_mirrored_trajectory_is_in_equilibrium(half):
         assert again.residual < 1e-9
 
 
-def test_telling_pressures_stand_for_all(half):
+def test_representative_pressures_stand_for_all(half):
     """A state that was left out, from the polynomial through the others."""
     mesh, model, _ = half
     made = Materials.neo_hooke(*moduli(mesh))
     pressure = np.array([0.0, -20.0, -10.0, 10.0, 20.0, 30.0])
     baseline = simulate(Equilibrium(model, made), np.arange(6.0), pressure)
-    assert telling_pressures(baseline).tolist() == [-0.02, 0.01, 0.03]
+    assert representative_pressures(baseline).tolist() == [-0.02, 0.01, 0.03]
     monitor = probe(mesh, POINTS)
     every = influence_map(model, made, baseline, monitor)
-    few = influence_map(model, made, baseline, monitor, telling_pressures(baseline)).at(every.pressure_MPa)
+    few = influence_map(model, made, baseline, monitor, representative_pressures(baseline)).at(
+        every.pressure_MPa
+    )
     gradients, weights = gradients_of(baseline, POINTS, monitor, 21), shares_of_time(baseline)
     one, other = (deviation_map(found, gradients, weights) for found in (every, few))
     assert np.abs(one - other).max() < 0.02 * one.max()

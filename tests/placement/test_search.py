@@ -23,7 +23,7 @@ from mu_addon.placement.inclusion import sensor_share
 from mu_addon.placement.influence import gradients_of, loaded, mean_deviation, shares_of_time
 from mu_addon.placement.polyline import polyline_inclusion
 from mu_addon.placement.response import reduced_response
-from mu_addon.placement.search import SearchSettings, chance_of_better, front, search_paths
+from mu_addon.placement.search import SearchSettings, front, probability_of_better, search_paths
 
 UNIT = load_preset("mu-1.0x")
 D = UNIT.dimensions
@@ -164,7 +164,7 @@ def test_the_risk_holds_over_many_searches():
 
 def test_everything_checked_leaves_no_risk():
     J = np.array([0.3, 0.1, 0.2])
-    assert chance_of_better(np.ones(3), J) == 0.0
+    assert probability_of_better(np.ones(3), J) == 0.0
     outcome = search_paths(np.ones(3), lambda numbers: J[numbers], SearchSettings(risk=0.0))
     assert outcome.complete
     assert outcome.best == 1

@@ -124,8 +124,8 @@ def test_every_path_and_rule_is_in_the_table(page):
 
 
 def test_assumptions_are_told_with_their_reason(page):
-    told = page.words[page.words.index("The paper does not print these values") :]
-    assert "chambers.wall_mm0.8mmthe thinnest wall that this printer holds" in told
+    section = page.words[page.words.index("The paper does not print these values") :]
+    assert "chambers.wall_mm0.8mmthe thinnest wall that this printer holds" in section
 
 
 def test_partial_says_so_at_the_top(page):

@@ -7,24 +7,24 @@ import sys
 import time
 
 
-def say(**message):
+def emit(**message):
     print(json.dumps(message), flush=True)
 
 
 def progress(fraction):
-    say(type="progress", stage="Model A", state="run", fraction=fraction, seconds=1.0, seconds_left=3.0)
+    emit(type="progress", stage="Model A", state="run", fraction=fraction, seconds=1.0, seconds_left=3.0)
 
 
 def good():
     progress(0.25)
-    say(type="warning", what="a small thing", where="", what_to_do="")
+    emit(type="warning", what="a small thing", where="", what_to_do="")
     progress(0.75)
-    say(type="result", summary={})
+    emit(type="result", summary={})
 
 
-def told_error():
+def reported_error():
     progress(0.5)
-    say(type="error", what="no equilibrium", where="at 12 kPa", what_to_do="thicker wall", status=4)
+    emit(type="error", what="no equilibrium", where="at 12 kPa", what_to_do="thicker wall", status=4)
     sys.exit(4)
 
 
@@ -51,11 +51,11 @@ def half_a_line():
     time.sleep(0.6)
     sys.stdout.write('ction": 0.5}\n')
     sys.stdout.flush()
-    say(type="result", summary={})
+    emit(type="result", summary={})
 
 
 def lies():
-    say(type="result", summary={})
+    emit(type="result", summary={})
     sys.exit(3)
 
 
@@ -63,7 +63,7 @@ def flood():
     for _ in range(20_000):
         sys.stderr.write("x" * 99 + "\n")
         progress(0.5)
-    say(type="result", summary={})
+    emit(type="result", summary={})
 
 
 def hang():
@@ -89,7 +89,7 @@ def orphan():
     from mu_addon.run.processes import end_with_input
 
     end_with_input()
-    say(type="progress", stage=str(os.getpid()), state="run", fraction=0.5, seconds=1.0, seconds_left=3.0)
+    emit(type="progress", stage=str(os.getpid()), state="run", fraction=0.5, seconds=1.0, seconds_left=3.0)
     time.sleep(600)
 
 
@@ -101,9 +101,9 @@ def greedy():
     try:
         kept = bytearray(2_000_000_000)
     except MemoryError:
-        say(type="error", what="refused", where="", what_to_do="", status=1)
+        emit(type="error", what="refused", where="", what_to_do="", status=1)
         sys.exit(1)
-    say(type="result", summary={"kept": len(kept)})
+    emit(type="result", summary={"kept": len(kept)})
 
 
 if __name__ == "__main__":

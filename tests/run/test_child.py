@@ -50,7 +50,7 @@ def test_a_good_run_is_heard(start):
 
 
 def test_an_error_is_passed_on_in_its_own_words(start):
-    child = start("told_error")
+    child = start("reported_error")
     watch(child)
     assert child.state == FAILED
     assert (child.error["what"], child.error["where"]) == ("no equilibrium", "at 12 kPa")

@@ -52,22 +52,22 @@ def start(how, folder):
 
 
 def finish(process, folder):
-    _, said = process.communicate(timeout=1800)
-    assert "Traceback" not in said
+    _, output = process.communicate(timeout=1800)
+    assert "Traceback" not in output
     summary = folder / "summary.json"
     log = folder / "log.ndjson"
     return (
         process.returncode,
-        said,
+        output,
         json.loads(summary.read_text()) if summary.exists() else None,
         [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else [],
     )
 
 
 def test_complete(tmp_path):
-    status, said, summary, log = finish(start("well", tmp_path), tmp_path)
+    status, output, summary, log = finish(start("well", tmp_path), tmp_path)
     assert status == 0
-    assert "error" not in said
+    assert "error" not in output
     assert summary["status"] == "complete"
     assert summary["angle_deg"] == [1.0, 2.0]
     assert list(summary["seconds"]) == ["model A"]
@@ -76,9 +76,9 @@ def test_complete(tmp_path):
 
 
 def test_a_known_failure(tmp_path):
-    status, said, summary, log = finish(start("mu", tmp_path), tmp_path)
+    status, output, summary, log = finish(start("mu", tmp_path), tmp_path)
     assert status == 4
-    assert "error: no equilibrium\n  where: at 37 kPa\n  what to do: thicken the wall" in said
+    assert "error: no equilibrium\n  where: at 37 kPa\n  what to do: thicken the wall" in output
     assert summary["status"] == "partial"
     assert summary["reason"] == {
         "what": "no equilibrium",
@@ -92,9 +92,9 @@ def test_a_known_failure(tmp_path):
 
 
 def test_a_fault_of_ours(tmp_path):
-    status, said, summary, log = finish(start("bug", tmp_path), tmp_path)
+    status, output, summary, log = finish(start("bug", tmp_path), tmp_path)
     assert status == 70
-    assert "RuntimeError: a bug" in said
+    assert "RuntimeError: a bug" in output
     assert summary["status"] == "partial"
     traces = [m["text"] for m in log if m["type"] == "traceback"]
     assert len(traces) == 1
@@ -102,9 +102,9 @@ def test_a_fault_of_ours(tmp_path):
 
 
 def test_a_fault_before_there_is_a_folder(tmp_path):
-    status, said, summary, log = finish(start("early", tmp_path), tmp_path)
+    status, output, summary, log = finish(start("early", tmp_path), tmp_path)
     assert (status, summary, log) == (70, None, [])
-    assert "RuntimeError: a bug" in said
+    assert "RuntimeError: a bug" in output
 
 
 @pytest.mark.parametrize(
@@ -115,9 +115,9 @@ def test_stopped_from_outside(tmp_path, number, status):
     assert process.stdout.readline() == "ready\n"
     assert json.loads((tmp_path / "summary.json").read_text()) == {"status": "running"}
     process.send_signal(number)
-    found, said, summary, log = finish(process, tmp_path)
+    found, output, summary, log = finish(process, tmp_path)
     assert found == status
-    assert "error: stopped by" in said
+    assert "error: stopped by" in output
     assert summary["status"] == "partial"
     assert log[-1]["status"] == status
     assert (tmp_path / "mesh.txt").read_text() == "kept"
@@ -128,9 +128,9 @@ def test_a_second_ctrl_c_cuts_short_what_takes_long(tmp_path):
     for word in ("ready", "saving"):
         assert process.stdout.readline() == word + "\n"
         process.send_signal(signal.SIGINT)
-    status, said, summary, _ = finish(process, tmp_path)
+    status, output, summary, _ = finish(process, tmp_path)
     assert status == 130
-    assert "error: stopped by Ctrl-C" in said
+    assert "error: stopped by Ctrl-C" in output
     assert summary["status"] == "partial"
     assert not (tmp_path / "last_words.txt").exists()
 
@@ -152,8 +152,8 @@ def test_a_full_disk_still_ends_with_its_message(tmp_path, monkeypatch):
     from mu_addon.run.context import run_to_end
     from mu_addon.run.progress import Progress
 
-    told = []
-    with run_to_end(Progress([told.append])) as context:
+    messages = []
+    with run_to_end(Progress([messages.append])) as context:
         context.open_folder(tmp_path)
 
         def full(_):
@@ -164,5 +164,5 @@ def test_a_full_disk_still_ends_with_its_message(tmp_path, monkeypatch):
 
         write_text(tmp_path / "a.csv", "x")
     assert context.status == 5
-    assert told[-1]["type"] == "error"
-    assert "free some space" in told[-1]["what_to_do"]
+    assert messages[-1]["type"] == "error"
+    assert "free some space" in messages[-1]["what_to_do"]

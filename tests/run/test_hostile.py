@@ -140,10 +140,10 @@ def test_every_flipped_bit_is_found_out_or_harmless(tmp_path):
 
 
 def started(folder, results=("a.csv", "model_a")):
-    told = []
-    with run_to_end(Progress([told.append])) as context:
+    messages = []
+    with run_to_end(Progress([messages.append])) as context:
         begin(context, folder, FolderLayout("mine.toml", HEADER, results), {"mine.toml": HEADER + "\n"})
-    return context, told
+    return context, messages
 
 
 @pytest.mark.parametrize(
@@ -155,9 +155,9 @@ def test_a_link_under_a_name_of_ours_is_refused(tmp_path, name):
     folder = tmp_path / "out"
     folder.mkdir()
     (folder / name).symlink_to(victim)
-    context, told = started(folder)
+    context, messages = started(folder)
     assert context.status == 2
-    assert f"{name} in the folder is a link to another location" in told[-1]["what"]
+    assert f"{name} in the folder is a link to another location" in messages[-1]["what"]
     assert victim.read_text() == "precious"
 
 

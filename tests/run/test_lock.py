@@ -85,11 +85,11 @@ def test_a_lock_that_is_a_link_is_not_followed(tmp_path):
 
 def test_a_run_in_a_folder_in_use_ends_and_touches_nothing(tmp_path, holder):
     before = sorted(path.name for path in tmp_path.iterdir())
-    told = []
-    with run_to_end(Progress([told.append])) as context:
+    messages = []
+    with run_to_end(Progress([messages.append])) as context:
         begin(context, tmp_path, LAYOUT, {"a.toml": "# mine\n"})
     assert context.status == 2
-    assert "another run uses this folder" in told[-1]["what"]
+    assert "another run uses this folder" in messages[-1]["what"]
     assert sorted(path.name for path in tmp_path.iterdir()) == before
 
 
@@ -109,8 +109,8 @@ def test_a_disk_without_locks_is_warned_of(tmp_path, monkeypatch):
         raise OSError(95, "Operation not supported")
 
     monkeypatch.setattr(fcntl, "flock", none)
-    told = []
-    with run_to_end(Progress([told.append])) as context:
+    messages = []
+    with run_to_end(Progress([messages.append])) as context:
         begin(context, tmp_path, LAYOUT, {"a.toml": "# mine\n"})
     assert context.status == 0
-    assert any(m["type"] == "warning" and "does not support file locks" in m["what"] for m in told)
+    assert any(m["type"] == "warning" and "does not support file locks" in m["what"] for m in messages)

@@ -34,12 +34,12 @@ def run(progress, clock, updates=10, step=1.0):
 
 
 def test_time_left_by_the_share_done(clock):
-    told = []
-    progress = Progress([told.append], clock)
+    messages = []
+    progress = Progress([messages.append], clock)
     with progress.stage("mesh", expected_s=20.0):
         clock.now += 3.0
         progress.update(0.25)
-    start, running, end = told
+    start, running, end = messages
     assert (start["state"], start["seconds_left"]) == ("start", 20.0)
     assert running["seconds_left"] == pytest.approx(9.0)
     assert (end["state"], end["fraction"], end["seconds"]) == ("end", 1.0, 3.0)
@@ -47,12 +47,12 @@ def test_time_left_by_the_share_done(clock):
 
 
 def test_a_failed_stage_is_not_told_as_ended(clock):
-    told = []
-    progress = Progress([told.append], clock)
+    messages = []
+    progress = Progress([messages.append], clock)
     with pytest.raises(ZeroDivisionError), progress.stage("mesh"):  # noqa: PT012
         clock.now += 2.0
         1 / 0  # noqa: B018
-    assert [m["state"] for m in told] == ["start"]
+    assert [m["state"] for m in messages] == ["start"]
     assert progress.seconds == {"mesh": 2.0}
     with progress.stage("next"):
         pass
@@ -147,13 +147,13 @@ def test_a_log_that_cannot_be_written(tmp_path):
 
 
 def test_an_error_reaches_the_sinks_that_still_work():
-    told = []
+    messages = []
 
     def broken(_):
         raise BrokenPipeError
 
-    Progress([broken, told.append]).error(InputError("bad"))
-    assert told[0]["what"] == "bad"
+    Progress([broken, messages.append]).error(InputError("bad"))
+    assert messages[0]["what"] == "bad"
 
 
 @pytest.mark.parametrize(

@@ -225,15 +225,15 @@ def test_host_time_follows_the_least_delayed() -> None:
     decoder = Decoder()
     decoder.feed(INFO, 0.0)
     drift, offset = 80e-6, 12.5
-    error, told = [], []
+    error, host_s = [], []
     for k in range(4000):
         device_s = 0.01 * k
         true_host = offset + device_s * (1 + drift)
         at = true_host + 0.001 + generator.exponential(0.02)
         for samples in decoder.feed(sample_frame(k, round(device_s * 1e6), (k, 1)), at):
             error.append(samples.host_s[-1] - true_host)
-            told += samples.host_s.tolist()
-    assert np.diff(told).min() > 0
+            host_s += samples.host_s.tolist()
+    assert np.diff(host_s).min() > 0
     # The least delay remains, as no clock can tell it from the offset.
     assert np.median(error[1000:]) == pytest.approx(0.001, abs=0.001)
     assert np.ptp(error[1000:]) < 0.004

@@ -109,8 +109,8 @@ def test_how_far_wells_open_against_plane_elasticity(pull: float, turn: float) -
     line = Centreline(s, points, np.column_stack([0 * s, np.cos(angle), np.sin(angle)]))
     shape = of_window("alpha4").shape
     found = notched(shape, line)
-    told = np.interp(wells, found.s, found.stretch - 1) + 0.75 * np.interp(wells, found.s, found.curvature)
-    np.testing.assert_allclose(told / exact, 0.84, atol=0.07)
+    opened = np.interp(wells, found.s, found.stretch - 1) + 0.75 * np.interp(wells, found.s, found.curvature)
+    np.testing.assert_allclose(opened / exact, 0.84, atol=0.07)
     # Sections that stay as they are along the bar would open them by a third of that or less.
     smooth = np.interp(wells, line.s, line.stretch - 1) + 0.75 * np.interp(wells, line.s, line.curvature)
     assert (np.abs(smooth / exact) < 0.34).all()

@@ -64,8 +64,8 @@ def test_samples_and_infos() -> None:
     assert payload is not None
     assert sample_of(payload) == (5, 70, (0, 65535, 300))
     assert info_of(payload) is None
-    said = {"channels": ["light"], "unit": "V", "unit_per_count": 0.001}
-    payload = payload_of(info_frame(said)[:-1])
+    info = {"channels": ["light"], "unit": "V", "unit_per_count": 0.001}
+    payload = payload_of(info_frame(info)[:-1])
     assert payload is not None
-    assert info_of(payload) == said
+    assert info_of(payload) == info
     assert sample_of(payload) is None

@@ -87,12 +87,12 @@ def test_a_stretched_guide_loses_light(law_of_d: Law) -> None:
     rest = arc(3 * D.cell + 5, 0)
     longer = Centreline(rest.s, 1.05 * rest.points, rest.normals)
     lights = [traced(shape, line, Optics(), rays=60_000) for line in (rest, longer)]
-    told = [law_of_d.transmitted(shape, [line]) for line in (rest, longer)]
+    transmitted = [law_of_d.transmitted(shape, [line]) for line in (rest, longer)]
     error = law_of_d.error(features(shape, [longer]) - features(shape, [rest]))
     error = np.hypot(error, np.hypot(*(light.error / light.detected for light in lights)))
     change = np.log(lights[1].detected / lights[0].detected)
     assert change < -0.15
-    assert np.log(told[1] / told[0]) == pytest.approx(change, abs=3 * error)
+    assert np.log(transmitted[1] / transmitted[0]) == pytest.approx(change, abs=3 * error)
 
 
 def test_a_resin_that_lets_hardly_any_light_through_is_named() -> None:

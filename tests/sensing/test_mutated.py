@@ -22,7 +22,7 @@ from mu_addon.sensing.decoder import Decoder, Samples
 from mu_addon.sensing.framing import framed, info_frame, sample_frame
 from mu_addon.sensing.recording import REJECTS, read_recording
 from mu_addon.sensing.session import run_session
-from mu_addon.usecases.sensor.stream import Display, console_summary, said
+from mu_addon.usecases.sensor.stream import Display, console_summary, status_line
 
 from .mutations import FORMATS, NASTY, decoded, sound
 from .test_session import _Scripted
@@ -88,11 +88,14 @@ def test_before_a_format_is_known_lines_count() -> None:
 
 def test_noise_and_text_are_said_to_be_that(tmp_path: Path) -> None:
     noise = random.Random(3).randbytes(5000)
-    said: list[tuple[str, Any]] = []
+    events: list[tuple[str, Any]] = []
     status = run_session(
-        _Scripted(noise), tmp_path / "noise", about={}, tell=lambda event, about: said.append((event, about))
+        _Scripted(noise),
+        tmp_path / "noise",
+        about={},
+        on_event=lambda event, about: events.append((event, about)),
     )
-    (words,) = [about for event, about in said if event == "unreadable"]
+    (words,) = [about for event, about in events if event == "unreadable"]
     assert "wrong baud rate" in words["detail"]
     assert "--baud" in words["what_to_do"]
     shown = console_summary(status)
@@ -194,7 +197,7 @@ def test_names_that_no_csv_and_no_terminal_should_see(tmp_path: Path) -> None:
     (recording,) = read_recording(tmp_path / "r")
     assert len(recording.channels) == len(names)
     assert all(name.isprintable() and "," not in name for name in recording.columns)
-    assert said(status).isprintable()
+    assert status_line(status).isprintable()
 
 
 def test_what_a_port_calls_itself_moves_no_cursor() -> None:

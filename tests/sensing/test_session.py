@@ -134,7 +134,11 @@ def test_the_port_is_given_back_and_taken_again(tmp_path: Path) -> None:
         line = SerialLine(str(link))
         status.update(
             run_session(
-                line, folder, about={}, control=control, tell=lambda e, d: e != "status" and events.append(e)
+                line,
+                folder,
+                about={},
+                control=control,
+                on_event=lambda e, d: e != "status" and events.append(e),
             )
         )
 

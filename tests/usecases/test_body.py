@@ -53,17 +53,17 @@ def test_design_in_a_body(files, capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "expected"),
     [
         (["--body", "none.stl"], "no body can be read from it"),
         (["--body", "unit.toml"], "the file type .toml is not supported for a body"),
     ],
 )
-def test_files_without_a_body_end_with_what_to_do(files, words, said, capsys):
+def test_files_without_a_body_end_with_what_to_do(files, words, expected, capsys):
     status, _ = design(files, words[0], files / words[1])
     assert status == 2
     error = [json.loads(line) for line in capsys.readouterr().out.splitlines()][-1]
-    assert said in error["what"]
+    assert expected in error["what"]
     assert "STL, OBJ or PLY" in error["what_to_do"]
 
 

@@ -40,10 +40,10 @@ def model_a():
 def swept(model_a, folder, **changes):
     mesh, trajectory = model_a
     sweep = CandidateSolver(attrs.evolve(JOB, **changes), Cache(folder), mesh, JOBS, PRESSURES)
-    told = []
-    found = sweep.evaluations(trajectory, told.append, verify=True)
+    shares = []
+    found = sweep.evaluations(trajectory, shares.append, verify=True)
     sweep.close()
-    assert told == sorted(told)
+    assert shares == sorted(shares)
     return sweep, np.array([e.deviation.delta for e in found])
 
 

@@ -83,7 +83,7 @@ def test_it_leaves_a_table_and_a_report(tmp_path):
         line.startswith("overcure: detectable from offset 0.0") for line in console_summary(context.summary)
     )
     assert (tmp_path / "out" / "limits.csv").read_text().startswith("effect,parameter,unit,visible_from")
-    assert "would show" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "can detect" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("word", ["angle", "angle=", "angle=-1", "loudness=3", "angle=nan"])

@@ -98,11 +98,11 @@ def test_the_terminal_is_told_in_a_few_lines(overcured):
 
 
 def test_every_stage_is_told(overcured):
-    told = [m["stage"] for m in overcured[3] if m["type"] == "progress" and m["state"] == "start"]
-    assert told[:3] == ["noise", "sensitivities", "single effects"]
-    assert told[-2:] == ["gain", "report"]
+    stages = [m["stage"] for m in overcured[3] if m["type"] == "progress" and m["state"] == "start"]
+    assert stages[:3] == ["noise", "sensitivities", "single effects"]
+    assert stages[-2:] == ["gain", "report"]
     ended = [m["stage"] for m in overcured[3] if m["type"] == "progress" and m["state"] == "end"]
-    assert ended == told
+    assert ended == stages
 
 
 def test_equal_data_leave_equal_bytes(overcured, tmp_path):
@@ -116,11 +116,11 @@ def test_the_same_data_are_not_judged_twice(overcured, tmp_path, monkeypatch):
     folder, out, summary, _ = overcured
     shutil.copytree(out, tmp_path / "out")
     monkeypatch.setattr(diagnosing, "diagnose", None)
-    context, told = run(folder, tmp_path / "out")
+    context, messages = run(folder, tmp_path / "out")
     assert context.status == 0
     assert console_summary(context.summary) == console_summary(summary)
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["status"] == "complete"
-    assert [m["stage"] for m in told if m["type"] == "progress" and m["state"] == "end"] == [
+    assert [m["stage"] for m in messages if m["type"] == "progress" and m["state"] == "end"] == [
         "verdict of the same data, from the cache"
     ]
     # A result that is gone is made again.
@@ -182,9 +182,9 @@ def test_a_unit_is_judged_by_its_angle_and_markers(tmp_path, monkeypatch, gauge_
     assert context.status == 0, messages[-1]
     assert context.summary["verdict"] == "named"
     assert [c["effect"] for c in context.summary["causes"]] == ["clogged_chamber"]
-    told = [r.partition(";")[0] for r in context.summary["remarks"] if "white noise" in r]
+    remarks = [r.partition(";")[0] for r in context.summary["remarks"] if "white noise" in r]
     # What is predicted has noise as well, of which nothing is taken.
-    assert told == ["pressure_kPa was read with white noise of up to 0.022"] * (gauge_kPa > 0)
+    assert remarks == ["pressure_kPa was read with white noise of up to 0.022"] * (gauge_kPa > 0)
     gain = context.summary["gain"]["held_out"]
     assert gain["unit"] == "deg"
     assert gain["rmse_after"] < 0.15 < gain["rmse_before"]

@@ -35,10 +35,10 @@ RESIN = load_material("elastic-50a-v1")
 
 
 def run(use_case, job, folder):
-    said = []
-    with run_to_end(Progress([said.append])) as context:
+    messages = []
+    with run_to_end(Progress([messages.append])) as context:
         use_case.start(job, folder, context)
-    return context, said
+    return context, messages
 
 
 @pytest.fixture(scope="module")
@@ -206,14 +206,14 @@ def test_without_gmsh_the_rest_is_written(tmp_path, monkeypatch):
 
     monkeypatch.setattr("mu_addon.meshing.step.load_gmsh", missing)
     job = Job(SMALL, RESIN, formats=("stl", "step", "txt"), quality="interactive")
-    context, said = run(EXPORT, job, tmp_path)
+    context, messages = run(EXPORT, job, tmp_path)
     assert context.status == 0
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     assert [f["file"] for f in manifest["files"]] == ["unit.stl", "nodes.txt"]
     assert manifest["refused"][0]["why"] == "gmsh cannot load libGLU.so.1"
-    assert any(m["type"] == "warning" and "libglu1-mesa" in m["text"] for m in said if "text" in m) or any(
-        "libglu1-mesa" in str(m) for m in said
-    )
+    assert any(
+        m["type"] == "warning" and "libglu1-mesa" in m["text"] for m in messages if "text" in m
+    ) or any("libglu1-mesa" in str(m) for m in messages)
     assert not list(tmp_path.glob("*.step"))
 
 
@@ -257,7 +257,7 @@ def test_calliper_sheets_become_offsets(tmp_path):
     path.write_text(sheet().replace("0.9,\n", "0.9,9.0\n"))
     with pytest.raises(InputError, match="x1 measured as"):
         read_sheet(path)
-    with pytest.raises(InputError, match="has no offsets"):
+    with pytest.raises(InputError, match="no print offset"):
         taken_off(SMALL, "unit")
     assert taken_off(SMALL, None) == ((0.0, 0.0), "")
 

@@ -78,14 +78,14 @@ def test_a_law_of_another_cell_is_warned_of(tmp_path):
     """Written by hand, the law has an offset of 0.1 mm, which the unit has not."""
     same = attrs.evolve(body_centred(), cell={"kind": "body-centred", "size_mm": 12.5})
     other = attrs.evolve(same, cell={"kind": "octet", "size_mm": 12.5, "offset_xy_mm": 0.1})
-    told = []
+    warnings = []
     for lattice in (same, other):
         progress = Progress([])
-        folder = tmp_path / str(len(told))
+        folder = tmp_path / str(len(warnings))
         study = Study.open(attrs.evolve(JOB, lattice=lattice), folder, RunContext(progress))
-        told.append([text for text in study.warnings if "another cell" in text])
-    assert told[0] == []
-    assert "kind octet (unit: body-centred), offset_xy_mm 0.1 (unit: 0.0)" in told[1][0]
+        warnings.append([text for text in study.warnings if "another cell" in text])
+    assert warnings[0] == []
+    assert "kind octet (unit: body-centred), offset_xy_mm 0.1 (unit: 0.0)" in warnings[1][0]
 
 
 def test_another_law_is_another_entry_of_the_cache():

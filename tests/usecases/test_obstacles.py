@@ -134,20 +134,20 @@ def test_a_unit_that_meets_a_wall(files, capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "expected"),
     [
         (["--obstacle", "none.stl"], "no body can be read from it"),
         (["--obstacle", "inside.stl"], "it overlaps the unit by up to"),
         (["--obstacle", "wall.stl", "--friction", "-1"], "a friction coefficient of -1"),
     ],
 )
-def test_what_cannot_be_an_obstacle_ends_with_what_to_do(files, words, said, capsys):
+def test_what_cannot_be_an_obstacle_ends_with_what_to_do(files, words, expected, capsys):
     inside = block((-5, 20, 5), (5, 60, 20))
     (files / "inside.stl").write_bytes(stl_bytes(inside.vertices, inside.triangles))
     words = [files / w if w.endswith(".stl") else w for w in words]
     status, _ = simulate(files, *words)
     assert status == 2
-    assert said in capsys.readouterr().out
+    assert expected in capsys.readouterr().out
 
 
 def test_friction_without_its_obstacle_is_refused(files, capsys):

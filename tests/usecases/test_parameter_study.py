@@ -69,12 +69,12 @@ def formula(task):
 
 
 def swept(text, folder, work=formula, status=0, **options):
-    told = []
+    messages = []
     asked.clear()
-    with run_to_end(Progress([told.append])) as context:
+    with run_to_end(Progress([messages.append])) as context:
         USE_CASE.start(Job(parse_plan(text, folder), work=work, **options), folder, context)
-    assert context.status == status, told[-1]
-    return list(csv.DictReader((folder / "points.csv").open(newline=""))), told
+    assert context.status == status, messages[-1]
+    return list(csv.DictReader((folder / "points.csv").open(newline=""))), messages
 
 
 def test_every_point_is_a_row_whatever_became_of_it(tmp_path):
@@ -139,11 +139,11 @@ def test_a_damaged_plan_or_point_is_made_again(tmp_path):
 
 def test_a_grid_cannot_be_added_to(tmp_path):
     text = TEXT.replace('"latin_hypercube"', '"grid"')
-    _, told = [], []
-    with run_to_end(Progress([told.append])) as context:
+    _, messages = [], []
+    with run_to_end(Progress([messages.append])) as context:
         USE_CASE.start(Job(parse_plan(text, tmp_path), add=2, work=formula), tmp_path / "out", context)
     assert context.status == 2
-    assert "--add" in told[-1]["where"]
+    assert "--add" in messages[-1]["where"]
 
 
 # One point, in a process of its own.
@@ -160,7 +160,7 @@ def task(how, **limits):
     [
         ("crash", {}, "SIGSEGV"),
         ("wordless", {}, "without a message"),
-        ("told_error", {}, "no equilibrium"),
+        ("reported_error", {}, "no equilibrium"),
         ("hang", {"minutes": 0.01}, "longer than the 0.01 minutes"),
         ("hungry", {"memory_MB": 200}, "more than the 200 MB"),
         ("greedy", {"memory_MB": 500}, "refused"),
@@ -319,13 +319,13 @@ def test_a_lost_worker_and_a_restarted_scheduler_lose_no_point(farm, tmp_path):
     folder = tmp_path / "out"
     folder.mkdir()
     text = TEXT.replace("points = 6", "points = 24").replace("high = 1.2", "high = 1.09")
-    told = []
+    messages = []
 
     class Trouble:
         """Kills what is to be killed as points are done, in the sweep's own process."""
 
         def __call__(self, message):
-            told.append(message)
+            messages.append(message)
             if message.get("state") != "run":
                 return
             if message["fraction"] >= 4 / 24 and lost.poll() is None:
@@ -339,25 +339,25 @@ def test_a_lost_worker_and_a_restarted_scheduler_lose_no_point(farm, tmp_path):
     with run_to_end(Progress([Trouble()])) as context:
         plan = parse_plan(text, tmp_path)
         USE_CASE.start(Job(plan, scheduler=farm.address, work=slow_formula), folder, context)
-    assert context.status == 0, told[-1]
+    assert context.status == 0, messages[-1]
     assert lost.poll() is not None
     assert first.poll() is not None
     rows = list(csv.DictReader((folder / "points.csv").open(newline="")))
     assert [row["status"] for row in rows] == ["done"] * 24
     walls = np.array([float(row["chambers.wall_mm"]) for row in rows])
     np.testing.assert_allclose([float(row["mass_g"]) for row in rows], 1.01 * walls)
-    assert any("the scheduler was lost" in m.get("what", "") for m in told)
+    assert any("the scheduler was lost" in m.get("what", "") for m in messages)
 
 
 def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(cluster_module, "PATIENCE_S", 4.0)
-    told = []
-    with run_to_end(Progress([told.append])) as context:
+    messages = []
+    with run_to_end(Progress([messages.append])) as context:
         job = Job(parse_plan(TEXT, tmp_path), scheduler=f"tcp://127.0.0.1:{free_port()}")
         USE_CASE.start(job, tmp_path / "out", context)
     assert context.status == 1
-    assert "no scheduler answers" in told[-1]["what"]
-    assert "dask scheduler" in told[-1]["what_to_do"]
+    assert "no scheduler answers" in messages[-1]["what"]
+    assert "dask scheduler" in messages[-1]["what_to_do"]
     assert (tmp_path / "out" / "points.csv").is_file()
 
 

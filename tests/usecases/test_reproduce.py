@@ -20,9 +20,9 @@ from mu_addon.placement.candidates import candidate_paths, evaluate
 from mu_addon.placement.inclusion import RULES
 from mu_addon.run.pool import each
 from mu_addon.usecases.reproduce.agreement import (
-    CANNOT_TELL,
     HELD,
     NOT_HELD,
+    UNDECIDED,
     agreement,
     spearman,
     statements,
@@ -73,7 +73,7 @@ def test_a_difference_that_the_mesh_turns_round_cannot_be_told():
     fine, coarse = PAPER.column(1.0).copy(), PAPER.column(1.0).copy()
     coarse[3] = coarse[2] + 0.01  # alpha4 above alpha3 on the other mesh
     found = verdicts({"1.0x": fine}, {"1.0x": coarse})
-    assert found["1.0x: of paths of equal length, the distal one deviates least"] == CANNOT_TELL
+    assert found["1.0x: of paths of equal length, the distal one deviates least"] == UNDECIDED
     assert agreement(fine, fine, PAPER.paths, coarse).tied == ("alpha1", "alpha3")
     # A mesh that makes all larger alike changes no order.
     assert agreement(fine, fine, PAPER.paths, 1.5 * fine).tied == ()

@@ -32,10 +32,10 @@ JOB = Job(
 
 def ran(job, folder):
     """Its summary; the report, which takes longest, is left out."""
-    told = []
-    with run_to_end(Progress([told.append])) as context:
+    messages = []
+    with run_to_end(Progress([messages.append])) as context:
         run_stages(Study.open(job, folder, context))
-    assert context.status == 0, told[-1]
+    assert context.status == 0, messages[-1]
     return json.loads((folder / "summary.json").read_text())
 
 
@@ -171,12 +171,12 @@ def test_a_damaged_cache_is_computed_again_to_the_same_digits(placed, copied, da
 def test_too_little_room_is_told_before_any_work(tmp_path, monkeypatch):
     usage = shutil.disk_usage(tmp_path)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=20_000_000))
-    told = []
-    with run_to_end(Progress([told.append])) as context:
+    messages = []
+    with run_to_end(Progress([messages.append])) as context:
         Study.open(JOB, tmp_path / "out", context)
     assert context.status == 5
-    assert "20 MB are free" in told[-1]["what"]
-    assert "free some space" in told[-1]["what_to_do"]
+    assert "20 MB are free" in messages[-1]["what"]
+    assert "free some space" in messages[-1]["what_to_do"]
     assert not (tmp_path / "out" / "unit.stl").exists()
 
 

@@ -88,10 +88,10 @@ def moved(job, mesh):
 
 def ran(job, folder):
     """Its summary; the report, which takes longest, is left out."""
-    told = []
-    with run_to_end(Progress([told.append])) as context:
+    messages = []
+    with run_to_end(Progress([messages.append])) as context:
         run_stages(Study.open(job, folder, context))
-    assert context.status == 0, told[-1]
+    assert context.status == 0, messages[-1]
     return json.loads((folder / "summary.json").read_text())
 
 
@@ -287,9 +287,9 @@ GRAVITY = "[simulate.effects.gravity]\ndensity_kg_m3 = 1300.0\n"
 def test_effects_that_are_none_are_refused_with_place_and_remedy(tmp_path, old, new, what, remedy):
     keep_inputs(tmp_path, with_effects(90.0, gravity=1300.0).texts())
     path = tmp_path / "study.toml"
-    empty, found = "[simulate.effects]\n\n", path.read_text()
-    assert empty + GRAVITY in found
-    path.write_text(found.replace(empty + GRAVITY, GRAVITY.replace(old, new)))
+    found = path.read_text()
+    assert GRAVITY in found
+    path.write_text(found.replace(GRAVITY, GRAVITY.replace(old, new)))
     with pytest.raises(InputError) as caught:
         read_job(tmp_path)
     assert what in caught.value.what
@@ -328,12 +328,12 @@ def test_the_command_line_simulates_what_a_diagnosis_found(tmp_path, capsys, mes
 
 def given(unit_of, *words):
     """What a command makes of its options --preset and --model, its summary, and what it warns of."""
-    told = []
+    messages = []
     options = parser().parse_args([str(w) for w in [*words, "--preset", "mu-1.0x", "--out", "out"]])
-    with run_to_end(Progress([told.append])) as context:
+    with run_to_end(Progress([messages.append])) as context:
         found = unit_of(options, context)
-    assert context.status == 0, told[-1]
-    return found, context.summary, [m["what"] for m in told if m.get("type") == "warning"]
+    assert context.status == 0, messages[-1]
+    return found, context.summary, [m["what"] for m in messages if m.get("type") == "warning"]
 
 
 def test_a_direction_of_nothing_that_weighs_is_told(tmp_path):

@@ -201,10 +201,10 @@ def test_the_command_line_from_followed_pixels(tmp_path, capsys):
     line = ["track", str(tmp_path / "source.pixels.csv"), "--markers", str(tmp_path / "bench.toml")]
     line += ["--pressure", str(tmp_path / "p.csv"), "--out", str(tmp_path / "out")]
     assert main(line) == 0
-    told = capsys.readouterr()
-    assert "angle: +0.00 to +48.00 deg" in told.out
-    assert "lost: c in 1 frames" in told.out
-    assert "marker 'c' is lost in 1 of 50 frames" in told.err
+    printed = capsys.readouterr()
+    assert "angle: +0.00 to +48.00 deg" in printed.out
+    assert "lost: c in 1 frames" in printed.out
+    assert "marker 'c' is lost in 1 of 50 frames" in printed.err
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["status"] == "complete"
     assert summary["mm_per_pixel"] == pytest.approx(0.25)

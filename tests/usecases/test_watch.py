@@ -43,17 +43,17 @@ def test_every_sample_once_with_marks_and_pauses(tmp_path):
             return sum(map(len, seen))
 
         until(lambda: look() > 50)
-        child.tell("mark angle 30")
-        child.tell("pause")
+        child.send("mark angle 30")
+        child.send("pause")
         until(lambda: look() and watched.status["state"] == "paused")
         before = watched.starved_s
         time.sleep(0.3)
         assert watched.starved_s > before
         until(lambda: look() and watched.silent_s < 3.0)
-        child.tell("resume")
+        child.send("resume")
         count = look()
         until(lambda: look() > count + 50)
-        child.tell("stop")
+        child.send("stop")
         until(lambda: child.poll() and child.state != "running")
     finally:
         child.kill()
@@ -79,7 +79,7 @@ def test_a_killed_reader_is_told_of_and_its_orders_go_nowhere(tmp_path):
         child.kill()
     assert child.state == "failed"
     assert "SIGKILL" in child.error["what"]
-    child.tell("pause")
+    child.send("pause")
     assert watched.status["state"] == "connected", "its last words"
 
 

@@ -121,7 +121,7 @@ class MU_OT_sensor_pause(SessionOperator, bpy.types.Operator):
 
     def execute(self, context):
         session = sensor.of(unit_object.active_root(context))
-        session.child.tell("resume" if session.state == "paused" else "pause")
+        session.child.send("resume" if session.state == "paused" else "pause")
         return {"FINISHED"}
 
 
@@ -140,7 +140,7 @@ class MU_OT_sensor_mark(SessionOperator, bpy.types.Operator):
     def execute(self, context):
         # One line: the next would be another order.
         words = " ".join(self.words.split())
-        sensor.of(unit_object.active_root(context)).child.tell(f"mark {words}")
+        sensor.of(unit_object.active_root(context)).child.send(f"mark {words}")
         return {"FINISHED"}
 
 

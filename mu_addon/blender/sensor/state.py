@@ -109,7 +109,7 @@ def disconnect(uuid: str) -> None:
     """Have a session end; what it has is on disk."""
     session = _sessions.get(uuid)
     if session is not None:
-        session.child.tell("stop")
+        session.child.send("stop")
 
 
 def chosen(root: Any) -> tuple[str, str | float]:
@@ -202,7 +202,7 @@ def hold(session: Session) -> None:
     """Mark the guided sweep's next angle as being held from now on."""
     guide = session.guide
     if guide is not None and guide.held < len(guide.angles) and not guide.holding:
-        session.child.tell(f"mark angle {guide.angles[guide.held]:g}")
+        session.child.send(f"mark angle {guide.angles[guide.held]:g}")
         guide.held += 1
         guide.until = time.monotonic() + HOLD_S
 

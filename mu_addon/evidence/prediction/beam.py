@@ -44,20 +44,24 @@ EFFECTS = (
 
 
 class BeamSag:
-    """Predicts the sag of a tip: an elastica of given modulus, without weight of its own.
+    """Predicts the tip's sag of a cantilever: an elastica of given modulus, without weight of its own.
 
-    Shear is added at first order; the solid is incompressible. Width and thickness are section_mm.
+    Shear is added at first order; the solid is incompressible. An experiment needs section_mm (width,
+    thickness), length_mm and the column added_mass_g.
     """
 
     nuisances = (MODULUS, TILT)
     effects = EFFECTS
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
-        """The sag of the tip."""
+        """The predicted column: sag of the tip in mm."""
         return ("tip_deflection_mm",)
 
     def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
-        """Prediction (1, n) in mm, see Simulator."""
+        """Sag (1, n) of the tip in mm under the masses of added_mass_g (n,); values as in `Simulator`.
+
+        Raises ConvergenceError where no equilibrium is found, see `cantilever`.
+        """
         assert experiment.section_mm is not None
         assert experiment.length_mm is not None
         get = values.get
@@ -87,12 +91,13 @@ def cantilever(
     stiffening: float = 0.0,
     shear: float = 0.0,
 ) -> Array:
-    """Sag (m,) of a level cantilever's tip over its length; raises ConvergenceError.
+    """Sag (m,) of a level cantilever's tip over its length, at any deflection.
 
     tip (m,): force at the tip times L^2/EI; weight: of the beam times L^2/EI. tilt: of the clamp, in rad,
     down; give: turn of the clamp a moment, times EI/L; stiffening: moment = EI k (1 + stiffening (L k)^2) of
-    curvature k; shear: EI/(GA' L^2), whose sag is added at first order. The slope a below the level obeys
-    (a' + stiffening a'^3)' = -(tip + weight (1 - s)) cos a, solved by collocation at Chebyshev points.
+    curvature k; shear: EI/(GA' L^2), whose sag is added at first order. The slope a below the level obeys (a'
+    + stiffening a'^3)' = -(tip + weight (1 - s)) cos a, solved by collocation at Chebyshev points. Raises
+    ConvergenceError where Newton's method finds no equilibrium.
     """
     s, D = _chebyshev(NODES)
     load = np.asarray(tip, float)[:, None] + weight * (1 - s)

@@ -13,9 +13,10 @@ from . import beam, coupon, hold, lattice, waveguide
 def bench_simulators(
     experiments: Sequence[Experiment], scalings: Mapping[str, lattice.Scaling] = MappingProxyType({})
 ) -> dict[str, Simulator]:
-    """Simulators of the kinds among the experiments, by kind; of a unit under pressure there is none here.
+    """Simulators of the kinds among the experiments, by kind; unit_pressure has none here.
 
-    scalings: of printed lattices, by experiment; a power law of slender struts where none is given.
+    scalings: response of printed lattices to printing, by name of the experiment; a power law of slender
+    struts where none is given.
     """
     every: dict[str, Simulator] = {
         beam.KIND: beam.BeamSag(),

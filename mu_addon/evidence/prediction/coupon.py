@@ -42,7 +42,8 @@ EFFECTS = (
 class CouponStress:
     """Predicts coupons by the neo-Hookean law, stiffened as Yeoh's: W = c1 (I1 - 3) + c2 (I1 - 3)^2.
 
-    The modulus is E = 6 c1. Experiments, in the order they were run, tell what each specimen went through.
+    Young's modulus is E = 6 c1, in kPa. experiments: in the order they were run, from which the earlier
+    strain of each specimen is known.
     """
 
     nuisances = (MODULUS,)
@@ -52,11 +53,14 @@ class CouponStress:
         self._pasts = pasts(experiments, KIND)
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
-        """The nominal stress."""
+        """The predicted column: nominal stress in kPa."""
         return ("stress_kPa",)
 
     def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
-        """Prediction (1, n) in kPa, see Simulator."""
+        """Nominal stress (1, n) in kPa at the strains of the experiment; values as in `Simulator`.
+
+        Raises InputError for a stretch that is not positive and ConvergenceError, see `recorded`.
+        """
         c1 = values.get(MODULUS.name, MODULUS.null) / 6
         c2 = c1 * values.get("strain_stiffening.c2_over_c1", 0.0)
         excess = values.get("tension_compression_asymmetry.excess", 0.0)
@@ -70,10 +74,12 @@ class CouponStress:
 
 
 def yeoh(c1: float, c2: float, mode: str, stretch: Array) -> Array:
-    """Nominal stress (n,) of an incompressible solid of W = c1 (I1 - 3) + c2 (I1 - 3)^2, in units of c1.
+    """Nominal stress (n,) of an incompressible solid of W = c1 (I1 - 3) + c2 (I1 - 3)^2, in the unit of c1.
 
-    P = 2 W' (a - a^-m), where m = 2, 5, 3 in the three modes. In closed form: fits ask for it thousands of
-    times, and a test compares it with the law of the finite elements. Raises InputError for no stretch.
+    stretch (n,): length over undeformed length. mode: "uniaxial", "equibiaxial" or "pure_shear". P = 2 W' (a
+    - a^-m), where m = 2, 5, 3 in the three modes. In closed form: fits ask for it thousands of times, and a
+    test compares it with the law of the finite elements. Raises InputError for a stretch that is not
+    positive.
     """
     if not (stretch > 0).all():
         raise InputError("a stretch is not positive", mode, "stretch is length over initial length")

@@ -60,11 +60,11 @@ EFFECTS = (
 
 
 class ChamberPressure:
-    """Predicts holds: p V = m R T in a chamber that, without effects, keeps volume, gas and temperature.
+    """Predicts pressure holds: p V = m R T in a chamber that, without effects, keeps V, m and T.
 
-    Every hold has its own initial pressure, and its own moment at which the valve was shut, until when the
-    supply keeps the pressure. compliance_per_kPa: growth of the volume with pressure, as a share, which only
-    matters while the pressure changes and is not told by a hold.
+    experiments: those of kind pressure_hold each add two nuisances, the initial pressure in kPa and the time
+    in s at which the valve was shut, until when the supply keeps the pressure. compliance_per_kPa: relative
+    growth of the volume a kPa; it matters only while the pressure changes and a hold does not show it.
     """
 
     effects = EFFECTS
@@ -88,11 +88,11 @@ class ChamberPressure:
         self.nuisances = tuple(nuisances)
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
-        """The gauge pressure."""
+        """The predicted column: gauge pressure in kPa."""
         return ("pressure_kPa",)
 
     def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
-        """Prediction (1, n) in kPa, see Simulator."""
+        """Gauge pressure (1, n) in kPa at the experiment's times; values as in `Simulator`."""
         get = values.get
         initial = get(_initial(experiment), None)
         initial = beginning_kPa(experiment) if initial is None else initial
@@ -113,7 +113,7 @@ class ChamberPressure:
 
 
 def beginning_kPa(experiment: Experiment) -> float:
-    """Mean of the first readings."""
+    """Mean gauge pressure in kPa over the first `BEGINNING_s` seconds of an experiment."""
     time = experiment["time_s"]
     return float(np.mean(experiment["pressure_kPa"][time <= time[0] + BEGINNING_s]))
 
@@ -138,11 +138,13 @@ def held(
     cooling_s: float = 30.0,
     compliance_per_kPa: float = 0.0,
 ) -> Array:
-    """Gauge pressure (n,) in kPa at times (n,) after the valve was shut, before which it is the initial one.
+    """Gauge pressure (n,) in kPa at times (n,) in s after the valve was shut.
 
-    With P absolute, P0 the atmosphere, V and T relative to the start: P V = P_i m T. Gas is lost by
-    P_i dm/dt = -k P0 x, where x + b x^2 = (P^2 - P0^2)/(2 P0^2), so that a small overpressure falls by
-    exp(-k t), and a large b makes it the flow of an orifice. The volume is
+    Up to then it is initial_kPa. loss_per_s: k in 1/s; inertia: b, Forchheimer's, no unit; creep_per_kPa: c
+    in 1/kPa; onset_s: onset of creep; cooling_K, cooling_s: excess temperature of the gas at the start and
+    its time constant; compliance_per_kPa: C in 1/kPa. With P absolute, P0 the atmosphere, V and T relative to
+    the start: P V = P_i m T. Gas is lost by P_i dm/dt = -k P0 x, where x + b x^2 = (P^2 - P0^2)/(2 P0^2), so
+    that a small overpressure falls by exp(-k t), and a large b makes it the flow of an orifice. The volume is
     V = 1 + C (p - p_i) + sum over decades d of c x_d, where x_d follows p with the time onset 10^d.
     """
     from scipy.interpolate import CubicSpline

@@ -74,46 +74,50 @@ EFFECTS = (
 
 
 class Scaling(Protocol):
-    """How printing changes a lattice of a scale, relative to the lattice as drawn."""
+    """How printing changes the modulus and mass of a lattice at a scale, relative to the lattice as drawn."""
 
     def stiffness(self, scale: float, offset_mm: float, excess_mm: float) -> float:
-        """Modulus over that as drawn, with every surface moved outward and a stiffer skin."""
+        """Modulus over the modulus as drawn.
+
+        offset_mm: outward print offset of every surface; excess_mm: depth of the skin times (its modulus over
+        the core's - 1). Both are lengths of the printed part, in mm.
+        """
         ...
 
     def mass(self, scale: float, offset_mm: float) -> float:
-        """Mass over that as drawn."""
+        """Mass over the mass as drawn, with every surface moved outward by offset_mm."""
         ...
 
     def largest_offset_mm(self, scale: float) -> float:
-        """Largest offset at which stiffness and mass are known."""
+        """Largest print offset in mm at which stiffness and mass are known."""
         ...
 
 
 @attrs.frozen
 class Struts:
-    """Slender struts of one thickness at 1.0x: stiffness of its power `exponent`, mass of its square.
+    """Slender struts of one thickness at 1.0x: stiffness as thickness^exponent, mass as its square.
 
-    exponent: 4 where struts bend, 2 where they stretch (Gibson and Ashby, Cellular Solids, 1997). A thin skin
-    of depth d and modulus k times the core's adds 2 exponent (k - 1) d/t to the stiffness. For the lattice's
-    own cell give what `homogenize` computes instead, see `ComputedCell`.
+    thickness_mm: at 1.0x. exponent: 4 where struts bend, 2 where they stretch (Gibson and Ashby, Cellular
+    Solids, 1997). A thin skin of depth d and modulus k times the core's adds 2 exponent (k - 1) d/t to the
+    stiffness. For the lattice's own cell use what `homogenize` computes instead, see `ComputedCell`.
     """
 
     thickness_mm: float = 1.5
     exponent: float = 4.0
 
     def stiffness(self, scale: float, offset_mm: float, excess_mm: float) -> float:
-        """Modulus over that as drawn."""
+        """Modulus over that as drawn, ((t + 2 offset)/t)^exponent (1 + 2 exponent excess/t); mm."""
         t = self.thickness_mm * scale
         # Without an effect exactly 1.
         return ((t + 2 * offset_mm) / t) ** self.exponent * (1 + 2 * self.exponent * excess_mm / t)
 
     def mass(self, scale: float, offset_mm: float) -> float:
-        """Mass over that as drawn."""
+        """Mass over the mass as drawn, ((t + 2 offset)/t)^2; lengths in mm."""
         t = self.thickness_mm * scale
         return ((t + 2 * offset_mm) / t) ** 2
 
     def largest_offset_mm(self, scale: float) -> float:
-        """None."""
+        """Infinity (mm): the power law has no largest offset."""
         return math.inf
 
 
@@ -125,8 +129,8 @@ class ComputedCell:
     """Stiffness and mass of a lattice's own cell, from virtual tests of it at several print offsets.
 
     A thin skin is, to first order of its depth, as good as its excess modulus times its depth of more resin
-    on the surface, so that it stiffens by the slope of the offset's response. reference: the block whose
-    modulus as drawn stiffness is told against, where it is not this one (another count of cells, say).
+    on the surface, so that it stiffens by the slope of the offset's response. reference: the block to whose
+    modulus as drawn the stiffness is relative, where it is not this one (another count of cells, say).
     printed_mm, printed_excess_mm: offset and skin that the lattice has before any effect.
     """
 
@@ -136,7 +140,11 @@ class ComputedCell:
     printed_excess_mm: float = 0.0
 
     def stiffness(self, scale: float, offset_mm: float, excess_mm: float) -> float:
-        """Modulus over the reference's as drawn; raises InputError beyond the offsets that were computed."""
+        """Modulus over the reference's as drawn.
+
+        offset_mm and excess_mm, as in `Scaling`, are added to the printed ones. Raises InputError beyond the
+        offsets that were computed.
+        """
         modulus = self.response.modulus_MPa
         drawn = (self.reference or self.response).modulus_MPa
         offset_mm, excess_mm = offset_mm + self.printed_mm, excess_mm + self.printed_excess_mm
@@ -150,12 +158,15 @@ class ComputedCell:
         return found * (1 + slope * excess_mm)
 
     def mass(self, scale: float, offset_mm: float) -> float:
-        """Mass over that as drawn; raises InputError beyond the offsets that were computed."""
+        """Mass over the mass as drawn, with offset_mm added to the printed one.
+
+        Raises InputError beyond the offsets that were computed.
+        """
         density = self.response.relative_density
         return float(density(scale, offset_mm + self.printed_mm) / density(1.0, 0.0))
 
     def largest_offset_mm(self, scale: float) -> float:
-        """The last offset that was computed, enlarged as the lattice."""
+        """The last offset in mm that was computed, times `scale`, less the lattice's printed offset."""
         return self.response.range_mm[1] * scale - self.printed_mm
 
 
@@ -167,9 +178,10 @@ class LatticeStress:
     """Predicts compressed lattices: modulus times `curve` of the strain, and the mass of weighed specimens.
 
     A lattice scaled as a whole has no length of its own: as drawn, its modulus does not depend on scale.
-    curve: stress (n,) over modulus at strain (n,), compression positive, of slope 1 at 0. Experiments, in the
-    order they were run, tell what each specimen went through. scalings: by experiment, slender struts where
-    one has none. The mass needs columns mass_g and mass_sd_g, and section_mm and length_mm.
+    curve: stress (n,) over modulus at strain (n,), compression positive, of slope 1 at 0. experiments: in the
+    order they were run, from which the earlier strain of each specimen is known. scalings: by name of the
+    experiment, slender struts where one has none. The mass needs columns mass_g and mass_sd_g, and section_mm
+    and length_mm.
     """
 
     nuisances = (MODULUS, DENSITY)
@@ -196,12 +208,15 @@ class LatticeStress:
         return (found[0].reference or found[0].response) if found else None
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
-        """The nominal stress, and the mass where it is known."""
+        """The predicted columns: nominal stress in kPa, and mass in g where it and the volume are given."""
         weighed = "mass_g" in experiment.columns and _volume_cm3(experiment) is not None
         return ("stress_kPa", "mass_g") if weighed else ("stress_kPa",)
 
     def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
-        """Prediction (channels, n), see Simulator."""
+        """Prediction (channels, n), stress in kPa and mass in g; values as in `Simulator`.
+
+        Raises InputError for a print offset beyond the computed ones and ConvergenceError, see `recorded`.
+        """
         offset = values.get("overcure.offset_mm", 0.0)
         excess = values.get("skin_cure.excess_mm", 0.0)
         modulus = values.get(MODULUS.name, MODULUS.null)

@@ -32,7 +32,7 @@ _AT, _WEIGHT = (_AT + 1) / 2, _WEIGHT / 2
 
 
 def machine(kind: str) -> tuple[Effect, ...]:
-    """Effects that coupons and lattices share: of the machine, of layers, and of the material in time."""
+    """Effects, for a kind, of the testing machine, of layers, and of the material in time."""
     in_time = ("viscoelasticity", "mullins_softening", "fatigue_drift", "temperature_drift")
     return (
         *(Effect(name, _TIMED[name], (kind,)) for name in in_time),
@@ -66,7 +66,7 @@ def machine(kind: str) -> tuple[Effect, ...]:
 
 @attrs.frozen
 class Past:
-    """What a specimen went through before an experiment: how many tests, and its largest strain."""
+    """History of a specimen before an experiment: number of tests, largest absolute strain (no unit)."""
 
     tests: int = 0
     strain: float = 0.0
@@ -76,7 +76,11 @@ NEW = Past()
 
 
 def pasts(experiments: Sequence[Experiment], kind: str) -> dict[str, Past]:
-    """The past of each experiment of a kind, by name; they were run in the order given."""
+    """The history of each experiment of a kind, by its name.
+
+    experiments: in the order they were run. Those of one specimen and scale follow one another; an experiment
+    without a specimen's name has a new one.
+    """
     found: dict[str, Past] = {}
     now: dict[Any, Past] = {}
     for e in experiments:
@@ -90,11 +94,13 @@ def pasts(experiments: Sequence[Experiment], kind: str) -> dict[str, Past]:
 
 
 def recorded(experiment: Experiment, law: Law, values: Mapping[str, float], past: Past = NEW) -> Array:
-    """Nominal stress (n,) in kPa that the machine records; raises ConvergenceError.
+    """Nominal stress (n,) in kPa that the machine records at the experiment's strains.
 
-    Faces close a gap g while the load builds up: the specimen strains by e - g/L (1 - exp(-e L/g)). What the
-    machine calls zero is where the preload was reached. A frame of compliance c in series leaves the specimen
-    e - c A s/L. Relaxation needs time_s, the frame section_mm and length_mm: without them they are not felt.
+    law: stress (n,) in kPa of strain (n,) in slow loading. Faces close a gap g while the load builds up: the
+    specimen strains by e - g/L (1 - exp(-e L/g)). The machine's zero is where the preload was reached. A
+    frame of compliance c in series leaves the specimen e - c A s/L. Relaxation needs time_s, the frame
+    section_mm and length_mm; without them they have no effect. Raises ConvergenceError where the frame's
+    share is not found.
     """
     strain = experiment["strain"]
     factor = _factor(experiment, values, past)

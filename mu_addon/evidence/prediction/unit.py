@@ -35,9 +35,11 @@ def _float64(values: Any) -> Array:
 
 @attrs.frozen(eq=False)
 class Variant:
-    """The unit's response with one static effect: values (m, c, k) at parameter values (m,) ascending.
+    """The unit's response with one static effect, at m sizes of it.
 
-    The parameter's null is among them, and there the response is the base's.
+    at (m,): values of `parameter` in its unit, ascending, its null among them. values (m, c, k): c channels
+    in their units at the k pressures of the response; at the null they are the base's. Raises InputError for
+    fewer than two sizes, or if they do not ascend through the null.
     """
 
     parameter: Parameter
@@ -57,9 +59,10 @@ class Variant:
 class UnitResponse:
     """Quasi-static response of the unit: values (c, k) of channels at pressures (k,) in kPa ascending.
 
-    channels: columns as measured (angle_deg, marker1_y_mm, ...). variants: by the name of their effect.
-    walls: by the side of the unit they stand on, 1 for +y and -1 for -y. Interpolated by cubic splines, and
-    along their end slopes beyond the last pressures.
+    channels: columns as measured (angle_deg, marker1_y_mm, ...), which give the units. variants: by the name
+    of their effect. walls: by the side of the unit they stand on, 1 for +y and -1 for -y. Interpolated by
+    cubic splines, and along their end slopes beyond the last pressures. Raises InputError for fewer than four
+    pressures and for shapes that do not match.
     """
 
     channels: tuple[str, ...]
@@ -92,7 +95,10 @@ class UnitResponse:
         object.__setattr__(self, "_splines", MappingProxyType(splines))
 
     def at(self, pressure_kPa: Array, sizes: Mapping[str, float]) -> Array:
-        """Channels (c, n) at effective pressures (n,) with static effects of the given sizes."""
+        """Channels (c, n) in their units at effective pressures (n,) in kPa, with static effects.
+
+        sizes: by name of the effect, in its parameter's unit; effects without a variant are ignored.
+        """
         known = self.variants
         curve = self._curve(
             tuple((n, v) for n, v in sizes.items() if n in known and v != known[n].parameter.null)
@@ -126,7 +132,7 @@ class UnitResponse:
 
 @attrs.frozen
 class Past:
-    """What a specimen went through before an experiment: cycles, and its extreme pressures in kPa."""
+    """History of a specimen before an experiment: pressure cycles, lowest and highest pressure in kPa."""
 
     cycles: float = 0.0
     trough_kPa: float = 0.0
@@ -134,7 +140,10 @@ class Past:
 
 
 def histories(experiments: Sequence[Experiment]) -> dict[str, Past]:
-    """The past of each unit_pressure experiment, by name; they were run in the order given."""
+    """The history of each unit_pressure experiment, by its name.
+
+    experiments: in the order they were run; those of one specimen and scale follow one another.
+    """
     found: dict[str, Past] = {}
     now: dict[tuple[str, float], Past] = {}
     for e in experiments:
@@ -153,7 +162,7 @@ def histories(experiments: Sequence[Experiment]) -> dict[str, Past]:
 
 
 def nuisances(channels: Sequence[str]) -> tuple[Parameter, ...]:
-    """What every fit of a unit frees: the modulus, and the zero of each channel."""
+    """Parameters that every fit of a unit frees: modulus factor, and each channel's zero in its unit."""
     zeros = [
         Parameter(_zero(c), c.rpartition("_")[2], -1e3, 1e3, 0.0, source="set by the camera", linear=True)
         for c in channels
@@ -231,13 +240,14 @@ TIMED = (
 
 
 class UnitPressure:
-    """Predicts unit_pressure experiments from responses of the unit, one a scale and orientation.
+    """Predicts unit_pressure experiments from responses of the unit, one for each scale and orientation.
 
-    The gauge's reading becomes the pressure in the chambers (offset, gain, leak, lag; the last two where the
-    valve behind the gauge is open), that becomes the
-    pressure at which the uncorrected unit would stand where the unit stands now (all moduli scaled alike are
-    the pressure scaled inversely, at rest exactly and for moduli that relax alike to first order of the
-    hereditary integral), and that is looked up in the response. Each record starts in equilibrium.
+    The gauge's reading becomes the pressure in the chambers (offset, gain, and with an open valve leak and
+    lag). That becomes the pressure at which the uncorrected unit would stand where the unit stands now: all
+    moduli scaled alike are the pressure scaled inversely, at rest exactly and for moduli that relax alike to
+    first order of the hereditary integral. That pressure is looked up in the response. Each record starts in
+    equilibrium. experiments: in the order they were run, for the history of each specimen. Raises InputError
+    without a response.
     """
 
     def __init__(self, responses: Sequence[UnitResponse], experiments: Sequence[Experiment] = ()) -> None:
@@ -286,7 +296,10 @@ class UnitPressure:
         return tuple(c for c in self._response(experiment).channels if c in experiment.columns)
 
     def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
-        """Prediction (channels, n), see Simulator."""
+        """Prediction (channels, n), angles in degrees and marker positions in mm; values as in `Simulator`.
+
+        Raises InputError where no response is near the experiment's scale and orientation.
+        """
         response = self._response(experiment)
         pressure = self.effective_kPa(experiment, values)
         static = {name: values[key] for name, key in self._sizes.items() if key in values}
@@ -302,7 +315,7 @@ class UnitPressure:
         return y if len(kept) == len(y) else y[kept]
 
     def effective_kPa(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
-        """Pressure (n,) at which the base unit would stand where the unit of these values stands."""
+        """Pressure (n,) in kPa at which the base unit would stand where the unit of these values stands."""
         t, p = experiment["time_s"], experiment["pressure_kPa"]
         past = self._past.get(experiment.name, Past())
         get = values.get
@@ -363,7 +376,10 @@ def _turn(degrees: float) -> float:
 
 
 def lagged(t: Array, p: Array, time_s: float) -> Array:
-    """Solution (n,) of time_s dx/dt + x = p from equilibrium, exact for p straight between its samples."""
+    """Solution (n,) of time_s dx/dt + x = p from equilibrium, in the unit of p.
+
+    t (n,): times in s. Exact for p (n,) linear between its samples; p itself where time_s is not positive.
+    """
     from scipy.signal import lfilter
 
     if time_s <= 0.0:
@@ -388,7 +404,7 @@ def _weights(h: Any, time_s: float) -> tuple[Any, Any, Any]:
 
 
 def play(p: Array, threshold: float) -> Array:
-    """Play operator (n,) of a half-width `threshold`, at rest in the middle at first."""
+    """Play operator (n,) of p (n,) with half-width `threshold`, in the unit of p; it begins in the middle."""
     moves = np.diff(p)
     at = np.flatnonzero(moves)
     turned = np.flatnonzero(np.diff(np.sign(moves[at])))
@@ -406,8 +422,8 @@ def play(p: Array, threshold: float) -> Array:
 def softened(p: Array, before_kPa: float, softening: float, width: float) -> Array:
     """Share (n,) of the virgin modulus left, 1 - softening erf((W_max - W)/width), Ogden and Roxburgh 1999.
 
-    W, in kPa^2, is the square of the pressure, as the energy of the virgin unit nearly is; before_kPa: the
-    largest one of earlier experiments.
+    p (n,): pressure in kPa. W and width, in kPa^2: W is the square of the pressure, as the energy of the
+    virgin unit nearly is; before_kPa: the largest absolute pressure of earlier experiments.
     """
     from scipy.special import erf
 
@@ -417,7 +433,10 @@ def softened(p: Array, before_kPa: float, softening: float, width: float) -> Arr
 
 
 def cycles(p: Array) -> Array:
-    """Cycles gone through (n,): travel of the pressure in kPa over twice its range, noise left out."""
+    """Number of cycles gone through (n,): travel of the pressure p (n,) in kPa over twice its range.
+
+    Reversals smaller than `DEADBAND_kPa` are ignored.
+    """
     smooth = play(p, DEADBAND_kPa)
     travel = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(smooth)))])
     extent = float(np.ptp(smooth))

@@ -55,7 +55,7 @@ class Side:
 
     @property
     def farthest_mm(self) -> float:
-        """How far the free unit leaves its outline at the last pressure."""
+        """How far, in mm, the free unit leaves its outline at the last pressure."""
         return float(self.outward_mm[-1])
 
     @cached_property
@@ -75,11 +75,17 @@ class Side:
         return CubicSpline(reaches, CubicSpline(shares, changes, axis=1)(_EVEN), axis=0)
 
     def met_kPa(self, reach_mm: float) -> float:
-        """Pressure at which a wall is met that stands so far inside the farthest place of all experiments."""
+        """Pressure in kPa at which the unit meets a wall.
+
+        reach_mm: how far the wall stands inside the farthest place of the free unit in all experiments.
+        """
         return float(self._met(self.farthest_mm - (reach_mm - self.spare_mm)))
 
     def change(self, pressure_kPa: Array, reach_mm: float) -> Array:
-        """Change (c, n) of the channels at pressures (n,)."""
+        """Change (c, n) of the channels, in their units, at pressures (n,) in kPa by a wall at reach_mm.
+
+        0 where the wall is farther than this unit gets; beyond the last computed reach that one is used.
+        """
         own, last = reach_mm - self.spare_mm, self.pressures_kPa[-1]
         if own <= 0:
             return np.zeros((self.changes.shape[2], len(pressure_kPa)))
@@ -94,7 +100,11 @@ _EVEN = np.linspace(0.0, 1.0, 101)
 
 
 def effect(sides: Sequence[tuple[int, Side]], kind: str) -> Effect:
-    """Contact with a wall, its size in mm: above 0 on the side +y, below 0 on the other."""
+    """The effect of contact with a wall; its size reach_mm is above 0 on the side +y, below 0 on -y.
+
+    sides: responses with the side that each wall stands on, 1 for +y and -1 for -y. Bounds are the nearest
+    computed walls. kind: of the experiments.
+    """
     farthest = {s: max((side.farthest_mm for t, side in sides if t == s), default=0.0) for s in (1, -1)}
     # Nearer walls than were computed are not guessed.
     nearest = {
@@ -102,7 +112,7 @@ def effect(sides: Sequence[tuple[int, Side]], kind: str) -> Effect:
         for s in (1, -1)
     }
     starts = [round(s * share * near, 3) for s, near in nearest.items() for share in (0.3, 0.7) if near]
-    said = " or ".join(
+    reaches = " or ".join(
         f"{far:.1f} mm beyond its outline at rest toward {'+' if s > 0 else '-'}y"
         for s, far in farthest.items()
         if far
@@ -114,10 +124,10 @@ def effect(sides: Sequence[tuple[int, Side]], kind: str) -> Effect:
         float(nearest[1]),
         0.0,
         tuple(starts),
-        f"how far a wall stands inside the farthest place of the free unit, {said}; below 0 toward -y",
+        f"how far a wall stands inside the farthest place of the free unit, {reaches}; below 0 toward -y",
     )
     mechanism = (
         "the unit touches a flat wall parallel to its axis, reach_mm inside the outline it would "
-        f"reach without the wall: {said}"
+        f"reach without the wall: {reaches}"
     )
     return Effect(NAME, (size,), (kind,), mechanism)

@@ -42,22 +42,22 @@ EFFECTS = (
 
 
 class WaveguideVoltage:
-    """Predicts waveguides: voltage V exp(-b a) at bending angle a, as each bend loses a share of the light.
+    """Predicts waveguides: voltage V exp(-b a) at bending angle a in degrees.
 
-    The loss of the straight guide is in V, which makes a zero of the angle the same as another V until
-    something else is nonlinear. Missing angles are interpolated in time, by cubics: the chords of a fast bend
-    miss as much of it as a late clock does.
+    Each bend loses a share of the light. The loss of the straight guide is in V, so a zero of the angle has
+    the same effect as another V until something else is nonlinear. Missing angles are interpolated in time by
+    Akima's cubics: linear interpolation of a fast bend errs as much as a late clock does.
     """
 
     nuisances = (STRAIGHT, LOSS)
     effects = EFFECTS
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
-        """The voltage."""
+        """The predicted column: voltage of the photodiode in V."""
         return ("voltage_V",)
 
     def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
-        """Prediction (1, n) in V, see Simulator."""
+        """Voltage (1, n) in V at the experiment's times and angles; values as in `Simulator`."""
         get = values.get
         time, angle = experiment["time_s"], experiment["angle_deg"]
         angle = _angle(time, angle, get("clock_offset.offset_s", 0.0))

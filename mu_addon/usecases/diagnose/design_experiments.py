@@ -128,7 +128,7 @@ def design_experiments(job: Job, folder: Path, context: RunContext) -> Plan:
     Raises InputError, OutputError.
     """
     measured, progress = job.measured, context.progress
-    simulators, told = simulators_of(measured.experiments, job.subject, folder / "cache", progress)
+    simulators, remarks = simulators_of(measured.experiments, job.subject, folder / "cache", progress)
     simulator = Composite(simulators)
     with progress.stage("sensitivities", expected_s=5.0):
         found = plan(measured.experiments, simulator, job.noise)
@@ -136,7 +136,7 @@ def design_experiments(job: Job, folder: Path, context: RunContext) -> Plan:
     context.summary |= summary(found)
     name = measured.folder.resolve().name
     context.report = lambda _: write_text(
-        folder / "report.html", _report(found, name, told, package_versions())
+        folder / "report.html", _report(found, name, remarks, package_versions())
     )
     return found
 
@@ -208,7 +208,7 @@ def _write(found: Plan, path: Path) -> None:
     write_csv(path, head, rows)
 
 
-def _report(found: Plan, name: str, told: Sequence[str], versions: Mapping[str, str]) -> str:
+def _report(found: Plan, name: str, remarks: Sequence[str], versions: Mapping[str, str]) -> str:
     rows = []
     for s in found.seen:
         alike = [b if a == s.effect.name else a for a, b, _ in found.alike if s.effect.name in (a, b)]
@@ -253,7 +253,7 @@ def _report(found: Plan, name: str, told: Sequence[str], versions: Mapping[str, 
     shown = sum(s.identifiable for s in found.seen)
     share = f"<strong>{shown} of {len(found.seen)}</strong>"
     lead = f'<p class="answer">These experiments can detect {share} effects.</p>'
-    return page(f"Experiments planned in {name}", subtitle, note(told), lead, sections)
+    return page(f"Experiments planned in {name}", subtitle, note(remarks), lead, sections)
 
 
 def summary(found: Plan) -> dict[str, Any]:

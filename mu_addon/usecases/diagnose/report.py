@@ -78,10 +78,10 @@ def report(found: Diagnosis, out: Path, versions: dict[str, str]) -> str:
 
 
 def _notes(found: Diagnosis) -> str:
-    told = [f"{r[:1].upper()}{r[1:]}." for r in found.remarks]
-    if len(told) > MOST_NOTES:
-        told = [f"There are {len(told)} remarks on the data; the section Data lists them."]
-    return note(told)
+    remarks = [f"{r[:1].upper()}{r[1:]}." for r in found.remarks]
+    if len(remarks) > MOST_NOTES:
+        remarks = [f"There are {len(remarks)} remarks on the data; the section Data lists them."]
+    return note(remarks)
 
 
 def _headline(found: Diagnosis) -> str:
@@ -107,7 +107,7 @@ def _headline(found: Diagnosis) -> str:
         facts.append(("error of the model", f"{judged.before:.3g} {judged.unit}"))
     if verdict.names:
         facts.append(
-            ("false-positive probability", _chance(max(c.p_value for c in verdict.selection.causes)))
+            ("false-positive probability", _p_value(max(c.p_value for c in verdict.selection.causes)))
         )
     facts.append(("effects tested", str(len(verdict.selection.singles))))
     return html + cards(facts)
@@ -141,8 +141,8 @@ def _key(found: Diagnosis) -> str:
     marks = [(INK, "●", "measured"), (pictures.BASE, "╌╌", "base model")]
     if found.extends:
         marks.append((CHOSEN, "━━", _extended_words(found)))
-    said = [f'<span style="color:{color}">{mark}</span> {escape(what)}' for color, mark, what in marks]
-    return f"<p>{' &emsp; '.join(said)}</p>"
+    entries = [f'<span style="color:{color}">{mark}</span> {escape(what)}' for color, mark, what in marks]
+    return f"<p>{' &emsp; '.join(entries)}</p>"
 
 
 def _chosen(every: Sequence[Curve]) -> tuple[list[Curve], int]:
@@ -169,7 +169,7 @@ def _causes(found: Diagnosis) -> str:
             low, high = verdict.intervals.get(key, (math.nan, math.nan))
             first = [readable(cause.effect.name), cause.effect.mechanism] if i == 0 else ["", ""]
             last = [
-                _chance(cause.p_value),
+                _p_value(cause.p_value),
                 listed([readable(r) for r in cause.rivals], "or") if cause.rivals else "none",
             ]
             value = verdict.selection.chosen.values[key]
@@ -330,8 +330,8 @@ def _gain(found: Diagnosis) -> str:
             '<p>No experiment was held out. Set role = "held_out" for one of them to measure the '
             "error reduction on unseen data.</p>"
         )
-    told = [name for name, (fit, _) in gain.by_quantity.items() if fit is gain.fit and name != KNOWN]
-    which = f" of {readable(told[0])}" if told and len(gain.by_quantity) > 1 else ""
+    gained = [name for name, (fit, _) in gain.by_quantity.items() if fit is gain.fit and name != KNOWN]
+    which = f" of {readable(gained[0])}" if gained and len(gain.by_quantity) > 1 else ""
     return (
         html
         + _by_quantity(found)
@@ -365,9 +365,9 @@ def _dependence(found: Diagnosis) -> str:
     rows, structured = [], {}
     for d in before:
         now = later.get(d.against)
-        cells: list[Any] = [readable(d.against), _chance(d.p_value), "yes" if d.p_value < level else "no"]
+        cells: list[Any] = [readable(d.against), _p_value(d.p_value), "yes" if d.p_value < level else "no"]
         if found.extends:
-            cells += [_chance(now.p_value), "yes" if now.p_value < level else "no"] if now else ["–", "–"]
+            cells += [_p_value(now.p_value), "yes" if now.p_value < level else "no"] if now else ["–", "–"]
         where = now if now is not None and now.p_value < level else d
         cells.append(where.where if where.p_value < level else "")
         rows.append((cells, where.p_value < level))
@@ -556,7 +556,7 @@ def _files(out: Path) -> dict[str, str]:
     return {n: what for n, what in FILES.items() if (out / n).exists() or n == "report.html"}
 
 
-def _chance(p: float) -> str:
+def _p_value(p: float) -> str:
     return f"{p:.2g}" if p >= 1e-3 else ("below 1e-12" if p < 1e-12 else f"{p:.0e}").replace("e-0", "e-")
 
 

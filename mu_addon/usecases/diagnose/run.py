@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -13,6 +12,7 @@ import attrs
 import numpy as np
 
 from ...design.parameters import Unit
+from ...errors import InputError
 from ...evidence.drive import reading_noise
 from ...evidence.extended import ExtendedModel, extended_model
 from ...evidence.prediction import lattice
@@ -20,6 +20,7 @@ from ...evidence.simulator import Composite
 from ...evidence.verdict import Verdict, diagnose
 from ...files import write_csv, write_json
 from ...measured import Measured
+from ...reading import file_bytes, parse_json
 from ...run.context import RunContext
 from ...run.folder import begin, same_inputs
 from ...run.progress import Progress
@@ -41,11 +42,16 @@ def begin_diagnosis(job: Job, folder: Path, context: RunContext) -> None:
 def _kept(folder: Path, inputs: Mapping[str, str]) -> dict[str, Any]:
     """The summary of a verdict on the same inputs that a folder holds whole; empty where it does not."""
     try:
-        found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        found = parse_json(file_bytes(folder / "summary.json"), "summary.json")
+    except (OSError, InputError):
         return {}
     whole = all((folder / name).is_file() for name in LAYOUT.results)
-    if not (same_inputs(folder, inputs) and whole and found.get("status") == "complete"):
+    if not (
+        same_inputs(folder, inputs)
+        and whole
+        and isinstance(found, dict)
+        and found.get("status") == "complete"
+    ):
         return {}
     return {k: v for k, v in found.items() if k != "status"}
 
@@ -62,17 +68,17 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | No
     if "verdict" in context.summary:
         with progress.stage("verdict of the same data, from the cache"):
             return None
-    simulators, told = simulators_of(measured.experiments, unit, folder / "cache", progress, job.settings)
+    simulators, notes = simulators_of(measured.experiments, unit, folder / "cache", progress, job.settings)
     simulator = Composite(simulators)
-    with _stages(progress, simulator) as tell:
-        verdict = diagnose(measured.experiments, simulator, tell)
+    with _stages(progress, simulator) as on_model:
+        verdict = diagnose(measured.experiments, simulator, on_model)
     model, block = _extended_model(verdict, simulator), simulators.get(lattice.KIND)
     if isinstance(block, lattice.LatticeStress) and block.computed:
         model = attrs.evolve(model, lattice=block.computed)
-        told += _resin(model, unit)
-    told += _bounds_met(verdict, simulator)
-    told += _noisy_gauges(measured, verdict)
-    remarks = [*(f"{r.what} ({_place(r.where)})" for r in measured.remarks), *told]
+        notes += _resin(model, unit)
+    notes += _bounds_met(verdict, simulator)
+    notes += _noisy_gauges(measured, verdict)
+    remarks = [*(f"{r.what} ({_place(r.where)})" for r in measured.remarks), *notes]
     unknown = dict.fromkeys(e.kind for e in measured.experiments if not simulator.knows(e))
     remarks += [f"there is no model for {kind}: its experiments were left out" for kind in unknown]
     found = Diagnosis(measured, simulator, verdict, model, unit, tuple(remarks))
@@ -136,7 +142,7 @@ def _stages(progress: Progress, simulator: Composite) -> Iterator[Callable[[str]
     with ExitStack() as stack:
         now, done = "", 0
 
-        def tell(what: str) -> None:
+        def on_model(what: str) -> None:
             nonlocal now, done
             stage = what
             if what not in ("noise", "sensitivities", "gain"):
@@ -148,7 +154,7 @@ def _stages(progress: Progress, simulator: Composite) -> Iterator[Callable[[str]
             # Later steps try up to four models with each effect.
             progress.update(done / (many if stage == "single effects" else 4 * many))
 
-        yield tell
+        yield on_model
 
 
 def _place(where: str) -> str:

@@ -31,27 +31,27 @@ def simulators_of(
     The unit is followed by finite elements, and so are blocks of its lattice; the runs are kept in the
     folder `cache`. What was taken for granted is among the words.
     """
-    told: list[str] = []
+    remarks: list[str] = []
     scalings: Mapping[str, lattice.Scaling] = {}
     if any(e.cells for e in experiments):
         assert unit is not None
         from ...evidence.lattice_fem import scalings as computed
 
         with progress.stage("lattice"):
-            scalings, told = computed(experiments, unit, cache, lambda _, share: progress.update(share))
+            scalings, remarks = computed(experiments, unit, cache, lambda _, share: progress.update(share))
     found = bench_simulators(experiments, scalings)
     bent = [e for e in experiments if e.kind == unit_pressure.KIND]
     if bent:
         assert unit is not None
         from ...evidence.unit_fem import unit_responses
 
-        with warnings.catch_warnings(record=True) as heard, progress.stage("unit"):
+        with warnings.catch_warnings(record=True) as caught, progress.stage("unit"):
             warnings.simplefilter("always")
             responses = unit_responses(unit, bent, settings, cache, lambda _, share: progress.update(share))
         # Where and what to do, on further lines, is of a simulation that nobody asked for.
-        left_out = [str(warning.message).partition("\n")[0] for warning in heard]
+        left_out = [str(warning.message).partition("\n")[0] for warning in caught]
         for words in left_out:
             progress.warning(words, "unit")
-        told += left_out
+        remarks += left_out
         found[unit_pressure.KIND] = unit_pressure.UnitPressure(responses, experiments)
-    return found, told
+    return found, remarks

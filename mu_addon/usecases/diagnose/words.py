@@ -43,30 +43,30 @@ def between(low: float, high: float) -> str:
 
 def sized(verdict: Verdict, cause: Cause) -> str:
     """Parameters of a cause with their intervals in words."""
-    said = []
+    sizes = []
     for key, p in zip(cause.effect.keys, cause.effect.parameters, strict=True):
         low, high = verdict.intervals.get(key, (math.nan, math.nan))
         unit = f" {p.unit}" if p.unit else ""
         value = verdict.selection.chosen.values[key]
-        said.append(f"{bare(p)} {value:.3g}{unit} (95 %: {between(low, high)})")
+        sizes.append(f"{bare(p)} {value:.3g}{unit} (95 %: {between(low, high)})")
         if (cause.effect.name, p.name) == ("overcure", "offset_mm"):
-            said.append(f"of every surface, so that struts and walls are {2 * value:.2g} mm thicker")
-    return ", ".join(said)
+            sizes.append(f"of every surface, so that struts and walls are {2 * value:.2g} mm thicker")
+    return ", ".join(sizes)
 
 
 def sentence(verdict: Verdict) -> tuple[str, str]:
     """The verdict in words: its headline, and one plain sentence."""
     found = verdict.selection
     if verdict.kind == "named":
-        said = [f"{_upper(c.effect.mechanism)}; {sized(verdict, c)}." for c in found.causes]
-        return listed([readable(n) for n in verdict.names]), " ".join(said)
+        sizes = [f"{_upper(c.effect.mechanism)}; {sized(verdict, c)}." for c in found.causes]
+        return listed([readable(n) for n in verdict.names]), " ".join(sizes)
     if verdict.kind == "ambiguous":
         choices = [listed([readable(n) for n in (c.effect.name, *c.rivals)], "or") for c in found.causes]
-        said = [f"{readable(c.effect.name)} has {sized(verdict, c)}" for c in found.causes]
+        sizes = [f"{readable(c.effect.name)} has {sized(verdict, c)}" for c in found.causes]
         return (
             " and ".join(choices),
             "The model is wrong. Each of these effects explains the data, and these data do not "
-            f"distinguish them. Fitted values: {'; '.join(said)}.",
+            f"distinguish them. Fitted values: {'; '.join(sizes)}.",
         )
     if verdict.kind == "none":
         return (
@@ -99,8 +99,8 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
 def advice(verdict: Verdict) -> str:
     """What to measure next, in words."""
     if verdict.proposal is not None:
-        told = listed([readable(n) for n in verdict.proposal.separates])
-        return f"{_upper(verdict.proposal.what)}. It distinguishes {told}."
+        effects = listed([readable(n) for n in verdict.proposal.separates])
+        return f"{_upper(verdict.proposal.what)}. It distinguishes {effects}."
     found = verdict.selection
     if verdict.kind == "named":
         return f"To confirm it on new data: {'; '.join(c.effect.reveals for c in found.causes)}."

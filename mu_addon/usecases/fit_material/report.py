@@ -62,32 +62,32 @@ def report(found: Fitting, versions: dict[str, str]) -> str:
 
 def _warnings(found: Fitting) -> list[str]:
     chosen = found.choice.chosen
-    told = []
+    warnings = []
     missed = [TITLES[m] for m in chosen.fails]
     if missed:
-        told.append(
+        warnings.append(
             f"{chosen.form.title} has an error on {_listed(missed)} of more than {TOLERANCE:.0%}: do "
             "not use it in that mode."
         )
     for mode, (stretch, ratio) in found.apart.items():
         i = int(np.argmax(ratio > 1.1)) if (ratio > 1.1).any() else len(ratio) - 1
-        told.append(
+        warnings.append(
             f"{TITLES[mode].capitalize()} was not tested. Laws that fit the other modes differ there "
             f"by a factor of {ratio[i]:.3g} at a stretch of {stretch[i]:.3g}"
             + (f" and {_factor(ratio[-1])} at {stretch[-1]:.3g}." if i < len(ratio) - 1 else ".")
             + (" Test this mode before using any of them in it." if ratio[-1] > 1.1 else "")
         )
     if found.compressibility > 0.02:
-        told.append(
+        warnings.append(
             f"With Poisson's ratio {POISSON:g}, stress at the end of the range differs by "
             f"{found.compressibility:.0%} from the incompressible law that was fitted: measure the "
             "bulk modulus, or stay well within the range."
         )
-    told += [
+    warnings += [
         f"{r.what[0].upper()}{r.what[1:]} ({Path(r.where.split(',')[0]).name})."
         for r in found.measured.remarks
     ]
-    return told
+    return warnings
 
 
 def _factor(ratio: float) -> str:

@@ -74,9 +74,9 @@ def _headline(study: Homogenisation) -> str:
     sentences = []
     if study.tests:
         values = {f: 1e3 * moduli(t.curve).get(DEFAULT, np.nan) for f, t in study.tests.items()}
-        said = " and ".join(f"{kPa(v)} between {FRICTION[f]}" for f, v in values.items())
+        listed = " and ".join(f"{kPa(v)} between {FRICTION[f]}" for f, v in values.items())
         n = study.job.cells
-        sentences.append(f"A block of {n} x {n} x {n} cells has {said} ({DEFAULT} of strain).")
+        sentences.append(f"A block of {n} x {n} x {n} cells has {listed} ({DEFAULT} of strain).")
     ratio = measured / (1e3 * e.E100)
     sentences.append(
         f"The unit's parameters say {kPa(measured)}, {ratio:.2g} times the prediction: "

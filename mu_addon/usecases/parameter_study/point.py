@@ -82,9 +82,9 @@ def run_point(task: Task) -> dict[str, Any]:
     }
     if stopped is None and child.result is not None and child.error is None:
         return {"status": "done", **row, "summary": plain(child.result.get("summary", {}))}
-    told = stopped or child.error or {}
+    error = stopped or child.error or {}
     words = {
-        name: str(told.get(name, "")).replace(str(folder), "") for name in ("what", "where", "what_to_do")
+        name: str(error.get(name, "")).replace(str(folder), "") for name in ("what", "where", "what_to_do")
     }
     return {"status": "failed", **row, **words}
 

@@ -142,8 +142,8 @@ class Run:
         """The table as far as it is known."""
         rows = [self._row(point) for point in self.points]
         inputs = tuple(v.name for v in self.plan.variables)
-        told = ("point", "status", *inputs, *LAST)
-        outputs = tuple(name for name in columns(rows) if name not in told)
+        known = ("point", "status", *inputs, *LAST)
+        outputs = tuple(name for name in columns(rows) if name not in known)
         return Found(self.plan, tuple(rows), inputs, outputs)
 
     def _row(self, point: Point) -> Row:

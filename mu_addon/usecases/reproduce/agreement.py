@@ -12,7 +12,7 @@ from ...report.results import Path
 
 Array = np.ndarray[Any, Any]
 
-HELD, NOT_HELD, CANNOT_TELL = "held", "not held", "undecided"
+HELD, NOT_HELD, UNDECIDED = "held", "not held", "undecided"
 
 
 @attrs.frozen
@@ -88,7 +88,7 @@ class _Comparison:
     @property
     def verdict(self) -> str:
         if self.coarser is not None and _unclear(self.margin, self.coarser):
-            return CANNOT_TELL
+            return UNDECIDED
         return HELD if self.margin > 0 else NOT_HELD
 
 
@@ -116,7 +116,7 @@ def statements(
 
 def _judged(text: str, comparisons: Sequence[_Comparison]) -> Statement:
     verdicts = [c.verdict for c in comparisons]
-    verdict = next((v for v in (NOT_HELD, CANNOT_TELL) if v in verdicts), HELD)
+    verdict = next((v for v in (NOT_HELD, UNDECIDED) if v in verdicts), HELD)
     closest = min(comparisons, key=lambda c: c.margin)
     counted = f"{verdicts.count(HELD)} of {len(verdicts)} hold; closest: " if len(verdicts) > 1 else ""
     return Statement(text, verdict, counted + closest.words)

@@ -15,7 +15,7 @@ from ...report.charts import label, signed
 from ...report.html import cards, facts_table, figure, note, page, table
 from ...run.versions import package_versions
 from . import charts, gripper
-from .agreement import CANNOT_TELL, HELD, Agreement, agreement
+from .agreement import HELD, UNDECIDED, Agreement, agreement
 from .columns import BENDING_KPA
 from .found import Found
 from .published import GRIPPER
@@ -170,7 +170,7 @@ def _statements(found: Found) -> str:
     for rule in _ORDER:
         rows = [([s.text, s.verdict, s.numbers], False) for s in found.statements(rule)]
         held = sum(s.verdict == HELD for s in found.statements(rule))
-        unclear = sum(s.verdict == CANNOT_TELL for s in found.statements(rule))
+        unclear = sum(s.verdict == UNDECIDED for s in found.statements(rule))
         words = (
             f"{rule.replace('_', ' ')}: {held} of {len(rows)} hold; {unclear} cannot be decided within "
             "the mesh uncertainty."

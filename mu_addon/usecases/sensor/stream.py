@@ -74,7 +74,7 @@ def stream(
     context.console_summary = console_summary
     progress = context.progress
 
-    def tell(event: str, details: dict[str, Any]) -> None:
+    def on_event(event: str, details: dict[str, Any]) -> None:
         message = {"type": "stream", "event": event, **details}
         if show is not None:
             show(message)
@@ -98,7 +98,7 @@ def stream(
             about=about,
             control=control,
             seconds=seconds,
-            tell=tell,
+            on_event=on_event,
             keep_time=keep_time,
             derive=derive,
         )
@@ -148,7 +148,7 @@ class Display:
             self._write(printable(f"{message['event']}{': ' if words else ''}{words}\n", self.out))
         elif self.live or self.clock() - self._last >= 5.0:
             self._last = self.clock()
-            line = printable(said(message), self.out)
+            line = printable(status_line(message), self.out)
             self._write(f"\r\x1b[K{line}" if self.live else line + "\n", self.live)
 
     def _write(self, text: str, stays_open: bool = False) -> None:
@@ -157,7 +157,7 @@ class Display:
         self._open = stays_open
 
 
-def said(status: Mapping[str, Any]) -> str:
+def status_line(status: Mapping[str, Any]) -> str:
     """A session's status in a line: time, rate, the latest values, what was lost."""
     values = [
         f"{name} {value:.4g}"

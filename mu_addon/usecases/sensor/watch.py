@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
+from ...reading import file_bytes
 from ...sensing.ring import Ring
 from ...sensing.session import STATUS
 
@@ -23,7 +24,7 @@ class Watched:
         self.folder = folder
         self.status: dict[str, Any] = {}
         self._written = 0
-        self._heard = self._sampled = time.monotonic()
+        self._last_status_s = self._sampled = time.monotonic()
         self._ring: Ring | None = None
         self._name = ""
         self._next = 0
@@ -36,7 +37,7 @@ class Watched:
     @property
     def silent_s(self) -> float:
         """Seconds since the session last said how it goes; it says so five times a second."""
-        return time.monotonic() - self._heard
+        return time.monotonic() - self._last_status_s
 
     @property
     def starved_s(self) -> float:
@@ -50,12 +51,12 @@ class Watched:
             written = path.stat().st_mtime_ns
             if written == self._written:
                 return False
-            status = json.loads(path.read_bytes())
-        except (OSError, ValueError):
+            status = json.loads(file_bytes(path))
+        except (OSError, ValueError, RecursionError):
             return False
         if not isinstance(status, dict):
             return False
-        self._written, self._heard = written, time.monotonic()
+        self._written, self._last_status_s = written, time.monotonic()
         self.status = status
         self._attach(str(status.get("live", "")))
         return True

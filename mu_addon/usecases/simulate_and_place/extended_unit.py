@@ -55,9 +55,9 @@ class Extended:
 
     def of_parameters(self) -> Extended:
         """As far as the unit's parameters go, for what simulates no whole unit."""
-        said = self.effects.words()
-        whole = tuple(f"{words}: only `simulate` and `place` simulate the whole unit" for words in said)
-        applied = tuple(words for words in self.applied if words not in said)
+        beyond = self.effects.words()
+        whole = tuple(f"{words}: only `simulate` and `place` simulate the whole unit" for words in beyond)
+        applied = tuple(words for words in self.applied if words not in beyond)
         return attrs.evolve(self, applied=applied, left_out=(*self.left_out, *whole), effects=StaticEffects())
 
 
@@ -84,7 +84,7 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
         known = effect is not None and tuple(values) == (effect.parameter.name,)
         put = _of_effect(name) if known and name in _DESCRIPTIONS else None
         if put is None:
-            left_out.append(f"{readable(name)} ({_said(values)}): {_ELSEWHERE.get(name, _NOWHERE)}")
+            left_out.append(f"{readable(name)} ({_listed_values(values)}): {_ELSEWHERE.get(name, _NOWHERE)}")
             continue
         for p, fitted in values.items():
             unit, words = _put(unit, origin, f"{name}.{p}", fitted, put)
@@ -143,7 +143,7 @@ def _put(unit: Unit, origin: str, key: str, fitted: Fitted, put: Put) -> tuple[U
         ) from error
 
 
-def _said(values: Values) -> str:
+def _listed_values(values: Values) -> str:
     return ", ".join(f"{p} {f.value:.4g}" for p, f in values.items())
 
 

@@ -18,8 +18,8 @@ from ...placement.influence import (
     influence_map,
     loaded,
     mean_deviation,
+    representative_pressures,
     shares_of_time,
-    telling_pressures,
 )
 from ...placement.response import reduced_response
 from ...placement.search import SearchSettings, front, search_paths
@@ -48,7 +48,7 @@ def sensitivity_map(study: Study) -> Array:
         model = study.job.model(study.mesh)
         monitor = probe(study.mesh, study.anchors)
         materials = study.job.materials(study.mesh)
-        chosen = telling_pressures(study.trajectory)
+        chosen = representative_pressures(study.trajectory)
         found = influence_map(model, materials, study.trajectory, monitor, chosen)
         pressures = np.array([s.pressure_MPa for s in loaded(study.trajectory)])
         gradients = gradients_of(study.trajectory, study.anchors, monitor, study.job.stations)

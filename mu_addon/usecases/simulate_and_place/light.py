@@ -74,7 +74,7 @@ def _signals(study: Study, optics: Optics) -> Signals:
     sizes = [size for size in (2, 3) if size <= len(names)]
     sets = [best for size in sizes for best in best_sets(SPREAD * np.array(slopes), NOISE, size)]
     pairs = differential_pairs([r.sensitivity_per_deg for r in responses])
-    told = Signals(
+    light = Signals(
         optics=optics,
         law=law,
         names=names,
@@ -87,9 +87,9 @@ def _signals(study: Study, optics: Optics) -> Signals:
         sets=_named(names, sets),
         differential=_named(names, pairs),
     )
-    study.light = told
-    _write(study, told)
-    return told
+    study.light = light
+    _write(study, light)
+    return light
 
 
 def _bars(study: Study) -> dict[str, tuple[list[int], EmbeddedWaveguide]]:

@@ -239,7 +239,9 @@ def _light(r: ReportData) -> str:
     front = (
         "The line joins the Pareto-optimal paths: no path has both a smaller deviation and a larger signal."
     )
-    told = "Chosen path in colour; dots: ray tracing through the bent waveguide, bars: two standard errors."
+    caption = (
+        "Chosen path in colour; dots: ray tracing through the bent waveguide, bars: two standard errors."
+    )
     way = "rises" if mine.sensitivity_per_deg < 0 else "falls"
     html = (
         f"<p>Along <strong>{escape(label(s.names[index]))}</strong> the light at the detector changes by "
@@ -251,7 +253,7 @@ def _light(r: ReportData) -> str:
         "there. The optical constants of the resin are assumed, because no published values were found: "
         f"index {o.index:g}, attenuation {o.attenuation_per_mm:g} per mm, wall slopes {o.roughness:g}.</p>"
         f'<div class="pair">{figure(front_chart(s, chosen), front, "deviation against sensitivity")}'
-        f"{figure(response_chart(s, chosen), told, 'light against angle')}</div>"
+        f"{figure(response_chart(s, chosen), caption, 'light against angle')}</div>"
     )
     head = [
         ("path", ""), ("Ĵ [mm]", "n"), ("signal [%/deg]", "n"), ("±", "n"), ("monotonic from [deg]", "n"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Callable
 from contextlib import closing
@@ -20,7 +19,7 @@ from ...design.quantity import in_kPa
 from ...design.solid import Solid, build_solid
 from ...design.strut_cell import strut_cell
 from ...design.wall import Wall
-from ...errors import ConvergenceError, MeshingError
+from ...errors import ConvergenceError, InputError, MeshingError
 from ...fem.equilibrium import Equilibrium
 from ...fem.kinematics import TipSection
 from ...fem.lattice_law import deformation_gradients, stretches
@@ -38,6 +37,7 @@ from ...meshing.settings import MeshSettings
 from ...meshing.unit import MeshingWarning, mesh_unit
 from ...placement.candidates import Candidate, Evaluation, candidate_paths
 from ...placement.deviation import rank
+from ...reading import file_bytes, parse_json
 from ...report.results import CONTACT_COLUMNS, ContactHistory, LatticeSearch, Signals
 from ...report.vtk import write_mesh, write_trajectory
 from ...run.cache import Cache, key
@@ -56,7 +56,7 @@ from .study_file import LAYOUT, NAME, STAGES
 Array = np.ndarray[Any, Any]
 
 # Figures of summary.json that tell that a stage was run.
-_TELLS = {"design": "gates", "simulate": "angle_deg", "place": "chosen"}
+_FIGURE_OF_STAGE = {"design": "gates", "simulate": "angle_deg", "place": "chosen"}
 # What a study writes, with as much to spare: so much anyway, and so much a node and distinct pressure.
 _BYTES = {"interactive": 30_000_000, "export": 150_000_000}
 _BYTES_A_NODE = {"simulate": 300, "place": 1000}
@@ -105,7 +105,7 @@ class Study:
             low, high = job.body.bounds.tolist()
             context.summary["body"] = {"low_mm": low, "high_mm": high, "triangles": len(job.body.triangles)}
         if "simulate" in job.stages:
-            study._tell_settings()
+            study._summarise_settings()
         return study
 
     @property
@@ -113,7 +113,7 @@ class Study:
         """Where the run says how it goes."""
         return self.context.progress
 
-    def _tell_settings(self) -> None:
+    def _summarise_settings(self) -> None:
         """Settings of the simulation in the summary, and warnings of what they leave out."""
         job, summary = self.job, self.context.summary
         summary["study"] = {"times": job.times, "stations": job.stations, "rules": job.rules}
@@ -146,7 +146,7 @@ class Study:
     def has_more(self) -> bool:
         """Whether the folder has the results of a further stage than this job's, from the same inputs."""
         further = STAGES[len(self.job.stages) :]
-        return any(_TELLS[stage] in self.context.summary for stage in further)
+        return any(_FIGURE_OF_STAGE[stage] in self.context.summary for stage in further)
 
     @property
     def cache(self) -> Cache:
@@ -668,8 +668,8 @@ def extremes(pressure_kPa: Array) -> Array:
 def _earlier(folder: Path) -> dict[str, Any]:
     """Figures of a folder's last run, as far as this version of the program found them."""
     try:
-        found = json.loads((folder / "summary.json").read_bytes())
-    except (OSError, ValueError, RecursionError):
+        found = parse_json(file_bytes(folder / "summary.json"), "summary.json")
+    except (OSError, InputError):
         return {}
     if not isinstance(found, dict) or found.get("versions") != package_versions():
         return {}

@@ -26,6 +26,7 @@ from ...measured.kinds import COMMON, KINDS
 from ...measured.rest import AT_REST, SAMPLES
 from ...measured.table import Remark, read_table
 from ...measured.video import Motion, Pair, Tracks, View, motion, resting
+from ...reading import file_text
 from ...run.context import RunContext
 from ...toml_writer import toml_text
 
@@ -98,7 +99,7 @@ class Filmed:
 def read_bench(path: Path) -> Bench:
     """Read a TOML file that describes a video; raises InputError with line and what to do."""
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
+        text = file_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             "cannot read the description of the video", str(path), "check path and file"
@@ -218,7 +219,7 @@ def _finite(value: Any) -> bool:
 def read_pressure(path: Path) -> tuple[Array, Array]:
     """Time in s and pressure in kPa, (k,) each, of a recording or a protocol; raises InputError."""
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
+        text = file_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             "cannot read the pressure", str(path), "give a CSV file of time_s,pressure_kPa"
@@ -240,7 +241,7 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
     clock, kPa = pressure
     slack = 0.5 / fps
     inside = (time >= clock[0] - slack) & (time <= clock[-1] + slack)
-    told = []
+    remarks = []
     if inside.sum() < 2:
         raise InputError(
             f"the clip lasts from {time[0]:.4g} to {time[-1]:.4g} s, the pressure record from "
@@ -249,7 +250,7 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
             "give starts_s, the pressure's clock at the first frame",
         )
     if not inside.all():
-        told.append(
+        remarks.append(
             Remark(
                 f"{(~inside).sum()} of {len(inside)} frames are outside the pressure record and were left "
                 "out",
@@ -266,7 +267,7 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
     if not rest.any() and seen.all(axis=0).any():
         first = int(np.argmax(seen.all(axis=0)))
         rest[first] = True
-        told.append(
+        remarks.append(
             Remark(
                 f"no frame shows the unit at rest; the angle is relative to {p[first]:.4g} kPa at "
                 f"{time[first]:.4g} s",
@@ -275,7 +276,7 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
             )
         )
     found = motion(kept, bench.view, rest, time, where)
-    return Filmed(kept, time, p, found, (*told, *found.remarks))
+    return Filmed(kept, time, p, found, (*remarks, *found.remarks))
 
 
 def write_experiment(found: Filmed, bench: Bench, name: str, folder: Path) -> tuple[Path, tuple[Remark, ...]]:
@@ -370,7 +371,7 @@ def read_pixels(path: Path) -> Tracks:
     One row a frame; empty where a marker was lost. Raises InputError.
     """
     try:
-        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+        lines = file_text(path).splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError("cannot read the tracked markers", str(path), "check path and file") from error
     rows = [

@@ -7,17 +7,17 @@ import bpy
 
 def drawn(panels):
     """All words that these panels show now."""
-    said, layout = [], MagicMock()
+    texts, layout = [], MagicMock()
     layout.panel.return_value = (layout, layout)
     for name in ("row", "column", "box", "split", "grid_flow"):
         getattr(layout, name).return_value = layout
-    layout.label.side_effect = lambda text="", **_: said.append(text)
-    layout.progress.side_effect = lambda factor, text: said.append(f"{factor:.2f} {text}")
-    layout.operator.side_effect = lambda name, text="", **_: said.append(text or name) or MagicMock()
-    layout.template_icon.side_effect = lambda icon, scale: said.append("a picture")
+    layout.label.side_effect = lambda text="", **_: texts.append(text)
+    layout.progress.side_effect = lambda factor, text: texts.append(f"{factor:.2f} {text}")
+    layout.operator.side_effect = lambda name, text="", **_: texts.append(text or name) or MagicMock()
+    layout.template_icon.side_effect = lambda icon, scale: texts.append("a picture")
     for panel in panels:
         if getattr(panel, "poll", lambda _: True)(bpy.context):
             seat = MagicMock(layout=layout, find_root=getattr(panel, "find_root", None))
             seat.show = lambda *words, panel=panel, seat=seat: panel.show(seat, *words)
             panel.draw(seat, bpy.context)
-    return " ".join(said)
+    return " ".join(texts)

@@ -75,11 +75,11 @@ def test_from_data_to_a_unit_that_has_what_was_found(blocks, tmp_path):
     root.mu_evidence.folder = "//data"
     diagnose(root)
     assert evidence.folder_of(root).parent == studies.folder_of(root)
-    said = drawn()
-    assert "Named: overcure" in said, said
-    assert "95 %" in said, said
-    assert "Stale" not in said, said
-    assert "p = " in said or "p < " in said
+    texts = drawn()
+    assert "Named: overcure" in texts, texts
+    assert "95 %" in texts, texts
+    assert "Stale" not in texts, texts
+    assert "p = " in texts or "p < " in texts
     assert bpy.ops.mu.evidence_open(what="errors") == {"FINISHED"}
     assert "No unit under pressure" in refused(bpy.ops.mu.evidence_motion, experiment="1x")
 
@@ -120,7 +120,7 @@ def test_a_diagnosis_that_fails_and_one_that_is_stopped(blocks):
     def start(how):
         return fake(evidence.DIAGNOSIS, root, how)
 
-    for how, expected in {"told_error": "thicker wall", "crash": "SIGSEGV", "good": "see below"}.items():
+    for how, expected in {"reported_error": "thicker wall", "crash": "SIGSEGV", "good": "see below"}.items():
         child = start(how)
         ended(child)
         assert expected in drawn(), (how, drawn())
@@ -165,11 +165,11 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
     (line,) = effects.lines(root)
     assert line.startswith(f"clogged chamber, share lost: {share:.4g} (")
     assert " to " in line
-    said = drawn(panels.MU_PT_simulate)
-    assert "With named effects" in said, said
-    assert "clogged chamber, share lost: 0.5" in said, said
-    assert "Applied to the unit: all moduli" in said, said
-    assert "the last chamber lacks" in said, said
+    texts = drawn(panels.MU_PT_simulate)
+    assert "With named effects" in texts, texts
+    assert "clogged chamber, share lost: 0.5" in texts, texts
+    assert "Applied to the unit: all moduli" in texts, texts
+    assert "the last chamber lacks" in texts, texts
     assert not bpy.ops.mu.evidence_apply.poll()
     # Pressure alone knows no direction.
     assert not effects.has_gravity(root)
@@ -244,7 +244,7 @@ def test_measured_and_simulated_motion_on_the_timeline(clogged):
     for i in (0, 7, len(first) - 1):
         frame = scene.frame_start + (first["time_s"][i] - first["time_s"][0]) * 30 / 1.001
         scene.frame_set(int(frame), subframe=frame % 1)
-        time, said = evidence_motion.reading(root, scene)
+        time, values = evidence_motion.reading(root, scene)
         assert abs(time - first["time_s"][i]) < 1e-3
         row = angle[str(first.rows[i])]
         # Single precision of a frame, at some tens of degrees a second.
@@ -253,7 +253,7 @@ def test_measured_and_simulated_motion_on_the_timeline(clogged):
             ("model", "base_model"),
             ("extended", "extended_model"),
         ):
-            assert abs(said[series] - float(row[column])) < 0.02, (series, said, row)
+            assert abs(values[series] - float(row[column])) < 0.02, (series, values, row)
         assert np.abs(np.array(found["measured|marker 1"].location) - first.markers[1][i]).max() < 1e-2
         (y,) = (r for r in table if r["channel"] == "marker1_y_mm" and r["row"] == str(first.rows[i]))
         assert abs(found["extended|marker 1"].location[1] - float(y["extended_model"])) < 1e-2
@@ -262,7 +262,7 @@ def test_measured_and_simulated_motion_on_the_timeline(clogged):
         bpy.context.view_layer.update()
         point = needle.matrix_world @ needle.data.vertices[2].co
         tilt = math.degrees(math.atan2(*(point - needle.matrix_world.translation).yz))
-        assert abs(tilt - said["measured"]) < 1e-3
+        assert abs(tilt - values["measured"]) < 1e-3
     assert scene.frame_end >= frame - 1
     assert bpy.ops.mu.evidence_protocol(experiment=first.name) == {"FINISHED"}
     played = read_protocol(Path(root.mu_unit.study.protocol))

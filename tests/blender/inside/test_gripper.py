@@ -183,7 +183,7 @@ def test_a_grasp_plays_on_the_timeline(tmp_path):
     assert bpy.ops.mu.grasp_show() == {"FINISHED"}
     left, right, cube = grasp_motion.parts(root)
     assert scene.frame_end == 21
-    for frame, way, height, said in (
+    for frame, way, height, expected in (
         (1, 0.0, 98.0, "i, opening: 0.00 N"),
         (6, 2.5, 88.0, "0.25 N"),
         (11, 5.0, 78.0, "ii, closing: 0.50 N"),
@@ -195,7 +195,7 @@ def test_a_grasp_plays_on_the_timeline(tmp_path):
         assert np.allclose(moved[0][:, 1].min(), -30 + way, atol=1e-3), frame
         assert np.allclose(moved[1][:, 1].min(), 30 - way, atol=1e-3), frame
         assert abs(cube.matrix_world.translation.z - height) < 1e-3, frame
-        assert said in drawn(), drawn()
+        assert expected in drawn(), drawn()
     assert gripper_object.part(root, "cube").hide_viewport
     assert not cube.hide_viewport
     assert bpy.ops.mu.grasp_show() == {"FINISHED"}

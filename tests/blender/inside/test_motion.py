@@ -127,24 +127,24 @@ def test_the_legend_stands_in_the_scene(study):
     assert bpy.ops.mu.motion_legend() == {"FINISHED"}
     bar = legend_object.bar_of(root)
 
-    def said(what):
+    def texts(what):
         return [text.data.body for text in bar.children if text["mu_legend"] == what]
 
     assert not bar.hide_render
     for frame, state in ((1, "0.00 s, 0.0 kPa"), (193, "8.00 s, 40.0 kPa")):
         bpy.context.scene.frame_set(frame)
-        said_then = f"Displacement [mm]\n{state}\nquick look: linear elements lock"
-        assert said("head") == [said_then], said("head")
+        expected = f"Displacement [mm]\n{state}\nquick look: linear elements lock"
+        assert texts("head") == [expected], texts("head")
     root.mu_motion.lock = True
     root.mu_motion.low, root.mu_motion.high = 0.0, 4.0
-    assert said("tick") == ["0", "1", "2", "3", "4"]
+    assert texts("tick") == ["0", "1", "2", "3", "4"]
     # At a tick's height the bar has the colour that the model has there.
     ramp = next(n for n in bar.data.materials[0].node_tree.nodes if n.type == "VALTORGB").color_ramp
     field = fields.material_of(root).node_tree.nodes["Ramp"].color_ramp
     assert np.allclose(ramp.evaluate(0.3), field.evaluate(0.3))
     bar.location.y = 99.0  # moved by the user, it stays there
     root.mu_motion.field = "von_mises_kPa"
-    assert said("head")[0].startswith("Von Mises Stress [kPa]")
+    assert texts("head")[0].startswith("Von Mises Stress [kPa]")
     assert bar.location.y == 99.0
     count = len(bpy.data.objects)
     assert bpy.ops.mu.motion_legend(on=False) == {"FINISHED"}
@@ -271,15 +271,15 @@ def test_panels_show_the_motion(study):
     assert "simulate this unit first" in drawn(results_panel.CLASSES)
     assert "No pictures yet" in drawn(results_panel.CLASSES)
     root.mu_unit.study.folder = str(study)
-    said = drawn(results_panel.CLASSES)
-    assert "A α1 α2" in said
-    assert "Play" not in said
-    assert said.count("a picture") == 1
-    assert "Choose a sensor path" in said
+    texts = drawn(results_panel.CLASSES)
+    assert "A α1 α2" in texts
+    assert "Play" not in texts
+    assert texts.count("a picture") == 1
+    assert "Choose a sensor path" in texts
     bpy.ops.mu.path(name="alpha4")
     assert drawn(results_panel.CLASSES).count("a picture") == 2
     show(name="alpha4")
     root.mu_motion.field = "dJ_by_modulus_mm_per_MPa"
-    said = drawn(results_panel.CLASSES)
-    assert "Play" in said
-    assert "without this field: alpha4" in said
+    texts = drawn(results_panel.CLASSES)
+    assert "Play" in texts
+    assert "without this field: alpha4" in texts

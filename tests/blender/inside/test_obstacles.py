@@ -177,8 +177,8 @@ def test_a_box_in_the_way_is_met_and_its_move_makes_the_study_stale(tmp_path):
     assert touch.force_N[0] == 0.0
     assert touch.time_s[touch.force_N.argmax()] == 8.0, "at the protocol's peak"
     bpy.context.scene.frame_set(193)
-    said = legend.lines(root, motion_parts.motion_of(root), bpy.context.scene)
-    assert f"Obstacle: {touch.force_N.max():.2f} N" in said
+    texts = legend.lines(root, motion_parts.motion_of(root), bpy.context.scene)
+    assert f"Obstacle: {touch.force_N.max():.2f} N" in texts
 
     assert not studies.findings(root).stale
     (box,) = obstacles.of_unit(root)

@@ -70,8 +70,8 @@ def write_check(root, findings, up=(0, 0, 1), builds=()):
     path = printing.path_of(root, to_unit(root.mu_unit))
     (folder / "check.toml").write_text(f"direction = {list(up)}\n" + (f'path = "{path}"\n' if path else ""))
     (folder / "printer.toml").write_text(printer_text(printing.printer_of(root)))
-    said = {"findings": findings, "orientation": list(builds), "direction": list(up)}
-    (folder / "check.json").write_text(json.dumps(said))
+    check = {"findings": findings, "orientation": list(builds), "direction": list(up)}
+    (folder / "check.json").write_text(json.dumps(check))
 
 
 def test_a_check_from_start_to_markers(tmp_path):
@@ -91,14 +91,14 @@ def test_a_check_from_start_to_markers(tmp_path):
     faults = [f for f in found.findings if f["severity"] in ("error", "warning")]
     assert faults
     assert not found.errors, found.findings
-    said = drawn()
+    texts = drawn()
     for fault in faults:
-        assert fault["check"].capitalize() in said
-    assert "checks passed" in said
-    assert "Checked: no errors" in said
-    assert "Stale" not in said
+        assert fault["check"].capitalize() in texts
+    assert "checks passed" in texts
+    assert "Checked: no errors" in texts
+    assert "Stale" not in texts
     best = found.found["orientation"][0]
-    assert f"{best['islands']} islands" in said
+    assert f"{best['islands']} islands" in texts
 
     assert bpy.ops.mu.print_show(finding=0) == {"FINISHED"}
     balls = [m for m in markers.marks(root) if m.data is not None]
@@ -148,11 +148,11 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
         ],
         builds=[build],
     )
-    said = drawn()
-    assert said.index("Thinnest solid  (2):  0.2 / 0.4 mm") < said.index("Bridge:  21.4 / 21 mm")
-    assert "1 error(s): export asks first" in said
-    assert "7 islands, cups of 0.25 ml" in said
-    assert said.index("Not examined") < said.index("1 checks passed")
+    texts = drawn()
+    assert texts.index("Thinnest solid  (2):  0.2 / 0.4 mm") < texts.index("Bridge:  21.4 / 21 mm")
+    assert "1 error(s): export asks first" in texts
+    assert "7 islands, cups of 0.25 ml" in texts
+    assert texts.index("Not examined") < texts.index("1 checks passed")
     bpy.ops.ed.undo_push(message="before")
     assert bpy.ops.mu.print_show(finding=0) == {"FINISHED"}
     bpy.ops.ed.undo_push(message="shown")
@@ -263,11 +263,11 @@ def test_an_export_as_chosen(tmp_path):
 
     assert bpy.ops.mu.print_export() == {"FINISHED"}
     done(root)
-    said = drawn()
-    assert "unit.stl" in said
-    assert "nodes.txt" in said
-    assert "unit.3mf" not in said
-    assert "Done in" in said
+    texts = drawn()
+    assert "unit.stl" in texts
+    assert "nodes.txt" in texts
+    assert "unit.3mf" not in texts
+    assert "Done in" in texts
     root.mu_unit.chambers.wall_mm = 1.0
     assert "Stale: they belong to other parameters" in drawn()
     manifest = printing.exported(root).folder / "manifest.json"
@@ -292,7 +292,7 @@ def test_jobs_that_fail_and_one_that_is_stopped():
         return fake(printing.PRINTING, root, how, printing.folder_of(root, "check"))
 
     for how, expected in {
-        "told_error": "thicker wall",
+        "reported_error": "thicker wall",
         "crash": "SIGSEGV",
         "wordless": "without a message",
         "good": "see Check",
@@ -302,7 +302,7 @@ def test_jobs_that_fail_and_one_that_is_stopped():
         assert expected in drawn(), (how, drawn())
         assert bpy.ops.mu.print_dismiss() == {"FINISHED"}
         assert expected not in drawn()
-    child = start("told_error")
+    child = start("reported_error")
     ended(child)
     child.error["status"] = print_panel.NOT_PRINTABLE
     assert "Checked: not printable" in drawn()
@@ -335,9 +335,9 @@ def test_a_unit_that_must_not_be_printed():
     assert [f["check"] for f in found.errors] == ["chamber wall"]
     assert not found.stale
     assert abs(found.errors[0]["value"] - 0.54) < 0.02
-    said = drawn()
-    assert "Checked: not printable" in said
-    assert "export asks first" in said
+    texts = drawn()
+    assert "Checked: not printable" in texts
+    assert "export asks first" in texts
     assert bpy.ops.mu.print_show(finding=0) == {"FINISHED"}
 
 

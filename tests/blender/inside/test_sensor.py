@@ -90,13 +90,13 @@ def test_connect_pause_mark_and_disconnect(tmp_path):
     assert "mu.sensor_connect" in drawn()
     assert not bpy.ops.mu.sensor_mark.poll()
     s = connected(root)
-    said = drawn()
-    assert "Connected: simulated sensor" in said, said
-    assert "nothing lost" in said, said
-    assert "light_V" in said, said
-    assert "frames, " in said
-    assert "samples on disk" in said
-    assert "Not calibrated" in said
+    texts = drawn()
+    assert "Connected: simulated sensor" in texts, texts
+    assert "nothing lost" in texts, texts
+    assert "light_V" in texts, texts
+    assert "frames, " in texts
+    assert "samples on disk" in texts
+    assert "Not calibrated" in texts
     assert not bpy.ops.mu.sensor_connect.poll()
     assert bpy.ops.mu.sensor_mark.poll()
     assert bpy.ops.mu.sensor_mark(words="valve\nopen") == {"FINISHED"}
@@ -136,9 +136,9 @@ def test_a_killed_reader_and_a_folder_that_is_gone(tmp_path, monkeypatch):
     s = connected(root)
     os.kill(s.child.pid, signal.SIGKILL)
     assert ended(s) == "failed"
-    said = drawn()
-    assert "SIGKILL" in said
-    assert "Connect again" in said
+    texts = drawn()
+    assert "SIGKILL" in texts
+    assert "Connect again" in texts
     assert bpy.ops.mu.sensor_connect.poll()
     s = connected(root)
     shutil.rmtree(s.watched.folder)
@@ -167,10 +167,10 @@ def test_a_device_at_a_pty_that_is_unplugged_twice(tmp_path):
         s = connected(root, 1000)
         assert s.channels == ("light0_V", "light1_V", "light2_V", "light3_V")
         watch(lambda: s.watched.status["reconnects"] == 2 and s.watched.status["lost"] > 0)
-        said = drawn()
-        assert "2 reconnects" in said, said
-        assert "lost" in said, said
-        assert "nothing lost" not in said, said
+        texts = drawn()
+        assert "2 reconnects" in texts, texts
+        assert "lost" in texts, texts
+        assert "nothing lost" not in texts, texts
         age, low, high = s.traces.extremes()
         assert len(age) > 10
         assert (low[:4, -1] <= high[:4, -1]).all()
@@ -204,9 +204,9 @@ def test_garbage_on_the_line_is_counted_and_shown():
         watch(lambda: True)
         time.sleep(0.01)
     watch(lambda: s.watched.status.get("rows", 0) >= 30)
-    said = drawn()
-    assert "unreadable" in said, said
-    assert "light" in said, said
+    texts = drawn()
+    assert "unreadable" in texts, texts
+    assert "light" in texts, texts
     os.close(master)
     os.close(slave)
     watch(lambda: s.state in ("disconnected", "waiting"))
@@ -444,10 +444,10 @@ def test_what_is_drawn_does_not_grow_with_the_rate_and_stays_in_its_axes(tmp_pat
     assert max(heights[:2]) <= sensor_plot.HEIGHT
     assert 20 < heights[2] <= sensor_plot.HEIGHT
     assert any(kind == "TRI_STRIP" and colour == sensor_plot.BAND for kind, _, colour in shapes)
-    said = " ".join(texts)
-    assert "light_V" in said, said
-    assert "angle in" in said, said
-    assert "-10 s" in said, said
+    words = " ".join(texts)
+    assert "light_V" in words, words
+    assert "angle in" in words, words
+    assert "-10 s" in words, words
     bpy.ops.mu.sensor_channel(name="dark_V")
     assert len(plotted()) == 2
     assert "dark_V" not in " ".join(texts)

@@ -52,7 +52,7 @@ def test_panels_tell_what_a_child_says():
 
     for how, expected in {
         "good": "Done in",
-        "told_error": "no equilibrium",
+        "reported_error": "no equilibrium",
         "crash": "SIGSEGV",
         "wordless": "without a message",
         "garbage": "Done in",
@@ -60,7 +60,7 @@ def test_panels_tell_what_a_child_says():
         child = launch(root, how)
         ended(child)
         assert expected in drawn(), (how, drawn())
-    launch(root, "told_error")
+    launch(root, "reported_error")
     watch(lambda: not jobs.running())
     assert "thicker wall" in drawn()
     assert "at 12 kPa" in drawn()
