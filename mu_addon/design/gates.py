@@ -25,10 +25,10 @@ class GateError(MuError):
 
 @attrs.frozen
 class Guide:
-    """Measurements on the lattice with its waveguide, next to the values they must have.
+    """Measurements on the lattice with its waveguide, next to the values they must have; mm3 and counts.
 
     cut_mm3: volume that wells, pockets and notches remove; strayed_mm3: the part of it that belongs to struts
-    or membrane instead of the waveguide. Genus and components are counts.
+    or membrane instead of the waveguide.
     """
 
     genus: int

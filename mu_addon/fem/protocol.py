@@ -31,7 +31,7 @@ class Protocol:
     pressure_kPa: Array
 
     def sample(self, count: int) -> tuple[Array, Array]:
-        """Time in s and pressure in kPa at `count` uniformly spaced instants, ends included."""
+        """Time (count,) in s and pressure (count,) in kPa at uniformly spaced instants, ends included."""
         time = np.linspace(self.time_s[0], self.time_s[-1], count)
         # Rounded, so that the same pressure met twice is recognised as one equilibrium.
         return time, np.round(np.interp(time, self.time_s, self.pressure_kPa), 9)

@@ -1,4 +1,4 @@
-"""Least squares for sums of terms: factors by linear algebra, exponents by Newton's method around it."""
+"""Least squares for sums of terms: factors by linear algebra, exponents by nonlinear least squares."""
 
 from __future__ import annotations
 

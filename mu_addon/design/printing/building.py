@@ -9,10 +9,12 @@ from . import layers
 from .drain import Chambers
 from .finding import MOST_PLACES, Finding, Points, Severity, gathered, numbered
 from .printer import Printer
-from .voxels import Columns
+from .voxels import VoxelColumns
 
 
-def building(built: Columns, chambers: Chambers, printer: Printer) -> tuple[list[Finding], dict[str, float]]:
+def building(
+    built: VoxelColumns, chambers: Chambers, printer: Printer
+) -> tuple[list[Finding], dict[str, float]]:
     """Findings on islands, cups, overhangs and bridges of a build, and the volumes of its cups in ml by name.
 
     built: the part's columns along the build direction, cells one layer high; chambers: to tell islands

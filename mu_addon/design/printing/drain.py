@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from .voxels import Columns
+from .voxels import VoxelColumns
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ class Room:
     true one.
     """
 
-    columns: Columns
+    columns: VoxelColumns
     distance: NDArray[np.float32]
 
 
@@ -66,7 +66,7 @@ class Chambers:
     """
 
     found: list[Chamber]
-    columns: Columns
+    columns: VoxelColumns
     within: NDArray[np.bool_]
     free: NDArray[np.bool_]
 
@@ -85,7 +85,7 @@ class Chambers:
         return tuple(np.clip(cell, 0, np.array(grid.shape) - 1).T)
 
 
-def room(columns: Columns) -> Room:
+def room(columns: VoxelColumns) -> Room:
     """Distances to the surface in a grid of cubes, computed slab by slab to limit memory; see `Room`.
 
     columns: cells as high as wide; the outermost cells of the grid count as DEEP mm from the surface.

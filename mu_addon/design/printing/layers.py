@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from .voxels import Columns
+from .voxels import VoxelColumns
 
 Array = NDArray[np.float64]
 
@@ -25,8 +25,8 @@ class Regions:
     """Connected regions of every layer, of solid or free cells, and which overlap from layer to layer.
 
     layer (r,): number of each region's layer; cells (r,): count of its cells; middle (r, 3): its mean, in
-    cells, see Columns.points; outside (r,): whether it reaches the edge of the grid. links (l, 2): numbers of
-    a region and of one in the next layer above it.
+    cells, see VoxelColumns.points; outside (r,): whether it reaches the edge of the grid. links (l, 2):
+    numbers of a region and of one in the next layer above it.
     """
 
     layer: NDArray[np.int64]
@@ -69,7 +69,7 @@ class Overhang:
     bridge: NDArray[np.bool_]
 
 
-def regions(columns: Columns, free: bool, at_once: int = 8_000_000) -> Regions:
+def regions(columns: VoxelColumns, free: bool, at_once: int = 8_000_000) -> Regions:
     """Connected regions of every layer: free cells that touch by side, or solid ones, by side or corner.
 
     free: which of both; at_once: largest number of cells that are held in memory at a time.
@@ -111,7 +111,7 @@ def regions(columns: Columns, free: bool, at_once: int = 8_000_000) -> Regions:
     )
 
 
-def islands(columns: Columns, solid: Regions) -> Islands:
+def islands(columns: VoxelColumns, solid: Regions) -> Islands:
     """Islands: solid regions above the first layer without any solid below them.
 
     solid: the regions of the solid in the same columns.
@@ -125,7 +125,7 @@ def islands(columns: Columns, solid: Regions) -> Islands:
     return Islands(columns.points(solid.middle[found]), area)
 
 
-def cups(columns: Columns, free: Regions) -> Cups:
+def cups(columns: VoxelColumns, free: Regions) -> Cups:
     """Cups: groups of free regions that are closed in from the sides and from the platform's side.
 
     free: the free regions in the same columns. Regions are joined in the order of building; while a group has
@@ -167,7 +167,7 @@ def cups(columns: Columns, free: Regions) -> Cups:
     )
 
 
-def overhangs(columns: Columns, slope_deg: float, at_once: int = 8_000_000) -> Overhang:
+def overhangs(columns: VoxelColumns, slope_deg: float, at_once: int = 8_000_000) -> Overhang:
     """What layers extend beyond the layer below, which supports slopes of `slope_deg` degrees from level.
 
     Islands are left out. A region supported from opposite sides is a bridge, whose span is twice its reach.

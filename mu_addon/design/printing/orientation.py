@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..surface import Triangles, Vertices
 from .layers import cups, islands, regions
 from .thickness import Samples
-from .voxels import columns, frame_along
+from .voxels import frame_along, voxel_columns
 
 Array = NDArray[np.float64]
 
@@ -82,7 +82,7 @@ def build(
     slope_deg: flattest slope from level, in degrees, that needs no support; room: sizes of the build volume
     in mm.
     """
-    grid = columns(vertices, triangles, step, frame=frame_along(direction))
+    grid = voxel_columns(vertices, triangles, step, frame=frame_along(direction))
     closed = cups(grid, regions(grid, free=True))
     loose = islands(grid, regions(grid, free=False))
     height = surface.points @ direction

@@ -38,7 +38,10 @@ MEANING = {
 
 @attrs.frozen
 class Limit:
-    """One limit of a printer with a resin, its source, and whether it is assumed and not published."""
+    """One limit of a printer with a resin, its source, and whether it is assumed and not published.
+
+    The value's unit is the end of the limit's name in MEANING.
+    """
 
     value: float
     source: str
