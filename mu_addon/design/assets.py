@@ -28,7 +28,8 @@ def asset_root() -> Path:
 def asset_names(folder: str, kind: str = "") -> list[str]:
     """Sorted names (file stems) of the TOML files in a folder of `assets` whose key `kind` has this value.
 
-    kind: "" for the files that have no such key, as most do. Raises InputError where `assets` is missing.
+    kind: "" for the files that have no such key, as most do. Raises InputError where `assets` is missing or a
+    file is not TOML.
     """
     paths = (asset_root() / folder).glob("*.toml")
     return sorted(path.stem for path in paths if _kind(path) == kind)

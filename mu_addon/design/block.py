@@ -1,4 +1,4 @@
-"""A box turned any way in space: wells, seats and pockets of a waveguide."""
+"""A box in any orientation: wells, seats and pockets of a waveguide."""
 
 from __future__ import annotations
 

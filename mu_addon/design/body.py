@@ -1,4 +1,4 @@
-"""A body of the user's own as a closed surface: read, examined, and cut to serve as a unit's envelope."""
+"""A user-defined body as a closed surface: read, checked, and cut to serve as a unit's envelope."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The true lengths of a unit at its scale, which geometry and meshes are made from."""
+"""The lengths of a unit in mm at its scale, from which geometry and meshes are made."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Gates of a printable solid: numbers that must come out exactly, each the sign of a different mistake."""
+"""Geometry checks (gates) of a printable solid: numbers that it must meet before it is written."""
 
 from __future__ import annotations
 

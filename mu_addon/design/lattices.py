@@ -1,4 +1,4 @@
-"""Kinds of lattice: the nodes and struts of one cell and how a strut's radius runs, by name.
+"""Kinds of lattice by name: nodes and struts of one cell, and a strut's radius along its length.
 
 A new kind is one `register(LatticeKind(...))`; solids, meshes and moduli take it from here.
 """

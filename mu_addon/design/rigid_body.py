@@ -1,4 +1,4 @@
-"""Rigid bodies that stand beside a unit, fixed in its frame: what they are, and one file for all of them."""
+"""Rigid bodies beside a unit, fixed in its frame, and the OBJ file that holds them."""
 
 from __future__ import annotations
 

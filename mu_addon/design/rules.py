@@ -1,4 +1,4 @@
-"""The co-design rules of a Monolithic Unit: each refuses what breaks it, by name and with what would fit."""
+"""The co-design rules of a Monolithic Unit; a broken one is reported by name with a value that fits."""
 
 from __future__ import annotations
 

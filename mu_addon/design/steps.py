@@ -1,4 +1,4 @@
-"""The design as small steps, each made from those before it, and made again only where what it takes changed.
+"""The design as a chain of steps, of which each is evaluated again only where its inputs have changed.
 
     profile -> chambers -> membranes
        \\-> cells -> trim -> struts

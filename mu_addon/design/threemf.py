@@ -44,7 +44,7 @@ _LONG_AGO = (1980, 1, 1, 0, 0, 0)
 
 @attrs.frozen(eq=False)
 class Beams:
-    """Beams as frusta with round ends: nodes (n, 3) in mm, pairs (b, 2), radii (b, 2) at both ends."""
+    """Beams as frusta with round ends: nodes (n, 3) in mm, pairs (b, 2) of nodes, end radii (b, 2) in mm."""
 
     nodes: Array
     pairs: NDArray[np.int64]

@@ -1,4 +1,4 @@
-"""TOML with line numbers in every complaint, and tables of described values with their comments."""
+"""TOML whose errors give line numbers, and tables of described values with comments."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which of the laws that were fitted to take, and which do as well."""
+"""Choice of a law among those that were fitted, and the laws tied with it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Laws fitted to coupons: parameters with intervals, errors a mode, stability."""
+"""Laws fitted to coupons: parameters with intervals, errors for each mode, stability."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Materials: figures with their source and how sure they are, and a law for simulations."""
+"""Materials: figures with source and confidence, and a law for simulations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a law is stable: whether every further strain costs work beyond what is there."""
+"""Drucker stability of a law: every further increment of strain must need positive work."""
 
 from __future__ import annotations
 

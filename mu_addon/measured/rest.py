@@ -1,4 +1,4 @@
-"""Where markers of a unit lie while nothing presses on it."""
+"""Positions of a unit's markers at zero pressure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A CSV file of one experiment: numbers by column, and every problem named by its row."""
+"""A CSV file of one experiment: numbers by column; problems are reported with their row."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Markers followed in a video of the bench: from pixels to millimetres in the unit's frame, and to an angle.
+"""Markers tracked in a video: from pixels to millimetres in the unit's frame, and to an angle.
 
 The bending plane is the complex plane, w = y + i z in mm, and a place in the picture is q = right + i up,
 seen from the side the camera is on; a camera far enough away makes w = a q + b, where |a| is the scale.

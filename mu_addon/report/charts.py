@@ -188,10 +188,10 @@ def protocol(time_s: Floats, pressure_kPa: Floats) -> str:
 
 
 def heatmap(delta: Floats, top: float, chosen: bool = False) -> str:
-    """SVG of one path's deviation (k times, j stations) in mm, coloured on a scale of 0 to `top` mm.
+    """SVG of one path's deviation delta (k, j) in mm at k times and j stations, coloured from 0 to `top` mm.
 
-    Arc length is to the right, time upward, both in percent; colour by square root, as in `color_bar`. An
-    array delta of shape (k, j); chosen: whether its frame is drawn in colour.
+    Arc length is to the right, time upward, both in percent; the colour goes by square root, as in
+    `color_bar`. chosen: whether its frame is drawn in colour.
     """
     from matplotlib.colors import PowerNorm
 

@@ -120,7 +120,7 @@ def _image(kind: str, data: bytes, caption: str, alt: str, css: str) -> str:
 
 
 def number(value: Any) -> str:
-    """A value as text: floats to six figures, thousands of whole numbers apart, yes or no for flags."""
+    """A value as text: floats to six figures, whole numbers with spaced thousands, yes or no for flags."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int | np.integer):

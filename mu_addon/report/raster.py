@@ -15,7 +15,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.func
 def crossing(a: wp.vec3, b: wp.vec3, y: float, lo: float, hi: float):
-    """Span (lo, hi) in pixels, widened to where the edge from a to b crosses the row y in pixels."""
+    """Span (lo, hi) of pixels, widened to where the edge from a to b crosses the row y; all in pixels."""
     if (a[1] <= y) != (b[1] <= y):
         x = a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
         lo = wp.min(lo, x)

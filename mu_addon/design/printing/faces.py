@@ -1,4 +1,4 @@
-"""Faults of a triangle surface as such: open, doubled, turned over, in pieces, hollow."""
+"""Faults of a triangle surface: open edges, doubled or flipped faces, loose pieces, sealed voids."""
 
 from __future__ import annotations
 

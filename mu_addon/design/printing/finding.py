@@ -1,4 +1,4 @@
-"""What a print check has to say: a value, its limit, where, and how bad it is."""
+"""Findings of the printability check: a value, its limit, where it shows, and how severe it is."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where two parts of a surface hang together by the shortest closed curves: holes too small for a grid."""
+"""Shortest closed curves that separate two parts of a surface: finds holes too small for a grid."""
 
 from __future__ import annotations
 

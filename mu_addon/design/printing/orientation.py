@@ -1,4 +1,4 @@
-"""Which way up to print: cups, islands, overhangs and height of many build directions, and the trade-off."""
+"""Build directions compared by cups, islands, overhangs and height, with the Pareto-optimal ones."""
 
 from __future__ import annotations
 
