@@ -13,7 +13,7 @@ from ..fem.laws import NeoHooke
 from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.newton_settings import NewtonSettings
-from ..fem.obstacle import CONTACT
+from ..fem.obstacle import CONTACT_NEWTON
 from ..fem.state import State
 from ..fem.time_stepping import simulate_in_time
 
@@ -60,7 +60,7 @@ class CandidateBatch:
         law with history. Raises InputError where time runs backward, and ConvergenceError.
         """
         equilibrium = self._batched_newton.alone(number)
-        equilibrium.settings = CONTACT
+        equilibrium.settings = CONTACT_NEWTON
         return self.points(simulate_in_time(equilibrium, time_s, pressure_kPa).states)
 
     def at(self, state: State) -> Array:
