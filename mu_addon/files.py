@@ -126,6 +126,9 @@ def read_npz(path: Path, most_bytes: int = 1 << 32) -> dict[str, Any] | None:
     many bytes as the array's header claims, and no more than `most_bytes` in all.
     """
     try:
+        # A pipe would be waited for.
+        if not path.is_file():
+            return None
         with zipfile.ZipFile(path) as archive:
             if sum(member.file_size for member in archive.infolist()) > most_bytes:
                 return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from typing import Any
 
@@ -47,6 +48,28 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
+def _require_usable(options: argparse.Namespace) -> None:
+    """Raise InputError for what no option can mean: nan, and names that are empty or no text.
+
+    An empty --out has words of its own.
+    """
+    from ..errors import InputError
+
+    for name, given in vars(options).items():
+        where = f"--{name.replace('_', '-')}"
+        for value in given if isinstance(given, list | tuple) else [given]:
+            if isinstance(value, float) and math.isnan(value):
+                raise InputError("nan is no number", where, "give a number")
+            if not isinstance(value, str) or (name == "out" and not value):
+                continue
+            if not value:
+                raise InputError("it is empty", where, "give a name, or leave the option out")
+            if "\0" in value or value != value.encode(errors="replace").decode():
+                raise InputError(
+                    "it holds a NUL byte, or bytes that are no UTF-8 text", where, "give a name in UTF-8"
+                )
+
+
 def main(arguments: list[str]) -> int:
     """Run one command line; returns its exit status and never raises."""
     options = parser().parse_args(arguments)
@@ -59,6 +82,7 @@ def main(arguments: list[str]) -> int:
     json = getattr(options, "json", False)
     progress = Progress([json_lines(sys.stdout) if json else terminal(sys.stderr)])
     with run_to_end(progress) as context:
+        _require_usable(options)
         command.run(options, context)
     if context.status == 0 and not json:
         results = [f"results: {context.folder}"] if context.folder is not None else []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -70,9 +71,16 @@ def add_calibration(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
     """Stream until Ctrl-C."""
+    from ..errors import InputError
     from ..usecases.sensor.stream import serial_source, simulated_source, stream
 
     require_out(options)
+    if options.seconds is not None and not 0 < options.seconds < math.inf:
+        raise InputError(
+            f"{options.seconds:g} s is no time to record", "--seconds", "give a number above zero"
+        )
+    if options.baud <= 0:
+        raise InputError(f"{options.baud} is no rate", "--baud", "give bits a second, such as 115200")
     source = simulated_source() if options.simulate else serial_source(options.port, options.baud)
     about = {"source": "simulated" if options.simulate else options.port, "baud": options.baud}
     stream(

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 
 from ..errors import InputError
+from ..reading import file_text, parse_toml
 from .toml_text import nearest
 
 
@@ -48,4 +48,4 @@ def asset_file(folder: str, what: str, name: str, kind: str = "") -> Path:
 
 def _kind(path: Path) -> str:
     """What a TOML file says it describes by `kind = ...`; nothing where it does not say."""
-    return str(tomllib.loads(path.read_text(encoding="utf-8")).get("kind", ""))
+    return str(parse_toml(file_text(path), str(path)).get("kind", ""))

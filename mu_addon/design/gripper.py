@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import write_bytes
+from ..reading import file_text
 from . import shapes, toml_text
 from .anchors import window
 from .assets import asset_file, asset_names
@@ -294,7 +295,7 @@ def from_toml(text: str, origin: str = "", beside: Path | None = None) -> Grippe
     keys |= {section.section: [d.name for d in describe(section)] for section in SECTIONS}
     document = toml_text.parse(text, keys, origin)
     with toml_text.located(text, origin):
-        if (document.get("format"), document.get("kind")) != (FORMAT, KIND):
+        if (document.get("format"), document.get("kind")) != (FORMAT, KIND) or document["format"] is True:
             raise InputError(
                 f"the file is not a gripper of format {FORMAT}",
                 "kind",
@@ -315,7 +316,7 @@ def read_gripper(path: str | Path) -> Gripper:
     """Gripper in a TOML file; InputError gives file, line and remedy."""
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = file_text(path)
     except OSError as error:
         raise InputError(
             f"cannot read the gripper: {error.strerror or error}", str(path), "give a gripper's TOML file"

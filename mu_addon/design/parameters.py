@@ -12,6 +12,7 @@ import attrs
 
 from ..errors import InputError
 from ..files import write_bytes
+from ..reading import file_text
 from . import lattices, rules, toml_text
 from .assets import asset_file, asset_names
 from .dimensions import Dimensions
@@ -517,7 +518,7 @@ def from_toml(text: str, origin: str = "") -> Unit:
     keys = {"": list(head)} | {_attribute(s): [d.name for d in describe(s)] for s in SECTIONS}
     document = toml_text.parse(text, keys, origin)
     with toml_text.located(text, origin):
-        if document.get("format") != FORMAT:
+        if document.get("format") != FORMAT or document["format"] is True:
             raise InputError(
                 f"format = {document.get('format', 'missing')} is not known here",
                 "format",
@@ -533,7 +534,7 @@ def read_unit(path: str | Path) -> Unit:
     """The unit in a TOML file. Raises InputError with file, line and what to do."""
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = file_text(path)
     except OSError as error:
         raise InputError(
             f"cannot read the unit: {error.strerror or error}",

@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
+from ..reading import file_text
 from .body import Body, flaws, half, overlaps, require_sound
 from .dimensions import Dimensions
 
@@ -74,7 +75,7 @@ def read_rigid_bodies(path: Path, friction: Any) -> tuple[RigidBody, ...]:
     found: list[tuple[str, list[list[float]], list[list[int]]]] = []
     before = 0
     try:
-        for line in path.read_text(encoding="utf-8").splitlines():
+        for line in file_text(path).splitlines():
             kind, _, words = line.partition(" ")
             if kind == "o":
                 before += len(found[-1][1]) if found else 0

@@ -5,23 +5,19 @@ from __future__ import annotations
 import difflib
 import re
 import textwrap
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from ..errors import InputError
+from ..reading import parse_toml
 from ..toml_writer import Noted, toml_text, toml_value
 from .quantity import Description
 
 
 def parse(text: str, keys: Mapping[str, Sequence[str]], origin: str) -> dict[str, Any]:
     """Document whose tables and keys are all among `keys` (table "" is the top level); else InputError."""
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        what, line = _located_syntax(str(error), text)
-        raise InputError(f"this is not TOML: {what}", place(origin, line), "correct that line") from error
+    document = parse_toml(text, origin)
     for key, value in document.items():
         if isinstance(value, dict) and key in keys:
             for inner in value:
@@ -110,11 +106,3 @@ def _unknown(
         f"{place(origin, line_of(text, where))}, {where}",
         f"known here: {', '.join(here)}",
     )
-
-
-def _located_syntax(message: str, text: str) -> tuple[str, int | None]:
-    match = re.search(r"\s*\(at (?:line (\d+), column \d+|end of document)\)", message)
-    if not match:
-        return message, None
-    line = int(match[1]) if match[1] else max(1, len(text.splitlines()))
-    return message[: match.start()], line

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -14,6 +13,7 @@ import attrs
 from ..errors import InputError
 from ..files import write_text
 from ..homogenize.offset_response import OffsetResponse
+from ..reading import file_text, is_number, parse_toml
 from ..toml_writer import Noted, toml_text
 from .effect import LIBRARY
 from .verdict import Verdict
@@ -110,17 +110,25 @@ def load_model(path: Path) -> ExtendedModel:
     parameter without a finite value and for an unusable table [lattice].
     """
     try:
-        document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        text = file_text(path)
     except OSError as error:
         raise InputError(
             f"cannot read {path}: {error.strerror}", str(path), "run `diagnose` on a folder first"
         ) from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"this is not TOML: {error}", str(path), "correct that line") from error
+    except UnicodeDecodeError as error:
+        raise InputError("the model is not UTF-8 text", str(path), "give a model.toml") from error
+    document = parse_toml(text, str(path))
+    if not isinstance(document.get("verdict"), str):
+        raise InputError("this is no model: it has no verdict", str(path), "give model.toml of `diagnose`")
+    for table in ("effect", "nuisance", "lattice"):
+        if not isinstance(document.get(table, {}), dict):
+            raise InputError(f"{table} is not a table", str(path), f"write it as [{table}]")
     effects = {}
     for name, parameters in document.get("effect", {}).items():
         if name not in LIBRARY:
             raise InputError(f"no effect {name!r} is known", f"{path}, [effect.{name}]", ", ".join(LIBRARY))
+        if not isinstance(parameters, dict):
+            raise InputError(f"effect.{name} is not a table", str(path), f"write [effect.{name}.PARAMETER]")
         effects[name] = {p: _fitted(path, f"effect.{name}.{p}", table) for p, table in parameters.items()}
     nuisances = {n: _fitted(path, f"nuisance.{n}", t) for n, t in document.get("nuisance", {}).items()}
     lattice = _response(path, document["lattice"]) if "lattice" in document else None
@@ -129,7 +137,10 @@ def load_model(path: Path) -> ExtendedModel:
 
 def _response(path: Path, table: Any) -> OffsetResponse:
     try:
-        return OffsetResponse(*(table[n] for n in _RESPONSE))
+        rows = [table[n] for n in _RESPONSE]
+        if not all(isinstance(row, list) and all(map(is_number, row)) for row in rows):
+            raise ValueError("it needs lists of numbers")
+        return OffsetResponse(*rows)
     except (InputError, KeyError, TypeError, ValueError) as error:
         raise InputError(
             f"[lattice] holds no response to a print offset: {error}",
@@ -142,5 +153,10 @@ def _fitted(path: Path, name: str, table: Any) -> Fitted:
     value = table.get("value") if isinstance(table, dict) else None
     if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
         raise InputError(f"[{name}] has no value", str(path), "write value = and a number")
-    others = {k: float(table.get(k, math.nan)) for k in ("sd", "low95", "high95")}
+    others = {k: table.get(k, math.nan) for k in ("sd", "low95", "high95")}
+    wrong = [k for k, v in others.items() if not is_number(v)]
+    if wrong:
+        raise InputError(
+            f"{wrong[0]} of [{name}] is no number", str(path), f"write {wrong[0]} = and a number"
+        )
     return Fitted(float(value), unit=str(table.get("unit", "")), **others)

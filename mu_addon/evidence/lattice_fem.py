@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from ..homogenize.modulus import modulus
 from ..homogenize.offset_response import OffsetResponse
 from ..homogenize.specimen import block_specimen
 from ..measured import Experiment
+from ..reading import file_text, parse_toml
 from ..run.cache import Cache
 from ..toml_writer import toml_text
 from .prediction.lattice import KIND, ComputedCell, Scaling
@@ -77,7 +77,7 @@ def response(block: Block, cache: Path | None = None, report: Progress = _silent
     """
     key = block.key()
     for name in asset_names(SHIPPED):
-        kept = tomllib.loads(asset_file(SHIPPED, "response", name).read_text(encoding="utf-8"))
+        kept = parse_toml(file_text(asset_file(SHIPPED, "response", name)), name)
         if kept["key"] == key:
             return OffsetResponse(kept["offset_mm"], kept["modulus"], kept["density"])
     table = Cache(cache) if cache else None

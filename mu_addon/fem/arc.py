@@ -26,7 +26,11 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen
 class ContinuationSettings:
-    """Step lengths of arc-length continuation, and how accurately critical points are located."""
+    """Step lengths of arc-length continuation, and how accurately critical points are located.
+
+    first_step_MPa: change of pressure of the first step. max_points: of a branch; max_iterations: of one
+    point. keep_factor, predictor_tolerance, min_step and accuracy are ratios, turn is an angle in radians.
+    """
 
     first_step_MPa: float = 0.002
     max_points: int = 100
@@ -66,9 +70,10 @@ class Point:
 
 @attrs.frozen(eq=False)
 class Node:
-    """A point as z, the free displacements and then the pressure; the branch's unit direction and bend there.
+    """A point as z (n + 1,), the n free displacements in mm and then the pressure in MPa.
 
-    bend: change of direction with length, (n + 1,).
+    direction (n + 1,): unit tangent of the branch there, in the metric of `Arc.product`; bend (n + 1,):
+    change of direction with length along the branch in mm.
     """
 
     point: Point
@@ -77,7 +82,7 @@ class Node:
     bend: Array
 
     def reversed(self) -> Node:
-        """The same, on the way back."""
+        """The same point with the branch's direction and its `slope` of pressure turned round."""
         point = attrs.evolve(self.point, slope=-self.point.slope)
         return attrs.evolve(self, point=point, direction=-self.direction)
 
@@ -98,7 +103,11 @@ class Body(Protocol):
 
 
 class Arc:
-    """Finds the points of one branch, of a body and materials, that begins at a converged state."""
+    """Finds the points of one branch of equilibria of a body that begins at a converged state.
+
+    Lengths along the branch are in mm, pressures in MPa. Each new point costs factorisations of the tangent,
+    counted in its state.
+    """
 
     def __init__(self, body: Body, start: State, settings: ContinuationSettings) -> None:
         self.model, self.parameters = body.model, body.parameters
@@ -111,7 +120,10 @@ class Arc:
         self._metric = np.full(self._size + 1, 1 / self._size)
 
     def begin(self) -> Node:
-        """The start, on the way to higher pressure. Raises ConvergenceError where it is no equilibrium."""
+        """The start as a node whose direction leads to higher pressure; also sets the metric of `product`.
+
+        Raises ConvergenceError where the start is no equilibrium or its tangent is singular.
+        """
         z = np.append(self._start.u.ravel()[self.model.free], self._start.pressure_MPa)
         force, scale = self._force(z)
         if np.linalg.norm(force) > self.tolerance * scale:
@@ -123,7 +135,11 @@ class Arc:
         return self._node(z, np.append(per_MPa, 1.0), self._start.residual, 0, 1)
 
     def advance(self, node: Node, length: float) -> Node:
-        """The point a length in mm ahead. Raises ConvergenceError where it is not where it is expected."""
+        """The node a positive length in mm ahead of a node.
+
+        Raises ConvergenceError where the correction fails, or ends farther from its prediction than the
+        predictor tolerance times the length.
+        """
         predicted = node.z + length * node.direction + length**2 / 2 * node.bend
         row = self._metric * node.direction
 
@@ -137,14 +153,20 @@ class Arc:
         return attrs.evolve(new, bend=(new.direction - node.direction) / length)
 
     def at_pressure(self, before: Node, after: Node, pressure: float) -> Node:
-        """The point of a pressure in MPa between two nodes. Raises ConvergenceError."""
+        """The node at a pressure in MPa between two nodes, started from linear interpolation.
+
+        Raises ConvergenceError where the correction fails.
+        """
         ends = before.z[-1], after.z[-1]
         row = np.append(np.zeros(self._size), 1.0)
         guess = _between(before, after, ends, pressure)
         return self._correct(guess, lambda z, _: (z[-1] - pressure, row), after)
 
     def at_volume(self, before: Node, after: Node, volume: float) -> Node:
-        """The point of a cavity volume in mm3 between two nodes. Raises ConvergenceError."""
+        """The node at a cavity volume in mm3 between two nodes, started from linear interpolation.
+
+        Raises ConvergenceError where the correction fails.
+        """
         ends = before.point.volume_mm3, after.point.volume_mm3
 
         def condition(z: Array, force_per_MPa: Array) -> tuple[float, Array]:
@@ -156,11 +178,15 @@ class Arc:
         return self._correct(_between(before, after, ends, volume), condition, after)
 
     def product(self, a: Array, b: Array) -> float:
-        """Inner product of two changes of z."""
+        """Inner product in mm2 of two changes (n + 1,) of z: |du|^2/n + (c dp)^2, see the module."""
         return float((self._metric * a) @ b)
 
     def softest(self, z: Array) -> tuple[float, Array]:
-        """The eigenvalue of the tangent nearest zero, in N/mm, and its vector (n, 3), the largest move 1."""
+        """The tangent's eigenvalue nearest zero at z (n + 1,), in N/mm, and its eigenvector (nodes, 3).
+
+        The eigenvector is scaled so that the node which moves most moves by 1. Raises ConvergenceError where
+        the tangent is singular or the eigenvalue is not found.
+        """
         self._factor(z)
         try:
             stiffness, modes = self.inertia.modes(1)

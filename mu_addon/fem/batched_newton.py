@@ -27,9 +27,9 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen(eq=False)
 class Variant:
-    """A body that is another's but for a share (m,) of its elements, which a law fills with parameters.
+    """A body that is another's but for a share (m,) of each element's volume, filled by another law.
 
-    parameters: (m, count), or one row for all.
+    share: 0 to 1, one an element; parameters: of the law, (m, count), or one row for all.
     """
 
     share: Array
@@ -37,7 +37,7 @@ class Variant:
     parameters: Array
 
     def of(self, materials: Materials) -> Materials:
-        """The variant's materials, of the body's."""
+        """The variant's materials, of the body's; raises InputError for a share outside 0 to 1."""
         return materials.blended(self.share, self.law, self.parameters)
 
 
@@ -111,7 +111,7 @@ class BatchedNewton:
         return [one for one in found if one is not None]
 
     def alone(self, i: int) -> Equilibrium:
-        """One variant by itself."""
+        """Variant number i as a body of its own: an `Equilibrium` with the same settings."""
         return Equilibrium(self.model, self.variants[i].of(self.materials), self.settings)
 
     def _alone(self, i: int, state: State, near: Array | None) -> State:

@@ -29,7 +29,8 @@ class CloggedModel(Model):
     What closes the neck is a cone from the neck's rim to the mean of its nodes. It bears the difference and
     hands it to the rim, so that both chambers are closed and the load has a potential, -p (V - share_lost
     V_beyond): the tangent stays symmetric. Its own part of the tangent, of the rim alone, is left out, which
-    costs Newton's method steps and changes no equilibrium. Raises InputError where no neck is cut.
+    costs Newton's method steps and changes no equilibrium. more: further arguments of `Model`. Raises
+    InputError where no neck is cut.
     """
 
     def __init__(self, mesh: Mesh, height_mm: float, share_lost: float, **more: Any) -> None:
@@ -52,11 +53,18 @@ class CloggedModel(Model):
         self._lost_blocks = wp.zeros(count * self._pairs, dtype=mat33, device=self.device)
 
     def potential(self, u: Array, pressure: float, m: MaterialData) -> float:
-        """As `Model.potential`, with the clogged part's share of the pressure's work."""
+        """Potential in mJ at u (n, 3) in mm and pressure in MPa, as `Model.potential`.
+
+        The part beyond the clog counts with 1 - share_lost of the pressure.
+        """
         return super().potential(u, pressure, m) + self.share_lost * pressure * self.volume_beyond(u)
 
     def residual(self, u: Array, pressure: float, m: MaterialData) -> Array:
-        """As `Model.residual`, with what the clogged part and the clog bear less and more."""
+        """Internal minus external forces (n, 3) in N at u (n, 3) in mm and pressure in MPa.
+
+        As `Model.residual`, with the pressure reduced beyond the clog, and with its difference on the clog's
+        cone, which the rim's nodes carry.
+        """
         residual = super().residual(u, pressure, m)
         lost = -self.share_lost * pressure
         inputs = [lost, self._x, self._lost_faces, *self._face_rule, 0, self._lost_force]
@@ -66,7 +74,7 @@ class CloggedModel(Model):
         return residual
 
     def tangent(self, u: Array, pressure: float, m: MaterialData) -> Array:
-        """As `Model.tangent`, without the clog's own part."""
+        """Values (nnz,) of the tangent in N/mm, as `Model.tangent`, without the part of the clog's cone."""
         self._place(u)
         self._launch_layers("stiffness", m, [self._mean_slope, self._block_parts])
         inputs = [self._x, self._faces, *self._face_rule, self._element_blocks, self._block_parts]
@@ -82,7 +90,10 @@ class CloggedModel(Model):
         return self._gathered(u)
 
     def volume_beyond(self, u: Array) -> float:
-        """Volume in mm3 that the cavity beyond the clog, the clog and the mirror planes enclose."""
+        """Volume in mm3 that the cavity beyond the clog, the clog's cone and the mirror planes enclose.
+
+        u: displacements (n, 3) in mm.
+        """
         self._place(u)
         inputs = [self._x, self._lost_faces, *self._face_rule, self._lost_volume]
         wp.launch(kernels.enclosed_volume, len(self._beyond), inputs, device=self.device)

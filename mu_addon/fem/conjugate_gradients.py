@@ -32,14 +32,14 @@ STEP_SIZE = 4
 
 @attrs.frozen(eq=False)
 class Rows:
-    """A sparse matrix (n, n) by rows on a device."""
+    """A sparse matrix (n, n) by rows (CSR) on a device: offsets (n + 1,), columns and values (nnz,)."""
 
     offsets: wp.array
     columns: wp.array
     values: wp.array
 
     def multiply(self, x: wp.array, y: wp.array) -> None:
-        """y = A x for vectors (k, n)."""
+        """y = A x for k vectors on the device, x and y (k, n); y is overwritten."""
         k, n = x.shape
         width = next((w for w in WIDTHS if k <= w), WIDTHS[-1])
         inputs = [self.offsets, self.columns, self.values, x, y]
@@ -48,7 +48,7 @@ class Rows:
 
 @attrs.frozen(eq=False)
 class Change:
-    """What a variant adds to the tangent: `matrix` (c, c) on the free unknowns (c,)."""
+    """What a variant adds to the tangent: `matrix` (c, c) in N/mm on the free unknowns `unknowns` (c,)."""
 
     unknowns: Array
     matrix: sparse.csr_matrix
@@ -77,17 +77,21 @@ class Changes:
         self._scale = wp.array(np.sqrt(shared / changed), dtype=wp.float64, device=device)
 
     def add(self, x: wp.array, y: wp.array) -> None:
-        """y += change x for vectors (k, n)."""
+        """y += change x for k vectors on the device, (k, n), each with its own system's change."""
         wp.launch(kernels.add_changes, self._count, [*self._where, *self._entries, x, y], device=x.device)
 
     def scale(self, x: wp.array) -> None:
-        """Divide x (k, n), in place, by the root of what the changes do to the diagonal."""
+        """Multiply x (k, n), in place, by the root of the shared diagonal over the changed one."""
         wp.launch(kernels.scale_rows, self._count, [*self._where, self._scale, x], device=x.device)
 
 
 @attrs.frozen(eq=False)
 class Solution:
-    """Of k systems: x (k, n) on the device, which are solved (k,), and which showed no negative curvature."""
+    """Result of `conjugate_gradients` for k systems.
+
+    x (k, n): on the device; solved (k,) bool: residual within the tolerance; definite (k,) bool: no direction
+    of negative curvature was met; iterations: those made, the same for all.
+    """
 
     x: wp.array
     solved: Array
@@ -141,7 +145,9 @@ class ConjugateGradients:
     """Solves with a symmetric positive definite matrix of one pattern, as `factor.Cholesky` does.
 
     The preconditioner is a factorised sparse approximate inverse, by Warp (Kolotilina and Yeremin, SIAM
-    J. Matrix Anal. Appl. 14 (1993) 45). tolerance: residual over right-hand side of every solution.
+    J. Matrix Anal. Appl. 14 (1993) 45). indptr (n + 1,), indices (nnz,): the lower triangle by columns; order
+    (n,): in which the unknowns are kept on the device. tolerance: residual over right-hand side of every
+    solution.
     """
 
     # A residual below this share of a random right-hand side proves the matrix definite but for about
@@ -176,7 +182,10 @@ class ConjugateGradients:
         return wp.array(np.ascontiguousarray(a, kind), dtype=dtype, device=self.device)
 
     def factor(self, values: Array) -> ConjugateGradients:
-        """Take the values (nnz,) of the lower triangle by columns. Raises IndefiniteError."""
+        """Take the values (nnz,) of the lower triangle by columns, and make the preconditioner.
+
+        Raises IndefiniteError where the matrix is not proved positive definite.
+        """
         inputs = [self._number, self._put(values, wp.float64), self._rows.values]
         wp.launch(kernels.pick, len(self._number), inputs, device=self.device)
         self.diagonal = values[self._diagonal_at]
@@ -222,21 +231,28 @@ class ConjugateGradients:
             )
 
     def solve(self, b: Array) -> Array:
-        """Solve for one (n,) or several (n, k) right-hand sides. Raises ConvergenceError."""
+        """Solve for one (n,) or several (n, k) right-hand sides; the result has the same shape.
+
+        Raises ConvergenceError where one is not solved within the tolerance.
+        """
         x, solved = self.solve_changed(b.T.reshape(-1, self.size), None)
         if not solved.all():
             raise ConvergenceError(f"conjugate gradients stopped after {self.iterations} iterations")
         return x.reshape(b.T.shape).T
 
     def changes(self, changes: Sequence[Change]) -> Changes:
-        """Put what systems add to the matrix on the device."""
+        """Put what several systems add to the matrix on the device, for `solve_changed`; after `factor`."""
         place = np.empty(self.size, dtype=np.int64)
         place[self._order] = np.arange(self.size)
         turned = [attrs.evolve(c, unknowns=place[c.unknowns]) for c in changes]
         return Changes(turned, self.diagonal[self._order], self.device)
 
     def solve_changed(self, b: Array, changes: Changes | None) -> tuple[Array, Array]:
-        """Solutions (k, n) of k systems that each add a change to the matrix, and which are solved (k,)."""
+        """Solutions (k, n) of k systems with right-hand sides b (k, n), and which are solved, (k,) bool.
+
+        Each system is the matrix plus its own change, or the matrix alone where changes is None. `iterations`
+        then holds how many were needed.
+        """
         found = self._run(self._put(b[:, self._order], wp.float64), changes, self.tolerance)
         self.iterations = found.iterations
         solution = np.empty(b.shape)

@@ -40,7 +40,10 @@ class Critical:
 
 @attrs.frozen(eq=False)
 class Branch:
-    """Points of a branch in order from its start, the critical points passed, and why it ends."""
+    """Points of a branch in order from its start, the critical points passed, and why it ends.
+
+    ended: "pressure reached", "volume reached", "critical point" or "most points".
+    """
 
     points: tuple[Point, ...]
     criticals: tuple[Critical, ...]
@@ -48,17 +51,17 @@ class Branch:
 
     @property
     def pressure_MPa(self) -> Array:
-        """Pressure of every point, (k,)."""
+        """Pressure in MPa of every point, (k,)."""
         return np.array([p.state.pressure_MPa for p in self.points])
 
     @property
     def volume_mm3(self) -> Array:
-        """Cavity volume of every point, (k,)."""
+        """Cavity volume in mm3 of every point, (k,)."""
         return np.array([p.volume_mm3 for p in self.points])
 
     @property
     def negative(self) -> Array:
-        """Negative eigenvalues of the tangent at every point, (k,)."""
+        """Number of negative eigenvalues of the tangent at every point, (k,); 0 is stable."""
         return np.array([p.negative for p in self.points])
 
 

@@ -35,12 +35,15 @@ class Descent:
 
     @property
     def converged(self) -> bool:
-        """Whether the residual is within the tolerance."""
+        """Whether `residual` is within the settings' tolerance."""
         return self.level <= self.settings.tolerance * self.scale
 
     @property
     def residual(self) -> float:
-        """Residual over the root sum of squares of all element forces."""
+        """Norm of the out-of-balance forces over the root sum of squares of all element forces.
+
+        Forces on free unknowns only; 0 where there are no element forces.
+        """
         return self.level / self.scale if self.scale else 0.0
 
     def forget(self) -> None:
@@ -48,12 +51,19 @@ class Descent:
         self._secants = []
 
     def direction(self, solve: Callable[[Array], Array]) -> Array:
-        """Step (free unknowns) in mm with a solver of the factorised tangent."""
+        """BFGS step (f,) in mm of the f free unknowns.
+
+        solve: maps right-hand sides (f,) in N to solutions (f,) in mm with the factorised tangent.
+        """
         force, shares = self.pulled_back()
         return self.pushed_forward(solve(force), shares)
 
     def pulled_back(self) -> tuple[Array, list[float]]:
-        """The right-hand side of the factorised system, and the shares of each secant taken off it."""
+        """First half of the BFGS two-loop recursion (Nocedal 1980), newest step first.
+
+        Returns the right-hand side (f,) in N for the factorised tangent, and the coefficient of each earlier
+        step, for `pushed_forward`.
+        """
         force = self.force.copy()
         shares = []
         for s, y, r in reversed(self._secants):
@@ -62,16 +72,20 @@ class Descent:
         return force, shares
 
     def pushed_forward(self, solved: Array, shares: list[float]) -> Array:
-        """Step (free unknowns) in mm of the solution for `pulled_back`."""
+        """Second half of the recursion: the step (f,) in mm of the factorised tangent's solution (f,) in mm.
+
+        solved, shares: the solution for what `pulled_back` returned, and its coefficients.
+        """
         step = solved
         for (s, y, r), share in zip(self._secants, reversed(shares), strict=True):
             step = step + s * (share - r * float(y @ step))
         return -step
 
     def move(self, step: Array) -> float:
-        """Go along a step as far as it helps; returns the residual's new level over the old one.
+        """Go along a step (f,) in mm as far as it helps; returns the residual's new norm over the old one.
 
-        Raises ConvergenceError where no length lowers the energy.
+        The step is halved until the residual halves or the potential falls enough (Armijo). Raises
+        ConvergenceError where no length tried does either.
         """
         model, s = self.model, self.settings
         slope = float(self.force @ step)

@@ -45,7 +45,10 @@ def triangle_quadrature(order: int) -> tuple[Array, Array]:
 
 
 def triangle_shapes(order: int) -> tuple[Array, Array, Array]:
-    """Shape functions (q, n), their reference derivatives (q, n, 2) and weights (q,) of a face."""
+    """Shape functions (q, n), their reference derivatives (q, n, 2) and weights (q,) of a face.
+
+    n: 3 nodes for order 1, 6 for order 2; the q points are those of `triangle_quadrature`.
+    """
     points, weights = triangle_quadrature(order)
     return (
         *shapes(points, TRIANGLE_EDGES, order),
@@ -55,7 +58,10 @@ def triangle_shapes(order: int) -> tuple[Array, Array, Array]:
 
 @attrs.frozen(eq=False)
 class ReferenceGradients:
-    """Shape gradients by reference coordinates in mm, (m, q, n, 3), and volumes in mm3, (m, q)."""
+    """Shape functions' gradients (m, q, n, 3) in 1/mm by the undeformed place, and volumes (m, q) in mm3.
+
+    Of m elements with n nodes, at q quadrature points; a volume is that which its point stands for.
+    """
 
     gradients: Array
     volumes: Array
@@ -93,5 +99,8 @@ def shape_functions(barycentric: Array, order: int) -> Array:
 
 
 def shape_gradients(barycentric: Array, order: int) -> Array:
-    """Derivatives (q, n, 3) of a tetrahedron's shape functions by its reference coordinates."""
+    """Derivatives (q, n, 3) of a tetrahedron's shape functions by its three reference coordinates.
+
+    barycentric: points (q, 4); n: 4 nodes for order 1, 10 for order 2.
+    """
     return shapes(barycentric, TET_EDGES, order)[1]

@@ -23,7 +23,10 @@ def element_forces(model: Model, u: Array, m: MaterialData) -> Array:
 
 
 def element_stiffness(model: Model, u: Array, m: MaterialData, elements: Array) -> Array:
-    """Tangents (e, 3k, 3k) in N/mm of some elements (e,) by their nodes' displacements, at u (n, 3) in mm."""
+    """Tangents (e, 3k, 3k) in N/mm of some elements (e,), by the displacements of their k nodes.
+
+    u: displacements (n, 3) in mm, about which the tangent is taken, at no pressure.
+    """
     model.tangent(u, 0.0, m)
     k = model.mesh.tets.shape[1]
     rows, columns = np.triu_indices(k)
@@ -36,7 +39,10 @@ def element_stiffness(model: Model, u: Array, m: MaterialData, elements: Array) 
 
 
 def rotations(mesh: Mesh, u: Array, elements: Array) -> Array:
-    """Rotation (e, 3, 3) of each element's mean deformation gradient: its nearest orthogonal matrix."""
+    """Rotation (e, 3, 3) of each element's mean deformation gradient: the nearest orthogonal matrix.
+
+    u: displacements (n, 3) in mm; elements: numbers (e,). By singular value decomposition.
+    """
     reference = reference_gradients(mesh.nodes, mesh.tets[elements])
     share = reference.volumes / reference.volumes.sum(axis=1)[:, None]
     F = np.eye(3) + np.einsum("eai,eqaj,eq->eij", u[mesh.tets[elements]], reference.gradients, share)

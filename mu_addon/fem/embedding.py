@@ -33,7 +33,7 @@ class Embedding(Probe):
     mirrored: Array
 
     def displacement(self, u: Array) -> Array:
-        """Displacements (p, 3) in mm of the points, of nodal displacements (n, 3)."""
+        """Displacements (p, 3) in mm of the points, of nodal displacements u (n, 3) in mm."""
         found = super().displacement(u)
         found[self.mirrored, 0] *= -1.0
         return found
@@ -44,7 +44,7 @@ def embed(mesh: Mesh, points: Array) -> Embedding:
 
     Inside the mesh a point moves by the shape functions of its element. Outside, the displacement of the
     nearest surface point is continued linearly with its gradient; points beyond the fixed base stand still
-    as it does.
+    as it does. Points across the mirror plane x = 0 of a half mesh move as their images do.
     """
     points = np.asarray(points, float)
     mirrored = np.zeros(len(points), bool)

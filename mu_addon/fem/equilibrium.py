@@ -101,10 +101,11 @@ class Equilibrium:
         )
 
     def newton(self, u: Array, pressure: float, reach_mm: float = np.inf) -> State:
-        """Stable equilibrium at a pressure in MPa, from a start (n, 3) that obeys the supports.
+        """Stable equilibrium at a pressure in MPa, from a start (n, 3) in mm that obeys the supports.
 
         With friction, one whose bound belongs to it. Raises ConvergenceError where elements invert, progress
-        stops, the equilibrium found is unstable, or it lies farther from the start than `reach_mm`.
+        stops, the equilibrium found is unstable, or a component of the displacement differs from the start's
+        by more than `reach_mm`.
         """
         obstacles, state = self.model.obstacles, State(pressure, u)
         for obstacle in obstacles:
@@ -204,7 +205,10 @@ class Equilibrium:
         start: State,
         on_state: Callable[[State], None] | None = None,
     ) -> list[State]:
-        """States at the given pressures, visited in order from a converged start; see `reach`."""
+        """States at the given pressures in MPa, visited in order from a converged start.
+
+        on_state: called with each state as it is found. Raises ConvergenceError as `reach`.
+        """
         found = [start]
         for target in pressures_MPa:
             found.append(self.reach(target, found))

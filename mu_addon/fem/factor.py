@@ -48,7 +48,11 @@ def _minimum_degree(graph: sparse.csr_matrix) -> Array:
 
 
 class Cholesky:
-    """Cholesky factor of a symmetric positive definite matrix whose lower triangle keeps one pattern."""
+    """Cholesky factor, by CHOLMOD, of symmetric positive definite matrices of one pattern.
+
+    indptr (n + 1,), indices (nnz,): the lower triangle by columns; order (n,): a fill-reducing permutation.
+    Raises ImportError where cvxopt is missing.
+    """
 
     def __init__(self, indptr: Array, indices: Array, order: Array) -> None:
         # Read when cvxopt loads its own OpenBLAS. Its threads spin while they wait for each other on
@@ -75,7 +79,10 @@ class Cholesky:
             del cholmod.options["nmethods"]
 
     def factor(self, values: Array) -> Cholesky:
-        """Factorise for the values (nnz,) of the lower triangle by columns. Raises IndefiniteError."""
+        """Factorise for the values (nnz,) of the lower triangle by columns, in the pattern's order.
+
+        Returns itself. Raises IndefiniteError where the matrix is not positive definite.
+        """
         from cvxopt import cholmod, matrix
 
         self._matrix.V = matrix(values)
@@ -86,7 +93,7 @@ class Cholesky:
         return self
 
     def solve(self, b: Array) -> Array:
-        """Solve for one (n,) or several (n, k) right-hand sides."""
+        """Solve for one (n,) or several (n, k) right-hand sides; the result has the same shape."""
         from cvxopt import cholmod, matrix
 
         x = matrix(np.asfortranarray(b if b.ndim == 2 else b[:, None]))
@@ -94,7 +101,7 @@ class Cholesky:
         return np.array(x).reshape(b.shape) if b.ndim == 1 else np.array(x)
 
     def lower(self) -> Lower:
-        """Hand over the factor; it must be made anew before `solve` is called again."""
+        """The factor L with its order, as `Lower`; `factor` must be called again before `solve`."""
         from cvxopt import cholmod, matrix
 
         places = matrix(np.arange(self.size, dtype=float))
@@ -109,7 +116,7 @@ class Cholesky:
 
 
 class SuperLU:
-    """LU of the same matrix by scipy: several times slower, always installed."""
+    """LU of the same matrix by scipy, with the same arguments: several times slower, always installed."""
 
     def __init__(self, indptr: Array, indices: Array, order: Array) -> None:
         self._indptr, self._indices = indptr, indices
@@ -117,7 +124,10 @@ class SuperLU:
         self.size = len(indptr) - 1
 
     def factor(self, values: Array) -> SuperLU:
-        """Factorise for the values (nnz,) of the lower triangle by columns. Raises IndefiniteError."""
+        """Factorise for the values (nnz,) of the lower triangle by columns, in the pattern's order.
+
+        Returns itself. Raises IndefiniteError where the matrix is singular or a pivot is not positive.
+        """
         from scipy.sparse.linalg import splu
 
         lower = sparse.csc_matrix((values, self._indices, self._indptr), shape=(self.size, self.size))
@@ -133,13 +143,13 @@ class SuperLU:
         return self
 
     def solve(self, b: Array) -> Array:
-        """Solve for one (n,) or several (n, k) right-hand sides."""
+        """Solve for one (n,) or several (n, k) right-hand sides; the result has the same shape."""
         x = np.empty_like(b)
         x[self._order] = self._lu.solve(np.ascontiguousarray(b[self._order]))
         return x
 
     def lower(self) -> Lower:
-        """The Cholesky factor that the LU of a symmetric matrix holds."""
+        """The Cholesky factor L with its order, from the LU of a symmetric matrix: L sqrt(diag U)."""
         order = np.empty(self.size, dtype=np.int64)
         order[self._lu.perm_r] = self._order
         scaled = sparse.csc_matrix(self._lu.L @ sparse.diags(np.sqrt(self._lu.U.diagonal())))
@@ -164,7 +174,10 @@ class LDL:
         self.negative = 0
 
     def factor(self, values: Array) -> LDL:
-        """Factorise for the values (nnz,) of the lower triangle by columns. Raises ArithmeticError."""
+        """Factorise for the values (nnz,) of the lower triangle by columns, and count `negative` eigenvalues.
+
+        Raises ArithmeticError where a pivot vanishes.
+        """
         from scipy.sparse.linalg import splu
 
         lower = sparse.csc_matrix((values, self._indices, self._indptr), shape=(self.size, self.size))
@@ -184,7 +197,7 @@ class LDL:
         return self
 
     def solve(self, b: Array) -> Array:
-        """Solve for one (n,) or several (n, k) right-hand sides."""
+        """Solve for one (n,) or several (n, k) right-hand sides, refined up to `refinements` times."""
         b = np.ascontiguousarray(b[self._order])
         y = self._lu.solve(b)
         for _ in range(self.refinements):
@@ -198,7 +211,11 @@ class LDL:
 
 
 def make_factor(indptr: Array, indices: Array, order: Array) -> Cholesky | SuperLU:
-    """The best factorisation installed here."""
+    """The fastest factorisation installed: `Cholesky`, or `SuperLU` where cvxopt is missing.
+
+    indptr (n + 1,), indices (nnz,): lower triangle of the (n, n) matrix by columns; order (n,): permutation
+    that reduces fill.
+    """
     try:
         return Cholesky(indptr, indices, order)
     except ImportError:

@@ -55,7 +55,11 @@ def met(before: Array, gap: Array) -> Array:
 
 
 def slip(memory: Memory, lag: Lag, place: Array) -> Array:
-    """Slip (f, q, 3) in mm in the lagged tangent plane, had nothing slid since the last committed state."""
+    """Slip (f, q, 3) in mm in the lagged tangent plane, had nothing slid since the last committed state.
+
+    place (f, q, 3) in mm: where the points are, in the obstacle's frame. The elastic slip remembered, plus
+    the share of the way that was in contact, less its part along the lagged normal.
+    """
     e: Array = memory.slip + lag.counts[..., None] * (place - memory.place)
     return np.asarray(e - (e * lag.normal).sum(axis=-1, keepdims=True) * lag.normal)
 
@@ -73,19 +77,29 @@ def energy(e: Array, bound: Array, stiffness: float) -> Array:
 
 
 def traction(e: Array, bound: Array, stiffness: float) -> Array:
-    """Traction (..., 3) in MPa along slip e (..., 3) in mm: stiffness times slip, up to the bound (...)."""
+    """Traction (..., 3) in MPa along slip e (..., 3) in mm: stiffness times slip, up to the bound (...).
+
+    bound in MPa, stiffness in MPa/mm.
+    """
     return stiffness * kept(e, bound, stiffness)[..., None] * e
 
 
 def kept(e: Array, bound: Array, stiffness: float) -> Array:
-    """Share (...) of slip e that is elastic: 1 where it sticks, 0 without pressure."""
+    """Share (...) of slip e (..., 3) in mm that is elastic: 1 where it sticks, 0 without pressure.
+
+    bound (...) of the traction in MPa, stiffness in MPa/mm; beyond a slip of bound/stiffness it slides.
+    """
     size = np.linalg.norm(e, axis=-1)
     least = bound / stiffness
     return np.where(size > least, least / np.maximum(size, 1e-300), np.where(bound > 0, 1.0, 0.0))
 
 
 def tangent(e: Array, bound: Array, stiffness: float, normal: Array) -> Array:
-    """Derivative (..., 3, 3) of `traction` by slip within the plane across `normal` (..., 3), in MPa/mm."""
+    """Derivative (..., 3, 3) in MPa/mm of `traction` by slip within the plane across `normal` (..., 3).
+
+    e (..., 3) in mm, bound (...) in MPa, stiffness in MPa/mm. Symmetric: where the point slides only a turn
+    of its direction is resisted.
+    """
     size = np.linalg.norm(e, axis=-1)
     along = e / np.maximum(size, 1e-300)[..., None]
     plane = np.eye(3) - normal[..., :, None] * normal[..., None, :]

@@ -45,14 +45,18 @@ class Inertia:
         return LDL(pattern.indptr, pattern.indices, pattern.order)
 
     def suspect(self, mode: Array) -> None:
-        """Tell a mode (free unknowns) that may be lost next: its springs are tried before an L D L^T."""
+        """Name a displacement (free unknowns,) that may become unstable next.
+
+        The next `factor` tries springs on the unknowns that move most in it before it falls back on an
+        L D L^T.
+        """
         self._suspect = mode
 
     def factor(self, values: Array, thorough: bool = True) -> Inertia:
-        """Factorise a tangent, (nnz,) as the model makes it.
+        """Factorise a tangent's values (nnz,), in N/mm, as `Model.tangent` gives them, and count `negative`.
 
-        Raises IndefiniteError where that would take an L D L^T and it is not to be `thorough`, and
-        ArithmeticError where it is singular.
+        thorough: whether an L D L^T may be made where all else fails. Raises IndefiniteError where it is
+        needed and not allowed, and ArithmeticError where the tangent is singular.
         """
         if self.negative == 0 and self._factor_definite(values):
             return self
@@ -111,7 +115,7 @@ class Inertia:
         return np.unique(np.array(chosen, int))
 
     def solve(self, b: Array) -> Array:
-        """Solve for one (n,) or several (n, k) right-hand sides with the last tangent."""
+        """Solve for one (n,) or several (n, k) right-hand sides with the last tangent; the same shape."""
         x = self._engine.solve(b)
         if self._release is not None:
             moved, small = self._release

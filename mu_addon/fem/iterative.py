@@ -17,9 +17,10 @@ Array = np.ndarray[Any, Any]
 
 
 def interpolation(mesh: Mesh, free: Array) -> tuple[sparse.csr_matrix, Array]:
-    """Free unknowns of a quadratic mesh from those of its corners, and each corner unknown's corner (c,).
+    """Linear interpolation (f, c) from the c free corner unknowns of a quadratic mesh to its f free unknowns.
 
-    free: numbers of the free components among the (3n,) of all nodes.
+    A corner keeps its value, a mid-edge node gets the mean of its edge's ends. free (f,): numbers of the free
+    components among the 3n of all nodes. Also returned: each corner unknown's corner (c,).
     """
     n = len(mesh.nodes)
     corner = np.unique(mesh.corners)
@@ -214,7 +215,11 @@ class TwoLevel:
         raise ConvergenceError(f"conjugate gradients stopped after {self.max_iterations} iterations")
 
     def solve(self, b: Array) -> Array:
-        """Solve for one (n,) or several (n, k) right-hand sides. Raises IndefiniteError, ConvergenceError."""
+        """Solve for one (n,) or several (n, k) right-hand sides; the result has the same shape.
+
+        Raises IndefiniteError where a direction has negative curvature, and ConvergenceError after
+        `max_iterations`.
+        """
         if b.ndim == 1:
             return self._conjugate_gradients(b, self.tolerance)
         return np.stack([self._conjugate_gradients(c, self.tolerance) for c in b.T], axis=1)

@@ -78,7 +78,10 @@ def mean_dilatation(
 
 @attrs.frozen
 class LawKernels:
-    """The element kernels of one material law; `advance` is None where it keeps no history."""
+    """The element kernels of one material law: energy, force, stiffness, and advance of its history.
+
+    `advance` is None where the law keeps none.
+    """
 
     energy: Any
     force: Any

@@ -16,9 +16,9 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen(eq=False)
 class Probe:
-    """Points of a mesh, read in any of its states: nodes (p, n) of their elements, shape functions (p, n).
+    """Points of a mesh, read in any of its states.
 
-    `displacement(u)` gives (p, 3) in mm from nodal displacements (n, 3).
+    nodes (p, n): of the element that each point lies in; weights (p, n): the element's shape functions there.
     """
 
     nodes: Array
@@ -93,7 +93,7 @@ class TipSection:
 
     @classmethod
     def of(cls, mesh: Mesh) -> TipSection:
-        """The end plane at the height of the mesh's `tip` nodes."""
+        """The end plane of a mesh, at the height of its first `tip` node."""
         nodes, area = _tip_areas(mesh)
         return cls(nodes, mesh.nodes[nodes, 1:], area)
 

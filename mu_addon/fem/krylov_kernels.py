@@ -10,7 +10,10 @@ f64 = wp.float64
 
 @cache
 def product_kernel(width: int) -> Any:
-    """y = A x of `width` systems a thread, which reads a matrix row once for all of them."""
+    """Warp kernel of y = A x of a sparse matrix for `width` systems a thread.
+
+    A matrix row is read once for all of them.
+    """
     vector = wp.types.vector(length=width, dtype=f64)
 
     @wp.kernel(module="unique")

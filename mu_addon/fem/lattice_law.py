@@ -38,7 +38,7 @@ class LatticeLaw:
         self.fill(np.zeros(1, int))
 
     def fill(self, elements: Array) -> tuple[Layer, ...]:
-        """Layers of a body's materials with these laws in some elements (k,)."""
+        """Layers of a body's materials with these laws in some elements (k,), the same parameters in each."""
         return tuple(Layer(law, elements, np.tile(row, (len(elements), 1))) for law, row in self.layers)
 
     def hash(self) -> str:

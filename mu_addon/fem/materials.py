@@ -51,7 +51,7 @@ class Layer:
         self.law.valid(self.parameters)
 
     def kept(self, rows: Array, weight: Array) -> Layer:
-        """The rows (r,) of this layer, under new weights (r,)."""
+        """The rows numbered `rows` (r,) of this layer, with new weights (r,) from 0 to 1."""
         return Layer(self.law, self.elements[rows], self.parameters[rows], weight)
 
 
@@ -73,14 +73,19 @@ class Materials:
 
     @classmethod
     def neo_hooke(cls, modulus_MPa: Array, poisson: Array) -> Materials:
-        """Neo-Hookean material in every element, of small-strain Young's moduli and Poisson's ratios (m,)."""
+        """Neo-Hookean material in every element, of Young's moduli (m,) in MPa and Poisson's ratios (m,).
+
+        Both are of small strain. Raises InputError where a modulus is not positive or a ratio not between -1
+        and 0.5.
+        """
         parameters = NeoHooke.parameters(modulus_MPa, poisson)
         return cls((Layer(NeoHooke, np.arange(len(parameters)), parameters),))
 
     def blended(self, share: Array, law: Any, parameters: Array) -> Materials:
         """These materials with another law in a share (m,) of every element, and as much less of themselves.
 
-        parameters: (m, count) or one row for all. Elements of which a layer keeps nothing leave it.
+        parameters: (m, count) or one row for all. Elements of which a layer keeps nothing leave it. Raises
+        InputError for a share outside 0 to 1, or parameters that the law does not admit.
         """
         share = np.asarray(share, float)
         if not ((share >= 0) & (share <= 1)).all():
@@ -99,7 +104,11 @@ class Materials:
         return Materials(tuple(layers))
 
     def small_strain(self, count: int) -> tuple[Array, Array]:
-        """Young's modulus in MPa and Poisson's ratio, (m,) each, of a body of `count` isotropic elements."""
+        """Young's modulus (m,) in MPa and Poisson's ratio (m,) of a body of `count` elements at small strain.
+
+        Of the sum of the layers' shear and bulk moduli by their weights; laws that depend on direction count
+        with their mean over directions.
+        """
         moduli = np.zeros((count, 2))
         for layer in self.layers:
             moduli[layer.elements] += layer.weight[:, None] * layer.law.small_strain(layer.parameters)

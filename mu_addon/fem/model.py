@@ -38,7 +38,12 @@ POINTWISE_BULK = 5.0
 
 @attrs.frozen(eq=False)
 class LayerData:
-    """A layer of materials on the device: its kernels, rows and weights, and history (k, q, h)."""
+    """A layer of materials on the device: kernels of its law, and arrays by its k elements.
+
+    rows (k, count): parameters; mean_kappa (k,): bulk modulus in MPa that acts on the mean J; history
+    (k, q, h): numbers at the q quadrature points; weight (k,): share of volume; adds (k,): 1 where an earlier
+    layer covers the element.
+    """
 
     kernels: kernels.LawKernels
     elements: wp.array
@@ -71,13 +76,13 @@ class MaterialData:
         return tuple(layer.history.numpy().copy() for layer in self.layers if layer.history.shape[2])
 
     def restore(self, kept: Sequence[Array]) -> None:
-        """Take the laws back to what `kept` gave."""
+        """Set each law's history (k, q, h) to what `kept` returned, in the same order."""
         remembering = [layer.history for layer in self.layers if layer.history.shape[2]]
         for history, values in zip(remembering, kept, strict=True):
             history.assign(np.ascontiguousarray(values))
 
     def forget(self) -> None:
-        """Take the materials back to the start, without history."""
+        """Set every law's history, and the step's length, to 0."""
         self.dt_s = 0.0
         for layer in self.layers:
             layer.history.zero_()
@@ -85,7 +90,10 @@ class MaterialData:
 
 @attrs.frozen(eq=False)
 class Pattern:
-    """Sparsity of the tangent between free unknowns: its lower triangle by columns, and an order."""
+    """Sparsity of the tangent between the f free unknowns.
+
+    indptr (f + 1,), indices (nnz,): its lower triangle by columns; order (f,): a fill-reducing permutation.
+    """
 
     indptr: Array
     indices: Array
@@ -230,7 +238,11 @@ class Model:
         return make_factor(indptr, indices, order)
 
     def parameters(self, materials: Materials) -> MaterialData:
-        """A body's materials on the device, without history; raises InputError where an element has none."""
+        """A body's materials on the device, without history.
+
+        Raises InputError where an element has none, or where with mean_dilatation a law does not split the
+        volume off.
+        """
         covered = np.zeros(len(self.mesh.tets), dtype=np.int32)
         stiffness = np.zeros(len(self.mesh.tets))
         points = self._dV.shape[1]
@@ -275,7 +287,10 @@ class Model:
         return np.maximum(kappa - POINTWISE_BULK * mu, 0.0)
 
     def commit(self, u: Array, m: MaterialData) -> None:
-        """Make a converged state, `m.dt_s` after the one before, part of what materials and contacts know."""
+        """Make the converged state u (n, 3) in mm the one that materials and contacts remember.
+
+        It lies `m.dt_s` seconds after the one remembered before.
+        """
         for obstacle in self.obstacles:
             obstacle.commit(u)
         self._place(u)
@@ -286,7 +301,7 @@ class Model:
                 self._launch(layer.kernels.advance, len(layer.elements), inputs)
 
     def forget(self, time_s: float, m: MaterialData) -> None:
-        """Take materials and contacts back to rest without history, obstacles to where they are then."""
+        """Clear the history of materials and contacts, and move obstacles with a path to a time in s."""
         m.forget()
         self.move_obstacles(time_s)
         for obstacle in self.obstacles:
@@ -303,7 +318,7 @@ class Model:
         return any(obstacle.friction for obstacle in self.obstacles)
 
     def deepest_mm(self, u: Array) -> float:
-        """How deep the body is in an obstacle at most, in mm."""
+        """Largest depth in mm of the surface inside any obstacle at u (n, 3) in mm, 0 without contact."""
         return max((obstacle.deepest_mm(u) for obstacle in self.obstacles), default=0.0)
 
     def _launch_layers(self, kind: str, m: MaterialData, outputs: list[Any]) -> None:
@@ -336,7 +351,10 @@ class Model:
         self._x.assign(self.mesh.nodes + u)
 
     def potential(self, u: Array, pressure: float, m: MaterialData) -> float:
-        """Strain energy minus the work of pressure and load, in mJ; infinite where J <= 0."""
+        """Potential in mJ at u (n, 3) in mm and pressure in MPa; infinite where J <= 0 at a quadrature point.
+
+        Strain energy and contact energy, minus pressure times cavity volume and the work of `load`.
+        """
         self._place(u)
         self._launch_layers("energy", m, [self._energy, self._smallest_J])
         if self._smallest_J.numpy().min() <= 0:
@@ -355,18 +373,21 @@ class Model:
         return float(self._face_volume.numpy().sum())
 
     def cavity_volume(self, u: Array) -> float:
-        """Volume in mm3 that the deformed cavity surface and the mirror planes enclose."""
+        """Volume in mm3 that the cavity surface displaced by u (n, 3) in mm and the mirror planes enclose."""
         self._place(u)
         return self._volume()
 
     def smallest_jacobian(self, u: Array, m: MaterialData) -> tuple[float, int]:
-        """The smallest det F at any quadrature point, and its element."""
+        """The smallest det F at any quadrature point at u (n, 3) in mm, and the number of its element."""
         self.potential(u, 0.0, m)
         values = self._smallest_J.numpy()
         return float(values.min()), int(values.argmin())
 
     def residual(self, u: Array, pressure: float, m: MaterialData) -> Array:
-        """Internal minus external forces in N, (n, 3), supports included."""
+        """Internal minus external forces (n, 3) in N at u (n, 3) in mm and pressure in MPa.
+
+        Rows of supported unknowns hold the reactions.
+        """
         self._place(u)
         self._least_force = m.least_force_N
         self._launch_layers("force", m, [self._mean_slope, self._element_force])
@@ -389,7 +410,10 @@ class Model:
         return max(float(np.sqrt(np.einsum("ij,ij->", parts, parts))), self._least_force)
 
     def tangent(self, u: Array, pressure: float, m: MaterialData) -> Array:
-        """Values (nnz,) of the tangent's lower triangle by columns, in N/mm, as in `pattern`."""
+        """Values (nnz,) in N/mm of the tangent's lower triangle by columns, as in `pattern`.
+
+        u: (n, 3) in mm; pressure in MPa, whose follower stiffness is included, as is that of contact.
+        """
         self._place(u)
         self._launch_layers("stiffness", m, [self._mean_slope, self._block_parts])
         if len(self.mesh.cavity):
@@ -411,7 +435,10 @@ class Model:
         return np.asarray(blocks.ravel()[self._scalar_map])
 
     def matrix(self, values: Array) -> sparse.csc_matrix:
-        """The whole symmetric tangent between free unknowns, of its lower triangle's values."""
+        """The whole symmetric tangent (f, f) between the f free unknowns.
+
+        values (nnz,): of its lower triangle by columns, as `tangent` gives them.
+        """
         size = (len(self.free), len(self.free))
         lower = sparse.csc_matrix((values, self.pattern.indices, self.pattern.indptr), shape=size)
         return lower + sparse.tril(lower, -1).T

@@ -10,7 +10,7 @@ class NewtonSettings:
     """Tolerances and limits of Newton's method; a state converges where the residual is below `tolerance`.
 
     Residuals are relative to the root sum of squares of all element forces. Load steps in MPa lie between
-    min_step_MPa and max_step_MPa.
+    min_step_MPa and max_step_MPa. The other numbers are counts and ratios, as the comments say.
     """
 
     tolerance: float = 1e-9  # residual over the root sum of squares of all element forces

@@ -46,7 +46,7 @@ class Contact:
 
     @property
     def force_N(self) -> Array:
-        """Both forces together, (3,)."""
+        """Normal and tangential force together, (3,) in N."""
         return np.asarray(self.normal_N + self.tangential_N)
 
 
@@ -113,24 +113,29 @@ class Obstacle:
         self.begin()
 
     def move(self, time_s: float) -> None:
-        """Go to where `path` has the obstacle, if it has one."""
+        """Set `pose` to what `path` gives for a time in s; without a path nothing happens."""
         if self.path is not None:
             self.pose = self.path(time_s)
 
     def begin(self, u: Array | None = None) -> None:
-        """Forget what was: the body comes to displacement (n, 3), else to rest, without any slip there."""
+        """Start friction's memory anew at displacement u (n, 3) in mm, else at rest, without any slip."""
         if not self.friction:
             return
         y, g, n, _ = self._points(np.zeros_like(self._rest) if u is None else u)
         self.recall(Memory(y, g, n, self._pressure(g)[0], np.zeros_like(y), np.zeros_like(g)))
 
     def recall(self, memory: Memory) -> None:
-        """Take a committed state's memory for the last one."""
+        """Set the memory of friction to that of a committed state, and its lag with it."""
         self.memory = memory
         self.lag_from_memory()
 
     def kept(self) -> dict[str, Array]:
-        """What the memory has beyond the displacement it was committed with, as arrays to store."""
+        """Friction's memory as arrays to store, of the j points with pressure or slid length.
+
+        point (j,): their numbers among the f q; normal (j, 3); pressure (j,) in MPa; slip (j, 3) and slid
+        (j,) in mm; lost_mJ: a scalar. The rest follows from the displacement, see `restore`. Empty without
+        friction.
+        """
         if not self.friction:
             return {}
         m = self.memory
@@ -140,7 +145,10 @@ class Obstacle:
         return {"point": at, "lost_mJ": np.array(m.lost_mJ), **found}
 
     def restore(self, u: Array, kept: dict[str, Array]) -> None:
-        """The memory as it was when `kept` was stored and displacement u (n, 3) the last committed one."""
+        """Set the memory to what it was when `kept` was stored.
+
+        u (n, 3) in mm: displacement that was the last committed one then. Nothing happens without friction.
+        """
         if not self.friction:
             return
         y, g, n, _ = self._points(u)
@@ -150,13 +158,16 @@ class Obstacle:
         self.recall(Memory(y, g, n, pressure, slip, slid, float(kept["lost_mJ"])))
 
     def lag_from_memory(self) -> None:
-        """Let friction's bound be the last committed state's."""
+        """Take pressure and normal that bound friction from the last committed state."""
         if self.friction:
             m = self.memory
             self.lag = Lag(m.pressure, m.normal, np.ones_like(m.pressure))
 
     def lag_change(self, u: Array) -> float:
-        """How much friction at displacement u would change with the lag, as a share of its bound."""
+        """Change of friction's forces if the lag followed to u (n, 3) in mm, over the sum of their bounds.
+
+        0 without friction.
+        """
         if not self.friction:
             return 0.0
         face = self._near(u)
@@ -169,7 +180,7 @@ class Obstacle:
         return change / most if most else float(change > 0)
 
     def update_lag(self, u: Array) -> None:
-        """Let the lag follow to displacement u (n, 3)."""
+        """Let pressure and normal that bound friction follow to displacement u (n, 3) in mm."""
         if not self.friction:
             return
         face, m = self._near(u), self.memory
@@ -180,7 +191,11 @@ class Obstacle:
         self.lag.counts[face] = new.counts
 
     def commit(self, u: Array) -> None:
-        """Make a converged state part of the memory: what is beyond the bound has slid."""
+        """Make a converged state u (n, 3) in mm part of the memory.
+
+        Slip beyond the bound is added to `slid`, and its work, by the mean of friction at both ends of the
+        step, to `lost_mJ`. Points that no longer touch lose their elastic slip.
+        """
         if not self.friction:
             return
         y, g, _, _ = self._points(u)
@@ -207,7 +222,7 @@ class Obstacle:
         )
 
     def energy_mJ(self, u: Array) -> float:
-        """Energy stored in the contact at displacement (n, 3) in mm, with what sliding costs in this step."""
+        """Energy in mJ stored in the contact at u (n, 3) in mm, with what sliding costs in this step."""
         face = self._near(u)
         y, g, _, _ = self._points(u, face)
         s = np.maximum(-g, 0.0)
@@ -220,7 +235,10 @@ class Obstacle:
         return float((self._area[face] * density).sum())
 
     def forces(self, u: Array) -> tuple[Array, Array]:
-        """Nodes (j,) of faces in contact, and the energy's derivative by their displacement (j, 3) in N."""
+        """Nodes (j,) of the faces in contact, and the contact energy's derivative by them, (j, 3) in N.
+
+        u: displacements (n, 3) in mm. A node is listed once for every face that it belongs to.
+        """
         face, y, g, n, _ = self._contact_candidates(u)
         at_points = -self._pressure(g)[0][..., None] * n
         if self.friction:
@@ -230,7 +248,10 @@ class Obstacle:
         return self.faces[face].ravel(), of_nodes.reshape(-1, 3)
 
     def blocks(self, u: Array) -> tuple[Array, Array]:
-        """Second derivative of the energy: pairs (j, 2) of nodes of one face, each once, blocks (j, 3, 3)."""
+        """Second derivative in N/mm of the contact energy at u (n, 3) in mm.
+
+        Returns pairs (j, 2) of nodes of one face, each once, and their blocks (j, 3, 3).
+        """
         face, y, g, n, h = self._contact_candidates(u)
         pressure, slope = self._pressure(g)
         at_points = slope[..., None, None] * n[..., :, None] * n[..., None, :] - pressure[..., None, None] * h
@@ -249,7 +270,11 @@ class Obstacle:
         return pairs.reshape(-1, 2), blocks.reshape(-1, 3, 3)
 
     def contact(self, u: Array) -> Contact:
-        """What a state's contact is; with friction, of the last committed one or one found since."""
+        """Forces, area and depth of the contact at displacement u (n, 3) in mm.
+
+        With friction u must be the last committed state or one found since: slid length and lost work are
+        those of the last commit.
+        """
         face = self._near(u)
         y, g, n, _ = self._points(u, face)
         area, pressure = self._area[face], self._pressure(g)[0]
@@ -276,28 +301,40 @@ class Obstacle:
         )
 
     def force_N(self, u: Array) -> Array:
-        """Force (3,) of the meshed body on the obstacle; of a half mesh, of that half."""
+        """Force (3,) in N of the meshed body on the obstacle, at u (n, 3) in mm; of a half mesh its half."""
         _, forces = self.forces(u)
         return np.asarray(forces.sum(axis=0))
 
     def places(self, u: Array) -> Array:
-        """The surface's points (f, q, 3) that may touch, in mm."""
+        """Places (f, q, 3) in mm of the surface's points that may touch, at displacement u (n, 3) in mm."""
         return np.asarray(np.einsum("qa,fai->fqi", self._shape, (self._rest + u)[self.faces]))
 
     def gap_mm(self, u: Array) -> float:
-        """Least distance of the surface's points from the obstacle, negative where they touch."""
+        """Least distance in mm of the surface's points from the obstacle, negative where they touch.
+
+        u: displacements (n, 3) in mm.
+        """
         return float(self._points(u)[1].min())
 
     def deepest_mm(self, u: Array) -> float:
-        """How deep the surface is in the obstacle at most: the error of the gap."""
+        """Largest depth in mm of the surface in the obstacle, 0 without contact: the gap error.
+
+        u: displacements (n, 3) in mm.
+        """
         return max(0.0, -float(self._points(u, self._near(u))[1].min(initial=np.inf)))
 
     def deepest_place(self, u: Array) -> Array:
-        """Place (3,) in mm of the surface's point that is deepest in the obstacle, or nearest to it."""
+        """Place (3,) in mm, deformed, of the surface's point deepest in the obstacle, or nearest to it.
+
+        u: displacements (n, 3) in mm.
+        """
         return np.asarray(self.places(u).reshape(-1, 3)[self._points(u)[1].argmin()])
 
     def pressures_MPa(self, u: Array) -> tuple[Array, Array]:
-        """Places (k, 3) in mm of the surface's points in contact, and the pressure (k,) on each."""
+        """Places (k, 3) in mm of the points in contact, deformed, and the pressure (k,) in MPa on each.
+
+        u: displacements (n, 3) in mm.
+        """
         face = self._near(u)
         pressure = self._pressure(self._points(u, face)[1])[0]
         on = pressure > 0
@@ -373,7 +410,11 @@ def _subdivided(points: Array, weight: Array, halvings: int) -> tuple[Array, Arr
 
 
 def outer_faces(mesh: Mesh) -> Array:
-    """Faces (f, 3 | 6) of a mesh that something outside can touch: neither cavity, base nor mirror plane."""
+    """Faces (f, 3 | 6), as node numbers, of a mesh that something outside can touch.
+
+    These are the boundary faces that belong to neither cavity, base nor a mirror plane; they have six nodes
+    where the mesh is quadratic.
+    """
     faces, owner = boundary_faces(mesh.tets)
     cavity = {tuple(f) for f in np.sort(mesh.cavity_corners, axis=1).tolist()}
     keep = np.array([tuple(f) not in cavity for f in np.sort(faces, axis=1).tolist()])

@@ -15,7 +15,10 @@ Array = np.ndarray[Any, Any]
 
 
 class Point(NamedTuple):
-    """Energy (n,) in MPa, first Piola-Kirchhoff stress (n, 3, 3) in MPa and dP/dF (n, 9, 9)."""
+    """Energy (n,) in MPa, first Piola-Kirchhoff stress P (n, 3, 3) in MPa and dP/dF (n, 9, 9) in MPa.
+
+    Rows and columns of dP/dF are numbered 3 i + J.
+    """
 
     energy: Array
     stress: Array
@@ -34,7 +37,7 @@ def evaluate(law: Any, F: Array, rows: Array) -> Point:
 
 
 def stress(law: Any, F: Array, rows: Array) -> Array:
-    """First Piola-Kirchhoff stress (n, 3, 3) in MPa alone, as `evaluate` has it."""
+    """First Piola-Kirchhoff stress (n, 3, 3) in MPa alone; law, F and rows as in `evaluate`."""
     inputs, n, count = _inputs(F, rows)
     P = wp.zeros(n, dtype=mat33, device="cpu")
     wp.launch(_stress_kernel(law, count), n, [*inputs, P], device="cpu")

@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
+from ..reading import file_text
 
 Array = np.ndarray[Any, Any]
 
@@ -30,7 +31,7 @@ class Protocol:
     pressure_kPa: Array
 
     def sample(self, count: int) -> tuple[Array, Array]:
-        """Time in s and pressure in kPa at `count` uniformly spaced instants, ends included."""
+        """Time (count,) in s and pressure (count,) in kPa at uniformly spaced instants, ends included."""
         time = np.linspace(self.time_s[0], self.time_s[-1], count)
         # Rounded, so that the same pressure met twice is recognised as one equilibrium.
         return time, np.round(np.interp(time, self.time_s, self.pressure_kPa), 9)
@@ -43,7 +44,7 @@ def read_protocol(path: Path) -> Protocol:
     finite number, time does not increase, or the protocol does not start at atmospheric pressure.
     """
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = file_text(path).splitlines()
     except OSError as error:
         raise InputError(f"cannot read the protocol: {error.strerror}", str(path), "check the path") from None
     except UnicodeDecodeError:

@@ -20,7 +20,10 @@ class Rigid(Protocol):
     """A rigid body in its own frame: a signed distance and its first two derivatives."""
 
     def distance(self, x: Array) -> tuple[Array, Array, Array]:
-        """Distance (k,) of points (k, 3), negative inside, its gradient (k, 3) and its bend (k, 3, 3)."""
+        """Signed distance (k,) in mm of points (k, 3) in mm, negative inside, and its derivatives.
+
+        Also returned: gradient (k, 3), of unit length, and second derivative (k, 3, 3) in 1/mm.
+        """
         ...
 
 
@@ -47,7 +50,7 @@ class Plane:
     normal: Array = attrs.field(converter=_unit)
 
     def distance(self, x: Array) -> tuple[Array, Array, Array]:
-        """See Rigid."""
+        """Distance (k,) in mm, gradient (k, 3) and second derivative (k, 3, 3), as `Rigid.distance`."""
         return (x - self.point) @ self.normal, np.tile(self.normal, (len(x), 1)), np.zeros((len(x), 3, 3))
 
 
@@ -59,7 +62,7 @@ class Sphere:
     radius: float
 
     def distance(self, x: Array) -> tuple[Array, Array, Array]:
-        """See Rigid."""
+        """Distance (k,) in mm, gradient (k, 3) and second derivative (k, 3, 3), as `Rigid.distance`."""
         away = x - self.centre
         length = np.maximum(np.linalg.norm(away, axis=1), 1e-12 * self.radius)
         normal = away / length[:, None]
@@ -77,7 +80,7 @@ class Box:
     half_mm: Array = attrs.field(converter=_float64)
 
     def distance(self, x: Array) -> tuple[Array, Array, Array]:
-        """See Rigid."""
+        """Distance (k,) in mm, gradient (k, 3) and second derivative (k, 3, 3), as `Rigid.distance`."""
         away = x - self.centre
         beyond = np.abs(away) - self.half_mm
         sign = np.where(away < 0, -1.0, 1.0)
@@ -109,7 +112,10 @@ def round_bend(normal: Array, radius: Array, within: Array | None = None) -> Arr
 
 @attrs.frozen(eq=False)
 class Pose:
-    """Where a rigid body is: turned by `rotation` (3, 3), then moved by `shift` (3,) in mm."""
+    """Where a rigid body is: turned by `rotation` (3, 3), then moved by `shift` (3,) in mm.
+
+    Raises InputError where the matrix is not a rotation (orthogonal, determinant 1).
+    """
 
     rotation: Array = attrs.field(converter=_float64, factory=lambda: np.eye(3))
     shift: Array = attrs.field(converter=_float64, factory=lambda: np.zeros(3))

@@ -58,7 +58,10 @@ class Surface:
         return wp.Mesh(points, indices)
 
     def distance(self, x: Array) -> tuple[Array, Array, Array]:
-        """See Rigid; the bend is that about the nearest edge or vertex, none over a face."""
+        """Distance (k,) in mm, gradient (k, 3) and second derivative (k, 3, 3), as `Rigid.distance`.
+
+        The second derivative is that about the nearest edge or vertex, and 0 where a face is nearest.
+        """
         near = self._nearest(x)
         a, b, c = np.moveaxis(self._corners[near], 1, 0)
         foot, region = _closest(x, a, b, c)

@@ -168,7 +168,10 @@ class _Boundary:
 
 
 def with_middles(faces: Array, tets: Array) -> Array:
-    """Faces (f, 6) with their mid-edge nodes, of corner faces (f, 3) and their elements (f, 10)."""
+    """Faces (f, 6) with their mid-edge nodes, of corner faces (f, 3) and their elements tets (f, 10).
+
+    Middle k lies between corners k and k + 1.
+    """
     number = np.zeros((4, 4), int)
     for k, (a, b) in enumerate(TET_EDGES):
         number[a, b] = number[b, a] = 4 + k

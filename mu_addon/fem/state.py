@@ -36,7 +36,7 @@ class State:
 
     @property
     def loaded(self) -> bool:
-        """Whether anything acts on the body: without pressure and weight it is as drawn."""
+        """Whether pressure or weight acts on the body: the pressure or a displacement is not 0."""
         return bool(self.pressure_MPa) or bool(self.u.any())
 
 

@@ -14,9 +14,8 @@ def substitution_kernels(width: int) -> tuple[Any, Any]:
     """Forward and backward substitution in single precision, in place: `width` right-hand sides a launch.
 
     x (n,): their values, a vector a row;
-
     block (b + 1,): first columns of blocks of up to COLUMNS columns that have the same rows below them;
-    indptr, row, value: the factor by columns, the diagonal first.
+    indptr (n + 1,), row and value (nnz,): the factor by columns, the diagonal first.
     """
     vector = wp.types.vector(length=width, dtype=wp.float32)
 

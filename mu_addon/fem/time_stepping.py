@@ -26,7 +26,7 @@ SMALLEST = 1e-4
 
 @attrs.frozen(eq=False)
 class Instant:
-    """A converged state, when it holds in s, and the rate in mm/s at which it was reached, if any.
+    """A converged state, when it holds in s, and the rate (n, 3) in mm/s at which it was reached, if any.
 
     contacts: what each of the model's obstacles remembers of it, see `Obstacle.kept`; history: what each law
     with one does, see `MaterialData.kept`. Both are filled in to be stored.
@@ -48,14 +48,15 @@ def simulate_in_time(
     load: Callable[[int], Instant | None] = lambda number: None,
     store: Callable[[int, Instant], None] = lambda number, instant: None,
 ) -> Trajectory:
-    """Equilibria of a body with history at k instants, time in s ascending and pressure in kPa.
+    """Equilibria of a body with history at k instants, time (k,) in s ascending and pressure (k,) in kPa.
 
     The body starts without history, at rest or, where the model has a load, where that takes it; the first
     instant's pressure comes at once. Pressure is
     linear between instants, in steps of at most `max_step_s` and the settings' largest pressure step, halved
     where they do not converge; obstacles with a path are where they are at each step's time. `on_state` is
     called when its instant is the last that materials and contacts remember. `load` gives an instant of an
-    earlier run by its number, if it kept one with `store`. Raises ConvergenceError naming instant and cause.
+    earlier run by its number, if it kept one with `store`. Raises InputError where time runs backward, and
+    ConvergenceError naming instant and cause.
     """
     time, pressure = np.asarray(time_s, float), in_MPa(np.asarray(pressure_kPa, float))
     if (np.diff(time) < 0).any():

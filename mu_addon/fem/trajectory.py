@@ -30,13 +30,14 @@ class Trajectory:
     index: Array
 
     def of_time(self, values: Array) -> Array:
-        """Values (k, ...) at every instant of values (s, ...) at every state."""
+        """Values (k, ...) at every instant of values (s, ...) at every state, in their unit."""
         return np.asarray(values)[self.index]
 
 
 def branches(pressure_kPa: Array) -> tuple[Array, list[Array]]:
-    """Distinct pressures ascending, and the order in which to visit them: outward from 0 to either side.
+    """Distinct pressures (d,) in kPa ascending, and the order in which to visit them: outward from 0.
 
+    The second result has one array for each side of 0 that occurs, negative first. pressure_kPa: (k,).
     An elastic body under pressure alone has no memory: as long as its path is stable, the state depends on
     the pressure only, so that a pressure met twice is solved once.
 

@@ -19,7 +19,10 @@ WIDTHS = (8, 16, 32)
 
 @attrs.frozen(eq=False)
 class Lower:
-    """L of P A P^T = L L^T by columns, diagonal first: row i of P A P^T is row order[i] of A."""
+    """Cholesky factor L of P A P^T = L L^T: row i of P A P^T is row order[i] of A.
+
+    order (n,); indptr (n + 1,), indices and values (nnz,): L by columns, the diagonal first in each.
+    """
 
     order: Array
     indptr: Array
@@ -28,7 +31,10 @@ class Lower:
 
 
 def column_blocks(lower: Lower, last: int) -> Array:
-    """First columns (b,) of blocks of up to four columns with the same rows below; `last` starts one."""
+    """First columns (b,) of blocks of up to four columns of a factor with the same rows below them.
+
+    last: number of a column that starts a block in any case.
+    """
     count = np.diff(lower.indptr)
     inner = np.minimum(lower.indptr[:-1] + 1, len(lower.indices) - 1)
     n = len(count)

@@ -20,7 +20,7 @@ class SharedTangent(Protocol):
     """What solves for variants: the tangent they share, each one's change, then all of them at once."""
 
     def factor(self, values: Array) -> None:
-        """Take the shared tangent's values (nnz,). Raises IndefiniteError."""
+        """Take the shared tangent's values (nnz,) in N/mm; raises IndefiniteError."""
 
     def take(self, change: Change) -> Any:
         """Prepare a variant's change for `solve`. Raises IndefiniteError."""
@@ -59,11 +59,14 @@ class DirectVariants:
         self._flexibility = _inverse(remaining)
 
     def take(self, change: Change) -> _Correction:
-        """Prepare a variant's change for `solve`."""
+        """Prepare a variant's change for `solve`, by the Woodbury formula; after `factor`."""
         return _Correction(self._flexibility, self._place[change.unknowns], change.matrix.toarray())
 
     def solve(self, b: Array, taken: Sequence[_Correction]) -> Sequence[Array]:
-        """A variant's solution (n,) for each right-hand side of b (k, n)."""
+        """A variant's solution (n,) for each right-hand side of b (k, n), in single precision.
+
+        taken: what `take` returned for each of the k variants.
+        """
         back = np.argsort(self._turned)
 
         def solve_trailing(g: Array) -> Array:
@@ -86,7 +89,10 @@ class IterativeVariants:
         self._stacked = None
 
     def take(self, change: Change) -> Change:
-        """Prepare a variant's change for `solve`. Raises IndefiniteError."""
+        """Prepare a variant's change for `solve`.
+
+        Raises IndefiniteError where the change leaves a diagonal entry of the matrix 0 or less.
+        """
         if (self._gradients.diagonal[change.unknowns] + change.matrix.diagonal() <= 0).any():
             raise IndefiniteError("a variant leaves nothing of the stiffness of an unknown")
         return change
@@ -101,7 +107,10 @@ class IterativeVariants:
 
 
 def make_variants(model: Model, changed: Array) -> SharedTangent:
-    """What solves for a body's variants on its device; `changed` (c,) are the free unknowns they change."""
+    """Solver for a body's variants on its device: `IterativeVariants` or `DirectVariants`.
+
+    changed (c,): numbers of the free unknowns that any variant changes.
+    """
     # Not asked for where it is not used: a factorisation's analysis takes a while.
     solver = model.factor if model.solver == "conjugate gradients" else None
     if isinstance(solver, ConjugateGradients):

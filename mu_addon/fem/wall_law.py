@@ -20,10 +20,11 @@ LAYER_NORMAL = (0.0, 0.0, 1.0)
 
 
 def wall_layers(wall: Wall, elements: Array, modulus_MPa: float, poisson: float) -> tuple[Layer, ...]:
-    """Layers in a wall's elements (k,), of its Young's modulus in MPa and Poisson's ratio at small strain.
+    """Layers of laws in a wall's elements (k,), of its Young's modulus in MPa and Poisson's ratio.
 
-    The moduli are those after long of a wall that relaxes, and of a wall not stretched before of one that
-    softens; a branch that slides comes on top of them.
+    Both are of small strain: of a wall that relaxes after long, of one that softens before any stretch; a
+    branch that slides comes on top of them. Laws: the one that the wall names, `Layered` where stiffness
+    along and across the print's layers differ, `Friction` where it slides.
     """
     (mu, kappa) = NeoHooke.parameters(modulus_MPa, poisson)[0]
     added, share = layer_stiffness(1 + wall.layers_excess, mu, kappa) if wall.layers_excess else (0.0, 1.0)
@@ -43,7 +44,10 @@ _LAWS = {"neo-hooke": NeoHooke, "yeoh": Yeoh, "prony": Prony, "ogden-roxburgh": 
 
 
 def law_row(wall: Wall, mu_MPa: float, kappa_MPa: float) -> Array:
-    """Parameters (count,) of the wall's law for shear and bulk modulus at small strain in MPa."""
+    """Parameters (count,) of the wall's law for shear and bulk modulus at small strain in MPa.
+
+    In the order of the law's `parameter_names`; Prony's relative moduli g become beta = g/(1 - sum of g).
+    """
     if wall.law == "neo-hooke":
         return np.array([mu_MPa, kappa_MPa])
     # Yeoh's law with c1 = mu/2 alone is neo-Hooke's.
@@ -62,8 +66,8 @@ def law_row(wall: Wall, mu_MPa: float, kappa_MPa: float) -> Array:
 def layer_stiffness(ratio: float, shear_MPa: float, bulk_MPa: float) -> tuple[float, float]:
     """What `Layered` adds along the layers in MPa, and the share of all, that make a wall's layers differ.
 
-    Beside an isotropic law of these moduli the modulus along the layers is then `ratio` times that across,
-    which stays what it was. Below 0: as much across them, with as much less of the isotropic law's shear,
+    ratio: Young's modulus along the layers over that across, which stays what it was; shear_MPa, bulk_MPa: of
+    the isotropic law beside it. Below 0: as much across them, with as much less of the isotropic law's shear,
     which is the same at small strain.
     """
     from scipy.optimize import brentq

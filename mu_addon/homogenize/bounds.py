@@ -26,7 +26,7 @@ class Moduli:
 
     @property
     def young(self) -> float:
-        """Young's modulus in MPa."""
+        """Young's modulus in MPa, 9 K G/(3 K + G); 0 without a shear modulus."""
         return 9 * self.bulk * self.shear / (3 * self.bulk + self.shear) if self.shear else 0.0
 
 

@@ -27,7 +27,7 @@ _TRIES = (1.0, 0.8, 0.6, 0.4)
 
 @attrs.frozen
 class CellMeshSettings:
-    """How fine a cell's mesh is; raises InputError.
+    """How fine a cell's mesh is; raises InputError for a value out of bounds.
 
     order of the elements; per_diameter: elements to a diameter of the thinnest printed strut; facets of the
     surface that is meshed, and tolerance, as a share of an element, of the mesh's distance from it.
@@ -81,7 +81,11 @@ def mesh_cell(cell: StrutCell, settings: CellMeshSettings | None = None, cache: 
 
 
 def cell_materials(cell: StrutCell, mesh: Mesh, modulus_MPa: float, poisson: float) -> Materials:
-    """Neo-Hookean resin of Young's modulus modulus_MPa and Poisson's ratio, stiffer in the cell's skin."""
+    """Neo-Hookean resin in every element of a cell's mesh, stiffer in the cell's skin.
+
+    modulus_MPa: Young's modulus of the core; poisson: Poisson's ratio of both. Elements partly in the skin
+    get both by volume. Raises InputError for moduli that are not admissible.
+    """
     count = len(mesh.tets)
     core = Materials.neo_hooke(np.full(count, modulus_MPa), np.full(count, poisson))
     if cell.skin_depth_mm == 0.0 or cell.skin_factor == 1.0:
@@ -91,7 +95,10 @@ def cell_materials(cell: StrutCell, mesh: Mesh, modulus_MPa: float, poisson: flo
 
 
 def skin_share(cell: StrutCell, mesh: Mesh) -> Array:
-    """Share (m,) of each element's volume within the cell's skin depth of the printed surface."""
+    """Share (m,), 0 to 1, of each element's volume within the skin depth of the printed surface.
+
+    By 20 points in each element, so in steps of a twentieth.
+    """
     at = _lattice_points(_STEPS)
     points = np.einsum("qn,mnd->mqd", shape_functions(at, mesh.order), mesh.nodes[mesh.tets])
     depth = depth_below_surface(cell, points.reshape(-1, 3)).reshape(points.shape[:2])

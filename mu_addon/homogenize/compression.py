@@ -60,7 +60,7 @@ class Compression:
 
     @property
     def curve(self) -> Curve:
-        """Nominal stress, and the mean lateral stretches over the nodes of the side faces."""
+        """Nominal stress in MPa, and mean lateral stretches of the side faces' nodes, as a `Curve`."""
         s = self.specimen
         half, nodes = s.side_mm / 2, s.mesh.nodes
         sides = [np.flatnonzero(nodes[:, i] == nodes[:, i].max()) for i in range(2)]
@@ -75,7 +75,7 @@ class Compression:
 
     @property
     def valid_to_strain(self) -> float:
-        """The nominal strain, compression positive, up to which neither contact nor buckling is missing."""
+        """Nominal strain, compression positive, up to which neither contact nor buckling is missing."""
         ends = [self.states[-1].strain]
         ends += [self.touch.strain] if self.touch else []
         ends += [self.loss.before] if self.loss else []
@@ -83,12 +83,12 @@ class Compression:
 
     @property
     def valid(self) -> Array:
-        """Whether each point (k,) of the curve is no farther than `valid_to_strain`."""
+        """Whether each point (k,) of `curve`, in its order, is no farther than `valid_to_strain`."""
         return np.array([state.strain <= self.valid_to_strain for state in self.states[::-1]])
 
     @property
     def why(self) -> str:
-        """A sentence on where the curve stops being valid."""
+        """A sentence on where the curve stops being valid, and why."""
         reasons = []
         if self.loss:
             reasons.append(str(self.loss))
@@ -119,8 +119,8 @@ def compress(
     neither lets go of them. `load` gives a state of an earlier run at a strain, if it kept one with
     `store`; a resumed run finds the same states to the last digit. Equilibria keep the mirror planes of the
     block; `stability` asks where others branch off, for about as many factorisations again. Where the path
-    cannot be followed it ends, and says why; raises InputError, and ConvergenceError where there is no first
-    state.
+    cannot be followed it ends, and says why. Raises InputError for strains not ascending between 0 and 1 or
+    an unknown friction, and ConvergenceError where there is no first state.
     """
     strains = [float(s) for s in strains]
     if not strains or not (np.diff([0.0, *strains, 1.0]) > 0).all():
@@ -158,7 +158,10 @@ def compress(
 
 
 class Plates:
-    """Two rigid plates that a specimen's faces slide on or stick to, and its equilibria between them."""
+    """Two rigid plates that a specimen's faces slide on or stick to, and its equilibria between them.
+
+    friction: "slide" or "stick". Raises InputError for another one.
+    """
 
     def __init__(
         self, specimen: Specimen, friction: Friction, threads: int = 2, mean_dilatation: bool = False
@@ -179,10 +182,10 @@ class Plates:
     def reach(
         self, strain: float, history: Sequence[Compressed]
     ) -> tuple[Compressed, ConvergenceError | None]:
-        """The state at a strain, from converged states before it, the last of them the nearest.
+        """The state at a nominal strain, from converged states before it, the last of them the nearest.
 
         Steps are halved until they converge near where they were predicted. Where the smallest fails, the
-        last state that did converge, and the error that names strain and cause.
+        last state that did converge, and the error that names strain and cause, which is None otherwise.
         """
         history = list(history[-3:])
         step = strain - history[-1].strain

@@ -21,7 +21,8 @@ class Curve:
     """Uniaxial response (k,) in ascending stretch, the undeformed state (1, 0) among it.
 
     stretch: length over initial length along z; stress_MPa: force over initial area, tension positive;
-    lateral (k, 2): stretches along x and y, 1 where they were held. Raises InputError.
+    lateral (k, 2): stretches along x and y, 1 where they were held. Raises InputError where shapes differ or
+    stretches do not ascend.
     """
 
     stretch: Array = attrs.field(converter=_float64)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import tomllib
 from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
@@ -17,6 +16,7 @@ from ..errors import InputError
 from ..fem.lattice_law import LatticeLaw
 from ..fem.laws import Foam
 from ..files import write_text
+from ..reading import file_text, parse_toml
 from ..toml_writer import Noted, toml_text
 from .foam_fit import NAME, FoamFit, Misfit, lattice_law, require_stable, stable_pressed, stable_shear
 
@@ -79,27 +79,27 @@ class Effective:
 
     @property
     def law(self) -> LatticeLaw:
-        """The law for the analysis mesh."""
+        """The law for the analysis mesh; raises InputError where it is not admissible."""
         return lattice_law(np.array(self.parameters), self.shear_MPa, self.diagonal_MPa, self.stretch)
 
     @property
     def E100_kPa(self) -> float:
-        """Young's modulus along an axis at small strain."""
+        """Young's modulus in kPa along an axis of the cell at small strain."""
         return (self.C11_kPa - self.C12_kPa) * (1 + self.nu100)
 
     @property
     def nu100(self) -> float:
-        """Poisson's ratio along an axis at small strain."""
+        """Poisson's ratio under stress along an axis at small strain, C12/(C11 + C12)."""
         return self.C12_kPa / (self.C11_kPa + self.C12_kPa)
 
     @property
     def E110_kPa(self) -> float:
-        """Young's modulus along the diagonal of a face."""
+        """Young's modulus in kPa along the diagonal of a face at small strain."""
         return self._along(1 / 4)
 
     @property
     def E111_kPa(self) -> float:
-        """Young's modulus along the diagonal of the cell."""
+        """Young's modulus in kPa along the diagonal of the cell at small strain."""
         return self._along(1 / 3)
 
     def _along(self, mixed: float) -> float:
@@ -113,7 +113,7 @@ class Effective:
         return 2 * self.C44_kPa / (self.C11_kPa - self.C12_kPa)
 
     def text(self) -> str:
-        """effective.toml."""
+        """The text of effective.toml, with units in keys or comments."""
         law: list[float] = [*self.parameters, self.shear_MPa, self.diagonal_MPa]
         misfit = attrs.astuple(self.misfit)
         derived = {
@@ -161,8 +161,9 @@ def effective(
 ) -> Effective:
     """A homogenized lattice of its fit and its C11, C12 and C44 in MPa.
 
-    cell, resin: text and numbers that describe them; inputs: text of all that decided the result, of which
-    the provenance keeps the hash.
+    relative_density: share of the volume that is solid. cell, resin: text and numbers that describe them;
+    inputs: text of all that decided the result, of which the provenance keeps the hash. Raises InputError as
+    `Effective`.
     """
     provenance = {
         "software": "mu_addon",
@@ -193,10 +194,13 @@ def write_effective(path: Path, found: Effective) -> None:
 
 
 def read_effective(path: str | Path) -> Effective:
-    """Read effective.toml; `parse_effective` says what it raises."""
+    """Read effective.toml.
+
+    Raises InputError where the file cannot be read or is no text, and as `parse_effective`.
+    """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = file_text(path)
     except OSError as error:
         raise InputError(
             f"cannot read the lattice's law: {error.strerror}", str(path), "give an effective.toml"
@@ -212,10 +216,7 @@ def parse_effective(text: str, origin: str = "effective.toml") -> Effective:
     Raises InputError that names file and key where the format is unknown, a key is missing, strange or no
     number, or the law is not admissible or not stable.
     """
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"this is not TOML: {error}", origin, "correct that line") from None
+    document = parse_toml(text, origin)
     found = document.get("format")
     if found != FORMAT or isinstance(found, bool):
         what = "it states no format" if found is None else f"its format is {found!r}"

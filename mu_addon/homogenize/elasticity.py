@@ -57,7 +57,7 @@ class Elasticity:
 
     @cached_property
     def cubic(self) -> Array:
-        """The nearest cubic tensor (6, 6) in MPa."""
+        """The nearest cubic tensor (6, 6) in MPa, of C11, C12 and C44, in Voigt's order."""
         C = np.diag([self.C11 - self.C12] * 3 + [self.C44] * 3)
         C[_NORMAL, _NORMAL] += self.C12
         return C
@@ -73,12 +73,12 @@ class Elasticity:
 
     @property
     def zener(self) -> float:
-        """Zener's ratio 2 C44 / (C11 - C12), 1 where isotropic."""
+        """Zener's ratio 2 C44/(C11 - C12), dimensionless: 1 where isotropic."""
         return 2 * self.C44 / (self.C11 - self.C12)
 
     @property
     def bulk(self) -> float:
-        """Bulk modulus in MPa of the cubic tensor."""
+        """Bulk modulus (C11 + 2 C12)/3 in MPa of the cubic tensor."""
         return (self.C11 + 2 * self.C12) / 3
 
     @property
@@ -89,22 +89,22 @@ class Elasticity:
 
     @property
     def shear_voigt(self) -> float:
-        """Voigt's mean over all directions of the shear modulus in MPa."""
+        """Voigt's mean over all directions of the shear modulus, (C11 - C12 + 3 C44)/5 in MPa."""
         return (self.C11 - self.C12 + 3 * self.C44) / 5
 
     @property
     def E100(self) -> float:
-        """Young's modulus in MPa along a cell's edge."""
+        """Young's modulus in MPa along a cell's edge, of the cubic tensor."""
         return float(young_modulus(self.cubic, [[1, 0, 0]])[0])
 
     @property
     def E110(self) -> float:
-        """Young's modulus in MPa along a face's diagonal."""
+        """Young's modulus in MPa along a face's diagonal, of the cubic tensor."""
         return float(young_modulus(self.cubic, [[1, 1, 0]])[0])
 
     @property
     def E111(self) -> float:
-        """Young's modulus in MPa along the cell's diagonal."""
+        """Young's modulus in MPa along the cell's diagonal, of the cubic tensor."""
         return float(young_modulus(self.cubic, [[1, 1, 1]])[0])
 
     @property
@@ -113,7 +113,7 @@ class Elasticity:
         return self.C12 / (self.C11 + self.C12)
 
     def young_modulus(self, directions: ArrayLike) -> Array:
-        """Young's modulus (k,) in MPa along directions (k, 3), of the tensor as it is."""
+        """Young's modulus (k,) in MPa along directions (k, 3) of any length, of the tensor C as it is."""
         return young_modulus(self.C, directions)
 
 

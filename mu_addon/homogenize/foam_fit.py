@@ -82,18 +82,25 @@ class FoamFit:
 
     @property
     def law(self) -> LatticeLaw:
-        """The law for the analysis mesh."""
+        """The law for the analysis mesh, valid in the range `stretch`."""
         return lattice_law(self.parameters, self.shear_MPa, self.diagonal_MPa, self.stretch)
 
     def uniaxial(self, stretch: Array) -> tuple[Array, Array]:
-        """Nominal stress in MPa and lateral stretch, (k,) each, under uniaxial stress along an axis."""
+        """Nominal stress (k,) in MPa and lateral stretch (k,) under uniaxial stress along an axis.
+
+        stretch (k,): along the load.
+        """
         return uniaxial(self.parameters, stretch, self.diagonal_MPa)
 
 
 def lattice_law(
     parameters: Array, shear_MPa: float, diagonal_MPa: float, stretch: tuple[float, float]
 ) -> LatticeLaw:
-    """Foam of parameters (6,), and cubic shear and diagonal stretch where not 0. Raises InputError."""
+    """Law of foam with parameters (6,) as `Foam` names them, cubic shear and diagonal stretch in MPa.
+
+    Shear or diagonal of 0 are left out. stretch: smallest and largest of the fit. Raises InputError for
+    parameters that are not admissible.
+    """
     layers: list[tuple[Any, Array]] = [(Foam, np.asarray(parameters, float))]
     layers += [
         (law, np.array([value]))
@@ -104,13 +111,14 @@ def lattice_law(
 
 
 def fit_foam(curve: Curve, C11_MPa: float, C12_MPa: float, C44_MPa: float) -> FoamFit:
-    """Foam with cubic shear that follows a cell's curve along an axis, of free sides, and its shear modulus.
+    """Foam with cubic shear that follows a cell's curve along an axis, of free sides, and its tensor.
 
-    Least squares of stress, each side of 1 by its own largest, and of lateral strain, from several starts.
-    What couples the axes is either the cell's C12 as diagonal stretch, the foam itself having none, or the
-    foam's own volumetric part, fitted too: the one that leaves less. The cubic shear makes up for what the
-    foam lacks of C44; where it has more, it stays and C44 is missed. Raises InputError for a curve that
-    leaves a side of 1 undetermined, and where the law found is not stable.
+    C11_MPa, C12_MPa, C44_MPa: of the cell at small strain. Least squares of stress, each side of 1 by its own
+    largest, and of lateral strain, from several starts. What couples the axes is either the cell's C12 as
+    diagonal stretch, the foam itself having none, or the foam's own volumetric part, fitted too: the one that
+    leaves less. The cubic shear makes up for what the foam lacks of C44; where it has more, it stays and C44
+    is missed. Raises InputError for a curve that leaves a side of 1 undetermined, and where the law found is
+    not stable.
     """
     _sides(curve)
     fits = {
@@ -147,7 +155,10 @@ def fit_foam(curve: Curve, C11_MPa: float, C12_MPa: float, C44_MPa: float) -> Fo
 
 
 def misfit(curve: Curve, parameters: Array, diagonal_MPa: float = 0.0) -> Misfit:
-    """What a foam of parameters (6,), with diagonal stretch, leaves of a curve."""
+    """What a foam of parameters (6,), with diagonal stretch in MPa, leaves of a curve.
+
+    Raises InputError for a curve with fewer than 3 points on a side of stretch 1, or with held sides.
+    """
     side = _sides(curve)
     stress, lateral = _residuals(curve, parameters, diagonal_MPa)
     tension, compression = (_rms(stress[s]) for s in side)
@@ -267,7 +278,8 @@ def require_stable(law: LatticeLaw) -> None:
 def stable_shear(law: LatticeLaw) -> float:
     """The simple shear between two axes, up to 0.6, up to which a lattice's law stays strongly elliptic.
 
-    Shear puts the struts of one diagonal under compression, and what holds them there is the foam alone.
+    In steps of 0.005. Shear puts the struts of one diagonal under compression, and what holds them there is
+    the foam alone.
     """
     amounts = np.linspace(0, _FARTHEST, _STEPS)
     F = np.tile(np.eye(3), (len(amounts), 1, 1))
@@ -276,7 +288,10 @@ def stable_shear(law: LatticeLaw) -> float:
 
 
 def stable_pressed(law: LatticeLaw) -> float:
-    """The equal compression on all sides, a strain up to 0.6, up to which a law stays strongly elliptic."""
+    """The equal compression on all sides up to which a law stays strongly elliptic.
+
+    A nominal strain, up to 0.6, in steps of 0.005.
+    """
     amounts = np.linspace(0, _FARTHEST, _STEPS)
     return _first_lost(law, amounts, (1 - amounts)[:, None, None] * np.eye(3))
 

@@ -71,14 +71,22 @@ def uniaxial(parameters: Array, stretch: Array, diagonal_MPa: float = 0.0) -> tu
 def small_strain(
     parameters: Array, shear_MPa: float = 0.0, diagonal_MPa: float = 0.0
 ) -> tuple[float, float, float]:
-    """Young's modulus in MPa and Poisson's ratio along an axis, and C44 in MPa; see `uniaxial`."""
+    """Young's modulus in MPa and Poisson's ratio along an axis, and C44 in MPa, at small strain.
+
+    Of a foam, parameters (6,) as `Foam` names them with mu the mean of both sides, cubic shear of shear_MPa
+    and diagonal stretch of diagonal_MPa in parallel.
+    """
     mu, lame = (parameters[0] + parameters[2]) / 2, parameters[4] + diagonal_MPa
     E = mu * (3 * lame + 2 * mu) / (lame + mu)
     return float(E), float(lame / (2 * (lame + mu))), float(mu + shear_MPa)
 
 
 def directions(count: int = 200) -> Array:
-    """Unit vectors (count, 3) spread evenly over a half sphere, and those between the axes."""
+    """Unit vectors (count + 17, 3): `count` spread evenly over a half sphere, and those between the axes.
+
+    The first lie on a spiral with golden-angle turns; the last are all with components of equal size or 0,
+    for z >= 0.
+    """
     z = (np.arange(count) + 0.5) / count
     turn = np.pi * (3 - 5**0.5) * np.arange(count)
     spread = np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=1)
@@ -88,9 +96,10 @@ def directions(count: int = 200) -> Array:
 
 
 def ellipticity(law: LatticeLaw, F: Array) -> Array:
-    """Least stiffness (n,) in MPa against a plane wave of any polarisation, over many directions.
+    """Least stiffness (n,) in MPa against a plane wave of any polarisation, at F (n, 3, 3).
 
-    Positive: strongly elliptic, so that no band of localised strain forms. F (n, 3, 3).
+    The smallest eigenvalue of the acoustic tensor over `directions()`. Positive: strongly elliptic, so that
+    no band of localised strain forms.
     """
     A = np.sum([evaluate(layer, F, row).tangent for layer, row in law.layers], axis=0)
     n = directions()

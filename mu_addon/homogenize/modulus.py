@@ -46,7 +46,10 @@ def modulus(curve: Curve, procedure: str = DEFAULT) -> float:
 
 
 def moduli(curve: Curve) -> dict[str, float]:
-    """Compression moduli in MPa by every procedure of `PROCEDURES` that the curve is long enough for."""
+    """Compression moduli in MPa by every procedure of `PROCEDURES` that the curve is long enough for.
+
+    Raises InputError for a curve without a compressed side that starts from rest.
+    """
     _, reach = _compressed(curve)[0][[0, -1]]
     needed = dict(zip(PROCEDURES, (0.0, 0.1, 0.4, 0.4), strict=True))
     return {p: modulus(curve, p) for p in PROCEDURES if reach >= needed[p] - 1e-9}

@@ -29,25 +29,34 @@ SHEARS = ((1, 2), (0, 2), (0, 1))
 
 @attrs.frozen(eq=False)
 class Part:
-    """Some of a model's unknowns: their numbers (f,), where in the tangent theirs lie, and its factor."""
+    """Some of a model's unknowns: their numbers (f,), and the factor of the tangent between them.
+
+    entries: where their values lie among the tangent's (nnz,).
+    """
 
     free: Array
     entries: Array
     factor: Cholesky | SuperLU
 
     def factorise(self, values: Array) -> None:
-        """Factorise the part of a tangent's values (nnz,); raises IndefiniteError."""
+        """Factorise the part of a tangent's values (nnz,), all in N/mm.
+
+        Raises IndefiniteError where it is not positive definite.
+        """
         self.factor.factor(values[self.entries])
 
     def solve(self, force: Array) -> Array:
-        """Displacements (3n,) or (3n, k) in mm of such forces in N on these unknowns, 0 at all others."""
+        """Displacements (3n,) or (3n, k) in mm of forces of the same shape in N, 0 at all other unknowns.
+
+        Forces on other unknowns do not count. After `factorise`.
+        """
         u = np.zeros_like(force)
         u[self.free] = self.factor.solve(np.ascontiguousarray(force[self.free]))
         return u
 
 
 def part(pattern: Pattern, free: Array) -> Part:
-    """The unknowns `free`, ascending, of a tangent's pattern."""
+    """The unknowns numbered `free` (f,), ascending, of a tangent's pattern; not yet factorised."""
     count = len(pattern.indptr) - 1
     number = np.full(count, -1)
     number[free] = np.arange(len(free))
@@ -108,7 +117,7 @@ class Octant:
 
     @cached_property
     def across(self) -> Array:
-        """(n, 3) bool: node on a side across x, y, z."""
+        """(n, 3) bool: whether a node lies on a side across x, y, z."""
         return np.asarray(self.sides.any(axis=0))
 
     @cached_property
@@ -117,7 +126,11 @@ class Octant:
         return self._part(self.across)
 
     def shearing(self, axes: tuple[int, int]) -> Part:
-        """The unknowns under a shear of two axes."""
+        """The unknowns under a shear of two axes, numbered 0 to 2.
+
+        Fixed are displacements in the plane of sides across these axes, and the normal one of those across
+        the third.
+        """
         return self._part(self._kept_by(np.tile(np.isin(range(3), axes), (2, 1))))
 
     def affine(self, gradient: Array) -> Array:
@@ -125,7 +138,7 @@ class Octant:
         return np.asarray((self.mesh.nodes @ np.asarray(gradient).T).ravel())
 
     def tangent(self, u: Array) -> tuple[Array, sparse.csc_matrix]:
-        """The tangent at u (n, 3) in mm: its values (nnz,), and whole, of all displacements."""
+        """The tangent in N/mm at u (n, 3) in mm: its values (nnz,), and whole (3n, 3n), without supports."""
         values = self.model.tangent(u, 0.0, self.parameters)
         return values, self.model.matrix(values)
 
@@ -171,7 +184,7 @@ class Octant:
 
 
 def pieces(mesh: Mesh) -> Array:
-    """The connected piece (n,) that each node of a mesh belongs to, numbered from 0."""
+    """Number (n,), from 0, of the connected piece that each node of a mesh belongs to."""
     from scipy.sparse.csgraph import connected_components
 
     first, other = mesh.tets[:, :1].repeat(mesh.tets.shape[1] - 1, axis=1), mesh.tets[:, 1:]
@@ -188,7 +201,10 @@ def _wave(odd: Array) -> str:
 
 
 def require_factor(part: Part, values: Array) -> None:
-    """Factorise at rest; raises MeshingError where a piece of the mesh hangs loose."""
+    """Factorise a part of the tangent's values (nnz,) at rest.
+
+    Raises MeshingError where it is not positive definite, as where a piece of the mesh hangs loose.
+    """
     try:
         part.factorise(values)
     except IndefiniteError:

@@ -26,7 +26,8 @@ class OffsetResponse:
     """Modulus over the resin's, and relative density, of a lattice of scale 1 at print offsets.
 
     offsets_mm (k,): of every surface, ascending, 4 or more; modulus (k,): over the resin's; density (k,).
-    Between them both are splines, the modulus in its logarithm. Raises InputError.
+    Between them both are cubic splines, the modulus in its logarithm. Raises InputError for too few offsets
+    or a modulus that is not positive.
     """
 
     offsets_mm: Array = attrs.field(converter=_float64)
@@ -41,16 +42,23 @@ class OffsetResponse:
 
     @property
     def range_mm(self) -> tuple[float, float]:
-        """Least and largest offset at scale 1."""
+        """Least and largest offset in mm at scale 1."""
         return float(self.offsets_mm[0]), float(self.offsets_mm[-1])
 
     def modulus_MPa(self, scale: Any, offset_mm: Any, resin_MPa: float) -> Array:
-        """Modulus at scales with an offset in mm, numbers or arrays; raises InputError outside the range."""
+        """Young's modulus (...) in MPa at scales (...) with print offsets (...) in mm, of a resin's in MPa.
+
+        Scales and offsets are numbers or arrays. Raises InputError where offset over scale is outside the
+        range.
+        """
         at = self._at(scale, offset_mm)
         return resin_MPa * np.exp(CubicSpline(self.offsets_mm, np.log(self.modulus))(at))
 
     def relative_density(self, scale: Any, offset_mm: Any) -> Array:
-        """Share of the volume that is solid at scales with an offset in mm."""
+        """Share (...) of the volume that is solid at scales (...) with print offsets (...) in mm.
+
+        Raises InputError where offset over scale is outside the range.
+        """
         return np.asarray(CubicSpline(self.offsets_mm, self.density)(self._at(scale, offset_mm)))
 
     def _at(self, scale: Any, offset_mm: Any) -> Array:

@@ -35,7 +35,7 @@ def block_specimen(octant: Mesh, cells: int, materials: Materials, axis: str = "
     octant: mesh of [0, U/2]^3 mm with a corner of the cell at the origin, and materials its own. The
     block's outer faces are faces of cells, cut flat. axis: that of the cell which the plates compress; the
     specimen is turned so that it becomes z. Laws must be isotropic, since copies are mirror images. Raises
-    InputError.
+    InputError for less than one cell, an unknown axis or an octant that is not cubic.
     """
     if cells < 1 or cells != int(cells):
         raise InputError(f"a specimen of {cells} cells", "compression test", "ask for 1 cell or more")
@@ -58,7 +58,7 @@ def block_specimen(octant: Mesh, cells: int, materials: Materials, axis: str = "
 
 
 def repeated(materials: Materials, elements: int, copies: int) -> Materials:
-    """The materials of a piece of some elements, for its copies one after another."""
+    """Materials of `copies` copies, one after another, of a piece of `elements` elements."""
     starts = elements * np.arange(copies)[:, None]
     return Materials(
         tuple(

@@ -41,7 +41,10 @@ _HALVINGS = 3
 
 @attrs.frozen
 class Loss:
-    """Two nominal strains between which an equilibrium becomes unstable, and the mirrors that are broken."""
+    """Two nominal strains, compression positive, between which an equilibrium becomes unstable.
+
+    signs: for the mirrors across x, y and z, whether the buckled shape breaks it.
+    """
 
     before: float
     after: float
@@ -58,7 +61,7 @@ class Loss:
 class Motions:
     """The small motions of a specimen's eighth in the seven parts that break its symmetry.
 
-    held (n, 3) bool: the supports on the plates.
+    held (n, 3) bool: the supports on the plates. threads, mean_dilatation: as `Model` has them.
     """
 
     def __init__(
@@ -72,7 +75,7 @@ class Motions:
         self._order = list(_BREAKING)
 
     def lost(self, u: Array) -> Signs | None:
-        """A part that meets no resistance at a displacement (n, 3) in mm, or None where all do."""
+        """Signs of a part whose tangent is not positive definite at u (n, 3) in mm, or None where all are."""
         values = self.model.tangent(u, 0.0, self.parameters)
         for signs in self._order:
             try:
@@ -98,10 +101,10 @@ class Motions:
 
 
 def first_loss(motions: Motions, strains: Sequence[float], moves: Sequence[Array]) -> Loss | None:
-    """Where along displacements (n, 3) at ascending strains, the first at rest, stability is lost, if it is.
+    """Where along displacements (n, 3) in mm at ascending strains, the first at rest, stability is lost.
 
-    Found by halving, first among the states and then between two, where equilibria are taken from the
-    polynomial through their neighbours: what is lost is taken to stay lost.
+    None where it is not. Found by halving, first among the states and then between two, where equilibria are
+    taken from the polynomial through their neighbours: what is lost is taken to stay lost.
     """
     low, high = 0, len(strains) - 1
     signs = motions.lost(moves[high])
@@ -127,7 +130,7 @@ def first_loss(motions: Motions, strains: Sequence[float], moves: Sequence[Array
 
 
 def interpolated(strains: Sequence[float], moves: Sequence[Array], strain: float) -> Array:
-    """Displacement (n, 3) at a strain of the polynomial through those at some strains."""
+    """Displacement (n, 3) in mm at a strain, of the Lagrange polynomial through those at other strains."""
     u = np.zeros_like(moves[0])
     for a, move in zip(strains, moves, strict=True):
         u += np.prod([(strain - b) / (a - b) for b in strains if b != a]) * move

@@ -24,11 +24,12 @@ _TOUCH = 1e-6
 class StretchSettings:
     """How a virtual test of a periodic lattice is run.
 
-    strains: nominal, at which points are kept; rest is always one. confined: the lateral stretches are held
-    at 1, else their mean stresses are 0. buckling: also ask whether the lattice would leave the planes of
-    its mirrors (octant.Octant.buckling), at some 60 factorisations a point asked. tolerance: residual over
-    the root sum of squares of all element forces; min_step: least step of strain; predictor_tolerance: how
-    far from its prediction a state may lie, as a share of the predicted move. Raises InputError.
+    axis: of the stretch, "x", "y" or "z". strains: nominal, at which points are kept; rest is always one.
+    confined: the lateral stretches are held at 1, else their mean stresses are 0. buckling: also ask whether
+    the lattice would leave the planes of its mirrors (octant.Octant.buckling), at some 60 factorisations a
+    point asked. tolerance: residual over the root sum of squares of all element forces; min_step: least step
+    of strain; predictor_tolerance: how far from its prediction a state may lie, as a share of the predicted
+    move. Raises InputError for strains not above -1.
     """
 
     axis: str = attrs.field(default="z", validator=attrs.validators.in_(AXES))
@@ -64,7 +65,10 @@ class Point:
 
 @attrs.frozen(eq=False)
 class Stretched:
-    """What a virtual test gave: the curve, its points, and where and why it stops short; "" where not."""
+    """What a virtual test gave: the curve, its points in the order of the curve, and why it stops short.
+
+    stopped: where and why, "" where it reaches both ends.
+    """
 
     curve: Curve
     points: tuple[Point, ...]
@@ -89,7 +93,10 @@ def stretch_lattice(
 
 
 class Stretching:
-    """A periodic lattice under prescribed stretch along one axis; see `stretch_lattice`."""
+    """A periodic lattice under prescribed stretch along one axis; arguments as `stretch_lattice`.
+
+    Raises MeshingError where the undeformed cell is unstable.
+    """
 
     def __init__(
         self,
@@ -109,11 +116,11 @@ class Stretching:
 
     @property
     def rest(self) -> Point:
-        """The undeformed lattice."""
+        """The undeformed lattice, at strain and stress 0."""
         return Point(0.0, np.ones(3), np.zeros(3), np.zeros_like(self.octant.mesh.nodes))
 
     def run(self, on_point: Callable[[Point], None] | None = None) -> Stretched:
-        """The test from rest to either end."""
+        """The test from rest to the largest strain on either side; on_point is called with each `Point`."""
         rest = self.rest
         wanted = sorted(set(self.settings.strains) - {0.0})
         compressed, why_compressed = self._along([s for s in wanted if s < 0][::-1], rest, on_point)
@@ -239,7 +246,11 @@ class Stretching:
         raise ConvergenceError(f"no convergence in {s.max_iterations} iterations")
 
     def predicted(self, history: Sequence[Point], strain: float) -> tuple[Array, Array]:
-        """Stretches (3,) and displacement (n, 3) to start from at another strain."""
+        """Stretches (3,) and displacement (n, 3) in mm to start from at another strain.
+
+        Along the tangent from one point, by Lagrange extrapolation from several. Raises ConvergenceError
+        where the one point is unstable.
+        """
         last = history[-1]
         if len(history) == 1:
             definite, solved, complement = self._factorised(last.u)

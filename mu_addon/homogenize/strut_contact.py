@@ -46,10 +46,11 @@ class _Plane:
 
 
 def first_strut_contact(mesh: Mesh, strains: Sequence[float], moves: Sequence[Array]) -> StrutContact | None:
-    """The first contact along displacements (n, 3) of an eighth at ascending strains, the first free of it.
+    """The first contact along displacements (n, 3) in mm of an eighth at ascending nominal strains, or None.
 
-    Struts meet a plate where they pass the plane of the mesh's `tip`, and their own images where they pass
-    a mirror plane; between two states nodes move along straight lines.
+    The first state must be free of contact. Struts meet a plate where they pass the plane of the mesh's
+    `tip`, and their own images where they pass a mirror plane; between two states nodes move along straight
+    lines.
     """
     planes = [
         _Plane("its mirror image", AXES.index(a), -1, 0.0, mesh.symmetry_nodes(a)) for a in mesh.symmetry

@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..fem import laws
 from ..fem.materials import Layer, Materials
 from ..files import write_text
+from ..reading import file_text
 from ..toml_writer import toml_value
 from .coupon import MODES, Array
 from .stability import Stability, check_stability, whole_ranges
@@ -191,7 +192,7 @@ def load_material(name: str) -> Material:
 def read_material(path: str | Path) -> Material:
     """Read a material from TOML; raises InputError that names file, line and key."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = file_text(path)
     except OSError as error:
         raise InputError(
             f"cannot read the file: {error.strerror}",
@@ -207,7 +208,7 @@ def parse_material(text: str, origin: str = "") -> Material:
     """A material of TOML text; raises InputError that names `origin`, line and key."""
     document = parse(text, _KEYS, origin)
     reader = _Reader(text, origin)
-    if document.get("format") != FORMAT:
+    if document.get("format") != FORMAT or document["format"] is True:
         raise InputError(
             f"format = {document.get('format')!r} is not known",
             reader.at("", "format"),

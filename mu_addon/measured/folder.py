@@ -6,7 +6,6 @@ import difflib
 import hashlib
 import math
 import re
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
+from ..reading import file_text, parse_toml
 from .experiment import Array, Experiment
 from .kinds import AXES, KINDS, MODES, PLATES, ROLES, VALVES, Kind
 from .table import Remark, read_table
@@ -45,10 +45,7 @@ def read_folder(folder: Path) -> Measured:
     """Read and check a folder of measured data; raises InputError with file, row and what to do."""
     path = Path(folder) / FILE
     text = _text(path, f"a folder of measured data holds {FILE}, which names its CSV files")
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"this is not TOML: {error}", str(path), "correct that line") from error
+    document = parse_toml(text, str(path))
     entries = document.pop("experiment", None)
     if document:
         key = next(iter(document))
@@ -310,7 +307,7 @@ def _file(name: str, at: _Place) -> Path:
 
 def _text(path: Path, remedy: str) -> str:
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        return file_text(path)
     except UnicodeDecodeError as error:
         raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
     except OSError as error:

@@ -18,8 +18,8 @@ _FLAT = 0.25
 def relieved(mesh: Mesh, bounds: Any) -> Mesh:
     """The mesh with lattice elements bent along with the membrane, where its curve comes near to fold one.
 
-    bounds: the envelope's box, (low, high) in mm for x, y and z; its faces and the mirror planes keep
-    their nodes in plane, and the membrane keeps all of its own.
+    bounds (3, 2): the envelope's box, (low, high) in mm for x, y and z; its faces and the mirror planes keep
+    their nodes in plane, and the membrane keeps all of its own. Meshes of order 1 are returned as they are.
     """
     lattice = mesh.region == LATTICE
     if mesh.order == 1 or folded_corners(mesh)[lattice].min() > _FLAT:

@@ -8,9 +8,10 @@ from .mesh import Array
 
 
 def harmonic(nodes: int, cells: Array, local: Array, moved: Array, prescribed: Array) -> Array:
-    """Displacements (nodes, 3) in mm: `moved` where `prescribed` (nodes, 3) bool, harmonic elsewhere.
+    """Displacements (nodes, 3) in mm: `moved` where `prescribed`, harmonic elsewhere.
 
-    cells (m, k): nodes of the elements; local (m, k, k): their stiffness. Nodes of no cell stay.
+    nodes: their number; cells (m, k): nodes of the elements; local (m, k, k): stiffness of each; moved
+    (nodes, 3) in mm; prescribed (nodes, 3) bool. Nodes of no cell that are not prescribed stay at 0.
     """
     from scipy.sparse import csr_matrix
     from scipy.sparse.linalg import splu

@@ -23,7 +23,10 @@ class GmshUnavailable(MeshingError):
 
 @attrs.frozen
 class Sizes:
-    """Element sizes in mm: at the envelope, on the anchors' line x = 0, y = row, and at the necks."""
+    """Element sizes in mm: at the envelope, on the anchors' line x = 0, y = `row`, and at the necks.
+
+    row and neck_radius are places in mm: of the line, and of the necks' outer surface.
+    """
 
     envelope: float
     anchor: float
@@ -33,7 +36,7 @@ class Sizes:
 
 
 def load_gmsh() -> Any:
-    """The gmsh module, or GmshUnavailable naming what is missing."""
+    """The gmsh module. Raises GmshUnavailable, naming what is missing, where it cannot be loaded."""
     try:
         import gmsh
     except ImportError as error:
@@ -59,9 +62,9 @@ def lattice_mesh(
     """Fill the space between the membrane and its envelope with linear tetrahedra.
 
     nodes (n, 3) in mm; outside (f, 3), the triangles of the membrane towards the lattice, which the
-    filling keeps; plan (k, 2), corners (x, y) of the envelope from the end of one mirror plane round to
-    the end of the other. Returns additional nodes (a, 3), numbered on from n, and tets (m, 4). Raises
-    GmshUnavailable and MeshingError.
+    filling keeps; plan (k, 2), corners (x, y) in mm of the envelope from the end of one mirror plane round to
+    the end of the other; height in mm. Returns additional nodes (a, 3), numbered on from n, and tets (m, 4).
+    Raises GmshUnavailable, and MeshingError where gmsh fails or does not keep the given triangles.
     """
     # gmsh numbers its own nodes on from the largest it was given, so these must be dense.
     used, dense = np.unique(outside, return_inverse=True)
@@ -119,7 +122,7 @@ _OPTIONS = {
 
 @contextmanager
 def gmsh_model(gmsh: Any) -> Iterator[Any]:
-    """A fresh silent model under fixed options; afterwards gmsh is as it was found."""
+    """A fresh silent gmsh model under fixed options, as a context; afterwards gmsh is as it was found."""
     ours = not gmsh.isInitialized()
     if ours:
         # Personal option files and signal handlers would change results and Ctrl-C.

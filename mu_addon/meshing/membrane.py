@@ -40,7 +40,7 @@ class Meridian:
 
     @classmethod
     def of(cls, d: Dimensions) -> Meridian:
-        """From a unit's dimensions; raises InputError where the caps leave no cavity."""
+        """The meridian of a unit's dimensions; raises InputError where the caps leave no cavity."""
         top = d.height
         cuts = _foot(d, d.base_cap), _foot(d, top - d.tip_cap)
         if not 0 < cuts[0] < cuts[1] < top:
@@ -52,7 +52,7 @@ class Meridian:
         return cls(d, cuts)
 
     def point(self, p: Array, q: Array) -> Array:
-        """Points (n, 2) of the solid, (radius, z) in mm, from coordinates p and q, (n,) each."""
+        """Points (n, 2) of the solid, (radius, z) in mm, at coordinates p in mm and q, (n,) each."""
         d = self.d
         found = under_profile(d, p, np.minimum(q, 1.0))
         for end, cut, cap in ((0.0, self.cuts[0], d.base_cap), (d.height, self.cuts[1], -d.tip_cap)):
@@ -74,7 +74,10 @@ class Meridian:
 
 
 def under_profile(d: Dimensions, p: Array, q: Array) -> Array:
-    """Points (n, 2), (radius, z) in mm, a share q of the wall below the profile along its normal at p."""
+    """Points (n, 2), (radius, z) in mm, a share q of the wall below the profile along its normal at p.
+
+    p (n,): heights on the profile in mm; q (n,) or a number: 0 on the profile, 1 on the cavity.
+    """
     slope = outer_slope(d, p)
     depth = q * d.wall / np.hypot(1.0, slope)
     return np.column_stack([outer_radius(d, p) - depth, p + depth * slope])
@@ -91,7 +94,11 @@ def _foot(d: Dimensions, z: float) -> float:
 
 
 def stations(meridian: Meridian, edge_mm: float) -> Array:
-    """Heights p on the profile that divide every arc, cut at the caps, into lengths near edge_mm."""
+    """Heights p (n,) in mm on the profile that divide every arc, cut at the caps, into lengths near edge_mm.
+
+    Ascending from 0 to the unit's height. An arc is divided further where one part would bend away from the
+    lattice by more than 40 degrees.
+    """
     d, (low, high) = meridian.d, meridian.cuts
     joints = np.array([0.0, d.b, d.cell / 2, d.cell - d.b])
     ends = (np.arange(d.count)[:, None] * d.cell + joints).ravel()[1:]
@@ -111,7 +118,7 @@ def stations(meridian: Meridian, edge_mm: float) -> Array:
 
 
 def division(length: float, edge: float) -> int:
-    """Number of equal parts of a length that come nearest to an edge, at least 1."""
+    """Number of equal parts, at least 1, that divide a length into parts nearest to `edge`, in its unit."""
     return max(1, int(length / edge + 0.5))
 
 
@@ -131,9 +138,10 @@ class Membrane:
 def membrane_mesh(
     meridian: Meridian, turn: float, p: Array, sectors: int, layers: int, rings: int
 ) -> Membrane:
-    """Revolve the grid of stations p over an angle `turn` (pi/2 or pi, from +y towards +x).
+    """Linear tetrahedra of the membrane: the grid of stations p (n,) in mm revolved over an angle.
 
-    `sectors` elements around, `layers` through the wall, `rings` from wall to axis in the caps.
+    turn: pi/2 or pi, in radians from +y towards +x. sectors: elements around; layers: through the wall;
+    rings: from wall to axis in the caps.
     """
     low, high = meridian.cuts
     q = np.concatenate([np.linspace(0, 1, layers + 1), 1 + np.arange(1, rings + 1) / rings])

@@ -117,7 +117,10 @@ def mirror(mesh: Mesh, axis: str) -> Mesh:
 
 
 def mirror_displacement(mesh: Mesh, u: Array, axis: str) -> Array:
-    """Displacement of `mirror(mesh, axis)`, of a symmetric displacement (n, 3) of the mesh."""
+    """Displacement (n', 3) of `mirror(mesh, axis)`, of a symmetric displacement u (n, 3) of the mesh.
+
+    Raises MeshingError where the axis has no mirror plane in the mesh.
+    """
     off = np.ones(len(mesh.nodes), bool)
     off[mesh.symmetry_nodes(axis)] = False
     image = u[off].copy()
@@ -126,20 +129,26 @@ def mirror_displacement(mesh: Mesh, u: Array, axis: str) -> Array:
 
 
 def oriented(nodes: Array, tets: Array) -> Array:
-    """Linear tets (m, 4) with those of negative volume turned positive."""
+    """Linear tets (m, 4) with those of negative volume turned positive; nodes (n, 3) in mm."""
     volume = np.linalg.det(nodes[tets[:, 1:]] - nodes[tets[:, :1]])
     return np.where((volume < 0)[:, None], tets[:, [1, 0, 2, 3]], tets)
 
 
 def edges_of(tets: Array) -> tuple[Array, Array]:
-    """Unique edges (e, 2), ends ascending, and the six edges of each tetrahedron (m, 6) in VTK's order."""
+    """Unique edges (e, 2), ends ascending, and the numbers (m, 6) of each element's edges among them.
+
+    tets (m, 4 | 10), of which the corners count; the six are in VTK's order, `TET_EDGES`.
+    """
     pairs = np.sort(tets[:, :4][:, TET_EDGES].reshape(-1, 2), axis=1)
     edges, inverse = np.unique(pairs, axis=0, return_inverse=True)
     return edges, np.reshape(inverse, (-1, 6))
 
 
 def boundary_faces(tets: Array) -> tuple[Array, Array]:
-    """Faces that belong to one tetrahedron only, (f, 3) with normals outward, and that tetrahedron, (f,)."""
+    """Faces that belong to one tetrahedron only, (f, 3) with normals outward, and its number (f,).
+
+    tets (m, 4 | 10), of which the corners count.
+    """
     faces = tets[:, :4][:, TET_FACES].reshape(-1, 3)
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     single = np.sort(first[count == 1])
@@ -147,12 +156,19 @@ def boundary_faces(tets: Array) -> tuple[Array, Array]:
 
 
 def edge_keys(edges: Array, count: int) -> Array:
-    """One number for each edge (e, 2), ends ascending, of a mesh of `count` nodes; ordered as edges are."""
+    """One number (e,) for each edge (e, 2) of a mesh of `count` nodes, ordered as edges are.
+
+    The ends of each edge must ascend.
+    """
     return np.asarray(edges[:, 0].astype(np.int64) * count + edges[:, 1])
 
 
 def second_order(nodes: Array, tets: Array, triangles: Array, middles: Array) -> tuple[Array, Array, Array]:
-    """Nodes, tets (m, 10) and triangles (f, 6) of order 2; middles (e, 3) are those of `edges_of(tets)`."""
+    """Nodes (n + e, 3), tets (m, 10) and triangles (f, 6) of order 2, from those of order 1.
+
+    nodes (n, 3) and middles (e, 3) in mm; tets (m, 4); triangles (f, 3), of edges of the tets; middles are
+    the mid-edge nodes of `edges_of(tets)`, in its order.
+    """
     edges, of_tet = edges_of(tets)
     ends = np.sort(triangles[:, TRIANGLE_EDGES].reshape(-1, 2), axis=1)
     of_triangle = np.searchsorted(edge_keys(edges, len(nodes)), edge_keys(ends, len(nodes)))
@@ -164,7 +180,10 @@ def second_order(nodes: Array, tets: Array, triangles: Array, middles: Array) ->
 
 
 def bisected(nodes: Array, tets: Array, edges: Array) -> tuple[Array, Array]:
-    """Linear tets with edges (k, 2), no two of them in one element, halved together with all around them."""
+    """Linear tets with some edges halved, together with all elements around them: new nodes and tets.
+
+    nodes (n, 3) in mm, tets (m, 4); edges (k, 2), no two of them in one element.
+    """
     for a, b in edges:
         around = (tets == a).any(axis=1) & (tets == b).any(axis=1)
         first, second = tets[around].copy(), tets[around].copy()

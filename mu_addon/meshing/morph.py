@@ -18,7 +18,7 @@ from .settings import CELL_MM, MeshSettings
 
 
 def morphed(mesh: Mesh, drawn: Unit, other: Unit, settings: MeshSettings) -> Mesh:
-    """The half or quarter mesh that gmsh made of `drawn`, moved to the unit `other`.
+    """The half or quarter mesh that gmsh made of `drawn` under `settings`, moved to the unit `other`.
 
     Both share cell, count, scale and envelope. The membrane goes to its exact place; what is between it and
     the envelope follows harmonically. Raises MeshingError where that cannot be done.

@@ -95,7 +95,7 @@ def mesh_quality(mesh: Mesh, unit: Unit, body: Body | None = None) -> Quality:
 
 
 def inverted(mesh: Mesh) -> Array:
-    """Indices (k,) of the elements that are inverted at a Gauss point, the worst first."""
+    """Numbers (k,) of the elements with det J <= 0, or not a number, at a Gauss point, the worst first."""
     determinants = _determinants(mesh, GAUSS).min(axis=1)
     bad = np.flatnonzero(~(determinants > 0))
     return np.asarray(bad[np.argsort(determinants[bad], kind="stable")])
@@ -116,7 +116,11 @@ def check_positive(mesh: Mesh) -> None:
 
 
 def folded_corners(mesh: Mesh) -> Array:
-    """Least det J at a corner over the largest in the element, (m,): 0 where two curved edges line up."""
+    """Least det J at a corner over the largest |det J| in the element, (m,).
+
+    The largest is that at corners and Gauss points. 1 where edges are straight, 0 where two curved edges line
+    up, negative where the element folds.
+    """
     determinants = _determinants(mesh, np.vstack([np.eye(4), GAUSS]))
     return np.asarray(determinants[:, :4].min(axis=1) / np.abs(determinants).max(axis=1))
 
@@ -142,7 +146,10 @@ def cavity_enclosed(mesh: Mesh) -> float:
 
 
 def dihedral_angles(mesh: Mesh) -> Array:
-    """The six dihedral angles (m, 6) in degrees of each element, taken as straight-sided."""
+    """The six dihedral angles (m, 6) in degrees of each element, taken as straight-sided.
+
+    Column e, with corners i, j = TET_EDGES[e], is the angle between the faces opposite to i and j.
+    """
     x = mesh.nodes[mesh.corners]
     # The gradient of a corner's barycentric coordinate is normal to the face opposite.
     inverse = np.linalg.inv(x[:, 1:] - x[:, :1])
@@ -160,7 +167,11 @@ def _determinants(mesh: Mesh, points: Array) -> Array:
 
 
 def shapes(points: Array, edges: Array, order: int) -> tuple[Array, Array]:
-    """Lagrange functions (q, n) and derivatives (q, n, d) by barycentrics 1..d, at points (q, d + 1)."""
+    """Lagrange functions (q, n) of a simplex and their derivatives (q, n, d), at barycentrics (q, d + 1).
+
+    edges (e, 2): in the order of the mid-edge nodes; order: 1 or 2. Derivatives are by barycentric
+    coordinates 1 to d.
+    """
     corner = np.vstack([-np.ones(points.shape[1] - 1), np.eye(points.shape[1] - 1)])
     if order == 1:
         return points, np.broadcast_to(corner, (len(points), *corner.shape))

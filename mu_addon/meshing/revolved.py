@@ -13,7 +13,11 @@ from .surface import VOID, Surface
 
 
 def unit_surfaces(d: Dimensions, turn: float, edge_mm: float) -> tuple[Surface, Surface, Surface]:
-    """Envelope, profile and cavity of the part of a unit with 0 <= angle <= turn, as nested surfaces."""
+    """Envelope, profile and cavity of the part of a unit with 0 <= angle <= turn, as nested surfaces.
+
+    turn in radians from +y towards +x; edge_mm: about how long the triangles' sides are. Their regions are
+    LATTICE, MEMBRANE and VOID.
+    """
     (_, x1), (y0, y1), _ = d.bounds
     low_x, low_y = -x1 if turn > math.pi else 0.0, y0 if turn >= math.pi else 0.0
     sectors = max(2, round(turn * d.R / edge_mm))

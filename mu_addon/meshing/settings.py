@@ -39,7 +39,8 @@ class MeshSettings:
     fraction: "half" (x >= 0), "quarter" (also y >= 0) or "full" (the half and its mirror image). order: 1
     or 2; linear elements lock in thin walls. refine: divides every size and multiplies through_wall. Sizes
     in mm for a cell of 12.5 mm: along the membrane's meridian and around its apex, at the line of anchors
-    and at the lattice's envelope. through_wall: elements across the membrane. Raises InputError.
+    and at the lattice's envelope. through_wall: elements across the membrane. Raises InputError for a value
+    that is not offered or out of bounds.
 
     >>> MeshSettings().order, MeshSettings(refine=0.5).fraction
     (2, 'half')

@@ -31,7 +31,10 @@ ROUND = 16
 
 
 def bodies(d: Dimensions, bar: Bar | None = None) -> dict[str, float]:
-    """Names of the bodies that there are, and the exact volume of each in mm3."""
+    """Volume in mm3, exact, of each body that can be written, by name: cavity, membrane, envelope, waveguide.
+
+    The cavity includes the inlet's bore, the membrane its boss. The waveguide is there if `bar` is given.
+    """
     (x0, x1), (y0, y1), (z0, z1) = d.bounds
     bore, boss = np.pi * d.inlet_radius**2, np.pi * (d.inlet_radius + d.inlet_wall) ** 2
     cavity = cavity_volume(d) + bore * (d.inlet_length + d.base_cap)
@@ -52,8 +55,8 @@ def write_step(name: str, d: Dimensions, path: Path, bar: Bar | None = None) -> 
     """Write one body as STEP in mm, whole or not at all.
 
     cavity: chambers and inlet as one; membrane: the wall with caps and inlet; envelope: the lattice's box
-    without the actuator; waveguide: bar and seats, with everything cut out. Raises MeshingError where gmsh
-    cannot be loaded (GmshUnavailable) or fails, and OutputError.
+    without the actuator; waveguide: bar and seats, with everything cut out. Raises InputError for another
+    name, MeshingError where gmsh cannot be loaded (GmshUnavailable) or fails, and OutputError.
     """
     makers: dict[str, Callable[[Any], object]] = {
         "cavity": lambda occ: _revolved(occ, _cavity_section(d)),
@@ -80,7 +83,7 @@ def step_volume(path: Path) -> tuple[int, float]:
     """How many solids a STEP file holds, and their volume in mm3 within a surface mesh of order 2.
 
     By the divergence theorem over the mesh, since a kernel's own mass properties are wrong by up to 20 % on
-    some swept splines. Raises MeshingError.
+    some swept splines. Raises MeshingError where gmsh cannot be loaded or cannot read the file.
     """
     with gmsh_model(load_gmsh()) as gmsh:
         try:

@@ -28,7 +28,10 @@ _FLAT = 1e-3
 
 @attrs.frozen(eq=False)
 class Surface:
-    """A closed triangulated surface inside another, normals outward, and the region it encloses, or VOID."""
+    """A closed triangulated surface: vertices (n, 3) in mm, triangles (f, 3) with normals outward.
+
+    region: of the space that it encloses, LATTICE, MEMBRANE or VOID.
+    """
 
     vertices: Array
     triangles: Array
@@ -127,9 +130,10 @@ def _labelled(
 
 
 def winding_number(surface: Surface, points: Array) -> Array:
-    """How many times a closed surface winds around points (n, 3): 1 inside, 0 outside.
+    """How many times a closed surface winds around points (n, 3) in mm, (n,): 1 inside, 0 outside.
 
-    Source: Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. BME-30 (1983) 125.
+    The sum of its triangles' solid angles over 4 pi. Source: Van Oosterom and Strackee, IEEE Trans. Biomed.
+    Eng. BME-30 (1983) 125.
     """
     corners = surface.vertices[surface.triangles]
     result = np.empty(len(points))
@@ -207,7 +211,10 @@ def _tetrahedralize(points: Array, faces: Array, edge: float, epsilon: float) ->
 
 
 def load_pytetwild() -> Any:
-    """The pytetwild module, without the pyvista it asks for on import only to extend it; or MeshingError."""
+    """The pytetwild module. Raises MeshingError where it cannot be loaded.
+
+    It is loaded without pyvista, which it imports only to extend it.
+    """
     try:
         with _pyvista_stand_in():
             import pytetwild

@@ -24,10 +24,10 @@ def tiled(
 ) -> Mesh:
     """Copies of a mesh in its box [0, box] side by side, every other one mirrored, along x, y and z.
 
-    box: (3,) mm, `box_of(mesh)` if not given. Nodes exactly on a shared plane become one. The m elements
-    of each copy follow those of the one before, in the mesh's own order; the cavity is left out; base and
-    tip are the nodes at the lowest and highest z. symmetry: the axes whose zero plane stays a mirror.
-    Raises MeshingError for a mesh that leaves its box.
+    counts: of copies along each axis. box: (3,) mm, `box_of(mesh)` if not given. Nodes exactly on a shared
+    plane become one. The m elements of each copy follow those of the one before, in the mesh's own order; the
+    cavity is left out; base and tip are the nodes at the lowest and highest z. symmetry: the axes whose zero
+    plane stays a mirror. Raises MeshingError for a mesh that leaves its box or a count below 1.
     """
     size = np.array(box_of(mesh) if box is None else box, float)
     if (mesh.nodes < 0).any() or (mesh.nodes > size).any():

@@ -25,7 +25,8 @@ class CandidateBatch:
 
     At every state of Model A (the unit without a sensor) all candidates share one factorisation (batched
     Newton). shares: for each sensor the share (m,) of every element that it fills (`sensor_share`).
-    monitored: points (p, 3) in mm of the backbone and their probe. settings: of Newton's method.
+    monitored: points (p, 3) in mm of the backbone and their probe. sensor_MPa: Young's modulus of the sensor.
+    settings: of Newton's method.
     """
 
     def __init__(
@@ -62,9 +63,10 @@ class CandidateBatch:
         return self.points(simulate_in_time(equilibrium, time_s, pressure_kPa).states)
 
     def at(self, state: State) -> Array:
-        """Monitored points (sensors, p, 3) in mm, at the pressure of one of Model A's states.
+        """Monitored points (sensors, p, 3) in mm of every sensor's unit, at a state of Model A.
 
-        Raises ConvergenceError where a sensor's unit has no equilibrium that continues Model A's.
+        They are at that state's pressure. Raises ConvergenceError where a sensor's unit has no equilibrium
+        that continues Model A's.
         """
         return self.points(self.states(state))
 

@@ -51,29 +51,40 @@ def candidate_paths(anchors: Array, windows: Any) -> list[Candidate]:
 
 
 def roi(mesh: Mesh, candidate: Candidate, radius_mm: float) -> Inclusion:
-    """Region of interest of a candidate: the share of each lattice element of a mesh inside its cylinder."""
+    """Region of interest of a candidate, whose cylinder has a radius in mm.
+
+    The share of each element of a mesh inside the cylinder, 0 outside the lattice region. Raises InputError
+    for a path that bends too sharply for its radius.
+    """
     corners, lattice = mesh.nodes[mesh.corners], mesh.region == LATTICE
     return polyline_inclusion(corners, lattice, candidate.points, radius_mm)
 
 
 def with_sensor(materials: Materials, share: Array, sensor_MPa: float) -> Materials:
-    """Materials with a neo-Hookean sensor of Young's modulus sensor_MPa in a share (m,) of every element.
+    """Materials with a neo-Hookean sensor in a share (m,) of every element.
 
-    Poisson's ratio stays the element's own, so that only Young's modulus differs.
+    sensor_MPa: the sensor's Young's modulus. Poisson's ratio stays the element's own, so that only Young's
+    modulus differs. Raises InputError for a share outside 0 to 1.
     """
     _, poisson = materials.small_strain(len(share))
     return materials.blended(share, NeoHooke, NeoHooke.parameters(sensor_MPa, poisson))
 
 
 def moved_points(monitored: tuple[Array, Probe], trajectory: Trajectory) -> Array:
-    """Positions (k, p, 3) in mm of monitored points at the k instants of a trajectory."""
+    """Positions (k, p, 3) in mm of monitored points at the k instants of a trajectory.
+
+    monitored: the points (p, 3) in mm at rest, and their probe.
+    """
     points, monitor = monitored
     return trajectory.of_time(np.array([points + monitor.displacement(s.u) for s in trajectory.states]))
 
 
 @attrs.frozen(eq=False)
 class Evaluation:
-    """One candidate under one inclusion rule: its deviation, and the volume in mm3 it stiffened."""
+    """One candidate under one inclusion rule: its deviation from Model A, and how much it stiffened.
+
+    stiffened_mm3: volume of the whole body that got the sensor's material; cylinder_mm3: of the cylinder.
+    """
 
     name: str
     rule: str
@@ -91,7 +102,11 @@ def evaluation(
     baseline: Array,
     stations: int,
 ) -> Evaluation:
-    """Deviation of one candidate's monitored points (k, p, 3) in mm from Model A's at the same k instants."""
+    """Deviation of one candidate's monitored points (k, p, 3) in mm from Model A's at the same k instants.
+
+    moved, baseline: the points with and without the sensor; radius_mm: of the inclusion; stations: number of
+    uniform arc lengths compared.
+    """
     found = roi(mesh, candidate, radius_mm)
     # A mesh of one half holds half of the cylinder and of what it stiffens.
     whole = 2 ** len(mesh.symmetry)

@@ -67,7 +67,7 @@ def centreline_deviation(candidate: Array, baseline: Array) -> Deviation:
 
 
 def deviation_of(delta: Array) -> Deviation:
-    """Marginal means and objectives of a matrix Delta (k, j) in mm."""
+    """Marginal means and objectives in mm of distances Delta (k, j) in mm at k times and j stations."""
     from scipy.integrate import trapezoid
 
     k, j = delta.shape

@@ -32,11 +32,12 @@ def _positive(_: object, field: attrs.Attribute[float], value: float) -> None:
 
 @attrs.frozen
 class Limits:
-    """What a path may be: fewest anchors' worth of length, longest, and its sharpest bend.
+    """What a path may be: its least length, its largest, and its sharpest bend.
 
     Lengths are in cells; a window of h anchors is h - 1 cells long, so the source paper's h >= 3 is 2
     cells. The bend is assumed, since the paper's paths are straight: 75 degrees admits the zigzag from
     one half-diagonal to a neighbouring one (70.5) and refuses a step across from one along the axis (90).
+    Raises InputError for a limit that is not positive.
     """
 
     shortest_cells: float = attrs.field(default=2.0, validator=_positive)
@@ -46,9 +47,10 @@ class Limits:
 
 @attrs.frozen(eq=False)
 class Graph:
-    """Nodes (n, 3) in mm and steps (e, 2) from the lower node to the higher; `image` (n,) mirrors x.
+    """Nodes (n, 3) in mm of a lattice and steps (e, 2) from the lower node to the higher.
 
-    Steps rise: light enters near the inlet and leaves near the tip, as in the source paper.
+    image (n,): number of each node's mirror image across x = 0; cell: edge of the unit cell in mm. Steps
+    rise: light enters near the inlet and leaves near the tip, as in the source paper.
     """
 
     nodes: Array
@@ -93,11 +95,11 @@ class Graph:
         return chain <= [int(i) for i in self.image[chain]]
 
     def count(self, limits: Limits) -> int:
-        """How many chains there are within the limits."""
+        """How many chains there are within the limits, mirror images counted once."""
         return sum(1 for _ in self.chains(limits))
 
     def steps_of(self, chain: tuple[int, ...]) -> list[int]:
-        """Numbers of the steps of a chain; raises KeyError where two of its nodes have none between."""
+        """Numbers of the steps of a chain of nodes; raises KeyError where two of them have none between."""
         return [self._number[pair] for pair in pairwise(chain)]
 
     @cached_property

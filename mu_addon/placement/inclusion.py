@@ -72,8 +72,8 @@ def _slices(tets: Array, z: Array) -> Array:
 def cylinder_overlap(corners: Array, start: Array, end: Array, radius: float) -> Array:
     """Volume (m,) in mm3 of straight tetrahedra (m, 4, 3) inside a flat-ended cylinder, all in mm.
 
-    Exact slice areas (disc with polygon), Gauss quadrature along the cylinder's axis between the
-    vertices' heights; the elements of a mesh add up to the cylinder within about 1e-6.
+    start, end (3,): the ends of its axis. Exact slice areas (disc with polygon), Gauss quadrature along the
+    axis between the vertices' heights; the elements of a mesh add up to the cylinder within about 1e-6.
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
     length = float(np.linalg.norm(end - start))
@@ -110,7 +110,10 @@ def cylinder_overlap(corners: Array, start: Array, end: Array, radius: float) ->
 
 @attrs.frozen(eq=False)
 class Inclusion:
-    """Region of interest of a path: share (m,) of each element's volume inside the waveguide's cylinder."""
+    """Region of interest of a path: share (m,) of each element's volume inside the waveguide's cylinder.
+
+    radius_mm and length_mm: of the cylinder.
+    """
 
     share: Array
     radius_mm: float
@@ -118,12 +121,12 @@ class Inclusion:
 
     @property
     def touched(self) -> Array:
-        """Elements (m,) that the cylinder touches: the paper's region of interest."""
+        """Whether the cylinder touches each element, (m,) bool: the paper's region of interest."""
         return self.share > 0
 
     @property
     def cylinder_volume_mm3(self) -> float:
-        """Volume of the cylinder itself."""
+        """Volume in mm3 of the cylinder itself, pi r^2 times its length."""
         return float(np.pi * self.radius_mm**2 * self.length_mm)
 
 
@@ -132,8 +135,9 @@ def straight_inclusion(
 ) -> Inclusion:
     """Inclusion of one straight path in the lattice elements of a mesh.
 
-    corners (m, 4, 3) mm; lattice (m,) bool, elsewhere the share stays 0; shares below `minimum_share`
-    are rounding at a face that the cylinder merely grazes and count as no contact.
+    corners (m, 4, 3), start and end (3,) and radius in mm; lattice (m,) bool, elsewhere the share stays 0;
+    shares below `minimum_share` are rounding at a face that the cylinder merely grazes and count as no
+    contact.
     """
     a, b, c, d = np.moveaxis(corners, 1, 0)
     volume = np.abs(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a)) / 6
@@ -148,7 +152,7 @@ def sensor_share(rule: str, found: Inclusion) -> Array:
 
     "intersect" (the paper's): the whole of every touched element, so that J depends on the mesh.
     "volume_fraction": the share inside the cylinder, in parallel with the lattice's own (Voigt's upper
-    bound); it converges.
+    bound); it converges. Raises ValueError for another rule.
 
     >>> found = Inclusion(np.array([0.0, 0.25, 1.0]), radius_mm=1.0, length_mm=25.0)
     >>> sensor_share("intersect", found).tolist(), sensor_share("volume_fraction", found).tolist()
@@ -162,5 +166,8 @@ def sensor_share(rule: str, found: Inclusion) -> Array:
 
 
 def stiffened_volume_mm3(rule: str, found: Inclusion, volumes: Array) -> float:
-    """Volume in mm3 that a rule gives the sensor's material to, blended elements by their share."""
+    """Volume in mm3 that a rule gives the sensor's material to, of elements with volumes (m,) in mm3.
+
+    Blended elements count by their share. Raises ValueError as `sensor_share`.
+    """
     return float((sensor_share(rule, found) * volumes).sum())

@@ -30,7 +30,7 @@ _STEP = 1e-4
 class Parity:
     """One half of the responses of a body with a mirror plane x = 0: those even in x, or those odd.
 
-    components: of the displacement of points on the plane, those that this half carries.
+    components: 0 to 2, of the displacement of points on the plane, those that this half carries.
     """
 
     model: Model
@@ -58,7 +58,10 @@ def parities(model: Model) -> list[Parity]:
 
 
 def probe_loads(mesh: Mesh, monitor: Probe, components: Sequence[int]) -> Array:
-    """Nodal loads (3 n, p, c) whose work is the displacement of each monitored point along each component."""
+    """Nodal loads (3n, p, c) whose work is the displacement of p monitored points along c components.
+
+    components: numbers 0 to 2 of the axes. A load is 1 N on the point, shared among its element's nodes.
+    """
     points = len(monitor.nodes)
     loads = np.zeros((3 * len(mesh.nodes), points, len(components)))
     for i in range(points):
@@ -68,7 +71,10 @@ def probe_loads(mesh: Mesh, monitor: Probe, components: Sequence[int]) -> Array:
 
 
 def loaded(trajectory: Trajectory, pressures_MPa: Array | None = None) -> list[State]:
-    """A trajectory's states under pressure or weight, or those at some pressures; rest is left out."""
+    """A trajectory's states under pressure or weight; the undeformed one is left out.
+
+    pressures_MPa (t,): take only those at these pressures.
+    """
     states = [state for state in trajectory.states if state.loaded]
     if pressures_MPa is None:
         return states
@@ -76,10 +82,11 @@ def loaded(trajectory: Trajectory, pressures_MPa: Array | None = None) -> list[S
 
 
 def representative_pressures(trajectory: Trajectory) -> Array:
-    """Three of a trajectory's pressures in MPa that stand for all: the extremes, and one between.
+    """Pressures (t,) in MPa, ascending, of three of a trajectory's loaded states that stand for all.
 
-    And none, where the unit's weight makes it deviate there, too. Over the grasp protocol J_hat by
-    `polynomials` through these was within 0.4 % of that with each pressure solved for.
+    The least, the largest, and the one nearest two thirds of the way between; 0 as well, where the unit's
+    weight makes it deviate there, too. Over the grasp protocol J_hat by `polynomials` through these was
+    within 0.4 % of that with each pressure solved for.
     """
     pressures = np.array([state.pressure_MPa for state in loaded(trajectory)])
     low, high = pressures.min(), pressures.max()
@@ -91,8 +98,8 @@ def representative_pressures(trajectory: Trajectory) -> Array:
 class Influence:
     """Displacement (s, p, 3, m) in mm of p points in s states by each element's stiffening, to first order.
 
-    Values are for one element of the whole body made stiffer by the factor 1 + e, divided by e; an element
-    of a half mesh stands for itself without its mirror image.
+    pressure_MPa (s,): of the states. Values are for one element of the whole body made stiffer by the factor
+    1 + e, divided by e; an element of a half mesh stands for itself without its mirror image.
     """
 
     pressure_MPa: Array
@@ -112,12 +119,13 @@ def influence_map(
     pressures_MPa: Array | None = None,
     sides: list[Parity] | None = None,
 ) -> Influence:
-    """First-order displacement of every monitored point by the stiffening of every element (adjoint method).
+    """First-order displacement of p monitored points by the stiffening of m elements, in s states.
 
-    In each state K lambda = probe is solved for every monitored point and component; stiffening an element
-    whose internal force is f then moves the point by -lambda f. Linear in the weights of the element's
-    laws, whatever they are. trajectory: of Model A; monitor: probe of p points; pressures_MPa: the states
-    to take, by default all under pressure. Raises IndefiniteError at an unstable state.
+    In each state K lambda = probe is solved for every monitored point and component (adjoint method);
+    stiffening an element whose internal force is f then moves the point by -lambda f. Linear in the weights
+    of the element's laws, whatever they are. trajectory: of Model A; monitor: probe of p points;
+    pressures_MPa: the states to take, by default all under pressure or weight; sides: `parities(model)`.
+    Raises IndefiniteError at an unstable state, and MeshingError as `parities`.
     """
     mesh = model.mesh
     sides = parities(model) if sides is None else sides
@@ -139,7 +147,10 @@ def influence_map(
 
 
 def centreline_gradient(points: Array, stations: int) -> Array:
-    """Derivative (j, 3, p, 3) of the centreline by the points (p, 3) in mm it goes through."""
+    """Derivative (j, 3, p, 3) of the centreline's j stations by the points (p, 3) in mm it goes through.
+
+    By central differences of 1e-4 mm.
+    """
     shifts = _STEP * np.eye(points.size).reshape(-1, *points.shape)
     ahead, behind = (centreline(points + sign * shifts, stations) for sign in (1, -1))
     return np.asarray((ahead - behind) / (2 * _STEP)).transpose(1, 2, 0).reshape(stations, 3, *points.shape)
@@ -160,13 +171,16 @@ def mean_deviation(gradients: Array, moved: Array, weights: Array) -> Array:
 
 
 def shares_of_time(trajectory: Trajectory) -> Array:
-    """Share (s,) of the instants at which each loaded state holds."""
+    """Share (s,), 0 to 1, of a trajectory's instants at which each loaded state holds."""
     count = np.bincount(trajectory.index, minlength=len(trajectory.states)) / len(trajectory.index)
     return count[[state.loaded for state in trajectory.states]]
 
 
 def gradients_of(trajectory: Trajectory, points: Array, monitor: Probe, stations: int) -> Array:
-    """`centreline_gradient` (s, j, 3, p, 3) about the baseline's monitored points in every loaded state."""
+    """`centreline_gradient` (s, j, 3, p, 3) about the monitored points of every loaded state.
+
+    points (p, 3) in mm at rest, monitor their probe; stations: the number j.
+    """
     return np.array(
         [centreline_gradient(points + monitor.displacement(s.u), stations) for s in loaded(trajectory)]
     )

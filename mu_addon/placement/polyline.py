@@ -18,7 +18,7 @@ _SHARPEST = np.radians(135.0)
 
 
 def legs(points: Array) -> Array:
-    """The points (k, 3) of a polyline (n, 3) where it bends, and its two ends."""
+    """The points (k, 3) of a polyline (n, 3) in mm where it bends, and its two ends."""
     points = np.asarray(points, float)
     way = np.diff(points, axis=0)
     way = way / np.linalg.norm(way, axis=1)[:, None]
@@ -62,7 +62,11 @@ def polyline_overlap(corners: Array, points: Array, radius: float) -> Array:
 def polyline_inclusion(
     corners: Array, lattice: Array, points: Array, radius: float, minimum_share: float = 1e-9
 ) -> Inclusion:
-    """Inclusion of a path (n, 3) in the lattice elements of a mesh; see `inclusion.straight_inclusion`."""
+    """Inclusion of a path (n, 3) in mm in the lattice elements of a mesh.
+
+    corners (m, 4, 3) and radius in mm; lattice (m,) bool; minimum_share: below it no contact, as in
+    `straight_inclusion`. Raises InputError as `polyline_overlap`.
+    """
     a, b, c, d = np.moveaxis(corners, 1, 0)
     volume = np.abs(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a)) / 6
     share = np.zeros(len(corners))

@@ -79,10 +79,11 @@ class Response:
     def displacements(
         self, chains: Sequence[tuple[int, ...]], pressures_MPa: Array, block: int = 512
     ) -> Array:
-        """Displacement (c, t, p, 3) in mm of the monitored points by each chain, against Model A.
+        """Displacement (c, t, p, 3) in mm of the monitored points by each of c chains, against Model A.
 
-        Between the states of the response, and at 0, where nothing deviates, it is a polynomial in the
-        pressure.
+        pressures_MPa (t,): between the states of the response, and at 0, where nothing deviates, it is a
+        polynomial in the pressure. block: chains solved at once. Raises KeyError for a chain that is not the
+        graph's.
         """
         moved = self._at_states(chains, block)
         return np.einsum("ts,cspi->ctpi", polynomials(self.pressure_MPa, pressures_MPa), moved)
@@ -134,9 +135,9 @@ def reduced_response(
     """Linear response of a unit to any chain of steps of its lattice graph, by a few strain patterns a step.
 
     model, materials, trajectory: Model A. sensor_MPa, rule, radius_mm: of the sensor, as in `evaluate`.
-    monitor: probe of the backbone's points. pressures_MPa: the states, by default those of
-    `representative_pressures`. Raises InputError where a step meets no element, IndefiniteError at an
-    unstable state.
+    monitor: probe of the backbone's p points. pressures_MPa (s,): the states, by default those of
+    `representative_pressures`; sides: `parities(model)`. Raises InputError where a step meets no element,
+    IndefiniteError at an unstable state.
     """
     mesh = model.mesh
     sides = parities(model) if sides is None else sides

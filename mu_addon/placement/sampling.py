@@ -11,7 +11,7 @@ Array = np.ndarray[Any, Any]
 
 
 def rounds(pressure: Array, has_gravity: bool = False) -> list[list[int]]:
-    """In which order to solve distinct pressures (s,): two at a time, the extremes first.
+    """Numbers of distinct pressures (s,) in the order to solve them: two at a time, the extremes first.
 
     Each later pressure is the one farthest from those before it and from 0, where nothing deviates. Where
     the unit weighs something, it deviates there, too: 0, if it is met, is then solved beside the extremes.
@@ -30,9 +30,10 @@ def rounds(pressure: Array, has_gravity: bool = False) -> list[list[int]]:
 
 
 def polynomials(known: Array, wanted: Array) -> Array:
-    """Weights (t, s) of values known at s pressures in their polynomial at t others.
+    """Weights (t, s) of values known at s pressures in their Lagrange polynomial at t others.
 
-    It is 0 at no pressure, unless the value there is among the known ones.
+    Pressures in any unit, the same for both. The polynomial is 0 at no pressure, unless the value there is
+    among the known ones.
     """
     weights = np.empty((len(wanted), len(known)))
     vanishes = [] if (np.asarray(known) == 0).any() else [0.0]
@@ -43,9 +44,9 @@ def polynomials(known: Array, wanted: Array) -> Array:
 
 
 def between(pressure: Array, known: Mapping[int, Array]) -> Array:
-    """Differences (s, ...) at all pressures (s,) of those known at some, by number.
+    """Differences (s, ...) at all pressures (s,), of those known at some of them by number.
 
-    Their polynomial, see `polynomials`; what is known stays as it is.
+    Their polynomial, see `polynomials`; what is known stays as it is. Pressures in any unit.
     """
     pressure = np.asarray(pressure, float)
     numbers = list(known)
@@ -57,10 +58,10 @@ def between(pressure: Array, known: Mapping[int, Array]) -> Array:
 
 
 def estimate(fuller: Array, sparser: Array, weight: Array) -> float:
-    """Error of the sparser of two sets of differences (s, jobs, p, 3), relative to the job's mean deviation.
+    """Relative error of the sparser of two sets of differences (s, jobs, p, 3) in mm against the fuller.
 
-    weight (s,): instants at each pressure. The largest of any job; by the triangle inequality a bound of
-    how far the mean deviations of the two lie apart.
+    weight (s,): instants at each pressure. The largest of any job, over its mean deviation; by the triangle
+    inequality a bound of how far the mean deviations of the two lie apart.
     """
 
     def mean(values: Array) -> Array:

@@ -15,10 +15,10 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen
 class SearchSettings:
-    """How many paths are checked at least, at most and at a time, and the risk left when it ends.
+    """How many paths are checked at first, at most and at a time, and the risk left when it ends.
 
     spread: of the first checks, how many are taken from the whole range of predictions, so that the
-    prediction's error is known there too.
+    prediction's error is known there too. risk: a probability, see `probability_of_better`.
     """
 
     first: int = 12
@@ -44,17 +44,18 @@ class Search:
 
     @property
     def checked(self) -> Array:
-        """Numbers of the paths that were checked, best first."""
+        """Numbers (k,) of the paths that were checked, by ascending exact J_hat."""
         order = np.argsort(self.exact_mm)
         return order[: np.count_nonzero(np.isfinite(self.exact_mm))]
 
 
 def probability_of_better(predicted_mm: Array, exact_mm: Array) -> float:
-    """Probability, at most, that some unchecked path (NaN in exact_mm) beats the best checked one.
+    """Upper bound of the probability that some unchecked path beats the best checked one.
 
-    The logarithm of exact over predicted J_hat is taken as normal with the checked paths' mean and
-    variance; Student's t gives the probability of each unchecked path, and their sum bounds that of any. This
-    is what was observed, not a proof: it holds as far as unchecked paths err as checked ones do.
+    predicted_mm, exact_mm (n,): J_hat of every path, exact NaN where unchecked. The logarithm of exact over
+    predicted is taken as normal with the checked paths' mean and variance; Student's t gives the probability
+    for each unchecked path, and their sum bounds that for any. This is what was observed, not a proof: it
+    holds as far as unchecked paths err as checked ones do.
     """
     from scipy.stats import t
 
@@ -103,9 +104,10 @@ def search_paths(
 
 
 def front(length: Array, deviation_mm: Array) -> Array:
-    """Numbers of the paths that are Pareto-optimal in length (longer is better) and deviation.
+    """Numbers (k,) of the paths that are Pareto-optimal in length (longer is better) and deviation.
 
-    length (n,) in cells or mm; deviation_mm (n,), NaN where unknown: such paths are left out.
+    length (n,) in cells or mm; deviation_mm (n,), NaN where unknown: such paths are left out. Ascending in
+    length.
 
     >>> front(np.array([2.0, 3.0, 4.0]), np.array([0.2, 0.1, 0.4])).tolist()
     [1, 2]

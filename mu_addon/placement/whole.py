@@ -14,9 +14,10 @@ Array = np.ndarray[Any, Any]
 
 
 def whole_body(mesh: Mesh, trajectory: Trajectory) -> tuple[Mesh, Trajectory]:
-    """Mesh and trajectory of the whole body, mirrored from those of its half, without solving again.
+    """Mesh and trajectory of the whole body, mirrored from those of its half or quarter.
 
-    A path off the mirror plane needs both sides. Equilibria stay equilibria, to rounding.
+    Nothing is solved again: equilibria stay equilibria, to rounding. A path off the mirror plane needs both
+    sides.
     """
     for axis in mesh.symmetry:
         states = (attrs.evolve(s, u=mirror_displacement(mesh, s.u, axis)) for s in trajectory.states)

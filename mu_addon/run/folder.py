@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ import attrs
 
 from ..errors import InputError, OutputError
 from ..files import make_folder, output_error, write_text
+from ..reading import file_bytes, parse_toml
 from .lock import LOCK, FolderLock
 
 if TYPE_CHECKING:
@@ -112,9 +112,9 @@ def _same(name: str, before: str, now: str | None) -> bool:
 
 def _document(text: str) -> dict[str, Any] | None:
     try:
-        return {key: value for key, value in tomllib.loads(text).items() if key != RUN}
+        return {key: value for key, value in parse_toml(text, "").items() if key != RUN}
     # Thousands of nested brackets exhaust the parser's stack.
-    except (tomllib.TOMLDecodeError, RecursionError):
+    except InputError:
         return None
 
 
@@ -148,6 +148,12 @@ def _refuse_links(folder: Path, patterns: Iterable[str]) -> None:
     """A link under a name that a run writes would send its words into a file elsewhere."""
     for pattern in patterns:
         for path in [folder / pattern, *folder.glob(pattern)]:
+            if path.exists() and not path.is_file() and not path.is_dir():
+                raise InputError(
+                    f"{path.name} in the folder is a pipe or a device",
+                    str(path),
+                    "remove it, or choose another folder for the results",
+                )
             if path.is_symlink() or (hasattr(os.path, "isjunction") and os.path.isjunction(path)):
                 raise InputError(
                     f"{path.name} in the folder is a link to another location",
@@ -158,7 +164,7 @@ def _refuse_links(folder: Path, patterns: Iterable[str]) -> None:
 
 def _read(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return file_bytes(path).decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except (OSError, UnicodeDecodeError):
         return ""
 

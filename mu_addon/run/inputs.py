@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import tomllib
 import types
 import typing
 from collections.abc import Mapping
@@ -13,6 +12,7 @@ from typing import Any, TypeVar, Union
 import attrs
 
 from ..errors import InputError
+from ..reading import file_text, parse_toml
 from .folder import RUN
 
 FORMAT = 1
@@ -30,24 +30,12 @@ def read_toml(path: Path, what: str = "inputs", remedy: str = "choose another fo
     """The document of a TOML file; raises InputError."""
     where = str(path)
     try:
-        with path.open(encoding="utf-8-sig") as stream:
-            text = stream.read(_LONGEST + 1)
+        text = file_text(path, _LONGEST)
     except OSError as error:
         raise InputError(f"cannot read the {what}: {error.strerror or error}", where, remedy) from error
     except UnicodeDecodeError as error:
         raise InputError("the file is not UTF-8 text", where, "save it as UTF-8") from error
-    if len(text) > _LONGEST:
-        raise InputError(f"more than {_LONGEST} characters are no {what}", where, remedy)
     return parse_toml(text, where)
-
-
-def parse_toml(text: str, where: str) -> dict[str, Any]:
-    """The document of TOML text; raises InputError."""
-    try:
-        return tomllib.loads(text)
-    # Thousands of nested brackets exhaust the parser's stack.
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"this is not TOML: {error}", where, "correct that line") from error
 
 
 def read_inputs(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:

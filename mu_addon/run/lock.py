@@ -85,7 +85,7 @@ def _owner(handle: int) -> str:
         os.lseek(handle, 0, os.SEEK_SET)
         signed: Any = json.loads(os.read(handle, 1000))
         return f"process {signed['process']:d} on {signed['machine']!s:.80}, since {signed['since']!s:.80}"
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         # It has the lock and has not signed yet.
         return "it has just started"
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -25,6 +24,7 @@ from scipy.special import stdtrit
 
 from ..errors import InputError
 from ..files import write_text
+from ..reading import file_text, is_number, parse_toml
 from ..toml_writer import Noted, toml_text
 
 Array = np.ndarray[Any, Any]
@@ -367,8 +367,18 @@ def read_calibration(path: Path) -> Calibration:
     Raises InputError where it cannot be read, has another version, lacks a value, or its map is not
     monotonic.
     """
+    remedy = "name a calibration.toml"
     try:
-        table = tomllib.loads(Path(path).read_text())
+        table = parse_toml(file_text(path), str(path))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read the calibration: {error}", str(path), remedy) from None
+    except InputError as error:
+        raise InputError(f"cannot read the calibration: {error.what}", error.where, remedy) from None
+    try:
+        numbers = [*table["knots_deg"], *table["coefficients_V"]]
+        numbers += [table[n] for n in ("version", "band_V", "drift_per_h", "gain", "error_deg", "sweeps")]
+        if not all(map(is_number, [*numbers, 0 if isinstance(table["dark"], str) else table["dark"]])):
+            raise TypeError("true, false or words where numbers should be")
         if table["version"] != VERSION:
             raise InputError(f"version {table['version']} is not known", str(path), "calibrate again")
         result = Calibration(
@@ -382,11 +392,7 @@ def read_calibration(path: Path) -> Calibration:
             float(table["error_deg"]),
             int(table["sweeps"]),
         )
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(
-            f"cannot read the calibration: {error}", str(path), "name a calibration.toml"
-        ) from None
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(f"the calibration is invalid: {error!r}", str(path), "calibrate again") from None
     steps = np.diff(result.coefficients)
     sound = (

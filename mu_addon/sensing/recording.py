@@ -22,6 +22,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..files import make_folder, output_error, plain
+from ..reading import file_bytes
 from .decoder import Reject, Samples
 
 Array = np.ndarray[Any, Any]
@@ -221,7 +222,7 @@ def read_recording(folder: Path) -> list[Recording]:
     folder = Path(folder)
     messages = []
     try:
-        lines = (folder / INDEX).read_bytes().split(b"\n")
+        lines = file_bytes(folder / INDEX, 1 << 32).split(b"\n")
     except OSError as error:
         raise InputError(
             f"the recording is invalid: {error.strerror}", str(folder), f"name a folder with {INDEX}"
@@ -229,7 +230,7 @@ def read_recording(folder: Path) -> list[Recording]:
     for line in lines:
         try:
             message = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             continue
         if isinstance(message, dict):
             messages.append(message)
@@ -239,7 +240,7 @@ def read_recording(folder: Path) -> list[Recording]:
 
 def _read_file(path: Path, messages: tuple[dict[str, Any], ...]) -> Recording | None:
     try:
-        text = path.read_bytes().decode()
+        text = file_bytes(path, 1 << 32).decode()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"cannot read {path.name}: {error}", str(path), "restore it from a copy") from None
     head, _, body = text.partition("\n")

@@ -234,7 +234,7 @@ def test_what_cannot_be_used_is_refused_by_file_and_row(tmp_path, keys, text, wh
     ("toml", "what", "where"),
     [
         ("", "no experiment is defined", "experiments.toml"),
-        ("[[experiment]\n", "not TOML", "experiments.toml"),
+        ("[[experiment]\n", "not TOML", "experiments.toml, line 1"),
         ("[experiment]\nname = 1\n", "no experiment is defined", "experiments.toml"),
         ("experiment = [1]\n", "is not a table", "experiments.toml"),
         ("[[experiments]]\n", "did you mean 'experiment'", "experiments.toml"),

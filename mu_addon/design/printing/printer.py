@@ -9,6 +9,7 @@ from typing import Any
 import attrs
 
 from ...errors import InputError
+from ...reading import file_text
 from ...toml_writer import Noted, toml_text
 from ..assets import asset_file, asset_names
 from ..toml_text import parse, place
@@ -69,12 +70,12 @@ def read_printer(path: str | Path) -> Printer:
     """The printer in a TOML file; InputError names the file, the line and the key that is wrong."""
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = file_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"cannot read the printer's limits: {error}", str(path), "check the name") from error
     keys = {"": ("format", "name", "title"), **dict.fromkeys(MEANING, ("value", "source", "assumed"))}
     document = parse(text, keys, str(path))
-    if document.get("format") != 1:
+    if document.get("format") != 1 or document["format"] is True:
         raise InputError("the printer's file has no format = 1", place(str(path), None), "write format = 1")
     missing = [name for name in MEANING if name not in document]
     if missing:

@@ -51,13 +51,13 @@ class CubicShear(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear modulus, averaged over directions (3/5 of G), and bulk modulus 0 (k, 2) in MPa."""
+        """Shear modulus, averaged over directions (3/5 of G), and bulk modulus 0, (k, 2) in MPa."""
         G = parameters[:, 0]
         return np.stack([0.6 * G, np.zeros_like(G)], axis=1)
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless G is 0 or more and finite."""
+        """Raise InputError unless G in MPa of every row (k, 1) is 0 or more and finite."""
         G = parameters[:, 0]
         good = np.isfinite(G) & (G >= 0)
         require(good, CubicShear, "G_MPa", G, "0 or more and finite", "give a G_MPa from 0")

@@ -47,13 +47,13 @@ class DiagonalStretch(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear modulus 0 and bulk modulus (k, 2) in MPa."""
+        """Shear modulus 0 and bulk modulus C, (k, 2) in MPa."""
         C = parameters[:, 0]
         return np.stack([np.zeros_like(C), C], axis=1)
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless C is 0 or more and finite."""
+        """Raise InputError unless C in MPa of every row (k, 1) is 0 or more and finite."""
         C = parameters[:, 0]
         good = np.isfinite(C) & (C >= 0)
         require(good, DiagonalStretch, "C_MPa", C, "0 or more and finite", "give a C_MPa from 0")

@@ -122,9 +122,11 @@ class Foam(Law):
 
     @staticmethod
     def parameters(modulus_MPa: Any, poisson: Any, alpha_tension: Any, alpha_compression: Any) -> Array:
-        """Parameters (k, 6) of one small-strain Young's modulus and Poisson's ratio, and two exponents.
+        """Parameters (k, 6) of one small-strain Young's modulus in MPa, Poisson's ratio and two exponents.
 
-        gamma = alpha_compression nu/(1 - 2 nu), as one term's hyperfoam has it, and 1 for a nu of 0.
+        Each is a number or (k,); tension and compression get the same mu. gamma = alpha_compression nu/(1 - 2
+        nu), as one term's hyperfoam has it, and 1 for a nu of 0. The values are not checked here: `valid`
+        does that.
         """
         values = np.broadcast_arrays(*np.atleast_1d(modulus_MPa, poisson, alpha_tension, alpha_compression))
         modulus, nu, tension, compression = (np.array(v, float) for v in values)
@@ -136,13 +138,19 @@ class Foam(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear modulus, the mean of tension and compression, and bulk modulus (k, 2) in MPa."""
+        """Shear modulus, mu as the mean of tension and compression, and bulk modulus, (k, 2) in MPa.
+
+        The bulk modulus is lambda + 2/3 mu.
+        """
         mu = (parameters[:, 0] + parameters[:, 2]) / 2
         return np.stack([mu, parameters[:, 4] + 2 / 3 * mu], axis=1)
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless both mu are positive, lambda is not negative, no exponent is 0."""
+        """Raise InputError unless mu > 0, lambda >= 0 in MPa and no exponent, gamma among them, is 0.
+
+        parameters: (k, 6); both mu must be finite too.
+        """
         require_positive(Foam, parameters, "mu_tension_MPa", "mu_compression_MPa")
         for name in ("alpha_tension", "alpha_compression", "gamma"):
             values = parameters[:, Foam.parameter_names.index(name)]

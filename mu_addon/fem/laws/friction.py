@@ -96,10 +96,10 @@ class Friction(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear modulus before sliding, and no bulk modulus (k, 2) in MPa."""
+        """Shear modulus before sliding, and bulk modulus 0, (k, 2) in MPa."""
         return np.stack([parameters[:, 0], np.zeros(len(parameters))], axis=1)
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless modulus and yield stress are positive."""
+        """Raise InputError unless modulus and yield stress in MPa of every row (k, 2) are > 0 and finite."""
         require_positive(Friction, parameters, *Friction.parameter_names)

@@ -10,9 +10,11 @@ from .tensors import add_left, f64, mat33, mat99
 
 
 def of_green_strain(energy: Any, stress: Any, stiffness: Any) -> tuple[Any, Any, Any]:
-    """Energy, stress and tangent by F of W(E), of functions (E, m) for W, S = dW/dE and dS/dE.
+    """Energy, stress and tangent by F, Warp functions of (F, m), of a law W(E) of the Green-Lagrange strain.
 
-    dS/dE (mat99) has the minor symmetries. dP_iJ/dF_kL = delta_ik S_JL + F_iM F_kN dS_MJ/dE_NL.
+    energy, stress, stiffness: Warp functions of (E, m) for W in MPa, S = dW/dE (mat33, MPa) and dS/dE (mat99,
+    MPa), which must have the minor symmetries. P = F S and
+    dP_iJ/dF_kL = delta_ik S_JL + F_iM F_kN dS_MJ/dE_NL.
     """
 
     @wp.func

@@ -13,9 +13,10 @@ slopes = wp.types.vector(length=5, dtype=wp.float64)
 
 
 def of_invariants(energy: Any, slope: Any) -> tuple[Any, Any, Any]:
-    """Energy, stress and tangent by F of W(I1, I2), of functions (I1, I2, m) for W and its `slopes`.
+    """Energy, stress and tangent by F, Warp functions of (F, m), of a law W(I1, I2).
 
-    I1 = tr C, I2 = (tr(C)^2 - tr(C^2))/2; dI1/dF = 2 F, dI2/dF = 2 (I1 F - F C).
+    energy, slope: Warp functions of (I1, I2, m) for W in MPa and its five derivatives, `slopes`. I1 = tr C,
+    I2 = (tr(C)^2 - tr(C^2))/2; dI1/dF = 2 F, dI2/dF = 2 (I1 F - F C).
     """
 
     @wp.func

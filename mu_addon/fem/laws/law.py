@@ -36,10 +36,17 @@ class Law:
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear and bulk modulus (k, 2) in MPa at small strain, averaged over directions (Voigt)."""
+        """Shear and bulk modulus (k, 2) in MPa at small strain of parameters (k, count).
+
+        Of a law that depends on direction: averaged over directions (Voigt). Raises NotImplementedError here;
+        every law gives its own.
+        """
         raise NotImplementedError
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless parameters (k, count) are admissible."""
+        """Raise InputError unless every row of parameters (k, count) is admissible; every law gives its own.
+
+        Raises NotImplementedError here.
+        """
         raise NotImplementedError

@@ -77,20 +77,26 @@ class Layered(Law):
 
     @staticmethod
     def parameters(in_plane_MPa: Any, across_MPa: Any, normal: Any) -> Array:
-        """Parameters (k, 5) of moduli, numbers or (k,), and normals (3,) or (k, 3) of any length."""
+        """Parameters (k, 5) of two moduli in MPa and the layers' normal, of any length.
+
+        Moduli are numbers or (k,), normals (3,) or (k, 3).
+        """
         moduli = np.stack(np.broadcast_arrays(*np.atleast_1d(in_plane_MPa, across_MPa)), axis=1)
         normals = np.broadcast_to(unit(normal), (len(moduli), 3))
         return np.hstack([moduli, normals])
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear and bulk modulus (k, 2) in MPa, averaged over directions."""
+        """Shear and bulk modulus (k, 2) in MPa, averaged over directions: 1/2 and 1/3 of tr K/3."""
         mean = (2 * parameters[:, 0] + parameters[:, 1]) / 3
         return np.stack([mean / 2, mean / 3], axis=1)
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless the moduli are 0 or more and finite and the normal a unit vector."""
+        """Raise InputError unless both moduli are 0 or more and finite and the normal is a unit vector.
+
+        parameters: (k, 5), moduli in MPa. The normal's length may differ from 1 by 1e-9.
+        """
         for column, name in enumerate(Layered.parameter_names[:_NORMAL]):
             values = parameters[:, column]
             good = np.isfinite(values) & (values >= 0)

@@ -46,7 +46,7 @@ class MooneyRivlin(Law):
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless kappa and c1 + c2 are positive."""
+        """Raise InputError unless kappa > 0 and finite and c1 + c2 > 0, in MPa, in every row (k, 3)."""
         require_positive(MooneyRivlin, parameters, "kappa_MPa")
         total = parameters[:, 0] + parameters[:, 1]
         require(

@@ -66,7 +66,11 @@ class NeoHooke(Law):
 
     @staticmethod
     def parameters(modulus_MPa: Any, poisson: Any) -> Array:
-        """Parameters (k, 2) of small-strain Young's modulus in MPa and Poisson's ratio; raises InputError."""
+        """Parameters (k, 2), mu and kappa in MPa, of small-strain Young's modulus in MPa and Poisson's ratio.
+
+        Each is a number or (k,). Raises InputError where the modulus is not positive or the ratio not between
+        -1 and 0.5.
+        """
         return np.stack(shear_and_bulk(NeoHooke, modulus_MPa, poisson), axis=1)
 
     @staticmethod
@@ -76,5 +80,5 @@ class NeoHooke(Law):
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless both moduli are positive."""
+        """Raise InputError unless mu and kappa in MPa of every row (k, 2) are positive and finite."""
         require_positive(NeoHooke, parameters, *NeoHooke.parameter_names)

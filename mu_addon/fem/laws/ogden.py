@@ -80,7 +80,10 @@ class Ogden(Law):
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless kappa and the shear modulus are positive and no exponent is 0."""
+        """Raise InputError unless every row (k, 7) has kappa > 0, a shear modulus > 0 and no exponent 0.
+
+        kappa and the shear modulus, the sum of mu_p alpha_p / 2, are in MPa.
+        """
         require_positive(Ogden, parameters, "kappa_MPa")
         for p in (1, 3, 5):
             name, alpha = Ogden.parameter_names[p], parameters[:, p]

@@ -90,7 +90,10 @@ class OgdenRoxburgh(Law):
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless the Yeoh law is valid, r is 1 or more, m positive and beta not negative."""
+        """Raise InputError unless the Yeoh law is valid, r >= 1, m > 0 in MPa and beta >= 0.
+
+        parameters: (k, 7), in the order of `parameter_names`.
+        """
         law = OgdenRoxburgh
         Yeoh.valid(parameters[:, :4])
         require_positive(law, parameters, "m_MPa")

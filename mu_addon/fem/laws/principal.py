@@ -29,10 +29,11 @@ def power_difference(a: wp.float64, b: wp.float64, r: wp.float64) -> wp.float64:
 
 
 def of_stretches(energy: Any, stress: Any, slope: Any, difference: Any) -> tuple[Any, Any, Any]:
-    """Energy, stress and tangent by F of a law in principal stretches, all functions of (stretches, m).
+    """Energy, stress and tangent by F, Warp functions of (F, m), of a law in principal stretches.
 
-    energy: W; stress: s_a = dW/d(stretch_a)/stretch_a (vec3); slope: ds_a/dx_b (mat33); difference:
-    (s_b - s_a)/(x_b - x_a) for the pairs 01, 12, 20 (vec3).
+    Arguments are Warp functions of (stretches, m), in MPa: energy: W; stress: s_a = dW/d(stretch_a)/stretch_a
+    (vec3); slope: ds_a/dx_b (mat33), x = stretch^2; difference: (s_b - s_a)/(x_b - x_a) for the pairs 01, 12,
+    20 (vec3).
     """
 
     @wp.func

@@ -114,7 +114,10 @@ class Prony(Law):
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless the Yeoh law is valid, all tau are positive and no beta is negative."""
+        """Raise InputError unless the Yeoh law is valid, all tau > 0 in s and all beta >= 0.
+
+        parameters: (k, 10), in the order of `parameter_names`.
+        """
         Yeoh.valid(parameters[:, :4])
         require_positive(Prony, parameters, "tau1_s", "tau2_s", "tau3_s")
         for name in ("beta1", "beta2", "beta3"):

@@ -12,7 +12,10 @@ Array = np.ndarray[Any, Any]
 
 
 def require(good: Array, law: Any, name: str, values: Array, wanted: str, remedy: str) -> None:
-    """Raise InputError unless `good` (k,) holds for all values (k,) of a law's parameter `name`."""
+    """Raise InputError unless `good` (k,) holds for all values (k,) of a law's parameter `name`.
+
+    wanted, remedy: what the value must be and what to do, for the message, which names the first bad row.
+    """
     bad = np.flatnonzero(~np.asarray(good))
     if len(bad):
         raise InputError(

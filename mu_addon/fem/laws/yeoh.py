@@ -52,7 +52,7 @@ class Yeoh(Law):
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless c1 and kappa are positive and c3 is not negative."""
+        """Raise InputError unless c1, kappa > 0 and finite and c3 >= 0, all in MPa, in every row (k, 4)."""
         require_positive(Yeoh, parameters, "c1_MPa", "kappa_MPa")
         c3 = parameters[:, 2]
         require(c3 >= 0, Yeoh, "c3_MPa", c3, "0 or more", "with less, a large stretch has no energy minimum")

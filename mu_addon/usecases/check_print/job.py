@@ -10,6 +10,7 @@ from ...design.anchors import Window, window
 from ...design.parameters import Unit, read_unit, to_toml
 from ...design.printing.printer import Printer, printer_text, read_printer
 from ...errors import InputError
+from ...reading import file_bytes
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, digest, named_path, read_inputs, require_digest, structured
 from ...toml_writer import toml_text
@@ -71,7 +72,7 @@ class Job:
 def read_stl(path: Path) -> bytes:
     """The bytes of an STL file to check; raises InputError."""
     try:
-        return path.read_bytes()
+        return file_bytes(path, 1 << 31)
     except OSError as error:
         raise InputError(
             f"cannot read the file: {error.strerror or error}", str(path), "check its name"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -13,6 +12,7 @@ import attrs
 import numpy as np
 
 from ...design.parameters import Unit
+from ...errors import InputError
 from ...evidence.drive import reading_noise
 from ...evidence.extended import ExtendedModel, extended_model
 from ...evidence.prediction import lattice
@@ -20,6 +20,7 @@ from ...evidence.simulator import Composite
 from ...evidence.verdict import Verdict, diagnose
 from ...files import write_csv, write_json
 from ...measured import Measured
+from ...reading import file_bytes, parse_json
 from ...run.context import RunContext
 from ...run.folder import begin, same_inputs
 from ...run.progress import Progress
@@ -41,11 +42,16 @@ def begin_diagnosis(job: Job, folder: Path, context: RunContext) -> None:
 def _kept(folder: Path, inputs: Mapping[str, str]) -> dict[str, Any]:
     """The summary of a verdict on the same inputs that a folder holds whole; empty where it does not."""
     try:
-        found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        found = parse_json(file_bytes(folder / "summary.json"), "summary.json")
+    except (OSError, InputError):
         return {}
     whole = all((folder / name).is_file() for name in LAYOUT.results)
-    if not (same_inputs(folder, inputs) and whole and found.get("status") == "complete"):
+    if not (
+        same_inputs(folder, inputs)
+        and whole
+        and isinstance(found, dict)
+        and found.get("status") == "complete"
+    ):
         return {}
     return {k: v for k, v in found.items() if k != "status"}
 

@@ -13,6 +13,7 @@ import numpy as np
 from ...design.assets import asset_root
 from ...errors import InputError
 from ...fem.protocol import Protocol, read_protocol
+from ...reading import file_text
 
 Array = np.ndarray[Any, Any]
 
@@ -66,7 +67,7 @@ def read_phases(path: Path) -> Phases:
     Raises InputError as `read_protocol` does, and for phases that are missing, out of order or unknown.
     """
     protocol = read_protocol(path)
-    lines = path.read_text(encoding="utf-8-sig").splitlines()
+    lines = file_text(path).splitlines()
     rows = list(csv.reader(words for line in lines if (words := line.split("#")[0].strip())))
     header = [name.strip() for name in rows[0]]
     if "phase" not in header:

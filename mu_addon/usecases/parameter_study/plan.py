@@ -14,8 +14,9 @@ from ...design.parameters import Unit, load_preset, read_unit, to_toml
 from ...design.toml_text import nearest
 from ...errors import InputError, MuError
 from ...fem.protocol import Protocol
+from ...reading import parse_toml
 from ...run.folder import RUN, FolderLayout
-from ...run.inputs import FORMAT, parse_toml, read_toml
+from ...run.inputs import FORMAT, read_toml
 from ...toml_writer import toml_text
 from ..simulate_and_place.job import OF_FILES, Job, job_with, protocol_of, protocol_text
 from ..simulate_and_place.study_file import FILES, STAGES

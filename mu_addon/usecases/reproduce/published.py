@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import tomllib
 from typing import Any
 
 import attrs
@@ -11,6 +10,7 @@ import numpy as np
 
 from ...design.assets import asset_root
 from ...errors import InputError
+from ...reading import file_text, parse_toml
 from ...report.results import Path
 
 Array = np.ndarray[Any, Any]
@@ -60,13 +60,13 @@ def published() -> Published:
     try:
         lines = (folder / TABLE).read_text(encoding="utf-8").splitlines()
         rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
-        measured = tomllib.loads((folder / MEASURED).read_text(encoding="utf-8"))
+        measured = parse_toml(file_text(folder / MEASURED), str(folder / MEASURED))
         paths = tuple(Path(r["path"], int(r["start"]), int(r["length"])) for r in rows)
         modulus = {float(s): float(mean) for s, (mean, _) in measured["lattice_modulus_kPa"].items()}
         bending = {float(s): (float(a), float(b)) for s, (a, b) in measured["bending_angle_deg"].items()}
         columns = {name_of(s): f"scale_{s:.2f}" for s in modulus} | {GRIPPER: GRIPPER}
         J_hat = {name: np.array([float(r[key]) for r in rows]) for name, key in columns.items()}
-    except (OSError, KeyError, ValueError, TypeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, KeyError, ValueError, TypeError) as error:
         raise InputError(
             f"the paper's figures cannot be read: {error}", str(folder), "install the whole extension"
         ) from error

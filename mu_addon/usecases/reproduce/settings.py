@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from ...design.assets import asset_root
 from ...design.parameters import Unit, load_preset
 from ...errors import InputError
 from ...meshing.settings import MeshSettings
+from ...reading import file_text, parse_toml
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...toml_writer import toml_text
@@ -101,13 +101,13 @@ def read_set(name: str) -> dict[str, Any]:
         return {}
     path = Path(name) if name.endswith(".toml") else asset_root() / FOLDER / f"{name}.toml"
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        tables = parse_toml(file_text(path), str(path))
     except OSError:
         names = ", ".join([DEFAULT, *sorted(p.stem for p in (asset_root() / FOLDER).glob("*.toml"))])
         raise InputError(
             f"there is no set of values {name!r}", "--set", f"choose one of {names}, or give a TOML file"
         ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise InputError(f"the set of values is no TOML: {error}", str(path), "correct that line") from error
     values, held_cells = tables.get("values", {}), tables.get("held_cells", 0.0)
     if set(tables) - {"values", "held_cells"} or not isinstance(values, dict):

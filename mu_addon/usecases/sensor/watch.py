@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
+from ...reading import file_bytes
 from ...sensing.ring import Ring
 from ...sensing.session import STATUS
 
@@ -50,8 +51,8 @@ class Watched:
             written = path.stat().st_mtime_ns
             if written == self._written:
                 return False
-            status = json.loads(path.read_bytes())
-        except (OSError, ValueError):
+            status = json.loads(file_bytes(path))
+        except (OSError, ValueError, RecursionError):
             return False
         if not isinstance(status, dict):
             return False

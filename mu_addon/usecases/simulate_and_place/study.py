@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Callable
 from contextlib import closing
@@ -20,7 +19,7 @@ from ...design.quantity import in_kPa
 from ...design.solid import Solid, build_solid
 from ...design.strut_cell import strut_cell
 from ...design.wall import Wall
-from ...errors import ConvergenceError, MeshingError
+from ...errors import ConvergenceError, InputError, MeshingError
 from ...fem.equilibrium import Equilibrium
 from ...fem.kinematics import TipSection
 from ...fem.lattice_law import deformation_gradients, stretches
@@ -38,6 +37,7 @@ from ...meshing.settings import MeshSettings
 from ...meshing.unit import MeshingWarning, mesh_unit
 from ...placement.candidates import Candidate, Evaluation, candidate_paths
 from ...placement.deviation import rank
+from ...reading import file_bytes, parse_json
 from ...report.results import CONTACT_COLUMNS, ContactHistory, LatticeSearch, Signals
 from ...report.vtk import write_mesh, write_trajectory
 from ...run.cache import Cache, key
@@ -668,8 +668,8 @@ def extremes(pressure_kPa: Array) -> Array:
 def _earlier(folder: Path) -> dict[str, Any]:
     """Figures of a folder's last run, as far as this version of the program found them."""
     try:
-        found = json.loads((folder / "summary.json").read_bytes())
-    except (OSError, ValueError, RecursionError):
+        found = parse_json(file_bytes(folder / "summary.json"), "summary.json")
+    except (OSError, InputError):
         return {}
     if not isinstance(found, dict) or found.get("versions") != package_versions():
         return {}

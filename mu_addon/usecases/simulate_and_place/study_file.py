@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -10,6 +9,7 @@ from typing import Any
 
 from ...errors import InputError
 from ...files import write_text
+from ...reading import file_bytes, parse_toml
 from ...run.folder import RUN, FolderLayout
 from ...run.inputs import digest
 from ...toml_writer import toml_text
@@ -80,7 +80,7 @@ def read(folder: Path) -> Tables | None:
 
 def read_run(folder: Path) -> dict[str, Any]:
     """The table [run] of a folder's study.toml; empty where there is none. Raises InputError."""
-    found = tomllib.loads(_text(folder / NAME)).get(RUN, {})
+    found = parse_toml(_text(folder / NAME), str(folder / NAME)).get(RUN, {})
     if not isinstance(found, dict):
         raise InputError(f"{RUN} is not a table", str(folder / NAME), f"write it as [{RUN}]")
     return found
@@ -111,11 +111,7 @@ def parse(text: str, folder: Path) -> tuple[Tables, bool]:
     folder: where the files lie that it names; a format without their digests is given them.
     """
     where = str(folder / NAME)
-    try:
-        document = tomllib.loads(text)
-    # Thousands of nested brackets exhaust the parser's stack.
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"this is not TOML: {error}", where, "choose another folder") from error
+    document = parse_toml(text, where, "choose another folder")
     found = document.pop("format", None)
     document.pop(RUN, None)
     if found == 1 and not isinstance(found, bool):
@@ -154,7 +150,7 @@ def _from_format_1(document: dict[str, Any], folder: Path) -> Tables:
 
     def with_digest(key: str) -> dict[str, Any]:
         try:
-            text = (folder / FILES[key]).read_bytes().decode("utf-8")
+            text = file_bytes(folder / FILES[key]).decode("utf-8")
         except (OSError, UnicodeDecodeError):
             text = ""
         return {key: FILES[key], f"{key}_sha256": digest(text)}
@@ -176,7 +172,7 @@ def holds(folder: Path, tables: Mapping[str, Mapping[str, Any]]) -> dict[str, st
         for key in _FILES_OF[stage]:
             if key in values:
                 try:
-                    texts[FILES[key]] = (folder / FILES[key]).read_bytes().decode("utf-8")
+                    texts[FILES[key]] = file_bytes(folder / FILES[key]).decode("utf-8")
                 except (OSError, UnicodeDecodeError):
                     return None
                 if digest(texts[FILES[key]]) != values.get(f"{key}_sha256"):

@@ -26,6 +26,7 @@ from ...measured.kinds import COMMON, KINDS
 from ...measured.rest import AT_REST, SAMPLES
 from ...measured.table import Remark, read_table
 from ...measured.video import Motion, Pair, Tracks, View, motion, resting
+from ...reading import file_text
 from ...run.context import RunContext
 from ...toml_writer import toml_text
 
@@ -98,7 +99,7 @@ class Filmed:
 def read_bench(path: Path) -> Bench:
     """Read a TOML file that describes a video; raises InputError with line and what to do."""
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
+        text = file_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             "cannot read the description of the video", str(path), "check path and file"
@@ -218,7 +219,7 @@ def _finite(value: Any) -> bool:
 def read_pressure(path: Path) -> tuple[Array, Array]:
     """Time in s and pressure in kPa, (k,) each, of a recording or a protocol; raises InputError."""
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
+        text = file_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             "cannot read the pressure", str(path), "give a CSV file of time_s,pressure_kPa"
@@ -370,7 +371,7 @@ def read_pixels(path: Path) -> Tracks:
     One row a frame; empty where a marker was lost. Raises InputError.
     """
     try:
-        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+        lines = file_text(path).splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError("cannot read the tracked markers", str(path), "check path and file") from error
     rows = [

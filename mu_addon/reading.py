@@ -1,0 +1,123 @@
+"""Files, TOML and JSON from anywhere, read so that whatever they hold ends in a clear error.
+
+Every reader of the program takes its text, TOML and JSON from here: a pipe or a device does not hang it, and
+neither brackets nor digits without end exhaust it.
+"""
+
+from __future__ import annotations
+
+import csv
+import errno
+import json
+import re
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from .errors import InputError
+
+# No file of text that is read here is longer, in bytes.
+_LONGEST = 1 << 28
+# No table of this program lies deeper in others, and no whole number is larger (TOML's own are of 64 bits).
+_DEEPEST, _LARGEST = 64, 1 << 63
+# The parser takes time by the square of a dotted key's length.
+_DOTTED = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){65}""")
+
+# A long field is no fault of its own: what reads the table says what is wrong with it.
+csv.field_size_limit(_LONGEST)
+
+
+def file_bytes(path: str | Path, most: int = _LONGEST) -> bytes:
+    """What a regular file holds; raises OSError, also for pipes and devices and beyond `most` bytes."""
+    path = Path(path)
+    try:
+        found = path.stat()
+    except ValueError as error:
+        # A NUL byte in the name.
+        raise OSError(errno.EINVAL, f"that is no name of a file: {error}", repr(str(path))) from None
+    if not stat.S_ISREG(found.st_mode):
+        if stat.S_ISDIR(found.st_mode):
+            raise IsADirectoryError(errno.EISDIR, "that is a folder", str(path))
+        raise OSError(errno.EINVAL, "that is no regular file", str(path))
+    if found.st_size > most:
+        words = f"{found.st_size / 1e6:.0f} MB are more than the {most / 1e6:.0f} MB that are read"
+        raise OSError(errno.EFBIG, words, str(path))
+    return path.read_bytes()
+
+
+def file_text(path: str | Path, most: int = _LONGEST) -> str:
+    """The text of a regular file of UTF-8, line ends as \\n; raises OSError and UnicodeDecodeError."""
+    return file_bytes(path, most).decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+
+
+def parse_toml(text: str, origin: str, remedy: str = "correct that line") -> dict[str, Any]:
+    """Tables and values of TOML text; raises InputError, with the line where it is known."""
+    if _DOTTED.search(text):
+        raise InputError(f"tables lie more than {_DEEPEST} deep in each other", origin or "TOML text", remedy)
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        what, line = _located(str(error), text)
+        where = f"{origin}, line {line}" if line and origin else origin or f"line {line}" if line else origin
+        raise InputError(f"this is not TOML: {what}", where or "TOML text", remedy) from error
+    # Brackets that exhaust the parser's stack, whole numbers of thousands of digits.
+    except (RecursionError, ValueError, OverflowError) as error:
+        raise InputError(f"this is not TOML: {_short(error)}", origin or "TOML text", remedy) from error
+    _require_sense(document, text, origin or "TOML text", remedy)
+    return document
+
+
+def parse_json(text: str | bytes, origin: str, remedy: str = "let the program write it again") -> Any:
+    """The value of JSON text; raises InputError."""
+    try:
+        value = json.loads(text)
+    except (RecursionError, ValueError, OverflowError) as error:
+        raise InputError(f"this is not JSON: {_short(error)}", origin, remedy) from error
+    _require_sense(value, text, origin, remedy)
+    return value
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value that was read is a number; `true` and `false` are none."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _require_sense(value: Any, text: str | bytes, origin: str, remedy: str) -> None:
+    """Raise InputError for whole numbers of more than 64 bits, and tables in tables without end."""
+
+    def at(number: int) -> str:
+        """The origin, with the number's line where it is written in decimal digits."""
+        if number.bit_length() > 8192:
+            # Python does not write longer ones out.
+            return origin
+        words = text if isinstance(text, str) else text.decode(errors="replace")
+        before, found, _ = words.partition(str(number))
+        return f"{origin}, line {before.count(chr(10)) + 1}" if found else origin
+
+    level, depth = [value], 0
+    while level:
+        if depth > _DEEPEST:
+            raise InputError(f"tables lie more than {_DEEPEST} deep in each other", origin, remedy)
+        inner: list[Any] = []
+        for item in level:
+            if isinstance(item, dict):
+                inner += item.values()
+            elif isinstance(item, list):
+                inner += item
+            elif isinstance(item, int) and not -_LARGEST <= item < _LARGEST:
+                raise InputError("a whole number of more than 64 bits is out of bounds", at(item), remedy)
+        level, depth = inner, depth + 1
+
+
+def _short(error: Exception) -> str:
+    return "brackets lie too deep in each other" if isinstance(error, RecursionError) else str(error)[:200]
+
+
+def _located(message: str, text: str) -> tuple[str, int | None]:
+    """The parser's complaint without its place, and its line."""
+    match = re.search(r"\s*\(at (?:line (\d+), column \d+|end of document)\)", message)
+    if not match:
+        return message, None
+    line = int(match[1]) if match[1] else max(1, len(text.splitlines()))
+    return message[: match.start()], line

@@ -1,0 +1,258 @@
+"""Every reader on files nobody should write: a clear error, never a traceback, a hang or a silent yes."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mu_addon.cli.main import main
+from mu_addon.design.gripper import load_gripper, read_gripper
+from mu_addon.design.gripper import to_toml as gripper_text
+from mu_addon.design.parameters import Unit, read_unit, to_toml
+from mu_addon.design.printing.printer import load_printer, printer_text, read_printer
+from mu_addon.errors import InputError
+from mu_addon.evidence.extended import load_model
+from mu_addon.fem.protocol import read_protocol
+from mu_addon.files import read_npz
+from mu_addon.homogenize.effective import read_effective
+from mu_addon.materials.library import read_material
+from mu_addon.measured.folder import read_folder
+from mu_addon.reading import file_text, parse_json, parse_toml
+from mu_addon.run.folder import FolderLayout, claim
+from mu_addon.sensing.calibration import read_calibration
+from mu_addon.sensing.recording import read_recording
+from mu_addon.usecases.grip.phases import read_phases
+from mu_addon.usecases.parameter_study.plan import read_plan
+from mu_addon.usecases.reproduce.settings import read_set
+from mu_addon.usecases.track_video.run import read_bench, read_pixels, read_pressure
+
+ASSETS = Path(__file__).parents[2] / "assets"
+
+CALIBRATION = """version = 1
+channel = "light_V"
+dark = 0.0
+knots_deg = [0.0, 0.0, 0.0, 0.0, 10.0, 10.0, 10.0, 10.0]
+coefficients_V = [2.0, 1.9, 1.8, 1.7]
+band_V = 0.01
+drift_per_h = 0.0
+gain = 1.0
+sweeps = 3
+error_deg = 0.5
+"""
+MODEL = 'verdict = "named"\n[effect.overcure.offset_mm]\nvalue = 0.1\nsd = 0.01\nunit = "mm"\n'
+PLAN = 'format = 1\npreset = "mu-1.0x"\n[vary]\n"chambers.wall_mm" = { low = 0.8, high = 1.2 }\n'
+
+# A reader, and text that it takes; None where only bad files are tried.
+READERS: dict[str, tuple[Callable[[Path], Any], str | None]] = {
+    "unit": (read_unit, to_toml(Unit())),
+    "gripper": (read_gripper, gripper_text(load_gripper("gripper"), "mu-1.0x")),
+    "printer": (read_printer, printer_text(load_printer())),
+    "material": (read_material, (ASSETS / "materials" / "elastic-50a-v1.toml").read_text()),
+    "model": (load_model, MODEL),
+    "lattice law": (read_effective, None),
+    "calibration": (read_calibration, CALIBRATION),
+    "sweep": (read_plan, PLAN),
+    "values": (lambda path: read_set(str(path)), "held_cells = 1\n[values]\n"),
+    "bench": (read_bench, None),
+    "protocol": (read_protocol, "time_s,pressure_kPa\n0,0\n1,5\n"),
+    "phases": (read_phases, None),
+    "pressure": (read_pressure, "time_s,pressure_kPa\n0,0\n1,5\n"),
+    "pixels": (read_pixels, None),
+    "folder": (lambda path: read_folder(_as(path, "experiments.toml")), None),
+    "recording": (lambda path: read_recording(_as(path, "index.ndjson")), None),
+}
+
+
+def _as(path: Path, name: str) -> Path:
+    """A folder that holds the file under another name."""
+    folder = path.parent / "folder"
+    folder.mkdir(exist_ok=True)
+    path.replace(folder / name)
+    return folder
+
+
+BAD = {
+    "brackets": b"a = " + b"[" * 50_000,
+    "braces": b"a = " + b"{b=" * 50_000,
+    "dots": b"a" + b".a" * 50_000 + b" = 1",
+    "digits": b"format = " + b"9" * 5000,
+    "many bits": b"format = " + b"9" * 400,
+    "hexadecimal": b"format = 0x" + b"f" * 6000,
+    "true": b"format = true\nversion = true\n",
+    "not UTF-8": b"format = 1\nname = \"\xff\xfe\"\n",
+    "UTF-16": "format = 1\n".encode("utf-16"),
+    "NUL": b"format\0 = 1\n",
+    "NUL in a table": b"time_s,pressure_kPa\n0,0\n\0,\0\n",
+    "a long field": b"time_s,pressure_kPa\n0,0\n1," + b"1" * 200_000 + b"\n",
+    "an open quote": b'time_s,pressure_kPa\n0,0\n1,"' + b"x,\n" * 100_000,
+    "infinite": b"time_s,pressure_kPa\n0,0\n1e999,1\n",
+    "empty": b"",
+    "a list": b"[[format]]\n[[effect]]\n[[law]]\n[[values]]\n[[experiment]]\n[[marker]]\n[[vary]]\n",
+    "a word": b"effect = 1\nlaw = 1\nvalues = 1\nexperiment = 1\nmarker = 1\nvary = 1\n",
+    "escapes": b"\x1b]0;x\x07 = 1",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("what", BAD)
+def test_a_bad_file_is_refused(name: str, what: str, tmp_path: Path) -> None:
+    path = tmp_path / "file.toml"
+    path.write_bytes(BAD[what])
+    if name == "recording" or (name == "values" and what in ("empty",)):
+        # Lines of an index that are none are passed over; a set of values may hold none.
+        found = READERS[name][0](path)
+        assert not found if name == "recording" else found == {"values": {}, "held_cells": 0.0}
+        return
+    with pytest.raises(InputError) as told:
+        READERS[name][0](path)
+    assert all((told.value.what, told.value.where, told.value.remedy))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such pipes")
+@pytest.mark.parametrize("name", READERS)
+def test_a_pipe_is_not_waited_for(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "file.toml"
+    os.mkfifo(path)
+    with pytest.raises(InputError):
+        READERS[name][0](path)
+
+
+@pytest.mark.parametrize("name", [name for name, (_, text) in READERS.items() if text])
+def test_damaged_files_end_in_a_clear_error(name: str, tmp_path: Path) -> None:
+    """Every number made true, a text, nested or huge; bytes changed at random."""
+    reader, text = READERS[name]
+    assert text
+    path = tmp_path / "file.toml"
+    path.write_text(text)
+    reader(path)
+    random_ = random.Random(name)
+    lines = text.splitlines()
+    for _ in range(150):
+        changed = list(lines)
+        place = random_.randrange(len(changed))
+        key, equals, _ = changed[place].partition("=")
+        if equals and random_.random() < 0.7:
+            worst = (
+                "true",
+                '"x"',
+                "[]",
+                "{}",
+                "nan",
+                "-inf",
+                "9" * 400,
+                "1e400",
+                "[[[]]]",
+                '"\\u001b[2J"',
+                "-1",
+                "1e300",
+            )
+            changed[place] = f"{key}= {random_.choice(worst)}"
+        data = bytearray("\n".join(changed).encode())
+        if random_.random() < 0.5:
+            data[random_.randrange(len(data))] = random_.randrange(256)
+        path.write_bytes(data)
+        with suppress(InputError):
+            reader(path)
+
+
+@pytest.mark.parametrize("name", ["unit", "printer", "material", "model", "calibration"])
+def test_true_is_no_number(name: str, tmp_path: Path) -> None:
+    reader, text = READERS[name]
+    assert text
+    path = tmp_path / "file.toml"
+    lines = text.splitlines()
+    tried = 0
+    for place, line in enumerate(lines):
+        key, equals, value = line.partition(" = ")
+        if not equals or line.startswith("#"):
+            continue
+        try:
+            float(value.split("#")[0])
+        except ValueError:
+            continue
+        path.write_text("\n".join([*lines[:place], f"{key} = true", *lines[place + 1 :]]))
+        with pytest.raises(InputError):
+            reader(path)
+        tried += 1
+    assert tried
+
+
+def test_toml_and_json() -> None:
+    assert parse_toml("a = [1, 2.5]", "x") == {"a": [1, 2.5]}
+    with pytest.raises(InputError, match="not TOML"):
+        parse_toml("a = = 1", "x")
+    with pytest.raises(InputError, match="64 deep"):
+        parse_toml("a" + ".a" * 100 + " = 1", "x")
+    with pytest.raises(InputError, match="64 bits"):
+        parse_json('{"a": ' + "9" * 30 + "}", "x")
+    for text in ("[" * 50_000, "9" * 5000, b"\xff", "{"):
+        with pytest.raises(InputError, match="not JSON"):
+            parse_json(text, "x")
+
+
+def test_files_that_are_none(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="folder"):
+        file_text(tmp_path)
+    with pytest.raises(OSError, match="no name"):
+        file_text("a\0b")
+    (tmp_path / "long").write_text("x" * 100)
+    with pytest.raises(OSError, match="more than"):
+        file_text(tmp_path / "long", 99)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such pipes")
+def test_a_pipe_in_a_folder_of_results(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "state-x.npz")
+    assert read_npz(tmp_path / "state-x.npz") is None
+    os.mkfifo(tmp_path / "log.ndjson")
+    with pytest.raises(InputError, match="pipe"):
+        claim(tmp_path, FolderLayout("study.toml", "format = 1", ()), {"study.toml": "format = 1\n"})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["record", "--simulate", "--seconds", "nan", "--out", "OUT"], "nan is no number"),
+        (["record", "--simulate", "--seconds", "inf", "--out", "OUT"], "no time"),
+        (["record", "--simulate", "--seconds", "-1", "--out", "OUT"], "no time"),
+        (["record", "--port", "x", "--baud", "0", "--out", "OUT"], "no rate"),
+        (["design", "--preset", "mu-1.0x", "--out", "OUT\0x"], "NUL"),
+        (["design", "--preset", "mu-1.0x", "--out", "OUT\udcff"], "no UTF-8"),
+        (["specimens", "--resin", "", "--out", "OUT"], "empty"),
+        (["design", "--preset", "mu-1.0x", "--out", ""], "no output folder"),
+        (["simulate", "--preset", "mu-1.0x", "--model", "", "--out", "OUT"], "empty"),
+        (["design", "--unit", "", "--out", "OUT"], "empty"),
+        (["simulate", "--preset", "mu-1.0x", "--model", "EMPTY", "--out", "OUT"], "no verdict"),
+        (["simulate", "--preset", "mu-1.0x", "--model", "LATIN", "--out", "OUT"], "UTF-8"),
+    ],
+)
+def test_options_that_mean_nothing(
+    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "EMPTY").write_text("")
+    (tmp_path / "LATIN").write_bytes(b'verdict = "\xe9"')
+    given = [str(tmp_path / a) if a.startswith(("OUT", "EMPTY", "LATIN")) else a for a in arguments]
+    assert main(given) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_escapes_in_a_file_are_spelt_out(tmp_path: Path) -> None:
+    path = tmp_path / "unit.toml"
+    path.write_text('format = 1\n"\\u001b]0;owned\\u0007" = 1\n')
+    run = [sys.executable, str(ASSETS.parent / "headless/run.py"), "design", "--unit", str(path)]
+    told = subprocess.run([*run, "--out", str(tmp_path / "o")], capture_output=True, check=False)
+    assert told.returncode == 2
+    assert b"\x1b" not in told.stderr
+    assert b"\\x1b" in told.stderr
+    told = subprocess.run([*run, "--json", "--out", str(tmp_path / "o")], capture_output=True, check=False)
+    assert b"\x1b" not in told.stdout
+    assert "owned" in json.loads(told.stdout.splitlines()[-1])["what"]
