@@ -155,7 +155,7 @@ def distance(p: OpenPoint, paper: Published) -> float:
 
 def _distance(J_hat: Array, bending: Array, paper: Published) -> Any:
     """The same of J_hat (..., c, paths) and angles (..., c, 2)."""
-    theirs = np.array([paper.column(s) for s in paper.scales])
+    theirs = np.array([paper.table_column(s) for s in paper.scales])
     wanted = np.array([paper.bending_deg[s] for s in paper.scales])
     # An end that lies beyond a limit point was not reached: it counts as a tenth of what is wanted.
     return objective(J_hat, theirs, np.where(np.isfinite(bending), bending, 0.1 * wanted), wanted)
@@ -197,7 +197,7 @@ def effects(points: Sequence[OpenPoint], paper: Published) -> list[Effect]:
     found.append(_effect("mean J_hat of 1.5x over 0.75x", x, J[:, -1].mean(axis=1) / J[:, 0].mean(axis=1)))
     model = _models(x, J)
     for i, scale in enumerate(paper.scales):
-        theirs = paper.column(scale)
+        theirs = paper.table_column(scale)
         rank = spearman(J[:, i], theirs)
         predicted = _rank_of(model[i], theirs)
         varied = ((rank - rank.mean()) ** 2).sum()

@@ -16,8 +16,8 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from mu_addon.run.cache import Cache, key
 from mu_addon.usecases.parameter_study.variable import Variable
-from mu_addon.usecases.reproduce.column import ENDS_KPA, Paths, held, motion, paths
-from mu_addon.usecases.reproduce.values import RULE, column_unit, with_values
+from mu_addon.usecases.reproduce.table_column import ENDS_KPA, Paths, motion, paths, with_fixed_base
+from mu_addon.usecases.reproduce.values import RULE, unit_of_table_column, with_values
 
 Array = np.ndarray[Any, Any]
 
@@ -127,10 +127,10 @@ def solve(
 ) -> PointResult:
     """Every column with one set of values. Raises InputError, MeshingError and ConvergenceError."""
     same = with_values(attrs.evolve(unit, scale=1.0), values)
-    body = held(mesh_unit(same, mesh), held_cells * same.dimensions.cell)
+    body = with_fixed_base(mesh_unit(same, mesh), held_cells * same.dimensions.cell)
     angles, crossings, at_rest, found = [], [], [], []
     for scale, modulus in moduli_kPa.items():
-        one = column_unit(same, scale, modulus)
+        one = unit_of_table_column(same, scale, modulus)
         mine = scaled(body, scale)
         try:
             moved = motion(one, mine, MOTION_KPA)

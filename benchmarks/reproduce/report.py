@@ -173,7 +173,7 @@ def _reached(found: LongFound, p: OpenPoint) -> bool:
 
 def _agreed(found: LongFound, p: OpenPoint) -> list[tuple[float, float]]:
     compared = [
-        agreement(J, found.table.paper.column(scale), found.table.paper.paths)
+        agreement(J, found.table.paper.table_column(scale), found.table.paper.paths)
         for scale, J in zip(found.table.paper.scales, p.J_hat, strict=True)
     ]
     return [(a.spearman, a.magnitude) for a in compared]

@@ -26,7 +26,7 @@ from mu_addon.usecases.reproduce.report import write_report
 from mu_addon.usecases.reproduce.run import solve, summary, write_tables
 from mu_addon.usecases.reproduce.settings import LAYOUT as TABLE_LAYOUT
 from mu_addon.usecases.reproduce.settings import REPORT, Settings, between
-from mu_addon.usecases.reproduce.values import column_unit
+from mu_addon.usecases.reproduce.values import unit_of_table_column
 
 from . import open_study, scatter
 from .open_study import OpenPoint, point
@@ -73,7 +73,9 @@ class LongFound:
 
     def scatters(self) -> dict[tuple[str, str, float], scatter.Scatter]:
         """What many meshes say, by family, rule and scale."""
-        return scatter.scatters(self.drawn, {s: self.table.paper.column(s) for s in self.table.paper.scales})
+        return scatter.scatters(
+            self.drawn, {s: self.table.paper.table_column(s) for s in self.table.paper.scales}
+        )
 
 
 def reproduce(settings: LongSettings, folder: Path, context: RunContext) -> LongFound:
@@ -85,7 +87,7 @@ def reproduce(settings: LongSettings, folder: Path, context: RunContext) -> Long
     cache = Cache(folder / "cache")
     table = solve(settings.table, cache, progress)
     paper, unit, samples = table.paper, settings.table.unit, table.samples_kPa
-    units = [column_unit(unit, scale, modulus) for scale, modulus in paper.modulus_kPa.items()]
+    units = [unit_of_table_column(unit, scale, modulus) for scale, modulus in paper.modulus_kPa.items()]
     drawn, points, origin = shipped(paper)
     if settings.meshes:
         with progress.stage("random meshes"):

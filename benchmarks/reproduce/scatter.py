@@ -18,7 +18,7 @@ from mu_addon.meshing.mesh import Mesh
 from mu_addon.placement.inclusion import RULES
 from mu_addon.run.cache import Cache, key
 from mu_addon.usecases.reproduce.agreement import spearman
-from mu_addon.usecases.reproduce.column import ENDS_KPA, motion, paths
+from mu_addon.usecases.reproduce.table_column import ENDS_KPA, motion, paths
 
 from .unstructured import Recipe, unstructured_mesh
 
@@ -107,7 +107,7 @@ def draw(one: Draw, samples_kPa: Array, cache: Cache) -> list[Drawn]:
 def _solved(one: Draw, samples_kPa: Array) -> dict[str, Array]:
     try:
         mesh = one.family.mesh(one.unit, one.seed)
-        moved = motion(one.unit, mesh, ENDS_KPA, look_for_contact=False)
+        moved = motion(one.unit, mesh, ENDS_KPA, look_for_self_intersection=False)
         found = paths(one.unit, mesh, moved, RULES, ENDS_KPA)
     except MuError as error:
         return {"failed": np.array(error.what)}

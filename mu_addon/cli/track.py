@@ -64,7 +64,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 def _tracker() -> Tracker:
     """Blender's tracker, where there is a Blender."""
 
-    def follow(clip: Path, marks: Any) -> Any:
+    def follow(clip: Path, markers: Any) -> Any:
         from ..errors import InputError
 
         if find_spec("bpy") is None:
@@ -75,6 +75,6 @@ def _tracker() -> Tracker:
                 "give a CSV of pixel positions from another tracker",
             )
         # By name: the command line knows the core, and Blender's side only where it is asked for.
-        return import_module("..blender.track.state", __package__).track_markers(clip, marks)
+        return import_module("..blender.track.state", __package__).track_markers(clip, markers)
 
     return follow

@@ -20,7 +20,7 @@ from ..fem.loads import gravity
 from ..fem.materials import Layer, Materials
 from ..fem.model import Model
 from ..fem.newton_settings import NewtonSettings
-from ..fem.obstacle import CONTACT, Obstacle
+from ..fem.obstacle import CONTACT_NEWTON, Obstacle
 from ..fem.rigid import Plane
 from ..fem.unit import materials_of
 from ..fem.wall_law import LAYER_NORMAL, layer_stiffness
@@ -30,7 +30,7 @@ from ..meshing.settings import CELL_MM, MeshSettings
 from ..meshing.unit import mesh_unit
 from .effect import Effect, Parameter
 from .prediction import beam, coupon, lattice
-from .prediction.wall import NAME as WALL
+from .prediction.flat_obstacle import NAME as CONTACT
 
 Array = np.ndarray[Any, Any]
 
@@ -44,9 +44,9 @@ SMOOTH = NewtonSettings(min_step_MPa=1e-3)
 KINKED = NewtonSettings(predictor_tolerance=3.0)
 TONNE_PER_MM3 = 1e-12  # in kg/m3
 # A wall's contact pressure is some kPa; there the gap is off by this much at 1.0x.
-WALL_MPa, WALL_mm = 0.005, 0.02
+OBSTACLE_MPa, OBSTACLE_mm = 0.005, 0.02
 # Faces of the envelope are some 20 mm long, and the tip's edge is what touches first.
-WALL_HALVINGS = 2
+OBSTACLE_HALVINGS = 2
 
 
 @attrs.frozen
@@ -150,7 +150,7 @@ def _clogged(body: Body, mesh: Mesh, share_lost: float) -> Model:
     return CloggedModel(mesh, (d.count - body.distal) * d.cell, share_lost, device=body.device, threads=1)
 
 
-def walled(body: Body, mesh: Mesh, gap_mm: float) -> Model:
+def with_flat_obstacle(body: Body, mesh: Mesh, gap_mm: float) -> Model:
     """The unit beside a flat frictionless wall along its axis, on the side +y, or -y for gap_mm < 0.
 
     |gap_mm|: distance in mm of the wall from the outline at rest.
@@ -160,7 +160,7 @@ def walled(body: Body, mesh: Mesh, gap_mm: float) -> Model:
     farthest = float((away * mesh.nodes[:, 1]).max())
     wall = Plane((0.0, away * (farthest + abs(gap_mm)), 0.0), (0.0, -away, 0.0))
     size = body.unit.dimensions.cell / CELL_MM
-    model.obstacles = (Obstacle(mesh, wall, WALL_MPa, WALL_mm * size, WALL_HALVINGS),)
+    model.obstacles = (Obstacle(mesh, wall, OBSTACLE_MPa, OBSTACLE_mm * size, OBSTACLE_HALVINGS),)
     return model
 
 
@@ -339,12 +339,13 @@ EFFECTS = {
     )
 }
 
-# How a wall enters a run; where walls stand depends on how far the free unit gets, see prediction/wall.
-WALLED = UnitEffect(
-    WALL,
+# How a flat obstacle enters a run; where it stands depends on how far the free unit gets, see
+# prediction/flat_obstacle.
+FLAT_OBSTACLE = UnitEffect(
+    CONTACT,
     Parameter("gap_mm", "mm", -1e3, 1e3, 1e3, (), "signed: toward +y, below 0 toward -y"),
     (1e3,),
-    model=walled,
-    newton=CONTACT,
+    model=with_flat_obstacle,
+    newton=CONTACT_NEWTON,
     length=1,
 )

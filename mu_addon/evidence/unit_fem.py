@@ -29,10 +29,10 @@ from ..run.cache import Cache
 from ..run.pool import each
 from ..run.processes import cores
 from .markers import Marker, attached, material_points
+from .prediction.flat_obstacle import NAME as CONTACT
+from .prediction.flat_obstacle import NEAREST, ObstacleResponse
 from .prediction.unit import KIND, UnitResponse, Variant
-from .prediction.wall import NAME as WALL
-from .prediction.wall import NEAREST, Side
-from .unit_effects import EFFECTS, SMOOTH, WALLED, Body, UnitEffect, walled
+from .unit_effects import EFFECTS, FLAT_OBSTACLE, SMOOTH, Body, UnitEffect, with_flat_obstacle
 
 Array = np.ndarray[Any, Any]
 Progress = Callable[[str, float], None]
@@ -47,11 +47,11 @@ COARSE = MeshSettings(refine=0.6, meridian_mm=0.9)
 # Finer in all its sizes: what a mesh misses along the meridian is another curve than the rest of it.
 FINE = MeshSettings(meridian_mm=1.0)
 # Share of the progress that walls take.
-WALLS = 0.2
+CONTACT_SHARE = 0.2
 # Walls as shares of how far the free unit gets, pressures as shares of the way on from where one is met.
 REACHES = (0.2, 0.5, NEAREST)
 SHARES = (0.15, 0.4, 0.7, 1.0)
-KNOWN = (*EFFECTS, WALL)
+KNOWN = (*EFFECTS, CONTACT)
 
 
 class UnitResponseWarning(UserWarning):
@@ -95,7 +95,7 @@ class UnitSettings:
 
 
 def _effect(name: str) -> UnitEffect:
-    return WALLED if name == WALL else EFFECTS[name]
+    return FLAT_OBSTACLE if name == CONTACT else EFFECTS[name]
 
 
 @attrs.frozen
@@ -183,7 +183,7 @@ def run(case: Run, cache: Path | None = None) -> Result:
         newton = effect.newton if effect else SMOOTH
         equilibrium = Equilibrium(model, materials, newton, explains=not case.effect)
         # Out of reach, it only lends the points at which the unit would touch.
-        outline = walled(body, mesh, 1e6).obstacles[0] if case.outline else None
+        outline = with_flat_obstacle(body, mesh, 1e6).obstacles[0] if case.outline else None
         places = slice(1, 1 + 3 * len(case.points))
         for at, state in _states(equilibrium, np.array(case.pressures_kPa)):
             values[0, at] = tip.angle_deg(state.u)
@@ -259,13 +259,13 @@ def unit_responses(
         for m in plan.markers:
             report(f"marker {m.number} at {plan.scale:g}x lies {m.distance_mm:.2f} mm from its point", 0.0)
     cases = {case.key(): case for plan in plans for case in plan.runs(settings)}
-    walled_too = WALL in settings.effects
-    part = 1 - WALLS if walled_too else 1.0
+    with_contact = CONTACT in settings.effects
+    part = 1 - CONTACT_SHARE if with_contact else 1.0
     found = _found(cases, settings.workers, cache, lambda what, share: report(what, share * part))
-    if walled_too:
+    if with_contact:
         walls = {c.key(): c for plan in plans for _, _, c in plan.walls(found)}
         more = _found(
-            walls, settings.workers, cache, lambda what, share: report(what, 1 + WALLS * (share - 1))
+            walls, settings.workers, cache, lambda what, share: report(what, 1 + CONTACT_SHARE * (share - 1))
         )
         found |= more
     responses = _counted_alike([r for plan in plans for r in plan.responses(settings, found)])
@@ -321,7 +321,7 @@ class _Plan:
     pressures_kPa: tuple[float, ...]
     markers: tuple[Marker, ...]
     channels: tuple[str, ...]
-    walled: bool
+    with_flat_obstacle: bool
 
     @classmethod
     def of(
@@ -349,14 +349,14 @@ class _Plan:
             pressures(readings, settings.pressures, settings.margin),
             markers,
             tuple(c for c in known if c in measured),
-            WALL in settings.effects,
+            CONTACT in settings.effects,
         )
 
     def case(self, effect: str = "", size: float = 0.0, orientation_deg: float = 0.0) -> Run:
         """A run of an effect whose size is that at 1.0x, of the base where none is named."""
         points = tuple(tuple((m.point / self.enlarged).tolist()) for m in self.markers)
         body = attrs.evolve(self.body, orientation_deg=orientation_deg)
-        return Run(body, self.pressures_kPa, points, effect, size, not effect and self.walled)
+        return Run(body, self.pressures_kPa, points, effect, size, not effect and self.with_flat_obstacle)
 
     def runs(self, settings: UnitSettings) -> Iterator[Run]:
         """The base first, then what takes longest."""
@@ -397,10 +397,12 @@ class _Plan:
                 gap = (1 - reach) * outward[-1]
                 met = float(PchipInterpolator(outward, pressure)(gap))
                 steps = sorted(met + s * (pressure[-1] - met) for s in SHARES)
-                case = self.case(WALL, side * gap / self.enlarged)
+                case = self.case(CONTACT, side * gap / self.enlarged)
                 yield side, reach * outward[-1], attrs.evolve(case, pressures_kPa=tuple(steps))
 
-    def sides(self, found: dict[str, Result], base: Array, rows: Sequence[int]) -> dict[int, Side]:
+    def sides(
+        self, found: dict[str, Result], base: Array, rows: Sequence[int]
+    ) -> dict[int, ObstacleResponse]:
         """The response to walls by side; `base` (rows, k): all values of the free unit at its pressures."""
         from scipy.interpolate import CubicSpline
 
@@ -419,7 +421,7 @@ class _Plan:
             walls.setdefault(side, []).append((reach, change))
         sides = self.free(found)
         return {
-            side: Side(*sides[side], [r for r, _ in kept], SHARES, np.array([c for _, c in kept]))
+            side: ObstacleResponse(*sides[side], [r for r, _ in kept], SHARES, np.array([c for _, c in kept]))
             for side, kept in walls.items()
         }
 
@@ -444,7 +446,7 @@ class _Plan:
             missed = ", ".join(f"{p:g}" for p in np.array(self.pressures_kPa)[~reached])
             _warn(f"The unit at {self.scale:g}x does not reach {missed} kPa: {base.why}")
         kept = np.ix_(np.array(rows), np.flatnonzero(reached))
-        walls = self.sides(found, self.larger * base.values, rows) if WALL in settings.effects else {}
+        walls = self.sides(found, self.larger * base.values, rows) if CONTACT in settings.effects else {}
         for orientation in self.orientations:
             names = [n for n in settings.effects if n in EFFECTS]
             every = {n: self._variant(n, orientation, base, found, kept) for n in names}

@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from .materials import Materials as Materials
     from .model import Model as Model
     from .newton_settings import NewtonSettings as NewtonSettings
-    from .obstacle import Contact as Contact
     from .obstacle import Obstacle as Obstacle
+    from .obstacle import ObstacleContact as ObstacleContact
     from .protocol import Protocol as Protocol
     from .protocol import read_protocol as read_protocol
     from .rigid import Box as Box
@@ -81,7 +81,7 @@ else:
             "materials": "Layer Materials",
             "model": "Model",
             "newton_settings": "NewtonSettings",
-            "obstacle": "Contact Obstacle",
+            "obstacle": "Obstacle ObstacleContact",
             "protocol": "Protocol read_protocol",
             "rigid": "Box Plane Pose Sphere",
             "self_intersection": "crossings first_self_intersection",

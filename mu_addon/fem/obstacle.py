@@ -22,13 +22,13 @@ Array = np.ndarray[Any, Any]
 
 # Points that begin to touch change the tangent, so an old factor is soon of no use; and a body that is
 # stopped ends far from where it was predicted.
-CONTACT = NewtonSettings(keep_factor=0.2, max_factorisations=40, predictor_tolerance=3.0)
+CONTACT_NEWTON = NewtonSettings(keep_factor=0.2, max_factorisations=40, predictor_tolerance=3.0)
 # A point slides where its friction is at least this share of its bound, which lags by less than the rest.
 _AT_BOUND = 0.999
 
 
 @attrs.frozen(eq=False)
-class Contact:
+class ObstacleContact:
     """What a state's contact with one obstacle is; forces are of the meshed body on the obstacle, (3,) in N.
 
     area_mm2: of the surface that touches, undeformed; sticking: the share of it that does not slide, 1 where
@@ -269,7 +269,7 @@ class Obstacle:
         pairs = self.faces[face][:, self._pairs]
         return pairs.reshape(-1, 2), blocks.reshape(-1, 3, 3)
 
-    def contact(self, u: Array) -> Contact:
+    def contact(self, u: Array) -> ObstacleContact:
         """Forces, area and depth of the contact at displacement u (n, 3) in mm.
 
         With friction u must be the last committed state or one found since: slid length and lost work are
@@ -290,7 +290,7 @@ class Obstacle:
             sliding = touching & (np.linalg.norm(rubbing, axis=-1) >= _AT_BOUND * most)
             slid, lost = self.memory.slid, self.memory.lost_mJ
         touched = float(area[touching].sum())
-        return Contact(
+        return ObstacleContact(
             normal.sum(axis=(0, 1)) @ r.T,
             rubbing.sum(axis=(0, 1)) @ r.T,
             touched,

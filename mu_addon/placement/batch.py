@@ -13,7 +13,7 @@ from ..fem.laws import NeoHooke
 from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.newton_settings import NewtonSettings
-from ..fem.obstacle import CONTACT
+from ..fem.obstacle import CONTACT_NEWTON
 from ..fem.state import State
 from ..fem.time_stepping import simulate_in_time
 
@@ -59,7 +59,7 @@ class CandidateBatch:
         For what remembers: friction on the model's obstacles, or a law with history. Raises ConvergenceError.
         """
         equilibrium = self._batched_newton.alone(number)
-        equilibrium.settings = CONTACT
+        equilibrium.settings = CONTACT_NEWTON
         return self.points(simulate_in_time(equilibrium, time_s, pressure_kPa).states)
 
     def at(self, state: State) -> Array:

@@ -110,8 +110,8 @@ CONTACT_COLUMNS = (
 class ContactHistory:
     """A whole unit's contact with b rigid bodies at k instants; forces (b, k, 3) are its on them, in N.
 
-    area_mm2, sticking, deepest_mm, slid_mm and lost_mJ (b, k): see `fem.obstacle.Contact`; slid_mm is the
-    farthest that a point has slid so far.
+    area_mm2, sticking, deepest_mm, slid_mm and lost_mJ (b, k): see `fem.obstacle.ObstacleContact`; slid_mm is
+    the farthest that a point has slid so far.
     """
 
     names: tuple[str, ...]

@@ -15,7 +15,7 @@ from ..lazy import public_face
 
 if TYPE_CHECKING:
     from .calibration import Calibration as Calibration
-    from .calibration import Sweep as Sweep
+    from .calibration import CalibrationSweep as CalibrationSweep
     from .calibration import calibrate as calibrate
     from .calibration import read_calibration as read_calibration
     from .calibration import write_calibration as write_calibration
@@ -53,7 +53,7 @@ else:
     __getattr__, __dir__, __all__ = public_face(
         __name__,
         {
-            "calibration": "Calibration Sweep calibrate read_calibration write_calibration",
+            "calibration": "Calibration CalibrationSweep calibrate read_calibration write_calibration",
             "decoder": "Decoder Layout Samples",
             "embedded_waveguide": "EmbeddedWaveguide Joints WaveguideShape embed_waveguide",
             "framing": "cobs_decoded cobs_encoded crc16",

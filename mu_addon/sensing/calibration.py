@@ -44,7 +44,7 @@ _CLEARLY = 0.25
 
 
 @attrs.frozen(eq=False)
-class Sweep:
+class CalibrationSweep:
     """One bending back and forth: time_s in s, angle_deg in degrees and voltage_V in V, (n,) each.
 
     The dark level is already subtracted from the voltages.
@@ -140,7 +140,7 @@ def _interval(volts: Array, angles: Array, at: Array) -> tuple[Array, Array]:
     return crossing(first), crossing(last)
 
 
-def calibrate(sweeps: Sequence[Sweep], channel: str, dark: str | float = 0.0) -> Calibration:
+def calibrate(sweeps: Sequence[CalibrationSweep], channel: str, dark: str | float = 0.0) -> Calibration:
     """Fit a monotonic map from voltage to bending angle, with its 95 % band, to two sweeps or more.
 
     channel: column of the recording that is calibrated; dark: the column of the dark level, or its value in
@@ -175,7 +175,7 @@ def calibrate(sweeps: Sequence[Sweep], channel: str, dark: str | float = 0.0) ->
     return attrs.evolve(result, error_deg=float(np.sqrt(np.mean(np.concatenate(errors) ** 2))))
 
 
-def _best(sweeps: Sequence[Sweep], drift: float) -> tuple[float, int, list[Array]]:
+def _best(sweeps: Sequence[CalibrationSweep], drift: float) -> tuple[float, int, list[Array]]:
     """Mean square in left-out sweeps, the number of intervals that makes it least, and what is left."""
     tried = [(m, _left_out(sweeps, m, drift)) for m in _INTERVALS if m == 1 or _determined(sweeps, m)]
     squares = [float(np.mean(np.concatenate(off) ** 2)) for _, off in tried]
@@ -183,7 +183,7 @@ def _best(sweeps: Sequence[Sweep], drift: float) -> tuple[float, int, list[Array
     return squares[best], *tried[best]
 
 
-def _determined(sweeps: Sequence[Sweep], intervals: int) -> bool:
+def _determined(sweeps: Sequence[CalibrationSweep], intervals: int) -> bool:
     """Whether the angles that were visited say each coefficient of a spline of so many intervals.
 
     Sweeps that hold a few angles say nothing of those between, and sweeps left out hold the same few: they
@@ -195,7 +195,7 @@ def _determined(sweeps: Sequence[Sweep], intervals: int) -> bool:
     return len(basis) >= basis.shape[1] and bool(values[-1] > _DETERMINED * values[0])
 
 
-def _require(sweeps: Sequence[Sweep]) -> None:
+def _require(sweeps: Sequence[CalibrationSweep]) -> None:
     if len(sweeps) < 2:
         raise InputError(
             f"{len(sweeps)} sweep",
@@ -219,12 +219,12 @@ def _gain(time_s: Array, drift_per_h: float) -> Array:
     return np.asarray(1 + drift_per_h * time_s / 3600)
 
 
-def _knots(sweeps: Sequence[Sweep], intervals: int) -> Array:
+def _knots(sweeps: Sequence[CalibrationSweep], intervals: int) -> Array:
     low, high = (f(float(f(s.angle_deg)) for s in sweeps) for f in (min, max))
     return np.concatenate([[low] * _DEGREE, np.linspace(low, high, intervals + 1), [high] * _DEGREE])
 
 
-def _triangle(sweep: Sweep, knots: Array, drift_per_h: float) -> Array:
+def _triangle(sweep: CalibrationSweep, knots: Array, drift_per_h: float) -> Array:
     """The sweep's least-squares problem (p, p + 1), reduced by QR, for a first coefficient and increments."""
     asked = _within(sweep, knots)
     basis = BSpline.design_matrix(sweep.angle_deg[asked], knots, _DEGREE).toarray()
@@ -247,11 +247,11 @@ def _monotone(triangles: Sequence[Array]) -> tuple[Array, float]:
     return best
 
 
-def _within(sweep: Sweep, knots: Array) -> Array:
+def _within(sweep: CalibrationSweep, knots: Array) -> Array:
     return np.asarray((sweep.angle_deg >= knots[0]) & (sweep.angle_deg <= knots[-1]))
 
 
-def _drift(sweeps: Sequence[Sweep]) -> float:
+def _drift(sweeps: Sequence[CalibrationSweep]) -> float:
     """The drift an hour that leaves least, with a spline of medium size."""
     knots = _knots(sweeps, 4)
     hours = max(max(float(np.abs(s.time_s).max()) for s in sweeps) / 3600, 1e-6)
@@ -263,7 +263,9 @@ def _drift(sweeps: Sequence[Sweep]) -> float:
     return float(minimize_scalar(left, bounds=(-most, most), method="bounded").x)
 
 
-def _without_each(sweeps: Sequence[Sweep], intervals: int, drift: float) -> list[tuple[Array, Array]]:
+def _without_each(
+    sweeps: Sequence[CalibrationSweep], intervals: int, drift: float
+) -> list[tuple[Array, Array]]:
     """Knots and coefficients of the fits to all sweeps but one."""
     result = []
     for k in range(len(sweeps)):
@@ -273,7 +275,7 @@ def _without_each(sweeps: Sequence[Sweep], intervals: int, drift: float) -> list
     return result
 
 
-def _left_out(sweeps: Sequence[Sweep], intervals: int, drift: float) -> list[Array]:
+def _left_out(sweeps: Sequence[CalibrationSweep], intervals: int, drift: float) -> list[Array]:
     """What each sweep is off in V from the fit to the others, at angles that these reach."""
     result = []
     for sweep, (knots, coefficients) in zip(sweeps, _without_each(sweeps, intervals, drift), strict=True):
@@ -308,7 +310,7 @@ def _independent(off: Array) -> float:
     return len(off) * (1 - rho) / (1 + rho)
 
 
-def sweeps_of(time_s: Array, angle_deg: Array, voltage_V: Array, fewest: int = 2) -> list[Sweep]:
+def sweeps_of(time_s: Array, angle_deg: Array, voltage_V: Array, fewest: int = 2) -> list[CalibrationSweep]:
     """Cut one record into sweeps, each back and forth.
 
     time_s in s, angle_deg in degrees and voltage_V in V, (n,) each; rows with a value that is not finite are
@@ -330,7 +332,9 @@ def sweeps_of(time_s: Array, angle_deg: Array, voltage_V: Array, fewest: int = 2
         if zone[visit[0]] == -1:
             inside = np.arange(before[-1], after[0])
             cuts.insert(-1, int(inside[np.argmin(angle_deg[inside])]))
-    result = [Sweep(time_s[a:b], angle_deg[a:b], voltage_V[a:b]) for a, b in itertools.pairwise(cuts)]
+    result = [
+        CalibrationSweep(time_s[a:b], angle_deg[a:b], voltage_V[a:b]) for a, b in itertools.pairwise(cuts)
+    ]
     if len(result) < fewest:
         raise InputError(
             f"{len(result)} sweep in that record",
@@ -364,8 +368,8 @@ def write_calibration(path: Path, calibration: Calibration, about: str = "") -> 
 def read_calibration(path: Path) -> Calibration:
     """Read a file of `write_calibration`.
 
-    Raises InputError where it cannot be read, has another version, lacks a value, or its map is not
-    monotonic.
+    Raises InputError where it cannot be read, has another version, lacks a value or has one that is no
+    number, or where its map is not monotonic.
     """
     remedy = "name a calibration.toml"
     try:

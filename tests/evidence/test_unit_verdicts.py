@@ -6,14 +6,14 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from mu_addon.design.parameters import load_preset
+from mu_addon.evidence.prediction.flat_obstacle import contact_effect
 from mu_addon.evidence.prediction.unit import UnitPressure
-from mu_addon.evidence.prediction.wall import effect
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.unit_effects import Body, layer_stiffness, walled
+from mu_addon.evidence.unit_effects import Body, layer_stiffness, with_flat_obstacle
 from mu_addon.evidence.unit_fem import Run, UnitSettings, run, unit_responses
 from mu_addon.evidence.verdict import diagnose
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.obstacle import CONTACT
+from mu_addon.fem.obstacle import CONTACT_NEWTON
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from tests.evidence import analytic
@@ -84,7 +84,7 @@ def test_walls_nearer_than_those_computed_are_not_guessed(walls):
     whole = max(walls, key=lambda r: r.scale)
     wall = whole.walls[1]
     fewer = attrs.evolve(wall, reaches_mm=wall.reaches_mm[:-1], changes=wall.changes[:-1])
-    (size,) = effect([(1, fewer), (-1, whole.walls[-1])], "unit_pressure").parameters
+    (size,) = contact_effect([(1, fewer), (-1, whole.walls[-1])], "unit_pressure").parameters
     assert size.high == wall.reaches_mm[-2]
     assert size.low == -whole.walls[-1].reaches_mm[-1]
 
@@ -104,9 +104,9 @@ def test_the_table_of_walls_is_the_simulation_between_its_points(walls):
 def test_the_unit_stops_at_the_wall():
     mesh = mesh_unit(UNIT, ROUGH)
     body = Body(UNIT, ROUGH, ROUGH)
-    model = walled(body, mesh, 1.0)
+    model = with_flat_obstacle(body, mesh, 1.0)
     (obstacle,) = model.obstacles
-    equilibrium = Equilibrium(model, body.materials(mesh), CONTACT)
+    equilibrium = Equilibrium(model, body.materials(mesh), CONTACT_NEWTON)
     state = equilibrium.newton(np.zeros_like(mesh.nodes), 0.0)
     for pressure in (0.01, 0.02):
         state = equilibrium.reach(pressure, [state])

@@ -9,7 +9,7 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.loads import gravity
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.fem.obstacle import CONTACT, Obstacle
+from mu_addon.fem.obstacle import CONTACT_NEWTON, Obstacle
 from mu_addon.fem.rigid import Box, Plane, Pose, Sphere
 from mu_addon.fem.state import rest
 from mu_addon.fem.time_stepping import simulate_in_time
@@ -32,7 +32,7 @@ def touched(mesh, *obstacles, poisson=NU):
     model = Model(mesh, threads=1)
     model.obstacles = obstacles
     count = len(mesh.tets)
-    return Equilibrium(model, Materials.neo_hooke(np.full(count, E), np.full(count, poisson)), CONTACT)
+    return Equilibrium(model, Materials.neo_hooke(np.full(count, E), np.full(count, poisson)), CONTACT_NEWTON)
 
 
 def along(time_s, places):

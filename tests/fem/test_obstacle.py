@@ -12,7 +12,7 @@ from mu_addon.errors import InputError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.fem.obstacle import CONTACT, Obstacle
+from mu_addon.fem.obstacle import CONTACT_NEWTON, Obstacle
 from mu_addon.fem.rigid import Box, Plane, Pose, Sphere
 from mu_addon.fem.state import rest
 
@@ -32,7 +32,7 @@ def pressed(mesh, obstacle):
     model = Model(mesh, threads=1)
     model.obstacles = (obstacle,)
     count = len(mesh.tets)
-    return Equilibrium(model, Materials.neo_hooke(np.full(count, E), np.full(count, NU)), CONTACT)
+    return Equilibrium(model, Materials.neo_hooke(np.full(count, E), np.full(count, NU)), CONTACT_NEWTON)
 
 
 @pytest.mark.parametrize("rigid", RIGID)
@@ -175,5 +175,5 @@ def test_a_pose_that_is_no_rotation_and_a_contact_without_depth_are_refused():
         Pose(np.diag([1.0, 1.0, -1.0]))
     with pytest.raises(InputError, match="MPa at 0 mm"):
         Obstacle(box(), RIGID[0], 0.5, 0.0)
-    with pytest.raises(InputError, match="no direction"):
+    with pytest.raises(InputError, match="is not a direction"):
         Plane((0, 0, 0), (0, 0, 0))

@@ -8,7 +8,7 @@ from mu_addon.errors import InputError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.fem.obstacle import CONTACT, Obstacle
+from mu_addon.fem.obstacle import CONTACT_NEWTON, Obstacle
 from mu_addon.fem.rigid import Box, Pose, Sphere
 from mu_addon.fem.rigid_surface import Surface, _closest
 from mu_addon.fem.state import rest
@@ -169,7 +169,7 @@ def test_patch_across_faces_that_do_not_match(order):
     depth, pressure, by = 0.01, 0.1, 0.1
     slab = Obstacle(mesh, ragged_slab(-0.2, 1.3, 1.0, 1.5), pressure, depth)
     model.obstacles = (slab,)
-    eq, state = Equilibrium(model, materials, CONTACT), rest(mesh)
+    eq, state = Equilibrium(model, materials, CONTACT_NEWTON), rest(mesh)
     for shift in (0.05, by):
         slab.pose = Pose(shift=(0, 0, -shift))
         state = eq.newton(state.u, 0.0)

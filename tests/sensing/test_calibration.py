@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from mu_addon.errors import InputError
 from mu_addon.sensing.calibration import (
-    Sweep,
+    CalibrationSweep,
     calibrate,
     deriver,
     read_calibration,
@@ -34,7 +34,7 @@ def sweep(
     hysteresis: float = 0.0,
     drift_per_h: float = 0.0,
     n: int = 120,
-) -> Sweep:
+) -> CalibrationSweep:
     phase = np.linspace(0, 2 * np.pi, n)
     angle = 25 * (1 - np.cos(phase))
     slow = np.empty(n)
@@ -43,12 +43,12 @@ def sweep(
         slow[k] = 0.8 * slow[k - 1] + 0.6 * generator.normal()
     time_s = start_s + np.linspace(0, 10, n)
     volts = light(angle) * (1 + drift_per_h * time_s / 3600) * (1 + whole * generator.normal())
-    return Sweep(time_s, angle, volts + noise * slow + hysteresis * np.sin(phase))
+    return CalibrationSweep(time_s, angle, volts + noise * slow + hysteresis * np.sin(phase))
 
 
 def test_an_exact_curve_comes_back() -> None:
     angle = np.linspace(0, 50, 200)
-    sweeps = [Sweep(angle, angle, 2 + 0.03 * angle)] * 2
+    sweeps = [CalibrationSweep(angle, angle, 2 + 0.03 * angle)] * 2
     found = calibrate(sweeps, "light_V")
     back, low, high, possible = found.angle_of(2 + 0.03 * angle)
     np.testing.assert_allclose(back, angle, atol=1e-6)
@@ -201,7 +201,7 @@ def test_angles_held_say_nothing_of_those_between():
     random = np.random.default_rng(1)
     angle = np.repeat([0.0, 15.0, 30.0, 45.0, 30.0, 15.0, 0.0], 40)
     sweeps = [
-        Sweep(np.arange(280) / 40 + 10 * k, angle, volts(angle) + 0.002 * random.normal(size=280))
+        CalibrationSweep(np.arange(280) / 40 + 10 * k, angle, volts(angle) + 0.002 * random.normal(size=280))
         for k in range(2)
     ]
     found = calibrate(sweeps, "light_V")

@@ -17,7 +17,7 @@ from mu_addon.meshing.unit import mesh_unit
 from mu_addon.report.pc2 import read_pc2
 from mu_addon.usecases.grip.grasp import Cube, Grip, grasp
 from mu_addon.usecases.grip.motion import even
-from mu_addon.usecases.grip.path_deviation import Column, column, printed_column
+from mu_addon.usecases.grip.path_deviation import PathDeviations, path_deviations, published_deviations
 from mu_addon.usecases.grip.phases import NAMES, Phases, read_phases, shipped_phases
 from mu_addon.usecases.grip.run import Job
 from mu_addon.usecases.simulate_and_place.motion import read_motion
@@ -79,15 +79,15 @@ def test_even_steps_keep_what_was_sampled():
 
 
 def test_the_papers_gripper_column():
-    printed = printed_column()
+    printed = published_deviations()
     assert len(printed) == 10
     assert min(printed, key=printed.get) == "alpha4"
-    assert Column("intersect", None, printed).rank_correlation(printed) == pytest.approx(1.0)
+    assert PathDeviations("intersect", None, printed).rank_correlation(printed) == pytest.approx(1.0)
     # Without ties Spearman's is 1 - 6 sum d^2 / (n (n^2 - 1)), d the differences of the ranks.
-    other = printed_column("scale_1.00")
+    other = published_deviations("scale_1.00")
     d = [sorted(printed.values()).index(printed[n]) - sorted(other.values()).index(other[n]) for n in printed]
     expected = 1 - 6 * sum(x * x for x in d) / (10 * 99)
-    assert Column("intersect", None, printed).rank_correlation(other) == pytest.approx(expected)
+    assert PathDeviations("intersect", None, printed).rank_correlation(other) == pytest.approx(expected)
 
 
 def test_a_cube_wider_than_the_gap_is_refused(finger):
@@ -136,10 +136,10 @@ def test_the_smaller_cube_bends_a_finger_more_and_is_pressed_less(smooth):
 def test_a_finger_that_closes_on_nothing_ranks_paths_as_the_paper_does(finger):
     gripper, mesh, materials = finger
     kept = {}
-    found = column(gripper, mesh, materials, "volume_fraction", None, store=kept.__setitem__)
+    found = path_deviations(gripper, mesh, materials, "volume_fraction", None, store=kept.__setitem__)
     assert found.chosen == "alpha4"
-    assert found.rank_correlation(printed_column()) > 0.9
-    again = column(gripper, mesh, materials, "volume_fraction", None, load=kept.get)
+    assert found.rank_correlation(published_deviations()) > 0.9
+    again = path_deviations(gripper, mesh, materials, "volume_fraction", None, load=kept.get)
     assert again.J_hat_mm == found.J_hat_mm
 
 

@@ -27,13 +27,13 @@ from mu_addon.usecases.reproduce.agreement import (
     spearman,
     statements,
 )
-from mu_addon.usecases.reproduce.column import STATIONS, held, motion, paths
-from mu_addon.usecases.reproduce.columns import BENDING_KPA, Solved, TableColumn
 from mu_addon.usecases.reproduce.published import GRIPPER, name_of, published
 from mu_addon.usecases.reproduce.report import report, weightings
-from mu_addon.usecases.reproduce.run import Found, OtherColumn, summary
+from mu_addon.usecases.reproduce.run import Found, OtherTableColumn, summary
 from mu_addon.usecases.reproduce.settings import Settings, read_set
-from mu_addon.usecases.reproduce.values import column_unit
+from mu_addon.usecases.reproduce.table_column import STATIONS, motion, paths, with_fixed_base
+from mu_addon.usecases.reproduce.table_columns import BENDING_KPA, Solved, TableColumn
+from mu_addon.usecases.reproduce.values import unit_of_table_column
 from mu_addon.usecases.simulate_and_place.job import grasp
 
 PAPER = published()
@@ -46,7 +46,7 @@ def verdicts(table, coarser=None):
 def test_the_papers_own_figures():
     assert PAPER.scales == (0.75, 1.0, 1.5)
     assert [name_of(s) for s in PAPER.scales] == ["0.75x", "1.0x", "1.5x"]
-    assert PAPER.column(1.0)[1] == 0.376
+    assert PAPER.table_column(1.0)[1] == 0.376
     assert PAPER.modulus_kPa[1.5] == 16.38
     assert PAPER.bending_deg[0.75] == (-50.0, 45.0)
     # Windows as this program numbers them.
@@ -70,7 +70,7 @@ def test_the_papers_statements_in_its_own_table():
 
 
 def test_a_difference_that_the_mesh_turns_round_cannot_be_told():
-    fine, coarse = PAPER.column(1.0).copy(), PAPER.column(1.0).copy()
+    fine, coarse = PAPER.table_column(1.0).copy(), PAPER.table_column(1.0).copy()
     coarse[3] = coarse[2] + 0.01  # alpha4 above alpha3 on the other mesh
     found = verdicts({"1.0x": fine}, {"1.0x": coarse})
     assert found["1.0x: of paths of equal length, the distal one deviates least"] == UNDECIDED
@@ -80,7 +80,7 @@ def test_a_difference_that_the_mesh_turns_round_cannot_be_told():
 
 
 def test_agreement_of_a_column_with_itself_and_with_its_opposite():
-    theirs = PAPER.column(0.75)
+    theirs = PAPER.table_column(0.75)
     same = agreement(2 * theirs, theirs, PAPER.paths)
     assert same.spearman == pytest.approx(1.0)
     assert (same.chosen, same.same_choice) == ("alpha4", True)
@@ -133,10 +133,10 @@ COARSE = MeshSettings(order=1, refine=0.4)
 
 def test_what_is_held_does_not_move_and_its_paths_disturb_nothing():
     unit = Unit()
-    mesh = held(mesh_unit(unit, COARSE), 3.0 * unit.dimensions.cell)
-    moved = motion(unit, mesh, (40.0,), look_for_contact=False)
+    mesh = with_fixed_base(mesh_unit(unit, COARSE), 3.0 * unit.dimensions.cell)
+    moved = motion(unit, mesh, (40.0,), look_for_self_intersection=False)
     assert np.abs(moved.states[-1].u[mesh.nodes[:, 2] <= 37.5]).max() == 0.0
-    free = motion(unit, mesh_unit(unit, COARSE), (40.0,), look_for_contact=False)
+    free = motion(unit, mesh_unit(unit, COARSE), (40.0,), look_for_self_intersection=False)
     assert 0 < moved.angle_at(40.0) < 0.7 * free.angle_at(40.0)
     J = paths(unit, mesh, moved, ("volume_fraction",), (40.0,)).J_hat(
         "volume_fraction", anchor_points(unit), np.array([0.0, 40.0])
@@ -146,7 +146,7 @@ def test_what_is_held_does_not_move_and_its_paths_disturb_nothing():
 
 
 def test_paths_side_by_side_are_each_path_alone():
-    unit = column_unit(Unit(), 0.75, 21.70)
+    unit = unit_of_table_column(Unit(), 0.75, 21.70)
     mesh = mesh_unit(unit, COARSE)
     pressures = (-20.0, 20.0, 40.0)
     moved = motion(unit, mesh, pressures)
@@ -185,13 +185,13 @@ def shown(**changes):
     columns = []
     for scale in PAPER.scales:
         load = np.abs(samples)[:, None] / np.abs(samples).mean()
-        delta = PAPER.column(scale)[:, None, None] * np.broadcast_to(load, (10, 13, STATIONS))
+        delta = PAPER.table_column(scale)[:, None, None] * np.broadcast_to(load, (10, 13, STATIONS))
         angle = np.array(BENDING_KPA)
         one = Solved(
             np.array(BENDING_KPA), angle, np.full(2, np.nan), np.array([delta, delta]), np.ones((2, 10))
         )
         columns.append(TableColumn(name_of(scale), scale, one, one))
-    gripper = OtherColumn(dict.fromkeys(RULES, PAPER.J_hat[GRIPPER]), remark="on a cube")
+    gripper = OtherTableColumn(dict.fromkeys(RULES, PAPER.J_hat[GRIPPER]), remark="on a cube")
     whole = Found(Settings(), PAPER, tuple(columns), {GRIPPER: gripper}, samples)
     return attrs.evolve(whole, **changes)
 

@@ -28,7 +28,7 @@ from mu_addon.usecases.grip import job as grip
 from mu_addon.usecases.grip.grasp import Cube, Grip
 from mu_addon.usecases.homogenize import job as homogenize
 from mu_addon.usecases.parameter_study.plan import parse_plan
-from mu_addon.usecases.parameter_study.run import Job as Sweep
+from mu_addon.usecases.parameter_study.run import Job as ParameterStudyJob
 from mu_addon.usecases.reproduce.settings import Settings
 from mu_addon.usecases.resume import MODULES, resume, use_case_of
 from mu_addon.usecases.simulate_and_place import job as study
@@ -85,7 +85,7 @@ def jobs(folder):
     yield diagnose.Job(paper, load_preset("mu-1.5x"))
     yield design_experiments.Job(paper, noise={**design_experiments.NOISE, "angle": 1 / 3})
     yield fit.Job(measured, ("yeoh", "neo-hooke"), ("uniaxial",), "relative")
-    yield Sweep(parse_plan(sweep, folder), workers=2)
+    yield ParameterStudyJob(parse_plan(sweep, folder), workers=2)
     yield Settings(
         values={"chambers.wall_mm": 0.95},
         values_name="mine",

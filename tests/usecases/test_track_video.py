@@ -11,7 +11,14 @@ from mu_addon.errors import InputError
 from mu_addon.measured import read_folder
 from mu_addon.measured.video import Tracks
 from mu_addon.usecases.track_video import run as tracking
-from mu_addon.usecases.track_video.run import Bench, Marks, filmed, read_bench, read_pixels, write_experiment
+from mu_addon.usecases.track_video.run import (
+    Bench,
+    MarkerSettings,
+    filmed,
+    read_bench,
+    read_pixels,
+    write_experiment,
+)
 
 from ..measured.test_video import VIEW, arc, picture
 
@@ -62,7 +69,7 @@ def test_a_description_is_read(tmp_path):
     assert bench.view == attrs.evolve(
         VIEW, base=("low", "high"), tip=("left", "right"), camera="-x", ruler=("zero", "fifty"), ruler_mm=50.0
     )
-    assert bench.marks == Marks({"low": (300, 30.5), "high": (180, 30), "left": (1, 2)}, "dots")
+    assert bench.markers == MarkerSettings({"low": (300, 30.5), "high": (180, 30), "left": (1, 2)}, "dots")
     assert (bench.fps, bench.starts_s) == (25.0, 1.5)
     assert bench.experiment["specimen"] == "A"
 
@@ -99,12 +106,12 @@ def test_descriptions_that_cannot_be_used(tmp_path, old, new, what, where):
 
 def test_frames_and_pressure_meet_by_time(tmp_path):
     """The camera starts 0.4 s before the pressure's record and stops after it."""
-    found = filmed(clip(70, -0.4), Bench(VIEW, Marks({}), starts_s=-0.4), PRESSURE)
+    found = filmed(clip(70, -0.4), Bench(VIEW, MarkerSettings({}), starts_s=-0.4), PRESSURE)
     assert found.time_s[0] == pytest.approx(0.0)
     assert found.time_s[-1] == pytest.approx(5.0)
     assert "19 of 70 frames are outside" in found.remarks[0].what
     np.testing.assert_allclose(found.motion.angle_deg, bend(found.time_s), atol=1e-6)
-    table, remarks = write_experiment(found, Bench(VIEW, Marks({})), "ladder / 1", tmp_path)
+    table, remarks = write_experiment(found, Bench(VIEW, MarkerSettings({})), "ladder / 1", tmp_path)
     assert table.name == "ladder-1.csv"
     assert remarks == ()
     (e,) = read_folder(tmp_path).experiments
@@ -120,8 +127,8 @@ def test_frames_and_pressure_meet_by_time(tmp_path):
 def test_lost_markers_leave_empty_rows_that_diagnose_may_read(tmp_path):
     tracks = clip()
     tracks.pixels[3, 20:23] = np.nan
-    found = filmed(tracks, Bench(VIEW, Marks({})), PRESSURE)
-    _, remarks = write_experiment(found, Bench(VIEW, Marks({})), "gap", tmp_path)
+    found = filmed(tracks, Bench(VIEW, MarkerSettings({})), PRESSURE)
+    _, remarks = write_experiment(found, Bench(VIEW, MarkerSettings({})), "gap", tmp_path)
     (e,) = read_folder(tmp_path).experiments
     assert np.flatnonzero(np.isnan(e["angle_deg"])).tolist() == [20, 21, 22]
     assert any("marker 'd' is lost in 3 of 50 frames, 2 to 2.2 s" in r.what for r in found.remarks)
@@ -129,20 +136,20 @@ def test_lost_markers_leave_empty_rows_that_diagnose_may_read(tmp_path):
 
 
 def test_never_at_rest_is_told():
-    found = filmed(clip(20, 2.0), Bench(VIEW, Marks({}), starts_s=2.0), PRESSURE)
+    found = filmed(clip(20, 2.0), Bench(VIEW, MarkerSettings({}), starts_s=2.0), PRESSURE)
     assert "no frame shows the unit at rest; the angle is relative to 20 kPa at 2 s" in found.remarks[0].what
     assert found.motion.angle_deg[0] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_clip_without_a_clock_and_one_at_another_time():
     with pytest.raises(InputError, match="has no frame rate"):
-        filmed(attrs.evolve(clip(), fps=0.0), Bench(VIEW, Marks({})), PRESSURE)
+        filmed(attrs.evolve(clip(), fps=0.0), Bench(VIEW, MarkerSettings({})), PRESSURE)
     with pytest.raises(InputError, match=r"from 100 to 104\.9 s, the pressure record from 0 to 5 s"):
-        filmed(clip(), Bench(VIEW, Marks({}), starts_s=100.0), PRESSURE)
+        filmed(clip(), Bench(VIEW, MarkerSettings({}), starts_s=100.0), PRESSURE)
 
 
 def test_clips_share_a_folder_and_a_name_is_taken_once(tmp_path):
-    bench = Bench(VIEW, Marks({}), experiment={"specimen": "A", "scale": 0.75})
+    bench = Bench(VIEW, MarkerSettings({}), experiment={"specimen": "A", "scale": 0.75})
     found = filmed(clip(), bench, PRESSURE)
     write_experiment(found, bench, "one", tmp_path)
     write_experiment(found, attrs.evolve(bench, experiment={"role": "held_out"}), "two", tmp_path / "other")
@@ -168,8 +175,8 @@ def described(tmp_path):
     """Files of a run: the markers as another tracker followed them, a description, and the pressure."""
     tracks = clip()
     tracks.pixels[2, 7] = np.nan
-    found = filmed(tracks, Bench(VIEW, Marks({})), PRESSURE)
-    write_experiment(found, Bench(VIEW, Marks({})), "source", tmp_path)
+    found = filmed(tracks, Bench(VIEW, MarkerSettings({})), PRESSURE)
+    write_experiment(found, Bench(VIEW, MarkerSettings({})), "source", tmp_path)
     markers = "\n".join(
         f'[[marker]]\nname = "{name}"\nplace_mm = [{y}, {z}]'
         for name, (y, z) in zip("ab", VIEW.places_mm, strict=True)
@@ -232,7 +239,7 @@ def test_a_marker_without_a_pixel_is_named(tmp_path):
     bench = read_bench(tmp_path / "bench.toml")
     (tmp_path / "bench.mp4").write_bytes(b"")
 
-    def follow(clip, marks):
+    def follow(clip, markers):
         raise AssertionError
 
     with pytest.raises(InputError, match="marker 'a' has no pixel"):

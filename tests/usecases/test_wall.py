@@ -28,7 +28,7 @@ MESH = MeshSettings(order=1, refine=0.4)
 STAGES = ("design", "simulate")
 
 
-def walled(**values):
+def unit_with_wall(**values):
     return attrs.evolve(BASE, wall=Wall(**values))
 
 
@@ -81,7 +81,7 @@ def test_a_wall_without_a_law_of_its_own_is_what_it_always_was(mesh):
     ],
 )
 def test_small_strain_is_the_units_moduli_under_every_law(mesh, values, laws):
-    unit = walled(**values)
+    unit = unit_with_wall(**values)
     materials = materials_of(unit, mesh)
     assert [layer.law for layer in materials.layers] == [*laws, NeoHooke]
     E, nu = (x[mesh.region == MEMBRANE] for x in materials.small_strain(len(mesh.tets)))
@@ -92,7 +92,7 @@ def test_small_strain_is_the_units_moduli_under_every_law(mesh, values, laws):
 
 
 def test_a_file_keeps_the_law_and_no_parameter_of_another(tmp_path):
-    unit = walled(law="prony", prony_g1=0.2, prony_tau1_s=3.0, friction_share=0.1)
+    unit = unit_with_wall(law="prony", prony_g1=0.2, prony_tau1_s=3.0, friction_share=0.1)
     write_unit(unit, tmp_path / "unit.toml")
     assert read_unit(tmp_path / "unit.toml") == unit
     assert "mullins" not in to_toml(unit)
@@ -111,7 +111,7 @@ def test_a_file_keeps_the_law_and_no_parameter_of_another(tmp_path):
 def test_a_wall_that_relaxes_is_stiff_at_once_and_the_units_own_after_long(tmp_path):
     """At once the shear modulus is 1/(1 - g) times that after long; the bulk modulus does not relax."""
     g, tau, p = 0.4, 1.0, 10.0
-    relaxing = walled(law="prony", prony_g1=g, prony_tau1_s=tau)
+    relaxing = unit_with_wall(law="prony", prony_g1=g, prony_tau1_s=tau)
     # Held for 40 tau; and pressed within a millionth of one.
     found, study = simulated(tmp_path / "held", job_of(relaxing, [0, 20.0, 60.0], [0, p, p], times=4))
     assert study.job.in_time
@@ -137,7 +137,9 @@ def test_a_wall_that_softens_does_not_on_its_first_loading_and_a_stopped_run_goe
     time, pressure = [0, 1, 2, 3, 4], [0, 10, 20, 10, 20]
     soft, study = simulated(
         tmp_path / "soft",
-        job_of(walled(law="ogden-roxburgh", mullins_r=1.5, mullins_m_kPa=2.0), time, pressure, times=5),
+        job_of(
+            unit_with_wall(law="ogden-roxburgh", mullins_r=1.5, mullins_m_kPa=2.0), time, pressure, times=5
+        ),
     )
     plain, _ = simulated(tmp_path / "plain", job_of(BASE, time, pressure, times=5))
     np.testing.assert_allclose(soft[:3], plain[:3], rtol=1e-6)
@@ -160,7 +162,7 @@ def test_a_wall_that_softens_does_not_on_its_first_loading_and_a_stopped_run_goe
 
 @pytest.mark.slow
 def test_friction_in_the_wall_leaves_a_loop_whatever_the_rate(tmp_path):
-    unit = walled(friction_share=0.5, friction_yield_kPa=10.0)
+    unit = unit_with_wall(friction_share=0.5, friction_yield_kPa=10.0)
     pressure = [0, 15, 0]
     slow, _ = simulated(tmp_path / "slow", job_of(unit, [0, 50, 100], pressure, times=3))
     fast, _ = simulated(tmp_path / "fast", job_of(unit, [0, 0.5, 1], pressure, times=3))
@@ -174,7 +176,7 @@ def test_friction_in_the_wall_leaves_a_loop_whatever_the_rate(tmp_path):
 def test_sensor_paths_are_ranked_in_a_wall_that_remembers(tmp_path):
     from mu_addon.usecases.simulate_and_place.run import run_stages
 
-    unit = walled(law="prony", prony_g1=0.3, prony_tau1_s=1.0)
+    unit = unit_with_wall(law="prony", prony_g1=0.3, prony_tau1_s=1.0)
     job = attrs.evolve(
         job_of(unit, [0, 1, 2], [0, 15, 0], times=3),
         stages=("design", "simulate", "place"),
@@ -199,7 +201,7 @@ def test_jobs_that_know_no_such_wall_refuse_it(mesh):
     from mu_addon.usecases.grip.run import Job as GripJob
     from mu_addon.usecases.simulate_and_place.static_effects import StaticEffects
 
-    unit = walled(law="prony", prony_g1=0.3)
+    unit = unit_with_wall(law="prony", prony_g1=0.3)
     with pytest.raises(InputError, match="neo-Hookean wall"):
         Body(unit).materials(mesh)
     gripper = load_gripper("gripper")

@@ -11,7 +11,7 @@ from ..shared.operators import UnitOperator, ValidUnitOperator, reports_errors
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from ..unit.properties import to_unit
-from . import markers
+from . import marks
 from . import state as printing
 
 NOT_CHECKED = "Check the print first"
@@ -118,28 +118,28 @@ class MU_OT_print_marks(_OfCheck, bpy.types.Operator):
 
     def execute(self, context):
         root = unit_object.active_root(context)
-        markers.mark(root, printing.checked(root))
+        marks.mark(root, printing.checked(root))
         return {"FINISHED"}
 
 
 class MU_OT_print_clear(UnitOperator, bpy.types.Operator):
-    """Remove the markers of the check from the scene"""
+    """Remove the marks of the check from the scene"""
 
     bl_idname = "mu.print_clear"
-    bl_label = "Clear Markers"
+    bl_label = "Clear Marks"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context):
         if not super().poll(context):
             return False
-        if not markers.marks(unit_object.active_root(context)):
+        if not marks.mark_objects(unit_object.active_root(context)):
             cls.poll_message_set("No place is marked")
             return False
         return True
 
     def execute(self, context):
-        markers.clear(unit_object.active_root(context))
+        marks.clear(unit_object.active_root(context))
         return {"FINISHED"}
 
 
@@ -178,20 +178,20 @@ class MU_OT_print_show(_OfCheck, bpy.types.Operator):
             self.report({"ERROR"}, f"{chosen['check']}: it has {len(places)} places")
             return {"CANCELLED"}
         next_one = settings.place + 1 if settings.finding == self.finding else 0
-        if markers.marked(root) != found.digest:
-            markers.mark(root, found)
+        if marks.marked(root) != found.digest:
+            marks.mark(root, found)
         settings.finding = self.finding
         settings.place = (next_one if self.place < 0 else self.place) % max(len(places), 1)
-        markers.resize(root)
+        marks.resize(root)
         if len(places):
             for obj in context.selected_objects:
                 obj.select_set(False)
-            for obj in markers.marks(root):
-                if obj[markers.MARK] == str(self.finding):
+            for obj in marks.mark_objects(root):
+                if obj[marks.MARK] == str(self.finding):
                     obj.select_set(True)
             if self.view:
                 reach = to_unit(root.mu_unit).dimensions.cell
-                markers.frame(root, places[settings.place], reach)
+                marks.frame(root, places[settings.place], reach)
         return {"FINISHED"}
 
 

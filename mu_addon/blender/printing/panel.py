@@ -11,7 +11,7 @@ from ...run.child import FAILED
 from ..jobs.panel import job_state
 from ..shared.panels import UnitPanel, alert, large_button, parameters, wrapped
 from ..unit import object as unit_object
-from . import markers
+from . import marks
 from . import state as printing
 from .properties import OWN_PRINTER
 
@@ -93,10 +93,10 @@ class MU_PT_print_check(_OfPrint, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("mu.print_marks", icon="EMPTY_AXIS")
         row.operator("mu.print_clear", text="", icon="X")
-        if markers.marks(root):
+        if marks.mark_objects(root):
             layout.prop(settings, "marker")
-            if markers.marked(root) != found.digest:
-                wrapped(layout, "The markers belong to an earlier check: mark again", "INFO")
+            if marks.marked(root) != found.digest:
+                wrapped(layout, "The marks belong to an earlier check: mark again", "INFO")
         _directions(layout, settings, found)
         layout.operator("mu.print_open", text="Report", icon="URL").what = "report"
 
@@ -215,7 +215,7 @@ def _check_state(layout, found) -> None:
     if found is None or found.stale:
         wrapped(layout, f"Not checked: {found.stale}" if found else "Not checked", "QUESTION")
         return
-    count = {s: sum(f["severity"] == s for f in found.findings) for s in markers.FAULTS}
+    count = {s: sum(f["severity"] == s for f in found.findings) for s in marks.FAULTS}
     if count["error"]:
         alert(layout, f"The check found {count['error']} error(s): export asks first", "CANCEL")
     else:

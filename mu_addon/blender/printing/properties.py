@@ -9,7 +9,7 @@ from ...design.assets import asset_names
 from ...design.printing.printer import DEFAULT
 from ..shared.registration import property_group_factory
 from ..unit.properties import BESIDE_BLEND_FILE
-from . import markers
+from . import marks
 
 OWN_PRINTER = "own"
 FORMATS = (
@@ -84,13 +84,13 @@ class MU_PG_print(bpy.types.PropertyGroup):
         options=BESIDE_BLEND_FILE,
     )
     marker: FloatProperty(
-        name="Markers",
+        name="Marks",
         description="Radius of the balls at the places that were found",
         subtype="DISTANCE",
         default=0.8,
         min=0.05,
         max=10.0,
-        update=lambda settings, context: markers.resize(settings.id_data),
+        update=lambda settings, context: marks.resize(settings.id_data),
     )
     # Which finding is looked at, and which of its places; -1: none.
     finding: IntProperty(default=-1, options={"HIDDEN"})

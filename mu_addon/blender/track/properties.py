@@ -17,7 +17,7 @@ from bpy.props import (
 from ...errors import InputError
 from ...measured.kinds import ROLES
 from ...measured.video import View
-from ...usecases.track_video.run import Bench, Marks
+from ...usecases.track_video.run import Bench, MarkerSettings
 from ..shared.registration import property_group_factory
 from ..unit.properties import BESIDE_BLEND_FILE, exact
 
@@ -180,7 +180,7 @@ def bench_of(clip: Any) -> Bench:
     experiment = {"role": b.role, "scale": exact(b.unit_scale), "orientation_deg": exact(b.orientation_deg)}
     if b.specimen:
         experiment["specimen"] = b.specimen
-    return Bench(view, Marks({}, b.marks), exact(b.fps) or None, exact(b.starts_s), experiment)
+    return Bench(view, MarkerSettings({}, b.marks), exact(b.fps) or None, exact(b.starts_s), experiment)
 
 
 def _pair(values: Any) -> tuple[float, float]:

@@ -12,14 +12,14 @@ import numpy as np
 
 from ...errors import InputError
 from ...measured.video import Tracks
-from ...usecases.track_video.run import Marks
+from ...usecases.track_video.run import MarkerSettings
 
 # Crosses show how they turn; a dot does not, and a tracker that looks for its turn walks off.
 MODELS = {"crosses": "LocRot", "dots": "Loc"}
 CORRELATION = 0.75
 
 
-def track_markers(path: Path, marks: Marks) -> Tracks:
+def track_markers(path: Path, markers: MarkerSettings) -> Tracks:
     """Track markers through a clip from where they are in its first frame; raises InputError.
 
     The clip is gone from Blender's data afterwards.
@@ -38,8 +38,8 @@ def track_markers(path: Path, marks: Marks) -> Tracks:
                 str(path),
                 "give a movie, or the first picture of a sequence that is numbered without gaps",
             )
-        for name, at in marks.pixels.items():
-            _place(clip, name, at, marks, str(path))
+        for name, at in markers.pixels.items():
+            _place(clip, name, at, markers, str(path))
         with _editor(clip) as scene:
             scene.frame_end = max(scene.frame_end, frames)
             scene.frame_set(1)
@@ -71,7 +71,7 @@ def prepare(tracks: Iterable[Any], kind: str) -> None:
         track.use_normalization = track.use_brute = True
 
 
-def _place(clip: Any, name: str, at: tuple[float, float], marks: Marks, where: str) -> None:
+def _place(clip: Any, name: str, at: tuple[float, float], markers: MarkerSettings, where: str) -> None:
     width, height = clip.size
     if not (0 <= at[0] <= width and 0 <= at[1] <= height):
         raise InputError(
@@ -82,12 +82,12 @@ def _place(clip: Any, name: str, at: tuple[float, float], marks: Marks, where: s
     track = clip.tracking.tracks.new(name=name, frame=1)
     marker = track.markers[0]
     marker.co = at[0] / width, 1.0 - at[1] / height
-    x, y = marks.pattern_px / 2 / width, marks.pattern_px / 2 / height
+    x, y = markers.pattern_px / 2 / width, markers.pattern_px / 2 / height
     marker.pattern_corners = ((-x, -y), (x, -y), (x, y), (-x, y))
-    x, y = marks.search_px / 2 / width, marks.search_px / 2 / height
+    x, y = markers.search_px / 2 / width, markers.search_px / 2 / height
     marker.search_min, marker.search_max = (-x, -y), (x, y)
     track.select = True
-    prepare([track], marks.kind)
+    prepare([track], markers.kind)
 
 
 @contextmanager

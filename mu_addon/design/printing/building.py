@@ -9,10 +9,12 @@ from . import layers
 from .drain import Chambers
 from .finding import MOST_PLACES, Finding, Points, Severity, gathered, numbered
 from .printer import Printer
-from .voxels import Columns
+from .voxels import VoxelColumns
 
 
-def building(built: Columns, chambers: Chambers, printer: Printer) -> tuple[list[Finding], dict[str, float]]:
+def building(
+    built: VoxelColumns, chambers: Chambers, printer: Printer
+) -> tuple[list[Finding], dict[str, float]]:
     """Findings of a build, its columns along the build direction a layer high, and its cups in ml."""
     begun = layers.islands(built, layers.regions(built, free=False))
     closed = layers.cups(built, layers.regions(built, free=True))

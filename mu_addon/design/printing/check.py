@@ -23,7 +23,7 @@ from .leaks import drains
 from .orientation import Build, fits, orientations
 from .printer import Printer
 from .thickness import across, samples
-from .voxels import columns, frame_along
+from .voxels import frame_along, voxel_columns
 from .walls import chamber_walls, narrowest, thinnest
 
 Array = NDArray[np.float64]
@@ -107,7 +107,7 @@ def check(
     if "chambers" in stages:
         with stage("chambers and drains"):
             step = _step(STEP, vertices)
-            pockets = chambers(room(columns(*seen, step)))
+            pockets = chambers(room(voxel_columns(*seen, step)))
             found += drains(solid, pockets, unit, printer)
             figures["chamber_ml"] = sum(p.volume for p in pockets.found) / 1e3
             if "thickness" in stages:
@@ -116,7 +116,7 @@ def check(
                 found += chamber_walls(surface, inward, lit & ~other, printer)
     if "layers" in stages:
         with stage("layers"):
-            built = columns(*seen, _step(STEP, vertices), printer["layer_mm"], frame_along(up))
+            built = voxel_columns(*seen, _step(STEP, vertices), printer["layer_mm"], frame_along(up))
             more, ml = building(built, pockets, printer)
             found += more
             figures |= ml

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from .voxels import Columns
+from .voxels import VoxelColumns
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class Room:
     A cell's distance is to the nearest solid cell's centre less half a cell: within half a cell of true.
     """
 
-    columns: Columns
+    columns: VoxelColumns
     distance: NDArray[np.float32]
 
 
@@ -61,7 +61,7 @@ class Chambers:
     narrowest places; free: the cells that hold no solid."""
 
     found: list[Chamber]
-    columns: Columns
+    columns: VoxelColumns
     within: NDArray[np.bool_]
     free: NDArray[np.bool_]
 
@@ -80,7 +80,7 @@ class Chambers:
         return tuple(np.clip(cell, 0, np.array(grid.shape) - 1).T)
 
 
-def room(columns: Columns) -> Room:
+def room(columns: VoxelColumns) -> Room:
     """Distances of a grid of cubes, slab by slab, so that memory beside the answer does not grow."""
     from scipy.ndimage import distance_transform_edt
 

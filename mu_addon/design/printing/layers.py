@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from .voxels import Columns
+from .voxels import VoxelColumns
 
 Array = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ class Overhang:
     bridge: NDArray[np.bool_]
 
 
-def regions(columns: Columns, free: bool, at_once: int = 8_000_000) -> Regions:
+def regions(columns: VoxelColumns, free: bool, at_once: int = 8_000_000) -> Regions:
     """Regions of the solid, cells touching by side or corner, or of what is free, touching by side."""
     from scipy.ndimage import label
 
@@ -102,7 +102,7 @@ def regions(columns: Columns, free: bool, at_once: int = 8_000_000) -> Regions:
     )
 
 
-def islands(columns: Columns, solid: Regions) -> Islands:
+def islands(columns: VoxelColumns, solid: Regions) -> Islands:
     """Regions above the first layer with nothing of the part below them."""
     held = np.zeros(len(solid.layer), bool)
     held[solid.links[:, 1]] = True
@@ -113,7 +113,7 @@ def islands(columns: Columns, solid: Regions) -> Islands:
     return Islands(columns.points(solid.middle[found]), area)
 
 
-def cups(columns: Columns, free: Regions) -> Cups:
+def cups(columns: VoxelColumns, free: Regions) -> Cups:
     """What is closed in from the side and from the platform's side, layer by layer; it opens, if ever, later.
 
     Regions are joined in the order in which they are built; a group that has not met the outside is closed
@@ -154,7 +154,7 @@ def cups(columns: Columns, free: Regions) -> Cups:
     )
 
 
-def overhangs(columns: Columns, slope_deg: float, at_once: int = 8_000_000) -> Overhang:
+def overhangs(columns: VoxelColumns, slope_deg: float, at_once: int = 8_000_000) -> Overhang:
     """What every layer holds out beyond the layer below it, widened by what `slope_deg` from level carries.
 
     Islands are no overhangs. What is held from opposite sides is a bridge, of twice the reach.

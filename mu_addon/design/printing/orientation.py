@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..surface import Triangles, Vertices
 from .layers import cups, islands, regions
 from .thickness import Samples
-from .voxels import columns, frame_along
+from .voxels import frame_along, voxel_columns
 
 Array = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ def build(
 
     Samples cover the surface, in_chamber (s,) marks those on a chamber's.
     """
-    grid = columns(vertices, triangles, step, frame=frame_along(direction))
+    grid = voxel_columns(vertices, triangles, step, frame=frame_along(direction))
     closed = cups(grid, regions(grid, free=True))
     loose = islands(grid, regions(grid, free=False))
     height = surface.points @ direction

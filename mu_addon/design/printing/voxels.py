@@ -17,7 +17,7 @@ _AT_ONCE = 2_000_000
 
 
 @attrs.frozen(eq=False)
-class Columns:
+class VoxelColumns:
     """A grid of `shape` cells of `step` (3,) mm from the corner `low` (3,), and its crossings along z.
 
     frame (3, 3): rows are the grid's axes. column, level and sign (c,) of each crossing: the column's number
@@ -63,14 +63,14 @@ def frame_along(direction: Array) -> Array:
     return np.stack([x, np.cross(up, x), up])
 
 
-def columns(
+def voxel_columns(
     vertices: Vertices,
     triangles: Triangles,
     step: float,
     layer: float | None = None,
     frame: Array | None = None,
     margin: float = 0.0,
-) -> Columns:
+) -> VoxelColumns:
     """Columns of a closed surface, `step` mm apart, cells `layer` mm high (as wide as high if None).
 
     The grid leaves `margin` mm, and at least two cells, free on every side; its lowest cell that holds the
@@ -88,7 +88,7 @@ def columns(
     local = (seen - low) / size - 0.5
     column, level, sign = _crossings(local, triangles, shape)
     order = np.argsort(level, kind="stable")
-    return Columns(frame, low, size, shape, column[order], level[order], sign[order])
+    return VoxelColumns(frame, low, size, shape, column[order], level[order], sign[order])
 
 
 def _crossings(

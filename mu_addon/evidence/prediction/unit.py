@@ -13,9 +13,8 @@ import numpy as np
 from ...errors import InputError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
-from .wall import NAME as CONTACT
-from .wall import Side
-from .wall import effect as wall_effect
+from .flat_obstacle import NAME as CONTACT
+from .flat_obstacle import ObstacleResponse, contact_effect
 
 Array = np.ndarray[Any, Any]
 
@@ -71,7 +70,7 @@ class UnitResponse:
     variants: Mapping[str, Variant] = attrs.field(factory=dict)
     scale: float = 1.0
     orientation_deg: float = 0.0
-    walls: Mapping[int, Side] = attrs.field(factory=dict)
+    walls: Mapping[int, ObstacleResponse] = attrs.field(factory=dict)
     _splines: Mapping[str, Any] = attrs.field(init=False, repr=False)
     _curves: dict[Any, Any] = attrs.field(init=False, repr=False, factory=dict)
 
@@ -267,7 +266,7 @@ class UnitPressure:
         static = {name: Effect(name, (p,), (KIND,)) for name, p in known.items()}
         walls = [wall for r in self._responses for wall in r.walls.items()]
         if walls:
-            static[CONTACT] = wall_effect(walls, KIND)
+            static[CONTACT] = contact_effect(walls, KIND)
         self.effects = (*TIMED, *static.values())
         self._sizes = {e.name: e.keys[0] for e in static.values()}
         self._reference_kPa = max(float(np.abs(r.pressures_kPa).max()) for r in self._responses)

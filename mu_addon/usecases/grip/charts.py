@@ -14,7 +14,7 @@ from ...report.render import Camera, Cut, Part, fit, png, render
 from ...report.results import Picture
 from ...report.unit_pictures import LATTICE_COLOR, MEMBRANE_COLOR, WHITE, skin, unit_parts
 from .grasp import Grasp
-from .path_deviation import Column
+from .path_deviation import PathDeviations
 
 Array = np.ndarray[Any, Any]
 
@@ -173,7 +173,7 @@ def shapes(gripper: Gripper, grasps: Mapping[float, Grasp]) -> str:
     return svg()
 
 
-def against_paper(columns: Sequence[Column], printed: Mapping[str, float]) -> str:
+def against_paper(columns: Sequence[PathDeviations], printed: Mapping[str, float]) -> str:
     """Ours against the paper's deviation of each path, a mark a path, as SVG text."""
     with plots.canvas(plots.WIDTH, 3.2) as (figure, svg):
         axes = figure.add_axes((0.15, 0.15, 0.81, 0.80))

@@ -21,7 +21,7 @@ from ...fem.kinematics import TipSection, probe
 from ...fem.loads import STANDARD_GRAVITY
 from ...fem.materials import Materials
 from ...fem.model import Model
-from ...fem.obstacle import CONTACT, Obstacle, outer_faces
+from ...fem.obstacle import CONTACT_NEWTON, Obstacle, outer_faces
 from ...fem.rigid import Box, Pose
 from ...fem.state import State
 from ...fem.time_stepping import simulate_in_time
@@ -256,7 +256,7 @@ class _Hand:
         self.obstacle.path = self.pose
         model = Model(mesh, threads=threads)
         model.obstacles = (self.obstacle,)
-        self.equilibrium = Equilibrium(model, materials, CONTACT)
+        self.equilibrium = Equilibrium(model, materials, CONTACT_NEWTON)
         self.time, self.pressure, self.phase = phases.sample(grip.step_s)
         self.on_instant = on_instant
         self.sunk = 0.0

@@ -27,7 +27,7 @@ from ...sensing.signal import Signal, traced_signal
 from .grasp import Cube, Grasp, Lift, grasp
 from .job import Job
 from .motion import write_grasp
-from .path_deviation import Column, column, printed_column
+from .path_deviation import PathDeviations, path_deviations, published_deviations
 from .phases import MEANING
 
 Array = np.ndarray[Any, Any]
@@ -47,7 +47,7 @@ class Gripping:
     mesh: Mesh | None = None
     grasps: dict[float, Grasp] = attrs.field(factory=dict)
     signals: dict[float, Signal] = attrs.field(factory=dict)
-    columns: list[Column] = attrs.field(factory=list)
+    columns: list[PathDeviations] = attrs.field(factory=list)
     warnings: list[str] = attrs.field(factory=list)
 
     @property
@@ -196,7 +196,7 @@ class Gripping:
             self.cache.put("moved", entry(name), {"points_mm": moved})
 
         with self.progress.stage(f"paths, {rule}, on {on}"):
-            found = column(
+            found = path_deviations(
                 self.job.gripper,
                 self.mesh,
                 self.materials,
@@ -212,11 +212,11 @@ class Gripping:
         table.setdefault(rule, {})[on] = {
             "J_hat_mm": found.J_hat_mm,
             "chosen": found.chosen,
-            "rank_correlation_with_paper": found.rank_correlation(printed_column()),
+            "rank_correlation_with_paper": found.rank_correlation(published_deviations()),
         }
 
     def _write_columns(self) -> None:
-        printed = printed_column()
+        printed = published_deviations()
         rows = [
             (
                 name,

@@ -22,7 +22,7 @@ from ...fem.equilibrium import Equilibrium
 from ...fem.kinematics import Probe, probe
 from ...fem.materials import Materials
 from ...fem.model import Model
-from ...fem.obstacle import CONTACT
+from ...fem.obstacle import CONTACT_NEWTON
 from ...fem.trajectory import Trajectory, simulate
 from ...meshing.mesh import Mesh
 from ...placement.batch import CandidateBatch
@@ -39,7 +39,7 @@ TIMES, STATIONS = 13, 51
 
 
 @attrs.frozen(eq=False)
-class Column:
+class PathDeviations:
     """J_hat in mm by path, under one inclusion rule; cube: what the finger closed on, None for nothing."""
 
     rule: str
@@ -62,14 +62,14 @@ class Column:
 
 
 @cache
-def printed_column(name: str = "gripper") -> dict[str, float]:
+def published_deviations(name: str = "gripper") -> dict[str, float]:
     """A column of the paper's Table I in mm by path: "gripper", "scale_0.75", "scale_1.00", "scale_1.50"."""
     lines = (asset_root() / TABLE).read_text(encoding="utf-8").splitlines()
     rows = csv.DictReader(line for line in lines if not line.startswith("#"))
     return {row["path"]: float(row[name]) for row in rows}
 
 
-def column(
+def path_deviations(
     gripper: Gripper,
     mesh: Mesh,
     materials: Materials,
@@ -80,7 +80,7 @@ def column(
     load: Callable[[str], Array | None] = lambda name: None,
     store: Callable[[str, Array], None] = lambda name, moved: None,
     on_path: Callable[[float, str], None] = lambda share, name: None,
-) -> Column:
+) -> PathDeviations:
     """J_hat of every window's path against the finger without a sensor, through the grasp protocol.
 
     `load` gives the monitored points (k, p, 3) in mm of a path's unit ("model_a" for none) that an earlier
@@ -102,7 +102,7 @@ def column(
     def alone(name: str, own: Materials) -> Array:
         """The monitored points of one unit along its own path."""
         if name not in known:
-            settings = None if cube is None else CONTACT
+            settings = None if cube is None else CONTACT_NEWTON
             found = simulate(Equilibrium(model, own, settings), time, pressure)
             known[name] = moved_points(monitored, found)
             store(name, known[name])
@@ -122,7 +122,7 @@ def column(
         moved = alone(name, with_sensor(materials, shares[name], sensor))
         J[name] = evaluation(mesh, candidate, rule, radius, moved, still, STATIONS).deviation.J_hat
         on_path(number / (len(every) + 1), name)
-    return Column(rule, cube, J)
+    return PathDeviations(rule, cube, J)
 
 
 def _together(
@@ -135,7 +135,7 @@ def _together(
 ) -> dict[str, Array]:
     """Monitored points (k, p, 3) in mm of every path's unit, from Model A's states and on one factor."""
     points, _ = monitored
-    sweep = CandidateBatch(model, materials, monitored, list(shares.values()), sensor_MPa)
+    batch = CandidateBatch(model, materials, monitored, list(shares.values()), sensor_MPa)
     at_rest = np.broadcast_to(points, (len(shares), *points.shape))
-    moved = np.array([sweep.at(s) if s.pressure_MPa else at_rest for s in base.states])
+    moved = np.array([batch.at(s) if s.pressure_MPa else at_rest for s in base.states])
     return {name: base.of_time(moved[:, i]) for i, name in enumerate(shares)}

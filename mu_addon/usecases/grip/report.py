@@ -16,7 +16,7 @@ from ...report.results import Picture
 from ...run.versions import package_versions
 from . import charts as pictures
 from .gripping import Gripping
-from .path_deviation import printed_column
+from .path_deviation import published_deviations
 from .phases import MEANING
 
 FILES = {
@@ -202,7 +202,7 @@ def _light(run: Gripping) -> str:
 def _paths(run: Gripping) -> str:
     if not run.columns:
         return ""
-    printed = printed_column()
+    printed = published_deviations()
     names = list(run.columns[0].J_hat_mm)
     head = [("path", ""), ("paper", "n")]
     groups = [("", 2)]

@@ -14,7 +14,7 @@ from ...run.usecase import UseCase
 from .grasp import Cube
 from .gripping import Gripping
 from .job import CUBES, LAYOUT, REFINE, Job, read_job
-from .path_deviation import column
+from .path_deviation import path_deviations
 from .report import write_report
 
 
@@ -26,7 +26,7 @@ def grip(job: Job, folder: Path, context: RunContext) -> Gripping:
     return run
 
 
-def gripper_column(
+def gripper_path_deviations(
     refine: float = REFINE,
     rule: str = "volume_fraction",
     cube: Cube | None = Cube(CUBES[-1]),  # noqa: B008 - frozen
@@ -38,7 +38,7 @@ def gripper_column(
     """
     chosen = gripper or load_gripper("gripper")
     mesh = mesh_unit(chosen.unit, MeshSettings(refine=refine))
-    return column(chosen, mesh, materials_of(chosen.unit, mesh), rule, cube).J_hat_mm
+    return path_deviations(chosen, mesh, materials_of(chosen.unit, mesh), rule, cube).J_hat_mm
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import attrs
 
-from .columns import Row
+from .csv_columns import Row
 from .plan import Plan
 
 

@@ -20,7 +20,7 @@ from ...run.context import RunContext
 from ...run.progress import Progress
 from ...run.usecase import UseCase
 from .cluster import Cluster, Work
-from .columns import Row, cell, columns, figures
+from .csv_columns import Row, cell, column_names, figures
 from .found import Found
 from .plan import LAYOUT, PLAN, REPORT, TABLE, Plan, Point, read_plan_of_run
 from .point import Task, run_point, version
@@ -143,7 +143,7 @@ class Run:
         rows = [self._row(point) for point in self.points]
         inputs = tuple(v.name for v in self.plan.variables)
         known = ("point", "status", *inputs, *LAST)
-        outputs = tuple(name for name in columns(rows) if name not in known)
+        outputs = tuple(name for name in column_names(rows) if name not in known)
         return Found(self.plan, tuple(rows), inputs, outputs)
 
     def _row(self, point: Point) -> Row:

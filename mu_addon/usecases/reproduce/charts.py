@@ -9,8 +9,8 @@ import numpy as np
 
 from ...report.charts import GRID, INK, QUIET, WIDTH, canvas, label
 from ...report.results import Path
-from .columns import TableColumn
 from .published import Published
+from .table_columns import TableColumn
 
 Array = np.ndarray[Any, Any]
 

@@ -9,15 +9,15 @@ import attrs
 import numpy as np
 
 from .agreement import Agreement, Statement, agreement, statements
-from .columns import TableColumn
 from .published import Published
 from .settings import Settings
+from .table_columns import TableColumn
 
 Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)
-class OtherColumn:
+class OtherTableColumn:
     """A column beside the three units: J_hat (paths,) in mm by rule, and on a coarser mesh where known."""
 
     J_hat: Mapping[str, Array]
@@ -32,7 +32,7 @@ class Found:
     settings: Settings
     paper: Published
     columns: tuple[TableColumn, ...]
-    others: Mapping[str, OtherColumn]
+    others: Mapping[str, OtherTableColumn]
     samples_kPa: Array
 
     def table(self, rule: str) -> dict[str, Array]:

@@ -17,7 +17,7 @@ from ...placement.inclusion import RULES
 from ...run.cache import Cache, key
 from ..grip.grasp import Cube
 from ..grip.job import CUBES
-from ..grip.run import gripper_column
+from ..grip.run import gripper_path_deviations
 from .published import GRIPPER
 from .values import RULE, with_values
 
@@ -53,7 +53,7 @@ def solved(task: Task, cache: Cache) -> Array | str:
         return str(kept["failed"]) if "failed" in kept else kept["J_hat"]
     cube = Cube(task.cube_mm) if task.cube_mm else None
     try:
-        found = gripper_column(task.refine, task.rule, cube, gripper)
+        found = gripper_path_deviations(task.refine, task.rule, cube, gripper)
     except ConvergenceError as error:
         cache.put("gripper", name, {"failed": np.array(error.what)})
         return error.what

@@ -44,7 +44,7 @@ class Published:
         """Table I's column (10,) in mm that one of ours is set beside: "gripper" for "gripper, 25 mm"."""
         return self.J_hat[name.partition(",")[0]]
 
-    def column(self, scale: float) -> Array:
+    def table_column(self, scale: float) -> Array:
         """Table I's column (10,) in mm of a scale."""
         return self.J_hat[name_of(scale)]
 

@@ -16,9 +16,9 @@ from ...report.html import cards, facts_table, figure, note, page, table
 from ...run.versions import package_versions
 from . import charts, gripper
 from .agreement import HELD, UNDECIDED, Agreement, agreement
-from .columns import BENDING_KPA
 from .found import Found
 from .published import GRIPPER
+from .table_columns import BENDING_KPA
 from .values import RULE
 
 Array = np.ndarray[Any, Any]

@@ -21,12 +21,12 @@ from ...run.usecase import UseCase
 from ...run.versions import package_versions
 from ..simulate_and_place.job import grasp
 from . import gripper
-from .columns import BENDING_KPA, Solved, TableColumn, solved, tasks
-from .found import Found, OtherColumn
+from .found import Found, OtherTableColumn
 from .published import Published, name_of, published
 from .report import write_report
 from .settings import AGREEMENT, BENDING, LAYOUT, REPORT, STATEMENTS, TABLE, Settings, read_settings
-from .values import RULE, column_unit
+from .table_columns import BENDING_KPA, Solved, TableColumn, solved, tasks
+from .values import RULE, unit_of_table_column
 
 Array = np.ndarray[Any, Any]
 
@@ -52,10 +52,10 @@ def solve(settings: Settings, cache: Cache, progress: Progress) -> Found:
     """Table and bending of the three units, and the gripper's column where it is asked for."""
     paper, unit = published(), settings.unit
     _, samples = grasp().sample(TIMES)
-    units = [column_unit(unit, scale, modulus) for scale, modulus in paper.modulus_kPa.items()]
+    units = [unit_of_table_column(unit, scale, modulus) for scale, modulus in paper.modulus_kPa.items()]
     with progress.stage("columns"):
         columns = _columns(units, settings, samples, cache, progress)
-    others: dict[str, OtherColumn] = {}
+    others: dict[str, OtherTableColumn] = {}
     if settings.gripper:
         with progress.stage("gripper"):
             others = _gripper(settings, paper, cache, progress)
@@ -78,16 +78,16 @@ def _columns(
 
 def _gripper(
     settings: Settings, paper: Published, cache: Cache, progress: Progress
-) -> dict[str, OtherColumn]:
+) -> dict[str, OtherTableColumn]:
     refine = min(settings.mesh.refine, gripper.REFINE)
     todo = gripper.tasks(settings.values, [p.name for p in paper.paths], refine)
     known: dict[int, Array | str] = {}
     for number, J_hat in each(partial(gripper.solved, cache=cache), todo, settings.workers, "columns"):
         known[number] = J_hat
         progress.update(len(known) / len(todo))
-    found: dict[str, OtherColumn] = {}
+    found: dict[str, OtherTableColumn] = {}
     for number, task in enumerate(todo):
-        column = found.setdefault(task.name, OtherColumn({}))
+        column = found.setdefault(task.name, OtherTableColumn({}))
         J_hat = known[number]
         if isinstance(J_hat, str):
             found[task.name] = attrs.evolve(column, remark=f"{task.rule}: {J_hat}")
@@ -175,11 +175,11 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
             for name, a in by_column.items()
         ]
         lines.append(f"{rule}: rank correlation {', '.join(words)}")
-    held: dict[str, int] = {}
+    counts: dict[str, int] = {}
     for verdict in summary.get("statements", {}).get(RULE, {}).values():
-        held[verdict] = held.get(verdict, 0) + 1
-    if held:
-        lines.append("statements: " + ", ".join(f"{count} {verdict}" for verdict, count in held.items()))
+        counts[verdict] = counts.get(verdict, 0) + 1
+    if counts:
+        lines.append("statements: " + ", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
     return lines
 
 

@@ -23,7 +23,7 @@ def with_values(unit: Unit, values: Mapping[str, Any]) -> Unit:
     return put(Inputs(unit, _REST, {}), values, Path()).unit
 
 
-def column_unit(unit: Unit, scale: float, lattice_modulus_kPa: float) -> Unit:
+def unit_of_table_column(unit: Unit, scale: float, lattice_modulus_kPa: float) -> Unit:
     """A unit at a column's scale, with the modulus that the paper measured there."""
     material = attrs.evolve(unit.material, lattice_modulus_kPa=lattice_modulus_kPa)
     return attrs.evolve(unit, name=f"mu-{scale:g}x", scale=scale, material=material)

@@ -22,7 +22,7 @@ from ...run.context import RunContext
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, digest, named_path, read_inputs, structured
 from ...run.usecase import UseCase
-from ...sensing.calibration import Calibration, Sweep, calibrate, sweeps_of, write_calibration
+from ...sensing.calibration import Calibration, CalibrationSweep, calibrate, sweeps_of, write_calibration
 from ...sensing.recording import INDEX, Recording, read_recording
 from ...toml_writer import toml_text
 
@@ -52,8 +52,8 @@ class Check:
 class Sweeps:
     """Sweeps to fit, those held out by name, the channel of the light, that of the dark or its level in V."""
 
-    fitted: list[Sweep]
-    held: list[tuple[str, Sweep]]
+    fitted: list[CalibrationSweep]
+    held: list[tuple[str, CalibrationSweep]]
     channel: str
     dark: str | float
 
@@ -162,8 +162,8 @@ def calibrate_sensor(job: Job, folder: Path, context: RunContext) -> Calibration
 
 
 def _sweeps(job: Job) -> Sweeps:
-    fitted: list[Sweep] = []
-    held: list[tuple[str, Sweep]] = []
+    fitted: list[CalibrationSweep] = []
+    held: list[tuple[str, CalibrationSweep]] = []
     name, level = job.channel, _level(job.dark)
     for folder in job.data:
         if (folder / INDEX).exists():
@@ -245,7 +245,7 @@ def _channel(recording: Recording, name: str | None, folder: Path) -> str:
 
 def _of_recording(
     recording: Recording, channel: str, dark: str | float, angles: Path | None, folder: Path
-) -> list[Sweep]:
+) -> list[CalibrationSweep]:
     time_s, volts = recording.columns["time_s"], recording.columns[channel]
     if isinstance(dark, str):
         if dark not in recording.columns:
@@ -299,7 +299,9 @@ def _joined_angles(path: Path, time_s: Array) -> Array:
     return np.asarray(np.interp(time_s, t, a, left=math.nan, right=math.nan))
 
 
-def _of_measured(folder: Path, dark: str | float) -> tuple[list[Sweep], list[tuple[str, Sweep]]]:
+def _of_measured(
+    folder: Path, dark: str | float
+) -> tuple[list[CalibrationSweep], list[tuple[str, CalibrationSweep]]]:
     experiments = read_folder(folder).of("waveguide_bending")
     if not experiments:
         raise InputError(
@@ -309,19 +311,19 @@ def _of_measured(folder: Path, dark: str | float) -> tuple[list[Sweep], list[tup
         )
     if isinstance(dark, str):
         raise InputError("measured data contain no dark-level channel", "--dark", "give the dark level in V")
-    fitted: list[Sweep] = []
-    held: list[tuple[str, Sweep]] = []
+    fitted: list[CalibrationSweep] = []
+    held: list[tuple[str, CalibrationSweep]] = []
     for experiment in experiments:
         time_s, angle, volts = (experiment[name] for name in ("time_s", "angle_deg", "voltage_V"))
         if experiment.role == "held_out":
             seen = np.isfinite(angle) & np.isfinite(volts)
-            held.append((experiment.name, Sweep(time_s[seen], angle[seen], volts[seen] - dark)))
+            held.append((experiment.name, CalibrationSweep(time_s[seen], angle[seen], volts[seen] - dark)))
         else:
             fitted += sweeps_of(time_s, angle, volts - dark, fewest=1)
     return fitted, held
 
 
-def _check(name: str, sweep: Sweep, found: Calibration) -> Check:
+def _check(name: str, sweep: CalibrationSweep, found: Calibration) -> Check:
     angle, low, high, possible = found.angle_of(sweep.voltage_V)
     error = angle - sweep.angle_deg
     within = (low <= sweep.angle_deg) & (sweep.angle_deg <= high)
@@ -329,7 +331,10 @@ def _check(name: str, sweep: Sweep, found: Calibration) -> Check:
 
 
 def _report(
-    found: Calibration, fitted: Sequence[Sweep], held: Sequence[tuple[str, Sweep]], checks: Sequence[Check]
+    found: Calibration,
+    fitted: Sequence[CalibrationSweep],
+    held: Sequence[tuple[str, CalibrationSweep]],
+    checks: Sequence[Check],
 ) -> str:
     low, high = found.range_deg
     facts = [
@@ -368,7 +373,9 @@ def _report(
     )
 
 
-def _chart(found: Calibration, fitted: Sequence[Sweep], held: Sequence[tuple[str, Sweep]]) -> str:
+def _chart(
+    found: Calibration, fitted: Sequence[CalibrationSweep], held: Sequence[tuple[str, CalibrationSweep]]
+) -> str:
     with canvas(6.4, 3.6) as (drawing, svg):
         axes = drawing.add_axes((0.11, 0.15, 0.86, 0.82))
         at = np.linspace(*found.range_deg, 201)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...design.anchors import anchor_points
 from ...fem.kinematics import probe
-from ...fem.obstacle import CONTACT
+from ...fem.obstacle import CONTACT_NEWTON
 from ...fem.trajectory import Trajectory
 from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, Evaluation, evaluation
@@ -40,7 +40,7 @@ def evaluations(
     sensor = unit.material.sensor_modulus_MPa
     time, pressure = trajectory.time_s, trajectory.pressure_kPa
     setting = CandidateProblem(mesh, materials, points, tuple(jobs), radius, sensor, study=job)
-    contact = CONTACT, PRESSURE_MPa, DEPTH_mm, HALVINGS, [o.friction for o in job.obstacles]
+    contact = CONTACT_NEWTON, PRESSURE_MPa, DEPTH_mm, HALVINGS, [o.friction for o in job.obstacles]
     names = [
         key(
             mesh.hash(),

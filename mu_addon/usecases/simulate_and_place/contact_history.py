@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import InputError
-from ...fem.obstacle import Contact, Obstacle
+from ...fem.obstacle import Obstacle, ObstacleContact
 from ...fem.rigid_surface import Surface
 from ...meshing.settings import CELL_MM
 from ...report.results import ContactHistory
@@ -53,7 +53,7 @@ def history(
     mesh: Mesh,
     time_s: Array,
     pressure_kPa: Array,
-    contacts: Sequence[Sequence[Contact]],
+    contacts: Sequence[Sequence[ObstacleContact]],
 ) -> ContactHistory:
     """What contacts, an instant a row, are together; a half mesh's with its mirror image's, k of b each."""
     whole, keeps = (2.0, np.array([0.0, 1.0, 1.0])) if "x" in mesh.symmetry else (1.0, np.ones(3))

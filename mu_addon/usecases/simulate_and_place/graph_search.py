@@ -102,7 +102,7 @@ def search_graph(study: Study) -> LatticeSearch:
 
     def check(numbers: Array) -> Array:
         jobs = [(Candidate(f"path{n}", 0, graph.nodes[list(chains[n])]), rule) for n in numbers]
-        return np.array([e.deviation.J_hat for e in study.sweep(mesh, trajectory, jobs)])
+        return np.array([e.deviation.J_hat for e in study.solve_candidates(mesh, trajectory, jobs)])
 
     with study.progress.stage("check of the best paths"):
         outcome = search_paths(predicted, check, SearchSettings(most=job.most_checks))
@@ -132,7 +132,7 @@ def search_graph(study: Study) -> LatticeSearch:
     if study.mesh.symmetry in ((), ("x",)):
         with study.progress.stage("motion of the best path"):
             alone = Candidate(first.name, 0, first.points)
-            study.sweep(mesh, trajectory, [(alone, rule)], to_look_at=True)
+            study.solve_candidates(mesh, trajectory, [(alone, rule)], to_look_at=True)
     study.context.summary["search"] = {
         "rule": rule,
         "paths": len(chains),

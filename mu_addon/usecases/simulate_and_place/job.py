@@ -18,7 +18,7 @@ from ...design.parameters import Unit, read_unit, to_toml
 from ...design.rigid_body import FRICTION, RigidBody, mirrored, read_rigid_bodies, require_beside, to_obj
 from ...design.solid import QUALITY
 from ...errors import InputError
-from ...fem.obstacle import CONTACT
+from ...fem.obstacle import CONTACT_NEWTON
 from ...fem.protocol import Protocol, read_protocol
 from ...fem.solver import SolverChoice
 from ...fem.unit import materials_of
@@ -211,7 +211,7 @@ class Job:
     @property
     def newton(self) -> NewtonSettings:
         """Settings of Newton's method for this unit."""
-        return CONTACT if self.in_time else self.effects.newton
+        return CONTACT_NEWTON if self.in_time else self.effects.newton
 
     @property
     def in_time(self) -> bool:

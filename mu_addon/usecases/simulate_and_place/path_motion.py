@@ -27,7 +27,7 @@ def keep_motion(
     own: Mesh,
     mesh: Mesh,
     trajectory: Trajectory,
-    sweep: CandidateSolver,
+    solver: CandidateSolver,
     jobs: list[tuple[Candidate, str]],
 ) -> None:
     """Write the motion of every path whose displacement a sweep on a mesh has kept. Raises OutputError.
@@ -42,7 +42,7 @@ def keep_motion(
     candidates = {candidate.name: candidate for candidate, of in jobs if of == rule}
     by_pressure = {state.pressure_kPa: state.u for state in trajectory.states}
     without: dict[str, Array] = {}
-    for name, pressure_kPa, difference_mm in sweep.whole(trajectory):
+    for name, pressure_kPa, difference_mm in solver.whole(trajectory):
         still = [by_pressure[p] for p in pressure_kPa]
         without = without or looked.of_states(still, materials)
         share = sensor_share(rule, roi(mesh, candidates[name], unit.dimensions.inclusion_radius))

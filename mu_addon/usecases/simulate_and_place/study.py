@@ -24,7 +24,7 @@ from ...fem.equilibrium import Equilibrium
 from ...fem.kinematics import TipSection
 from ...fem.lattice_law import deformation_gradients, stretches
 from ...fem.model import Model
-from ...fem.obstacle import Contact as Touch
+from ...fem.obstacle import ObstacleContact
 from ...fem.self_intersection import first_self_intersection
 from ...fem.state import State, rest
 from ...fem.time_stepping import Instant, simulate_in_time
@@ -243,7 +243,7 @@ class Study:
             self._write_contact()
             materials = self.job.materials(self.mesh)
             write_model_a(self.folder, self.mesh, materials, self.trajectory, self._remembered(model))
-            self._look_for_contact(self.trajectory.states)
+            self._look_for_self_intersection(self.trajectory.states)
             self._look_beyond_the_fit(self.trajectory.states)
         states = [s for s in self.trajectory.states if s.loaded]
         self.solver = {
@@ -295,7 +295,7 @@ class Study:
         """Model A instant by instant, since contact or the wall remembers, from the cache likewise."""
         job, materials = self.job, self.job.materials(model.mesh)
         name = self._in_time_key(model, time, pressure)
-        found: list[list[Touch]] = []
+        found: list[list[ObstacleContact]] = []
 
         def keep(state: State) -> None:
             found.append([o.contact(state.u) for o in model.obstacles])
@@ -413,7 +413,7 @@ class Study:
         write_csv(self.folder / "contact.csv", CONTACT_COLUMNS, self.contact.rows())
         self.context.summary["contact"] = self.contact.summary()
 
-    def _look_for_contact(self, states: tuple[State, ...]) -> None:
+    def _look_for_self_intersection(self, states: tuple[State, ...]) -> None:
         """Name the first pressure, on either side, at which walls pass through each other, and which."""
         assert self.mesh is not None
         found: dict[str, Any] = {}
@@ -422,13 +422,13 @@ class Study:
                 (s for s in states if s.pressure_MPa * sign > 0), key=lambda s: abs(s.pressure_MPa)
             )
             still = [s for s in states if s.loaded and not s.pressure_MPa]
-            contact = first_self_intersection(self.mesh, [rest(self.mesh), *still, *outward])
-            if contact is None:
+            first = first_self_intersection(self.mesh, [rest(self.mesh), *still, *outward])
+            if first is None:
                 continue
-            pressure = f"{in_kPa(contact.pressure_MPa):.4g}"
-            found[pressure] = [str(c) for c in contact.crossings]
+            pressure = f"{in_kPa(first.pressure_MPa):.4g}"
+            found[pressure] = [str(c) for c in first.crossings]
             self.warn(
-                f"From {pressure} kPa on, walls intersect: {contact.crossings[0]}. Self-contact is not "
+                f"From {pressure} kPa on, walls intersect: {first.crossings[0]}. Self-contact is not "
                 "modelled, so states beyond this pressure are invalid. Use a thicker wall or a smaller "
                 "pressure."
             )
@@ -489,7 +489,9 @@ class Study:
         assert self.trajectory is not None
         jobs = self._jobs()
         with self.progress.stage("candidates"):
-            found = self.sweep(self.mesh, self.trajectory, jobs, self._ahead, verify=True, to_look_at=True)
+            found = self.solve_candidates(
+                self.mesh, self.trajectory, jobs, self._ahead, verify=True, to_look_at=True
+            )
         self.evaluations = {(e.name, e.rule): e for e in found}
         every = candidate_paths(self.anchors, self.windows)
         chosen = self._write_ranking(every)
@@ -501,7 +503,7 @@ class Study:
             chosen = self._write_ranking(every)
         return chosen
 
-    def sweep(
+    def solve_candidates(
         self,
         mesh: Mesh,
         trajectory: Trajectory,
@@ -518,22 +520,24 @@ class Study:
             self.context.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = {"along_paths": True}
             return evaluations(self.job, self.cache, mesh, trajectory, jobs, self.progress.update)
         whole = self.job.headline_rule if to_look_at else ""
-        sweep = under_way or CandidateSolver(self.job, self.cache, mesh, jobs, trajectory.pressure_kPa, whole)
-        with closing(sweep):
-            found = sweep.evaluations(trajectory, self.progress.update, verify)
+        solver = under_way or CandidateSolver(
+            self.job, self.cache, mesh, jobs, trajectory.pressure_kPa, whole
+        )
+        with closing(solver):
+            found = solver.evaluations(trajectory, self.progress.update, verify)
             if to_look_at:
                 assert self.mesh is not None
-                keep_motion(self.job, self.folder, self.mesh, mesh, trajectory, sweep, jobs)
-        if sweep.path_difference_mm > PATH_DIFFERENCE_MM:
+                keep_motion(self.job, self.folder, self.mesh, mesh, trajectory, solver, jobs)
+        if solver.path_difference_mm > PATH_DIFFERENCE_MM:
             self.warn(
                 "A candidate started from Model A's states does not lie on its own equilibrium path from "
-                f"rest (difference {sweep.path_difference_mm:.2g} mm), so every candidate was solved from "
+                f"rest (difference {solver.path_difference_mm:.2g} mm), so every candidate was solved from "
                 "rest."
             )
         self.context.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = {
-            "pressures_solved_kPa": sweep.solved_kPa,
-            "relative_error_between": sweep.error,
-            "path_difference_mm": sweep.path_difference_mm,
+            "pressures_solved_kPa": solver.solved_kPa,
+            "relative_error_between": solver.error,
+            "path_difference_mm": solver.path_difference_mm,
         }
         return found
 
@@ -558,7 +562,7 @@ class Study:
             model = self.job.model(mesh)
             trajectory = self._model_a(model, time, chosen, lambda _: None)
             ratio: dict[str, list[float]] = {rule: [] for rule in self.job.rules}
-            for found in self.sweep(mesh, trajectory, jobs):
+            for found in self.solve_candidates(mesh, trajectory, jobs):
                 fine = self.evaluations[found.name, found.rule].deviation
                 same = fine.delta[instants].mean()
                 # A sensor as soft as the lattice disturbs nothing, on any mesh.

@@ -50,16 +50,16 @@ HEAD = (
 )
 OF_MARKER = ("name", "pixel", "place_mm")
 OF_EXPERIMENT = tuple(k for k in COMMON + KINDS[KIND].may_have_keys if k not in ("kind", "file"))
-MARKS = ("crosses", "dots")
+MARKER_KINDS = ("crosses", "dots")
 """What markers look like: `crosses` show how they turn, `dots` do not."""
 
 
 @attrs.frozen
-class Marks:
+class MarkerSettings:
     """What a tracker is told of the markers.
 
     pixels: place of each by name in the first frame, right and down from the upper left corner; kind: one of
-    `MARKS`; pattern_px: side of the square that is compared; search_px: of the one that is searched.
+    `MARKER_KINDS`; pattern_px: side of the square that is compared; search_px: of the one that is searched.
     """
 
     pixels: Mapping[str, tuple[float, float]]
@@ -76,13 +76,13 @@ class Bench:
     """
 
     view: View
-    marks: Marks
+    markers: MarkerSettings
     fps: float | None = None
     starts_s: float = 0.0
     experiment: Mapping[str, Any] = attrs.field(factory=dict)
 
 
-Tracker = Callable[[Path, Marks], Tracks]
+Tracker = Callable[[Path, MarkerSettings], Tracks]
 
 
 @attrs.frozen(eq=False)
@@ -120,14 +120,16 @@ def read_bench(path: Path) -> Bench:
             str(path),
             "give its y and z in the unit's frame, in mm",
         )
-    marks = Marks(
+    markers = MarkerSettings(
         pixels, **_given(document, at, kind="marks", pattern_px="pattern_px", search_px="search_px")
     )
-    if marks.kind not in MARKS:
-        raise InputError(f"marks = {marks.kind!r} is not known", at("marks"), f"say {' or '.join(MARKS)}")
-    if not 5 <= marks.pattern_px < marks.search_px <= 2000:
+    if markers.kind not in MARKER_KINDS:
         raise InputError(
-            f"pattern_px = {marks.pattern_px:g} and search_px = {marks.search_px:g} do not fit",
+            f"marks = {markers.kind!r} is not known", at("marks"), f"say {' or '.join(MARKER_KINDS)}"
+        )
+    if not 5 <= markers.pattern_px < markers.search_px <= 2000:
+        raise InputError(
+            f"pattern_px = {markers.pattern_px:g} and search_px = {markers.search_px:g} do not fit",
             at("pattern_px"),
             "a pattern of 5 pixels or more, and a larger square to search",
         )
@@ -147,7 +149,7 @@ def read_bench(path: Path) -> Bench:
     )
     return Bench(
         view,
-        marks,
+        markers,
         experiment=document.get("experiment", {}),
         **_given(document, at, fps="fps", starts_s="starts_s"),
     )
@@ -418,7 +420,7 @@ def track(
         tracks = read_pixels(clip)
     else:
         unplaced = {*bench.view.base, *(bench.view.tip or ()), *(bench.view.ruler or ())} - {
-            *bench.marks.pixels
+            *bench.markers.pixels
         }
         if unplaced:
             raise InputError(
@@ -426,7 +428,7 @@ def track(
                 str(clip),
                 "give its pixel position in the first frame",
             )
-        tracks = follow(Path(clip), bench.marks)
+        tracks = follow(Path(clip), bench.markers)
     found = filmed(tracks, bench, recorded, str(clip))
     name = str(bench.experiment.get("name", Path(clip).stem))
     table, remarks = write_experiment(found, bench, name, folder)

@@ -9,7 +9,7 @@ import pytest
 from mathutils import Vector
 
 from mu_addon.blender.jobs import start_child as jobs
-from mu_addon.blender.printing import markers
+from mu_addon.blender.printing import marks
 from mu_addon.blender.printing import panel as print_panel
 from mu_addon.blender.printing import state as printing
 from mu_addon.blender.printing.operators import MU_OT_print_export as operator
@@ -101,7 +101,7 @@ def test_a_check_from_start_to_markers(tmp_path):
     assert f"{best['islands']} islands" in texts
 
     assert bpy.ops.mu.print_show(finding=0) == {"FINISHED"}
-    balls = [m for m in markers.marks(root) if m.data is not None]
+    balls = [m for m in marks.mark_objects(root) if m.data is not None]
     assert len(balls) == sum(len(f["places"]) > 0 for f in faults)
     (chosen,) = bpy.context.selected_objects
     first = found.findings[0]
@@ -115,7 +115,7 @@ def test_a_check_from_start_to_markers(tmp_path):
     bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
     (root,) = unit_object.roots()
     assert printing.checked(root).stale == ""
-    assert len(markers.marks(root)) == len(balls) + 1
+    assert len(marks.mark_objects(root)) == len(balls) + 1
     assert "place 1 of" in drawn()
     (folder,) = (tmp_path / "seat.mu").glob("*/check")
     assert (folder / "report.html").is_file()
@@ -171,41 +171,41 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
     assert "There are 4 findings" in refused(bpy.ops.mu.print_show, finding=9)
     assert "has 2 places" in refused(bpy.ops.mu.print_show, finding=0, place=2)
 
-    marks = {m.get("mu_check"): m for m in markers.marks(root)}
-    assert set(marks) == {"0", "1", "up"}
-    colours = [marks[k].data.materials[0].name for k in "01"]
+    by_finding = {m.get("mu_check"): m for m in marks.mark_objects(root)}
+    assert set(by_finding) == {"0", "1", "up"}
+    colours = [by_finding[k].data.materials[0].name for k in "01"]
     assert colours == ["MU Flaws", "MU Doubt"]
     graph = bpy.context.evaluated_depsgraph_get()
 
     def width():
-        return marks["0"].evaluated_get(graph).dimensions.x - 3.0
+        return by_finding["0"].evaluated_get(graph).dimensions.x - 3.0
 
     bpy.context.view_layer.update()
     assert abs(width() - 2 * 0.8) < 0.05
     bpy.ops.mu.print_show(finding=0)
     bpy.context.view_layer.update()
-    assert abs(width() - 0.8 * (1 + markers.LARGER)) < 0.1  # the place that is looked at is larger
+    assert abs(width() - 0.8 * (1 + marks.LARGER)) < 0.1  # the place that is looked at is larger
     bpy.ops.mu.print_show(finding=1)
     root.mu_print.marker = 2.0
     bpy.context.view_layer.update()
     assert abs(width() - 2 * 2.0) < 0.1
-    up = marks["up"].rotation_quaternion @ Vector((0, 0, 1))
+    up = by_finding["up"].rotation_quaternion @ Vector((0, 0, 1))
     assert (up - Vector((0, 0, 1))).length < 1e-5
 
-    while markers.marks(root):
+    while marks.mark_objects(root):
         bpy.ops.ed.undo()
         (root,) = unit_object.roots()
     assert "No place is marked" in refused(bpy.ops.mu.print_clear)
     bpy.ops.mu.print_marks()
     root.mu_unit.chambers.wall_mm = 1.0  # a rebuild leaves them, and the panel says that they are old
-    assert len(markers.marks(root)) == 3
+    assert len(marks.mark_objects(root)) == 3
     assert "Stale: it belongs to other parameters" in drawn()
     assert "The check is stale" in refused(bpy.ops.mu.print_marks)
     root.mu_unit.chambers.wall_mm = 0.9
     write_check(root, [finding("cup", "warning", [[0, 0, 0]])])
-    assert "markers belong to an earlier check" in drawn().replace("  ", " ")
+    assert "marks belong to an earlier check" in drawn().replace("  ", " ")
     assert bpy.ops.mu.print_clear() == {"FINISHED"}
-    assert not markers.marks(root)
+    assert not marks.mark_objects(root)
 
     assert bpy.ops.mu.print_up(direction=(0.6, 0, 0.8)) == {"FINISHED"}
     assert "Stale: it belongs to another build direction" in drawn()

@@ -28,7 +28,7 @@ from mu_addon.blender.sensor import session as sensor_session
 from mu_addon.blender.sensor import state as sensor
 from mu_addon.blender.sensor import twin
 from mu_addon.blender.unit import object as unit_object
-from mu_addon.sensing.calibration import Sweep, calibrate, write_calibration
+from mu_addon.sensing.calibration import CalibrationSweep, calibrate, write_calibration
 from mu_addon.sensing.recording import read_recording
 from tests.usecases.bent_motion import write_bent_motion
 
@@ -81,7 +81,7 @@ def calibrated(path, channel="light_V", dark="dark_V", top=45.0):
     for k in range(3):
         angle = top / 2 * (1 - np.cos(np.linspace(0, 2 * np.pi, 200)))
         volts = 2.4 * np.exp(-0.006 * angle) - 0.02 + 0.004 * random.normal(size=200)
-        sweeps.append(Sweep(np.linspace(0, 8, 200) + 10 * k, angle, volts))
+        sweeps.append(CalibrationSweep(np.linspace(0, 8, 200) + 10 * k, angle, volts))
     write_calibration(path, calibrate(sweeps, channel, dark))
 
 

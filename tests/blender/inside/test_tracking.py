@@ -7,7 +7,7 @@ from mu_addon.blender.track import properties as bench
 from mu_addon.blender.track import state as tracking
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.measured import read_folder
-from mu_addon.usecases.track_video.run import Marks
+from mu_addon.usecases.track_video.run import MarkerSettings
 
 from .acting import add, refused
 
@@ -33,7 +33,7 @@ def test_the_clip_editors_operators(tmp_path, filmed):
         assert not bpy.ops.mu.track_write.poll()
         assert "Place markers first" in bench.missing(clip)
         for name, pixel in at.items():
-            tracking._place(clip, name, pixel, Marks({}), "")
+            tracking._place(clip, name, pixel, MarkerSettings({}), "")
         assert bpy.ops.mu.track() == {"FINISHED"}
     settings = clip.mu_bench
     settings.base_1 = "a"

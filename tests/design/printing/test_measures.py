@@ -12,7 +12,7 @@ from mu_addon.design.printing.finding import gathered
 from mu_addon.design.printing.neck import necks
 from mu_addon.design.printing.orientation import Build, directions, fits, ranked, tilted
 from mu_addon.design.printing.thickness import across, samples
-from mu_addon.design.printing.voxels import columns, frame_along
+from mu_addon.design.printing.voxels import frame_along, voxel_columns
 
 from .parts import arrays
 
@@ -86,7 +86,7 @@ def test_a_slot_is_as_wide_as_it_is(width, turn):
 def test_columns_fill_the_same_volume_along_any_direction(way):
     body = shapes.ball(4.0, 48) - shapes.cylinder(1.0, -6, 6, 32)
     vertices, triangles = arrays(body)
-    grid = columns(vertices, triangles, 0.2, frame=frame_along(np.array(way)))
+    grid = voxel_columns(vertices, triangles, 0.2, frame=frame_along(np.array(way)))
     wound = grid.slab(0, grid.shape[2])
     assert set(np.unique(wound)) == {0, 1}
     assert np.count_nonzero(wound) * grid.cell_volume == pytest.approx(body.volume(), rel=0.01)
@@ -95,7 +95,7 @@ def test_columns_fill_the_same_volume_along_any_direction(way):
 
 
 def test_slabs_are_the_whole():
-    grid = columns(*arrays(shapes.ball(4.0, 32)), 0.3)
+    grid = voxel_columns(*arrays(shapes.ball(4.0, 32)), 0.3)
     whole = grid.slab(0, grid.shape[2])
     parts = [grid.slab(k, min(k + 7, grid.shape[2])) for k in range(0, grid.shape[2], 7)]
     assert (np.concatenate(parts, axis=2) == whole).all()
@@ -103,7 +103,9 @@ def test_slabs_are_the_whole():
 
 def test_overlapping_bodies_count_twice():
     one, other = arrays(box(4, 4, 4)), arrays(box(4, 4, 4).translate([2, 0, 0]))
-    grid = columns(np.concatenate([one[0], other[0]]), np.concatenate([one[1], other[1] + len(one[0])]), 0.25)
+    grid = voxel_columns(
+        np.concatenate([one[0], other[0]]), np.concatenate([one[1], other[1] + len(one[0])]), 0.25
+    )
     wound = grid.slab(0, grid.shape[2])
     assert wound.max() == 2
     assert np.count_nonzero(wound == 2) * grid.cell_volume == pytest.approx(32.0, rel=0.05)
@@ -113,7 +115,7 @@ def test_overlapping_bodies_count_twice():
 
 
 def built(body, up=(0, 0, 1), step=0.2):
-    return columns(*arrays(body), step, 0.1, frame_along(np.array(up, float)))
+    return voxel_columns(*arrays(body), step, 0.1, frame_along(np.array(up, float)))
 
 
 def cups_of(body, up=(0, 0, 1)):
@@ -195,7 +197,7 @@ def test_a_chamber_and_its_ways_out():
     """A ball's hollow with a bore of 2 mm to the top and one of 1 mm to the side."""
     hollow = box(14, 14, 14) - shapes.ball(5.0, 64)
     body = hollow - shapes.cylinder(1.0, 0, 9, 32) - shapes.cylinder(0.5, 0, 9, 32).rotate([0, 90, 0])
-    found = drain.chambers(drain.room(columns(*arrays(body), 0.2))).found
+    found = drain.chambers(drain.room(voxel_columns(*arrays(body), 0.2))).found
     assert len(found) == 1
     assert found[0].volume == pytest.approx(4 / 3 * np.pi * 125, rel=0.02)
     assert np.linalg.norm(found[0].place) < 0.7
@@ -213,7 +215,7 @@ def test_a_way_out_is_the_widest_however_far_it_leads(near, monkeypatch):
     monkeypatch.setattr(drain, "NEAR", near)
     hollow = box(12, 12, 42).translate([0, 0, 14]) - shapes.ball(4.0, 48)
     body = hollow - shapes.cylinder(1.0, 0, 40, 24) - shapes.cylinder(0.5, 0, 9, 24).rotate([0, 90, 0])
-    (found,) = drain.chambers(drain.room(columns(*arrays(body), 0.25))).found
+    (found,) = drain.chambers(drain.room(voxel_columns(*arrays(body), 0.25))).found
     far, side = found.openings
     assert [far.radius, side.radius] == pytest.approx([1.0, 0.5], abs=0.2)
     assert far.place[:2] == pytest.approx([0, 0], abs=0.3)
@@ -224,11 +226,11 @@ def test_a_way_out_is_the_widest_however_far_it_leads(near, monkeypatch):
 
 
 def test_a_sealed_chamber_has_no_way_out_and_an_open_frame_is_no_chamber():
-    sealed = drain.chambers(drain.room(columns(*arrays(box(12, 12, 12) - shapes.ball(4.0, 48)), 0.25)))
+    sealed = drain.chambers(drain.room(voxel_columns(*arrays(box(12, 12, 12) - shapes.ball(4.0, 48)), 0.25)))
     assert [len(chamber.openings) for chamber in sealed.found] == [0]
     assert sealed.hold(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 5.0]])).tolist() == [True, False]
     frame = box(12, 12, 12) - box(9, 9, 14) - box(9, 14, 9) - box(14, 9, 9)
-    assert drain.chambers(drain.room(columns(*arrays(frame), 0.25))).found == []
+    assert drain.chambers(drain.room(voxel_columns(*arrays(frame), 0.25))).found == []
 
 
 def test_the_shortest_cut_of_a_surface_is_its_waist():

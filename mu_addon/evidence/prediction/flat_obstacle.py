@@ -24,7 +24,7 @@ def _float64(values: Any) -> Array:
 
 
 @attrs.frozen(eq=False)
-class Side:
+class ObstacleResponse:
     """The unit's response to a flat wall on one side of it, along its axis.
 
     pressures_kPa (k,): of the free unit, from 0 on to its last one on this side, up or down; outward_mm (k,):
@@ -99,7 +99,7 @@ class Side:
 _EVEN = np.linspace(0.0, 1.0, 101)
 
 
-def effect(sides: Sequence[tuple[int, Side]], kind: str) -> Effect:
+def contact_effect(sides: Sequence[tuple[int, ObstacleResponse]], kind: str) -> Effect:
     """The effect of contact with a wall; its size reach_mm is above 0 on the side +y, below 0 on -y.
 
     sides: responses with the side that each wall stands on, 1 for +y and -1 for -y. Bounds are the nearest

@@ -36,7 +36,7 @@ def figures(summary: Mapping[str, Any], density_g_per_ml: float) -> Row:
     return found
 
 
-def columns(rows: Sequence[Row]) -> list[str]:
+def column_names(rows: Sequence[Row]) -> list[str]:
     """Names of all columns, in the order in which rows first have them."""
     return list(dict.fromkeys(name for row in rows for name in row))
 

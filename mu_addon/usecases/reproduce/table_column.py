@@ -85,12 +85,14 @@ class Paths:
         return np.array([d.J_hat for d in self.deviations(rule, at_rest, samples_kPa)])
 
 
-def held(mesh: Mesh, height_mm: float) -> Mesh:
+def with_fixed_base(mesh: Mesh, height_mm: float) -> Mesh:
     """The mesh with all of its nodes up to a height held fast, as a fixture around the base would."""
     return attrs.evolve(mesh, base=np.flatnonzero(mesh.nodes[:, 2] <= height_mm * (1 + 1e-9)))
 
 
-def motion(unit: Unit, mesh: Mesh, pressures_kPa: Sequence[float], look_for_contact: bool = True) -> Motion:
+def motion(
+    unit: Unit, mesh: Mesh, pressures_kPa: Sequence[float], look_for_self_intersection: bool = True
+) -> Motion:
     """Model A through some pressures, each once. Raises ConvergenceError."""
     model = Model(mesh, threads=1)
     pressure = np.unique([0.0, *pressures_kPa])
@@ -98,7 +100,7 @@ def motion(unit: Unit, mesh: Mesh, pressures_kPa: Sequence[float], look_for_cont
     states = simulate(body, np.arange(len(pressure), dtype=float), pressure).states
     tip = TipSection.of(mesh)
     angle = np.array([tip.angle_deg(s.u) for s in states])
-    crossing = _crossings(mesh, states) if look_for_contact else ()
+    crossing = _crossings(mesh, states) if look_for_self_intersection else ()
     return Motion(pressure, angle, states, crossing)
 
 
@@ -106,9 +108,9 @@ def _crossings(mesh: Mesh, states: Sequence[State]) -> tuple[float, ...]:
     found = []
     for sign in (-1, 1):
         outward = sorted((s for s in states if s.pressure_MPa * sign > 0), key=lambda s: abs(s.pressure_MPa))
-        contact = first_self_intersection(mesh, [rest(mesh), *outward]) if outward else None
-        if contact is not None:
-            found.append(in_kPa(contact.pressure_MPa))
+        first = first_self_intersection(mesh, [rest(mesh), *outward]) if outward else None
+        if first is not None:
+            found.append(in_kPa(first.pressure_MPa))
     return tuple(found)
 
 
@@ -126,7 +128,7 @@ def paths(
     shares = [sensor_share(rule, one) for rule in rules for one in found]
     monitor = probe(mesh, points)
     states = [moved.states[int(np.argmin(np.abs(moved.pressure_kPa - p)))] for p in solved_kPa]
-    sweep = CandidateBatch(
+    batch = CandidateBatch(
         Model(mesh, threads=1),
         materials_of(unit, mesh),
         (points, monitor),
@@ -134,7 +136,7 @@ def paths(
         unit.material.sensor_modulus_MPa,
     )
     still = np.array([points + monitor.displacement(s.u) for s in states])
-    apart = np.array([sweep.at(s) - at for s, at in zip(states, still, strict=True)])
+    apart = np.array([batch.at(s) - at for s, at in zip(states, still, strict=True)])
     volumes = _volumes(mesh)
     ratio = [
         2 ** len(mesh.symmetry) * float(share @ volumes) / one.cylinder_volume_mm3

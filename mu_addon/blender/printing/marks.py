@@ -1,4 +1,4 @@
-"""Markers in the view of what a check found: a ball at every place, an arrow along the build direction."""
+"""Marks in the view of what a check found: a ball at every place, an arrow along the build direction."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..unit.properties import to_unit
 
 FAULTS = ("error", "warning")
 MARK = unit_object.CHECK
-"""Its value on a marker is the finding's number, and `UP` on the arrow along the build direction."""
+"""Its value on a mark is the finding's number, and `UP` on the arrow along the build direction."""
 UP = "up"
 LARGER = 1.8
 """How much larger the ball at the place that is looked at is."""
@@ -25,19 +25,19 @@ OF = "mu_check_of"
 MATERIAL = {"error": "MU Flaws", "warning": "MU Doubt"}
 
 
-def marks(root: Any) -> list[Any]:
+def mark_objects(root: Any) -> list[Any]:
     """The objects that show where a check found something."""
     return [child for child in root.children if MARK in child]
 
 
 def marked(root: Any) -> str:
     """Digest of the check whose places are marked, or nothing."""
-    return next((obj[OF] for obj in marks(root) if obj[MARK] == UP), "")
+    return next((obj[OF] for obj in mark_objects(root) if obj[MARK] == UP), "")
 
 
 def clear(root: Any) -> None:
-    """Take the markers out."""
-    for obj in marks(root):
+    """Remove the marks."""
+    for obj in mark_objects(root):
         unit_object.remove_part(obj)
     root.mu_print.finding = -1
 
@@ -49,13 +49,13 @@ def mark(root: Any, found: Any) -> None:
         if finding["severity"] not in FAULTS or not len(finding["places"]):
             continue
         name = f"{finding['check'].capitalize()} ({finding['severity']})"
-        obj = _marker(root, name, bpy.data.meshes.new(name), str(number))
+        obj = _mark_object(root, name, bpy.data.meshes.new(name), str(number))
         radius = np.full(len(finding["places"]), root.mu_print.marker)
         skeletons.write(obj.data, skeletons.Skeleton(finding["places"], attributes={"radius": radius}))
         materials.assign(obj.data, MATERIAL[finding["severity"]])
         set_modifier_input(nodes.skin(obj, "MU Balls"), "Material", obj.data.materials[0])
         obj.hide_render = True
-    arrow = _marker(root, "Build Direction", None, UP)
+    arrow = _mark_object(root, "Build Direction", None, UP)
     arrow[OF] = found.digest
     arrow.empty_display_type = "SINGLE_ARROW"
     unit = to_unit(root.mu_unit).dimensions
@@ -65,7 +65,7 @@ def mark(root: Any, found: Any) -> None:
     arrow.rotation_quaternion = Vector(found.found["direction"]).to_track_quat("Z", "Y")
 
 
-def _marker(root: Any, name: str, data: Any, value: str) -> Any:
+def _mark_object(root: Any, name: str, data: Any, value: str) -> Any:
     obj = bpy.data.objects.new(name, data)
     obj[MARK] = value
     for collection in root.users_collection:
@@ -77,9 +77,9 @@ def _marker(root: Any, name: str, data: Any, value: str) -> Any:
 
 
 def resize(root: Any) -> None:
-    """Give the markers the radius that is set, and the place that is looked at a larger one."""
+    """Give the marks the radius that is set, and the place that is looked at a larger one."""
     settings = root.mu_print
-    for obj in marks(root):
+    for obj in mark_objects(root):
         if obj.data is None:
             continue
         values = np.full(len(obj.data.vertices), settings.marker, np.float32)

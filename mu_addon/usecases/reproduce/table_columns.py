@@ -16,7 +16,7 @@ from ...meshing.unit import mesh_unit
 from ...placement.deviation import Deviation, deviation_of
 from ...placement.inclusion import RULES
 from ...run.cache import Cache, key
-from .column import SOLVED_KPA, STATIONS, held, motion, paths
+from .table_column import SOLVED_KPA, STATIONS, motion, paths, with_fixed_base
 
 Array = np.ndarray[Any, Any]
 
@@ -79,7 +79,7 @@ def solved(task: Task, cache: Cache) -> Solved:
 
 
 def _solve(task: Task) -> Solved:
-    mesh = held(mesh_unit(task.unit, task.mesh), task.held_cells * task.unit.dimensions.cell)
+    mesh = with_fixed_base(mesh_unit(task.unit, task.mesh), task.held_cells * task.unit.dimensions.cell)
     stopped = ""
     try:
         moved = motion(task.unit, mesh, BENDING_KPA)
