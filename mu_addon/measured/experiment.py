@@ -69,7 +69,7 @@ class Experiment:
 
     @property
     def markers(self) -> dict[int, Array]:
-        """Positions (n, 3) in mm of each marker by its number; nan where a coordinate was not seen."""
+        """Positions (n, 3) in mm of each marker, by its number; nan where a coordinate was not measured."""
         numbers = sorted({int(c[6 : c.index("_")]) for c in self.columns if c.startswith("marker")})
         unseen = np.full(len(self), np.nan)
         return {
