@@ -283,7 +283,7 @@ def require_path_inside(body: Body, unit: Unit, window: Window) -> None:
 
 
 def covering(d: Dimensions, body: Body) -> Dimensions:
-    """Dimensions whose envelope has cells wherever the body is: the box that the body is cut from."""
+    """Dimensions with enough cells in the envelope to contain the body, to which the lattice is then cut."""
     low, high = body.bounds
     half_x = _cells(max(-low[0], high[0]), d.cell)
     return attrs.evolve(

@@ -29,10 +29,10 @@ class Experiment:
     columns: arrays (n,) by their names, which end with the unit; for a coupon or a lattice that was recorded
     as displacement and force they include strain and nominal stress_kPa (compression positive in
     lattice_compression, tension positive in coupon). A column with _sd_ in its name is the standard deviation
-    of the record beside it. A lattice that was weighed has columns mass_g and mass_sd_g, one value
-    throughout. rows (n,): numbers of the lines in the file. orientation_deg: direction of gravity about x, 0
-    hanging with the tip down. section_mm: width and thickness of what bears the load. sha256: of the file's
-    bytes.
+    by which the whole record beside it is uncertain. A lattice that was weighed has columns mass_g and
+    mass_sd_g, one value throughout. rows (n,): numbers of the lines in the file. orientation_deg: direction
+    of gravity about x, 0 hanging with the tip down. section_mm: width and thickness of what bears the load.
+    sha256: of the file's bytes.
     """
 
     name: str
