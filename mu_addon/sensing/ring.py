@@ -26,7 +26,7 @@ _START = 64
 class Ring:
     """Ring buffer (capacity, columns) of float64 in a mapped file; row k lies at index k modulo capacity.
 
-    Columns have the units that their writer gives them. One process appends and others read, without locks.
+    Columns have whatever units the writer gives them. One process appends, others read, none waits.
     """
 
     rows: Array
@@ -66,7 +66,7 @@ class Ring:
         return int(struct.unpack_from("<Q", self._map, _COUNT_AT)[0])
 
     def append(self, rows: Array) -> None:
-        """Write rows (n, columns); the latest capacity of them remain."""
+        """Write rows (n, columns); the last `capacity` rows written remain."""
         capacity, count = len(self.rows), self.written
         kept = rows[-capacity:]
         places = np.arange(count + len(rows) - len(kept), count + len(rows)) % capacity

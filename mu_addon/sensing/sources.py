@@ -178,7 +178,7 @@ class Replay:
         return b"".join(out)
 
     def close(self) -> None:
-        """Nothing: no file is kept open."""
+        """Does nothing: no file is kept open."""
 
 
 def _lines(recordings: list[Recording]) -> Iterator[tuple[float, bytes]]:
@@ -238,7 +238,7 @@ class Simulated:
         return b"".join(out)
 
     def close(self) -> None:
-        """Nothing: there is no line."""
+        """Does nothing: there is no line."""
 
 
 def _serial() -> Any:
