@@ -15,7 +15,7 @@ SHORTEST = 3
 
 
 class Window(NamedTuple):
-    """A path through `length` contiguous anchors P_start .. P_(start + length - 1), counted from 1.
+    """A path through `length` consecutive anchors P_start .. P_(start + length - 1), counted from 1.
 
     name: alpha1, alpha2, ... in the order of `windows`.
     """
@@ -45,7 +45,9 @@ def anchor_points(unit: Unit) -> NDArray[np.float64]:
 
 
 def windows(n: int) -> list[Window]:
-    """All (n - 2)(n - 1)/2 windows of 3 or more of n anchors, by length then start: alpha1, alpha2, ...
+    """All (n - 2)(n - 1)/2 windows of 3 or more consecutive anchors out of n, by length, then by start.
+
+    They are named alpha1, alpha2, ... in this order; fewer than 3 anchors give an empty list.
 
     >>> [(w.name, w.start, w.length) for w in windows(4)]
     [('alpha1', 1, 3), ('alpha2', 2, 3), ('alpha3', 1, 4)]
@@ -55,7 +57,9 @@ def windows(n: int) -> list[Window]:
 
 
 def window(unit: Unit, name: str) -> Window:
-    """The unit's window of that name. Raises InputError, which lists the names there are.
+    """The window of this name, such as "alpha4", among those of the unit's anchors.
+
+    Raises InputError, which gives the range of valid names.
 
     >>> from mu_addon.design import load_preset
     >>> window(load_preset("mu-1.0x"), "alpha5").length

@@ -10,7 +10,10 @@ from .toml_text import nearest
 
 
 def asset_root() -> Path:
-    """Folder `assets`: inside the package in the built extension, beside it in a checkout; or InputError."""
+    """The folder `assets`: inside the package in the built extension, beside it in a checkout.
+
+    Raises InputError where neither exists.
+    """
     package = Path(__file__).resolve().parent.parent
     for folder in (package / "assets", package.parent / "assets"):
         if folder.is_dir():
@@ -23,13 +26,21 @@ def asset_root() -> Path:
 
 
 def asset_names(folder: str, kind: str = "") -> list[str]:
-    """Names of the TOML files of a `kind` shipped in a folder of `assets`, sorted; most files name none."""
+    """Sorted names (file stems) of the TOML files in a folder of `assets` whose key `kind` has this value.
+
+    kind: "" for the files that have no such key, as most do. Raises InputError where `assets` is missing or a
+    file is not TOML.
+    """
     paths = (asset_root() / folder).glob("*.toml")
     return sorted(path.stem for path in paths if _kind(path) == kind)
 
 
 def asset_file(folder: str, what: str, name: str, kind: str = "") -> Path:
-    """The shipped TOML file of that name; InputError lists the names there are, `what` says of what."""
+    """Path of the shipped TOML file `name` of this `kind` in a folder of `assets`.
+
+    what: the noun for messages, such as "preset". Raises InputError, with the valid names, for an unknown
+    name or a file of another kind.
+    """
     names = asset_names(folder, kind)
     files = {path.stem: path for path in (asset_root() / folder).glob("*.toml")}
     if name in names:

@@ -18,9 +18,11 @@ PIECES = 8
 
 
 def lattice_beams(d: Dimensions, bar: Bar | None = None, pieces: int = PIECES) -> Beams:
-    """Struts as frusta of linear radius, those of a waveguide's path left out or raised as in the solid.
+    """The lattice as beams: each strut is a chain of `pieces` frusta whose radii in mm follow its law.
 
-    Pieces that lie wholly within the actuator's outer surface are left out.
+    bar: a waveguide; struts that it replaces are left out, and those that meet it are thickened as in the
+    printable solid (`waveguide.strut_radii`). Frusta with both ends inside the actuator's outer surface are
+    left out.
     """
     lattice = lattice_of(d)
     t = np.linspace(0.0, 1.0, pieces + 1)
@@ -47,9 +49,11 @@ def _radii(lattice: Lattice, bar: Bar | None, t: NDArray[np.float64]) -> NDArray
 
 
 def beam_parts(d: Dimensions, facets: Facets, bar: Bar | None = None) -> tuple[list[Part], list[int]]:
-    """Objects of a 3MF file of the unit with its lattice as beams, and the numbers of those to be printed.
+    """Objects of a 3MF file with the lattice as beams, and the numbers, from 1, of those to be printed.
 
-    The beams are cut to the envelope without the cavity, so that they end inside the membrane.
+    The objects are the actuator with inlet and cavity, a clipping mesh, the lattice and, with a `bar`, the
+    waveguide with its wells. The clipping mesh, object 2, is the envelope without the cavity: beams cut to it
+    end inside the membrane. It is not printed.
     """
     from manifold3d import Manifold, OpType
 

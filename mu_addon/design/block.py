@@ -1,4 +1,4 @@
-"""A box turned any way in space: wells, seats and pockets of a waveguide."""
+"""A box in any orientation: wells, seats and pockets of a waveguide."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2,
 
 @attrs.frozen(eq=False)
 class Block:
-    """A box of centre (3,) and half sizes (3,) in mm along orthonormal, right-handed axes, rows of (3, 3)."""
+    """A box with its centre (3,) and half sizes (3,) in mm; the rows of axes (3, 3) are its unit vectors.
+
+    axes: orthonormal and right-handed; `half` is given along them.
+    """
 
     centre: Array
     axes: Array
@@ -26,7 +29,10 @@ class Block:
 
     @classmethod
     def between(cls, low: ArrayLike, high: ArrayLike, origin: ArrayLike, axes: Array) -> Block:
-        """The box from low to high (3,), told along the axes from an origin (3,), mm."""
+        """The box from corner `low` (3,) to `high` (3,), both in mm in a local frame.
+
+        origin (3,): the frame's origin in mm; axes (3, 3): its unit vectors as rows.
+        """
         low, high = np.asarray(low, float), np.asarray(high, float)
         return cls(np.asarray(origin, float) + (low + high) / 2.0 @ axes, axes, (high - low) / 2.0)
 
@@ -45,18 +51,21 @@ class Block:
         return attrs.evolve(self, half=self.half + face_moves(self.axes, offset))
 
     def longer(self, axis: int, by: float) -> Block:
-        """The box with the face that looks along an axis, 0 to 2, moved outward by `by` mm."""
+        """The box with one face moved outward by `by` mm: the face whose outward normal is +axis, 0 to 2."""
         more = by / 2.0 * np.eye(3)[axis]
         return Block(self.centre + more @ self.axes, self.axes, self.half + more)
 
     def points(self, step: float) -> Array:
-        """Points (n, 3) of a grid of at most `step` mm that fills the box, its corners among them."""
+        """Points (n, 3) in mm of a regular grid that fills the box, its corners among them.
+
+        step: largest distance in mm between neighbours along each axis.
+        """
         counts = np.maximum(2, np.ceil(2.0 * self.half / step).astype(int) + 1)
         ticks = [np.linspace(-h, h, n) for h, n in zip(self.half, counts, strict=True)]
         return np.asarray(self.centre + np.stack(np.meshgrid(*ticks), axis=-1).reshape(-1, 3) @ self.axes)
 
     def solid(self) -> Any:
-        """The box as a Manifold."""
+        """The box as a manifold3d.Manifold, in mm."""
         from manifold3d import Manifold, Mesh64
 
         triangles = np.concatenate([FACES[:, [0, 1, 2]], FACES[:, [0, 2, 3]]])
@@ -64,6 +73,10 @@ class Block:
 
 
 def face_moves(normals: Array, offset: Array) -> Array:
-    """How far (n,) flat faces of unit normals (n, 3) move for offsets (3,) along x, y and z of one sign."""
+    """Distances (n,) in mm by which flat faces of unit normals (n, 3) move along their normals.
+
+    offset (3,): the print offset D along x, y and z in mm, all of one sign; a face moves by |D n|, inward if
+    the offset is negative.
+    """
     moves = np.linalg.norm(normals * offset, axis=-1)
     return np.asarray(-moves if (offset < 0.0).any() else moves)

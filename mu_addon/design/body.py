@@ -1,4 +1,4 @@
-"""A body of the user's own as a closed surface: read, examined, and cut to serve as a unit's envelope."""
+"""A user-defined body as a closed surface: read, checked, and cut to serve as a unit's envelope."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _UNITS = {1000.0: "metres", 25.4: "inches", 10.0: "centimetres", 0.001: "microme
 
 @attrs.frozen
 class Flaw:
-    """Why a body cannot serve: what, the places (n, 3) in mm where it shows, and what to do."""
+    """Why a surface cannot be used: what is wrong, what to do, and the places (n, 3) in mm where it shows."""
 
     what: str
     remedy: str
@@ -44,9 +44,10 @@ class Flaw:
 
 @attrs.frozen(eq=False)
 class Body:
-    """Triangles (m, 3) between vertices (n, 3) in mm, in the unit's frame; raises InputError.
+    """A surface of triangles (m, 3) between vertices (n, 3) in mm, in the unit's frame.
 
-    A closed body whose faces all look inward is turned: nothing else can be meant.
+    Raises InputError where it is empty, has a coordinate that is not finite, or more than MOST_TRIANGLES
+    triangles. `flaws` tells whether the surface is closed.
     """
 
     vertices: Vertices
@@ -86,14 +87,17 @@ class Body:
 
     @cached_property
     def manifold(self) -> Any:
-        """The body for manifold3d."""
+        """The body as a manifold3d.Manifold, in mm."""
         from manifold3d import Manifold, Mesh64
 
         return Manifold(Mesh64(self.vertices, self.triangles.astype(np.uint64)))
 
 
 def body_of(vertices: ArrayLike, triangles: ArrayLike, name: str = "body") -> Body:
-    """Body of triangles (m, 3) and vertices (n, 3) in mm, equal vertices merged; raises InputError."""
+    """Body of triangles (m, 3) and vertices (n, 3) in mm; vertices that agree to QUANTUM_MM are merged.
+
+    A closed surface whose faces all look inward is reversed. Raises InputError as `Body` does.
+    """
     given = np.asarray(vertices, float).reshape(-1, 3), np.asarray(triangles, np.int64).reshape(-1, 3)
     if not (len(given[1]) and np.isfinite(given[0]).all()):
         return Body(*given, name)
@@ -104,7 +108,10 @@ def body_of(vertices: ArrayLike, triangles: ArrayLike, name: str = "body") -> Bo
 
 
 def read_body(path: str | Path) -> Body:
-    """Body in an STL, OBJ or PLY file in mm; raises InputError."""
+    """Body in an STL, OBJ or PLY file in mm; quadrilaterals are split into triangles.
+
+    Raises InputError for another file type, a file that cannot be read, and as `Body` does.
+    """
     from meshio import ReadError, obj, ply, stl
 
     path = Path(path)
@@ -133,7 +140,11 @@ def read_body(path: str | Path) -> Body:
 
 
 def flaws(body: Body) -> list[Flaw]:
-    """What keeps a surface from being the skin of one body: empty for one that is."""
+    """What keeps a surface from bounding one solid body; an empty list if nothing does.
+
+    Checked are open and inconsistently oriented edges, edges of more than two faces, self-intersection and,
+    only where these are in order, the number of separate bodies and the sign of the volume.
+    """
     v, t = body.vertices, body.triangles
     open_, crowded = _odd_edges(t)
     found = []
@@ -174,7 +185,11 @@ def flaws(body: Body) -> list[Flaw]:
 
 
 def misfits(body: Body, d: Dimensions) -> list[Flaw]:
-    """Why a sound body cannot be the envelope of a unit of these dimensions."""
+    """Why a body without `flaws` cannot be the envelope of a unit of these dimensions; empty if it can.
+
+    Checked are a size that suggests another unit of length, the extent along z against the unit's height, and
+    whether the chambers lie inside.
+    """
     low, high = body.bounds
     size, own = float(np.ptp(body.bounds, axis=0).max()), float(np.ptp(np.array(d.bounds), axis=1).max())
     for factor, unit in _UNITS.items():
@@ -212,9 +227,10 @@ def misfits(body: Body, d: Dimensions) -> list[Flaw]:
 
 
 def overlaps(body: Body, d: Dimensions, own: Body | None = None) -> list[Flaw]:
-    """Where a sound body stands in a unit of these dimensions: in its box or own envelope, or its chambers.
+    """Where a body without `flaws` overlaps a unit of these dimensions: one Flaw with all places, or empty.
 
-    The lattice counts as filled, since that is how it is simulated.
+    own: the body that replaces the lattice's box as envelope. The lattice counts as filled, since that is how
+    it is simulated.
     """
     lattice = shapes.box(*np.transpose(d.bounds)) if own is None else own.manifold
     common = (lattice + shapes.revolved(outer_polygon(d, 6), AROUND)) ^ body.manifold
@@ -232,7 +248,10 @@ def overlaps(body: Body, d: Dimensions, own: Body | None = None) -> list[Flaw]:
 
 
 def envelope(body: Body, d: Dimensions) -> Body:
-    """The body between the unit's end planes, z = 0 and the height; InputError names its first flaw."""
+    """The body cut flat at the unit's end planes, z = 0 and z = d.height.
+
+    Raises InputError with the first of its `flaws` or `misfits`.
+    """
     require_sound(body, [*flaws(body)] or misfits(body, d))
     low, high = body.bounds
     slab = shapes.box([*low[:2] - 1.0, 0.0], [*high[:2] + 1.0, d.height])
@@ -240,7 +259,10 @@ def envelope(body: Body, d: Dimensions) -> Body:
 
 
 def require_sound(body: Body, found: list[Flaw], role: str = "an envelope") -> None:
-    """Raise InputError for the first of these flaws, with the first of its places."""
+    """Raise InputError for the first of these flaws and its first place; do nothing for an empty list.
+
+    role: what the body was meant to be, for the message.
+    """
     if found:
         flaw = found[0]
         at = ", first at ({:.2f}, {:.2f}, {:.2f}) mm".format(*flaw.places[0]) if len(flaw.places) else ""
@@ -248,7 +270,7 @@ def require_sound(body: Body, found: list[Flaw], role: str = "an envelope") -> N
 
 
 def require_path_inside(body: Body, unit: Unit, window: Window) -> None:
-    """Raise InputError where the waveguide along a window leaves the body."""
+    """Raise InputError where the waveguide along a window leaves the body, or cannot be built in it."""
     from .waveguide import waveguide
 
     bar = waveguide(unit, window, covering(unit.dimensions, body)).solid()
@@ -261,7 +283,7 @@ def require_path_inside(body: Body, unit: Unit, window: Window) -> None:
 
 
 def covering(d: Dimensions, body: Body) -> Dimensions:
-    """Dimensions whose envelope has cells wherever the body is: the box that the body is cut from."""
+    """Dimensions with enough cells in the envelope to contain the body, to which the lattice is then cut."""
     low, high = body.bounds
     half_x = _cells(max(-low[0], high[0]), d.cell)
     return attrs.evolve(
@@ -273,7 +295,11 @@ def covering(d: Dimensions, body: Body) -> Dimensions:
 
 
 def half(body: Body) -> Body | None:
-    """The part at x >= 0 of a body that is its own mirror image across x; None of any other."""
+    """The part at x >= 0 of a body that is its own mirror image across x = 0; None for any other body.
+
+    Symmetric means that less than 1e-4 of the volume lies outside the mirror image. Raises InputError where
+    the cut surface is no valid `Body`.
+    """
     whole = body.manifold
     mirrored = whole.mirror([1.0, 0.0, 0.0])
     if (whole - mirrored).volume() > 1e-4 * whole.volume():
@@ -284,10 +310,11 @@ def half(body: Body) -> Body | None:
 
 
 def inside(body: Body, points: ArrayLike) -> NDArray[np.bool_]:
-    """Whether points (..., 3) lie in a sound body: how often a ray along z leaves through its surface.
+    """Whether points (..., 3) in mm lie in a closed body: a result of shape (...,), by ray casting along z.
 
-    Rays are moved aside by a nanometre, in a direction of no simple slope: an edge of a drawn body that one
-    would meet is missed. Triangles are found by columns of a grid across z.
+    A point is inside if its ray leaves through an odd number of triangles. Rays are shifted by two nanometres
+    in an irrational direction, so that they miss the edges of drawn bodies. Triangles are found through the
+    columns of a grid across z.
     """
     at = np.asarray(points, float)
     p = at.reshape(-1, 3) + np.array([1e-6 * np.sqrt(2.0), 1e-6 * np.sqrt(3.0), 0.0])

@@ -26,7 +26,10 @@ ARM_MM = 40.0
 
 @attrs.frozen
 class Feature:
-    """One size of the gauge that calipers measure: `solid` or `gap`, across x, y or z, nominal in mm."""
+    """One dimension of the gauge to measure with calipers: nominal_mm in mm along `axis` "x", "y" or "z".
+
+    kind: "solid" for material, "gap" for a slot; where: its place on the gauge, in words.
+    """
 
     name: str
     kind: str
@@ -60,7 +63,10 @@ FEATURES: tuple[Feature, ...] = (
 
 
 def gauge() -> tuple[Vertices, Triangles]:
-    """The gauge for the printer's offsets, as a closed surface in mm: fins, slots and shelves of FEATURES."""
+    """The gauge for the print offsets: vertices (n, 3) in mm and triangles (m, 3) of a closed surface.
+
+    A base with the fins, slots and shelves of FEATURES, at their nominal sizes.
+    """
     size = {feature.name: feature.nominal_mm for feature in FEATURES}
     boxes = [((0.0, 0.0, 0.0), (size["length"], size["depth"], 4.0))]
     x = 2.0
@@ -109,7 +115,10 @@ def offsets(features: list[Feature], measured: ArrayLike) -> dict[str, tuple[flo
 
 
 def strut_coupon(d: Dimensions) -> tuple[Vertices, Triangles]:
-    """A round tension coupon as thick as a strut's junction, with grips, its axis along z."""
+    """A round tension coupon as thick as a strut's junction: vertices (n, 3) in mm, triangles (m, 3).
+
+    Its axis is z, its gauge length GAUGE_MM between tapered grips.
+    """
     r, grip = d.junction_diameter / 2.0, max(4.0, 2.0 * d.junction_diameter)
     taper = 1.5 * (grip - r)
     z = np.cumsum([0.0, 12.0, taper, GAUGE_MM, taper, 12.0])
@@ -120,7 +129,10 @@ def strut_coupon(d: Dimensions) -> tuple[Vertices, Triangles]:
 
 
 def wall_coupon(d: Dimensions) -> tuple[Vertices, Triangles]:
-    """A flat tension coupon as thick as the membrane's wall, with grips, upright in the xz plane."""
+    """A flat tension coupon as thick as the membrane's wall: vertices (n, 3) in mm, triangles (m, 3).
+
+    It stands upright in the xz plane, STRIP_MM wide over a gauge length of GAUGE_MM between wider grips.
+    """
     from manifold3d import CrossSection, Manifold
 
     half, grip, z = STRIP_MM / 2.0, 10.0, np.cumsum([0.0, 15.0, 8.0, GAUGE_MM, 8.0, 15.0])
@@ -131,7 +143,10 @@ def wall_coupon(d: Dimensions) -> tuple[Vertices, Triangles]:
 
 
 def beam_coupon(d: Dimensions) -> tuple[Vertices, Triangles]:
-    """A cantilever of the waveguide's section along x from a block to clamp: loaded by weights at its tip."""
+    """A cantilever with the waveguide's square section: vertices (n, 3) in mm, triangles (m, 3).
+
+    The beam extends ARM_MM along x from a block to be clamped; weights are hung from its tip.
+    """
     h = d.waveguide_section / 2.0
     return _united(
         [shapes.box([-12.0, -6.0, -4.0], [0.0, 6.0, 4.0]), shapes.box([-1.0, -h, -h], [ARM_MM, h, h])]
@@ -139,7 +154,10 @@ def beam_coupon(d: Dimensions) -> tuple[Vertices, Triangles]:
 
 
 def waveguide_coupon(d: Dimensions, length: float) -> tuple[Vertices, Triangles]:
-    """A straight waveguide with wells and seats along z, `length` mm between what would be its end nodes."""
+    """A straight waveguide along z with wells and seats: vertices (n, 3) in mm, triangles (m, 3).
+
+    length: distance in mm between the points that are its end nodes in a lattice.
+    """
     bar = free_bar(d, length)
     body = bar.solid()
     for cut in bar.cut_solids():

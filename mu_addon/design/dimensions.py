@@ -1,4 +1,4 @@
-"""The true lengths of a unit at its scale, which geometry and meshes are made from."""
+"""The lengths of a unit in mm at its scale, from which geometry and meshes are made."""
 
 from __future__ import annotations
 
@@ -58,22 +58,22 @@ class Dimensions:
 
     @property
     def height(self) -> float:
-        """Length of the unit along z without the inlet boss."""
+        """Length of the unit along z in mm, without the inlet boss."""
         return self.count * self.cell
 
     @property
     def joint_radius(self) -> float:
-        """Radius where bladder and neck meet with one slope."""
+        """Outer radius in mm where the arcs of bladder and neck meet with one slope: (R b + r a)/(a + b)."""
         return (self.R * self.b + self.r * self.a) / (self.a + self.b)
 
     @property
     def apex_curvature_radius(self) -> float:
-        """Radius of curvature of the profile at an apex: the thickest wall before the inner offset folds."""
+        """Radius of curvature in mm of the profile at an apex; a thicker wall folds its inner offset."""
         return self.a * (self.a + self.b) / (2.0 * (self.R - self.r))
 
     @property
     def bounds(self) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
-        """Box of the lattice envelope as (low, high) for x, y and z."""
+        """Box of the lattice envelope in mm: (low, high) along x, y and z."""
         x = self.cell * self.cells_x / 2.0
         return (
             (-x, x),

@@ -23,7 +23,7 @@ def write_nodes(unit: Unit, path: str | Path) -> None:
     """Write every lattice node as text: `#` header lines, then id, kind and x, y, z in mm, split by spaces.
 
     The id counts from 0; kind is `centre` or `corner` of a cell, `node` for another, or `P1`, `P2`, ... for
-    those that are anchors.
+    those that are anchors. Raises OutputError.
     """
     lattice = lattice_of(unit.dimensions)
     kinds = np.select([lattice.is_centre, lattice.is_corner], ["centre", "corner"], "node").tolist()

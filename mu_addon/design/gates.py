@@ -1,4 +1,4 @@
-"""Gates of a printable solid: numbers that must come out exactly, each the sign of a different mistake."""
+"""Geometry checks (gates) of a printable solid: numbers that it must meet before it is written."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ STRAYED_MM3 = 1e-6
 
 
 class GateError(MuError):
-    """A solid that must not be printed; it names the gate that failed."""
+    """A solid that failed a geometry check and must not be printed; the message names the check."""
 
     status = 6
 
 
 @attrs.frozen
 class Guide:
-    """What was measured on the lattice with its waveguide, next to what it had to be.
+    """Measurements on the lattice with its waveguide, next to the values they must have; mm3 and counts.
 
-    cut_mm3: what wells, pockets and notches take away; strayed_mm3: what of that is strut or membrane and not
-    waveguide.
+    cut_mm3: volume that wells, pockets and notches remove; strayed_mm3: the part of it that belongs to struts
+    or membrane instead of the waveguide.
     """
 
     genus: int
@@ -40,7 +40,11 @@ class Guide:
 
 @attrs.frozen
 class Gates:
-    """What was measured on a solid, next to what it had to be."""
+    """Measurements on a printable solid, next to the values they must have; mm2, mm3 and counts.
+
+    inner_shells and inner_volume_mm3 are those of the cavity, with the inlet plugged; guide: those of the
+    waveguide, None without one.
+    """
 
     lattice_genus: int
     lattice_genus_expected: int
@@ -60,7 +64,7 @@ class Gates:
 
     @property
     def inner_volume_error(self) -> float:
-        """Relative difference of the cavity's volume from the analytic one."""
+        """Relative difference of the measured cavity volume from the analytic one; 0 where they agree."""
         return self.inner_volume_mm3 / self.inner_volume_expected_mm3 - 1.0
 
 
@@ -73,11 +77,12 @@ def check_solid(
     lattice_cycles: int,
     guide: Guide | None = None,
 ) -> Gates:
-    """Gates of a surface; GateError names the first that fails.
+    """Measure a surface of vertices (n, 3) in mm and triangles (m, 3), and require every gate.
 
-    `plug` is a Manifold that stops the inlet and `sealed_volume` (mm3) what it seals off; `lattice` is the
-    bare lattice's measured (genus, components), `lattice_cycles` the E - V + 1 of its graph; `guide` what
-    `check_waveguide` found, if there is a waveguide.
+    plug: a Manifold that closes the inlet; sealed_volume: volume in mm3 that it then encloses, analytically.
+    lattice: genus and number of components of the bare lattice's solid; lattice_cycles: E - V + 1 of its
+    graph. guide: the result of `check_waveguide`, if there is a waveguide. Raises GateError for the first
+    gate that fails.
     """
     import manifold3d
 
@@ -108,11 +113,11 @@ def check_solid(
 
 
 def check_waveguide(sensed: Any, bar: Any, cuts: Any, actuator: Sequence[Any], cycles: int) -> Guide:
-    """What the lattice with its waveguide measures; GateError where a cut opens more than the waveguide.
+    """Measure the lattice united with its waveguide, and what the cuts remove; bodies are Manifolds in mm.
 
-    sensed: lattice and waveguide united; bar: the waveguide alone; cuts: its wells, pockets and notches;
-    actuator: its bodies, all as Manifolds. cycles: E - V + 1 of the lattice's graph with the waveguide's own
-    steps.
+    sensed: lattice and waveguide; bar: the waveguide alone; cuts: its wells, pockets and notches; actuator:
+    its bodies; cycles: E - V + 1 of the lattice's graph with the waveguide's own edges. Raises GateError
+    where the cuts touch struts or membrane, or the result is in pieces or has another genus than `cycles`.
     """
     from manifold3d import Manifold, OpType
 
@@ -143,7 +148,7 @@ def check_waveguide(sensed: Any, bar: Any, cuts: Any, actuator: Sequence[Any], c
 
 
 def require(gates: Gates) -> None:
-    """Raise GateError for the first gate that is not passed."""
+    """Raise GateError for the first gate that fails; the cavity's volume may be off by CAVITY_TOLERANCE."""
     g = gates
     if g.lattice_components != 1:
         _fail("lattice in one piece", f"the bare lattice falls into {g.lattice_components} pieces")

@@ -37,7 +37,7 @@ ROOT = 0.1
 
 @attrs.frozen
 class Fingers:
-    """How the two units stand."""
+    """Section [fingers]: the distance in mm between the two units at rest."""
 
     section: ClassVar[str] = "fingers"
 
@@ -55,7 +55,7 @@ class Fingers:
 
 @attrs.frozen
 class Plate:
-    """The base plate."""
+    """Section [plate]: thickness, margin and mounting holes of the base plate, in mm."""
 
     section: ClassVar[str] = "plate"
 
@@ -98,7 +98,10 @@ def _one_line(gripper: Any, field: Any, value: Any) -> None:
 
 @attrs.frozen
 class Gripper:
-    """Two equal units on a plate, each with its waveguide along `path`; InputError says what does not fit."""
+    """Two equal units on a base plate, each with its waveguide along the window `path`.
+
+    Raises InputError for a path that the unit has not, or mounting holes wider than half the plate's margin.
+    """
 
     section: ClassVar[str] = ""
 
@@ -120,26 +123,29 @@ class Gripper:
 
     @property
     def axis_mm(self) -> float:
-        """Distance of each finger's axis from the middle plane."""
+        """Distance in mm of each finger's z axis from the middle plane y = 0."""
         return self.fingers.gap_mm / 2.0 + self.unit.dimensions.bounds[1][1]
 
     @property
     def size_mm(self) -> tuple[float, float]:
-        """Extent of the plate along x and y."""
+        """Extents of the plate along x and y, in mm."""
         (x0, x1), (y0, y1), _ = self.unit.dimensions.bounds
         more = 2.0 * self.plate.margin_mm
         return x1 - x0 + more, 2.0 * (y1 - y0) + self.fingers.gap_mm + more
 
     @property
     def placements(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        """Of either finger the rotation (3, 3) and the shift (3,) in mm from the unit's frame."""
+        """For each finger the rotation (3, 3) and then the shift (3,) in mm that move a unit to its place."""
         shift = np.array([0.0, self.axis_mm, 0.0])
         return (np.eye(3), -shift), (np.diag([-1.0, -1.0, 1.0]), shift)
 
 
 @attrs.frozen
 class GripperGates:
-    """What was measured on the gripper's solid, next to what it had to be; see `build_gripper`."""
+    """Measurements on the gripper's solid, next to the values they must have; mm2, mm3 and counts.
+
+    See `build_gripper` for what is required of them.
+    """
 
     components: int
     bad_edges: int
@@ -171,9 +177,10 @@ class GripperSolid:
 def build_gripper(gripper: Gripper, quality: str = "interactive") -> GripperSolid:
     """The printable gripper: two fingers with their waveguides, and the plate with both inlets through it.
 
-    Gates: one component; closed, also once the STL is read back; with both inlets plugged exactly two inner
-    shells, each of a finger's cavity; and the genus that the Euler characteristics of fingers, plate and what
-    they share add up to. Raises GateError if one fails, InputError for a seat that the plate covers.
+    quality: "interactive" or "export", the number of facets. Gates: one component; closed, also once the STL
+    is read back; with both inlets plugged exactly two inner shells, each of a finger's cavity; and the genus
+    that the Euler characteristics of fingers, plate and their intersections add up to. Raises GateError where
+    one fails, InputError where the plate covers a seat.
     """
     from manifold3d import Manifold, Mesh64, OpType
 
@@ -274,7 +281,10 @@ def _require(gates: GripperGates) -> None:
 
 
 def to_toml(gripper: Gripper, unit: str, comments: bool = True) -> str:
-    """The gripper as TOML; `unit`: how it names its fingers' unit, a preset or a TOML file beside it."""
+    """The gripper as TOML text, by default with unit, meaning and source of each value as comments.
+
+    unit: how the file names the fingers' unit, a preset's name or a TOML file beside it.
+    """
     head = {
         "format": FORMAT,
         "kind": KIND,
@@ -290,7 +300,11 @@ def to_toml(gripper: Gripper, unit: str, comments: bool = True) -> str:
 
 
 def from_toml(text: str, origin: str = "", beside: Path | None = None) -> Gripper:
-    """Gripper read from TOML; InputError gives file and line. beside: where a unit's file it names lies."""
+    """The gripper in TOML text; keys left out keep their defaults.
+
+    origin: name of the file, for messages; beside: folder of the unit's file that the text may name. Raises
+    InputError with file and line.
+    """
     keys = {"": ["format", "kind", "name", "unit", "path"]}
     keys |= {section.section: [d.name for d in describe(section)] for section in SECTIONS}
     document = toml_text.parse(text, keys, origin)
@@ -313,7 +327,7 @@ def from_toml(text: str, origin: str = "", beside: Path | None = None) -> Grippe
 
 
 def read_gripper(path: str | Path) -> Gripper:
-    """Gripper in a TOML file; InputError gives file, line and remedy."""
+    """The gripper in a TOML file. Raises InputError with file, line and what to do."""
     path = Path(path)
     try:
         text = file_text(path)
@@ -327,15 +341,18 @@ def read_gripper(path: str | Path) -> Gripper:
 
 
 def write_gripper(gripper: Gripper, path: str | Path, unit: str) -> None:
-    """Write the gripper as commented TOML, whole or not at all; `unit` as in `to_toml`."""
+    """Write the gripper as commented TOML; the file is replaced only once it is complete. Raises OutputError.
+
+    unit: as in `to_toml`.
+    """
     write_bytes(Path(path), to_toml(gripper, unit).encode())
 
 
 def gripper_names() -> list[str]:
-    """Names of the shipped grippers, sorted."""
+    """Sorted names of the shipped grippers. Raises InputError where the folder of assets is missing."""
     return asset_names("presets", KIND)
 
 
 def load_gripper(name: str) -> Gripper:
-    """The shipped gripper of that name; InputError lists the names there are."""
+    """The shipped gripper of this name. Raises InputError, which lists the valid names."""
     return read_gripper(asset_file("presets", "gripper", name, KIND))

@@ -31,22 +31,22 @@ class Graph:
 
     @property
     def is_centre(self) -> NDArray[np.bool_]:
-        """Whether a node (N,) is the centre of a cell."""
+        """Whether each node is the centre of a cell, (N,)."""
         return self._at(self.kind.divisions // 2)
 
     @property
     def is_corner(self) -> NDArray[np.bool_]:
-        """Whether a node (N,) is a corner of a cell."""
+        """Whether each node is a corner of a cell, (N,)."""
         return self._at(0)
 
     @property
     def inside(self) -> NDArray[np.bool_]:
-        """Whether a node (N,) lies inside a cell."""
+        """Whether each node lies in the interior of a cell, (N,)."""
         return np.asarray(((self.grid - self.cells[0]) % self.kind.divisions != 0).all(axis=1))
 
     @property
     def on_face(self) -> NDArray[np.bool_]:
-        """Whether a strut (E,) lies in a face of a cell."""
+        """Whether each strut lies in a face of a cell, (E,)."""
         first, second = (self.grid[self.struts[:, k]] for k in (0, 1))
         level = (first - self.cells[0]) % self.kind.divisions == 0
         return np.asarray(((first == second) & level).any(axis=1))
@@ -62,23 +62,23 @@ class Graph:
 
 @attrs.frozen(eq=False)
 class Lattice(Graph):
-    """The same with struts of these radii, in mm."""
+    """A graph whose struts have thickness: radius in mm at their junctions and at mid-span."""
 
     junction_radius: float
     midspan_radius: float
 
     def radius(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Strut radius (mm) at fractions t of its length, as the kind has it."""
+        """Strut radii in mm (any shape) at fractions t, 0 .. 1, (any shape) of the strut's length."""
         return self.kind.radius(np.asarray(t, dtype=float), self.junction_radius, self.midspan_radius)
 
 
 def lattice_of(d: Dimensions) -> Lattice:
-    """Lattice of all cells of the envelope, their centres at (iU, jU, (k + 1/2)U)."""
+    """Lattice of all cells of the unit's envelope; cell centres lie at (iU, jU, (k + 1/2)U) in mm."""
     return thickened(graph_of(d), d.junction_diameter / 2.0, d.midspan_diameter / 2.0)
 
 
 def graph_of(d: Dimensions) -> Graph:
-    """Nodes and struts of all cells of the envelope."""
+    """Nodes and struts of all cells of the unit's envelope, without thickness; cells as in `lattice_of`."""
     half_x = d.cells_x // 2
     i, j, k = (
         np.arange(-half_x, half_x + 1),
@@ -96,20 +96,23 @@ def filled(
     junction_radius: float,
     midspan_radius: float,
 ) -> Lattice:
-    """Lattice of cells, as `joined`, with struts of these radii in mm."""
+    """Lattice of cells whose lower corners are cells (C, 3), with struts of these radii in mm.
+
+    cells: in whole numbers of kind.divisions a cell, as in `joined`; cell: edge of a cell in mm.
+    """
     return thickened(joined(kind, cells, cell), junction_radius, midspan_radius)
 
 
 def thickened(graph: Graph, junction_radius: float, midspan_radius: float) -> Lattice:
-    """The graph with struts of these radii, in mm."""
+    """The graph with struts of these radii in mm, at junctions and at mid-span."""
     own = {f.name: getattr(graph, f.name) for f in attrs.fields(Graph)}
     return Lattice(**own, junction_radius=junction_radius, midspan_radius=midspan_radius)
 
 
 def joined(kind: LatticeKind, cells: NDArray[np.int64], cell: float) -> Graph:
-    """Cells of `cell` mm, their lower corners (C, 3) in whole numbers of kind.divisions a cell.
+    """Graph of equal cells side by side; nodes and struts that cells share appear once.
 
-    Nodes and struts that cells share are there once.
+    cells (C, 3): lower corners in whole numbers of kind.divisions a cell; cell: edge of a cell in mm.
     """
     n, m = len(cells), len(kind.nodes)
     inside, own = kind.inside, int(np.count_nonzero(kind.inside))
@@ -131,6 +134,6 @@ def joined(kind: LatticeKind, cells: NDArray[np.int64], cell: float) -> Graph:
 
 
 def grid_points(x: NDArray[np.int64], y: NDArray[np.int64], z: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Points (n, 3) of a grid, x running fastest and z slowest."""
+    """Points (n, 3) of the grid of coordinates x (a,), y (b,) and z (c,), n = a b c; x varies fastest."""
     zz, yy, xx = np.meshgrid(z, y, x, indexing="ij")
     return np.stack([xx.ravel(), yy.ravel(), zz.ravel()], axis=1)

@@ -1,4 +1,4 @@
-"""Kinds of lattice: the nodes and struts of one cell and how a strut's radius runs, by name.
+"""Kinds of lattice by name: nodes and struts of one cell, and a strut's radius along its length.
 
 A new kind is one `register(LatticeKind(...))`; solids, meshes and moduli take it from here.
 """
@@ -26,7 +26,10 @@ _FINEST = 64
 
 
 def sin_squared(t: Array, junction_radius: float, midspan_radius: float) -> Array:
-    """Radius at fractions t of a strut: the junction's at both ends, the mid-span's halfway, sin^2 between.
+    """Strut radius at fractions t (0 .. 1, any shape) of the length, in the unit and shape of its arguments.
+
+    r_junction + (r_midspan - r_junction) sin^2(pi t): the junction's at both ends, the mid-span's at t = 1/2.
+    An array of the shape of t (any shape).
 
     >>> sin_squared(np.array([0.0, 0.5, 1.0]), 0.75, 1.0).tolist()
     [0.75, 1.0, 0.75]
@@ -36,7 +39,10 @@ def sin_squared(t: Array, junction_radius: float, midspan_radius: float) -> Arra
 
 
 def constant(t: Array, junction_radius: float, midspan_radius: float) -> Array:
-    """The mid-span's radius all along; the junction's is ignored."""
+    """The mid-span's radius at all fractions t (any shape), in its unit; an array of that shape (any shape).
+
+    The junction's radius is ignored.
+    """
     return np.full_like(np.asarray(t, dtype=float), midspan_radius)
 
 
@@ -56,10 +62,11 @@ def _content(array: NDArray[Any]) -> tuple[Any, ...]:
 class LatticeKind:
     """One cell of a lattice, to be repeated along x, y and z.
 
-    nodes (n, 3): in cells of side 1, within [0, 1]^3, those on its faces and corners included, each
-    coordinate a fraction of denominator at most 64; struts (e, 2): pairs of nodes, those that neighbours
-    share included; radius(t, junction_radius, midspan_radius): of t (array, 0 .. 1), the same from either
-    end. Raises InputError.
+    nodes (n, 3): in a cell of side 1, within [0, 1]^3, those on faces and corners included; every coordinate
+    is a fraction with a denominator of at most 64. struts (e, 2): pairs of nodes, those that neighbours share
+    included. radius(t, junction_radius, midspan_radius): strut radius at t (array, 0 .. 1), symmetric about t
+    = 1/2. Raises InputError for nodes outside the cell or listed twice, struts that are missing, doubled,
+    invalid or cross, and a radius that is not symmetric and positive.
     """
 
     name: str
@@ -100,31 +107,32 @@ class LatticeKind:
 
     @cached_property
     def divisions(self) -> int:
-        """Smallest even number of equal parts of a cell's side that puts every node on a whole number."""
+        """Smallest even number of parts of the cell's side that gives all nodes whole coordinates."""
         parts = {Fraction(x).limit_denominator(_FINEST).denominator for x in self.nodes.ravel().tolist()}
         return math.lcm(2, *parts)
 
     @cached_property
     def grid(self) -> NDArray[np.int64]:
-        """Nodes (n, 3) as whole numbers of `divisions` a side."""
+        """Nodes (n, 3) as whole numbers, in units of the cell's side over `divisions`."""
         return np.rint(self.nodes * self.divisions).astype(np.int64)
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
-        """Whether a node (n,) lies inside the cell and is no neighbour's."""
+        """Whether each node lies in the interior of the cell, (n,), and belongs to no neighbour."""
         return np.asarray(((self.grid > 0) & (self.grid < self.divisions)).all(axis=1))
 
     @cached_property
     def on_face(self) -> NDArray[np.bool_]:
-        """Whether a strut (e,) lies in a face of the cell and may be a neighbour's, too."""
+        """Whether each strut lies in a face of the cell, (e,), where a neighbour may share it."""
         first, second = self.grid[self.struts[:, 0]], self.grid[self.struts[:, 1]]
         return np.asarray(((first == second) & (first % self.divisions == 0)).any(axis=1))
 
     @cached_property
     def opening(self) -> float:
-        """Least distance, in cells, between the axes of two struts that share no node; inf without such.
+        """Smallest distance, in cells, between the axes of two struts without a common node.
 
-        Struts as wide as that touch between their nodes: the openings around which they run close.
+        Struts of this diameter touch between their nodes, and the openings of the cell close. inf where every
+        two struts share a node.
         """
         here = self.grid[self.struts]
         shifts = np.array(list(product((-1, 0, 1), repeat=3))) * self.divisions
@@ -136,7 +144,7 @@ class LatticeKind:
 
     @cached_property
     def mirrors(self) -> tuple[bool, bool, bool]:
-        """Whether the endless lattice is its own mirror image in the cell's mid-plane across x, y and z."""
+        """Whether the periodic lattice is symmetric about the cell's mid-planes normal to x, y and z."""
         period = self.divisions
 
         def skeleton(grid: NDArray[np.int64]) -> set[tuple[int, ...]]:
@@ -185,7 +193,7 @@ KINDS: dict[str, LatticeKind] = {}
 
 
 def register(kind: LatticeKind) -> LatticeKind:
-    """Make a kind known by its name; InputError where another has it."""
+    """Add a lattice kind under its name and return it. Raises InputError where another kind has the name."""
     if KINDS.get(kind.name, kind) != kind:
         raise InputError(f"a lattice {kind.name!r} already exists", "lattice kind", "choose another name")
     KINDS[kind.name] = kind
@@ -193,7 +201,7 @@ def register(kind: LatticeKind) -> LatticeKind:
 
 
 def kind(name: str) -> LatticeKind:
-    """The kind of that name; InputError lists those there are."""
+    """The lattice kind of this name. Raises InputError, which lists the valid names."""
     if name not in KINDS:
         raise InputError(
             f"there is no lattice {name!r}", "[lattice] kind", f"choose one of {', '.join(names())}"

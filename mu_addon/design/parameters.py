@@ -25,7 +25,7 @@ FORMAT = 1
 
 @attrs.frozen
 class Chambers:
-    """The pneumatic actuator: a bellows of parabolic bladders and necks around the z axis."""
+    """Section [chambers]: the actuator, a bellows of parabolic bladders and necks around z; in mm."""
 
     section: ClassVar[str] = "chambers"
 
@@ -103,7 +103,7 @@ class Chambers:
 
 @attrs.frozen
 class Envelope:
-    """The lattice envelope around the actuator."""
+    """Section [lattice]: kind of cell, numbers of cells around the actuator, and strut diameters in mm."""
 
     section: ClassVar[str] = "lattice"
 
@@ -155,7 +155,7 @@ class Envelope:
 
 @attrs.frozen
 class Waveguide:
-    """The optical waveguide along the anchors; its lengths are the same at every scale."""
+    """Section [waveguide]: the optical waveguide along the anchors; in mm, the same at every scale."""
 
     section: ClassVar[str] = "waveguide"
 
@@ -259,7 +259,7 @@ class Waveguide:
 
 @attrs.frozen
 class Printing:
-    """How the printed part differs from the drawing; its lengths are the same at every scale."""
+    """Section [print]: how the printed part differs from the nominal one; in mm, the same at every scale."""
 
     section: ClassVar[str] = "print"
 
@@ -302,7 +302,7 @@ class Printing:
 
 @attrs.frozen
 class Material:
-    """Elastic constants of the small-strain limit."""
+    """Section [material]: elastic constants at small strain, moduli in kPa."""
 
     section: ClassVar[str] = "material"
 
@@ -404,12 +404,15 @@ class Unit:
 
     @cached_property
     def printed(self) -> Dimensions:
-        """True lengths in mm at this unit's scale as they are printed, see `as_printed`."""
+        """Lengths in mm at the unit's scale as they come out of the printer, see `as_printed`."""
         return as_printed(self.dimensions, self.print.offset_xy_mm, self.print.offset_z_mm)
 
     @cached_property
     def dimensions(self) -> Dimensions:
-        """Nominal lengths in mm at this unit's scale, those of the files to print."""
+        """Nominal lengths in mm at the unit's scale, those of the exported files.
+
+        Raises InputError for a lattice kind that is not registered.
+        """
         c, t, w, s = self.chambers, self.lattice, self.waveguide, self.scale
         half_pitch = s * c.cell_mm / 2.0
         a = c.bladder_share * half_pitch
@@ -450,7 +453,7 @@ class Unit:
         )
 
     def hash(self) -> str:
-        """SHA-256 of the unit's canonical TOML, in hexadecimal."""
+        """SHA-256, in hexadecimal, of the unit's canonical TOML without comments."""
         return hashlib.sha256(to_toml(self, comments=False).encode()).hexdigest()
 
 
@@ -458,7 +461,7 @@ SECTIONS: tuple[type, ...] = (Chambers, Envelope, Waveguide, Printing, Material,
 
 
 class Assumption(NamedTuple):
-    """One value that the source paper does not print."""
+    """A value that the source paper does not give: path `section.name`, value, unit and reason."""
 
     path: str
     value: Any
@@ -467,7 +470,7 @@ class Assumption(NamedTuple):
 
 
 def assumed(unit: Unit) -> list[Assumption]:
-    """Every value of the unit that the source paper does not print: path `section.name`, value, unit, reason.
+    """Every value of the unit that the source paper does not give, in the order of its file.
 
     >>> assumed(Unit())[0].path
     'chambers.neck_diameter_mm'
@@ -483,9 +486,9 @@ def assumed(unit: Unit) -> list[Assumption]:
 
 
 def stated(unit: Unit) -> Iterator[tuple[str, Description, Any]]:
-    """Section, description and value of every parameter that counts, in the order of the unit's file.
+    """Section, description and value of every parameter in use, in the order of the unit's file.
 
-    Those of a wall's law are left out where its law has none of that name.
+    Parameters of the wall that its law does not use are left out.
     """
     for section in SECTIONS:
         values = getattr(unit, _attribute(section))
@@ -509,7 +512,9 @@ def to_toml(unit: Unit, comments: bool = True) -> str:
 
 
 def from_toml(text: str, origin: str = "") -> Unit:
-    """The unit in TOML text; keys left out keep their defaults. Raises InputError with `origin` and line.
+    """The unit in TOML text; keys left out keep their defaults.
+
+    origin: name of the file, for messages. Raises InputError with file and line.
 
     >>> from_toml('format = 1').chambers.count
     6
@@ -552,7 +557,7 @@ def write_unit(unit: Unit, path: str | Path) -> None:
 
 
 def preset_names() -> list[str]:
-    """Names of the shipped presets, sorted.
+    """Sorted names of the shipped presets. Raises InputError where the folder of assets is missing.
 
     >>> preset_names()
     ['mu-0.75x', 'mu-1.0x', 'mu-1.5x']
@@ -561,7 +566,7 @@ def preset_names() -> list[str]:
 
 
 def load_preset(name: str) -> Unit:
-    """The shipped unit of that name. Raises InputError, which lists the names there are.
+    """The shipped unit of this name. Raises InputError, which lists the valid names.
 
     >>> load_preset("mu-0.75x").scale
     0.75

@@ -19,12 +19,13 @@ Array = NDArray[np.float64]
 
 
 def as_printed(d: Dimensions, offset_xy: float, offset_z: float) -> Dimensions:
-    """Dimensions with every surface moved outward by offset_xy in the plane and offset_z along z, in mm.
+    """Dimensions of the part as printed: every surface moved outward by the print offsets in mm.
 
-    Struts and walls grow by twice the offset, or by its mean round the struts and over the profile where the
-    two differ. The outer profile stays one of parabolas, with R + o, r + o and the joint moved along z so
-    that it, too, lies as far outside: equal offsets o then move it by o within 0.1 o everywhere. Caps grow by
-    2 offset_z inward, so that their ends keep their planes; wells keep their depth.
+    offset_xy in the plane, offset_z along z; negative ones move inward. Struts and walls grow by twice the
+    offset, or by its mean round the struts and over the profile where the two differ. The outer profile stays
+    one of parabolas, with R + o, r + o and the joint moved along z so that it, too, lies as far outside:
+    equal offsets o then move it by o within 0.1 o everywhere. Caps grow by 2 offset_z inward, so that their
+    ends keep their planes; wells keep their depth.
     """
     if offset_xy == 0.0 and offset_z == 0.0:
         return d

@@ -21,7 +21,7 @@ OFFSET_TOLERANCE = 5e-4
 
 
 def outer_radius(d: Dimensions, z: ArrayLike) -> Array:
-    """Radius in mm of the actuator's outer profile at heights z in mm (any shape).
+    """Radius in mm (any shape) of the actuator's outer profile at heights z in mm (any shape).
 
     Parabola arcs: R at a bladder's apex, r at a neck, equal slopes where they meet.
 
@@ -33,12 +33,12 @@ def outer_radius(d: Dimensions, z: ArrayLike) -> Array:
 
 
 def outer_slope(d: Dimensions, z: ArrayLike) -> Array:
-    """Slope d(radius)/dz of the outer profile at heights z (mm, any shape)."""
+    """Slope d(radius)/dz of the outer profile (any shape), without unit, at heights z in mm (any shape)."""
     return _outer(d, np.asarray(z, dtype=float))[1]
 
 
 def cavity_radius(d: Dimensions, z: ArrayLike) -> Array:
-    """Radius in mm of the cavity at heights z in mm (any shape), the end caps not yet cut.
+    """Radius in mm (any shape) of the cavity at heights z in mm (any shape), the end caps not yet cut.
 
     The cavity is the outer profile offset inward by the wall along its normal.
 
@@ -50,7 +50,7 @@ def cavity_radius(d: Dimensions, z: ArrayLike) -> Array:
 
 
 def outer_arcs(d: Dimensions) -> list[Array]:
-    """Outer profile as exact quadratic Bezier arcs, (3, 2) poles (radius, z) each, from z = 0 to the top."""
+    """Outer profile as exact quadratic Bezier arcs from z = 0 up: poles (3, 2), radius and z in mm."""
     poles = []
     for low, high in _spans(d, _splits(d)):
         radius, slope, _ = _outer(d, np.array([low, high]))
@@ -60,16 +60,20 @@ def outer_arcs(d: Dimensions) -> list[Array]:
 
 
 def inner_arcs(d: Dimensions) -> list[Array]:
-    """Offset of each outer arc by the wall as a cubic Bezier arc, (4, 2) poles (radius, z).
+    """Inner profile as cubic Bezier arcs, one for each outer arc: poles (4, 2), radius and z in mm.
 
-    Ends and end tangents are those of the exact offset, and the arc passes through the offset of its
-    middle; arcs are halved, inner and outer alike, until they keep within OFFSET_TOLERANCE of the curve.
+    Each approximates the outer arc's offset by the wall: ends and end tangents are those of the exact offset,
+    and it passes through the offset of the middle. Arcs are halved, inner and outer alike, until they keep
+    within OFFSET_TOLERANCE of the exact offset.
     """
     return _offset_arcs(d, _splits(d))
 
 
 def cavity_arcs(d: Dimensions) -> list[Array]:
-    """The inner arcs between the end caps, the first and last cut exactly at the caps; (4, 2) poles each."""
+    """The inner arcs between the end caps: poles (4, 2), radius and z in mm, from the base on.
+
+    The first and the last arc are cut exactly at the caps.
+    """
     low, high = d.base_cap, d.height - d.tip_cap
     near = 1e-6 * d.cell  # a cap that meets an arc's end leaves no sliver of that arc
     kept = [arc for arc in inner_arcs(d) if arc[3, 1] > low + near and arc[0, 1] < high - near]
@@ -80,9 +84,9 @@ def cavity_arcs(d: Dimensions) -> list[Array]:
 
 
 def outer_polygon(d: Dimensions, per_arc: int, offset: Array | None = None) -> Array:
-    """Half section of the actuator without its cavity, counter-clockwise (n, 2) points (radius, z) in mm.
+    """Half section of the actuator without its cavity: counter-clockwise points (n, 2), radius and z, in mm.
 
-    Its surface is moved outward by offset (3,), along x, y and z, where that is given.
+    per_arc: pieces of every quarter chamber; offset (3,): outward move of the surface along x, y and z in mm.
     """
     s = _samples(d, 0.0, d.height, per_arc)
     curve = np.stack([outer_radius(d, s), s], axis=1)
@@ -92,10 +96,10 @@ def outer_polygon(d: Dimensions, per_arc: int, offset: Array | None = None) -> A
 
 
 def cavity_polygon(d: Dimensions, per_arc: int, offset: Array | None = None) -> Array:
-    """Half section of the cavity between the end caps, counter-clockwise (n, 2) points (radius, z) in mm.
+    """Half section of the cavity between the end caps: counter-clockwise points (n, 2), radius and z, in mm.
 
-    The solid's surface is moved by offset (3,), along x, y and z, out of the wall and so into the cavity,
-    where that is given.
+    per_arc: pieces of every quarter chamber; offset (3,): move of the solid's surface along x, y and z in mm,
+    out of the wall and so into the cavity.
     """
     low, high = d.base_cap, d.height - d.tip_cap
     if offset is None:
@@ -138,7 +142,7 @@ def cavity_volume(d: Dimensions) -> float:
 
 
 def outer_volume(d: Dimensions) -> float:
-    """Volume (mm3) inside the outer profile between z = 0 and the height, in closed form."""
+    """Volume in mm3 inside the outer profile between z = 0 and d.height, in closed form."""
     rise = d.joint_radius - d.r
     neck = d.b * (d.r**2 + 2.0 / 3.0 * d.r * rise + rise**2 / 5.0)
     fall = d.joint_radius - d.R
@@ -147,7 +151,7 @@ def outer_volume(d: Dimensions) -> float:
 
 
 def membrane_volume(d: Dimensions) -> float:
-    """Volume (mm3) between outer profile and cavity, both end caps included, without the inlet's bore."""
+    """Volume in mm3 between outer profile and cavity with both end caps, the inlet's bore not subtracted."""
     return outer_volume(d) - cavity_volume(d)
 
 

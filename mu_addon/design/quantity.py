@@ -36,9 +36,10 @@ def in_kPa(value_MPa: Number) -> Number:
 
 
 class Description(NamedTuple):
-    """What one parameter is; bounds are closed, `fixed` marks a length that is the same at every scale.
+    """What one parameter is: type, default, unit, closed bounds in that unit, meaning and source.
 
-    A choice among names has those `choices`, and no bounds.
+    fixed: whether it is a length that is the same at every scale. A choice among names has `choices` and no
+    bounds.
     """
 
     name: str
@@ -54,21 +55,25 @@ class Description(NamedTuple):
 
     @property
     def allowed(self) -> str:
-        """Bounds or choices in words, nothing for a flag."""
+        """The bounds or the choices as text; "" for a flag."""
         if self.type is bool:
             return ""
         return " or ".join(self.choices) if self.choices else f"{self.low:g} to {self.high:g}"
 
     @property
     def assumed(self) -> bool:
-        """True where the source paper prints no value."""
+        """Whether the source paper gives no value."""
         return self.source.startswith("assumed")
 
 
 def quantity(
     default: Any, unit: str, low: float, high: float, text: str, source: str, fixed: bool = False
 ) -> Any:
-    """attrs field of a parameter, its fields as in Description; `unit` is "" for numbers and flags."""
+    """attrs field of a parameter with bounds low and high in `unit`; "" is the unit of counts and flags.
+
+    The arguments are those of `Description`. Setting a value of another type or out of bounds raises
+    InputError.
+    """
     kind = type(default)
     metadata = {
         "type": kind,
@@ -85,7 +90,10 @@ def quantity(
 
 
 def choice(default: str, names: Callable[[], Sequence[str]], text: str, source: str) -> Any:
-    """attrs field of a parameter that is one of `names()`, asked for whenever a value is checked."""
+    """attrs field of a parameter that is one of `names()`, which is called whenever a value is checked.
+
+    Setting another value raises InputError.
+    """
     metadata = {
         "type": str,
         "unit": "",
@@ -100,7 +108,7 @@ def choice(default: str, names: Callable[[], Sequence[str]], text: str, source: 
 
 
 def describe(section: type) -> Iterator[Description]:
-    """Descriptions of the parameters of an attrs class, in their order."""
+    """Descriptions of the parameters of an attrs class, in order; fields without a source are left out."""
     for field in attrs.fields(section):
         if "source" in field.metadata:
             m = field.metadata
@@ -119,7 +127,7 @@ def describe(section: type) -> Iterator[Description]:
 
 
 def where(instance: Any, name: str) -> str:
-    """Name of a parameter as it is written in a file: `[section] name`."""
+    """A parameter's name as it is written in a file: `[section] name`, or `name` at the top level."""
     section = getattr(type(instance), "section", "")
     return f"[{section}] {name}" if section else name
 

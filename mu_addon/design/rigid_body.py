@@ -1,4 +1,4 @@
-"""Rigid bodies that stand beside a unit, fixed in its frame: what they are, and one file for all of them."""
+"""Rigid bodies beside a unit, fixed in its frame, and the OBJ file that holds them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,10 @@ def _coefficient(_: object, field: attrs.Attribute[float], value: float) -> None
 
 @attrs.frozen(eq=False)
 class RigidBody:
-    """A closed surface in mm, in the unit's frame, and Coulomb's coefficient of friction between both."""
+    """A closed surface in mm, fixed in the unit's frame, and its Coulomb friction coefficient with the unit.
+
+    Raises InputError for a coefficient outside 0 .. 5.
+    """
 
     body: Body
     friction: float = attrs.field(default=FRICTION, validator=_coefficient)
@@ -38,9 +41,9 @@ class RigidBody:
 
 
 def require_beside(bodies: Sequence[RigidBody], d: Dimensions, own: Body | None = None) -> None:
-    """Raise InputError for a surface that bounds no body, or that stands in a unit at rest: where, how deep.
+    """Raise InputError for a body that has `flaws` or overlaps the unit at rest; the message says where.
 
-    own: a body that takes the place of the lattice's box.
+    own: the body that replaces the lattice's box as envelope.
     """
     for rigid in bodies:
         found = flaws(rigid.body)
@@ -48,7 +51,10 @@ def require_beside(bodies: Sequence[RigidBody], d: Dimensions, own: Body | None 
 
 
 def mirrored(bodies: Sequence[RigidBody]) -> bool:
-    """Whether every one of some sound bodies is its own mirror image across x = 0."""
+    """Whether every body is its own mirror image across x = 0 and extends to both sides of that plane.
+
+    The bodies must have no `flaws`. Raises InputError as `half` does.
+    """
     return all(low < 0.0 < high and half(r.body) is not None for r in bodies for low, high in [_across(r)])
 
 
@@ -58,7 +64,7 @@ def _across(rigid: RigidBody) -> tuple[float, float]:
 
 
 def to_obj(bodies: Sequence[RigidBody]) -> str:
-    """All surfaces as one Wavefront OBJ in mm, an object each, with every digit."""
+    """All bodies as the text of a Wavefront OBJ file in mm, one object each, with every digit."""
     lines, first = ["# rigid bodies beside the unit, millimetres"], 1
     for number, rigid in enumerate(bodies, 1):
         v, t = rigid.body.vertices, rigid.body.triangles
@@ -70,7 +76,10 @@ def to_obj(bodies: Sequence[RigidBody]) -> str:
 
 
 def read_rigid_bodies(path: Path, friction: Any) -> tuple[RigidBody, ...]:
-    """The bodies of a file by `to_obj`, with the coefficient of each; raises InputError."""
+    """The bodies of a file written by `to_obj`; friction: list of their coefficients, in the file's order.
+
+    Raises InputError for a file that cannot be read or coefficients that do not fit it.
+    """
     remedy = "restore the file that the study wrote"
     found: list[tuple[str, list[list[float]], list[list[int]]]] = []
     before = 0

@@ -1,4 +1,4 @@
-"""The co-design rules of a Monolithic Unit: each refuses what breaks it, by name and with what would fit."""
+"""The co-design rules of a Monolithic Unit; a broken one is reported by name with a value that fits."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ from .printed import as_printed
 
 
 def check(d: Dimensions, allow_symmetric: bool = False) -> None:
-    """Raise InputError for the first rule broken; lengths that scale are given in mm at scale 1."""
+    """Raise InputError for the first co-design rule that the dimensions break.
+
+    The message names the rule and a value that fits; lengths that scale are given in mm at scale 1.
+    allow_symmetric: accept as many cells on -y as on +y.
+    """
     _node_apex_alignment(d)
     _profile(d)
     _sagittal_symmetry(d)
@@ -23,7 +27,10 @@ def check(d: Dimensions, allow_symmetric: bool = False) -> None:
 
 
 def check_printed(d: Dimensions, offset_xy: float, offset_z: float) -> None:
-    """Raise InputError where the printer's offsets (mm) erase, fill or close a part of a unit that fits."""
+    """Raise InputError where the printer's offsets in mm erase, fill or close a part of a unit that fits.
+
+    The message names the largest share of both offsets that is possible.
+    """
     broken = _printed_breach(d, offset_xy, offset_z)
     if broken is None:
         return

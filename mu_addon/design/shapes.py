@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 def inscribed(n: int) -> float:
-    """Factor on the radius that gives an n-sided polygon its circle's area: sqrt((2 pi/n)/sin(2 pi/n)).
+    """Factor on the radius that gives an n-sided polygon the area of its circle: sqrt((2 pi/n)/sin(2 pi/n)).
 
     >>> round(inscribed(16), 4)
     1.013
@@ -20,7 +20,7 @@ def inscribed(n: int) -> float:
 
 
 def box(low: ArrayLike, high: ArrayLike) -> Any:
-    """Axis-aligned box between two corners (3,) in mm."""
+    """Axis-aligned box from corner `low` (3,) to `high` (3,) in mm, as a Manifold."""
     from manifold3d import Manifold
 
     low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
@@ -28,7 +28,10 @@ def box(low: ArrayLike, high: ArrayLike) -> Any:
 
 
 def cylinder(radius: float, low: float, high: float, n: int) -> Any:
-    """Cylinder of n sides around the z axis between two heights, mm."""
+    """Prism of n sides around the z axis between two heights in mm, as a Manifold.
+
+    Its section has the area of a circle of `radius` mm.
+    """
     from manifold3d import Manifold
 
     return Manifold.cylinder(high - low, radius * inscribed(n), circular_segments=n).translate(
@@ -37,14 +40,17 @@ def cylinder(radius: float, low: float, high: float, n: int) -> Any:
 
 
 def revolved(polygon: Array, n: int) -> Any:
-    """Body of n sides around z from a counter-clockwise half section (m, 2) of (radius, z) in mm."""
+    """Body of n sides from a counter-clockwise half section (m, 2), radius and z in mm, turned around z.
+
+    A Manifold; its sections have the area of the circles that they stand for.
+    """
     from manifold3d import CrossSection
 
     return CrossSection([polygon * [inscribed(n), 1.0]]).revolve(n)
 
 
 def offset_along(normals: Array, offset: ArrayLike) -> Array:
-    """How far (n, 3) the surface moves where its unit normals are (n, 3), for offsets (3,) along x, y, z.
+    """Moves (n, 3) of a surface with unit normals (n, 3) for offsets (3,) along x, y and z, in their unit.
 
     D^2 n / |D n| with D = diag(offset): the point of the ellipsoid of those half-axes whose normal is n, so
     that the body grows by that ellipsoid (its Minkowski sum); o n for equal offsets o. A negative offset
@@ -59,7 +65,10 @@ def offset_along(normals: Array, offset: ArrayLike) -> Array:
 
 
 def ball(radius: float, n: int, offset: ArrayLike | None = None) -> Any:
-    """Ball with about n facets around, mm; its surface moved outward by offsets (3,) along x, y and z."""
+    """Faceted ball around the origin with the volume of a sphere of `radius` mm, about n facets around.
+
+    offset (3,): outward move of its surface along x, y and z in mm. The result is a Manifold.
+    """
     from manifold3d import Manifold
 
     unit = Manifold.sphere(1.0, n)
@@ -86,9 +95,10 @@ def ring(axis: Array, n: int) -> Array:
 
 
 def spindle(axis: Array, radii: Array, n: int, offset: ArrayLike | None = None) -> Any:
-    """Body of n sides along `axis` (3,) from the origin, with evenly spaced radii (m,) in mm.
+    """Manifold of n sides along `axis` (3,) in mm from the origin, with evenly spaced radii (m,) in mm.
 
-    Its sides are moved outward, square to the axis, by offsets (3,) along x, y and z where these are given.
+    offset (3,): outward move of its sides along x, y and z in mm, of which the part square to the axis is
+    taken.
     """
     from manifold3d import Manifold, Mesh64
 

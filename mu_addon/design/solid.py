@@ -27,7 +27,7 @@ QUANTA = (1e-4, 2e-5, 5e-4)
 
 @attrs.frozen
 class Facets:
-    """Number of flat pieces around the axis, along a quarter chamber, around a strut and along it."""
+    """Numbers of flat pieces: around the z axis, along a quarter chamber, around a strut and along it."""
 
     around_axis: int
     along_arc: int
@@ -42,9 +42,8 @@ QUALITY = {"interactive": Facets(64, 6, 12, 4), "export": Facets(192, 16, 32, 10
 class Solid:
     """A printable surface: vertices (n, 3) in mm, triangles (m, 3) facing outward, and the gates it passed.
 
-    window: of its waveguide, None without one and along another path; bar: its waveguide. taken_off: by how
-    much in mm, in the plane and along z, every surface was drawn inward to make up for the printer's
-    offset.
+    window: that of its waveguide, None without one and for a path of nodes; bar: its waveguide. taken_off: by
+    how much in mm, in the plane and along z, every surface was drawn inward to compensate the print offset.
     """
 
     vertices: Vertices
@@ -153,9 +152,10 @@ def with_waveguide(
     bare: Any,
     offset: NDArray[np.float64] | None = None,
 ) -> Any:
-    """The lattice with its waveguide, uncut, as a Manifold.
+    """The lattice united with its waveguide, before wells and pockets are cut, as a Manifold in mm.
 
-    Struts that the bar follows are left out; those that meet it are raised to its thickness.
+    Struts that the bar replaces are left out of `bare`, the lattice's solid; those that meet it are thickened
+    (`strut_radii`). offset (3,): outward move of all surfaces along x, y and z in mm.
     """
     from manifold3d import Manifold, OpType
 
@@ -191,9 +191,9 @@ def lattice_solid(
     offset: NDArray[np.float64] | None = None,
     without: NDArray[np.bool_] | None = None,
 ) -> Any:
-    """Bare lattice as a Manifold: a ball at each node, a strut along each edge, cut to its box.
+    """Bare lattice as a Manifold in mm: a ball at each node, a strut along each edge, cut to the envelope.
 
-    offset (3,): outward move of its surfaces; without (E,): struts that are left out.
+    offset (3,): outward move of its surfaces along x, y and z in mm; without (E,): marks struts to leave out.
     """
     from manifold3d import Manifold, OpType
 
@@ -250,7 +250,11 @@ def _ends(ends: NDArray[np.int64]) -> frozenset[tuple[int, ...]]:
 
 
 def printable(solid: Any) -> tuple[Vertices, Triangles]:
-    """Surface of a Manifold, simplified, rounded and welded so that it stays closed in single precision."""
+    """Surface of a Manifold as vertices (n, 3) in mm and triangles (m, 3), closed also in single precision.
+
+    Vertices are simplified, rounded and welded to the first step of QUANTA that leaves no bad edge, or else
+    to the last.
+    """
     for quantum in QUANTA:
         # Slivers between nearly coincident facets would weld into edges of four triangles: collapse them.
         mesh = solid.simplify(quantum).to_mesh64()

@@ -1,4 +1,4 @@
-"""The design as small steps, each made from those before it, and made again only where what it takes changed.
+"""The design as a chain of steps, of which each is evaluated again only where its inputs have changed.
 
     profile -> chambers -> membranes
        \\-> cells -> trim -> struts
@@ -45,9 +45,10 @@ KEPT = 12
 
 @attrs.frozen
 class StepInputs:
-    """What the steps are made from: a unit, the name of a path or nothing, and the muted steps.
+    """What the steps are made from: a unit, the name of a path or "", and the names of muted steps.
 
-    body: a sound body in place of the lattice's box, see `body.envelope`, or None.
+    quality: as in `build_solid`; body: a body in place of the lattice's box, cut by `body.envelope`, or None.
+    Raises InputError for a muted step that does not exist or cannot be muted.
     """
 
     unit: Unit
@@ -68,9 +69,9 @@ class StepInputs:
 
 @attrs.frozen(eq=False)
 class Section:
-    """Half sections in mm, (radius, z) each: the outer profile, the inlet, and the cavity or None.
+    """Half sections, radius and z in mm: outer profile (n, 2), inlet (4, 2), and cavity (m, 2) or None.
 
-    The inlet runs from the inner end of its bore out around the boss.
+    The inlet goes from the inner end of its bore out around the boss.
     """
 
     outer: Array
@@ -80,7 +81,7 @@ class Section:
 
 @attrs.frozen(eq=False)
 class TrimmedStruts:
-    """Struts that show: their ends (e, 2, 3) in mm, and the fractions (e,) first .. last left of each."""
+    """Visible struts: ends (e, 2, 3) in mm of each whole strut, and fractions (e,) of its visible part."""
 
     graph: Graph
     ends: Array
@@ -90,7 +91,7 @@ class TrimmedStruts:
 
 @attrs.frozen(eq=False)
 class Struts:
-    """Trimmed struts and the lattice that knows their radii; without a lattice they are bare lines."""
+    """Trimmed struts and the lattice that gives their radii, None for struts drawn as bare lines."""
 
     trimmed: TrimmedStruts
     lattice: Lattice | None
@@ -126,9 +127,9 @@ class Step:
 
 @attrs.define
 class Stack:
-    """Values of the steps by content, and how often each was made.
+    """Cached values of the steps, at most KEPT for each, under a hash of all that they depend on.
 
-    counts: evaluations by step's name; one that is found again is not counted.
+    counts: how often each step was evaluated; a value found in the cache is not counted.
     """
 
     counts: Counter[str] = attrs.field(factory=Counter)
@@ -137,13 +138,19 @@ class Stack:
     )
 
     def value(self, name: str, given: StepInputs) -> Any:
-        """What a step gives, made where it is not there yet; raises InputError and what the step raises."""
+        """The value of a step, evaluated with the steps before it where it is not cached.
+
+        Raises InputError for an unknown step, and what the steps raise.
+        """
         if name not in STEPS:
             raise _unknown(name)
         return self._value(name, given, keys(given))
 
     def again(self, name: str, given: StepInputs) -> Any:
-        """What a step gives, made anew even if it is there; those before it only where they are not."""
+        """The value of a step, evaluated anew even if it is cached; earlier steps only where they are not.
+
+        Raises InputError for an unknown step, and what the steps raise.
+        """
         if name not in STEPS:
             raise _unknown(name)
         key = keys(given)
@@ -166,7 +173,7 @@ class Stack:
 
 
 def keys(given: StepInputs) -> dict[str, str]:
-    """Hash, by step, of everything that its value is made from."""
+    """For each step the SHA-256, in hexadecimal, of everything that its value depends on."""
     found: dict[str, str] = {}
     for step in STEPS.values():
         content = [
@@ -182,13 +189,13 @@ def keys(given: StepInputs) -> dict[str, str]:
 
 
 def parameter(unit: Unit, path: str) -> Any:
-    """Value of the parameter `section.name` of a unit."""
+    """Value of a unit's parameter, given as `section.name`."""
     section, name = path.split(".")
     return getattr(getattr(unit, section), name)
 
 
 def downstream(name: str) -> tuple[str, ...]:
-    """The steps that are made from this one, directly or not, in their order."""
+    """Names of the steps that depend on this one, directly or not, in their order."""
     found = {name}
     for step in STEPS.values():
         if found.intersection(step.after):
@@ -197,7 +204,10 @@ def downstream(name: str) -> tuple[str, ...]:
 
 
 def require_whole(given: StepInputs) -> None:
-    """Raise InputError where a muted step leaves out what the print needs; a path may be left out."""
+    """Raise InputError where a muted step leaves out a part that the printable solid needs.
+
+    The path may be muted, and without a path also anchors and wells.
+    """
     needed = set(STEPS) - {"path", "solid"}
     if not given.path or "path" in given.muted:
         needed -= {"anchors", "wells"}
@@ -306,7 +316,7 @@ def _solid(given: StepInputs, *_: Any) -> Solid:
 
 
 def along(ends: Array, t: Array) -> Array:
-    """Points (e, n, 3) at fractions t, (n,) or (e, n), of the way between ends (e, 2, 3)."""
+    """Points (e, n, 3) on the lines between ends (e, 2, 3), at fractions t of shape (n,) or (e, n); in mm."""
     return np.asarray(ends[:, :1] + t[..., None] * (ends[:, 1:] - ends[:, :1]))
 
 

@@ -36,9 +36,9 @@ _CORE = 0.95
 
 @attrs.frozen
 class Facets:
-    """Number of flat pieces around a strut, a multiple of 4 from 8 to 128, and along it; raises InputError.
+    """Numbers of flat pieces around a strut, a multiple of 4 from 8 to 128, and along it, 1 to 128.
 
-    Only with a multiple of 4 are mirrored struts mirror images to their last facet.
+    Only with a multiple of 4 are mirrored struts mirror images to their last facet. Raises InputError.
     """
 
     around: int = 24
@@ -55,11 +55,11 @@ class Facets:
 
 @attrs.frozen
 class StrutCell:
-    """A lattice's cell as it is printed: struts of nominal radii in mm, at scale, and what the printer adds.
+    """A lattice's cell as it is printed, at scale: edge, nominal strut radii and print offsets in mm.
 
-    offset_xy_mm, offset_z_mm: outward move of every surface in the plane and along the build axis z;
-    skin_depth_mm, skin_factor: depth of the more cured skin, and its modulus over the core's. Raises
-    InputError for struts that miss each other, that are nothing, or that leave no open space.
+    offset_xy_mm, offset_z_mm: print offset in the plane and along the build axis z; skin_depth_mm,
+    skin_factor: depth of the more cured skin, and its modulus over the core's. Raises InputError for a kind
+    without three mirror planes, struts that are not connected or have no material, and cells that close.
     """
 
     kind: LatticeKind
@@ -113,21 +113,21 @@ class StrutCell:
 
     @property
     def offset(self) -> Array:
-        """Outward move (3,) of a surface facing x, y and z, in mm."""
+        """Print offset (3,) of surfaces that face x, y and z, in mm."""
         return np.array([self.offset_xy_mm, self.offset_xy_mm, self.offset_z_mm])
 
     @property
     def half_mm(self) -> float:
-        """Side of the octant."""
+        """Edge of the octant, half a cell, in mm."""
         return self.size_mm / 2.0
 
     def radius(self, t: ArrayLike) -> Array:
-        """Nominal radius (mm) at fractions t of a strut's length."""
+        """Nominal strut radii in mm (any shape) at fractions t, 0 .. 1, (any shape) of the strut's length."""
         return self.kind.radius(np.asarray(t, float), self.junction_radius_mm, self.midspan_radius_mm)
 
 
 def strut_cell(unit: Unit) -> StrutCell:
-    """The cell of a unit's lattice, at the unit's scale, as it is printed."""
+    """The printed cell of a unit's lattice, at the unit's scale. Raises InputError as `StrutCell` does."""
     d, p = unit.dimensions, unit.print
     return StrutCell(
         kind=d.kind,
@@ -142,31 +142,38 @@ def strut_cell(unit: Unit) -> StrutCell:
 
 
 def octant_surface(cell: StrutCell, facets: Facets | None = None) -> tuple[Vertices, Triangles]:
-    """The printed lattice within [0, size/2]^3, a node or face of the cell at the origin's corner.
+    """The printed lattice within [0, size/2]^3 mm: vertices (n, 3) in mm, triangles (m, 3) facing outward.
 
-    Closed and outward; its flat sides lie exactly on the six planes. Its images in them are the whole
-    lattice. Cells that differ in size only have the same surface, enlarged.
+    The octant's corner at the origin is one of the cell's. Flat sides lie exactly on the six planes, and
+    reflections in these planes give the whole lattice. Cells that differ only in size have the same surface,
+    scaled. Raises GateError where the surface cannot be closed.
     """
     vertices, triangles = _octant(_shape(cell), facets or Facets())
     return vertices * (cell.half_mm / _GRID), triangles.copy()
 
 
 def relative_density(cell: StrutCell, facets: Facets | None = None) -> float:
-    """Share of the cell's volume that is solid, of its faceted surface."""
+    """Relative density of the printed cell: the solid's share of the cell's volume, 0 .. 1, of its facets.
+
+    Raises GateError as `octant_surface` does.
+    """
     vertices, triangles = _octant(_shape(cell), facets or Facets())
     return volume(vertices / _GRID, triangles)
 
 
 def mass_g(cell: StrutCell, density_g_per_ml: float, n: int = 1, facets: Facets | None = None) -> float:
-    """Mass (g) of n x n x n printed cells of a resin of that density."""
+    """Mass in g of n x n x n printed cells of a resin of this density in g/ml.
+
+    Raises GateError as `octant_surface` does.
+    """
     return relative_density(cell, facets) * (n * cell.size_mm / 10.0) ** 3 * density_g_per_ml
 
 
 def specimen_solid(cell: StrutCell, n: int, facets: Facets | None = None) -> tuple[Vertices, Triangles]:
-    """Watertight block of n x n x n cells in [0, n size]^3 mm; GateError where one is not in order.
+    """Closed surface of n x n x n cells in [0, n size]^3 mm: vertices (v, 3) in mm and triangles (t, 3).
 
-    Its genus must be E - V + 1 of the lattice's graph; struts so thick that they close the openings
-    between them, or that touch where they share no node, are refused by it.
+    Raises InputError for n below 1, GateError for a surface that is open, in pieces, or of another genus than
+    E - V + 1 of the lattice's graph: struts then close the openings or touch where they share no node.
     """
     if n < 1:
         raise InputError(f"{n} cells a side are none", "specimen", "give 1 or more")
@@ -193,9 +200,9 @@ def specimen_solid(cell: StrutCell, n: int, facets: Facets | None = None) -> tup
 
 
 def depth_below_surface(cell: StrutCell, points: ArrayLike) -> Array:
-    """Depth (n,) in mm of points (n, 3) below the printed surface, 0 outside it.
+    """Depths (n,) in mm of points (n, 3) in mm below the printed surface of the periodic lattice; 0 outside.
 
-    The deepest of the depths within each strut alone: the distance to its surface, square to its axis, with
+    The largest of the depths within each strut alone: the distance to its surface, square to its axis, with
     the radius of that place. So it is exact in straight struts and a lower bound at junctions, where struts
     merge; the taper's slope (below 0.1) and the facets are left out.
     """

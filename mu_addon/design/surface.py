@@ -19,10 +19,11 @@ _HEADER = b"binary STL, millimetres"  # must not begin with "solid", which reade
 
 
 def weld(vertices: Vertices, triangles: Triangles, quantum: float) -> tuple[Vertices, Triangles]:
-    """Surface in canonical order, with vertices (n, 3) rounded to `quantum` mm and merged, without folds.
+    """Vertices (k, 3) in mm and triangles (l, 3) of a surface, near vertices merged, in canonical order.
 
-    Vertices closer than single precision resolves would merge in an STL file and open it; rounding first
-    decides that here, where what collapses can still be removed in pairs.
+    vertices (n, 3) in mm are rounded to `quantum` mm; triangles (m, 3) that collapse or then lie on one
+    another with opposite orientation are removed. Vertices closer than single precision resolves would merge
+    in an STL file and open it; rounding first avoids that.
     """
     grid, index = _unique_rows(np.rint(vertices / quantum).astype(np.int64))
     faces = index[triangles]
@@ -57,13 +58,13 @@ def volume(vertices: Vertices, triangles: Triangles) -> float:
 
 
 def area(vertices: Vertices, triangles: Triangles) -> float:
-    """Area (mm2) of a surface."""
+    """Area in mm2 of a surface of triangles (m, 3) between vertices (n, 3) in mm."""
     p, q, r = vertices[triangles.T]
     return float(np.linalg.norm(np.cross(q - p, r - p), axis=1).sum() / 2.0)
 
 
 def genus(vertices: Vertices, triangles: Triangles) -> int:
-    """Genus 1 - (V - E + F)/2 of one closed connected surface of triangles (m, 3).
+    """Genus 1 - (V - E + F)/2 of a closed connected surface of triangles (m, 3) between vertices (n, 3).
 
     >>> genus(np.eye(4)[:, :3], np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]]))
     0
@@ -72,7 +73,10 @@ def genus(vertices: Vertices, triangles: Triangles) -> int:
 
 
 def stl_bytes(vertices: Vertices, triangles: Triangles) -> bytes:
-    """Binary STL with a fixed header, so that equal surfaces are equal files."""
+    """Content of a binary STL file of triangles (m, 3) between vertices (n, 3) in mm.
+
+    The header is fixed, so that equal surfaces give equal files.
+    """
     records = np.zeros(len(triangles), _STL)
     records["corners"] = vertices[triangles]
     normal = np.cross(
@@ -85,7 +89,10 @@ def stl_bytes(vertices: Vertices, triangles: Triangles) -> bytes:
 
 
 def stl_surface(content: bytes) -> tuple[Vertices, Triangles]:
-    """Surface in a binary STL, equal corners merged; InputError if the length does not fit the count."""
+    """Vertices (n, 3) in mm, equal ones merged, and triangles (m, 3) in the content of a binary STL file.
+
+    Raises InputError where the length does not fit the number of triangles.
+    """
     count = int.from_bytes(content[80:84], "little")
     if len(content) != 84 + count * _STL.itemsize:
         raise InputError("the binary STL is truncated or malformed", "STL", "write the file again")

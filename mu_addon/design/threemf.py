@@ -44,7 +44,7 @@ _LONG_AGO = (1980, 1, 1, 0, 0, 0)
 
 @attrs.frozen(eq=False)
 class Beams:
-    """Beams as frusta with round ends: nodes (n, 3) in mm, pairs (b, 2), radii (b, 2) at both ends."""
+    """Beams as frusta with round ends: nodes (n, 3) in mm, pairs (b, 2) of nodes, end radii (b, 2) in mm."""
 
     nodes: Array
     pairs: NDArray[np.int64]
@@ -57,14 +57,17 @@ class Beams:
 
     @property
     def volume(self) -> float:
-        """Sum of the frusta's volumes in mm3, overlaps counted as often as they are there."""
+        """Sum of the frusta's volumes in mm3; overlaps count more than once."""
         r, q = self.radii.T
         return float(np.pi / 3.0 * np.sum(self.lengths * (r * r + r * q + q * q)))
 
 
 @attrs.frozen(eq=False)
 class Part:
-    """One object of a model: a mesh, beams, or both; clipped_to: the object that its beams are cut to."""
+    """One object of a model: triangles (m, 3) between vertices (n, 3) in mm, beams, or both.
+
+    clipped_to: number of the object that its beams are cut to.
+    """
 
     name: str
     vertices: Vertices = attrs.field(factory=lambda: np.zeros((0, 3)))
@@ -74,7 +77,11 @@ class Part:
 
 
 def write_3mf(parts: Sequence[Part], printed: Sequence[int], title: str) -> bytes:
-    """A 3MF package (bytes of a zip file) of objects numbered from 1; those `printed` are one build item."""
+    """Content of a 3MF file (a zip) of these objects, numbered from 1, lengths in mm.
+
+    printed: numbers of the objects to print, which become one build item. Source: 3MF Core Specification 1.3
+    and Beam Lattice Extension 1.2.
+    """
     extension = f' xmlns:b="{BEAMS}" requiredextensions="b"' if any(p.beams for p in parts) else ""
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
@@ -133,11 +140,12 @@ def _mesh(part: Part) -> Iterable[str]:
 
 
 def read_3mf(content: bytes) -> tuple[dict[int, Part], list[int]]:
-    """Objects by their numbers, and which are printed; InputError names the rule that a package breaks.
+    """Objects of a 3MF file by their numbers, and the numbers of those to print; lengths in mm.
 
-    Asked for are the rules that a reader may refuse a package by: the parts and their types, one model in
-    millimetres, required extensions, resources before they are used, indices within range, triangles of
-    three vertices. What this module does not write, textures or transforms say, is not read.
+    Checked are the rules for which a reader may refuse a file: the parts and their types, one model in
+    millimetres, required extensions, resources before they are used, indices within range, triangles of three
+    vertices. Textures and transforms, which this module does not write, are not read. Raises InputError,
+    which names the rule that is broken.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as package:

@@ -1,4 +1,4 @@
-"""TOML with line numbers in every complaint, and tables of described values with their comments."""
+"""TOML whose errors give line numbers, and tables of described values with comments."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ from .quantity import Description
 
 
 def parse(text: str, keys: Mapping[str, Sequence[str]], origin: str) -> dict[str, Any]:
-    """Document whose tables and keys are all among `keys` (table "" is the top level); else InputError."""
+    """The document of a TOML text, whose tables and keys must be among `keys`; table "" is the top level.
+
+    origin: name of the file, for messages. Raises InputError with file, line and the nearest known key.
+    """
     document = parse_toml(text, origin)
     for key, value in document.items():
         if isinstance(value, dict) and key in keys:
@@ -36,7 +39,10 @@ def parse(text: str, keys: Mapping[str, Sequence[str]], origin: str) -> dict[str
 def compose(
     head: Mapping[str, Any], tables: Mapping[str, Sequence[tuple[Description, Any]]], comments: bool
 ) -> str:
-    """TOML text of the top-level values and of one table a name, with the descriptions as comments."""
+    """TOML text of top-level values and of tables of described values, by name of the table.
+
+    comments: whether meaning, unit and source are written above each value.
+    """
     return toml_text(
         {
             **head,
@@ -57,7 +63,7 @@ def _notes(d: Description, value: Any) -> tuple[str, ...]:
 
 @contextmanager
 def located(text: str, origin: str) -> Iterator[None]:
-    """Add file and line to the `where` of an InputError that names a key as `[section] key`."""
+    """Context that adds file and line to an InputError which names a key as `[section] key`."""
     try:
         yield
     except InputError as error:
@@ -66,7 +72,7 @@ def located(text: str, origin: str) -> Iterator[None]:
 
 
 def line_of(text: str, where: str) -> int | None:
-    """Line of `[section] key`, `[section]` or `key` in the text, None where it is not written out."""
+    """Number, from 1, of the line with `[section] key`, `[section]` or `key`; None if there is none."""
     match = re.fullmatch(r"(?:\[(\w+)\])?\s*(.*)", where)
     wanted, key = (match[1] or "", match[2]) if match else ("", where)
     section = ""
@@ -82,13 +88,13 @@ def line_of(text: str, where: str) -> int | None:
 
 
 def place(origin: str, line: int | None) -> str:
-    """`file, line n`, as far as both are known."""
+    """`file, line n` as far as both are known, else "TOML text"."""
     parts = [part for part in (origin, f"line {line}" if line else "") if part]
     return ", ".join(parts) or "TOML text"
 
 
 def nearest(name: str, names: Sequence[str]) -> str:
-    """`; did you mean x?` or nothing."""
+    """`; did you mean x?` for the most similar of the names, "" where none is similar."""
     close = difflib.get_close_matches(name, names, n=1)
     return f"; did you mean {close[0]!r}?" if close else ""
 

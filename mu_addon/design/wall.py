@@ -51,10 +51,11 @@ def _time(number: int, default: float) -> float:
 
 @attrs.frozen
 class Wall:
-    """Law of the membrane's wall. [material] gives its small-strain moduli: after long, of a virgin wall.
+    """Section [wall]: the membrane's law beyond the small-strain moduli of [material].
 
-    c2_over_c1 and c3_over_c1 shape Yeoh's law, on which the other two build. `names` are the parameters that
-    count. The lattice keeps its own law.
+    Those moduli are the long-term ones of a wall that has not been loaded. c2_over_c1 and c3_over_c1 shape
+    Yeoh's law, on which prony and ogden-roxburgh build; `names` are the parameters in use. The lattice keeps
+    its own law. Raises InputError for Prony shares that add up to more than LARGEST_SHARE.
     """
 
     section: ClassVar[str] = "wall"
@@ -147,7 +148,7 @@ class Wall:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The parameters that count with this law; none for the default wall."""
+        """Names of the parameters that this law uses; empty for the default wall."""
         sliding = ("friction_share", "friction_yield_kPa") if self.friction_share else ()
         layers = ("layers_excess",) if self.layers_excess else ()
         if self.law == LAWS[0] and not (sliding or layers):
@@ -156,21 +157,21 @@ class Wall:
 
     @property
     def prony_shares(self) -> tuple[float, ...]:
-        """g_i of the branches."""
+        """Shares g_i of the shear modulus that relax, one for each of the three branches; without unit."""
         return tuple(getattr(self, f"prony_g{i}") for i in BRANCHES)
 
     @property
     def prony_times_s(self) -> tuple[float, ...]:
-        """tau_i of the branches."""
+        """Relaxation times tau_i in s, one for each of the three branches."""
         return tuple(getattr(self, f"prony_tau{i}_s") for i in BRANCHES)
 
     @property
     def has_memory(self) -> bool:
-        """Whether the wall's stress depends on how it got where it is, so that motion is solved in time."""
+        """Whether the stress depends on the history of deformation, so that motions are solved in time."""
         return self.law in ("prony", "ogden-roxburgh") or self.friction_share > 0
 
     def require_without_memory(self, what: str) -> None:
-        """Raise InputError where the wall remembers; what: the job that knows no such wall."""
+        """Raise InputError where the stress depends on history; what: the job that does not support it."""
         if self.has_memory:
             raise InputError(
                 f"{what} knows no wall that remembers",
@@ -180,13 +181,16 @@ class Wall:
 
 
 def offered(law: str, friction_share: float) -> tuple[str, ...]:
-    """The parameters to show beside a law, in the order of the class."""
+    """Names of the parameters to show beside a law, in the order of `Wall`.
+
+    friction_share: its value, 0 .. 10, without unit; 0 leaves out the yield stress.
+    """
     sliding = ("friction_share", "friction_yield_kPa") if friction_share else ("friction_share",)
     return ("law", *_OF_LAW[law], "layers_excess", *sliding)
 
 
 def require_used(wall: Wall, given: Iterable[str]) -> None:
-    """Raise InputError where a file gives a parameter that the wall's law has not."""
+    """Raise InputError for a parameter among `given` that the wall's law does not use."""
     for name in given:
         if name not in offered(wall.law, 1.0):
             having = [law for law, names in _OF_LAW.items() if name in names]

@@ -44,7 +44,7 @@ _AXES = np.array([[0, 0, 1], [0, 0, -1], [0, 1, 0], [0, -1, 0], [1, 0, 0], [-1, 
 
 @attrs.frozen(eq=False)
 class Seat:
-    """The end of a waveguide: its body, widening from a foot, the part's pocket and a notch for its wires."""
+    """The holder at one end of a waveguide: foot, wider body, pocket for the part and notch for its wires."""
 
     foot: Block
     body: Block
@@ -52,7 +52,10 @@ class Seat:
     notch: Block
 
     def solid(self, offset: Array | None = None) -> Any:
-        """Foot and body and what is between them, uncut, as a Manifold, as `Bar.solid`."""
+        """Convex hull of foot and body, before pocket and notch are cut, as a Manifold in mm.
+
+        offset (3,): outward move of its faces along x, y and z in mm.
+        """
         from manifold3d import Manifold
 
         blocks = [_moved(block, offset).corners for block in (self.foot, self.body)]
@@ -82,20 +85,20 @@ class Bar:
 
     @property
     def legs(self) -> Array:
-        """Corners (n - 1, 8, 3) of each leg, in the order of `Block.corners`."""
+        """Corners (n - 1, 8, 3) in mm of each straight leg, in the order of `Block.corners`."""
         rings = self.rings()
         order = [0, 3, 1, 2]  # from around the section to the order of a box
         return np.concatenate([rings[:-1, order], rings[1:, order]], axis=1)
 
     @property
     def cuts(self) -> list[Block]:
-        """Every box that is cut out: wells, pockets, notches."""
+        """All boxes that are cut out of the bar: wells, then pockets and notches of the seats."""
         return [*self.wells, *(cut for seat in self.seats for cut in (seat.pocket, seat.notch))]
 
     def rings(self, offset: Array | None = None) -> Array:
-        """Corners (n, 4, 3) of the section at every point, around it, cut by the plane that halves a bend.
+        """Corners (n, 4, 3) in mm of the section at every point, around it, in the plane that halves a bend.
 
-        offset (3,): outward move of faces along x, y and z; where that makes two legs of unequal section,
+        offset (3,): outward move of faces along x, y and z in mm; where two legs then have unequal sections,
         they meet in the mean of their corners.
         """
         way = _directions(self.points)
@@ -121,7 +124,10 @@ class Bar:
         return rings
 
     def solid(self, offset: Array | None = None) -> Any:
-        """The bar with its seats, uncut, as a Manifold; its faces moved outward by `offset` (3,)."""
+        """The bar with its seats, before anything is cut out, as a Manifold in mm.
+
+        offset (3,): outward move of its faces along x, y and z in mm.
+        """
         from manifold3d import Manifold, Mesh64, OpType
 
         rings = self.rings(offset)
@@ -137,15 +143,16 @@ class Bar:
         return Manifold.batch_boolean([bar, *(seat.solid(offset) for seat in self.seats)], OpType.Add)
 
     def cut_solids(self, offset: Array | None = None) -> list[Any]:
-        """What is cut out, as Manifolds; an `offset` (3,) of the solid's faces makes it smaller."""
+        """The boxes of `cuts` as Manifolds in mm, made smaller by an offset (3,) in mm of solid faces."""
         return [_moved(cut, None if offset is None else -offset).solid() for cut in self.cuts]
 
 
 def waveguide(unit: Unit, path: Window | ArrayLike, within: Dimensions | None = None) -> Bar:
-    """The waveguide along a window of anchors, or along lattice nodes (n, 3) in mm; raises InputError.
+    """The waveguide along a window of anchors, or along a chain of lattice nodes (n, 3) in mm.
 
-    within: dimensions of the lattice it stands in, where that is not the unit's own. Refused: a path off the
-    lattice's nodes, through the actuator, bent too sharply, or with no room at an end.
+    within: dimensions of the lattice it stands in, where that is not the unit's own. Raises InputError for a
+    path off the lattice's nodes, through the actuator, bent by more than SHARPEST_DEG, or without room for a
+    seat at an end.
     """
     d = unit.dimensions if within is None else within
     lattice = lattice_of(d)
@@ -185,9 +192,10 @@ def waveguide(unit: Unit, path: Window | ArrayLike, within: Dimensions | None = 
 
 
 def free_bar(d: Dimensions, length: float) -> Bar:
-    """A straight waveguide of its own along z, `length` mm between its end nodes: a coupon of the unit's.
+    """A straight waveguide along z outside any lattice, with seats if the unit has them: a coupon.
 
-    Every well of its pitch is there but those in its seats' feet, and both seats.
+    length: distance in mm between the points that are its end nodes in a lattice. Wells in the feet of its
+    seats are left out.
     """
     nodes = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, length]])
     up, outer, end = _AXES[0], _AXES[2], d.waveguide_end
@@ -209,10 +217,10 @@ def free_bar(d: Dimensions, length: float) -> Bar:
 
 
 def strut_radii(lattice: Lattice, met: NDArray[np.bool_], least: float, t: ArrayLike) -> Array:
-    """Radii (E, n) in mm of struts at fractions t (n,) where those that meet a bar are raised to `least`.
+    """Radii (E, n) in mm of the lattice's struts at fractions t (n,), thickened where they meet a bar.
 
-    met (E, 2): whether a strut meets it with its first and second end. From that end to its middle a strut
-    is at least that thick; toward its other end what was added fades as sin^2.
+    met (E, 2): whether a strut's first and second end meet it. From that end to mid-span a strut's radius is
+    at least `least` mm; from there to the other end what was added fades as sin^2(pi t).
     """
     t = np.asarray(t, float)
     law = lattice.radius(t)

@@ -106,8 +106,9 @@ def extended_model(verdict: Verdict, units: Mapping[str, str] = MappingProxyType
 def load_model(path: Path) -> ExtendedModel:
     """Read a model.toml.
 
-    Raises InputError where the file cannot be read or is not TOML, for an effect that `LIBRARY` lacks, for a
-    parameter without a finite value and for an unusable table [lattice].
+    Raises InputError where the file cannot be read or is not TOML, without a verdict, where a table is none,
+    for an effect that `LIBRARY` lacks, for a parameter with a value that is no finite number and for an
+    unusable table [lattice].
     """
     try:
         text = file_text(path)

@@ -53,10 +53,10 @@ class Cause:
 class Selection:
     """The base model, the chosen one, its causes, and what either leaves.
 
-    singles: the fit of every single effect, best first. p_best: p-value of the best single effect. doubted:
-    why a model was not accepted, empty if it was. table: tests that `strict_table` makes of the chosen
-    model's residual. table_base: `dependence_table` of the base model; by the strict tests where nothing is
-    wrong.
+    singles: the fit of every single effect, best first. p_best: p-value (a probability) of the best single
+    effect. doubted: why a model was not accepted, empty if it was. table: tests that `strict_table` makes of
+    the chosen model's residual. table_base: `dependence_table` of the base model; by the strict tests where
+    nothing is wrong.
     """
 
     base: Fit

@@ -74,19 +74,22 @@ class Sensitivity:
 
     @property
     def linear(self) -> bool:
-        """Whether the effect, were it proportional to its size, would be seen within its bounds."""
+        """Whether the effect's detection limit, to first order, lies within its bounds."""
         p = self.effect.parameters[0]
         reach = max(abs(p.high - p.null), abs(p.low - p.null))
         return self.unabsorbed > ABSORBED and self.limit < reach
 
     @property
     def identifiable(self) -> bool:
-        """Whether the data could show the effect at a size within its bounds."""
+        """Whether the effect is above its detection limit at some size within its bounds.
+
+        To first order (`linear`), or because `at_bounds` is at least `SEEN`; nuisances must not absorb it.
+        """
         return self.linear or (self.unabsorbed > ABSORBED and self.at_bounds >= SEEN)
 
     @property
     def worth_a_fit(self) -> bool:
-        """Whether the effect could explain a part of what another one explains."""
+        """Whether the effect is worth a fit: `linear`, or `at_bounds` at least `WORTH` and not absorbed."""
         return self.linear or (self.unabsorbed > ABSORBED and self.at_bounds >= WORTH)
 
 

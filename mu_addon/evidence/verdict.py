@@ -109,10 +109,10 @@ class Verdict:
 def noise_of(
     measured: Record, simulator: Composite, values: Mapping[str, float] | None = None
 ) -> dict[str, Source]:
-    """White and slow noise of a record, by group of series, whatever effect of the library it may hold.
+    """White and slow noise of a record, by group of series in its channel's unit (see `noise.estimate`).
 
-    values: of nuisances and effects by key, around which the noise is estimated; the base model's fit where
-    None.
+    values: of nuisances and effects by key, in their units, around which the noise is estimated; those of the
+    base model's fit where None. What any effect of the library can do to the data is not counted as noise.
     """
     if values is None:
         rough = Fitter(measured, simulator, {g: _rough(measured, g) for g in measured.groups})

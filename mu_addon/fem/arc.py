@@ -178,7 +178,7 @@ class Arc:
         return self._correct(_between(before, after, ends, volume), condition, after)
 
     def product(self, a: Array, b: Array) -> float:
-        """Inner product in mm2 of two changes (n + 1,) of z: |du|^2/n + (c dp)^2, see the module."""
+        """Inner product in mm2 of two changes a and b (n + 1,) of z: |du|^2/n + (c dp)^2, see the module."""
         return float((self._metric * a) @ b)
 
     def softest(self, z: Array) -> tuple[float, Array]:

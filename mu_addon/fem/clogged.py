@@ -74,7 +74,10 @@ class CloggedModel(Model):
         return residual
 
     def tangent(self, u: Array, pressure: float, m: MaterialData) -> Array:
-        """Values (nnz,) of the tangent in N/mm, as `Model.tangent`, without the part of the clog's cone."""
+        """Values (nnz,) in N/mm of the tangent, as `Model.tangent`, without the part of the clog's cone.
+
+        u: (n, 3) in mm; pressure in MPa.
+        """
         self._place(u)
         self._launch_layers("stiffness", m, [self._mean_slope, self._block_parts])
         inputs = [self._x, self._faces, *self._face_rule, self._element_blocks, self._block_parts]

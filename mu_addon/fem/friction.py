@@ -46,8 +46,9 @@ class Lag:
 def met(before: Array, gap: Array) -> Array:
     """Share (f, q) of a step that is in contact, of the distances in mm at both its ends.
 
-    The distance is taken to be linear over the step, so that a point which comes nearer aslant does not slip
-    before it touches. 1 out of contact, where it is of no account.
+    before, gap (f, q): at the start and the end, negative in contact. The distance is taken to be linear over
+    the step, so that a point which comes nearer aslant does not slip before it touches. 1 out of contact,
+    where it is of no account.
     """
     away = np.maximum(before, 0.0)
     share = gap / np.where(gap < 0, gap - away, 1.0)

@@ -56,9 +56,10 @@ def probe(mesh: Mesh, points: Array, tolerance: float = 1e-6) -> Probe:
 
 
 def invert(nodes: Array, points: Array, local: Array) -> Array:
-    """Reference coordinates (e, 3) of a point (e, 3) in each of e curved elements with nodes (e, 10, 3).
+    """Reference coordinates (e, 3) of a point in each of e curved elements, by Newton's method.
 
-    local: where to begin, changed in place. Newton's method; -1 where the map is singular on its way.
+    nodes (e, 10, 3) and points (e, 3) in mm. local (e, 3): where to begin, changed in place; -1 where the map
+    is singular on its way.
     """
     for _ in range(8):
         bary = np.column_stack([1 - local.sum(axis=1), local])

@@ -20,10 +20,10 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen(eq=False)
 class LatticeLaw:
-    """Laws that act in parallel in every lattice element, as (law, parameters (count,)) pairs.
+    """Laws that act in parallel in every lattice element.
 
-    stretch: the smallest and the largest stretch that they were fitted to. Raises InputError where a law
-    does not admit its parameters.
+    layers: (law, parameters (count,)) pairs. stretch: the smallest and the largest stretch that they were
+    fitted to. Raises InputError where there is no law, or one does not admit its parameters.
     """
 
     name: str

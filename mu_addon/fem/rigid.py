@@ -71,7 +71,7 @@ class Sphere:
 
 @attrs.frozen(eq=False)
 class Box:
-    """A box about `centre` (3,) with half sides (3,) in mm along the axes.
+    """A box about `centre` (3,) with half sides `half_mm` (3,) in mm along the axes.
 
     Outside it the distance is that of its faces, edges and corners; inside, of the nearest face.
     """
@@ -102,9 +102,10 @@ class Box:
 
 
 def round_bend(normal: Array, radius: Array, within: Array | None = None) -> Array:
-    """Second derivative (k, 3, 3) of the distance from a point, or from an edge, at a `radius` (k,) in mm.
+    """Second derivative (k, 3, 3) in 1/mm of the distance from a point, or from an edge.
 
-    within (k, 3, 3): the projection on the plane across the edge; the radius is below 0 for what is inside.
+    normal (k, 3): the distance's gradient; radius (k,) in mm: the distance, below 0 for what is inside.
+    within (k, 3, 3): the projection on the plane across the edge, for an edge.
     """
     plane = np.eye(3) if within is None else within
     return np.asarray((plane - normal[:, :, None] * normal[:, None, :]) / radius[:, None, None])

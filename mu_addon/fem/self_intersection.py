@@ -52,8 +52,8 @@ def _text(place: Array) -> str:
 class FirstSelfIntersection:
     """The pressure in MPa at which walls first meet, between two states of a path, and where they do.
 
-    Between the states the body is taken to move along a straight line; `crossings` are those at the
-    second, `pressure_MPa` is where the first of them begins.
+    before_MPa, after_MPa: of the two states. Between them the body is taken to move along a straight line;
+    `crossings` are those found at `pressure_MPa`, where the first of them begins.
     """
 
     pressure_MPa: float

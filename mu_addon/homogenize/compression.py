@@ -30,9 +30,10 @@ _PROBE = 1e-5
 
 @attrs.frozen(eq=False)
 class Compressed:
-    """A converged equilibrium: nominal strain, compression positive, displacement (n, 3) of the eighth in mm.
+    """A converged equilibrium: nominal strain, compression positive, and displacement of the eighth.
 
-    force_N and energy_mJ: of the plates on the whole block, compression positive, and stored in it.
+    u (n, 3) in mm. force_N and energy_mJ: of the plates on the whole block, compression positive, and stored
+    in it. residual: over the root sum of squares of all element forces; factorisations: those it took.
     """
 
     strain: float

@@ -47,9 +47,10 @@ class Effective:
     """A homogenized lattice: where it comes from, its moduli at small strain, and its law.
 
     cell: kind and geometry, with the print's offset; resin; provenance: software, version and hash of what
-    went in, all three tables of text and numbers. parameters (6,) as Foam names them, shear_MPa of CubicShear
-    and diagonal_MPa of DiagonalStretch act in parallel; stretch is the range they were fitted in. Raises
-    InputError for a law that is not admissible or not stable.
+    went in, all three tables of text and numbers. relative_density: solid share of the volume; C11, C12, C44
+    in kPa, of cubic symmetry. parameters (6,) as Foam names them, shear_MPa of CubicShear and diagonal_MPa of
+    DiagonalStretch act in parallel; stretch is the range they were fitted in. Raises InputError for moduli
+    that are not positive definite, and a law that is not admissible or not stable.
     """
 
     cell: Mapping[str, str | float]

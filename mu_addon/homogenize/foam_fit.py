@@ -56,13 +56,14 @@ class Misfit:
 
 @attrs.frozen(eq=False)
 class FoamFit:
-    """Foam (6,), cubic shear and diagonal stretch that act in parallel, and how well they stand for a cell.
+    """A foam, a cubic shear and a diagonal stretch that act in parallel, and how well they stand for a cell.
 
-    stretch: the range of the curve; one_modulus: whether tension and compression share theirs, so that the
-    tangent is continuous at rest; E_MPa, poisson and C44_MPa: the law's own at small strain along an axis,
-    and cell_E_MPa, cell_poisson and cell_C44_MPa the cell's; stable_shear and stable_pressed: the simple
-    shear between two axes, and the strain on all sides (compression positive), up to which no band of
-    localised strain can form.
+    parameters (6,): as Foam names them; shear_MPa and diagonal_MPa: G and C of the others. stretch: the range
+    of the curve; one_modulus: whether tension and compression share theirs, so that the tangent is continuous
+    at rest; E_MPa, poisson and C44_MPa: the law's own at small strain along an axis, and cell_E_MPa,
+    cell_poisson and cell_C44_MPa the cell's; stable_shear and stable_pressed: the simple shear between two
+    axes, and the strain on all sides (compression positive), up to which no band of localised strain can
+    form.
     """
 
     parameters: Array

@@ -132,7 +132,10 @@ def first_loss(
 
 
 def interpolated(strains: Sequence[float], moves: Sequence[Array], strain: float) -> Array:
-    """Displacement (n, 3) in mm at a strain, of the Lagrange polynomial through those at other strains."""
+    """Displacement (n, 3) in mm at a strain, of the Lagrange polynomial through some states.
+
+    strains, moves: nominal strain and displacement (n, 3) in mm of each.
+    """
     u = np.zeros_like(moves[0])
     for a, move in zip(strains, moves, strict=True):
         u += np.prod([(strain - b) / (a - b) for b in strains if b != a]) * move

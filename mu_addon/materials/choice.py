@@ -1,4 +1,4 @@
-"""Which of the laws that were fitted to take, and which do as well."""
+"""Choice of a law among those that were fitted, and the laws tied with it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ HELD_OUT_TIE = 1.1
 
 @attrs.frozen(eq=False)
 class Choice:
-    """The law that was chosen, those that do as well, and by which score ("held out" or "AICc") of each."""
+    """The chosen law, the laws tied with it, and the scores by name of the law, smaller is better.
+
+    by: "held out", the relative error on data that were not fitted, or "AICc".
+    """
 
     chosen: Fit
     tied: tuple[Fit, ...]
@@ -29,12 +32,13 @@ class Choice:
 
 
 def choose(fits: Sequence[Fit]) -> Choice:
-    """The stable law that misses held-out coupons least or, without any, has the least AICc.
+    """The stable law with the smallest error on held-out coupons or, without any, with the smallest AICc.
 
     Laws that miss what they were fitted to are considered only if all do: a straight line may pass near a
-    held-out curve by chance. Of tied laws the one with the fewest parameters. The number of independent
-    values, for AICc, is that of the law that fits best: what is left over there is noise if anything is.
-    Raises InputError where no law is stable.
+    held-out curve by chance. Of tied laws the one with the fewest parameters is chosen. AICc takes the number
+    of independent values from the law that fits best, whose residuals are noise if any are. Raises InputError
+    where no law is stable. Sources: Hurvich and Tsai, Biometrika 76 (1989) 297; Burnham and Anderson, 2002,
+    for ties.
     """
     stable = [f for f in fits if f.stable]
     if not stable:
@@ -52,11 +56,10 @@ def choose(fits: Sequence[Fit]) -> Choice:
 
 
 def disagreement(fits: Sequence[Fit], coupons: Sequence[Coupon]) -> dict[str, tuple[Array, Array]]:
-    """For each mode without a coupon: stretches (k,), and how far laws that fit the rest differ there (k,).
+    """For each mode without a coupon: stretches (5,), and the laws' largest over smallest stress there (5,).
 
-    The difference is the largest stress over the smallest among stable laws that miss no fitted coupon;
-    a mode is left out where fewer than two laws are left. k = 5 stretches up to the largest logarithmic
-    strain of the coupons.
+    Compared are the stable laws that miss no fitted coupon, at stretches up to the largest logarithmic strain
+    of the coupons. Empty where fewer than two such laws are left.
     """
     good = [f for f in fits if f.stable and f.follows]
     have = ranges(coupons)

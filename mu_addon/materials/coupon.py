@@ -1,4 +1,4 @@
-"""Coupons: what a law answers to the homogeneous stretches of a tensile machine.
+"""Coupons: response of a law to the homogeneous deformations of a tension test.
 
 Modes, with axis 1 pulled: "uniaxial" (2 and 3 free), "equibiaxial" (1 and 2 pulled alike, 3 free) and
 "pure_shear" (1 pulled, 2 held, 3 free: a wide, short strip). Free axes bear no stress.
@@ -32,7 +32,7 @@ def _float64(values: Any) -> Array:
 
 @attrs.frozen(eq=False)
 class Response:
-    """Nominal stress (n,) in MPa along axis 1, and the stretches (n, 3) of all three axes."""
+    """Nominal stress (n,) in MPa along axis 1, and the stretches (n, 3) along the three axes."""
 
     stress_MPa: Array
     stretches: Array
@@ -40,7 +40,11 @@ class Response:
 
 @attrs.frozen(eq=False)
 class Coupon:
-    """One tensile test: nominal stress (n,) in MPa at stretches (n,) along axis 1; raises InputError."""
+    """One tensile test in a mode: nominal stress (n,) in MPa at stretches (n,) along axis 1.
+
+    Raises InputError for arrays of different lengths, a stretch that is not positive, or a missing stress,
+    and ValueError for an unknown mode.
+    """
 
     name: str
     mode: str = attrs.field(validator=attrs.validators.in_(MODES))
@@ -57,14 +61,21 @@ class Coupon:
 
     @classmethod
     def of(cls, experiment: Experiment) -> Coupon:
-        """The coupon of an experiment of that kind."""
+        """The coupon of an experiment of kind `coupon`: stretch is 1 + strain, kPa become MPa.
+
+        Raises InputError as `Coupon` does.
+        """
         return cls(
             experiment.name, str(experiment.mode), 1 + experiment["strain"], in_MPa(experiment["stress_kPa"])
         )
 
 
 def binned(coupon: Coupon, most: int = 128) -> tuple[Coupon, Array]:
-    """A record of over 2 `most` rows as mean values in equal bins of stretch, and rows in each bin (k,)."""
+    """A coupon with means of stretch and stress (MPa) in `most` equal bins of stretch, and the counts (k,).
+
+    The counts are of rows in each bin; empty bins are left out. A coupon of up to 2 `most` rows is returned
+    as it is, with counts of 1.
+    """
     n = len(coupon.stretch)
     if n <= 2 * most:
         return coupon, np.ones(n)
@@ -77,11 +88,11 @@ def binned(coupon: Coupon, most: int = 128) -> tuple[Coupon, Array]:
 
 
 def response(law: Any, parameters: Array, mode: str, stretch: Array) -> Response:
-    """Nominal stress of a law, of one row of parameters (count,), at stretches (n,) along axis 1.
+    """Response of a law with one row of parameters (count,) to stretches (n,) along axis 1 of a mode.
 
-    The free stretches make the lateral stress vanish, by Newton's method with the law's own tangent.
-    Raises InputError for a law with history or with axes oblique to the coupon's, ConvergenceError where
-    no such stretches are found.
+    The free stretches make the lateral stress vanish, by Newton's method with the law's own tangent. Raises
+    InputError for an unknown mode, a stretch that is not positive, a law with history or with axes oblique to
+    the coupon's; ConvergenceError where no such stretches are found.
     """
     stretch = _checked(law, mode, stretch)
     row = np.asarray(parameters, float)
@@ -115,9 +126,10 @@ def response(law: Any, parameters: Array, mode: str, stretch: Array) -> Response
 
 
 def incompressible(law: Any, parameters: Array, mode: str, stretch: Array) -> Array:
-    """Nominal stress (n,) in MPa of a law that splits the volume off, at constant volume.
+    """Nominal stress (n,) in MPa along axis 1 at stretches (n,) along it, at constant volume.
 
-    Its bulk modulus has no part in it. Raises InputError for a law without that split.
+    parameters: one row (count,) of a law that splits the volume off; its bulk modulus has no effect. Raises
+    InputError for a law without that split, an unknown mode, or a stretch that is not positive.
     """
     stretches = isochoric_stretches(mode, _checked(law, mode, stretch))
     return isochoric_stress(law, parameters, stretches)
@@ -136,19 +148,29 @@ def isochoric_stress(law: Any, parameters: Array, stretches: Array) -> Array:
 
 
 def principal_stretches(law: Any, parameters: Array, mode: str, stretch: Array) -> Array:
-    """Stretches (n, 3) of a coupon: at constant volume where the law splits it off, else as `response`."""
+    """Stretches (n, 3) of a coupon with stretches (n,) along axis 1; parameters: the law's row (count,).
+
+    At constant volume for a law that splits it off, else without lateral stress as in `response`. Raises
+    InputError and ConvergenceError as `response` does.
+    """
     if law.split_volume:
         return isochoric_stretches(mode, _checked(law, mode, stretch))
     return response(law, parameters, mode, stretch).stretches
 
 
 def equivalent_stretch(mode: str, stretch: Any) -> Any:
-    """The uniaxial stretch of the same logarithmic strain, sqrt(2/3 e:e), at constant volume."""
+    """The uniaxial stretch with the same equivalent logarithmic strain, sqrt(2/3 e:e), at constant volume.
+
+    stretch: along axis 1 in this mode, a number or an array of any shape.
+    """
     return np.exp(_STRAIN[mode] * np.abs(np.log(stretch)))
 
 
 def stretch_of_equivalent(mode: str, stretch: Any) -> Any:
-    """The stretch of a mode that has the logarithmic strain of a uniaxial stretch above 1."""
+    """The stretch along axis 1 in this mode with the equivalent logarithmic strain of a uniaxial stretch.
+
+    stretch: at least 1, a number or an array of any shape; the inverse of `equivalent_stretch` in tension.
+    """
     return np.exp(np.log(stretch) / _STRAIN[mode])
 
 
@@ -168,7 +190,7 @@ def _checked(law: Any, mode: str, stretch: Array) -> Array:
 
 
 def isochoric_stretches(mode: str, stretch: Array) -> Array:
-    """Principal stretches (n, 3) at constant volume."""
+    """Principal stretches (n, 3) of a mode at constant volume, at stretches (n,) along axis 1."""
     one = np.ones_like(stretch)
     rest = {
         "uniaxial": (stretch**-0.5, stretch**-0.5),

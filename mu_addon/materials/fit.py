@@ -1,4 +1,4 @@
-"""Laws fitted to coupons: parameters with intervals, errors a mode, stability."""
+"""Laws fitted to coupons: parameters with intervals, errors for each mode, stability."""
 
 from __future__ import annotations
 
@@ -26,8 +26,11 @@ WEIGHTS = ("absolute", "relative")
 
 @attrs.frozen
 class ModeError:
-    """How far a law is from one coupon: root mean square in MPa; `share` of the stresses, norm over norm;
-    `worst` deviation as a share of the largest stress.
+    """How far a law is from one coupon.
+
+    rms_MPa: root mean square of the deviation in MPa; share: norm of the deviations over the norm of the
+    stresses; worst: largest deviation over the largest stress; fitted: whether the law was fitted to the
+    coupon.
     """
 
     coupon: str
@@ -42,9 +45,10 @@ class ModeError:
 class Fit:
     """A law fitted to coupons.
 
-    parameters: the law's row (count,). rss: sum of squared weighted residuals of n values. memory: how many
-    of them tell as much as one that is independent. errors: of every coupon, fitted or held out. stability:
-    over each mode's range. invalid: why the law does not admit the parameters.
+    parameters: the law's row (count,), in the units that its names give. rss: sum of squared weighted
+    residuals of n values, without unit. memory: number of correlated values that are worth one independent
+    value. errors: of every coupon, fitted or held out. stability: over each mode's range. invalid: why the
+    law does not admit the parameters, "" if it does.
     """
 
     form: Form
@@ -60,38 +64,44 @@ class Fit:
 
     @property
     def stable(self) -> bool:
-        """Whether the law is admissible and stable over all it was checked for."""
+        """Whether the parameters are valid and the law is stable over all ranges that were checked."""
         return not self.invalid and all(s.stable for s in self.stability)
 
     @property
     def fails(self) -> tuple[str, ...]:
-        """Modes that the law misses, fitted or held out."""
+        """Modes in which the law misses a coupon by a share of more than TOLERANCE, fitted or held out."""
         return tuple(dict.fromkeys(e.mode for e in self.errors if not e.share <= TOLERANCE))
 
     @property
     def follows(self) -> bool:
-        """Whether the law misses no coupon that it was fitted to."""
+        """Whether the law misses no coupon that it was fitted to by a share of more than TOLERANCE."""
         return all(e.share <= TOLERANCE for e in self.errors if e.fitted)
 
     @property
     def n_effective(self) -> float:
-        """How many independent values would tell as much."""
+        """Effective number of independent values, n over `memory`."""
         return self.n / self.memory
 
     def aicc(self, n: float) -> float:
-        """Akaike's criterion, corrected for few values, with the likelihood of n independent ones."""
+        """AICc with the likelihood of n independent values, without unit; inf where they are too few.
+
+        Source: Hurvich and Tsai, Biometrika 76 (1989) 297; the number of parameters includes the variance.
+        """
         k = self.form.count + 1
         if self.n - k - 1 <= 0:
             return np.inf
         return float(n * np.log(self.rss / self.n) + 2 * k + 2 * k * (k + 1) / (self.n - k - 1))
 
     def held_out(self) -> float:
-        """Share by which the law misses the coupons it was not fitted to, together; nan without any."""
+        """Relative error on the held-out coupons: root mean square of their shares; nan without any."""
         shares = [e.share for e in self.errors if not e.fitted]
         return float(np.sqrt(np.mean(np.square(shares)))) if shares else np.nan
 
     def usable(self) -> tuple[Any, Array]:
-        """Law and row of parameters, for a simulation; InputError where the law is not stable."""
+        """Law and row of parameters (count,), in the units that their names give, for a simulation.
+
+        Raises InputError where the law is not stable.
+        """
         if not self.stable:
             raise InputError(
                 f"{self.form.title} as fitted is unstable: {self.instability()}",
@@ -101,13 +111,16 @@ class Fit:
         return self.form.law, self.parameters
 
     def instability(self) -> str:
-        """What is wrong with the law, in words; nothing where it is stable."""
+        """Why the law is not stable, in words; "" where it is."""
         if self.invalid:
             return self.invalid
         return "; ".join(s.where() for s in self.stability if not s.stable)
 
     def stress(self, mode: str, stretch: Array) -> Array:
-        """Nominal stress (n,) in MPa at constant volume."""
+        """Nominal stress (n,) in MPa at stretches (n,) along axis 1 of a mode, at constant volume.
+
+        Raises InputError as `incompressible` does.
+        """
         return incompressible(self.form.law, self.parameters, mode, stretch)
 
 
@@ -121,12 +134,13 @@ def fit_coupons(
 ) -> Fit:
     """Fit a law to coupons by least squares, all modes at once, at constant volume.
 
-    weights: "absolute", residuals over the largest stress of their coupon, as a load cell's errors scale
-    with its range; "relative", residuals over the stress itself, or FLOOR of the largest where that is more.
-    Factors follow from exponents by linear least squares within their bounds, exponents by Newton's
-    method from the best combinations on a grid. Intervals of 95 %: linearised, or by `profile` for Ogden's,
-    with Student's t and widened where residuals resemble those before them. They hold for noise; where
-    the law itself is wrong no interval is honest, and a long memory says so. Raises InputError.
+    weights: "absolute", residuals over the largest stress of their coupon, as a load cell's errors scale with
+    its range; "relative", residuals over the stress itself, or FLOOR of the largest where that is more.
+    poisson: Poisson's ratio that sets the bulk modulus. Factors follow from exponents by linear least squares
+    within their bounds, exponents by nonlinear least squares from the best combinations on a grid. Intervals
+    of 95 %: linearised, or by `profile` for Ogden laws, with Student's t, widened where successive residuals
+    are correlated. They hold for noise only, not where the law itself is wrong, which a large `memory`
+    indicates. Raises InputError for unknown weights, too few values, or a coupon without stress.
     """
     if weights not in WEIGHTS:
         raise InputError(f"unknown weights {weights!r}", "fit", f"choose from {', '.join(WEIGHTS)}")
@@ -162,7 +176,10 @@ def fit_coupons(
 
 
 def leave_one_mode_out(form: Form, coupons: Sequence[Coupon], weights: str = "absolute") -> dict[str, float]:
-    """Share by which the law misses each mode when fitted to the others alone; {} for a single mode."""
+    """Leave-one-out error of each mode, as a share of its stresses, with the law fitted to the others.
+
+    {} where the coupons are of a single mode. Raises InputError and ConvergenceError as the fits do.
+    """
     modes = dict.fromkeys(c.mode for c in coupons)
     found = {}
     for mode in modes if len(modes) > 1 else ():
@@ -173,7 +190,10 @@ def leave_one_mode_out(form: Form, coupons: Sequence[Coupon], weights: str = "ab
 
 
 def mode_error(form: Form, row: Array, coupon: Coupon, fitted: bool) -> ModeError:
-    """How far a law of parameters (count,) is from a coupon."""
+    """How far a law with a row of parameters (count,) is from a coupon, in MPa and as shares.
+
+    Raises InputError as `incompressible` does.
+    """
     off = incompressible(form.law, row, coupon.mode, coupon.stretch) - coupon.stress_MPa
     size = np.abs(coupon.stress_MPa)
     return ModeError(
@@ -237,7 +257,7 @@ def _stability(form: Form, row: Array, coupons: Sequence[Coupon]) -> tuple[Stabi
 
 
 def ranges(coupons: Sequence[Coupon]) -> dict[str, tuple[float, float]]:
-    """Lowest and highest stretch of the modes that coupons reach, the unstretched state among them."""
+    """Lowest and highest stretch, by mode, that coupons reach, the undeformed state (1) included."""
     found: dict[str, tuple[float, float]] = {}
     for c in coupons:
         low, high = found.get(c.mode, (1.0, 1.0))

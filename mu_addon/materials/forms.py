@@ -17,12 +17,12 @@ EXPONENTS = (-15.0, 25.0)
 
 @attrs.frozen
 class Form:
-    """A law as it is fitted: stress = sum of factor_k times a term of the stretch.
+    """A law as it is fitted: stress = sum over k of factor_k times a term of the stretches.
 
-    names: the parameters that are fitted. exponents: how many Ogden terms, each of a free exponent alpha_p
-    and a factor c_p = mu_p alpha_p/2, its share of the shear modulus; 0 for a law whose terms are fixed.
-    least: lower bounds of the factors. Ogden's are kept at c_p >= 0, which is enough for stability (Hill
-    1970; Ogden, Non-Linear Elastic Deformations, 1984, section 6.2.6).
+    names: parameters that are fitted. exponents: number of Ogden terms, each with a free exponent alpha_p and
+    a factor c_p = mu_p alpha_p/2, its share of the shear modulus; 0 for a law whose terms are fixed. least:
+    lower bounds of the factors. Ogden's are kept at c_p >= 0, which is sufficient for stability (Hill 1970;
+    Ogden, Non-Linear Elastic Deformations, 1984, section 6.2.6).
     """
 
     name: str
@@ -34,11 +34,14 @@ class Form:
 
     @property
     def count(self) -> int:
-        """How many parameters are fitted."""
+        """Number of parameters that are fitted."""
         return len(self.names)
 
     def parameters(self, factors: Array, exponents: Array, poisson: float) -> Array:
-        """The law's row (count,); kappa by Poisson's ratio at small strain."""
+        """The law's row (count,) of factors (k,) in MPa and exponents (k,), (0,) where terms are fixed.
+
+        kappa, in MPa, follows from Poisson's ratio at small strain.
+        """
         row = np.zeros(len(self.law.parameter_names))
         if self.exponents:
             order = np.argsort(-np.asarray(factors), kind="stable")
@@ -51,7 +54,11 @@ class Form:
         return with_bulk(self.law, row, poisson)
 
     def terms(self, stretches: Array, exponents: Array) -> Array:
-        """Nominal stress (n, k) in MPa of every term with factor 1, at principal stretches (n, 3)."""
+        """Nominal stress (n, k) in MPa of every term with a factor of 1 MPa, at principal stretches (n, 3).
+
+        exponents (k,): of the Ogden terms, not used where the terms are fixed. Raises InputError for a law
+        that does not split the volume off.
+        """
         k = len(exponents) if self.exponents else len(self.least)
         rows = np.zeros((k, len(self.law.parameter_names)))
         if self.exponents:
@@ -67,7 +74,10 @@ class Form:
 
 
 def with_bulk(law: Any, row: Array, poisson: float) -> Array:
-    """A row (count,) of a law that splits the volume off, its kappa by Poisson's ratio at small strain."""
+    """A row (count,) with the bulk modulus that follows from Poisson's ratio; row (count,) is not changed.
+
+    kappa = 2 mu (1 + nu)/(3 (1 - 2 nu)) in MPa, for a law that splits the volume off.
+    """
     row = np.array(row, float)
     mu = abs(law.small_strain(row[None])[0, 0])
     row[law.bulk] = 2 * mu * (1 + poisson) / (3 * (1 - 2 * poisson))
@@ -94,7 +104,7 @@ FORMS = {
 
 
 def form(name: str) -> Form:
-    """The form of that name; InputError lists those there are."""
+    """The form of this name. Raises InputError, which lists the valid names."""
     if name not in FORMS:
         raise InputError(f"unknown law {name!r}", "laws", f"choose from {', '.join(FORMS)}")
     return FORMS[name]

@@ -21,7 +21,10 @@ FARTHEST = 14.0
 
 @attrs.frozen
 class Parameter:
-    """A fitted parameter and its 95 % interval, nan where the data do not bound it; note says why."""
+    """A fitted parameter with its 95 % interval, in the unit that its name gives.
+
+    Bounds are nan where the data do not determine it; note says why.
+    """
 
     name: str
     value: float
@@ -33,11 +36,12 @@ class Parameter:
 def intervals(
     problem: Problem, row: Array, residual: Array, memory: float, profile: Problem | None
 ) -> tuple[Parameter, ...]:
-    """95 % intervals of the parameters of a fitted row (count,), by its weighted residuals (n,).
+    """95 % intervals of the parameters of a fitted row (count,), from its weighted residuals (n,).
 
-    memory: how many residuals tell as much as one that is independent, which widens every interval by its
-    square root. profile: the problem, or one of fewer rows, in which those of Ogden's parameters are looked
-    for, where the best fit with that parameter fixed is worse by Student's t.
+    memory: number of correlated residuals that are worth one independent value; it widens every interval by
+    its square root. profile: None for linearised intervals; else the problem, or one of fewer rows, whose
+    profile gives those of Ogden's parameters: up to where the best fit with that parameter fixed is worse by
+    Student's t.
     """
     form = problem.form
     at = [form.law.parameter_names.index(name) for name in form.names]

@@ -1,4 +1,4 @@
-"""Materials: figures with their source and how sure they are, and a law for simulations."""
+"""Materials: figures with source and confidence, and a law for simulations."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ _KEYS["wall"] = (*_WALL, "confidence", "source")
 
 @attrs.frozen
 class Value:
-    """A figure in `unit`, from low to high where its source leaves room, with its source and confidence."""
+    """A figure of a material in `unit`, with its source and confidence; low and high bound it where known."""
 
     name: str
     value: float
@@ -68,7 +68,7 @@ class Value:
 
 @attrs.frozen
 class StressPoint:
-    """Nominal stress in MPa at a nominal strain, tension positive, in a mode of `coupon`."""
+    """Nominal stress in MPa at a nominal strain, without unit, tension positive, in a mode of `coupon`."""
 
     mode: str
     strain: float
@@ -79,11 +79,11 @@ class StressPoint:
 
 @attrs.frozen(eq=False)
 class Material:
-    """A material: figures by name, points of its stress-strain curve, a law with one row of parameters.
+    """A material: figures by name, points of its stress-strain curve, a law with its row of parameters (p,).
 
-    ranges: lowest and highest stretch of every mode that the law rests on; fails: modes it is known to
-    miss; low95, high95: intervals of parameters that were fitted. wall: what a unit's wall of it does beyond
-    its elastic law.
+    ranges: lowest and highest stretch, by mode, of the data that the law was fitted to or is meant for;
+    fails: modes that it is known to miss; low95, high95: 95 % intervals of fitted parameters. wall: the
+    behaviour of a unit's wall of it beyond the elastic law.
     """
 
     name: str
@@ -104,7 +104,7 @@ class Material:
 
     @property
     def density_g_per_ml(self) -> float:
-        """Density; InputError where none is given."""
+        """Density in g/ml. Raises InputError where none is given."""
         if "density" not in self.values:
             raise InputError(
                 f"{self.name} has no density", "[density]", "weigh a solid body of known volume and add it"
@@ -113,19 +113,22 @@ class Material:
 
     @property
     def modulus_MPa(self) -> float:
-        """Young's modulus of the law at small strain."""
+        """Young's modulus in MPa of the law at small strain, 9 kappa mu/(3 kappa + mu)."""
         mu, kappa = self.law.small_strain(self.parameters[None])[0]
         return float(9 * kappa * mu / (3 * kappa + mu))
 
     @property
     def poisson(self) -> float:
-        """Poisson's ratio of the law at small strain."""
+        """Poisson's ratio of the law at small strain, (3 kappa - 2 mu)/(6 kappa + 2 mu)."""
         mu, kappa = self.law.small_strain(self.parameters[None])[0]
         return float((3 * kappa - 2 * mu) / (6 * kappa + 2 * mu))
 
     @cached_property
     def stability(self) -> tuple[Stability, ...]:
-        """The law's stability over its range, in every mode."""
+        """Stability of the law over its range in every mode; modes without a range as in `whole_ranges`.
+
+        Raises InputError and ConvergenceError as `check_stability` does.
+        """
         checked = whole_ranges(self.ranges)
         return tuple(
             check_stability(self.law, self.parameters, mode, *span) for mode, span in checked.items()
@@ -142,9 +145,10 @@ class Material:
                 )
 
     def rows(self, count: int, factor: Any = 1.0) -> Array:
-        """Parameters (count, p) of so many elements, every modulus times `factor`, a number or (count,).
+        """Parameters (count, p) of `count` elements, with every modulus, in MPa, multiplied by `factor`.
 
-        Raises InputError where the law is unstable within its range.
+        factor: a number, or one for each element (count,). Raises InputError where the law is unstable within
+        its range.
         """
         self.require_stable()
         rows = np.repeat(self.parameters[None], count, axis=0)
@@ -153,9 +157,9 @@ class Material:
         return rows
 
     def in_unit(self, unit: Unit) -> Unit:
-        """The unit with a wall of this material, its moduli, law and memory; raises InputError.
+        """The unit with the moduli (kPa), law and memory of this material in its wall, else unchanged.
 
-        A unit's wall knows neo-Hooke's and Yeoh's law; sensor and lattice stay what they are.
+        Raises InputError for another law than neo-Hooke or Yeoh, and where the law is unstable.
         """
         if self.law not in (laws.NeoHooke, laws.Yeoh):
             raise InputError(
@@ -175,22 +179,25 @@ class Material:
         return attrs.evolve(unit, material=material, wall=wall)
 
     def materials(self, count: int, factor: Any = 1.0) -> Materials:
-        """A body of so many elements of this material, every modulus times `factor` as `rows` has it."""
+        """`count` elements of this material for the solver, with moduli multiplied by `factor` as in `rows`.
+
+        Raises InputError where the law is unstable within its range.
+        """
         return Materials((Layer(self.law, np.arange(count), self.rows(count, factor)),))
 
 
 def material_names() -> list[str]:
-    """Names of the shipped materials, sorted."""
+    """Sorted names of the shipped materials. Raises InputError where the folder of assets is missing."""
     return asset_names("materials")
 
 
 def load_material(name: str) -> Material:
-    """The shipped material of that name; InputError lists the names there are."""
+    """The shipped material of this name. Raises InputError, which lists the valid names."""
     return read_material(asset_file("materials", "material", name))
 
 
 def read_material(path: str | Path) -> Material:
-    """Read a material from TOML; raises InputError that names file, line and key."""
+    """The material in a TOML file. Raises InputError with file, line and key."""
     try:
         text = file_text(path)
     except OSError as error:
@@ -205,7 +212,10 @@ def read_material(path: str | Path) -> Material:
 
 
 def parse_material(text: str, origin: str = "") -> Material:
-    """A material of TOML text; raises InputError that names `origin`, line and key."""
+    """The material in TOML text; origin: name of the file, for messages.
+
+    Raises InputError with `origin`, line and key.
+    """
     document = parse(text, _KEYS, origin)
     reader = _Reader(text, origin)
     if document.get("format") != FORMAT or document["format"] is True:
@@ -413,12 +423,15 @@ class _Reader:
 
 
 def write_material(material: Material, path: Path, head: str = "") -> None:
-    """Write a material as TOML that `read_material` takes, under `head` as comments; raises OutputError."""
+    """Write a material as TOML that `read_material` reads, below the lines of `head` as comments.
+
+    Raises OutputError.
+    """
     write_text(path, material_text(material, head))
 
 
 def material_text(material: Material, head: str = "") -> str:
-    """A material as TOML text."""
+    """A material as TOML text, below the lines of `head` as comments; floats keep every digit."""
     lines = [f"# {line}".rstrip() for line in head.splitlines()]
     lines += [f"format = {FORMAT}", f"name = {toml_value(material.name)}"]
     if material.about:

@@ -1,4 +1,4 @@
-"""Least squares for sums of terms: factors by linear algebra, exponents by Newton's method around it."""
+"""Least squares for sums of terms: factors by linear algebra, exponents by nonlinear least squares."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ STARTS = 6
 
 @attrs.frozen(eq=False)
 class Problem:
-    """form: what is fitted; stretches (n, 3), target (n,): stress over scale; scale (n,): in MPa."""
+    """Weighted least squares of a form: principal stretches (n, 3) and target (n,), stress over scale.
+
+    scale (n,): what residuals are divided by, in MPa.
+    """
 
     form: Form
     stretches: Array
@@ -30,21 +33,27 @@ class Problem:
 
     @classmethod
     def of(cls, form: Form, coupons: Sequence[Coupon], scale: Array) -> Problem:
-        """The problem of a form and coupons; scale (n,): what residuals are divided by."""
+        """The problem of a form and coupons; scale (n,): what residuals are divided by, in MPa."""
         stretches = np.concatenate([isochoric_stretches(c.mode, c.stretch) for c in coupons])
         stress = np.concatenate([c.stress_MPa for c in coupons])
         return cls(form, stretches, stress / scale, scale)
 
     def terms(self, exponents: Array) -> Array:
-        """Weighted stress (n, k) of every term with factor 1."""
+        """Stress (n, k) over scale, without unit, of every term with factor 1, for exponents (k,).
+
+        A form with fixed terms does not use the exponents.
+        """
         return self.form.terms(self.stretches, exponents) / self.scale[:, None]
 
     def solve(self, exponents: Array) -> tuple[Array, Array]:
-        """Best factors (k,) for given exponents, and the weighted residuals (n,)."""
+        """Best factors (k,) in MPa for exponents (k,), and the weighted residuals (n,), without unit."""
         return linear(self.terms(exponents), self.target, self.form.least)
 
     def jacobian(self, row: Array) -> Array:
-        """Weighted derivatives (n, count) by the parameters that are fitted."""
+        """Derivatives (n, count) of weighted stress by the parameters of a row (p,), per their units.
+
+        By central differences. Raises InputError for a law that does not split the volume off.
+        """
         at = [self.form.law.parameter_names.index(name) for name in self.form.names]
         step = 1e-6 * np.maximum(np.abs(row[at]), 1e-6 * np.abs(row[at]).max())
         k, n = len(at), len(self.target)
@@ -58,7 +67,10 @@ class Problem:
 
 
 def linear(terms: Array, target: Array, least: Sequence[float]) -> tuple[Array, Array]:
-    """Factors above their bounds of a linear least-squares problem, and its residuals."""
+    """Factors (k,) that minimise |terms factors - target| above their bounds, and the residuals (n,).
+
+    terms (n, k), target (n,), least (k,): lower bounds. Factors are in the unit of target over that of terms.
+    """
     # Terms may differ by twenty orders of magnitude; without scaling the small ones drown.
     size = np.linalg.norm(terms, axis=0)
     scaled = terms / size
@@ -71,7 +83,11 @@ def linear(terms: Array, target: Array, least: Sequence[float]) -> tuple[Array, 
 
 
 def best_exponents(problem: Problem) -> Array:
-    """Exponents (k,) of the best Ogden fit."""
+    """Exponents (k,), without unit, of the best fit of an Ogden form.
+
+    Every combination of GRID is tried; the STARTS best are refined by nonlinear least squares, within
+    EXPONENTS.
+    """
     k = problem.form.exponents
     # Distances between columns are those of a triangle of as many rows, however many values there are.
     table = np.column_stack([problem.terms(GRID), problem.target])
@@ -103,6 +119,6 @@ def best_exponents(problem: Problem) -> Array:
 
 
 def nonzero_exponents(exponents: Array) -> Array:
-    """The exponents, none of them 0."""
+    """Exponents (k,), without unit, with those nearer to 0 than 1e-3 moved to -1e-3 or 1e-3; array (k,)."""
     small = np.abs(exponents) < 1e-3
     return np.where(small, np.where(exponents < 0, -1e-3, 1e-3), exponents)

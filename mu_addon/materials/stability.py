@@ -1,4 +1,4 @@
-"""Whether a law is stable: whether every further strain costs work beyond what is there."""
+"""Drucker stability of a law: every further increment of strain must need positive work."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _EQUAL = 1e-6
 
 @attrs.frozen
 class Stability:
-    """Least incremental stiffness in MPa of a law over a mode's stretches from low to high, and where.
+    """Least incremental stiffness in MPa of a law at stretches low .. high of a mode, and where it is.
 
-    unstable_at: the stretch nearest to 1 where it is not positive, or None.
+    unstable_at: the stretch nearest to 1 at which it is not positive, or None.
     """
 
     mode: str
@@ -33,11 +33,11 @@ class Stability:
 
     @property
     def stable(self) -> bool:
-        """Whether the stiffness is positive throughout."""
+        """Whether the incremental stiffness is positive over the whole range."""
         return self.unstable_at is None
 
     def where(self) -> str:
-        """Where it is unstable, in words."""
+        """Where the law is unstable, in words."""
         if self.unstable_at is None:
             return "nowhere"
         side = "at" if self.unstable_at == 1 else "above" if self.unstable_at > 1 else "below"
@@ -45,23 +45,23 @@ class Stability:
 
 
 def whole_ranges(reached: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-    """Lowest and highest stretch of every mode, of those that were reached.
+    """Lowest and highest stretch of every mode, from those of the modes in `reached`.
 
-    A mode that was not is taken in tension to the largest logarithmic strain of the others.
+    Another mode gets a range from 1 up to the largest equivalent logarithmic strain of those.
     """
     far = max(equivalent_stretch(mode, x) for mode, span in reached.items() for x in span)
     return {mode: reached.get(mode, (1.0, float(stretch_of_equivalent(mode, far)))) for mode in MODES}
 
 
 def check_stability(law: Any, parameters: Array, mode: str, low: float, high: float) -> Stability:
-    """Check a law of one row of parameters (count,) along a mode, from stretch `low` to `high`.
+    """Check a law with one row of parameters (count,) along a mode, from stretch `low` to `high`.
 
-    Drucker's postulate in Hill's form: d(tau):d(e) > 0 for every increment de of the logarithmic strain,
-    tau the Kirchhoff stress. At principal stretches that is: the Hessian of the energy by logarithmic
-    strains is positive definite, and (tau_a - tau_b)/(e_a - e_b) > 0 for every pair. A law that splits the
-    volume off is checked at constant volume, for increments that keep it; any other along its own path
-    without lateral stress. Sources: Drucker, J. Appl. Mech. 26 (1959) 101; Hill, Proc. R. Soc. A 314 (1970)
-    457. Raises InputError as `principal_stretches` does.
+    Drucker's postulate in Hill's form: d(tau):d(e) > 0 for every increment de of the logarithmic strain, tau
+    the Kirchhoff stress. At principal stretches that is: the Hessian of the energy by logarithmic strains is
+    positive definite, and (tau_a - tau_b)/(e_a - e_b) > 0 for every pair. A law that splits the volume off is
+    checked at constant volume, for increments that keep it; any other along its own path without lateral
+    stress. Sources: Drucker, J. Appl. Mech. 26 (1959) 101; Hill, Proc. R. Soc. A 314 (1970) 457. Raises
+    InputError for low and high that are not a range, and as `principal_stretches` does.
     """
     if not 0 < low < high:
         raise InputError(f"stretches from {low:g} to {high:g}", mode, "give 0 < low < high")
@@ -74,7 +74,10 @@ def check_stability(law: Any, parameters: Array, mode: str, low: float, high: fl
 
 
 def least_stiffness(law: Any, parameters: Array, mode: str, stretch: Array) -> Array:
-    """Least of d(tau):d(e)/|de|^2 over all increments, (n,) in MPa, at stretches (n,) of a mode."""
+    """Least of d(tau):d(e)/|de|^2 over all increments, (n,) in MPa, at stretches (n,) along axis 1 of a mode.
+
+    parameters: the law's row (count,). Raises InputError and ConvergenceError as `principal_stretches` does.
+    """
     lengths = principal_stretches(law, parameters, mode, stretch)
     n = len(lengths)
     F = np.zeros((n, 3, 3))

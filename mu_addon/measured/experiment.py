@@ -26,13 +26,13 @@ def _read_only(columns: Mapping[str, Any]) -> Mapping[str, Array]:
 class Experiment:
     """One experiment of a folder of measured data; what a kind does not have, or was not given, is None.
 
-    columns: arrays (n,) by their names with unit; where a coupon or lattice was recorded as displacement
-    and force, strain and nominal stress_kPa are among them too (compression positive in
-    lattice_compression, tension positive in coupon). A column with _sd_ in its name is the spread by which
-    the whole record beside it is uncertain. A lattice that was weighed has columns mass_g and mass_sd_g, one
-    value throughout. rows (n,): where each lies in the file. orientation_deg:
-    direction of gravity about x, 0 hanging with the tip down. section_mm: width and thickness of what bears
-    the load. sha256: of the file's bytes.
+    columns: arrays (n,) by their names, which end with the unit; for a coupon or a lattice that was recorded
+    as displacement and force they include strain and nominal stress_kPa (compression positive in
+    lattice_compression, tension positive in coupon). A column with _sd_ in its name is the standard deviation
+    by which the whole record beside it is uncertain. A lattice that was weighed has columns mass_g and
+    mass_sd_g, one value throughout. rows (n,): numbers of the lines in the file. orientation_deg: direction
+    of gravity about x, 0 hanging with the tip down. section_mm: width and thickness of what bears the load.
+    sha256: of the file's bytes.
     """
 
     name: str
@@ -69,7 +69,7 @@ class Experiment:
 
     @property
     def markers(self) -> dict[int, Array]:
-        """Positions (n, 3) in mm of each marker by its number; nan where a coordinate was not seen."""
+        """Positions (n, 3) in mm of each marker, by its number; nan where a coordinate was not measured."""
         numbers = sorted({int(c[6 : c.index("_")]) for c in self.columns if c.startswith("marker")})
         unseen = np.full(len(self), np.nan)
         return {

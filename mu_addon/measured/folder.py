@@ -30,19 +30,23 @@ PRELOAD = 0.05
 
 @attrs.frozen
 class Measured:
-    """The experiments of a folder in the order they were made, and what is to know about them."""
+    """The experiments of a folder in the order they were made, and remarks on data that can be used."""
 
     folder: Path
     experiments: tuple[Experiment, ...]
     remarks: tuple[Remark, ...]
 
     def of(self, kind: str, role: str | None = None) -> tuple[Experiment, ...]:
-        """Experiments of a kind and, where it is given, of a role."""
+        """The experiments of a kind and, where it is given, of a role ("fit" or "held_out")."""
         return tuple(e for e in self.experiments if e.kind == kind and role in (None, e.role))
 
 
 def read_folder(folder: Path) -> Measured:
-    """Read and check a folder of measured data; raises InputError with file, row and what to do."""
+    """Read and check a folder of measured data: experiments.toml and the CSV files that it names.
+
+    Strain and stress are computed from displacement and force where needed. Raises InputError with file, row
+    or key, and what to do.
+    """
     path = Path(folder) / FILE
     text = _text(path, f"a folder of measured data holds {FILE}, which names its CSV files")
     document = parse_toml(text, str(path))

@@ -65,9 +65,9 @@ COMMON = (
 class Kind:
     """A kind of experiment.
 
-    needs: sets of columns, of which one must be whole; may_have: further columns; timed: whether time_s
-    must be there; needs_keys and may_have_keys: what describes it beyond `COMMON`; fewest: rows; marked:
-    whether markers may be among its columns.
+    needs: groups of columns, of which at least one must be complete; may_have: further columns; timed:
+    whether time_s is required; needs_keys, may_have_keys: keys of experiments.toml beyond `COMMON`; fewest:
+    least number of rows; marked: whether it may have columns of markers.
     """
 
     name: str
@@ -81,17 +81,17 @@ class Kind:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Every column it knows by name, markers apart."""
+        """Names of all columns that it may have, markers apart."""
         needed = [column for group in self.needs for column in group]
         return tuple(dict.fromkeys([*(("time_s",) if self.timed else ()), *needed, *self.may_have]))
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Every key that may describe it."""
+        """All keys of experiments.toml that may describe it."""
         return COMMON + self.needs_keys + self.may_have_keys
 
     def knows(self, column: str) -> bool:
-        """Whether a column of that name belongs to it."""
+        """Whether it may have a column of this name, with the unit that is read."""
         return column in self.columns or (self.marked and _MARKER.fullmatch(column) is not None)
 
 
@@ -141,7 +141,7 @@ KINDS = {
 
 
 def quantity_of(column: str) -> tuple[str, str] | None:
-    """Quantity and unit that a column's name is made of; None where the quantity is not known."""
+    """Quantity and unit in a column's name, such as ("pressure", "kPa"); None for an unknown quantity."""
     if re.fullmatch(r"marker[1-9]\d*_[xyz](_\w+)?", column):
         head, _, tail = column.rpartition("_")
         return (column, "") if tail in "xyz" else (head, tail)
@@ -152,19 +152,19 @@ def quantity_of(column: str) -> tuple[str, str] | None:
 
 
 def named(quantity: str) -> str:
-    """The column of a quantity, with the unit it is read in."""
+    """Name of a quantity's column with the unit that is read, such as pressure_kPa; mm for a marker."""
     unit = UNITS.get(quantity, "mm")
     return f"{quantity}_{unit}" if unit else quantity
 
 
 def units_of(quantity: str) -> dict[str, float]:
-    """Units that a quantity's column may be in, each with what it is multiplied by to be read."""
+    """Units that a quantity's column may have, each with its factor to the unit that is read."""
     unit = UNITS.get(quantity, "mm")
     return {unit: 1.0, **CONVERTED[unit]}
 
 
 def markers(columns: Sequence[str]) -> dict[int, set[str]]:
-    """Which of x, y, z each marker among the columns has."""
+    """Which of x, y and z are among the columns, by the number of the marker."""
     found: dict[int, set[str]] = {}
     for column in columns:
         match = _MARKER.fullmatch(column)
@@ -174,5 +174,5 @@ def markers(columns: Sequence[str]) -> dict[int, set[str]]:
 
 
 def may_be_missing(column: str) -> bool:
-    """Whether single values of a column may be missing."""
+    """Whether single values of this column may be missing: angle, voltage or a marker."""
     return column.startswith(MAY_BE_MISSING)

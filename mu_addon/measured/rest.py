@@ -1,4 +1,4 @@
-"""Where markers of a unit lie while nothing presses on it."""
+"""Positions of a unit's markers at zero pressure."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ SAMPLES = 5
 
 
 def at_rest(experiments: Sequence[Experiment]) -> dict[int, tuple[str, Array, str]]:
-    """Axes, position (3,) in mm at rest, 0 where not measured, and experiment of each marker by its number.
+    """Markers at rest, by number: known axes, position (3,) in mm, 0 where unknown, and the experiment.
 
-    In the unit's frame: z along the axis from the inlet, +y the side with more lattice. Of the first
-    experiment that shows the marker at rest. Raises InputError where none does or a marker lacks y or z.
+    The frame is the unit's: z along the axis from the inlet, +y the side with more lattice. The position is
+    the mean of the first SAMPLES rows at rest, in the first experiment that has any: pressure within AT_REST
+    of its range from 0. Raises InputError where there is none or a marker lacks y or z.
     """
     found: dict[int, tuple[str, Array, str]] = {}
     missed: dict[int, str] = {}

@@ -1,4 +1,4 @@
-"""A CSV file of one experiment: numbers by column, and every problem named by its row."""
+"""A CSV file of one experiment: numbers by column; problems are reported with their row."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SPIKE_SCATTER, SPIKE_RANGE = 10.0, 0.02
 
 @attrs.frozen
 class Remark:
-    """Something to know about data that can be used: `what`, `where`, and what to do about it."""
+    """Something unusual about data that can still be used: what, where, and what to do about it."""
 
     what: str
     where: str
@@ -36,7 +36,7 @@ class Remark:
 
 @attrs.frozen(eq=False)
 class Table:
-    """Columns (n,) by name, the row of each in the file (n,), and remarks."""
+    """Columns (n,) by name, in the units of their names; rows (n,): line in the file of each row; remarks."""
 
     columns: dict[str, Array]
     rows: Array
@@ -44,9 +44,11 @@ class Table:
 
 
 def read_table(text: str, kind: Kind, path: Path) -> Table:
-    """Read CSV text for an experiment of a kind; rows are counted as an editor counts lines.
+    """Read CSV text as an experiment of this kind; values are converted to the units that are read.
 
-    Lines that begin with # are comments. Raises InputError for a file that cannot be used.
+    Rows are numbered as an editor counts lines; lines that begin with # are comments. Rows that repeat the
+    one before are left out of timed data. path: for messages. Raises InputError for a table that cannot be
+    used.
     """
     remarks: list[Remark] = []
     header, body = _lines(text, path)

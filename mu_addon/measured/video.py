@@ -1,4 +1,4 @@
-"""Markers followed in a video of the bench: from pixels to millimetres in the unit's frame, and to an angle.
+"""Markers tracked in a video: from pixels to millimetres in the unit's frame, and to an angle.
 
 The bending plane is the complex plane, w = y + i z in mm, and a place in the picture is q = right + i up,
 seen from the side the camera is on; a camera far enough away makes w = a q + b, where |a| is the scale.
@@ -31,10 +31,10 @@ Pair = tuple[str, str]
 
 @attrs.frozen(eq=False)
 class Tracks:
-    """Markers followed through a clip: pixels (m, n, 2) right and down from the picture's upper left corner.
+    """Markers tracked through a clip: (m, n, 2) in pixels, right and down from the upper left corner.
 
-    names: of the m markers; pixels are nan where a marker was lost. fps: frames a second, 0 where the clip
-    does not say.
+    names: of the m markers; positions are nan in frames where a marker was lost. fps: frames per s, 0 where
+    the clip does not give it.
     """
 
     names: tuple[str, ...]
@@ -45,7 +45,7 @@ class Tracks:
         return int(self.pixels.shape[1])
 
     def of(self, name: str) -> Array:
-        """Pixels (n, 2) of one marker; raises InputError where it was not followed."""
+        """Positions (n, 2) in pixels of one marker. Raises InputError where it was not tracked."""
         if name not in self.names:
             raise InputError(
                 f"marker {name!r} was not tracked", "", f"tracked markers: {', '.join(self.names) or 'none'}"
@@ -57,10 +57,11 @@ class Tracks:
 class View:
     """How the camera sees the unit.
 
-    base: two markers that stand with the base; places_mm: (y, z) of each in the unit's frame; tip: two on the
-    tip, or None where only places are wanted; camera: the side it looks from. Scale: mm_per_pixel, or the
-    distance ruler_mm of the two markers `ruler`, or the places of the base. follow_base: whether places and
-    angle are against the base as it is in each picture, for a camera or clamp that moves.
+    base: two markers that are fixed to the base; places_mm: (y, z) in mm of each in the unit's frame; tip:
+    two markers on the tip, or None if no angle is wanted; camera: "+x" or "-x", the side it stands on. The
+    scale is mm_per_pixel, or follows from ruler_mm, the distance of the two markers `ruler`, or from the
+    base. follow_base: whether places and angle are relative to the base in each frame, for a camera or clamp
+    that moves.
     """
 
     base: Pair
@@ -75,11 +76,11 @@ class View:
 
 @attrs.frozen(eq=False)
 class Motion:
-    """What a video shows: places (m, n, 2) of all markers as (y, z) in mm, and the angle (n,) in degrees.
+    """Motion in a video: places (m, n, 2) of all markers as (y, z) in mm, bending angle (n,) in degrees.
 
-    angle_deg: rotation of the tip's pair against the base's since rest, positive toward +y, or None without a
-    tip. noise_px: standard deviation of one coordinate of a marker, from the distance of pairs that are
-    rigid. remarks: what is odd and can be used.
+    angle_deg: rotation of the tip's pair relative to the base's since rest, positive toward +y; None without
+    a tip. noise_px: standard deviation in pixels of one coordinate of a marker, from the distance of pairs on
+    rigid parts. remarks: what is unusual.
     """
 
     names: tuple[str, ...]
@@ -91,10 +92,10 @@ class Motion:
 
 
 def motion(tracks: Tracks, view: View, rest: Array, time_s: Array, where: str = "") -> Motion:
-    """The unit's motion from followed markers; rest (n,) marks the frames from which the angle counts.
+    """Motion of the unit from tracked markers; rest (n,) marks the frames that define an angle of 0.
 
-    time_s (n,): for the remarks. where: of the data, for messages. Raises InputError for a view that does
-    not fit the tracks.
+    time_s (n,): time in s, for remarks; where: origin of the data, for messages. Raises InputError for a view
+    that does not fit the tracks, or a tip that is never visible at rest.
     """
     q = {name: _seen(tracks.of(name), view.camera) for name in tracks.names}
     _check(tracks, view, where)
@@ -262,9 +263,10 @@ def _remark_moved_base(middle: Array, turn: Array, apart: Array, remarks: list[R
 
 
 def resting(pressure_kPa: Array, seen: Sequence[Array] | Array, share: float, samples: int) -> Array:
-    """Frames (n,) of rest: the first few, `samples`, with pressure within a share of its range of 0.
+    """Marks (n,) of frames at rest: the first `samples` with abs(pressure) up to `share` of its range.
 
-    seen (k, n): frames in which every one of k things was there. Without any such frame, none is marked.
+    pressure_kPa (n,): in kPa; seen (k, n): frames in which each of k markers was visible, all of which must
+    be. No frame is marked where there is none.
     """
     still = np.abs(pressure_kPa) <= share * np.ptp(pressure_kPa)
     frames = np.flatnonzero(still & np.all(np.asarray(seen, bool), axis=0))[:samples]

@@ -124,9 +124,11 @@ def division(length: float, edge: float) -> int:
 
 @attrs.frozen(eq=False)
 class Membrane:
-    """Tetrahedra of the membrane: nodes (n, 3), tets (m, 4), triangles of the outer surface towards the
-    lattice and of the cavity (both (f, 3), normals out of the solid), and the true middle (e, 3) of each
-    of its `edges_of`."""
+    """Linear tetrahedra of the membrane and the middles that make them quadratic.
+
+    nodes (n, 3) in mm, tets (m, 4); outside and cavity (f, 3): triangles towards the lattice and of the
+    cavity, normals out of the solid; middles (e, 3) in mm: on the true surface, of each of `edges_of(tets)`.
+    """
 
     nodes: Array
     tets: Array

@@ -26,11 +26,12 @@ _DUNAVANT_WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3) / 2
 
 @attrs.frozen
 class Quality:
-    """What `mesh_quality` measures; volumes in mm3 are the whole body's, errors relative to the design.
+    """What `mesh_quality` measures of a mesh: counts, angles in degrees, Jacobians, volumes in mm3.
 
-    min_scaled_jacobian is the least ratio, in one element, of the smallest to the largest det J at its four
-    Gauss points: 1 where edges are straight, 0 where it folds; inverted counts elements that do.
-    min_corner_jacobian is that ratio at the corners, the worst points of a curved element.
+    Volumes are the whole body's, their errors relative to the design. min_scaled_jacobian is the least ratio,
+    in one element, of the smallest to the largest det J at its four Gauss points: 1 where edges are straight,
+    0 where it folds; inverted counts elements that do. min_corner_jacobian is that ratio at the corners, the
+    worst points of a curved element.
     """
 
     nodes: int

@@ -48,7 +48,7 @@ class CandidateBatch:
     def alone(self, number: int, pressures_MPa: Array) -> Array:
         """Monitored points (s, p, 3) in mm of one sensor's unit along its whole path through some pressures.
 
-        They are visited in order from the state without pressure. Raises ConvergenceError.
+        pressures_MPa (s,): visited in order from the state without pressure. Raises ConvergenceError.
         """
         equilibrium = self._batched_newton.alone(number)
         return self.points(equilibrium.path(pressures_MPa, equilibrium.at_zero_pressure()))
@@ -56,7 +56,8 @@ class CandidateBatch:
     def simulated_in_time(self, number: int, time_s: Array, pressure_kPa: Array) -> Array:
         """Monitored points (k, p, 3) in mm of one sensor's unit at k instants, in the order of time.
 
-        For what remembers: friction on the model's obstacles, or a law with history. Raises ConvergenceError.
+        time_s (k,) ascending, pressure_kPa (k,). For what remembers: friction on the model's obstacles, or a
+        law with history. Raises InputError where time runs backward, and ConvergenceError.
         """
         equilibrium = self._batched_newton.alone(number)
         equilibrium.settings = CONTACT_NEWTON

@@ -189,7 +189,8 @@ def gradients_of(trajectory: Trajectory, points: Array, monitor: Probe, stations
 def deviation_map(found: Influence, gradients: Array, weights: Array) -> Array:
     """dJ_hat (m,) in mm by each element's relative stiffening, alone and from Model A on.
 
-    J_hat is a mean of distances and has a kink at Model A, where all of them are 0: this is its slope
-    on the side of stiffening, and never negative.
+    gradients (s, j, 3, p, 3), weights (s,): as `mean_deviation` has them. J_hat is a mean of distances and
+    has a kink at Model A, where all of them are 0: this is its slope on the side of stiffening, and never
+    negative.
     """
     return mean_deviation(gradients, np.moveaxis(found.displacement, -1, 0), weights)

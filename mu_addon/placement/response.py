@@ -58,11 +58,12 @@ class Patterns:
 class Response:
     """Reduced response of a unit to any chain of its graph's steps.
 
-    For each of s states: flexibility (s, parities, q, q) between all patterns, drive (s, q) what Model A
-    does to them, and reach (s, p, 3, q), the displacement in mm of the monitored points. stiffness (q,):
-    the sensor's own, pattern by pattern; each representative step has as many `patterns`. step (e,) and
-    side (e,) of every step of the graph: the place of the one that represents it, and on which side of
-    the mirror plane it lies itself, 0 if in it. odd: which parities are.
+    For each of s states, at pressure_MPa (s,): flexibility (s, parities, q, q) between all patterns, drive
+    (s, q) the work of each pattern's forces under Model A's deformation, and reach (s, p, 3, q), the
+    displacement in mm of the monitored points. stiffness (q,): the sensor's own, pattern by pattern; each
+    representative step has as many `patterns`. step (e,) and side (e,) of every step of the graph: the place
+    of the one that represents it, and on which side of the mirror plane it lies itself, 0 if in it. odd:
+    which parities are.
     """
 
     graph: Graph

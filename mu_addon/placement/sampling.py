@@ -32,8 +32,8 @@ def solution_order(pressure: Array, has_gravity: bool = False) -> list[list[int]
 def polynomials(known: Array, wanted: Array) -> Array:
     """Weights (t, s) of values known at s pressures in their Lagrange polynomial at t others.
 
-    Pressures in any unit, the same for both. The polynomial is 0 at no pressure, unless the value there is
-    among the known ones.
+    known (s,), wanted (t,): pressures in one unit. The polynomial is 0 at no pressure, unless the value there
+    is among the known ones.
     """
     weights = np.empty((len(wanted), len(known)))
     vanishes = [] if (np.asarray(known) == 0).any() else [0.0]

@@ -30,10 +30,11 @@ class SearchSettings:
 
 @attrs.frozen(eq=False)
 class Search:
-    """A search's outcome over n paths, in mm: predicted J_hat, exact J_hat (NaN where unchecked), the best.
+    """A search's outcome over n paths: predicted and exact J_hat (n,) in mm, and the number of the best path.
 
-    risk: probability that an unchecked path beats the best, as `probability_of_better` has it; complete:
-    whether every path was checked or the risk is as small as was asked for.
+    exact_mm is NaN where unchecked. risk: probability that an unchecked path beats the best, as
+    `probability_of_better` has it; complete: whether every path was checked or the risk is as small as was
+    asked for.
     """
 
     predicted_mm: Array

@@ -51,7 +51,7 @@ _STYLE: Any = {
 
 
 def label(name: str) -> str:
-    """A path's name as it is read: alpha10 as "α10" with its number lowered."""
+    """A path's name as text: alpha10 as "α10" with a lowered number; other names unchanged."""
     match = re.fullmatch(r"alpha(\d+)", name)
     if match is None:
         return name
@@ -59,13 +59,16 @@ def label(name: str) -> str:
 
 
 def signed(text: str) -> str:
-    """`text` with true minus signs in front of its numbers, and none in front of zeros."""
+    """The text with true minus signs in front of numbers, and none in front of zero."""
     text = re.sub(r"(?<![\w-])-(?=0(?:\.0+)?(?![\d.]))", "", text)
     return re.sub(r"(?<![\w-])-(?=[\d.])", "−", text)
 
 
 def line_style(path: Path) -> dict[str, Any]:
-    """Colour by a path's length, dashes by its start: every window of six anchors looks different."""
+    """matplotlib's colour by a path's length and dashes by its start.
+
+    Every window of six anchors has another combination.
+    """
     return {
         "color": BY_LENGTH[(path.length - 3) % len(BY_LENGTH)],
         "linestyle": BY_START[(path.start - 1) % len(BY_START)],
@@ -73,7 +76,10 @@ def line_style(path: Path) -> dict[str, Any]:
 
 
 def unit_with_paths(view: SideView, paths: Sequence[Path], chosen: str, j_hat: Floats | None = None) -> str:
-    """The unit's section, and beside it every path as a lane at its true height, the chosen one in colour."""
+    """SVG of the unit's section and, beside it, each path as a line between the heights of its anchors.
+
+    chosen: name of the path drawn in colour; j_hat (paths,): mean deviations in mm, written below the lines.
+    """
     left, right, bottom, top = view.extent
     width, wide = 4.2, 1.85  # inches, of which the section's
     high = wide * (top - bottom) / (right - left)
@@ -132,7 +138,10 @@ def _scale_bar(axes: Any, middle: float, z: float, length: float) -> None:
 
 
 def angle_against_pressure(pressure_kPa: Floats, angle_deg: Floats) -> str:
-    """Bending angle against pressure, in the order the states were computed."""
+    """SVG of the bending angle (k,) in degrees against pressure (k,) in kPa, in the order of computation.
+
+    The angles at the lowest and at the highest pressure are written beside them.
+    """
     with canvas(WIDTH, 3.1) as (figure, svg):
         axes = figure.add_axes((0.14, 0.16, 0.82, 0.78))
         axes.axhline(0, color=QUIET, linewidth=0.8)
@@ -153,7 +162,7 @@ def angle_against_pressure(pressure_kPa: Floats, angle_deg: Floats) -> str:
 
 
 def contact_force(time_s: Floats, normal_N: Floats, friction_N: Floats) -> str:
-    """Sizes of a contact's normal force and friction over time."""
+    """SVG of the sizes of a contact's normal (k,) and friction force (k,) in N over time (k,) in s."""
     with canvas(WIDTH, 2.6) as (figure, svg):
         axes = figure.add_axes((0.14, 0.19, 0.82, 0.74))
         for values, color, style, name in (
@@ -168,7 +177,7 @@ def contact_force(time_s: Floats, normal_N: Floats, friction_N: Floats) -> str:
 
 
 def protocol(time_s: Floats, pressure_kPa: Floats) -> str:
-    """Pressure against time."""
+    """SVG of pressure (k,) in kPa against time (k,) in s."""
     with canvas(WIDTH, 2.3) as (figure, svg):
         axes = figure.add_axes((0.14, 0.21, 0.82, 0.72))
         axes.axhline(0, color=QUIET, linewidth=0.8)
@@ -179,7 +188,11 @@ def protocol(time_s: Floats, pressure_kPa: Floats) -> str:
 
 
 def heatmap(delta: Floats, top: float, chosen: bool = False) -> str:
-    """One path's deviation (k times, j stations), 0..`top` mm: length to the right, time upward."""
+    """SVG of one path's deviation delta (k, j) in mm at k times and j stations, coloured from 0 to `top` mm.
+
+    Arc length is to the right, time upward, both in percent; the colour goes by square root, as in
+    `color_bar`. chosen: whether its frame is drawn in colour.
+    """
     from matplotlib.colors import PowerNorm
 
     with canvas(1.75, 1.75) as (figure, svg):
@@ -203,7 +216,10 @@ def heatmap(delta: Floats, top: float, chosen: bool = False) -> str:
 
 
 def color_bar(top: float) -> str:
-    """The scale 0..`top` mm that a rule's heatmaps share; by square root, or the worst hides the rest."""
+    """SVG of the colour scale from 0 to `top` mm that the heatmaps of a rule share.
+
+    Colour goes by square root, so that small deviations are visible beside the largest.
+    """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import PowerNorm
 
@@ -219,7 +235,10 @@ def color_bar(top: float) -> str:
 
 
 def marginal(values: Floats, paths: Sequence[Path], chosen: str, along: str) -> str:
-    """One line a path of `values` (paths, n) in mm; `along` is "length" or "time"."""
+    """SVG of one line for each path of mean deviations (paths, n) in mm, over 0 to 100 % of length or time.
+
+    chosen: name of the path drawn bold; along: "length" or "time", for the axis.
+    """
     with canvas(WIDTH, 3.3) as (figure, svg):
         axes = figure.add_axes((0.14, 0.14, 0.66, 0.82))
         percent = np.linspace(0.0, 100.0, values.shape[1])
@@ -244,7 +263,10 @@ def marginal(values: Floats, paths: Sequence[Path], chosen: str, along: str) -> 
 
 
 def ranking(result: RuleResult, paths: Sequence[Path]) -> str:
-    """J_hat of every path as a bar, best first; the chosen one in colour, those tied with it hatched."""
+    """SVG of J_hat in mm of every path as a bar, best first.
+
+    The chosen path is coloured, paths tied with it are hatched; error bars give the mesh uncertainty.
+    """
     order = np.argsort(np.asarray(result.rank), kind="stable")
     names = [paths[i].name for i in order]
     values = np.asarray(result.j_hat)[order]
@@ -274,7 +296,7 @@ def ranking(result: RuleResult, paths: Sequence[Path]) -> str:
 
 
 def seconds(stages: Mapping[str, float]) -> str:
-    """How long each stage took, in the order they ran."""
+    """SVG of the duration of each stage in s, in the order in which they ran."""
     names, values = list(stages), np.array(list(stages.values()))
     high = 0.55 + 0.24 * len(names)
     with canvas(WIDTH, high) as (figure, svg):
@@ -294,7 +316,7 @@ def seconds(stages: Mapping[str, float]) -> str:
 
 @contextmanager
 def canvas(width: float, height: float) -> Iterator[tuple[Figure, Callable[[], str]]]:
-    """A figure of that many inches, and a function that gives its SVG text once the body has drawn it."""
+    """Context with a figure, sizes in inches, and a function that returns its SVG text after the context."""
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     stream = io.StringIO()
@@ -312,7 +334,7 @@ def canvas(width: float, height: float) -> Iterator[tuple[Figure, Callable[[], s
 
 @contextmanager
 def styled(width: float, height: float) -> Iterator[Figure]:
-    """A figure of that many inches in the house's style."""
+    """Context with a figure, sizes in inches, in the style of all charts; it must be saved within."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 

@@ -16,9 +16,10 @@ from .results import Picture
 
 
 def page(title: str, subtitle: str, notes: str, lead: str, sections: Sequence[tuple[str, str, str]]) -> str:
-    """A whole page as HTML text; sections are (key, title, HTML), and those without HTML are left out.
+    """A whole report page as HTML text without scripts or outside files.
 
-    title and subtitle are text; notes, above the lead, and the lead are HTML.
+    title, subtitle: text; notes, lead: HTML, the notes above the lead; sections: key, title and HTML of each,
+    those without HTML are left out.
     """
     css = (Path(__file__).parent / "report.css").read_text(encoding="utf-8")
     sections = [section for section in sections if section[2]]
@@ -41,19 +42,19 @@ def page(title: str, subtitle: str, notes: str, lead: str, sections: Sequence[tu
 
 
 def note(paragraphs: Iterable[str]) -> str:
-    """A box of warnings, each a paragraph of text; nothing where there is none."""
+    """HTML of a box with paragraphs of text; "" where there are none."""
     html = "".join(f"<p>{escape(paragraph)}</p>" for paragraph in paragraphs)
     return f'<div class="note">{html}</div>' if html else ""
 
 
 def cards(facts: Sequence[tuple[str, str]]) -> str:
-    """Key figures side by side, each a label and a value."""
+    """HTML of key figures side by side, each a label and a value, both HTML."""
     html = "".join(f"<div><dt>{signed(what)}</dt><dd>{signed(value)}</dd></div>" for what, value in facts)
     return f'<dl class="facts">{html}</dl>'
 
 
 def facts_table(left: str, right: str, facts: Mapping[str, Any]) -> str:
-    """A table of names and values, or nothing."""
+    """HTML of a table of names and values under two column titles; "" where there are none."""
     if not facts:
         return ""
     head = [(left, ""), (right, "" if right else "n")]
@@ -67,9 +68,10 @@ def table(
     groups: Sequence[tuple[str, int]] = (),
     css: str = "",
 ) -> str:
-    """A table that scrolls sideways by itself; `head` gives each column its title and class.
+    """HTML of a table that scrolls sideways by itself; texts are escaped.
 
-    `groups` are titles over so many columns each; `css` "stack" folds each row up on a phone.
+    head: title and CSS class of each column; rows: cells, and whether the row is the best; groups: titles
+    over so many columns each; css: "stack" shows each row as a block on a phone. A cell "FAILED" is marked.
     """
 
     def cell(tag: str, text: Any, kind: str, scope: str = "") -> str:
@@ -100,12 +102,12 @@ def table(
 
 
 def figure(svg: str, caption: str, alt: str, kind: str = "") -> str:
-    """A chart; `caption` is HTML."""
+    """HTML of a chart given as SVG text; caption: HTML, alt: text, kind: CSS class."""
     return _image("image/svg+xml", svg.encode(), caption, alt, kind)
 
 
 def picture_figure(picture: Picture) -> str:
-    """A picture with its caption."""
+    """HTML of a PNG picture with its caption, in which names of paths are written as by `label`."""
     caption = re.sub(r"\balpha\d+\b", lambda name: label(name[0]), signed(picture.caption))
     return _image("image/png", picture.png, escape(caption), picture.alt, "")
 
@@ -118,7 +120,7 @@ def _image(kind: str, data: bytes, caption: str, alt: str, css: str) -> str:
 
 
 def number(value: Any) -> str:
-    """Floats to six figures, the rest as it is."""
+    """A value as text: floats to six figures, whole numbers with spaced thousands, yes or no for flags."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int | np.integer):

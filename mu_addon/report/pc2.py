@@ -18,9 +18,10 @@ _MAGIC = b"POINTCACHE2\0"
 
 
 def write_pc2(path: Path, positions: Array, start_s: float, step_s: float) -> None:
-    """Write positions (k, p, 3) at k samples, `step_s` apart from `start_s` on. Raises OutputError.
+    """Write positions (k, p, 3) of p points at k samples, `step_s` apart from `start_s` on, both in s.
 
-    Little-endian, single precision: 12 letters, version 1, points, start, step, samples, then the points.
+    The PC2 format: little-endian, single precision, a header of 12 letters, version 1, points, start, step
+    and samples, then the positions. Raises OutputError.
     """
     samples, points, _ = positions.shape
     head = struct.pack(_HEADER, _MAGIC, 1, points, start_s, step_s, samples)
@@ -28,7 +29,10 @@ def write_pc2(path: Path, positions: Array, start_s: float, step_s: float) -> No
 
 
 def read_pc2(path: Path) -> tuple[Array, float, float]:
-    """Positions (k, p, 3), start and step in s of a PC2 file; raises InputError where it is none."""
+    """Positions (k, p, 3) in the unit of the file, and start and step in s, of a PC2 file.
+
+    Raises InputError for a file that is missing, incomplete or of another format.
+    """
     try:
         data = path.read_bytes()
         magic, version, points, start, step, samples = struct.unpack_from(_HEADER, data)

@@ -15,7 +15,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.func
 def crossing(a: wp.vec3, b: wp.vec3, y: float, lo: float, hi: float):
-    """Widen the span (lo, hi) to where the edge from a to b crosses the row y."""
+    """Span (lo, hi) of pixels, widened to where the edge from a to b crosses the row y; all in pixels."""
     if (a[1] <= y) != (b[1] <= y):
         x = a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
         lo = wp.min(lo, x)
@@ -34,7 +34,11 @@ def draw(
     depth: wp.array2d(dtype=float),
     owner: wp.array2d(dtype=int),
 ):
-    """Nearest face of every pixel: greatest nearness below `ceiling` into `depth`, its index into `owner`."""
+    """Nearest visible face of every pixel (h, w): its nearness into `depth`, its number into `owner`.
+
+    Nearness grows toward the viewer; only faces nearer than `depth` has and farther than `ceiling` are drawn,
+    up to the cutting plane. To be launched with dim 1: faces are drawn one after another.
+    """
     h = depth.shape[0]
     w = depth.shape[1]
     for f in range(faces.shape[0]):
@@ -91,7 +95,7 @@ def draw(
 
 @wp.struct
 class View:
-    """What turns a pixel into a ray: through the target's plane, along `towards` or from the eye."""
+    """The camera and cutting plane that turn a pixel into a ray: along `towards`, or from the eye."""
 
     target: wp.vec3
     right: wp.vec3
@@ -120,7 +124,11 @@ def surface(
     normal: wp.array2d(dtype=wp.vec3),
     color: wp.array2d(dtype=wp.vec3),
 ):
-    """Position, normal towards the viewer and colour of what every pixel sees; sections are filled."""
+    """Position in mm, unit normal toward the viewer and colour of what every pixel (h, w) sees.
+
+    Where the nearest face shows its back behind a cutting plane, the section is filled. To be launched with
+    dim (h, w).
+    """
     row, column = wp.tid()
     f = owner[row, column]
     if f < 0:
@@ -185,7 +193,11 @@ def shade(
     scale: float,  # pixels of a depth map per mm
     color: wp.array2d(dtype=wp.vec3),
 ):
-    """Multiply the colours by the light: a lamp, and the share of the sky that nothing blocks."""
+    """Multiply the colours of pixels (h, w) by the light of a lamp and of the sky that nothing blocks.
+
+    The unblocked share of the sky is found by comparing positions with the depth maps; each pixel takes one
+    of samples^2 subsets of the directions. To be launched with dim (h, w).
+    """
     row, column = wp.tid()
     if owner[row, column] < 0:
         return

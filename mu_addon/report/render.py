@@ -25,9 +25,9 @@ FAR = -1.0e30
 
 @attrs.frozen(eq=False)
 class Part:
-    """A triangle mesh with a colour: one sRGB triple (0..1) or one a vertex (n, 3); opacity 0..1.
+    """A triangle mesh with a colour: one sRGB triple, 0 .. 1, or one for each vertex (n, 3); opacity 0 .. 1.
 
-    A closed part shows a filled section where it is cut; one that is `whole` is left so.
+    A closed part shows a filled section where it is cut; a part that is `whole` is not cut.
     """
 
     vertices: Floats  # (n, 3) mm
@@ -39,9 +39,10 @@ class Part:
 
 @attrs.frozen(eq=False)
 class Camera:
-    """Looks at `target` from the side `towards`; `height` mm of the target's plane fill the picture.
+    """A camera that looks at `target` (3,) from the side `towards` (3,), with `up` (3,) upward; in mm.
 
-    Orthographic unless `distance` (mm from eye to target) is given.
+    height: extent of the target's plane in mm that fills the picture; distance: from eye to target in mm,
+    None for an orthographic picture.
     """
 
     target: Any
@@ -52,14 +53,14 @@ class Camera:
 
     @property
     def axes(self) -> Floats:
-        """Rows: right, up and towards the viewer, orthonormal (3, 3)."""
+        """Orthonormal unit vectors as rows (3, 3): right, up and toward the viewer."""
         towards = np.asarray(self.towards, float) / np.linalg.norm(self.towards)
         right = np.cross(np.asarray(self.up, float), towards)
         right /= np.linalg.norm(right)
         return np.array([right, np.cross(towards, right), towards])
 
     def extent(self, aspect: float) -> tuple[float, float, float, float]:
-        """Left, right, bottom and top of the picture in mm along `axes`, for an aspect of width / height."""
+        """Left, right, bottom and top of the picture in mm along `axes`; aspect: width over height."""
         x, y = self.axes[:2] @ np.asarray(self.target, float)
         half = 0.5 * self.height
         return x - half * aspect, x + half * aspect, y - half, y + half
@@ -67,9 +68,9 @@ class Camera:
 
 @attrs.frozen(eq=False)
 class Cut:
-    """A plane through `point`: what lies on the side its `normal` points to is left out.
+    """A cutting plane through `point` (3,) in mm: what lies on the side of its `normal` (3,) is not drawn.
 
-    Sections are filled with `color`, or with their part's where that is None.
+    color: sRGB of the sections, 0 .. 1, or None for that of their part.
     """
 
     point: Any
@@ -80,7 +81,10 @@ class Cut:
 def fit(
     parts: Sequence[Part], towards: Any, up: Any = (0.0, 0.0, 1.0), aspect: float = 1.0, margin: float = 0.04
 ) -> Camera:
-    """The orthographic camera that shows all `parts` with a `margin` (share of the picture) around them."""
+    """The orthographic camera that shows all `parts`, with a margin given as a share of the picture.
+
+    towards, up (3,): as in `Camera`; aspect: width over height of the picture.
+    """
     axes = Camera((0, 0, 0), towards, up, 1.0).axes
     seen = np.vstack([np.asarray(part.vertices, float) for part in parts]) @ axes.T
     low, high = seen.min(axis=0), seen.max(axis=0)
@@ -100,10 +104,11 @@ def render(
     layers: int = 2,
     ambient: bool = True,
 ) -> Image:
-    """Picture (height, width, 4) of `parts`, sRGB with straight alpha.
+    """Picture (height, width, 4) of `parts` in pixels: 8-bit sRGB with straight alpha.
 
-    `background` None leaves it transparent; `samples` squared are averaged a pixel; of translucent parts the
-    nearest `layers` surfaces show; `ambient` False leaves out the shade of parts on each other.
+    background: sRGB, 0 .. 1, None for transparent; samples: squared, the number of values averaged for a
+    pixel; layers: number of translucent surfaces shown behind each other; ambient: whether parts shade each
+    other.
     """
     scene = _Scene(parts, cut)
     shot = _Shot(scene, camera, width * samples, height * samples)
@@ -137,7 +142,7 @@ def render(
 
 
 def png(image: Image) -> bytes:
-    """`image` (h, w, 3 or 4) as the bytes of a PNG file."""
+    """Content of a PNG file of an image (h, w, 3 or 4) of 8 bits."""
     from PIL import Image as Pillow
 
     stream = io.BytesIO()

@@ -19,7 +19,7 @@ Floats = NDArray[np.floating[Any]]
 
 @attrs.frozen
 class Parameter:
-    """One row of the parameter table; `source` says where the value is from, or why it was assumed."""
+    """One row of the parameter table: value in `unit`, and its source or the reason why it was assumed."""
 
     path: str
     value: Any
@@ -30,7 +30,7 @@ class Parameter:
 
 @attrs.frozen
 class Gate:
-    """A check with a number: what was found, what was asked for, and whether it passed."""
+    """A geometry check: the value found, the limit as text, and whether it passed."""
 
     name: str
     value: Any
@@ -40,7 +40,7 @@ class Gate:
 
 @attrs.frozen
 class Path:
-    """A candidate sensor path: `length` contiguous anchors from P`start` (counted from 1, from the inlet)."""
+    """A candidate path: `length` consecutive anchors from P`start`, counted from 1 from the inlet on."""
 
     name: str
     start: int
@@ -48,13 +48,13 @@ class Path:
 
     @property
     def anchors(self) -> str:
-        """Its first and last anchor as text."""
+        """Its first and last anchor as text, such as "P2 to P5"."""
         return f"P{self.start} to P{self.start + self.length - 1}"
 
 
 @attrs.frozen(eq=False)
 class RuleResult:
-    """What one inclusion rule found, per path in the order of `ReportData.paths`."""
+    """Result of a placement with one inclusion rule; paths in the order of `ReportData.paths`."""
 
     delta: Floats  # (paths, k times, j stations) mm
     j_hat: Floats  # (paths,) mm
@@ -69,7 +69,7 @@ class RuleResult:
 
 @attrs.frozen(eq=False)
 class LatticePath:
-    """A path of the lattice that was solved exactly: points (h, 3) and length in mm, J_hat in mm."""
+    """A solved path through the lattice: points (h, 3) and length in mm, predicted and solved J_hat in mm."""
 
     name: str
     points: Floats
@@ -81,7 +81,10 @@ class LatticePath:
 
 @attrs.frozen(eq=False)
 class LatticeSearch:
-    """The search of the whole lattice: solved paths, best first, out of so many, and the risk left."""
+    """Search over all paths of the lattice: the solved ones, best first, and the number of all.
+
+    risk: upper bound, 0 .. 1, of the probability that an unsolved path is better.
+    """
 
     rule: str
     solved: Sequence[LatticePath]
@@ -108,10 +111,11 @@ CONTACT_COLUMNS = (
 
 @attrs.frozen(eq=False)
 class ContactHistory:
-    """A whole unit's contact with b rigid bodies at k instants; forces (b, k, 3) are its on them, in N.
+    """Contact of a whole unit with b rigid bodies at k instants: forces (b, k, 3) of the unit on them, in N.
 
-    area_mm2, sticking, deepest_mm, slid_mm and lost_mJ (b, k): see `fem.obstacle.ObstacleContact`; slid_mm is
-    the farthest that a point has slid so far.
+    area_mm2, sticking, deepest_mm, slid_mm and lost_mJ (b, k): see `fem.obstacle.Contact`; slid_mm is the
+    largest distance in mm that a point has slid so far. friction (b,): coefficients; time_s in s and
+    pressure_kPa in kPa (k,).
     """
 
     names: tuple[str, ...]
@@ -128,11 +132,11 @@ class ContactHistory:
 
     @property
     def force_N(self) -> Floats:
-        """Size (b, k) of the whole force."""
+        """Size (b, k) in N of the sum of normal and friction force."""
         return np.asarray(np.linalg.norm(self.normal_N + self.tangential_N, axis=2))
 
     def rows(self) -> list[tuple[Any, ...]]:
-        """A row of contact.csv an instant and body, see `CONTACT_COLUMNS`."""
+        """Rows of contact.csv, one for each instant and body, with columns CONTACT_COLUMNS; all text."""
         found = []
         for k, (time, pressure) in enumerate(zip(self.time_s, self.pressure_kPa, strict=True)):
             for b, name in enumerate(self.names):
@@ -144,7 +148,7 @@ class ContactHistory:
         return found
 
     def summary(self) -> dict[str, Any]:
-        """Its figures by name of the body; two of a name are told apart by their number."""
+        """Figures by number and name of the body: largest force in N and its instant, gap error, sliding."""
         found = {}
         for b, name in enumerate(self.names):
             k = int(self.force_N[b].argmax())
@@ -162,7 +166,7 @@ class ContactHistory:
 
 @attrs.frozen(eq=False)
 class Checks:
-    """Rays through a bent waveguide: angle_deg, Delta V / V_f and its error by their number, (k,) each."""
+    """Rays through a bent waveguide: angles (k,) in degrees, delta V / V_f (k,) and its error (k,)."""
 
     angle_deg: Floats
     delta: Floats
@@ -171,13 +175,14 @@ class Checks:
 
 @attrs.frozen(eq=False)
 class Signals:
-    """What light would tell along each path, in the order of the study's windows.
+    """Predicted optical signal of each path, arrays (paths,) in the order of the study's windows.
 
-    errors_per_deg: what the law's own error makes of a response's slope; at_rest: share of the light that
-    arrives at rest; checks: of the law for the least disturbing path, by rays; front: whether no path
-    disturbs less and tells more;
-    sets: pairs, then triples, of paths that tell most of how bending is spread along the unit, best first.
-    differential: pairs read one against the other, with the slope of their difference a degree, best first.
+    errors_per_deg: error of a response's slope, per degree, from the law's own; at_rest: share of the light
+    that arrives at rest; j_hat: mean deviations in mm; checks: of the law, by rays, for the path with the
+    least deviation; front: whether a path is Pareto-optimal in deviation and signal. sets: pairs, then
+    triples, of paths that together resolve the distribution of bending along the unit best, with the
+    logarithm of their information, best first; differential: pairs read against each other, with the slope of
+    their difference per degree, best first.
     """
 
     optics: Optics
@@ -195,7 +200,7 @@ class Signals:
 
 @attrs.frozen(eq=False)
 class Picture:
-    """An image with the words that go with it."""
+    """An image as PNG bytes, with a caption and an alternative text."""
 
     png: bytes
     caption: str
@@ -204,7 +209,7 @@ class Picture:
 
 @attrs.frozen(eq=False)
 class SideView:
-    """The unit seen along -x: `image` (h, w, 4), the y and z of its edges (`extent`) and anchors in mm."""
+    """The unit seen along -x: image (h, w, 4), extent (y, y, z, z) in mm, anchors (n, 2) as y and z in mm."""
 
     image: NDArray[np.uint8]
     extent: tuple[float, float, float, float]
@@ -213,7 +218,11 @@ class SideView:
 
 @attrs.frozen(eq=False)
 class ReportData:
-    """One run, as far as it came: what was not reached stays empty and is left out of the report."""
+    """Everything that a report shows of one run; what was not reached is empty and left out.
+
+    pressure_kPa and angle_deg (k,): of the converged states; protocol_s and protocol_kPa (n,): the pressure
+    protocol.
+    """
 
     title: str
     unit: str

@@ -11,7 +11,10 @@ Mesh = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
 def tube(points: ArrayLike, radius: float, sides: int = 20) -> Mesh:
-    """Vertices (v, 3), faces (f, 3) of a round-ended tube of `radius` along the polyline `points` (n, 3)."""
+    """Vertices (v, 3) and faces (f, 3) of a round-ended tube along a polyline (n, 3), closed and outward.
+
+    radius: in the unit of the points, such as mm; sides: flat pieces around it.
+    """
     line = np.asarray(points, float)
     steps = np.diff(line, axis=0)
     steps /= np.linalg.norm(steps, axis=1, keepdims=True)
@@ -42,7 +45,10 @@ def tube(points: ArrayLike, radius: float, sides: int = 20) -> Mesh:
 
 
 def ball(center: ArrayLike, radius: float, sides: int = 24) -> Mesh:
-    """Vertices (v, 3) and faces (f, 3) of a ball."""
+    """Vertices (v, 3) and faces (f, 3) of a ball around `center` (3,), closed and outward.
+
+    radius: in the unit of the centre, such as mm; sides: flat pieces around it.
+    """
     middle = np.asarray(center, float)
     short = np.array([0.0, 0.0, 1e-3 * radius])
     return tube([middle - short, middle + short], radius, sides)

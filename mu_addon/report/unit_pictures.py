@@ -28,7 +28,7 @@ _MIDDLE = np.array([[-1, 4, 6, 7], [4, -1, 5, 8], [6, 5, -1, 9], [7, 8, 9, -1]])
 
 
 def unit_parts(d: Dimensions, vertices: Floats, triangles: NDArray[np.integer]) -> list[Part]:
-    """The printable surface as two parts: the membrane with its inlet, and the lattice."""
+    """The printable surface, vertices (n, 3) in mm, triangles (m, 3), as membrane with inlet, and lattice."""
     radius = np.hypot(vertices[:, 0], vertices[:, 1])
     z = vertices[:, 2]
     membrane = (radius <= outer_radius(d, np.clip(z, 0.0, d.height)) + 1e-3 * d.cell) | (z < 0.0)
@@ -42,7 +42,11 @@ def unit_parts(d: Dimensions, vertices: Floats, triangles: NDArray[np.integer]) 
 def side_view(
     parts: Sequence[Part], anchors: Floats, path: ArrayLike, radius: float, width: int = 900
 ) -> SideView:
-    """The section x = 0 seen along -x, to scale, with `anchors` (n, 3) and the sensor along `path` (k, 3)."""
+    """The section x = 0 of the unit seen along -x, to scale, with anchors (n, 3) and a path (k, 3) in mm.
+
+    radius: of the sensor along the path in mm, 1.6 of it for the anchors' balls; a path of fewer than two
+    points is not drawn; width: of the image in pixels.
+    """
     seen = [*parts, *_sensor(anchors, np.asarray(path, float), radius)]
     camera, aspect = _framed(seen, (1.0, 0.0, 0.0))
     image = render(seen, camera, width, round(width / aspect), cut=SAGITTAL)
@@ -52,7 +56,10 @@ def side_view(
 def portrait(
     parts: Sequence[Part], anchors: Floats, path: ArrayLike, radius: float, width: int = 900
 ) -> Image:
-    """The unit cut open, seen from the front, above and the lattice's side, on white."""
+    """Image (h, width, 4) of the unit cut open, from the front, above and the lattice's side, on white.
+
+    anchors (n, 3), path (k, 3) and radius in mm as in `side_view`; width in pixels.
+    """
     seen = [*parts, *_sensor(anchors, np.asarray(path, float), radius)]
     camera, aspect = _framed(seen, (1.0, 0.55, 0.30))
     return render(seen, camera, width, round(width / aspect), cut=SAGITTAL, background=WHITE)
@@ -74,10 +81,10 @@ def motion(
     width: int = 560,
     beside: Sequence[RigidBody] = (),
 ) -> list[Picture]:
-    """One picture a state, all to one scale, of the mesh cut open along its sagittal plane.
+    """One picture for each state, all to one scale, of the mesh cut open along its sagittal plane.
 
-    A state is displacement (n, 3) in mm, caption and text for those who cannot see it. Rigid bodies beside
-    the unit are shown as far as they lie behind that plane and within the picture.
+    A state is displacement (n, 3) in mm, caption and alternative text. beside: rigid bodies, of which the
+    part at x <= 0 and within the picture is shown; width: in pixels.
     """
     skins = {region: skin(mesh.tets[mesh.region == region]) for region in (MEMBRANE, LATTICE)}
     colors = {MEMBRANE: MEMBRANE_COLOR, LATTICE: LATTICE_COLOR}
@@ -130,7 +137,7 @@ def _behind(bodies: Sequence[RigidBody]) -> list[Part]:
 
 
 def skin(tets: NDArray[np.integer]) -> NDArray[np.int64]:
-    """Outward triangles (f, 3) of the boundary of `tets` (m, 4 | 10); four a face if there are mid nodes."""
+    """Outward triangles (f, 3) on the boundary of tetrahedra (m, 4 | 10), four for a face with mid nodes."""
     corners, owner = boundary_faces(tets)
     if tets.shape[1] == 4:
         return corners.astype(np.int64)

@@ -20,9 +20,9 @@ _CELL = {4: "tetra", 10: "tetra10"}
 
 
 def write_mesh(path: Path, mesh: Mesh, modulus_MPa: Array, displacement: Array | None = None) -> None:
-    """Write `mesh` with region (m,), E_MPa (m,) and displacement_mm (n, 3) to a compressed binary .vtu.
+    """Write a mesh with region (m,), modulus (m,) in MPa and displacement (n, 3) in mm to a binary .vtu file.
 
-    Raises OutputError.
+    Without a displacement it is 0. Raises OutputError.
     """
     cells: dict[str, Array] = {
         "region": mesh.region.astype(np.int32),
@@ -33,16 +33,19 @@ def write_mesh(path: Path, mesh: Mesh, modulus_MPa: Array, displacement: Array |
 
 
 def write_fields(path: Path, mesh: Mesh, fields: dict[str, Array]) -> None:
-    """Write `mesh` with its region and values (m,) an element, in single precision. Raises OutputError."""
+    """Write a mesh with region and named values (m,) of its elements, each in its own unit, to a .vtu file.
+
+    Values are in single precision. Raises OutputError.
+    """
     cells = {name: np.asarray(values, np.float32) for name, values in fields.items()}
     _write(path, mesh, {}, {"region": mesh.region.astype(np.int32), **cells})
 
 
 def write_trajectory(path: Path, mesh: Mesh, states: Sequence[tuple[float, State]]) -> None:
-    """Write `states`, each with its time in s, to the .pvd `path` and one .vtu a state beside it.
+    """Write states, each with its time in s, to a .pvd file and one .vtu file a state, displacement in mm.
 
-    A state that holds at several times is written once. They lie in a folder of the .pvd's name; an earlier
-    run's are removed. Raises OutputError.
+    They lie in a folder of the .pvd file's name, from which files of an earlier run are removed. A state that
+    holds at several times is written once. Raises OutputError.
     """
     folder = make_folder(path.with_suffix(""))
     files: dict[int, str] = {}

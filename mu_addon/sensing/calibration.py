@@ -45,7 +45,10 @@ _CLEARLY = 0.25
 
 @attrs.frozen(eq=False)
 class CalibrationSweep:
-    """One bending to and fro: time_s, angle_deg and voltage_V (n,), the dark level already taken off."""
+    """One bending back and forth: time_s in s, angle_deg in degrees and voltage_V in V, (n,) each.
+
+    The dark level is already subtracted from the voltages.
+    """
 
     time_s: Array
     angle_deg: Array
@@ -75,20 +78,24 @@ class Calibration:
 
     @property
     def range_deg(self) -> tuple[float, float]:
-        """The angles that were swept."""
+        """Lowest and highest angle in degrees of the sweeps, between which the map holds."""
         return float(self.knots[_DEGREE]), float(self.knots[-_DEGREE - 1])
 
     def voltage_of(self, angle_deg: Array) -> Array:
-        """The voltages (n,) in V, dark level aside, that angles (n,) in degrees within the range give."""
+        """Voltages (n,) in V, dark level subtracted, at angles (n,) in degrees.
+
+        Angles outside `range_deg` are moved to its ends.
+        """
         low, high = self.range_deg
         clipped = np.clip(np.asarray(angle_deg, float), low, high)
         return np.asarray(BSpline(self.knots, self.coefficients, _DEGREE)(clipped)) * self.gain
 
     def angle_of(self, voltage_V: Array) -> tuple[Array, Array, Array, Array]:
-        """Angles, their 95 % low and high (n,) in degrees, and whether the map can give such a voltage (n,).
+        """Angles, and low and high ends of their 95 % intervals (n,) in degrees, and a validity mask (n,).
 
-        voltage_V (n,): dark level taken off. Where the sensor says nothing, low and high are the ends of that
-        interval and the angle its middle.
+        voltage_V (n,): in V, dark level subtracted. The mask is True where the map, within `band_V`, can give
+        the voltage. Where the map is flat, the angle is the middle of that interval; low and high are where
+        the map reaches the voltage less and plus `band_V`.
         """
         voltage = np.asarray(voltage_V, float) / self.gain
         angles = np.linspace(*self.range_deg, _TABLE)
@@ -103,9 +110,10 @@ class Calibration:
         return (first + last) / 2, np.minimum(near, far), np.maximum(near, far), possible
 
     def zeroed(self, voltage_V: float, angle_deg: float = 0.0) -> Calibration:
-        """The same map for light that has become stronger or weaker: told by a voltage at a known angle.
+        """The same map with `gain` set from one voltage at a known angle: light became stronger or weaker.
 
-        Raises InputError if no such light could be.
+        voltage_V: in V, dark level subtracted; angle_deg: in degrees. Raises InputError unless the gain is
+        between 0.05 and 20.
         """
         expected = float(attrs.evolve(self, gain=1.0).voltage_of(np.array([angle_deg]))[0])
         gain = voltage_V / expected if expected else math.nan
@@ -133,12 +141,12 @@ def _interval(volts: Array, angles: Array, at: Array) -> tuple[Array, Array]:
 
 
 def calibrate(sweeps: Sequence[CalibrationSweep], channel: str, dark: str | float = 0.0) -> Calibration:
-    """Fit a monotone map from voltage to bending angle, with a 95 % band, to two sweeps or more.
+    """Fit a monotonic map from voltage to bending angle, with its 95 % band, to two sweeps or more.
 
     channel: column of the recording that is calibrated; dark: the column of the dark level, or its value in
-    V. The number of spline intervals is the one that predicts left-out sweeps best; a drift of the light is
-    taken out if that quarters their squared error. Raises InputError where there is too little to fit, or
-    no signal.
+    V. The number of spline intervals is the one of least leave-one-out error; a drift of the light is removed
+    if that reduces the squared error of left-out sweeps to a quarter. Raises InputError for fewer than two
+    sweeps, too few readings or angles in one, values that are not numbers, or no signal.
     """
     _require(sweeps)
     middle = float(np.mean(np.concatenate([s.time_s for s in sweeps])))
@@ -303,10 +311,11 @@ def _independent(off: Array) -> float:
 
 
 def sweeps_of(time_s: Array, angle_deg: Array, voltage_V: Array, fewest: int = 2) -> list[CalibrationSweep]:
-    """Cut one record (n,) into sweeps, each to and fro; raises InputError for less than `fewest`.
+    """Cut one record into sweeps, each back and forth.
 
-    It is cut where the angle is lowest between two visits to the upper third of its range, so that neither
-    noise nor hesitation counts as a turn.
+    time_s in s, angle_deg in degrees and voltage_V in V, (n,) each; rows with a value that is not finite are
+    left out. It is cut where the angle is lowest between two visits to the upper third of its range, so that
+    neither noise nor hesitation counts as a turn. Raises InputError for fewer than `fewest` sweeps.
     """
     good = np.isfinite(angle_deg) & np.isfinite(voltage_V) & np.isfinite(time_s)
     time_s, angle_deg, voltage_V = time_s[good], angle_deg[good], voltage_V[good]
@@ -336,7 +345,7 @@ def sweeps_of(time_s: Array, angle_deg: Array, voltage_V: Array, fewest: int = 2
 
 
 def write_calibration(path: Path, calibration: Calibration, about: str = "") -> None:
-    """Write a calibration as TOML; raises OutputError."""
+    """Write a calibration to the TOML file `path`, headed by the lines of `about`; raises OutputError."""
     c = calibration
     low, high = c.range_deg
     values = {
@@ -357,7 +366,11 @@ def write_calibration(path: Path, calibration: Calibration, about: str = "") -> 
 
 
 def read_calibration(path: Path) -> Calibration:
-    """Read what `write_calibration` wrote; raises InputError with what is wrong."""
+    """Read a file of `write_calibration`.
+
+    Raises InputError where it cannot be read, has another version, lacks a value or has one that is no
+    number, or where its map is not monotonic.
+    """
     remedy = "name a calibration.toml"
     try:
         table = parse_toml(file_text(path), str(path))
@@ -403,9 +416,10 @@ def read_calibration(path: Path) -> Calibration:
 
 
 def deriver(calibration: Calibration) -> Any:
-    """What a session shows beside the voltages: angle_deg, its 95 % low and high, and 1 where the map holds.
+    """A function for `run_session` that adds angle_deg, its 95 % interval in degrees, and in_range.
 
-    Raises InputError, when it is called, if the stream has not the channels that were calibrated.
+    in_range is 1 where the map can give the voltage. The function takes columns and values (n, c) and returns
+    names and values (n, 4); it raises InputError where the stream lacks the calibrated channel.
     """
     names = ("angle_deg", "angle_low_deg", "angle_high_deg", "in_range")
 
@@ -416,7 +430,11 @@ def deriver(calibration: Calibration) -> Any:
 
 
 def light_of(calibration: Calibration, columns: Sequence[str], values: Array) -> Array:
-    """Voltages (n,) of the calibrated channel without its dark level, of values (n, c) in these columns."""
+    """Voltages (n,) in V of the calibrated channel, dark level subtracted.
+
+    columns: c names; values (n, c): in V. Raises InputError where the channel, or the dark level's, is
+    missing.
+    """
     level: Any = calibration.dark
     for name in (calibration.channel, *([level] if isinstance(level, str) else [])):
         if name not in columns:

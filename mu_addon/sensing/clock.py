@@ -11,10 +11,10 @@ Array = np.ndarray[Any, Any]
 
 
 class UnwrappedCounter:
-    """Readings of a counter that begins again at `modulus`, as one that never does.
+    """Readings of a counter that restarts at `modulus` (None: never), as one that does not restart.
 
     A reading less than half the modulus ahead of the last is later; anything else came out of order, or its
-    counter was set back.
+    counter was set back. last: the last accepted reading, set by the caller.
     """
 
     def __init__(self, modulus: int | None) -> None:
@@ -22,9 +22,10 @@ class UnwrappedCounter:
         self.last: float | None = None
 
     def ahead(self, reading: float, expected: float = 0.0) -> float:
-        """How far a reading is ahead of the last one, negative if behind; `expected` counts whole turns.
+        """Counts from the last reading to this one, negative if behind; 0 where there is no last one.
 
-        expected: how many counts should have passed since, from another clock; only turns are taken from it.
+        expected: how many counts should have passed since, by another clock; only whole turns are taken from
+        it.
         """
         if self.last is None:
             return 0.0
@@ -38,11 +39,11 @@ class UnwrappedCounter:
 
 
 class HostTime:
-    """Device time told in the host's, by the messages that were delayed least.
+    """Conversion of a device's time to the host's, in s, by the messages with the least delay.
 
-    A message is never early: host minus device time, seen when it arrives, is their offset plus a delay. The
-    least of each second lies near the offset, which drifts along a straight line as the two crystals differ;
-    the line is fitted through the last half minute and lowered until no message is early.
+    A message is never early: host minus device time at its arrival is their offset plus a delay. The least of
+    each second lies near the offset, which drifts linearly as the two oscillators differ; a line is fitted to
+    the last half minute and lowered until no message is early.
     """
 
     bin_s = 1.0
@@ -53,7 +54,7 @@ class HostTime:
         self._slope, self._offset, self._origin = 0.0, 0.0, 0.0
 
     def learn(self, device_s: float, host_s: float) -> None:
-        """Take in one arrival: device time of the newest sample of a message, and host time; both in s."""
+        """Add one arrival: device time of the newest sample of a message, and host time, both in s."""
         delta = host_s - device_s
         if self._least and device_s - self._least[-1][0] < self.bin_s:
             if delta >= self._least[-1][1]:
@@ -73,5 +74,5 @@ class HostTime:
         return device_s + self._offset + self._slope * (device_s - self._origin)
 
     def restart(self) -> None:
-        """Forget everything: the device's clock was set back."""
+        """Forget all arrivals: the device's clock was set back."""
         self._least.clear()

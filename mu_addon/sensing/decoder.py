@@ -51,7 +51,7 @@ _READERS: dict[str, Callable[[str], Pairs | list[float] | None]] = {
 
 @attrs.define
 class Counters:
-    """What has come over a line so far, and what has not come whole."""
+    """Counts of bytes, samples, and faults on a line since the decoder began."""
 
     bytes: int = 0
     samples: int = 0
@@ -87,7 +87,10 @@ class Reject(NamedTuple):
 
 @attrs.frozen
 class Layout:
-    """What a sample holds: channels by name, the unit of their values (or none), and its size a count."""
+    """What a sample holds: names of its channels, the unit of their values (or none), size of a count.
+
+    per_count: in `unit`; raw counts of frames are multiplied by it.
+    """
 
     channels: tuple[str, ...]
     unit: str = ""
@@ -96,10 +99,11 @@ class Layout:
 
 @attrs.frozen(eq=False)
 class Samples:
-    """Samples of one layout in the order they came.
+    """n samples of one layout with c channels, in the order they came.
 
-    host_s (n,): seconds on the host's clock, rising; device_s (n,): the device's own, without wraps, or nan;
-    sequence (n,): running number without wraps, counted on where the device sends none; values (n, c).
+    host_s (n,): seconds on the host's clock, rising; device_s (n,): the device's own in s, without wraps, or
+    nan; sequence (n,): running number without wraps, counted on where the device sends none; values (n, c) in
+    the layout's unit.
     """
 
     layout: Layout
@@ -113,10 +117,10 @@ class Samples:
 
 
 class Decoder:
-    """Turns the bytes of a serial line into samples; knows binary frames, label:value pairs, CSV and JSON.
+    """Converts the bytes of a serial line to samples; knows binary frames, label:value pairs, CSV and JSON.
 
     `feed` takes bytes as they come and returns the samples that are complete. Lost and damaged samples are
-    counted. It keeps at most a few kilobytes of input.
+    counted in `counters`. It keeps at most a few kilobytes of input.
     """
 
     def __init__(self) -> None:
@@ -153,13 +157,13 @@ class Decoder:
         self._unnamed_since = math.inf
 
     def interrupted(self) -> None:
-        """The line was cut: what is half read is as it is, and what comes next may begin in the middle."""
+        """Process pending input as it is: the line was cut, and the next bytes may begin within a frame."""
         self._flush_pending()
         self._flush_buffer()
         self._first = True
 
     def feed(self, data: bytes, at: float) -> list[Samples]:
-        """Samples in bytes that arrived at host time `at` in s, a group for each layout they came in."""
+        """Samples in bytes that arrived at host time `at` in s, a group for each run with one layout."""
         self.counters.bytes += len(data)
         self._buffer += data
         self._at = at
@@ -173,7 +177,11 @@ class Decoder:
         return self._timed_groups()
 
     def finish(self, at: float) -> list[Samples]:
-        """What still waits for a device to name its channels, for the rest of a sample, or for an end."""
+        """The samples still pending at the end of input, as they are; `at` is the host time in s.
+
+        These are frames without channel names, a sample that lacks channels, and one whose number is in
+        doubt.
+        """
         self._at = at
         if self.format is None:
             self._detect_format(enough=1)
@@ -187,7 +195,7 @@ class Decoder:
 
     @property
     def complaint(self) -> tuple[str, str] | None:
-        """What is wrong with bytes of which none can be read, and what to do; None while some can."""
+        """What is wrong with input of which almost nothing can be read, and what to do; else None."""
         counted = self.counters
         unread = counted.bytes - counted.read_bytes
         if self.format is not None or unread < _COMPLAINT_BYTES or 20 * counted.read_bytes > counted.bytes:

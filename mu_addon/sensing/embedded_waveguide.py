@@ -60,13 +60,14 @@ class EmbeddedWaveguide:
 
     @property
     def at_rest(self) -> tuple[Centreline, ...]:
-        """The axis as it is printed, see `legs`."""
+        """The axis as printed, one centreline from each bend to the next (see `legs`)."""
         return self.legs(self.nodes, np.tile(np.eye(3), (len(self.nodes), 1, 1)))
 
     def legs(self, positions: Array, rotations: Array) -> tuple[Centreline, ...]:
         """The axis where the nodes are at positions (h, 3) in mm, turned by rotations (h, 3, 3).
 
-        One centreline from each bend of the bar at rest to the next; s goes on from one to the next.
+        One centreline from each bend of the bar at rest to the next; s goes on from one to the next. Between
+        two nodes the axis is the cubic of a beam without load (Euler and Bernoulli).
         """
         way = np.diff(self.points, axis=0) / np.diff(self.s)[:, None]
         found: list[list[tuple[Array, Array, Array]]] = []
@@ -157,7 +158,10 @@ def _along(points: Array, corners: Array, centre: Array) -> float:
 
 @attrs.frozen(eq=False)
 class Joints:
-    """Lattice nodes (n, 3) in mm in a homogenised mesh: each moves and rotates as the body around it does."""
+    """Lattice nodes (n, 3) in mm in a homogenised mesh: each moves and rotates as the body around it does.
+
+    reach: half the width in mm over which the body around a node is averaged.
+    """
 
     nodes: Array
     reach: float
@@ -165,7 +169,10 @@ class Joints:
 
     @classmethod
     def of(cls, mesh: Mesh, nodes: Array, cell: float) -> Joints:
-        """Joints at nodes (n, 3) in mm; the body around one is half a cell wide, to even out elements."""
+        """Joints at nodes (n, 3) in mm of an undeformed mesh.
+
+        cell: the unit cell in mm; the body around a node is half a cell wide, to even out elements.
+        """
         reach = cell / 4
         offsets = np.concatenate([np.zeros((1, 3)), reach * np.eye(3), -reach * np.eye(3)])
         return cls(nodes, reach, embed(mesh, (nodes[:, None] + offsets).reshape(-1, 3)))

@@ -27,7 +27,7 @@ _COUNTS = [struct.Struct(f"<{n}H") for n in range(65)]
 
 
 def crc16(data: bytes) -> int:
-    """CRC-16/IBM-3740 of some bytes.
+    """CRC-16/IBM-3740 of bytes, 0 to 65535.
 
     >>> hex(crc16(b"123456789"))
     '0x29b1'
@@ -58,7 +58,7 @@ def cobs_encoded(data: bytes) -> bytes:
 
 
 def cobs_decoded(data: bytes) -> bytes | None:
-    """What COBS made these bytes from, or None where they cannot be COBS-encoded."""
+    """The bytes of which `cobs_encoded` made `data`, or None where `data` is not COBS-encoded."""
     out = bytearray()
     place, length = 0, len(data)
     while place < length:
@@ -74,23 +74,27 @@ def cobs_decoded(data: bytes) -> bytes | None:
 
 
 def framed(payload: bytes) -> bytes:
-    """A payload as it goes over the line, its end included."""
+    """A payload as it is sent: with its CRC, COBS-encoded, ended by a zero byte."""
     return cobs_encoded(payload + _CRC.pack(crc16(payload))) + END
 
 
 def sample_frame(sequence: int, time_us: int, counts: Sequence[int]) -> bytes:
-    """A SAMPLE: sequence number, device time in microseconds (both modulo 2^32), counts of 0 to 65535."""
+    """The frame of a SAMPLE.
+
+    sequence: running number, and time_us: device time in microseconds, both sent modulo 2^32; counts: 0 to
+    65535, 64 channels at most.
+    """
     head = _HEAD.pack(SAMPLE, sequence & 0xFFFFFFFF, time_us & 0xFFFFFFFF, len(counts))
     return framed(head + _COUNTS[len(counts)].pack(*counts))
 
 
 def info_frame(info: dict[str, Any]) -> bytes:
-    """An INFO: what the device says of itself."""
+    """The frame of an INFO: what the device says of itself, as JSON."""
     return framed(bytes([INFO]) + json.dumps(info, separators=(",", ":")).encode())
 
 
 def payload_of(frame: bytes) -> bytes | None:
-    """The payload of what stood between two zero bytes, or None if its CRC or its stuffing is wrong."""
+    """The payload of a frame without its final zero byte, or None if its CRC or COBS encoding is wrong."""
     data = cobs_decoded(frame)
     if data is None or len(data) < 3:
         return None
@@ -99,7 +103,7 @@ def payload_of(frame: bytes) -> bytes | None:
 
 
 def sample_of(payload: bytes) -> tuple[int, int, tuple[int, ...]] | None:
-    """Sequence, device time in microseconds and counts of a SAMPLE, or None if it is none."""
+    """Running number, device time in microseconds and counts of a SAMPLE's payload, or None if it is none."""
     if len(payload) < _HEAD.size:
         return None
     kind, sequence, time_us, n = _HEAD.unpack_from(payload)
@@ -109,7 +113,7 @@ def sample_of(payload: bytes) -> tuple[int, int, tuple[int, ...]] | None:
 
 
 def info_of(payload: bytes) -> dict[str, Any] | None:
-    """What an INFO says, or None if it is none."""
+    """The JSON object of an INFO's payload, or None if it is none."""
     if payload[:1] != bytes([INFO]):
         return None
     try:

@@ -18,11 +18,11 @@ WALL, ENTRY, EXIT, JUNCTION = 0, 1, 2, 3
 
 @attrs.frozen(eq=False)
 class Guide:
-    """A closed surface: vertices (n, 3) in mm, triangles (f, 3) outward, and what each is (f,).
+    """A closed surface: vertices (n, 3) in mm, triangles (f, 3) with normals outward, and their kinds (f,).
 
     WALL reflects and refracts; light enters at ENTRY and is detected at EXIT; JUNCTION opens into a strut of
-    the same resin, in which light is lost. entry_frame (3, 3): the entry's two edges in mm and its inward
-    normal; entry_corner (3,).
+    the same resin, in which light is lost. entry_frame (3, 3): rows are the entry's two edges in mm and its
+    inward unit normal; entry_corner (3,) in mm.
     """
 
     vertices: Array
@@ -54,12 +54,15 @@ class Centreline:
 
     @property
     def stretch(self) -> Array:
-        """Length now over length when straight, (n,)."""
+        """Stretch (n,) of the axis, length now over length when straight (no unit)."""
         return np.linalg.norm(np.gradient(self.points, self.s, axis=0, edge_order=2), axis=1)
 
 
 def arc(length: float, angle_deg: float, steps: int = 200) -> Centreline:
-    """A centreline bent to a circle's arc in the y-z plane, its well side outward for positive angles."""
+    """A centreline of `length` mm bent to a circle's arc in the y-z plane, in `steps` equal pieces.
+
+    angle_deg: angle in degrees between its ends; positive angles stretch the face with the wells.
+    """
     s = np.linspace(0.0, length, steps + 1)
     a = np.radians(angle_deg)
     if abs(a) < 1e-12:

@@ -44,9 +44,10 @@ CHANGE_MISFIT = 0.45
 
 
 def traced(shape: WaveguideShape, line: Centreline, optics: Optics, rays: int = RAYS, seed: int = 0) -> Light:
-    """Where a diffuse source's light ends in the bent guide, by traced rays.
+    """Where a diffuse source's light ends in the bent guide, by Monte Carlo ray tracing.
 
-    line: of the bar as if it had no wells, straight or with one leg at rest; see `with_wells`.
+    line: of the bar as if it had no wells, straight or with one leg at rest; see `with_wells`. rays: their
+    number. Raises InputError for wells that overlap or leave the bar.
     """
     guide = swept(
         with_wells(shape, line),
@@ -62,9 +63,11 @@ def traced(shape: WaveguideShape, line: Centreline, optics: Optics, rays: int = 
 
 
 def features(shape: WaveguideShape, legs: Sequence[Centreline]) -> Array:
-    """What the law is linear in, (8,), see FEATURES, of a guide whose axis consists of legs.
+    """Inputs (8,) of the linear law, named in FEATURES, of a guide whose axis consists of legs.
 
-    A bar's bends at rest, between two legs, are in none of them: what they cost is there at rest as well.
+    In mm, 1/mm and radians: length in mm, elongation in mm, kinks in rad, curvature at the wells in 1/mm,
+    integral of the squared curvature in 1/mm. The bends of the bar at rest, between two legs, are not
+    included: their loss is there at rest as well.
     """
     wells = np.asarray(shape.wells)
     stretched, kinked, signed, bent = 0.0, 0.0, 0.0, 0.0
@@ -93,8 +96,8 @@ def _area(values: Array, s: Array) -> float:
 class Law:
     """-log(transmitted) = coefficients (8,) times `features`, fitted to traces.
 
-    covariance (8, 8) of the coefficients; rms: of what it misses in traces left out, their noise included,
-    each weighed by its own.
+    coefficients: in one over the unit of each feature. covariance (8, 8): of the coefficients; rms: root mean
+    square error of log(transmitted) for traces left out, weighted, their own noise included.
     """
 
     coefficients: Array
@@ -102,11 +105,15 @@ class Law:
     rms: float
 
     def transmitted(self, shape: WaveguideShape, legs: Sequence[Centreline]) -> float:
-        """Share of the light that arrives."""
+        """Share (0 to 1) of the source's light that arrives, for a guide whose axis consists of legs."""
         return float(np.exp(-self.coefficients @ features(shape, legs)))
 
     def error(self, change: Array) -> float:
-        """Standard error of log(light)'s change by a change of features (8,), the law's misfit included."""
+        """Standard error of the change of log(light) by a change of features (8,), the law's misfit included.
+
+        No unit; 0 for no change. The misfit is `MISFIT` for each of two states and `CHANGE_MISFIT` of the
+        change.
+        """
         if not change.any():
             return 0.0
         missed = 2 * MISFIT**2 + (CHANGE_MISFIT * float(self.coefficients @ change)) ** 2
@@ -114,10 +121,10 @@ class Law:
 
 
 def straight_guide(d: Dimensions, length: float) -> WaveguideShape:
-    """A guide as printed straight along a column of cells, `length` mm from its first node to its last.
+    """A guide printed straight along a column of cells, `length` mm from its first node to its last.
 
-    Wells lie at whole pitches from the first node but for those in a strut, which is as wide as the bar at
-    least. Raises InputError where no well has room.
+    d: dimensions of the unit in mm. Wells lie at whole pitches from the first node but for those in a strut,
+    which is as wide as the bar at least. Raises InputError where no well has room.
     """
     end, half = d.waveguide_end, max(d.junction_diameter, d.waveguide_section) / 2
     total = length + 2 * end
@@ -145,8 +152,9 @@ def fit_law(
 ) -> Law:
     """A law of transmitted light for a unit's waveguides, fitted to traces of many lengths and bends.
 
-    d: printed dimensions of the unit; rays: a trace; traces: how many guides; on_trace: called with the
-    share done. Its rms error is found by leaving each trace out. Takes some seconds.
+    d: printed dimensions of the unit in mm; rays: in each trace; traces: how many guides; on_trace: called
+    with the share done. The law's rms error is the leave-one-out error. Takes some seconds. Raises InputError
+    where almost no light arrives.
     """
     random = np.random.default_rng(seed)
     rows, logs, spread = [], [], []

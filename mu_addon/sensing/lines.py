@@ -56,7 +56,10 @@ def pairs_of(line: str) -> Pairs | None:
 
 
 def json_of(line: str) -> Pairs | None:
-    """Numbers by name of a JSON object, or None; what is neither number nor true or false is left out."""
+    """Numbers by name of a JSON object, or None where the line is none.
+
+    Values that are neither number nor true or false are left out; None also for a name that comes twice.
+    """
     if not line.startswith("{"):
         return None
     try:
@@ -87,19 +90,22 @@ def _readable(found: Pairs) -> Pairs | None:
 
 
 def pairs_of_row(columns: list[str], row: list[float]) -> Pairs | None:
-    """A CSV row by its columns' names, or None where a clock or running number is beyond sense."""
+    """Values of a CSV row by column name, or None where a clock or running number is too large.
+
+    row: as many numbers as columns, in the device's units.
+    """
     return _readable(dict(zip(columns, row, strict=True)))
 
 
 def header_of(line: str) -> list[str] | None:
-    """Column names of a CSV header, or None if the line is none: names, none of them a number or twice."""
+    """Column names of a CSV header, or None where the line is none: every name valid and none twice."""
     names = _cells(line)
     named = all(_NAME.match(name) for name in names) and len(set(names)) == len(names)
     return names if names and named else None
 
 
 def row_of(line: str) -> list[float] | None:
-    """Numbers of a CSV row, or None where any field is no number.
+    """Numbers of a CSV row, in the device's units, or None where a field is no number or is infinite.
 
     >>> row_of("1.5,2"), row_of("time,light")
     ([1.5, 2.0], None)

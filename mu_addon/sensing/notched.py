@@ -23,8 +23,9 @@ _STEPS_A_MM = 8
 def with_wells(shape: WaveguideShape, line: Centreline) -> Centreline:
     """The axis of a bar with wells whose mean curvature and stretch are those of `line`.
 
-    The mean is over what struts hold, from the line's first junction to its last; beyond them it is as it
-    was. The far end face is elsewhere than the line's by a little, which light does not see.
+    Lengths in mm, curvatures in 1/mm. The mean is over what struts hold, from the line's first junction to
+    its last; beyond them it is as it was. The far end face is displaced a little from the line's, which has
+    no effect on light.
     """
     s, strain, curvature, before = _given_way(shape, line)
     step = np.diff(s)
@@ -38,7 +39,7 @@ def with_wells(shape: WaveguideShape, line: Centreline) -> Centreline:
 
 
 def well_angles(shape: WaveguideShape, line: Centreline) -> Array:
-    """By how much each well (n,) on the line bends the bar beyond the line's own curvature, in radians."""
+    """Angle (n,) in radians by which each well on the line bends the bar beyond the line's own curvature."""
     s, _, curvature, before = _given_way(shape, line)
     return shape.well_width * np.interp(
         _on(line, np.asarray(shape.wells)), (s[1:] + s[:-1]) / 2, curvature - before

@@ -17,7 +17,7 @@ from .clock import UnwrappedCounter
 
 
 class Row(NamedTuple):
-    """A sample as it was read."""
+    """A sample as it was read: number and clock as sent (None if absent), values, arrival time, bytes."""
 
     number: float | None
     """Running number, finite."""
@@ -30,7 +30,10 @@ class Row(NamedTuple):
 
 
 class Numbered(NamedTuple):
-    """A sample with its running number and device time (s, or nan), both without wraps."""
+    """A sample with its running number and device time in s (or nan), both without wraps.
+
+    clock_restarted: whether the device's clock began anew at this sample.
+    """
 
     row: Row
     sequence: int
@@ -40,7 +43,7 @@ class Numbered(NamedTuple):
 
 @attrs.define
 class Tally:
-    """What the numbers of the samples say."""
+    """Counts of what the samples' numbers show: missing, repeated and misnumbered samples, and restarts."""
 
     lost: int = 0
     repeated: int = 0
@@ -62,7 +65,10 @@ _ON, _GLITCH, _RUN = "on", "glitch", "run"
 
 
 class Numbering:
-    """Takes rows in the order they came; holds one back while its number or clock is in doubt."""
+    """Numbers rows in the order they came; holds one back while its number or clock is in doubt.
+
+    tick_s: seconds of one tick of the device's clock. left_out: repeated rows. tally: counts of faults.
+    """
 
     def __init__(self) -> None:
         self.tally = Tally()
@@ -97,12 +103,12 @@ class Numbering:
         return settled
 
     def finish(self) -> list[Numbered]:
-        """What was held back, judged as it stands."""
+        """The sample that was held back, if any, judged without one that follows it."""
         held, self._held = self._held, None
         return [] if held is None else [self._settle(held, None)]
 
     def forget(self) -> list[Numbered]:
-        """Another format begins: its numbers and clock have nothing to do with those before."""
+        """Settle the sample that was held back and forget numbers and clock: another format begins."""
         settled = self.finish()
         self.numbers, self.clock = UnwrappedCounter(None), UnwrappedCounter(None)
         self._odd = 0

@@ -9,11 +9,12 @@ from ..errors import InputError
 
 @attrs.frozen
 class Optics:
-    """What the resin does to light at one wavelength; for Elastic 50A at 850 nm nobody has published it.
+    """Optical constants of a resin at one wavelength; for Elastic 50A at 850 nm none are published.
 
-    index: of refraction; around: that of what surrounds it; attenuation_per_mm: natural logarithm of the loss
-    a mm; roughness: standard deviation of the wall's slope. The defaults are assumed: a silicone-like
-    index, a tenth of the light lost in a centimetre, walls as smooth as layers of 0.1 mm with rounded steps.
+    index, around: refractive index of the resin, and of what surrounds it; attenuation_per_mm: natural
+    logarithm of the loss a mm, in 1/mm; roughness: standard deviation of the wall's slope (no unit). The
+    defaults are assumed: a silicone-like index, a tenth of the light lost in a centimetre, walls as smooth as
+    layers of 0.1 mm with rounded steps. Raises InputError for an index outside 1 to 4 or negative losses.
     """
 
     index: float = 1.5

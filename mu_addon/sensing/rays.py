@@ -19,7 +19,10 @@ _MOST_HITS = 5000
 
 @wp.func
 def fresnel(cosine: float, n1: float, n2: float):
-    """Reflected share of unpolarised light, 1 beyond the critical angle."""
+    """Reflected share of unpolarised light, 1 beyond the critical angle (Fresnel's equations).
+
+    cosine: of the angle of incidence; n1, n2: refractive index before and behind the surface.
+    """
     sine = n1 / n2 * wp.sqrt(wp.max(0.0, 1.0 - cosine * cosine))
     if sine >= 1.0:
         return float(1.0)
@@ -44,7 +47,12 @@ def trace_rays(
     weight: wp.array(dtype=float),
     absorbed: wp.array(dtype=float),
 ):
-    """Follow each ray from outside the entry to its end."""
+    """Follow each of n rays from outside the entry to its end.
+
+    starts, directions (n): in mm, and of unit length; kinds (f): of the mesh's faces; index, around:
+    refractive indices; attenuation in 1/mm; roughness: standard deviation of the wall's slope (no unit).
+    Written: fate (n), weight (n), the share of its light left, and absorbed (n), the share absorbed.
+    """
     ray = wp.tid()
     state = wp.rand_init(seed, ray)
     p = starts[ray]

@@ -37,7 +37,10 @@ _MOST_REJECTS = 100_000_000
 
 
 def columns_of(samples: Samples) -> tuple[str, ...]:
-    """Columns that samples of this layout fill, units in the names, each a name that CSV can hold."""
+    """CSV column names of samples of this layout: the fixed ones, then one a channel with its unit.
+
+    Characters that CSV cannot hold are replaced, and names that repeat are numbered.
+    """
     unit = f"_{samples.layout.unit}" if samples.layout.unit else ""
     columns = list(FIXED)
     for channel in samples.layout.channels:
@@ -57,7 +60,11 @@ def _column(name: str) -> str:
 
 
 class Recorder:
-    """Writes one recording; `folder` must not hold one. Raises InputError and OutputError."""
+    """Writes one recording; `folder` must not hold one.
+
+    about: entries for the first line of the index. Raises InputError where the folder holds a recording and
+    OutputError where it cannot be written; every method may raise OutputError.
+    """
 
     def __init__(self, folder: Path, about: Mapping[str, Any]) -> None:
         self.folder = make_folder(folder)
@@ -82,7 +89,10 @@ class Recorder:
         self._index_line({"type": "recording", "version": VERSION, **about})
 
     def write(self, samples: Samples, start_s: float) -> None:
-        """Append samples, host times counted from start_s; they are the system's when this returns."""
+        """Append samples with host times counted from start_s, in s; the system has them when this returns.
+
+        A new file begins when the columns change. Raises OutputError.
+        """
         columns = columns_of(samples)
         if columns != self._columns:
             self._begin(columns)
@@ -101,7 +111,10 @@ class Recorder:
         self.rows += len(samples)
 
     def reject(self, rejects: Iterable[Reject], time_s: float) -> None:
-        """Keep the bytes of what gave no sample, as they came, until there are too many of them."""
+        """Append the bytes that gave no sample, and why, to rejects.ndjson; time_s in s from the start.
+
+        Nothing is kept beyond some 100 MB. Raises OutputError.
+        """
         messages = [
             {"time_s": round(time_s, 6), "why": why, "raw": raw.decode("latin-1")} for why, raw in rejects
         ]
@@ -120,7 +133,11 @@ class Recorder:
             self.event("rejects_full", time_s, detail=f"{REJECTS} grows no more; bytes are still counted")
 
     def tick(self, time_s: float, counters: Mapping[str, int]) -> None:
-        """Once a second of time_s: where the file is, into the index, and everything to the disk."""
+        """Once a second, write file position and counters to the index, and everything to the disk.
+
+        time_s: in s from the start; a call within a second of the last entry does nothing. Raises
+        OutputError.
+        """
         if time_s - self._indexed < _SYNC_S:
             return
         self._indexed = time_s
@@ -129,13 +146,13 @@ class Recorder:
         self._sync()
 
     def event(self, name: str, time_s: float, **details: Any) -> None:
-        """A line in the index: what happened, when in s from the start, and details of it."""
+        """Append an event to the index: name, time_s in s from the start, details; raises OutputError."""
         self._index_line(
             {"type": "event", "event": name, "time_s": round(time_s, 6), "row": self._row, **details}
         )
 
     def close(self) -> None:
-        """Everything to the disk, and the end."""
+        """Write everything to the disk and close the files; raises OutputError."""
         self._sync()
         for stream in (self._file, self._rejects):
             if stream is not None:
@@ -186,19 +203,22 @@ class Recorder:
 
 @attrs.frozen(eq=False)
 class Recording:
-    """One file of a recording: columns by name, (n,) each, and the index's messages of the whole folder."""
+    """One file of a recording: columns (n,) by name, units in the names, and the index's messages."""
 
     columns: dict[str, Array]
     messages: tuple[dict[str, Any], ...]
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of what was measured."""
+        """Names of the measured columns."""
         return tuple(name for name in self.columns if name not in FIXED)
 
 
 def read_recording(folder: Path) -> list[Recording]:
-    """The files of a recording in order; a last line cut by a crash is left out. Raises InputError."""
+    """The files of a recording in order; a last line cut by a crash is left out.
+
+    Raises InputError for a folder without an index and for a file or row that cannot be read.
+    """
     folder = Path(folder)
     messages = []
     try:

@@ -24,14 +24,17 @@ _START = 64
 
 @attrs.define(eq=False)
 class Ring:
-    """Rows (capacity, columns) of float64 in a mapped file; row k lies at k modulo capacity."""
+    """Ring buffer (capacity, columns) of float64 in a mapped file; row k lies at index k modulo capacity.
+
+    Columns have whatever units the writer gives them. One process appends, others read, none waits.
+    """
 
     rows: Array
     _map: mmap.mmap
 
     @classmethod
     def create(cls, path: Path, columns: int, capacity: int = 1 << 16) -> Ring:
-        """A new, empty ring at `path`; raises OutputError."""
+        """A new, empty ring in the file `path`, 65536 rows by default; raises OutputError."""
         size = _START + 8 * columns * capacity
         try:
             with path.open("wb+") as stream:
@@ -44,7 +47,7 @@ class Ring:
 
     @classmethod
     def attach(cls, path: Path) -> Ring:
-        """Look into the ring at `path`; raises InputError if it is none."""
+        """Open the ring in the file `path` to read; raises InputError where the file holds none."""
         try:
             with path.open("rb") as stream:
                 mapped = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
@@ -59,11 +62,11 @@ class Ring:
 
     @property
     def written(self) -> int:
-        """Rows written since the beginning, most of them overwritten by now."""
+        """Number of rows written so far, overwritten ones included."""
         return int(struct.unpack_from("<Q", self._map, _COUNT_AT)[0])
 
     def append(self, rows: Array) -> None:
-        """Write rows (n, columns); the latest capacity of them remain."""
+        """Write rows (n, columns); the last `capacity` rows written remain."""
         capacity, count = len(self.rows), self.written
         kept = rows[-capacity:]
         places = np.arange(count + len(rows) - len(kept), count + len(rows)) % capacity
@@ -72,10 +75,10 @@ class Ring:
         struct.pack_into("<Q", self._map, _COUNT_AT, count + len(rows))
 
     def since(self, row: int) -> tuple[Array, int]:
-        """A copy (m, columns) of the rows from number `row` on, and the number that comes next.
+        """A copy (m, columns) of the rows from number `row` on, and the number of the next row.
 
-        At most half of the ring, the latest: the other half is what the writer may overwrite while this
-        copies.
+        Values have the units of their writer. At most half of the ring, the latest: the other half is what
+        the writer may overwrite meanwhile.
         """
         count, capacity = self.written, len(self.rows)
         m = min(max(count - row, 0), capacity // 2)
@@ -86,7 +89,7 @@ class Ring:
         return self.since(max(0, self.written - n))[0][-n:]
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file; the ring cannot be used any more."""
         del self.rows
         self._map.close()
 

@@ -49,7 +49,7 @@ _BACK_OFF_S = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 
 @attrs.define
 class Control:
-    """What others ask of a running session, from any thread: set a flag, or leave a mark."""
+    """Requests to a running session, from any thread: stop, pause, or leave a mark (a text)."""
 
     stop: threading.Event = attrs.field(factory=threading.Event)
     pause: threading.Event = attrs.field(factory=threading.Event)
@@ -76,12 +76,13 @@ def run_session(
     keep_time: bool = False,
     on_event: EventHandler = lambda event, details: None,
 ) -> dict[str, Any]:
-    """Record a source into `folder` until it ends, `seconds` have passed, or it is asked to stop.
+    """Record a source into `folder` until it ends, `seconds` have passed, or `control` asks it to stop.
 
-    Beside the recording, status.json says five times a second how it goes, and names the file of the latest
-    samples (a Ring: time_s, device_s, sequence, channels, what `derive` makes of them). `on_event` is called
-    with events, and with "status" as often. keep_time: the source's clock is the time that is recorded, as
-    for a recording that is played again. Returns the last status. Raises InputError and OutputError.
+    Beside the recording, status.json is written five times a second and names the file of the latest samples
+    (a Ring: time_s, device_s, sequence, channels, columns of `derive`). about: entries for the recording's
+    index. on_event: called with events, and with "status" as often. keep_time: the source's clock is the time
+    that is recorded, as for a recording that is played again. Returns the last status. Raises InputError and
+    OutputError.
     """
     control = control or Control()
     clock = _Clock()

@@ -27,9 +27,10 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen(eq=False)
 class Signal:
-    """A waveguide's light in states of its body: transmitted (k,), the share of the source's that arrives.
+    """A waveguide's light in k states of its body: transmitted (k,), the share of the source's that arrives.
 
-    at_rest: the same of the body at rest; errors (k,): standard error of log(transmitted / at_rest).
+    at_rest: the same of the body at rest; errors (k,): standard error of log(transmitted / at_rest). No
+    units.
     """
 
     transmitted: Array
@@ -89,9 +90,10 @@ def traced_signal(
     rays: int = 60_000,
     seed: int = 0,
 ) -> Signal:
-    """The same as `signal_of_nodes`, by rays through the bent bar itself instead of the law.
+    """The light of an embedded waveguide in states of its nodes, by tracing rays in the bent bar.
 
-    Its errors are those of the number of rays. Raises InputError for a bar that is not straight at rest.
+    moved: for each of k states positions (h, 3) in mm and rotations (h, 3, 3). errors are the statistical
+    ones of so many rays (no unit). Raises InputError for a bar that is not straight at rest.
     """
     if len(guide.at_rest) > 1:
         raise InputError(
@@ -125,12 +127,16 @@ class Response:
 
     @property
     def delta(self) -> Array:
-        """Delta V / V_f (k,): the share of the light at rest that is lost."""
+        """Delta V / V_f (k,): the share of the light at rest that is lost (no unit)."""
         return 1 - self.transmitted / np.interp(self.rest_deg, self.angle_deg, self.transmitted)
 
 
 def response(angle_deg: Array, share: Array, rest_deg: float = 0.0) -> Response:
-    """The figures of a signal `share` (k,) at angles (k,) that include that at rest; see Response."""
+    """Sensitivity, monotonic range and span of a signal over bending; see `Response`.
+
+    angle_deg (k,): in degrees, in any order; share (k,): of the light that arrives; rest_deg: the angle at
+    rest. Raises InputError for fewer than two different angles, or if rest_deg is outside them.
+    """
     order = np.argsort(angle_deg, kind="stable")
     angle, light = np.asarray(angle_deg, float)[order], np.asarray(share, float)[order]
     keep = np.r_[True, np.diff(angle) > 1e-9]
@@ -163,7 +169,11 @@ def response(angle_deg: Array, share: Array, rest_deg: float = 0.0) -> Response:
 
 
 def pareto(disturbance: Sequence[float], sensitivity: Sequence[float]) -> list[bool]:
-    """Which candidates are Pareto-optimal: no other disturbs less and senses more, (n,) bool."""
+    """Which of n candidates are Pareto-optimal: no other disturbs less and senses more.
+
+    disturbance (n,) and sensitivity (n,): each in one unit of the caller's; the sign of a sensitivity does
+    not matter.
+    """
     d, s = np.asarray(disturbance, float), np.abs(np.asarray(sensitivity, float))
     better = (
         (d[None] <= d[:, None]) & (s[None] >= s[:, None]) & ((d[None] < d[:, None]) | (s[None] > s[:, None]))
@@ -172,10 +182,11 @@ def pareto(disturbance: Sequence[float], sensitivity: Sequence[float]) -> list[b
 
 
 def best_sets(signals: Array, noise: float, size: int, most: int = 5) -> list[tuple[tuple[int, ...], float]]:
-    """Sets of `size` sensors that tell the most, best first, with the logarithm of their information.
+    """Sets of `size` sensors with the largest information, best first, and that information in nats.
 
-    signals (n, q): each sensor's derivative by q independent ways to bend, each of unit spread; noise: of a
-    reading. D-optimality with a unit prior: log det(1 + S^T S / noise^2) / 2, in natural units.
+    signals (n, q): each sensor's derivative by q independent ways to bend, each of unit standard deviation;
+    noise: standard deviation of a reading, in the unit of the signals. D-optimality with a unit prior: log
+    det(1 + S^T S / noise^2) / 2. most: how many sets. Raises InputError for a size outside 1 to n.
     """
     n, q = signals.shape
     if not 1 <= size <= n:
@@ -188,10 +199,11 @@ def best_sets(signals: Array, noise: float, size: int, most: int = 5) -> list[tu
 
 
 def differential_pairs(sensitivity: Sequence[float], most: int = 5) -> list[tuple[tuple[int, int], float]]:
-    """Pairs of sensors whose difference changes most with bending, best first, and by how much.
+    """Pairs of sensors whose difference changes most with bending, best first, with that signed change.
 
-    sensitivity (n,): relative change of each one's light by bending. What dims both alike, such as a light
-    source that warms, is not in the difference of their logarithms.
+    sensitivity (n,): relative change of each one's light by bending, in 1/degree, say; the result has the
+    same unit. What dims both alike, such as a light source that warms, cancels in the difference of their
+    logarithms.
     """
     pairs = [((i, j), sensitivity[i] - sensitivity[j]) for i, j in combinations(range(len(sensitivity)), 2)]
     return sorted(pairs, key=lambda pair: -abs(pair[1]))[:most]

@@ -20,24 +20,24 @@ _WAIT_S = 0.02
 
 
 class ConnectionLost(Exception):
-    """The line is cut; it may come back."""
+    """The line is interrupted; it may come back."""
 
 
 class EndOfStream(Exception):
-    """There is nothing more to come, ever."""
+    """The source has ended: no more bytes will come."""
 
 
 class Source(Protocol):
-    """A line that is opened, read until it is Gone or Ended, closed, and perhaps opened again."""
+    """A line that is opened, read until it raises Gone or Ended, closed, and perhaps opened again."""
 
     def open(self) -> str:
-        """Open it; returns what it is in words. Raises Gone if it is not there now, InputError for good."""
+        """Open the line and describe it in words; raises Gone if it is absent now, InputError for good."""
 
     def read(self) -> bytes:
-        """What has come, waiting a few hundredths of a second at most; raises Gone and Ended."""
+        """The bytes that have come, after at most a few hundredths of a second; raises Gone and Ended."""
 
     def close(self) -> None:
-        """Let others have it."""
+        """Close the line, so that others can open it."""
 
 
 @attrs.frozen
@@ -52,7 +52,7 @@ class Port:
 
     @property
     def identity(self) -> str | None:
-        """usb:VID:PID or usb:VID:PID:SERIAL, the same in whatever socket it is; None for other ports."""
+        """usb:VID:PID or usb:VID:PID:SERIAL, the same at every socket; None where it is no USB device."""
         if self.vid is None or self.pid is None:
             return None
         serial = f":{self.serial_number}" if self.serial_number else ""
@@ -88,7 +88,10 @@ def find(name: str, present: list[Port]) -> Port | None:
 
 
 class SerialLine:
-    """A serial port by pyserial; a USB device is found again in whatever socket it comes back."""
+    """A serial port by pyserial; a USB device is found again in whatever socket it comes back.
+
+    name: of the device file, or usb:VID:PID[:SERIAL]; baud: bits a second.
+    """
 
     def __init__(self, name: str, baud: int = 115200, list_ports: Callable[[], list[Port]] = ports) -> None:
         self.name, self.baud = name, baud
@@ -96,7 +99,11 @@ class SerialLine:
         self._line: Any = None
 
     def open(self) -> str:
-        """Open the port, for itself alone; see Source."""
+        """Open the port for exclusive use and describe it in words.
+
+        Raises Gone where it is absent or cannot be opened, InputError where several devices fit or pyserial
+        is missing.
+        """
         serial = _serial()
         port = find(self.name, self._list_ports())
         if port is None and self.name.startswith("usb:"):
@@ -112,7 +119,7 @@ class SerialLine:
         return device if port is None else f"{device} ({port.description})"
 
     def read(self) -> bytes:
-        """See Source."""
+        """The bytes that have come, after a wait of 0.02 s at most; raises Gone where the port fails."""
         try:
             data = self._line.read(1)
             waiting = self._line.in_waiting
@@ -122,7 +129,7 @@ class SerialLine:
             raise ConnectionLost(str(error)) from None
 
     def close(self) -> None:
-        """See Source."""
+        """Close the port."""
         if self._line is not None:
             try:
                 self._line.close()
@@ -132,7 +139,10 @@ class SerialLine:
 
 
 class Replay:
-    """A recording as the lines of a device that sends CSV, `speed` times as fast, or at once if 0."""
+    """A recording as the CSV lines of a device, `speed` times as fast, or at once if 0.
+
+    Raises InputError where the recording cannot be read or contains no samples.
+    """
 
     def __init__(self, folder: Path, speed: float = 1.0) -> None:
         self.folder, self.speed = Path(folder), speed
@@ -144,12 +154,12 @@ class Replay:
         self._start = 0.0
 
     def open(self) -> str:
-        """See Source."""
+        """Start the replay's clock and describe the source."""
         self._start = time.perf_counter()
         return f"recording {self.folder.name}"
 
     def read(self) -> bytes:
-        """See Source."""
+        """The lines due by now, 2000 at most; raises Ended after the last one."""
         until = (time.perf_counter() - self._start) * self.speed if self.speed > 0 else np.inf
         out: list[bytes] = []
         while len(out) < 2000:
@@ -168,7 +178,7 @@ class Replay:
         return b"".join(out)
 
     def close(self) -> None:
-        """See Source."""
+        """Does nothing: no file is kept open."""
 
 
 def _lines(recordings: list[Recording]) -> Iterator[tuple[float, bytes]]:
@@ -186,7 +196,11 @@ def _lines(recordings: list[Recording]) -> Iterator[tuple[float, bytes]]:
 
 
 class Simulated:
-    """A sensor that is not there: volts of its channels as a function of time, sent as binary frames."""
+    """A simulated sensor that sends its channels' voltages as binary frames.
+
+    volts: of time in s, a voltage in V for each channel; rate_hz: samples a second; noise_V: standard
+    deviation of white noise in V; full_scale_V: voltage in V of the largest count, 65535; seed: of the noise.
+    """
 
     def __init__(
         self,
@@ -203,12 +217,12 @@ class Simulated:
         self._sent, self._start = 0, 0.0
 
     def open(self) -> str:
-        """See Source."""
+        """Start the sensor's clock, going on where it stopped, and describe the source."""
         self._start = time.perf_counter() - self._sent / self.rate_hz
         return "simulated sensor"
 
     def read(self) -> bytes:
-        """See Source."""
+        """The frames due by now, after a wait of 0.02 s, with an INFO about once a second."""
         time.sleep(_WAIT_S)
         due = int((time.perf_counter() - self._start) * self.rate_hz)
         out = []
@@ -224,7 +238,7 @@ class Simulated:
         return b"".join(out)
 
     def close(self) -> None:
-        """See Source."""
+        """Does nothing: there is no line."""
 
 
 def _serial() -> Any:

@@ -22,7 +22,10 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen
 class Light:
-    """Shares of the light that was sent toward the entry, by where it ended, and the error of `detected`."""
+    """Shares (0 to 1) of the light sent toward the entry, by where it ended.
+
+    detected: the share that reaches the detector; error: its standard error; shares: by the names in FATES.
+    """
 
     detected: float
     error: float
@@ -30,7 +33,10 @@ class Light:
 
 
 def lambertian(guide: Guide, rays: int, seed: int = 0) -> tuple[Array, Array]:
-    """Starts and directions (rays, 3) of light from a diffuse source that touches the whole entry."""
+    """Starts in mm and unit directions (rays, 3) of light from a diffuse source that touches the whole entry.
+
+    rays: their number; seed: of the random numbers.
+    """
     random = np.random.default_rng(seed)
     right, up, inward = guide.entry_frame
     u, v = random.random((2, rays))
@@ -46,7 +52,10 @@ def lambertian(guide: Guide, rays: int, seed: int = 0) -> tuple[Array, Array]:
 
 
 def beam(guide: Guide, rays: int, angle_deg: float = 0.0, seed: int = 0) -> tuple[Array, Array]:
-    """Starts and directions (rays, 3) of parallel light on the entry, tilted toward the wells' side."""
+    """Starts in mm and unit directions (rays, 3) of parallel light on the entry.
+
+    angle_deg: tilt in degrees toward the side of the wells; rays: their number; seed: of the starts.
+    """
     starts, _ = lambertian(guide, rays, seed)
     _, up, inward = guide.entry_frame
     a = np.radians(angle_deg)

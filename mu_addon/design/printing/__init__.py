@@ -1,1 +1,1 @@
-"""Print check: what a printer would make of a triangle surface, measured against its limits."""
+"""Printability check of a triangle surface against the limits of a printer and its resin."""

@@ -15,7 +15,11 @@ from .voxels import VoxelColumns
 def build_findings(
     built: VoxelColumns, chambers: Chambers, printer: Printer
 ) -> tuple[list[Finding], dict[str, float]]:
-    """Findings of a build, its columns along the build direction a layer high, and its cups in ml."""
+    """Findings on islands, cups, overhangs and bridges of a build, and the volumes of its cups in ml by name.
+
+    built: the part's columns along the build direction, cells one layer high; chambers: to tell islands
+    within them from those outside. The limits are the printer's.
+    """
     begun = layers.islands(built, layers.regions(built, free=False))
     closed = layers.cups(built, layers.regions(built, free=True))
     over = layers.overhangs(built, printer["overhang_deg"])

@@ -44,7 +44,7 @@ Stage = Callable[[str], AbstractContextManager[Any]]
 
 @attrs.frozen(eq=False)
 class PrintCheck:
-    """What a check found: every check's outcome, key figures by name, build directions, the best first."""
+    """Result of a printability check: findings, figures by name with unit, build directions, best first."""
 
     findings: list[Finding]
     figures: dict[str, float]
@@ -52,7 +52,7 @@ class PrintCheck:
 
     @property
     def worst(self) -> Severity:
-        """`error`, `warning` or `pass`."""
+        """The worst severity among the findings: `error`, `warning` or `pass`."""
         found = {f.severity for f in self.findings}
         return "error" if "error" in found else "warning" if "warning" in found else "pass"
 
@@ -67,11 +67,12 @@ def check(
     stages: Collection[str] = STAGES,
     stage: Stage = nullcontext,
 ) -> PrintCheck:
-    """Check a surface (n, 3), (m, 3) in mm as its STL is read back.
+    """Printability check of a surface of vertices (n, 3) in mm and triangles (m, 3), as its STL is read back.
 
-    With a unit, its inlet, chamber and drawing are known and checked against. direction points away from
-    the platform. A surface that is not closed is examined no further than its faces. `stages` may leave some
-    out, for a quick answer: layers need chambers, directions need both chambers and thickness.
+    unit, window: of the design, whose inlet, size, struts and wells are then checked too; direction: away
+    from the platform. A surface that is not closed, inside out or of the wrong size is examined no further.
+    `stages` may leave some out: layers need chambers, directions need chambers and thickness. stage: context
+    that is entered, with its name, for each stage. Raises InputError for a window that does not fit the unit.
     """
     vertices, triangles = stl_surface(stl_bytes(vertices, triangles))
     up = np.asarray(direction, float) / np.linalg.norm(direction)

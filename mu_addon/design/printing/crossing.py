@@ -18,9 +18,10 @@ _PAIRS_AT_ONCE = 200_000
 
 
 def crossings(vertices: Vertices, triangles: Triangles) -> Points:
-    """Places (k, 3) in mm where an edge of one triangle goes through the inside of another.
+    """Points (k, 3) in mm where an edge of one triangle passes through the interior of another.
 
-    Triangles with a common edge are not tested against each other; overlap within one plane is not seen.
+    vertices (n, 3) in mm, triangles (m, 3). Triangles with a common edge are not tested against each other;
+    overlap within one plane is not found, nor penetration by less than DEPTH mm.
     """
     pairs = near_pairs(vertices[triangles])
     shared = (triangles[pairs[:, 0]][:, :, None] == triangles[pairs[:, 1]][:, None, :]).sum(axis=(1, 2))
@@ -33,7 +34,10 @@ def crossings(vertices: Vertices, triangles: Triangles) -> Points:
 
 
 def near_pairs(corners: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Pairs (p, 2) of triangles (m, 3, 3) whose boxes overlap, each once, by hashing into cells."""
+    """Pairs (p, 2) of numbers of triangles, corners (m, 3, 3) in mm, whose bounding boxes overlap, each once.
+
+    Found by hashing the boxes into cells of a grid.
+    """
     low, high = corners.min(axis=1), corners.max(axis=1)
     if not len(corners):
         return np.empty((0, 2), np.int64)

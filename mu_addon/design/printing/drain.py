@@ -23,8 +23,10 @@ Box = tuple[slice, ...]
 
 @attrs.frozen(eq=False)
 class Opening:
-    """A way out of a chamber: its narrowest place (3,) in mm, the radius there of the widest ball in mm, to
-    a cell, and the unit vector (3,) along the way."""
+    """A way out of a chamber: its narrowest place (3,) in mm, and the unit vector (3,) along the way there.
+
+    radius: of the largest ball in mm that fits there, to within a cell.
+    """
 
     place: Array
     radius: float
@@ -33,9 +35,9 @@ class Opening:
 
 @attrs.frozen(eq=False)
 class Chamber:
-    """A pocket: its widest place (3,) in mm, the ball's radius there, its volume in mm3, its ways out.
+    """A pocket: its widest place (3,) in mm, the radius of the largest ball there in mm, its volume in mm3.
 
-    The widest way comes first; a sealed chamber has none.
+    openings: its ways out, the widest first; a sealed chamber has none.
     """
 
     place: Array
@@ -46,9 +48,10 @@ class Chamber:
 
 @attrs.frozen(eq=False)
 class DistanceField:
-    """Distance in mm, up to DEEP, from the centre of every free cell to the surface; 0 in the solid.
+    """Distances (nx, ny, nz) in mm, DEEP at most, of free cells' centres from the surface; 0 in the solid.
 
-    A cell's distance is to the nearest solid cell's centre less half a cell: within half a cell of true.
+    It is the distance to the nearest solid cell's centre less half a cell, and so within half a cell of the
+    true one.
     """
 
     columns: VoxelColumns
@@ -57,8 +60,10 @@ class DistanceField:
 
 @attrs.frozen(eq=False)
 class Chambers:
-    """The chambers of a part, the largest first, and the grid's cells within them, up to their ways out's
-    narrowest places; free: the cells that hold no solid."""
+    """The chambers of a part, the largest first, and the grid's cells (nx, ny, nz) within them.
+
+    within: cells of a chamber, up to the narrowest places of its ways out; free: cells that hold no solid.
+    """
 
     found: list[Chamber]
     columns: VoxelColumns
@@ -66,11 +71,11 @@ class Chambers:
     free: NDArray[np.bool_]
 
     def hold(self, points: Array) -> NDArray[np.bool_]:
-        """Whether each of the points (n, 3) in mm lies in a chamber's cell."""
+        """Whether each of the points (n, 3) in mm lies in a cell of a chamber, (n,)."""
         return np.asarray(self.within[self._cells(points)])
 
     def beside(self, points: Array) -> NDArray[np.bool_]:
-        """Whether each of the points (n, 3) in mm lies in a free cell that is in no chamber."""
+        """Whether each of the points (n, 3) in mm lies in a free cell of no chamber, (n,)."""
         cells = self._cells(points)
         return np.asarray(self.free[cells] & ~self.within[cells])
 
@@ -81,7 +86,10 @@ class Chambers:
 
 
 def distance_field(columns: VoxelColumns) -> DistanceField:
-    """Distances of a grid of cubes, slab by slab, so that memory beside the answer does not grow."""
+    """Distances to the surface in a grid of cubes, computed slab by slab to limit memory; see `Room`.
+
+    columns: cells as high as wide; the outermost cells of the grid count as DEEP mm from the surface.
+    """
     from scipy.ndimage import distance_transform_edt
 
     step = float(columns.step[0])
@@ -107,9 +115,10 @@ def distance_field(columns: VoxelColumns) -> DistanceField:
 
 
 def chambers(space: DistanceField, smallest_radius: float = 1.0) -> Chambers:
-    """Pockets that narrow toward the outside, the largest first, with every way out that the grid shows.
+    """Pockets that narrow toward the outside, the largest first, with every way out that the grid resolves.
 
-    Ways out are found down to a radius of about 0.87 of a cell: what passes through a wall of cells.
+    smallest_radius: in mm, that the largest ball in a pocket must have at least. Ways out are found down to a
+    radius of about 0.87 of a cell; narrower ones cannot be told from a wall of cells.
     """
     from scipy.ndimage import find_objects, label
 

@@ -1,4 +1,4 @@
-"""Faults of a triangle surface as such: open, doubled, turned over, in pieces, hollow."""
+"""Faults of a triangle surface: open edges, doubled or flipped faces, loose pieces, sealed voids."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ MOST_SHELLS = 400
 
 
 class Edges(NamedTuple):
-    """Edges of a surface: ends (e, 2), and the edge (3 m,) and direction (3 m,) of every side.
+    """Edges of triangles (m, 3): their ends (e, 2), and of each side its edge and its direction, (3 m,) each.
 
-    Side k of triangle t is number k m + t and runs from corner k to the next.
+    Side k of triangle t is number k m + t and runs from corner k to the next; forward: from the lower to the
+    higher vertex number.
     """
 
     ends: NDArray[np.int64]
@@ -28,7 +29,10 @@ class Edges(NamedTuple):
 
 @attrs.frozen(eq=False)
 class Shell:
-    """A closed connected part of a surface: its triangles (m,) by number, signed volume in mm3, centroid."""
+    """A closed connected part of a surface: its triangles (k,), volume in mm3 and centroid (3,) in mm.
+
+    The triangles are given by number; the volume is negative for a surface that faces inward.
+    """
 
     triangles: NDArray[np.int64]
     volume: float
@@ -37,7 +41,7 @@ class Shell:
 
 @attrs.frozen(eq=False)
 class Pieces:
-    """Shells by what they are: solid bodies, the largest first; sealed voids; and solids within solids."""
+    """Shells by kind, the largest first: solid bodies, sealed voids, solids within solids, inside out."""
 
     bodies: list[Shell]
     voids: list[Shell]
@@ -46,7 +50,7 @@ class Pieces:
 
 
 def edges(triangles: Triangles) -> Edges:
-    """Edges of triangles (m, 3)."""
+    """Edges of triangles (m, 3), each once, and which edge every side belongs to."""
     sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     forward = sides[:, 0] < sides[:, 1]
     low, high = sides.min(axis=1), sides.max(axis=1)
@@ -56,7 +60,7 @@ def edges(triangles: Triangles) -> Edges:
 
 
 def doubled(triangles: Triangles) -> NDArray[np.bool_]:
-    """Which triangles (m,) have all three corners of one before them, whichever way they turn."""
+    """Which triangles (m, 3) have the same three corners as an earlier one, in any order; (m,)."""
     key = np.sort(triangles, axis=1)
     order = np.lexsort(key.T[::-1])
     same = np.zeros(len(key), bool)
@@ -65,9 +69,10 @@ def doubled(triangles: Triangles) -> NDArray[np.bool_]:
 
 
 def open_places(vertices: Vertices, triangles: Triangles) -> tuple[Points, int]:
-    """Middles (k, 3) of the surface's holes, the largest first, and the number of open edges.
+    """Middles (k, 3) in mm of a surface's holes, the largest first, and the number of open edges.
 
-    A hole is a connected run of edges with one triangle; edges of more than two count as well.
+    vertices (n, 3) in mm, triangles (m, 3). An edge is open unless exactly two triangles share it; a hole is
+    a connected set of open edges.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -87,7 +92,10 @@ def open_places(vertices: Vertices, triangles: Triangles) -> tuple[Points, int]:
 
 
 def turned(vertices: Vertices, triangles: Triangles) -> NDArray[np.bool_]:
-    """Which triangles (m,) face the other way than the larger part of the surface they are joined to."""
+    """Which triangles (m, 3) face against the larger part, by area in mm2, of their surface; (m,).
+
+    vertices (n, 3) in mm. Triangles belong together where exactly two share an edge.
+    """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import breadth_first_order, connected_components
 
@@ -122,7 +130,11 @@ def turned(vertices: Vertices, triangles: Triangles) -> NDArray[np.bool_]:
 
 
 def pieces(vertices: Vertices, triangles: Triangles) -> Pieces:
-    """The shells of a closed, oriented surface, told apart by what encloses them."""
+    """The shells of a closed, oriented surface of vertices (n, 3) in mm and triangles (m, 3), by kind.
+
+    The kind follows from the sign of a shell's volume and from whether the other shells enclose it, by the
+    winding number; beyond the MOST_SHELLS largest, shells count as not enclosed.
+    """
     from scipy.sparse.csgraph import connected_components
 
     m = len(triangles)
@@ -152,9 +164,10 @@ def pieces(vertices: Vertices, triangles: Triangles) -> Pieces:
 
 
 def winding(point: Points, corners: Points) -> float:
-    """How often triangles (m, 3, 3) wind around a point (3,): their solid angles over 4 pi.
+    """Winding number of triangles, corners (m, 3, 3), around a point (3,): their solid angles over 4 pi.
 
-    Source: Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30 (1983) 125.
+    Corners and point are in one unit of length. Source: Van Oosterom and Strackee, IEEE Trans. Biomed. Eng.
+    30 (1983) 125.
     """
     if not len(corners):
         return 0.0

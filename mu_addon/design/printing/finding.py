@@ -1,4 +1,4 @@
-"""What a print check has to say: a value, its limit, where, and how bad it is."""
+"""Findings of the printability check: a value, its limit, where it shows, and how severe it is."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ class Finding:
 
     @property
     def is_fault(self) -> bool:
-        """Whether something is to be done about it."""
+        """Whether something must be done: severity `error` or `warning`."""
         return self.severity in ("error", "warning")
 
     def plain(self) -> dict[str, Any]:
-        """Its fields by name, for a file."""
+        """Its fields by name, for a file; arrays stay arrays."""
         return attrs.asdict(self)
 
 
 def clustered(points: Points, badness: NDArray[np.float64] | None = None, reach: float = 1.0) -> Points:
-    """One place (k, 3) for each group of points (n, 3) that lie within `reach` mm of one another.
+    """One place (k, 3) in mm for each group of points (n, 3) in mm that lie within about `reach` mm.
 
-    It is the group's worst point, of the greatest badness (n,), or its middle; the worst group comes first,
-    or the largest.
+    It is the group's point of the greatest badness (n,), the group of the worst first; or, without badness,
+    its mean, the largest group first.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -75,7 +75,10 @@ def clustered(points: Points, badness: NDArray[np.float64] | None = None, reach:
 
 
 def none_of(name: str, number: int, places: Points, what: tuple[str, str], remedy: str) -> Finding:
-    """A finding of something of which there must be none; `what` says one of them and several."""
+    """Finding on faults of which there must be none: `error` for any number of them, else `pass`.
+
+    places (k, 3) in mm; what: the text for one fault and for several, which follows their number.
+    """
     return Finding(
         name,
         "error" if number else "pass",
@@ -100,7 +103,10 @@ def at_least(
     places: Points = NOWHERE,
     remedy: str = "",
 ) -> Finding:
-    """A finding of something that must reach the printer's limit `key`, in mm."""
+    """Finding on a value in mm that must reach the printer's limit `key`: `severity` if below, else `pass`.
+
+    what: the text; places (k, 3) in mm; remedy: what to do, shown only if the value is below the limit.
+    """
     limit = printer.limits[key]
     bad = value < limit.value
     return Finding(
@@ -119,5 +125,5 @@ def at_least(
 
 
 def counted(number: int, one: str, several: str) -> str:
-    """`1 triangle lies on another`, `3 triangles lie on others`."""
+    """The number with the fitting text: `1 triangle lies on another`, `3 triangles lie on others`."""
     return f"{number} {one if number == 1 else several}"

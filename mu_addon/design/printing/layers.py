@@ -22,10 +22,11 @@ _ROUND[:, :, 1] = True
 
 @attrs.frozen(eq=False)
 class Regions:
-    """Connected regions of every layer, of solid or of what is free, and which touch from layer to layer.
+    """Connected regions of every layer, of solid or free cells, and which overlap from layer to layer.
 
-    layer, cells, middle (r,), (r,), (r, 3): of each region, by number; middle in cells, see Columns.points.
-    outside (r,): those that reach the edge of the grid. links (l, 2): a region and one on it.
+    layer (r,): number of each region's layer; cells (r,): count of its cells; middle (r, 3): its mean, in
+    cells, see VoxelColumns.points; outside (r,): whether it reaches the edge of the grid. links (l, 2):
+    numbers of a region and of one in the next layer above it.
     """
 
     layer: NDArray[np.int64]
@@ -37,7 +38,7 @@ class Regions:
 
 @attrs.frozen(eq=False)
 class Islands:
-    """Regions that begin on nothing: where (n, 3) in mm, the largest first, and their areas (n,) in mm2."""
+    """Islands, the largest first: places (n, 3) in mm of their middles, and areas (n,) in mm2."""
 
     places: Array
     area: Array
@@ -45,8 +46,10 @@ class Islands:
 
 @attrs.frozen(eq=False)
 class Cups:
-    """Volumes that the part seals against the film: mm3 (n,) when largest, the largest first, and where
-    (n, 3) in mm their middles are. sealed (n,): those that never open."""
+    """Cups, the largest first: largest sealed volumes (n,) in mm3, and places (n, 3) in mm of their middles.
+
+    sealed (n,): whether a cup never opens.
+    """
 
     volume: Array
     places: Array
@@ -55,8 +58,11 @@ class Cups:
 
 @attrs.frozen(eq=False)
 class Overhang:
-    """Parts of layers that reach beyond what lies below: farthest point (n, 3) in mm, its distance (n,) in
-    mm to the supported part, and whether it is held from both sides (n,)."""
+    """Regions of layers beyond what supports them: their farthest points (n, 3) in mm.
+
+    reach (n,): distance of these points from the supported part, in mm; bridge (n,): whether a region is
+    supported from opposite sides.
+    """
 
     places: Array
     reach: Array
@@ -64,7 +70,10 @@ class Overhang:
 
 
 def regions(columns: VoxelColumns, free: bool, at_once: int = 8_000_000) -> Regions:
-    """Regions of the solid, cells touching by side or corner, or of what is free, touching by side."""
+    """Connected regions of every layer: free cells that touch by side, or solid ones, by side or corner.
+
+    free: which of both; at_once: largest number of cells that are held in memory at a time.
+    """
     from scipy.ndimage import label
 
     nx, ny, levels = columns.shape
@@ -103,7 +112,10 @@ def regions(columns: VoxelColumns, free: bool, at_once: int = 8_000_000) -> Regi
 
 
 def islands(columns: VoxelColumns, solid: Regions) -> Islands:
-    """Regions above the first layer with nothing of the part below them."""
+    """Islands: solid regions above the first layer without any solid below them.
+
+    solid: the regions of the solid in the same columns.
+    """
     held = np.zeros(len(solid.layer), bool)
     held[solid.links[:, 1]] = True
     found = np.flatnonzero(~held)
@@ -114,10 +126,11 @@ def islands(columns: VoxelColumns, solid: Regions) -> Islands:
 
 
 def cups(columns: VoxelColumns, free: Regions) -> Cups:
-    """What is closed in from the side and from the platform's side, layer by layer; it opens, if ever, later.
+    """Cups: groups of free regions that are closed in from the sides and from the platform's side.
 
-    Regions are joined in the order in which they are built; a group that has not met the outside is closed
-    off by the film. Its volume is largest just before it does.
+    free: the free regions in the same columns. Regions are joined in the order of building; while a group has
+    not met the outside, the film seals it. A cup's volume is that just before its group meets the outside, or
+    that of the whole group if it never does.
     """
     parent = list(range(len(free.layer)))
     # Of each group of regions: cells, and the sums of their middles; whether it met the outside; its start.
@@ -155,9 +168,10 @@ def cups(columns: VoxelColumns, free: Regions) -> Cups:
 
 
 def overhangs(columns: VoxelColumns, slope_deg: float, at_once: int = 8_000_000) -> Overhang:
-    """What every layer holds out beyond the layer below it, widened by what `slope_deg` from level carries.
+    """What layers extend beyond the layer below, which supports slopes of `slope_deg` degrees from level.
 
-    Islands are no overhangs. What is held from opposite sides is a bridge, of twice the reach.
+    Islands are left out. A region supported from opposite sides is a bridge, whose span is twice its reach.
+    at_once: largest number of cells that are held in memory at a time.
     """
     from scipy.ndimage import label
 

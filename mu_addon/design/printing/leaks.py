@@ -17,9 +17,10 @@ from .voxels import frame_along
 
 
 def drainage_findings(solid: Any, chambers: Chambers, unit: Unit | None, printer: Printer) -> list[Finding]:
-    """Whether every chamber of a Manifold drains through its inlet, and through nothing else.
+    """Findings on whether every chamber of a Manifold in mm drains through its inlet and is tight otherwise.
 
-    Without a unit a chamber's widest way out is taken for its inlet, and others are warned of.
+    With a unit the inlet's place is known, and the number of chambers that a plug in it seals off is checked
+    exactly. Without one a chamber's widest way out is taken for its inlet, and others are warnings.
     """
     limit = printer.limits["drain_diameter_mm"]
     step = float(chambers.columns.step[0])

@@ -1,4 +1,4 @@
-"""Where two parts of a surface hang together by the shortest closed curves: holes too small for a grid."""
+"""Shortest closed curves that separate two parts of a surface: finds holes too small for a grid."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ _GRAIN = 1e-3
 def necks(
     vertices: Vertices, triangles: Triangles, one: NDArray[np.bool_], other: NDArray[np.bool_]
 ) -> list[Points]:
-    """Edges' middles (k, 3) of each closed curve of the shortest cut of a surface between two parts.
+    """Shortest closed curves that separate two parts of a surface, each as its edges' middles (k, 3) in mm.
 
-    `one` and `other` (m,) mark triangles on either side. The cut is the least by its length: the minimum cut
-    of the graph of triangles, whose links are as strong as their common edges are long.
+    vertices (n, 3) in mm, triangles (m, 3); one (m,), other (m,): mark the triangles of either part. The
+    curves are the minimum cut of the graph of triangles, whose links are as strong as the common edges are
+    long. An empty list where nothing connects the parts, or one is empty.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import breadth_first_order, connected_components, maximum_flow

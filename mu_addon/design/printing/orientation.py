@@ -1,4 +1,4 @@
-"""Which way up to print: cups, islands, overhangs and height of many build directions, and the trade-off."""
+"""Build directions compared by cups, islands, overhangs and height, with the Pareto-optimal ones."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Array = NDArray[np.float64]
 
 @attrs.frozen
 class Build:
-    """One build direction, a unit vector away from the platform, and what it costs.
+    """One build direction, a unit vector away from the platform, and its costs.
 
-    cup_ml: the largest volume sealed against the film; islands: regions that begin on nothing; support_mm2:
-    surface flatter than the printer's slope that needs supports; inner_mm2: the part of it in chambers,
-    where no support can be removed; height_mm; fits: within the build volume, turned about the direction by
-    0 or 90 degrees; best_among: no other direction is as good in all of these and better in one.
+    cup_ml: the largest volume sealed against the film; islands: their number; support_mm2: surface flatter
+    than the printer's slope, which needs supports; inner_mm2: the part of it in chambers, where supports
+    cannot be removed; height_mm: along the direction; fits: whether the part fits the build volume, turned
+    about the direction by 0 or 90 degrees; best_among: whether the build is Pareto-optimal in these.
     """
 
     direction: tuple[float, float, float]
@@ -37,7 +37,10 @@ class Build:
 
     @property
     def costs(self) -> tuple[float, ...]:
-        """What is to be small, the most important first; in steps below which directions count as equal."""
+        """Costs to minimise, the most important first: not fitting, cup, inner, islands, support, height.
+
+        In the units of the attributes, rounded to steps below which directions count as equal.
+        """
         return (
             float(not self.fits),
             0.5 * round(2.0 * self.cup_ml),
@@ -49,14 +52,14 @@ class Build:
 
 
 def directions() -> Array:
-    """The 26 directions (26, 3) to the sides, edges and corners of a cube; the six along the axes first."""
+    """Unit vectors (26, 3) to the sides, edges and corners of a cube; the six along the axes first."""
     every = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
     every = every[np.argsort(np.abs(every).sum(axis=1), kind="stable")]
     return np.asarray(every / np.linalg.norm(every, axis=1, keepdims=True))
 
 
 def tilted(direction: Array, degrees: float) -> Array:
-    """Eight directions (8, 3) inclined against `direction`, all around it."""
+    """Eight unit vectors (8, 3) inclined by this angle in degrees to a direction (3,), evenly around it."""
     x, y, z = frame_along(direction)
     angle = np.arange(8) * np.pi / 4.0
     away = np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y
@@ -73,9 +76,11 @@ def build(
     slope_deg: float,
     room: tuple[float, float, float],
 ) -> Build:
-    """What printing along `direction` (3,) costs, on a grid of `step` mm; room is the build volume's, mm.
+    """Costs of printing a surface, vertices (n, 3) in mm and triangles (m, 3), along a unit vector (3,).
 
-    Samples cover the surface, in_chamber (s,) marks those on a chamber's.
+    surface: samples of it, of which in_chamber (s,) marks those of chambers; step: cell of the grid in mm;
+    slope_deg: flattest slope from level, in degrees, that needs no support; room: sizes of the build volume
+    in mm.
     """
     grid = voxel_columns(vertices, triangles, step, frame=frame_along(direction))
     closed = cups(grid, regions(grid, free=True))
@@ -96,17 +101,14 @@ def build(
 
 
 def fits(extent: Array, room: tuple[float, float, float]) -> bool:
-    """Whether a part of `extent` (3,) mm fits the room as it stands or turned by 90 degrees about z."""
+    """Whether extents (3,) in mm fit a build volume in mm, as they are or turned by 90 degrees about z."""
     x, y, z = extent.tolist()
     flat = (x <= room[0] and y <= room[1]) or (y <= room[0] and x <= room[1])
     return bool(flat and z <= room[2])
 
 
 def ranked(builds: list[Build]) -> list[Build]:
-    """The builds, the one to choose first, the Pareto-optimal ones marked.
-
-    Order: fits, then the largest cup, flat surface in chambers, islands, supported surface, height.
-    """
+    """The builds in the order of their `costs`, the best first, with the Pareto-optimal ones marked."""
     cost = np.array([b.costs for b in builds])
     as_good = (cost[:, None, :] <= cost[None, :, :]).all(axis=2)
     better = (cost[:, None, :] < cost[None, :, :]).any(axis=2)
@@ -125,7 +127,10 @@ def orientations(
     room: tuple[float, float, float],
     own: Array,
 ) -> list[Build]:
-    """Builds along 26 directions, the part's `own` (3,), and eight tilted by 20 degrees about the best."""
+    """Ranked builds along 26 directions, the part's `own` (3,), and eight at 20 degrees to the best of these.
+
+    vertices (n, 3) in mm and triangles (m, 3); in_chamber (s,) and the other arguments are as in `build`.
+    """
 
     def built(direction: Array) -> Build:
         return build(vertices, triangles, surface, in_chamber, direction, step, slope_deg, room)

@@ -38,7 +38,10 @@ MEANING = {
 
 @attrs.frozen
 class Limit:
-    """One figure, where it is from, and whether nobody has published it for this printer and resin."""
+    """One limit of a printer with a resin, its source, and whether it is assumed and not published.
+
+    The value's unit is the end of the limit's name in MEANING.
+    """
 
     value: float
     source: str
@@ -47,7 +50,10 @@ class Limit:
 
 @attrs.frozen
 class Printer:
-    """A printer with a resin and a layer height, and its limits by the names of MEANING."""
+    """A printer with a resin and a layer height; limits by the names of MEANING, which end with their units.
+
+    `printer[name]` is a limit's value.
+    """
 
     name: str
     title: str
@@ -58,7 +64,10 @@ class Printer:
 
 
 def load_printer(name: str = DEFAULT) -> Printer:
-    """The shipped printer whose name is, or alone begins with, `name`; or the TOML file at that path."""
+    """The shipped printer of this name, or the only one whose name begins so, or the one in a TOML file.
+
+    Raises InputError for an unknown or ambiguous name, and as `read_printer` does.
+    """
     if name.endswith(".toml") or "/" in name or "\\" in name:
         return read_printer(name)
     matches = [known for known in asset_names("printers") if known.startswith(name)] if name else []
@@ -67,7 +76,7 @@ def load_printer(name: str = DEFAULT) -> Printer:
 
 
 def read_printer(path: str | Path) -> Printer:
-    """The printer in a TOML file; InputError names the file, the line and the key that is wrong."""
+    """The printer in a TOML file. Raises InputError with file, line or key, and what to do."""
     path = Path(path)
     try:
         text = file_text(path)
@@ -89,7 +98,7 @@ def read_printer(path: str | Path) -> Printer:
 
 
 def printer_text(printer: Printer) -> str:
-    """The printer as the text of such a file."""
+    """The printer as TOML text that `read_printer` reads, with the meaning of each limit as comment."""
     values: dict[str, Any] = {"format": 1, "name": printer.name, "title": printer.title}
     for name, limit in printer.limits.items():
         table = {"value": limit.value, "source": limit.source, "assumed": limit.assumed}

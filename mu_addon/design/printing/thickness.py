@@ -18,7 +18,7 @@ START = 1e-3
 
 @attrs.frozen(eq=False)
 class Samples:
-    """Points (s, 3) on a surface with outward unit normals (s, 3), their triangle (s,) and area (s,) mm2."""
+    """Points (s, 3) in mm on a surface, outward unit normals (s, 3), triangles (s,), areas (s,) in mm2."""
 
     points: Array
     normals: Array
@@ -28,8 +28,11 @@ class Samples:
 
 @attrs.frozen(eq=False)
 class RayHits:
-    """What rays from samples met: distance (s,) in mm, inf beyond reach; where (s, 3); and the cosine (s,)
-    between the sample's normal and that of the triangle met, -1 where the two faces are parallel."""
+    """What the rays from samples hit first: distances (s,) in mm, inf beyond reach, and places (s, 3) in mm.
+
+    cosine (s,): between the normals of the sample and of the triangle hit; -1 where these faces are parallel,
+    0 where nothing was hit.
+    """
 
     distance: Array
     at: Array
@@ -37,9 +40,10 @@ class RayHits:
 
 
 def samples(vertices: Vertices, triangles: Triangles, spacing: float) -> Samples:
-    """Points spread evenly over a surface, one for each spacing squared of its area, whatever its triangles.
+    """Samples of a surface, vertices (n, 3) in mm and triangles (m, 3), one for each `spacing` squared.
 
-    Within a triangle they follow Roberts' R2 sequence, so they are the same every time.
+    spacing: in mm. They are spread evenly whatever the triangles' size; within a triangle they follow
+    Roberts' R2 sequence, so that they are the same in every run.
     """
     p, q, r = vertices[triangles.T]
     normal = np.cross(q - p, r - p)
@@ -57,10 +61,11 @@ def samples(vertices: Vertices, triangles: Triangles, spacing: float) -> Samples
 
 
 def cast_rays(solid: Any, surface: Samples, side: int, reach: float) -> RayHits:
-    """Rays through a Manifold from every sample, inward (side = -1) or outward (+1), `reach` mm long.
+    """Rays through a Manifold from every sample, square to the surface and `reach` mm long.
 
-    Thickness and gap are exact for parallel faces, cylinders and balls met through their centres; a wedge
-    of angle phi gives its width square to one face. A ball that fits inside is never wider than this.
+    side: -1 inward, for thickness, +1 outward, for gaps. The distance is exact for parallel faces, and for
+    cylinders and balls through their centres; in a wedge it is the width square to one face. A ball that fits
+    inside is never wider than this.
     """
     direction = side * surface.normals
     first = surface.points + START * direction

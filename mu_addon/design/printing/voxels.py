@@ -18,7 +18,7 @@ _AT_ONCE = 2_000_000
 
 @attrs.frozen(eq=False)
 class VoxelColumns:
-    """A grid of `shape` cells of `step` (3,) mm from the corner `low` (3,), and its crossings along z.
+    """A grid of `shape` cells of step (3,) mm from its corner low (3,), and the surface's crossings along z.
 
     frame (3, 3): rows are the grid's axes. column, level and sign (c,) of each crossing: the column's number
     i * shape[1] + j, the first cell whose centre lies above it, and +1 where the solid begins, -1 where it
@@ -34,7 +34,7 @@ class VoxelColumns:
     sign: NDArray[np.int8]
 
     def slab(self, first: int, last: int) -> NDArray[np.int8]:
-        """Winding number at the centres of the cells of levels first..last - 1, (nx, ny, last - first)."""
+        """Winding numbers (nx, ny, last - first) at the centres of cells in levels first .. last - 1."""
         nx, ny, _ = self.shape
         a, b = np.searchsorted(self.level, [first, last])
         turns = np.zeros((nx * ny, last - first), np.int8)
@@ -45,7 +45,7 @@ class VoxelColumns:
         return turns.reshape(nx, ny, last - first)
 
     def points(self, index: ArrayLike) -> Array:
-        """Places (n, 3) in the surface's own frame of cells (n, 3), whole numbers being their centres."""
+        """Places (n, 3) in mm, in the surface's frame, of cells (n, 3); whole numbers are cell centres."""
         return np.asarray((self.low + (np.asarray(index) + 0.5) * self.step) @ self.frame)
 
     @property
@@ -55,7 +55,7 @@ class VoxelColumns:
 
 
 def frame_along(direction: Array) -> Array:
-    """Axes (3, 3), right-handed, the third along `direction` (3,)."""
+    """Orthogonal unit vectors as rows (3, 3), right-handed, the third along a direction (3,)."""
     up = np.asarray(direction, float) / np.linalg.norm(direction)
     aside = np.array([1.0, 0.0, 0.0]) if abs(up[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     x = aside - (aside @ up) * up
@@ -71,10 +71,11 @@ def voxel_columns(
     frame: Array | None = None,
     margin: float = 0.0,
 ) -> VoxelColumns:
-    """Columns of a closed surface, `step` mm apart, cells `layer` mm high (as wide as high if None).
+    """Columns through a closed surface, vertices (n, 3) in mm and triangles (m, 3), `step` mm apart.
 
-    The grid leaves `margin` mm, and at least two cells, free on every side; its lowest cell that holds the
-    part begins where the part does.
+    layer: height of cells in mm, `step` if None; frame (3, 3): the grid's axes as rows, by default x, y, z.
+    The grid leaves `margin` mm, and at least two cells, free on every side; the lowest layer of the part
+    begins where the part does.
     """
     frame = np.eye(3) if frame is None else frame
     seen = vertices @ frame.T

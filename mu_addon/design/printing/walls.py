@@ -14,7 +14,7 @@ OPPOSED = -0.9
 
 
 def thinnest(surface: Samples, inward: RayHits, printer: Printer) -> Finding:
-    """The thinnest solid, by rays into it."""
+    """Finding on the thinnest solid in mm against the limit solid_mm; inward: rays into the solid."""
     return _measured(
         "thinnest solid",
         surface,
@@ -29,7 +29,7 @@ def thinnest(surface: Samples, inward: RayHits, printer: Printer) -> Finding:
 
 
 def narrowest(surface: Samples, outward: RayHits, printer: Printer) -> Finding:
-    """The narrowest gap, by rays out of the solid."""
+    """Finding on the narrowest gap in mm against the limit gap_mm; outward: rays out of the solid."""
     remedy = "widen it, or close it in the drawing: resin may close it in print"
     facing = outward.cosine < OPPOSED
     return _measured("narrowest gap", surface, outward, facing, printer, "gap_mm", "warning", "wide", remedy)
@@ -76,7 +76,10 @@ def _measured(
 def chamber_walls(
     surface: Samples, inward: RayHits, between: NDArray[np.bool_], printer: Printer
 ) -> list[Finding]:
-    """The wall between chambers and the outside; nothing where there is no chamber."""
+    """Finding on the thinnest wall in mm between chambers and the outside; empty without such a wall.
+
+    inward: rays from samples into the solid; between (s,): marks those from a chamber that end outside any.
+    """
     if not between.any():
         return []
     counts = between & (inward.cosine < -0.5)

@@ -74,7 +74,11 @@ EFFECTS = (
 
 
 class Scaling(Protocol):
-    """How printing changes the modulus and mass of a lattice at a scale, relative to the lattice as drawn."""
+    """How printing changes the modulus and mass of a lattice, relative to the lattice as drawn.
+
+    scale: factor on the lengths of the design, 1 as drawn at 1.0x; offsets in mm are of the printed part and
+    do not grow with it.
+    """
 
     def stiffness(self, scale: float, offset_mm: float, excess_mm: float) -> float:
         """Modulus over the modulus as drawn.
@@ -97,9 +101,9 @@ class Scaling(Protocol):
 class Struts:
     """Slender struts of one thickness at 1.0x: stiffness as thickness^exponent, mass as its square.
 
-    thickness_mm: at 1.0x. exponent: 4 where struts bend, 2 where they stretch (Gibson and Ashby, Cellular
-    Solids, 1997). A thin skin of depth d and modulus k times the core's adds 2 exponent (k - 1) d/t to the
-    stiffness. For the lattice's own cell use what `homogenize` computes instead, see `ComputedCell`.
+    thickness_mm: in mm, at 1.0x. exponent: 4 where struts bend, 2 where they stretch (Gibson and Ashby,
+    Cellular Solids, 1997). A thin skin of depth d and modulus k times the core's adds 2 exponent (k - 1) d/t
+    to the stiffness. For the lattice's own cell use what `homogenize` computes instead, see `ComputedCell`.
     """
 
     thickness_mm: float = 1.5

@@ -291,7 +291,10 @@ class UnitPressure:
         return (modulus, *free[1:])
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
-        """Columns of the experiment that the response knows."""
+        """The experiment's columns that the response at its scale and orientation predicts.
+
+        Raises InputError where no response is near that scale and orientation.
+        """
         return tuple(c for c in self._response(experiment).channels if c in experiment.columns)
 
     def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
@@ -314,7 +317,12 @@ class UnitPressure:
         return y if len(kept) == len(y) else y[kept]
 
     def effective_kPa(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
-        """Pressure (n,) in kPa at which the base unit would stand where the unit of these values stands."""
+        """Pressure (n,) in kPa at which the base unit would stand where the unit of these values stands.
+
+        values: by key, as in `Simulator`. Applied in this order: clock offset, gauge offset and gain, leak
+        and line lag (with an open valve), modulus with temperature and fatigue, viscoelasticity, hysteresis,
+        Mullins softening.
+        """
         t, p = experiment["time_s"], experiment["pressure_kPa"]
         past = self._past.get(experiment.name, PressureHistory())
         get = values.get

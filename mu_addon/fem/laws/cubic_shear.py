@@ -51,7 +51,10 @@ class CubicShear(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear modulus, averaged over directions (3/5 of G), and bulk modulus 0, (k, 2) in MPa."""
+        """Shear and bulk modulus (k, 2) in MPa of parameters (k, 1).
+
+        3/5 of G, its mean over directions, and 0.
+        """
         G = parameters[:, 0]
         return np.stack([0.6 * G, np.zeros_like(G)], axis=1)
 

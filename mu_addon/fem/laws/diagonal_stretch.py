@@ -47,7 +47,7 @@ class DiagonalStretch(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear modulus 0 and bulk modulus C, (k, 2) in MPa."""
+        """Shear and bulk modulus (k, 2) in MPa of parameters (k, 1): 0 and C."""
         C = parameters[:, 0]
         return np.stack([np.zeros_like(C), C], axis=1)
 

@@ -138,9 +138,9 @@ class Foam(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear modulus, mu as the mean of tension and compression, and bulk modulus, (k, 2) in MPa.
+        """Shear and bulk modulus (k, 2) in MPa of parameters (k, 6).
 
-        The bulk modulus is lambda + 2/3 mu.
+        mu, the mean of tension and compression, and lambda + 2/3 mu.
         """
         mu = (parameters[:, 0] + parameters[:, 2]) / 2
         return np.stack([mu, parameters[:, 4] + 2 / 3 * mu], axis=1)

@@ -96,7 +96,7 @@ class Friction(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear modulus before sliding, and bulk modulus 0, (k, 2) in MPa."""
+        """Shear modulus before sliding, and bulk modulus 0, (k, 2) in MPa, of parameters (k, 2)."""
         return np.stack([parameters[:, 0], np.zeros(len(parameters))], axis=1)
 
     @staticmethod

@@ -87,7 +87,10 @@ class Layered(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear and bulk modulus (k, 2) in MPa, averaged over directions: 1/2 and 1/3 of tr K/3."""
+        """Shear and bulk modulus (k, 2) in MPa of parameters (k, 5), averaged over directions.
+
+        A half and a third of the mean of K's principal values.
+        """
         mean = (2 * parameters[:, 0] + parameters[:, 1]) / 3
         return np.stack([mean / 2, mean / 3], axis=1)
 

@@ -41,7 +41,7 @@ class MooneyRivlin(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear modulus 2 (c1 + c2) and kappa (k, 2) in MPa."""
+        """Shear modulus 2 (c1 + c2) and kappa, (k, 2) in MPa, of parameters (k, 3)."""
         return np.stack([2 * (parameters[:, 0] + parameters[:, 1]), parameters[:, 2]], axis=1)
 
     @staticmethod

@@ -75,7 +75,7 @@ class NeoHooke(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear and bulk modulus (k, 2) in MPa at small strain."""
+        """Shear and bulk modulus (k, 2) in MPa at small strain: the parameters (k, 2) themselves."""
         return parameters
 
     @staticmethod

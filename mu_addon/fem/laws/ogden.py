@@ -74,7 +74,7 @@ class Ogden(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear modulus, half of the sum of mu_p alpha_p, and kappa (k, 2) in MPa."""
+        """Shear modulus, half of the sum of mu_p alpha_p, and kappa, (k, 2) in MPa, of parameters (k, 7)."""
         mu = (parameters[:, 0:6:2] * parameters[:, 1:6:2]).sum(axis=1) / 2
         return np.stack([mu, parameters[:, 6]], axis=1)
 

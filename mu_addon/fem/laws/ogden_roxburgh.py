@@ -85,7 +85,7 @@ class OgdenRoxburgh(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear modulus of the virgin material and kappa (k, 2) in MPa."""
+        """Shear modulus 2 c1 of the virgin material and kappa, (k, 2) in MPa, of parameters (k, 7)."""
         return Yeoh.small_strain(parameters)
 
     @staticmethod

@@ -109,7 +109,7 @@ class Prony(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Long-term shear modulus and kappa (k, 2) in MPa."""
+        """Long-term shear modulus 2 c1 and kappa, (k, 2) in MPa, of parameters (k, 10)."""
         return Yeoh.small_strain(parameters)
 
     @staticmethod

@@ -47,7 +47,7 @@ class Yeoh(Law):
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
-        """Shear modulus 2 c1 and kappa (k, 2) in MPa."""
+        """Shear modulus 2 c1 and kappa, (k, 2) in MPa, of parameters (k, 4)."""
         return np.stack([2 * parameters[:, 0], parameters[:, 3]], axis=1)
 
     @staticmethod
