@@ -454,6 +454,7 @@ def interval(fitter: Fitter, fit: Fit, key: str, rise: float = 3.84) -> tuple[fl
             inner, outer = (value, outer) if risen < rise else (inner, value)
             grown = value * min(math.sqrt(rise / max(risen, 0.1)), 3.0)
             value = grown if inner < grown < outer else 0.5 * (inner + min(outer, 4.0 * inner + value))
-        at = centre + sign * value * scale
-        found.append(math.exp(at) if log else at)
+        else:
+            at = centre + sign * value * scale
+        found.append(bound if at == limit else math.exp(at) if log else at)
     return found[0], found[1]

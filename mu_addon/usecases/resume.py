@@ -39,7 +39,7 @@ def use_case_of(folder: Path) -> UseCase[Any]:
         # One whose first line is another's is read all the same: its reader says best what is wrong with it.
         return next((case for case in cases if case.layout.is_of(folder)), cases[0])
     raise InputError(
-        "there is no study in this folder, nor another run",
+        "this folder contains no study and no other run",
         str(folder),
         f"give a folder that holds one of {', '.join(MODULES)}, as a run writes it",
     )

@@ -265,7 +265,7 @@ MISSING = {
 @pytest.mark.parametrize("case", MISSING)
 def test_struts_that_miss_each_other_are_named(case):
     lattice, what = MISSING[case]
-    with pytest.raises(InputError, match="struts of lattice 'mine' miss each other") as caught:
+    with pytest.raises(InputError, match="struts of lattice 'mine' are not connected") as caught:
         StrutCell(lattice, 10.0, 0.5, 0.5)
     assert what in caught.value.what
     assert caught.value.remedy

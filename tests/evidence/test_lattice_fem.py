@@ -99,7 +99,7 @@ def test_an_offset_that_the_unit_has_already_comes_before_the_effects():
 def test_a_specimen_without_a_count_is_of_slender_struts_and_that_is_told():
     found, remarks = scalings([block()], UNIT)
     assert found == {}
-    assert "slender struts" in remarks[0]
+    assert "slender bending struts" in remarks[0]
     e = block()
     model = LatticeStress([e])
     assert model.computed is None

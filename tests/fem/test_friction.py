@@ -230,7 +230,7 @@ def test_what_comes_nearer_aslant_does_not_rub_before_it_touches():
 def test_a_body_that_rubs_is_marched_and_bad_friction_refused():
     mesh = box((1, 1, 1), clamp=True)
     eq = touched(mesh, Obstacle(mesh, LID, 0.05, 0.01, friction=MU))
-    with pytest.raises(InputError, match="remembers"):
+    with pytest.raises(InputError, match="depends on its history"):
         simulate(eq, np.arange(2.0), np.zeros(2))
     with pytest.raises(InputError, match="friction coefficient of -0"):
         Obstacle(mesh, LID, 0.05, 0.01, friction=-0.1)

@@ -109,6 +109,6 @@ def test_a_file_of_the_law_that_is_there_already_is_no_obstacle_but_another_is(t
     other = tmp_path / "other"
     other.mkdir()
     (other / "effective.toml").write_text("not yours")
-    with pytest.raises(InputError, match=r"somebody else's: effective\.toml"):
+    with pytest.raises(InputError, match=r"unknown file: effective\.toml"):
         Study.open(attrs.evolve(JOB, lattice=law), other, RunContext(progress))
     assert (other / "effective.toml").read_text() == "not yours"

@@ -413,7 +413,7 @@ def require_paths_inside(unit: Unit, body: Body, stages: Sequence[str], paths: s
     if "place" in stages:
         if paths == "graph":
             raise InputError(
-                "the search of the whole lattice knows the lattice's box only",
+                "the search of the whole lattice supports only the default box of the lattice",
                 "--body, --paths graph",
                 "leave one of them out",
             )

@@ -41,7 +41,7 @@ def test_the_clip_editors_operators(tmp_path, filmed):
     settings.base_2, settings.tip_1, settings.tip_2 = "b", "c", "d"
     assert "Give the places" in bench.missing(clip)
     settings.base_1_mm, settings.base_2_mm = (-15, 0), (15, 0)
-    assert "frames a second" in bench.missing(clip)
+    assert "frames per second" in bench.missing(clip)
     settings.fps = 10
     assert "pressure" in bench.missing(clip)
     settings.pressure = str(tmp_path / "pressure.csv")
