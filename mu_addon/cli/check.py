@@ -6,8 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_unit, unit_if_named
-from .study_options import add_solid
+from .options import add_solid, add_unit, unit_if_named
 
 if TYPE_CHECKING:
     from ..run.context import RunContext

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .options import add_unit
+from .options import EXAMPLE, add_body, add_solid, add_unit
 from .study_job import run
-from .study_options import EXAMPLE, add_body, add_solid
 
 if TYPE_CHECKING:
     from .options import Commands

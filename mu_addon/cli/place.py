@@ -4,9 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .options import add_model, add_orientation, add_resin, add_unit
+from .options import (
+    EXAMPLE,
+    add_body,
+    add_model,
+    add_obstacles,
+    add_orientation,
+    add_resin,
+    add_simulation,
+    add_solid,
+    add_unit,
+)
 from .study_job import run
-from .study_options import EXAMPLE, add_body, add_obstacles, add_simulation, add_solid
 
 if TYPE_CHECKING:
     from .options import Commands
