@@ -46,7 +46,7 @@ def add_model(command: argparse.ArgumentParser) -> None:
 
 
 def add_orientation(command: argparse.ArgumentParser) -> None:
-    """--orientation, of what weighs."""
+    """--orientation, the direction of gravity."""
     command.add_argument(
         "--orientation",
         type=float,

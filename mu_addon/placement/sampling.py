@@ -14,7 +14,7 @@ def solution_order(pressure: Array, has_gravity: bool = False) -> list[list[int]
     """Numbers of distinct pressures (s,) in the order to solve them: two at a time, the extremes first.
 
     Each later pressure is the one farthest from those before it and from 0, where nothing deviates. Where
-    the unit weighs something, it deviates there, too: 0, if it is met, is then solved beside the extremes.
+    the unit has weight, it deviates there, too: 0, if it is met, is then solved beside the extremes.
     """
     pressure = np.asarray(pressure, float)
     left = [i for i, p in enumerate(pressure) if p or has_gravity]

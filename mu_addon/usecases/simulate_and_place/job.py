@@ -200,7 +200,7 @@ class Job:
         return self.effects.materials(drawn, mesh)
 
     def model(self, mesh: Mesh, threads: int = 2) -> Model:
-        """Model of the unit's mesh: pressure, what weighs, what it may touch. Raises InputError."""
+        """Model of the unit's mesh: pressure, weight, obstacles. Raises InputError."""
         device, solver = self.solver.resolved(mesh, needs_factor="place" in self.stages)
         model = self.effects.model(self.unit, mesh, threads, device)
         model.solver = solver

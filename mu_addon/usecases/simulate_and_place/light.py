@@ -118,7 +118,7 @@ def _checked(
 ) -> Checks:
     """Rays through a bar at rest, at its ends of the motion and between them; `moved` begins with rest.
 
-    weighs: whether rest is not as drawn.
+    has_gravity: whether the unit at rest differs from the drawn one, under its own weight.
     """
     order = np.argsort(angle, kind="stable")
     some = order[np.unique(np.linspace(0, len(order) - 1, _CHECKS).astype(int))]

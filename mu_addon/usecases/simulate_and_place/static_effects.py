@@ -111,7 +111,7 @@ class StaticEffects:
 
     @property
     def tables(self) -> dict[str, Any]:
-        """What study.toml has of them: nothing where there is none, no direction where nothing weighs."""
+        """What study.toml has of them: nothing where there is none, no direction where nothing has weight."""
         if not self:
             return {}
         turned = {"orientation_deg": self.orientation_deg} if self.has_gravity else {}
