@@ -39,7 +39,7 @@ def job_of(unit, time, pressure, **more):
 
 def opened(job, folder):
     progress = Progress()
-    return Study.open(job, folder, progress, RunContext(progress))
+    return Study.open(job, folder, RunContext(progress))
 
 
 def simulated(folder, job):
