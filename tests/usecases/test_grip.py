@@ -202,7 +202,7 @@ def test_a_grasp_with_friction_from_the_command_line(tmp_path):
     assert {"gripper.stl", "grasp_25.csv", "pull_25.csv", "report.html", "frame_25_iv.png"} <= names
     report = (out / "report.html").read_text()
     before = (out / "grasp_25.csv").read_text()
-    assert "over the weight" in report
+    assert "capacity / weight" in report
     assert main([*line, "--refine", "0.3"]) == 0
     again = json.loads((out / "summary.json").read_text())
     assert again["seconds"]["grasp of 25 mm"] < 0.3 * summary["seconds"]["grasp of 25 mm"]
