@@ -91,7 +91,7 @@ def test_the_extended_model_comes_back_from_its_file(lagging, tmp_path):
     back = load_model(tmp_path / "model.toml")
     assert back.values == model.values
     assert back.effects == model.effects
-    (tmp_path / "model.toml").write_text("verdict = \"named\"\n[effect.magic.size]\nvalue = 1.0\n")
+    (tmp_path / "model.toml").write_text('verdict = "named"\n[effect.magic.size]\nvalue = 1.0\n')
     with pytest.raises(InputError, match="magic"):
         load_model(tmp_path / "model.toml")
 

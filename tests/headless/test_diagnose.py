@@ -65,7 +65,7 @@ def test_homogenize_takes_the_model(overcured, tmp_path):
 )
 def test_a_model_that_cannot_be_used_is_named(tmp_path, text, words):
     model = tmp_path / "model.toml"
-    model.write_text(f"verdict = \"named\"\n{text}")
+    model.write_text(f'verdict = "named"\n{text}')
     done = run("simulate", "--preset", "mu-1.0x", "--model", model, "--out", tmp_path / "out")
     assert_clear_failure(done, 2, *words)
 

@@ -52,7 +52,7 @@ def test_it_leaves_tensor_curves_law_and_report(lattice):
     assert law.C44_kPa == pytest.approx(moduli["C44"])
     assert (out / "specimen.stl").stat().st_size > 10_000
     report = (out / "report.html").read_text()
-    for words in ("Young&#x27;s modulus", "Block between plates", "The law for the analysis mesh"):
+    for words in ("Young&#x27;s modulus", "Block between plates", "Lattice law for the analysis mesh"):
         assert words in report or words.replace("&#x27;", "'") in report
 
 

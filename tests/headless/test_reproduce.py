@@ -44,7 +44,7 @@ def test_tables_and_page_are_whole(folder):
     assert sorted(int(row["rank"]) for row in table[:10]) == list(range(1, 11))
     assert len(rows(folder / "agreement.csv")) == 6
     assert len(rows(folder / "bending.csv")) == 30
-    assert {row["verdict"] for row in rows(folder / "statements.csv")} <= {"held", "not held", "cannot tell"}
+    assert {row["verdict"] for row in rows(folder / "statements.csv")} <= {"held", "not held", "undecided"}
     page = (folder / "report.html").read_text(encoding="utf-8")
     for part in ("table", "deviation", "statements", "bending", "sampling"):
         assert f'<section id="{part}"' in page

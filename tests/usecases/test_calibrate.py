@@ -88,8 +88,14 @@ def test_the_same_folder_serves_again_and_describes_its_run(
     # A folder of the version that wrote no header.
     (out / "calibrate.toml").write_text("data = ['bench']\nchannel = 'light_V'\ndark = 0\n")
     assert run(*words) == 0, capsys.readouterr().err
-    # Other recordings than those that were calibrated are not taken for them.
-    (tmp_path / "bench" / "recording-000.csv").unlink()
+    # A recording that goes on is the same, other samples at the angles are not.
+    assert run(*words) == 0
+    recording = tmp_path / "bench" / "recording-000.csv"
+    rows = recording.read_text().splitlines(keepends=True)
+    later = rows[-1].split(",")
+    recording.write_text("".join(rows) + ",".join([str(float(later[0]) + 60.0), *later[1:]]))
+    assert run("resume", out) == 0, capsys.readouterr().err
+    recording.write_text("".join(rows).replace("0.5", "0.6"))
     capsys.readouterr()
     assert run("resume", out) == 2
     assert "what to do" in capsys.readouterr().err

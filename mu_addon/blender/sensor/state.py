@@ -163,12 +163,13 @@ CALIBRATION = JobKind("calibrate", lambda root: root.mu_unit.uuid, latest_calibr
 def calibrate(root: Any, data: Path) -> None:
     """Calibrate from a folder in a process of its own, and then apply what it finds; raises MuError."""
     # Only now: it brings in scipy, which a Blender without the wheels lacks.
-    from ...usecases.sensor.calibrate import LAYOUT, Job
+    from ...usecases.sensor.calibrate import LAYOUT, input_texts
 
     folder = _unused(studies.assign_folder(root) / CALIBRATIONS)
     light, dark = chosen(root)
-    job = Job((data,), light or None, str(dark) if dark else None)
-    CALIBRATION.start(root, folder, lambda folder: write_run(folder, LAYOUT, job.texts()))
+    # Its samples are counted by the process that calibrates: until then more of them may have come.
+    inputs = input_texts([data], light or None, str(dark) if dark else None)
+    CALIBRATION.start(root, folder, lambda folder: write_run(folder, LAYOUT, inputs))
     _calibrating[CALIBRATION.key(root)] = folder
     _tick()
 

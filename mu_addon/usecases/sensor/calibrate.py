@@ -15,7 +15,6 @@ import numpy as np
 from ...errors import InputError
 from ...files import write_csv, write_text
 from ...measured import read_folder
-from ...measured.folder import FILE
 from ...report.charts import canvas
 from ...report.html import cards, figure, page, table
 from ...run.context import RunContext
@@ -30,7 +29,7 @@ Array = np.ndarray[Any, Any]
 
 LAYOUT = FolderLayout(
     "calibrate.toml",
-    "# The inputs of this calibration; the recordings are named by the SHA-256 of their files.",
+    "# The inputs of this calibration; its samples, angles and volts, are known by their SHA-256.",
     results=("calibration.toml", "calibration.csv", "report.html"),
     older_headers=("data = [",),
 )
@@ -57,6 +56,13 @@ class Sweeps:
     channel: str
     dark: str | float
 
+    def digest(self) -> str:
+        """SHA-256 of every sweep's times, angles and volts, those fitted and those held out."""
+        whole = [("", sweep) for sweep in self.fitted] + self.held
+        tables = [(name, np.column_stack([s.time_s, s.angle_deg, s.voltage_V])) for name, s in whole]
+        parts = [f"{name} {digest(np.ascontiguousarray(rows).tobytes())}" for name, rows in tables]
+        return digest("\n".join(parts))
+
 
 @attrs.frozen
 class Job:
@@ -77,41 +83,29 @@ class Job:
     def _read(self) -> Sweeps:
         return _sweeps(self)
 
-    def inputs(self) -> dict[str, Any]:
-        """What decides the result: files by their SHA-256; raises InputError where one cannot be read."""
-        return {
-            "channel": self.channel,
-            "dark": self.dark,
-            "data": [_digest_of(folder) for folder in self.data],
-            "angles": None if self.angles is None else digest(_content(self.angles)),
-        }
-
     def texts(self) -> dict[str, str]:
-        """Text of every file of inputs, by name; raises InputError where a file cannot be read."""
-        run = {
-            "data": [str(folder.resolve()) for folder in self.data],
-            "angles": None if self.angles is None else str(self.angles.resolve()),
-        }
-        values = {"format": FORMAT, **self.inputs(), "run": run}
-        return {LAYOUT.inputs: toml_text(values, LAYOUT.header)}
+        """Text of every file of inputs, by name."""
+        return input_texts(self.data, self.channel, self.dark, self.angles, self.sweeps.digest())
 
 
-def _digest_of(folder: Path) -> str:
-    """SHA-256 of a recording's or measured folder's tables and of what describes them."""
-    if not folder.is_dir():
-        raise InputError(
-            "there is no such folder", str(folder), "give a recording, or a folder of measured data"
-        )
-    names = {INDEX, FILE, *(path.name for path in folder.glob("*.csv"))}
-    files = [folder / name for name in sorted(names) if (folder / name).is_file()]
-    return digest("\n".join(f"{path.name} {digest(_content(path))}" for path in files))
+def input_texts(
+    data: Sequence[Path],
+    channel: str | None = None,
+    dark: str | None = None,
+    angles: Path | None = None,
+    samples: str | None = None,
+) -> dict[str, str]:
+    """Text of every file of inputs of a `Job`, by name.
 
-
-def _content(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(f"cannot read {path.name}: {error.strerror}", str(path), "check its name") from None
+    samples: SHA-256 of the samples (`Sweeps.digest`); without it the run that `resume` starts takes those
+    that it finds, as of a recording that still goes on.
+    """
+    run = {
+        "data": [str(folder.resolve()) for folder in data],
+        "angles": None if angles is None else str(angles.resolve()),
+    }
+    values = {"format": FORMAT, "channel": channel, "dark": dark, "samples": samples, "run": run}
+    return {LAYOUT.inputs: toml_text(values, LAYOUT.header)}
 
 
 def read_job(folder: Path) -> Job:
@@ -123,13 +117,12 @@ def read_job(folder: Path) -> Job:
         named_path(path, {"data": place}, "data", "recording")
         for place in (places if isinstance(places, list) and places else [None])
     ]
-    angles = named_path(path, run, "angles", "table of angles") if "angles" in values else None
+    angles = named_path(path, run, "angles", "table of angles") if "angles" in run else None
     asked = {key: values[key] for key in ("channel", "dark") if key in values}
     job = structured(Job, asked, str(path), data=tuple(data), angles=angles)
-    now = job.inputs()
-    if any(values[key] != now[key] for key in ("data", "angles") if key in values):
+    if values.get("samples", job.sweeps.digest()) != job.sweeps.digest():
         raise InputError(
-            "the recordings are not those that the calibration was made with",
+            "the samples are not those that the calibration was made with",
             ", ".join(map(str, data)),
             "put those back, or calibrate these in a folder of their own",
         )

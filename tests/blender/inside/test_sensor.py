@@ -254,15 +254,16 @@ def test_a_guided_sweep_calibrates_and_a_zero_mends_weaker_light(tmp_path, monke
         assert not bpy.ops.mu.sensor_hold.poll()
         assert "Hold still" in drawn()
         watching(lambda: s.guide is None or not s.guide.holding)
-    watching(lambda: sensor.calibration(root)[0] is not None)
+    watching(lambda: s.guide is None)
+    child = sensor.CALIBRATION.child(root)
+    watching(lambda: child.state == "failed" or sensor.calibration(root)[0] is not None)
+    assert child.state == "done", child.error
     found, _ = sensor.calibration(root)
     assert found.range_deg == (0.0, 45.0)
     assert found.sweeps == 2
     assert found.dark == "dark"
     assert s.guide is None
     assert "0 to 45" in drawn()
-    child = sensor.CALIBRATION.child(root)
-    assert child.state == "done", child.error
     assert child.result, child.error
 
     bench["angle"] = 30.0
