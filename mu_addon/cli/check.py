@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_solid, add_unit, unit_if_named
+from .options import add_report, add_solid, add_unit, unit_if_named
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -22,6 +22,7 @@ def add(commands: Commands[Any]) -> None:
         epilog="example: run.py check --preset mu-1.0x --path alpha4 --out out/check",
     )
     add_unit(command, required=False)
+    add_report(command)
     command.add_argument(
         "--stl",
         metavar="FILE",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .options import EXAMPLE, add_body, add_solid, add_unit
+from .options import EXAMPLE, add_body, add_report, add_solid, add_unit
 from .study_job import run
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ def add(commands: Commands[Any]) -> None:
         "design", help="Generate the printable solid of a unit: STL file and lattice nodes.", epilog=EXAMPLE
     )
     add_unit(command)
+    add_report(command)
     add_solid(command)
     add_body(command)
     command.add_argument(

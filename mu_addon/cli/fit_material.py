@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_measured_folder, add_results, require_out
+from .options import add_measured_folder, add_report, add_results, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -22,6 +22,7 @@ def add(commands: Commands[Any]) -> None:
     )
     add_measured_folder(command)
     add_results(command)
+    add_report(command)
     command.add_argument(
         "--laws",
         nargs="+",

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_results, require_out
+from .options import add_report, add_results, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -25,6 +25,7 @@ def add(commands: Commands[Any]) -> None:
     which.add_argument("--preset", metavar="NAME", help="Gripper preset: gripper.")
     which.add_argument("--gripper", metavar="FILE", help="Gripper parameters, a TOML file.")
     add_results(command)
+    add_report(command)
     command.add_argument(
         "--cube",
         nargs="+",

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_model, add_unit, modelled_unit
+from .options import add_model, add_report, add_unit, modelled_unit
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -22,6 +22,7 @@ def add(commands: Commands[Any]) -> None:
         epilog="example: run.py homogenize --preset mu-1.0x --out out/lattice",
     )
     add_unit(command)
+    add_report(command)
     add_model(command)
     command.add_argument(
         "--resin",

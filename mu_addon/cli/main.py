@@ -83,6 +83,7 @@ def main(arguments: list[str]) -> int:
     progress = Progress([json_lines(sys.stdout) if json else terminal(sys.stderr)])
     with run_to_end(progress) as context:
         _require_usable(options)
+        context.wants_report = getattr(options, "report", True)
         command.run(options, context)
     if context.status == 0 and not json:
         results = [f"results: {context.folder}"] if context.folder is not None else []

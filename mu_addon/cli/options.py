@@ -26,6 +26,16 @@ def add_results(command: argparse.ArgumentParser) -> None:
     )
 
 
+def add_report(command: argparse.ArgumentParser) -> None:
+    """--no-report."""
+    command.add_argument(
+        "--no-report",
+        dest="report",
+        action="store_false",
+        help="Compute the numbers only: no pictures, no report.html.",
+    )
+
+
 def add_unit(command: argparse.ArgumentParser, required: bool = True) -> None:
     """--preset or --unit, and where the results go."""
     which = command.add_mutually_exclusive_group(required=required)

@@ -10,6 +10,7 @@ from .options import (
     add_model,
     add_obstacles,
     add_orientation,
+    add_report,
     add_resin,
     add_simulation,
     add_solid,
@@ -32,6 +33,7 @@ def add(commands: Commands[Any]) -> None:
         epilog=EXAMPLE,
     )
     add_unit(command)
+    add_report(command)
     add_model(command)
     add_orientation(command)
     add_resin(command)

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_results, require_out
+from .options import add_report, add_results, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -28,6 +28,7 @@ def add(commands: Commands[Any]) -> None:
 def add_options(command: argparse.ArgumentParser) -> None:
     """Folder, meshes and values of a reproduction."""
     add_results(command)
+    add_report(command)
     command.add_argument(
         "--coarse",
         action="store_true",

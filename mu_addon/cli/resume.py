@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_solver, require_out
+from .options import add_report, add_solver, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -25,12 +25,7 @@ def add(commands: Commands[Any]) -> None:
         "--json", action="store_true", help="Write one JSON message per line to standard output."
     )
     command.add_argument("--workers", type=int, metavar="N", help="Number of worker processes (default: 2).")
-    command.add_argument(
-        "--no-report",
-        dest="report",
-        action="store_false",
-        help="Compute the numbers only: no pictures, no report.html.",
-    )
+    add_report(command)
     add_solver(command)
 
 
@@ -41,7 +36,6 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
     from .options import solver_of
 
     require_out(options)
-    context.wants_report = options.report
     solver = solver_of(options)
     # The folder's own say, where the command says nothing else.
     given = {"workers": options.workers, "solver": None if solver == SolverChoice() else solver}

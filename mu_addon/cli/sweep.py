@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_results, require_out
+from .options import add_report, add_results, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -27,6 +27,7 @@ def add(commands: Commands[Any]) -> None:
         help="Plan of the parameter study, a sweep.toml: which inputs are varied, and how.",
     )
     add_results(command)
+    add_report(command)
     command.add_argument(
         "--workers",
         type=int,

@@ -23,7 +23,8 @@ from mu_addon.meshing.revolved import unit_surfaces
 from ..design.bodies import box, cylinder
 
 UNIT = load_preset("mu-1.0x")
-SHORT = attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=3))
+# A thick wall: pytetwild keeps to a fifth of it, and takes ten times as long at half the thickness.
+SHORT = attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=3, wall_mm=1.8))
 COARSE = MeshSettings(order=1, refine=0.4)
 
 
@@ -78,7 +79,7 @@ def test_bodies_bend_as_their_shape_says(tmp_path):
 
     low, high = np.array(d.bounds).T
     wide = of_body(box(np.append(low[:2], -1.0), np.append(high[:2], d.height + 1.0)))
-    assert wide > 2.0
+    assert wide > 1.0
     assert abs(of_body(cylinder(22.0, 22.0, 0.0, -1.0, d.height + 1.0))) < 0.2 * wide
 
 

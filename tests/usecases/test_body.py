@@ -27,7 +27,16 @@ def files(tmp_path):
 def design(files, *more):
     out = files / "out"
     status = main(
-        ["design", "--unit", str(files / "unit.toml"), "--out", str(out), "--json", *map(str, more)]
+        [
+            "design",
+            "--unit",
+            str(files / "unit.toml"),
+            "--out",
+            str(out),
+            "--json",
+            "--no-report",
+            *map(str, more),
+        ]
     )
     return status, out
 
