@@ -9,6 +9,8 @@ from hypothesis import HealthCheck, settings
 
 from . import costs
 
+pytest_plugins = ["tests.light_law"]
+
 # Read when numpy is loaded, and by every process that a test starts: one core each, also where a test runs
 # alone, since threads that wait for each other on small systems only spin.
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):

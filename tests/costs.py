@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 TABLE = Path(__file__).with_name("costs.csv")
-SLOW_S = 4.0
+SLOW_S = 2.0
 LEAST_S = 1.0
 
 elsewhere = 0.0

@@ -33,9 +33,9 @@ QUICK = (*COARSE, "--order", "1", "--no-report")
 
 
 @pytest.fixture(scope="module")
-def quick(tmp_path_factory):
+def quick(tmp_path_factory, with_light):
     """The same run of linear elements, for what is compared with itself."""
-    folder = tmp_path_factory.mktemp("quick") / "out"
+    folder = with_light(tmp_path_factory.mktemp("quick") / "out")
     done = run("place", "--preset", "mu-1.0x", "--out", folder, *QUICK)
     assert done.returncode == 0, done.stderr
     return folder
@@ -180,7 +180,8 @@ def test_other_inputs_set_old_results_aside(finished, tmp_path):
     assert (folder / "stale" / "unit.stl").exists()
 
 
-def test_one_worker_finds_the_same(quick, tmp_path):
+def test_one_worker_finds_the_same(quick, with_light, tmp_path):
+    with_light(tmp_path / "one")
     arguments = ("--rule", "volume_fraction", "--no-mesh-check", "--workers", "1")
     done = run("place", "--preset", "mu-1.0x", "--out", tmp_path / "one", *QUICK, *arguments)
     assert done.returncode == 0
@@ -189,9 +190,9 @@ def test_one_worker_finds_the_same(quick, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def searched(tmp_path_factory):
+def searched(tmp_path_factory, with_light):
     """A search of the whole lattice, with limits that leave few paths, after the same study's windows."""
-    folder = tmp_path_factory.mktemp("search") / "out"
+    folder = with_light(tmp_path_factory.mktemp("search") / "out")
     limits = ("--paths", "graph", "--shortest-cells", "4.5", "--longest-cells", "5", "--bend-deg", "20")
     arguments = ("--rule", "volume_fraction", "--no-mesh-check", *limits)
     done = run("place", "--preset", "mu-1.0x", "--out", folder, *QUICK, *arguments)
@@ -270,8 +271,8 @@ def test_killed_it_leaves_no_process_behind_and_does_not_pass_for_complete(tmp_p
     assert json.loads((out / "summary.json").read_text())["status"] == "running"
 
 
-def test_interrupted_it_keeps_what_it_has_and_resumes_to_the_same_digits(quick, tmp_path):
-    out = tmp_path / "out"
+def test_interrupted_it_keeps_what_it_has_and_resumes_to_the_same_digits(quick, with_light, tmp_path):
+    out = with_light(tmp_path / "out")
     process = started(out)
     wait_for_a_state_swept(process, out)
     # As a terminal does it: to every process of the group.
@@ -294,9 +295,9 @@ def same_delta(one, other):
         return set(a.files) == set(b.files) and all(np.array_equal(a[n], b[n]) for n in a.files)
 
 
-def test_it_is_the_same_inside_bpy(quick, tmp_path):
+def test_it_is_the_same_inside_bpy(quick, with_light, tmp_path):
     pytest.importorskip("bpy", reason="the bpy wheel is for Python 3.11 only")
-    out = tmp_path / "out"
+    out = with_light(tmp_path / "out")
     script = f"""
 import bpy, runpy, sys
 sys.argv = ["blender", "-b", "-P", {str(RUN)!r}, "--", "place", "--preset", "mu-1.0x", "--out", {str(out)!r}]

@@ -33,15 +33,16 @@ def resumed(folder):
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("resume") / "whole"
+def whole(tmp_path_factory, with_light):
+    folder = with_light(tmp_path_factory.mktemp("resume") / "whole")
     keep_inputs(folder, JOB.texts())
     return folder, resumed(folder)
 
 
 @pytest.mark.parametrize("pattern", ["unit.stl", "cache/mesh-*", "cache/state-*", "cache/sweep-*"])
-def test_killed_at_any_stage_it_goes_on_to_the_same_digits(whole, tmp_path, pattern):
+def test_killed_at_any_stage_it_goes_on_to_the_same_digits(whole, with_light, tmp_path, pattern):
     reference, expected = whole
+    with_light(tmp_path)
     keep_inputs(tmp_path, JOB.texts())
     words = command("resume", tmp_path, "--no-report")
     process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

@@ -31,8 +31,8 @@ def test_the_default_mesh_is_within_three_percent_of_the_finest(meshes):
     found = []
     for mesh in meshes:
         materials = materials_of(UNIT, mesh)
-        pressure = np.array([0.0, -10, -20, 0, 10, 20, 30, 40])
-        path = simulate(Equilibrium(Model(mesh), materials), np.arange(8.0), pressure)
+        pressure = np.array([0.0, -20, 0, 20, 40])
+        path = simulate(Equilibrium(Model(mesh), materials), np.arange(5.0), pressure)
         angle = {round(s.pressure_MPa * 1e3): bending_angle_deg(mesh, s.u) for s in path.states}
         found.append([angle[p] for p in (-20, 20, 40)])
     coarse, default, fine = np.array(found)

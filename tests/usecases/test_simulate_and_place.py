@@ -144,25 +144,34 @@ def same_digits(one, other):
         return set(a.files) == set(b.files) and all(np.array_equal(a[n], b[n]) for n in a.files)
 
 
-@pytest.mark.parametrize("damage", ["truncated", "flipped", "emptied", "other names", "other shapes"])
-def test_a_damaged_cache_is_computed_again_to_the_same_digits(placed, copied, damage):
+def damaged(path, damage, rng):
+    """Damage an entry of the cache in one of several ways."""
+    whole = bytearray(path.read_bytes())
+    if damage == "truncated":
+        path.write_bytes(whole[: int(rng.integers(len(whole)))])
+    elif damage == "flipped":
+        whole[int(rng.integers(100, len(whole) - 200))] ^= 1 << int(rng.integers(8))
+        path.write_bytes(whole)
+    elif damage == "emptied":
+        path.write_bytes(b"")
+    elif damage == "other names":
+        write_npz(path, {"spam": np.zeros(3)})
+    else:
+        with np.load(path) as stored:
+            arrays = {name: np.zeros((1, 1)) for name in stored.files}
+        write_npz(path, arrays)
+
+
+DAMAGES = ("truncated", "flipped", "emptied", "other names", "other shapes")
+
+
+@pytest.mark.parametrize("first", [0, 2])
+def test_a_damaged_cache_is_computed_again_to_the_same_digits(placed, copied, first):
+    """Every entry is damaged, and entries of a kind each in another way."""
     folder, full = copied
-    rng = np.random.default_rng(1)
-    for path in (folder / "cache").glob("*.npz"):
-        whole = bytearray(path.read_bytes())
-        if damage == "truncated":
-            path.write_bytes(whole[: int(rng.integers(len(whole)))])
-        elif damage == "flipped":
-            whole[int(rng.integers(100, len(whole) - 200))] ^= 1 << int(rng.integers(8))
-            path.write_bytes(whole)
-        elif damage == "emptied":
-            path.write_bytes(b"")
-        elif damage == "other names":
-            write_npz(path, {"spam": np.zeros(3)})
-        else:
-            with np.load(path) as stored:
-                arrays = {name: np.zeros((1, 1)) for name in stored.files}
-            write_npz(path, arrays)
+    rng = np.random.default_rng(first)
+    for number, path in enumerate(sorted((folder / "cache").glob("*.npz"))):
+        damaged(path, DAMAGES[(first + number) % len(DAMAGES)], rng)
     summary = ran(JOB, folder)
     assert summary["J_hat_mm"] == full["J_hat_mm"]
     assert same_digits(folder, placed[0])

@@ -174,7 +174,7 @@ def test_beside_obstacles_weight_acts_from_the_first_instant_on(mesh):
 
 
 @pytest.fixture(scope="module")
-def placed(tmp_path_factory):
+def placed(tmp_path_factory, with_light):
     """Folder and summary of a placement without effects, with weight, and with a wall that stiffens."""
     root = tmp_path_factory.mktemp("placed")
     jobs = {
@@ -182,7 +182,7 @@ def placed(tmp_path_factory):
         "weight": with_effects(90.0, gravity=1300.0),
         "stiffening": with_effects(strain_stiffening=0.4),
     }
-    return {name: (root / name, ran(job, root / name), job) for name, job in jobs.items()}
+    return {name: (root / name, ran(job, with_light(root / name)), job) for name, job in jobs.items()}
 
 
 @pytest.mark.parametrize("name", ["weight", "stiffening"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -12,13 +12,14 @@ from ...design.waveguide import waveguide
 from ...errors import InputError
 from ...files import write_csv
 from ...report.results import Checks, Signals
-from ...run.cache import key
+from ...run.cache import Cache, key
 from ...sensing.embedded_waveguide import EmbeddedWaveguide, Joints, embed_waveguide
 from ...sensing.law import CURVATURE_OF_WELLS, Law, features, fit_law
 from ...sensing.optics import Optics
 from ...sensing.signal import best_sets, differential_pairs, pareto, response, signal_of_nodes, traced_signal
 
 if TYPE_CHECKING:
+    from ...design.dimensions import Dimensions
     from .study import Study
 
 Array = np.ndarray[Any, Any]
@@ -48,7 +49,7 @@ def _signals(study: Study, optics: Optics) -> Signals:
     assert study.trajectory is not None
     unit = study.job.unit
     with study.progress.stage("light", expected_s=10.0):
-        law = _law(study, optics)
+        law = cached_law(unit.printed, optics, study.cache, study.progress.update)
         states = study.trajectory.states
         # What no pressure acts on comes first, whether or not a sample meets it.
         still = next((s.u for s in states if not s.pressure_MPa), np.zeros_like(study.mesh.nodes))
@@ -132,19 +133,20 @@ def _named(names: Sequence[str], chosen: Any) -> tuple[tuple[tuple[str, ...], fl
     return tuple((tuple(names[i] for i in numbers), float(value)) for numbers, value in chosen)
 
 
-def _law(study: Study, optics: Optics) -> Law:
-    """The fast law of this unit's waveguide, from the cache if it was fitted before."""
-    d = study.job.unit.printed
+def cached_law(
+    d: Dimensions, optics: Optics, cache: Cache, on_trace: Callable[[float], None] = lambda share: None
+) -> Law:
+    """The fast law of a unit's waveguide, from a cache if it was fitted before; on_trace: share done."""
     sizes = (
         d.cell, d.waveguide_section, d.well_width, d.well_depth, d.well_pitch, d.waveguide_end,
         d.junction_diameter,
     )  # fmt: skip
     name = key("light", 3, sizes, attrs.astuple(optics))
-    stored = study.cache.get("light", name)
+    stored = cache.get("light", name)
     if stored is None:
-        law = fit_law(d, optics, on_trace=study.progress.update)
+        law = fit_law(d, optics, on_trace=on_trace)
         arrays = {"coefficients": law.coefficients, "covariance": law.covariance, "rms": np.array(law.rms)}
-        study.cache.put("light", name, arrays)
+        cache.put("light", name, arrays)
         return law
     return Law(stored["coefficients"], stored["covariance"], float(stored["rms"]))
 
