@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-PACKAGE = __package__.rpartition(".")[0]
+PACKAGE = __package__.removesuffix(".blender.shared")
 """Name of the whole extension: `bl_ext.<repository>.mu_addon` when installed, `mu_addon` from source."""
 
 INSTALLED = PACKAGE.startswith("bl_ext.")
