@@ -87,7 +87,7 @@ def _sync_folder(folder: Path) -> None:
             os.close(handle)
 
 
-def write_bytes(path: Path, data: bytes) -> None:
+def write_bytes(path: Path, data: bytes | memoryview) -> None:
     """Write `data` to `path`; raises OutputError."""
     with replacing(path) as beside:
         beside.write_bytes(data)
@@ -153,8 +153,10 @@ def _check_header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> None:
 
 def write_npz(path: Path, arrays: Mapping[str, Any]) -> None:
     """Write named `arrays`, compressed, to `path`; equal arrays make equal bytes; raises OutputError."""
-    with replacing(path) as beside, beside.open("wb") as stream:
-        np.savez_compressed(stream, **arrays)
+    # Packed in memory: an archive on a full disk fails again when it is thrown away, with a traceback.
+    packed = io.BytesIO()
+    np.savez_compressed(packed, **arrays)
+    write_bytes(path, packed.getbuffer())
 
 
 def plain(value: Any) -> Any:
