@@ -87,7 +87,7 @@ def _sync_folder(folder: Path) -> None:
             os.close(handle)
 
 
-def write_bytes(path: Path, data: bytes) -> None:
+def write_bytes(path: Path, data: bytes | memoryview) -> None:
     """Write `data` to `path`; raises OutputError."""
     with replacing(path) as beside:
         beside.write_bytes(data)
@@ -119,18 +119,24 @@ _DAMAGED = (
 )  # fmt: skip
 
 
+# An archive unpacks to no more than this many times its size, or to no more than this many bytes at all.
+# Computed numbers shrink to a half or a third; what shrinks far more was made to fill the memory.
+_MOST_SHRUNK, _SMALL = 16, 1 << 26
+
+
 def read_npz(path: Path, most_bytes: int = 1 << 32) -> dict[str, Any] | None:
     """Arrays by name of an NPZ file, or None where there is none that can be read whole.
 
     Nothing of the file is run, and nothing is set aside for an array before the archive is known to hold as
-    many bytes as the array's header claims, and no more than `most_bytes` in all.
+    many bytes as the array's header claims, no more than `most_bytes` in all and in proportion to its size.
     """
     try:
         # A pipe would be waited for.
         if not path.is_file():
             return None
         with zipfile.ZipFile(path) as archive:
-            if sum(member.file_size for member in archive.infolist()) > most_bytes:
+            unpacked = sum(member.file_size for member in archive.infolist())
+            if unpacked > min(most_bytes, _most_unpacked(path.stat().st_size)):
                 return None
             for member in archive.infolist():
                 _check_header(archive, member)
@@ -138,6 +144,11 @@ def read_npz(path: Path, most_bytes: int = 1 << 32) -> dict[str, Any] | None:
             return {name: stored[name] for name in stored.files}
     except _DAMAGED:
         return None
+
+
+def _most_unpacked(packed: int) -> int:
+    """How many bytes an archive of `packed` bytes may unpack to."""
+    return max(_SMALL, _MOST_SHRUNK * packed)
 
 
 def _check_header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> None:
@@ -152,9 +163,18 @@ def _check_header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> None:
 
 
 def write_npz(path: Path, arrays: Mapping[str, Any]) -> None:
-    """Write named `arrays`, compressed, to `path`; equal arrays make equal bytes; raises OutputError."""
-    with replacing(path) as beside, beside.open("wb") as stream:
-        np.savez_compressed(stream, **arrays)
+    """Write named `arrays` to `path`; equal arrays make equal bytes; raises OutputError.
+
+    They are compressed, unless they shrink so far that `read_npz` would not take them.
+    """
+    # Packed in memory: an archive on a full disk fails again when it is thrown away, with a traceback.
+    packed = io.BytesIO()
+    np.savez_compressed(packed, **arrays)
+    if sum(np.asarray(array).nbytes for array in arrays.values()) > _most_unpacked(packed.tell()) // 2:
+        # Long rows of equal numbers: `read_npz` would take it for one that was made to fill the memory.
+        packed = io.BytesIO()
+        np.savez(packed, **arrays)
+    write_bytes(path, packed.getbuffer())
 
 
 def plain(value: Any) -> Any:

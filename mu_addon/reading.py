@@ -17,8 +17,11 @@ from typing import Any
 
 from .errors import InputError
 
-# No file of text that is read here is longer, in bytes.
-_LONGEST = 1 << 28
+# No file of text that is read here is longer, in bytes, and no table has more rows. What is made of a text
+# takes up to some thirty times its length in memory, which these limits keep below 2 GB.
+_LONGEST, MOST_ROWS = 1 << 26, 1_000_000
+# No TOML or JSON document is longer, in characters: far more than any that the program writes.
+_LONGEST_DOCUMENT = 1 << 24
 # No table of this program lies deeper in others, and no whole number is larger (TOML's own are of 64 bits).
 _DEEPEST, _LARGEST = 64, 1 << 63
 # The parser takes time by the square of a dotted key's length.
@@ -41,7 +44,7 @@ def file_bytes(path: str | Path, most: int = _LONGEST) -> bytes:
             raise IsADirectoryError(errno.EISDIR, "that is a folder", str(path))
         raise OSError(errno.EINVAL, "that is no regular file", str(path))
     if found.st_size > most:
-        words = f"{found.st_size / 1e6:.0f} MB are more than the {most / 1e6:.0f} MB that are read"
+        words = f"its {_size(found.st_size)} are more than the {_size(most)} that are read"
         raise OSError(errno.EFBIG, words, str(path))
     return path.read_bytes()
 
@@ -51,8 +54,35 @@ def file_text(path: str | Path, most: int = _LONGEST) -> str:
     return file_bytes(path, most).decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
 
 
+def _size(count: int) -> str:
+    return f"{count / 1e6:.0f} MB" if count >= 1e7 else f"{count / 1e3:.0f} kB"
+
+
+def require_rows(count: int, where: str) -> None:
+    """Raise InputError where a table of `count` rows is longer than is read."""
+    if count > MOST_ROWS:
+        raise InputError(
+            f"the table has more than the {MOST_ROWS} rows that are read",
+            where,
+            "leave out rows, or divide it into several files",
+        )
+
+
+def _require_length(text: str | bytes, origin: str, remedy: str) -> None:
+    """Raise InputError for a document that would exhaust the memory when it is parsed."""
+    if len(text) > _LONGEST_DOCUMENT:
+        words = f"its {_size(len(text))} are more than the {_size(_LONGEST_DOCUMENT)} that are read"
+        raise InputError(words, origin, remedy)
+
+
+def unreadable(error: OSError | UnicodeDecodeError) -> str:
+    """Why a file could not be read as text, in words without its name."""
+    return str(error.strerror or error) if isinstance(error, OSError) else "it is not UTF-8 text"
+
+
 def parse_toml(text: str, origin: str, remedy: str = "correct that line") -> dict[str, Any]:
     """Tables and values of TOML text; raises InputError, with the line where it is known."""
+    _require_length(text, origin or "TOML text", remedy)
     if _DOTTED.search(text):
         raise InputError(f"tables lie more than {_DEEPEST} deep in each other", origin or "TOML text", remedy)
     try:
@@ -70,6 +100,7 @@ def parse_toml(text: str, origin: str, remedy: str = "correct that line") -> dic
 
 def parse_json(text: str | bytes, origin: str, remedy: str = "let the program write it again") -> Any:
     """The value of JSON text; raises InputError."""
+    _require_length(text, origin, remedy)
     try:
         value = json.loads(text)
     except (RecursionError, ValueError, OverflowError) as error:

@@ -10,11 +10,13 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
-from ..reading import file_text
+from ..reading import file_text, require_rows
 
 Array = np.ndarray[Any, Any]
 
 COLUMNS = ("time_s", "pressure_kPa")
+# Far longer than any protocol of a million corner points needs to be, in bytes.
+_LONGEST = 1 << 25
 
 
 @attrs.frozen(eq=False)
@@ -44,11 +46,12 @@ def read_protocol(path: Path) -> Protocol:
     finite number, time does not increase, or the protocol does not start at atmospheric pressure.
     """
     try:
-        lines = file_text(path).splitlines()
+        lines = file_text(path, _LONGEST).splitlines()
     except OSError as error:
         raise InputError(f"cannot read the protocol: {error.strerror}", str(path), "check the path") from None
     except UnicodeDecodeError:
         raise InputError("the protocol is not a text file", str(path), "save it as UTF-8 CSV") from None
+    require_rows(sum(1 for line in lines if line.split("#")[0].strip()) - 1, str(path))
     rows = [(i, line) for i, line in enumerate(lines, 1) if line.split("#")[0].strip()]
     if not rows:
         raise InputError("the protocol is empty", str(path), f"give the columns {', '.join(COLUMNS)}")

@@ -14,6 +14,7 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
+from ..reading import require_rows
 from .kinds import Kind, markers, may_be_missing, named, quantity_of, units_of
 
 Array = np.ndarray[Any, Any]
@@ -80,9 +81,10 @@ def _at(path: Path, row: int | None = None, column: str = "") -> str:
 
 def _lines(text: str, path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """Cells of the header, and of every further line with its number."""
-    found = []
+    found: list[tuple[int, list[str]]] = []
     for number, line in enumerate(text.splitlines(), 1):
         if line.strip() and not line.lstrip().startswith("#"):
+            require_rows(len(found), _at(path))
             found.append((number, [cell.strip() for cell in next(csv.reader(io.StringIO(line)))]))
     if not found:
         raise InputError("the file contains no table", _at(path), "the first line must hold the column names")

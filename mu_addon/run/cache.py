@@ -26,7 +26,9 @@ def _digest(parts: Iterable[Any]) -> hashlib._Hash:
     digest = hashlib.sha256(str(REVISION).encode())
     for part in parts:
         if isinstance(part, np.ndarray):
-            digest.update(f"{part.shape} {part.dtype.str}".encode() + np.ascontiguousarray(part).tobytes())
+            digest.update(f"{part.shape} {part.dtype.str}".encode())
+            # Its memory as it is: a copy of a large array would double it.
+            digest.update(np.ascontiguousarray(part).data)
         else:
             digest.update(repr(part).encode())
         digest.update(b"\0")

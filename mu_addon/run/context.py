@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
@@ -14,12 +15,15 @@ from typing import Any
 
 import attrs
 
-from ..errors import MuError
-from ..files import write_json
+from ..errors import MuError, OutputError
+from ..files import plain, write_json, write_text
 from .lock import FolderLock
 from .progress import Progress, log_file
 
 DONE, UNEXPECTED, INTERRUPTED, TERMINATED = 0, 70, 130, 143
+SUMMARY = "summary.json"
+# Bytes that the summary of a run that goes on takes up: room for its last one where the disk is full by then.
+RESERVED = 1 << 14
 
 
 class _Interrupted(MuError):
@@ -85,12 +89,13 @@ class RunContext:
     def open_folder(self, folder: Path) -> Path:
         """Make `folder` the run's: locked, with log.ndjson, and "running" in summary.json until the end.
 
-        So a run that was killed, or overtaken by a new one, never passes for complete. Raises InUseError and
-        OutputError.
+        So a run that was killed, or overtaken by a new one, never passes for complete. The summary is filled
+        up with blanks to RESERVED bytes, which a last summary gets. Raises InUseError and OutputError.
         """
         self.lock_folder(folder)
         self.progress.sinks.append(log_file(folder / "log.ndjson"))
-        write_json(folder / "summary.json", {"status": "running", **self.summary})
+        text = json.dumps(plain({"status": "running", **self.summary}), ensure_ascii=False, allow_nan=False)
+        write_text(folder / SUMMARY, text.ljust(RESERVED) + "\n")
         self.folder = folder
         return folder
 
@@ -161,8 +166,30 @@ def _write_summary(context: RunContext, state: dict[str, Any]) -> None:
     seconds = {"seconds": {**context.summary.get("seconds", {}), **context.progress.seconds}}
     # Twice, so that the state is read first and yet overrides an older one.
     context.summary = {**state, **context.summary, **state, **seconds}
-    if context.folder is not None:
-        write_json(context.folder / "summary.json", context.summary)
+    if context.folder is None:
+        return
+    # Without room for all that was found, a run that stops says at least why.
+    stopped = [state] if "reason" in state else []
+    _replace_summary(context.folder / SUMMARY, [context.summary, *stopped])
+
+
+def _replace_summary(path: Path, wanted: Sequence[dict[str, Any]]) -> None:
+    """Write the first summary that there is room for; raises OutputError where there is none for any.
+
+    On a full disk the one that is there gives way first: a folder without a summary does not pass for one
+    whose run goes on.
+    """
+    try:
+        write_json(path, wanted[0])
+        return
+    except OutputError:
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
+    for summary in wanted[:-1]:
+        with suppress(OutputError):
+            write_json(path, summary)
+            return
+    write_json(path, wanted[-1])
 
 
 def _log_traceback(context: RunContext, error: Exception) -> None:

@@ -12,6 +12,7 @@ A `Progress` makes messages, plain dictionaries with a `type`, and hands each to
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
 import unicodedata
@@ -260,6 +261,18 @@ def json_lines(stream: TextIO = sys.stdout, clock: Clock = time.perf_counter) ->
     return sink
 
 
+def _add_whole(path: Path, line: bytes) -> None:
+    """Add a line to the end of a file, or nothing where only a part of it finds room; raises OSError."""
+    with path.open("ab", buffering=0) as stream:
+        end = stream.seek(0, os.SEEK_END)
+        if (written := stream.write(line)) < len(line):
+            try:
+                stream.write(line[written:])
+            except OSError:
+                stream.truncate(end)
+                raise
+
+
 def log_file(path: Path, clock: Clock = time.perf_counter) -> Sink:
     """A sink that adds to `path` (log.ndjson): messages with the time of day, running fractions every 5 s.
 
@@ -275,8 +288,7 @@ def log_file(path: Path, clock: Clock = time.perf_counter) -> Sink:
             last = clock()
         stamped = {"time": time.strftime("%Y-%m-%dT%H:%M:%S%z"), **plain(message)}
         try:
-            with path.open("a", encoding="utf-8") as stream:
-                stream.write(_json_line(stamped))
+            _add_whole(path, _json_line(stamped).encode())
         except OSError as error:
             raise output_error(error, path) from error
 

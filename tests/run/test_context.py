@@ -1,11 +1,19 @@
 """However a run ends, it leaves a message, an exit status and a summary.json, and never a traceback."""
 
+import errno
 import json
+import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+from mu_addon.files import write_text
+from mu_addon.run import context as context_module
+from mu_addon.run.context import run_to_end
+from mu_addon.run.progress import Progress
 
 RUN = """
 import signal, sys, time
@@ -166,3 +174,55 @@ def test_a_full_disk_still_ends_with_its_message(tmp_path, monkeypatch):
     assert context.status == 5
     assert messages[-1]["type"] == "error"
     assert "free some space" in messages[-1]["what_to_do"]
+
+
+def full_below(monkeypatch, folder, reserved):
+    """Writing as on a disk on which files of `folder` that are there have taken all room but a few bytes."""
+    room = sum(path.stat().st_size for path in folder.iterdir()) + reserved
+
+    def write(path, data):
+        taken = sum(found.stat().st_size for found in path.parent.iterdir())
+        with path.open("wb") as stream:
+            stream.write(data[: max(0, room - taken)])
+        if len(data) > room - taken:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return len(data)
+
+    monkeypatch.setattr(Path, "write_bytes", write)
+
+
+@pytest.mark.parametrize(
+    ("figures", "kept"), [({"angle_deg": 4.0}, {"angle_deg": 4.0}), ({"rows": list(range(5000))}, {})]
+)
+def test_a_run_that_fills_the_disk_does_not_pass_for_one_that_goes_on(tmp_path, monkeypatch, figures, kept):
+    """Its last summary gets the room that was kept for it; one too long for that says why the run ended."""
+    with run_to_end(Progress()) as context:
+        context.open_folder(tmp_path)
+        assert json.loads((tmp_path / "summary.json").read_text())["status"] == "running"
+        full_below(monkeypatch, tmp_path, reserved=0)
+        context.summary |= figures
+        write_text(tmp_path / "mesh.txt", "too much")
+    assert context.status == 5
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["status"] == "partial"
+    assert summary["reason"]["what"] == "cannot write mesh.txt: No space left on device"
+    assert {name: summary[name] for name in figures if name in summary} == kept
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["log.ndjson", "run.lock", "summary.json"]
+
+
+def test_where_not_even_the_reason_can_be_written_no_summary_stays(tmp_path, monkeypatch):
+    with run_to_end(Progress()) as context:
+        context.open_folder(tmp_path)
+        full_below(monkeypatch, tmp_path, reserved=-context_module.RESERVED)
+        write_text(tmp_path / "mesh.txt", "too much")
+    assert context.status == 5
+    assert not (tmp_path / "summary.json").exists()
+
+
+def test_a_run_is_not_complete_before_its_figures_are_written(tmp_path, monkeypatch):
+    with run_to_end(Progress()) as context:
+        context.open_folder(tmp_path)
+        full_below(monkeypatch, tmp_path, reserved=0)
+        context.summary["rows"] = list(range(5000))
+    assert context.status == 5
+    assert json.loads((tmp_path / "summary.json").read_text())["status"] == "partial"

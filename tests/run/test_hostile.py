@@ -11,7 +11,7 @@ import pytest
 
 from mu_addon.errors import InputError
 from mu_addon.files import read_npz, write_npz
-from mu_addon.run.cache import Cache
+from mu_addon.run.cache import Cache, key
 from mu_addon.run.context import run_to_end
 from mu_addon.run.folder import FolderLayout, begin
 from mu_addon.run.progress import Progress
@@ -196,3 +196,30 @@ def test_reading_takes_no_time_worth_an_attack(tmp_path):
     start = time.process_time()
     assert read_npz(path) is None
     assert time.process_time() - start < 5
+
+
+def test_a_small_archive_does_not_unpack_to_gigabytes(tmp_path):
+    """A thousand times its size: a zip bomb that a limit on what real entries need lets pass."""
+    header = "{'descr': '<f8', 'fortran_order': False, 'shape': (37500000,), }"
+    path = archive(tmp_path / "a.npz", u=npy(header, bytes(300_000_000)))
+    assert path.stat().st_size < 300_000
+    assert _peak_of(path) < 50e6
+
+
+def test_what_shrinks_as_far_is_written_so_that_it_can_be_read(tmp_path):
+    write_npz(tmp_path / "a.npz", {"u": np.zeros(12_000_000)})
+    assert read_npz(tmp_path / "a.npz")["u"].shape == (12_000_000,)
+    cache = Cache(tmp_path)
+    cache.put("state", "a", {"u": np.zeros((4_000_000, 3))})
+    assert cache.get("state", "a")["u"].shape == (4_000_000, 3)
+
+
+def test_an_entry_is_sealed_without_a_copy(tmp_path):
+    import tracemalloc
+
+    values = np.random.default_rng(0).random(2_000_000)
+    tracemalloc.start()
+    key(values)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1e6

@@ -2,6 +2,7 @@
 
 import io
 import json
+import sys
 
 import pytest
 
@@ -162,3 +163,20 @@ def test_an_error_reaches_the_sinks_that_still_work():
 )
 def test_spell(seconds, words):
     assert spell(seconds) == words
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sets no limits on the size of a file")
+def test_a_full_disk_leaves_no_half_line_in_the_log(tmp_path):
+    import resource
+
+    log = log_file(tmp_path / "log.ndjson")
+    log({"type": "warning", "what": "first"})
+    before = (tmp_path / "log.ndjson").read_bytes()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(before) + 20, limits[1]))
+    try:
+        with pytest.raises(OutputError):
+            log({"type": "warning", "what": "second"})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert (tmp_path / "log.ndjson").read_bytes() == before

@@ -7,6 +7,7 @@ import os
 import random
 import subprocess
 import sys
+import tracemalloc
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -26,10 +27,14 @@ from mu_addon.files import read_npz
 from mu_addon.homogenize.effective import read_effective
 from mu_addon.materials.library import read_material
 from mu_addon.measured.folder import read_folder
-from mu_addon.reading import file_text, parse_json, parse_toml
+from mu_addon.measured.kinds import KINDS
+from mu_addon.measured.table import read_table
+from mu_addon.reading import MOST_ROWS, file_text, parse_json, parse_toml
 from mu_addon.run.folder import FolderLayout, claim
 from mu_addon.sensing.calibration import read_calibration
 from mu_addon.sensing.recording import read_recording
+from mu_addon.usecases.export.job import path_of
+from mu_addon.usecases.export.print_offsets import read_sheet
 from mu_addon.usecases.grip.phases import read_phases
 from mu_addon.usecases.parameter_study.plan import read_plan
 from mu_addon.usecases.reproduce.settings import read_set
@@ -67,6 +72,8 @@ READERS: dict[str, tuple[Callable[[Path], Any], str | None]] = {
     "phases": (read_phases, None),
     "pressure": (read_pressure, "time_s,pressure_kPa\n0,0\n1,5\n"),
     "pixels": (read_pixels, None),
+    "gauge": (read_sheet, None),
+    "paths": (lambda path: path_of(Unit(), str(path.rename(path.with_suffix(".csv")))), None),
     "folder": (lambda path: read_folder(_as(path, "experiments.toml")), None),
     "recording": (lambda path: read_recording(_as(path, "index.ndjson")), None),
 }
@@ -124,6 +131,50 @@ def test_a_pipe_is_not_waited_for(name: str, tmp_path: Path) -> None:
     os.mkfifo(path)
     with pytest.raises(InputError):
         READERS[name][0](path)
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_file_of_gigabytes_is_refused_by_its_size(name: str, tmp_path: Path) -> None:
+    """Of 3 GB, none of which lies on the disk; before it is read."""
+    path = tmp_path / "file.toml"
+    path.touch()
+    os.truncate(path, 3 << 30)
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError) as told:
+            READERS[name][0](path)
+        assert name == "values" or "its 3221 MB are more" in told.value.what
+        assert tracemalloc.get_traced_memory()[1] < 3e6
+    finally:
+        tracemalloc.stop()
+
+
+LONG = {
+    "protocol": (read_protocol, "time_s,pressure_kPa\n", "0,0\n"),
+    "pressure": (read_pressure, "time_s,pressure_kPa\n", "0,0\n"),
+    "pixels": (read_pixels, "base right_px,base down_px\n", "1,2\n"),
+    "measured": (
+        lambda path: read_table(path.read_text(), KINDS["unit_pressure"], path),
+        "time_s,pressure_kPa,angle_deg\n",
+        "0,0,0\n",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_a_table_of_too_many_rows_is_refused(name: str, tmp_path: Path) -> None:
+    reader, head, row = LONG[name]
+    path = tmp_path / "long.csv"
+    path.write_text(head + row * (MOST_ROWS + 1))
+    with pytest.raises(InputError, match="more than the 1000000 rows that are read"):
+        reader(path)
+
+
+def test_a_document_that_would_fill_the_memory_is_refused() -> None:
+    text = "[" + "[]," * 6_000_000 + "[]]"
+    for parse in (parse_toml, parse_json):
+        with pytest.raises(InputError, match="its 18 MB are more than"):
+            parse("a=" + text if parse is parse_toml else text, "x")
 
 
 @pytest.mark.parametrize("name", [name for name, (_, text) in READERS.items() if text])

@@ -7,12 +7,14 @@ import pytest
 
 from mu_addon.cli.main import main
 from mu_addon.design import shapes
+from mu_addon.design.parameters import Chambers, Unit
 from mu_addon.design.printing.printer import MEANING, load_printer, printer_text, read_printer
-from mu_addon.design.solid import printable
-from mu_addon.design.surface import stl_bytes
+from mu_addon.design.solid import build_solid, printable
+from mu_addon.design.surface import genus, stl_bytes
 from mu_addon.errors import InputError
+from mu_addon.usecases.check_print.job import Job
 from mu_addon.usecases.check_print.report import direction_name
-from mu_addon.usecases.check_print.run import read_surface
+from mu_addon.usecases.check_print.run import nominal_of, read_surface
 
 
 def bottle(bore):
@@ -135,3 +137,12 @@ def test_directions_are_named_as_they_are_spoken_of():
     assert direction_name((1, -1, 0)) == "+x−y"
     lean = np.radians(20)
     assert direction_name((-np.sin(lean), 0, np.cos(lean))) == "20° from +z toward −x"
+
+
+def test_a_file_is_compared_with_its_unit(tmp_path):
+    unit = Unit(chambers=Chambers(count=3))
+    solid = build_solid(unit)
+    job = Job(load_printer(), unit, stl=stl_bytes(solid.vertices, solid.triangles))
+    assert genus(*nominal_of(job)) == genus(solid.vertices, solid.triangles)
+    assert nominal_of(Job(load_printer(), unit)) is None
+    assert nominal_of(Job(load_printer(), stl=job.stl)) is None

@@ -20,6 +20,7 @@ from .crossing import crossings
 from .drain import chambers, distance_field
 from .finding import NOWHERE, Finding, Severity, at_least, clustered, none_of
 from .leaks import drainage_findings
+from .nominal import against_nominal
 from .orientation import Build, fits, orientations
 from .printer import Printer
 from .thickness import cast_rays, samples
@@ -66,13 +67,15 @@ def check(
     direction: tuple[float, float, float] = (0.0, 0.0, 1.0),
     stages: Collection[str] = STAGES,
     stage: Stage = nullcontext,
+    nominal: tuple[Vertices, Triangles] | None = None,
 ) -> PrintCheck:
     """Printability check of a surface of vertices (n, 3) in mm and triangles (m, 3), as its STL is read back.
 
     unit, window: of the design, whose inlet, size, struts and wells are then checked too; direction: away
     from the platform. A surface that is not closed, inside out or of the wrong size is examined no further.
     `stages` may leave some out: layers need chambers, directions need chambers and thickness. stage: context
-    that is entered, with its name, for each stage. Raises InputError for a window that does not fit the unit.
+    that is entered, with its name, for each stage. nominal: surface of the unit's own solid, which a surface
+    from elsewhere is compared with. Raises InputError for a window that does not fit the unit.
     """
     vertices, triangles = stl_surface(stl_bytes(vertices, triangles))
     up = np.asarray(direction, float) / np.linalg.norm(direction)
@@ -93,6 +96,8 @@ def check(
     solid = Manifold(Mesh64(vertices, triangles.astype(np.uint64)))
     if solid.status() != Error.NoError:
         return PrintCheck([*found, _unexamined(False)], figures, [])
+    if nominal is not None:
+        found += against_nominal(vertices, triangles, nominal)
     figures["volume_ml"] = solid.volume() / 1e3
     figures["mass_g"] = figures["volume_ml"] * printer["density_g_per_ml"]
     # Grids see no more of a surface than their cells: what is simplified is less than they tell.
@@ -125,8 +130,7 @@ def check(
     if "directions" in stages:
         with stage("build directions"):
             coarse = _step(max(min(COARSE, 0.9 * float(inward.distance.min())), STEP), vertices)
-            volume_mm = (printer["build_x_mm"], printer["build_y_mm"], printer["build_z_mm"])
-            builds = orientations(*seen, surface, lit, coarse, printer["overhang_deg"], volume_mm, up)
+            builds = orientations(*seen, surface, lit, coarse, printer["overhang_deg"], printer.room, up)
     return PrintCheck(found, figures, builds)
 
 
@@ -216,31 +220,42 @@ def _size(vertices: Vertices, printer: Printer, unit: Unit | None, up: Array) ->
                 remedy="" if same else "export in mm",
             )
         )
+    return [*found, _room(vertices, printer, up)]
+
+
+def _room(vertices: Vertices, printer: Printer, up: Array) -> Finding:
+    """Whether the part fits the build volume on its supports, as it stands or turned about the direction."""
     extent = np.ptp(vertices @ frame_along(up).T, axis=0)
-    room_mm = (printer["build_x_mm"], printer["build_y_mm"], printer["build_z_mm"])
-    inside = fits(extent, room_mm)
-    share = max(extent[2] / room_mm[2], min(_flat(extent, room_mm), _flat(extent[[1, 0, 2]], room_mm)))
-    limit = printer.limits["build_x_mm"]
-    words = "it would fit if its coordinates were inches" if not inside and share / INCH < 1.0 else ""
+    room, limit = printer.room, printer.limits["build_x_mm"]
+    straight, turned = _flat(extent, room), _flat(extent[[1, 0, 2]], room)
+    share = max(extent[2] / room[2], min(straight, turned))
     tiny = float(extent.max()) < 5.0
-    words = "the whole part is smaller than 5 mm: the file may be in metres or inches" if tiny else words
-    found.append(
-        Finding(
-            "build volume",
-            "error" if not inside or tiny else "pass",
-            f"{extent[0]:.4g} x {extent[1]:.4g} x {extent[2]:.4g} mm as it stands"
-            + (f"; {words}" if words else ""),
-            float(share),
-            1.0,
-            "of the room",
-            0.5 * (low + high)[None] if not inside or tiny else NOWHERE,
-            int(not inside or tiny),
-            limit.source,
-            limit.assumed,
-            "" if inside and not tiny else "turn the part, divide it, or check its scale",
-        )
+    bad = not fits(extent, room) or tiny
+    what = (
+        f"{extent[0]:.4g} x {extent[1]:.4g} x {extent[2]:.4g} mm as it stands, on "
+        f"{printer['support_mm']:g} mm of supports and raft"
     )
-    return found
+    remedy = "turn the part, divide it, or check its scale" if bad else ""
+    if not bad and straight > 1.0:
+        what += f"; it fits {room[0]:g} x {room[1]:g} mm only if it is turned by 90 degrees on the platform"
+        remedy = "turn the part by 90 degrees about the build direction"
+    if tiny:
+        what += "; the whole part is smaller than 5 mm: the file may be in metres or inches"
+    elif bad and share / INCH < 1.0:
+        what += "; it would fit if its coordinates were inches"
+    return Finding(
+        "build volume",
+        "error" if bad else "pass",
+        what,
+        float(share),
+        1.0,
+        "of the room",
+        0.5 * (vertices.min(axis=0) + vertices.max(axis=0))[None] if bad else NOWHERE,
+        int(bad),
+        f"{limit.source}; supports: {printer.limits['support_mm'].source}",
+        limit.assumed or printer.limits["support_mm"].assumed,
+        remedy,
+    )
 
 
 def _flat(extent: Array, room_mm: tuple[float, float, float]) -> float:

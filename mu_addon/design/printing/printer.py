@@ -19,6 +19,7 @@ MEANING = {
     "build_x_mm": "size of the build volume along x",
     "build_y_mm": "size of the build volume along y",
     "build_z_mm": "height of the build volume above the platform",
+    "support_mm": "height that supports and raft lift the part above the platform",
     "layer_mm": "height of a layer",
     "solid_mm": "thinnest solid",
     "wall_mm": "thinnest wall between a chamber and the outside",
@@ -48,6 +49,10 @@ class Limit:
     assumed: bool
 
 
+# For files that do not give it, as those of older versions.
+SUPPORTS = Limit(7.0, "a raft of 2 mm and supports of 5 mm above it; set your slicer's figures", True)
+
+
 @attrs.frozen
 class Printer:
     """A printer with a resin and a layer height; limits by the names of MEANING, which end with their units.
@@ -61,6 +66,11 @@ class Printer:
 
     def __getitem__(self, name: str) -> float:
         return self.limits[name].value
+
+    @property
+    def room(self) -> tuple[float, float, float]:
+        """Sizes in mm of the room for the part itself: the build volume less the height of its supports."""
+        return self["build_x_mm"], self["build_y_mm"], self["build_z_mm"] - self["support_mm"]
 
 
 def load_printer(name: str = DEFAULT) -> Printer:
@@ -86,14 +96,20 @@ def read_printer(path: str | Path) -> Printer:
     document = parse(text, keys, str(path))
     if document.get("format") != 1 or document["format"] is True:
         raise InputError("the printer's file has no format = 1", place(str(path), None), "write format = 1")
-    missing = [name for name in MEANING if name not in document]
+    missing = [name for name in MEANING if name not in document and name != "support_mm"]
     if missing:
         raise InputError(
             f"a limit is missing: {missing[0]}, {MEANING[missing[0]]}",
             str(path),
             f"add [{missing[0]}] with value and source, or start from a shipped file",
         )
-    limits = {name: _limit(name, document[name], str(path)) for name in MEANING}
+    limits = {
+        name: _limit(name, document[name], str(path)) if name in document else SUPPORTS for name in MEANING
+    }
+    if limits["support_mm"].value >= limits["build_z_mm"].value:
+        raise InputError(
+            "supports take the whole height of the build volume", f"{path}, [support_mm]", "correct it"
+        )
     return Printer(str(document.get("name", path.stem)), str(document.get("title", path.stem)), limits)
 
 

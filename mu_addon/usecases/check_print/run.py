@@ -25,6 +25,7 @@ def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
     progress = context.progress
     with progress.stage("part"):
         vertices, triangles = surface_of(job)
+        nominal = nominal_of(job)
     found = check(
         vertices,
         triangles,
@@ -33,6 +34,7 @@ def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
         job.window,
         job.direction,
         stage=progress.stage,
+        nominal=nominal,
     )
     context.summary |= summary(found)
     write_bytes(folder / "part.stl", stl_bytes(vertices, triangles))
@@ -59,6 +61,16 @@ def surface_of(job: Job) -> tuple[Vertices, Triangles]:
     if job.stl is not None:
         return read_surface(job.stl, job.stl_name)
     assert job.unit is not None
+    solid = build_solid(job.unit, job.window, job.quality)
+    return solid.vertices, solid.triangles
+
+
+def nominal_of(job: Job) -> tuple[Vertices, Triangles] | None:
+    """The surface (n, 3), (m, 3) that a file is compared with: its unit's solid. None where there is no unit,
+    or nothing but it. Raises GateError.
+    """
+    if job.stl is None or job.unit is None:
+        return None
     solid = build_solid(job.unit, job.window, job.quality)
     return solid.vertices, solid.triangles
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from pathlib import Path
 
 import attrs
@@ -14,6 +15,7 @@ from ...design.parameters import Unit, read_unit, to_toml
 from ...design.solid import QUALITY
 from ...errors import InputError
 from ...materials.library import Material, load_material, material_text, read_material
+from ...reading import file_text, unreadable
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...toml_writer import toml_text
@@ -24,6 +26,8 @@ UNIT, RESIN = "unit.toml", "resin.toml"
 USUAL_RESIN = "elastic-50a-v1"
 FORMATS = ("stl", "3mf", "3mf-beams", "step", "txt")
 MANIFEST = "manifest.json"
+# Characters of a path's points: some ten thousand of them.
+_LONGEST_PATH = 1 << 18
 LAYOUT = FolderLayout(
     "export.toml",
     "# The inputs of this export; unit.toml beside it belongs to them.",
@@ -126,21 +130,28 @@ def path_of(unit: Unit, name: str | None, row: str | None = None) -> tuple[Windo
     if not name.endswith(".csv"):
         return window(unit, name), name
     try:
-        with Path(name).open(encoding="utf-8", newline="") as stream:
-            rows = list(csv.DictReader(stream))
+        rows = csv.DictReader(io.StringIO(file_text(name)))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
-            f"cannot read the paths: {error}", name, "give paths.csv of `place --paths graph`"
+            f"cannot read the paths: {unreadable(error)}", name, "give paths.csv of `place --paths graph`"
         ) from error
-    named = [r for r in rows if row is None or r.get("path") == row]
-    if not named:
+    named = next((r for r in rows if row is None or r.get("path") == row), None)
+    if named is None:
         raise InputError(
             f"there is no path {row!r}" if row else "there is no path", name, "see its first column"
         )
     try:
-        points = np.array([[float(c) for c in p.split()] for p in named[0]["points_mm"].split(";")])
-        return points.reshape(-1, 3), named[0]["path"]
+        return _points(named.get("points_mm") or ""), named["path"]
     except (KeyError, ValueError) as error:
         raise InputError(
             "its column points_mm is not a list of points", name, "write it again by `place`"
         ) from error
+
+
+def _points(text: str) -> Array:
+    """Points (n, 3) in mm of a cell of paths.csv; raises ValueError."""
+    if len(text) > _LONGEST_PATH:
+        raise ValueError("no path of a lattice is that long")
+    if not text.strip():
+        raise ValueError("no points")
+    return np.array([[float(c) for c in p.split()] for p in text.split(";")]).reshape(-1, 3)

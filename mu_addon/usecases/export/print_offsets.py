@@ -10,7 +10,10 @@ from pathlib import Path
 from ...design.coupons import FEATURES, offsets
 from ...design.parameters import Unit
 from ...errors import InputError
+from ...reading import file_text, unreadable
 
+# Bytes of a filled sheet: a hundred times as many as the empty one has.
+_LONGEST = 1 << 17
 COLUMNS = ("feature", "kind", "axis", "nominal_mm", "measured_mm")
 
 
@@ -26,10 +29,11 @@ def gauge_sheet() -> str:
 def read_sheet(path: Path) -> dict[str, tuple[float, float, float]]:
     """Offset, its standard error and scale, for "xy" and "z", of a filled sheet; raises InputError."""
     try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            rows = list(csv.DictReader(stream))
+        rows = list(csv.DictReader(io.StringIO(file_text(path, _LONGEST))))
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read the sheet: {error}", str(path), "give the gauge's CSV file") from error
+        raise InputError(
+            f"cannot read the sheet: {unreadable(error)}", str(path), "give the gauge's CSV file"
+        ) from error
     known = {feature.name: feature for feature in FEATURES}
     chosen, sizes = [], []
     for number, row in enumerate(rows, 2):

@@ -15,6 +15,7 @@ import numpy as np
 from ...errors import InputError
 from ...files import write_csv, write_text
 from ...measured import read_folder
+from ...reading import file_text, require_rows
 from ...report.charts import canvas
 from ...report.html import cards, figure, page, table
 from ...run.context import RunContext
@@ -278,8 +279,9 @@ def _marked(recording: Recording, time_s: Array) -> Array:
 def _joined_angles(path: Path, time_s: Array) -> Array:
     """Angles (n,) in degrees at given times, interpolated in a CSV file, nan beyond its ends."""
     try:
-        with path.open(newline="") as stream:
-            rows = list(csv.DictReader(line for line in stream if not line.lstrip().startswith("#")))
+        lines = [line for line in file_text(path).splitlines() if not line.lstrip().startswith("#")]
+        require_rows(len(lines) - 1, str(path))
+        rows = list(csv.DictReader(lines))
         t, a = np.array([[float(row["time_s"]), float(row["angle_deg"])] for row in rows]).T
     except OSError as error:
         raise InputError(f"cannot read {path.name}: {error.strerror}", str(path), "check its name") from None

@@ -26,7 +26,7 @@ from ...measured.kinds import COMMON, KINDS
 from ...measured.rest import AT_REST, SAMPLES
 from ...measured.table import Remark, read_table
 from ...measured.video import Motion, Pair, Tracks, View, motion, resting
-from ...reading import file_text
+from ...reading import file_text, require_rows, unreadable
 from ...run.context import RunContext
 from ...toml_writer import toml_text
 
@@ -102,7 +102,7 @@ def read_bench(path: Path) -> Bench:
         text = file_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
-            "cannot read the description of the video", str(path), "check path and file"
+            f"cannot read the description of the video: {unreadable(error)}", str(path), "check path and file"
         ) from error
     document = parse(text, {"": HEAD, "experiment": OF_EXPERIMENT}, str(path))
 
@@ -224,7 +224,9 @@ def read_pressure(path: Path) -> tuple[Array, Array]:
         text = file_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
-            "cannot read the pressure", str(path), "give a CSV file of time_s,pressure_kPa"
+            f"cannot read the pressure: {unreadable(error)}",
+            str(path),
+            "give a CSV file of time_s,pressure_kPa",
         ) from error
     table = read_table(text, KINDS["pressure_hold"], Path(path))
     return table.columns["time_s"], table.columns["pressure_kPa"]
@@ -375,10 +377,13 @@ def read_pixels(path: Path) -> Tracks:
     try:
         lines = file_text(path).splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError("cannot read the tracked markers", str(path), "check path and file") from error
+        raise InputError(
+            f"cannot read the tracked markers: {unreadable(error)}", str(path), "check path and file"
+        ) from error
     rows = [
         (n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")
     ]
+    require_rows(len(rows) - 1, str(path))
     head, *body = [[cell.strip() for cell in cells] for cells in csv.reader(line for _, line in rows)] or [[]]
     names = tuple(h.removesuffix(" right_px") for h in head if h.endswith(" right_px"))
     wanted = [f"{name} {side}_px" for name in names for side in ("right", "down")]

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from mu_addon.design import shapes
+from mu_addon.design.lattice import lattice_of
 from mu_addon.design.printing.check import check
-from mu_addon.design.printing.printer import load_printer
+from mu_addon.design.printing.printer import load_printer, printer_text, read_printer
+from mu_addon.design.solid import build_solid, printable
 
 from . import parts
 from .parts import APEX
@@ -173,3 +175,65 @@ def test_the_presets_have_no_errors(name):
     by_name = {f.check: f for f in found.findings}
     assert by_name["drain"].value == pytest.approx(unit.dimensions.inlet_radius * 2, abs=0.05)
     assert by_name["chamber wall"].value == pytest.approx(unit.dimensions.wall, rel=0.03)
+
+
+def build_volume(*size, printer=None):
+    """The finding on a box of this size in mm on its supports."""
+    body = printable(shapes.box([0.0, 0.0, 0.0], list(size)))
+    found = check(*body, printer or load_printer(), stages=())
+    return next(f for f in found.findings if f.check == "build volume")
+
+
+def test_a_part_that_fits_only_turned_is_said_to():
+    assert "turned" not in build_volume(150, 60, 40).what
+    found = build_volume(60, 150, 40)
+    assert found.severity == "pass"
+    assert "only if it is turned by 90 degrees" in found.what
+    assert "by 90 degrees about the build direction" in found.remedy
+    assert build_volume(150, 150, 40).severity == "error"
+
+
+def test_supports_need_some_of_the_height():
+    """A part of 202.5 mm fits 210 mm on supports of 7 mm, one of 203.5 mm does not."""
+    found = build_volume(20, 20, 202.5)
+    assert found.severity == "pass"
+    assert found.value == pytest.approx(202.5 / 203.0)
+    assert "on 7 mm of supports and raft" in found.what
+    assert found.assumed
+    assert build_volume(20, 20, 203.5).severity == "error"
+
+
+def test_a_printers_file_without_supports_is_given_them(tmp_path):
+    text = printer_text(load_printer())
+    start = text.index("# height that supports")
+    (tmp_path / "old.toml").write_text(text[:start] + text[text.index("# height of a layer") :])
+    assert read_printer(tmp_path / "old.toml")["support_mm"] == 7.0
+
+
+def without_a_strut():
+    """The small unit with one strut cut through in its middle, and that place."""
+    lattice = lattice_of(parts.small_unit().dimensions)
+    middles = lattice.nodes[lattice.struts].mean(axis=1)
+    # In the lattice's outermost corner, far from the membrane.
+    place = middles[np.argmax(middles @ [0.1, 1.0, 0.01])]
+    return printable(parts.small_body() - shapes.box(place - 1.6, place + 1.6)), place
+
+
+def test_a_missing_strut_is_a_missing_tunnel():
+    solid = parts.small_solid()
+    nominal = solid.vertices, solid.triangles
+    surface, _ = without_a_strut()
+    found = {f.check: f for f in check(*surface, load_printer(), stages=(), nominal=nominal).findings}
+    assert found["tunnels"].severity == "error"
+    assert ": 1 less, as where struts are missing" in found["tunnels"].what
+    assert found["volume"].severity == "pass"
+
+
+def test_the_same_unit_of_other_facets_is_the_same():
+    solid, fine = parts.small_solid(), build_solid(parts.small_unit(), quality="export")
+    nominal = solid.vertices, solid.triangles
+    found = check(fine.vertices, fine.triangles, load_printer(), stages=(), nominal=nominal)
+    assert {f.check: f.severity for f in found.findings if f.check in ("tunnels", "volume")} == {
+        "tunnels": "pass",
+        "volume": "pass",
+    }
