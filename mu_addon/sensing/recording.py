@@ -34,8 +34,8 @@ INDEX = "index.ndjson"
 REJECTS = "rejects.ndjson"
 VERSION = 1
 _SYNC_S = 1.0
-# Bytes of a recording's file beyond which it is not read: four hours of ten channels at 1 kHz.
-_LONGEST = 1 << 30
+# Bytes of a recording's file beyond which it is not read: some six hours of four channels at 5 kHz.
+_LONGEST = 1 << 32
 # Of what cannot be read no more is kept than this; the counters go on.
 _MOST_REJECTS = 100_000_000
 

@@ -102,8 +102,8 @@ def test_the_command_line_gives_the_same_digits_as_plain_python(installed, home,
     run = ROOT / "headless" / "run.py"
     call(home, "-b", "--python-exit-code", "4", "-P", run, "--", *COARSE, "--out", tmp_path / "blender")
     (packages,) = installed.glob(".local/lib/python*/site-packages")
-    # By the Python that this Blender runs on, in a process that never saw Blender; its packages lie as Blender
-    # unpacked them, which this file of the extension's knows.
+    # By the Python that this Blender runs on, in a process that never saw Blender. Its packages lie as
+    # Blender unpacked them, which this file of the extension's knows.
     line = [str(ROOT / "mu_addon/blender/jobs/child_main.py"), *COARSE, "--out", str(tmp_path / "plain")]
     plain = f"""
 import os, subprocess, sys
