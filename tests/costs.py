@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 
 TABLE = Path(__file__).with_name("costs.csv")
-SLOW_S = 2.0
-LEAST_S = 1.0
+SLOW_S = 1.0
 
 elsewhere = 0.0
 """Seconds that a process which is still there took for tests; see `blender.session`."""
@@ -28,7 +27,7 @@ class Order:
     """Long files first, so that none is left over for one process at the end; long tests are `slow`."""
 
     def __init__(self, costs):
-        self.slow = {name for name, seconds in costs.items() if seconds >= SLOW_S}
+        self.slow = set(costs)
         self.by_file = Counter()
         for name, seconds in costs.items():
             self.by_file[name.partition("::")[0]] += seconds
@@ -91,5 +90,5 @@ def write(costs):
         rows = csv.writer(file, lineterminator="\n")
         rows.writerow(["seconds", "name"])
         for name, seconds in sorted(costs.items(), key=lambda cost: (-cost[1], cost[0])):
-            if seconds >= LEAST_S:
+            if seconds >= SLOW_S:
                 rows.writerow([f"{seconds:.1f}", name])
