@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+import tomlkit
 
 from mu_addon.design.anchors import window
 from mu_addon.design.assets import asset_root
@@ -113,7 +114,17 @@ def test_a_folder_of_an_older_version_says_the_same(tmp_path, name):
     found = use_case_of(folder)
     job = found.read(folder)
     texts = job.texts_in(folder)[0] if hasattr(job, "texts_in") else job.texts()
+    if name == "check":
+        # A limit that came since is written with its default: what was found without it is set aside.
+        texts["printer.toml"] = without_table(texts["printer.toml"], "support_mm")
     assert same_inputs(folder, {k: v for k, v in texts.items() if k != "resin.toml"})
+
+
+def without_table(text, name):
+    """TOML text without one of its tables."""
+    document = tomlkit.parse(text)
+    del document[name]
+    return tomlkit.dumps(document)
 
 
 def test_measured_data_that_are_gone_or_others_are_named(tmp_path):
