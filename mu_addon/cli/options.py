@@ -188,6 +188,13 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
         help="Mesh refinement: every element size is divided by F (default: 1).",
     )
     command.add_argument(
+        "--fidelity",
+        choices=("resolved", "homogenised"),
+        default="homogenised",
+        help="What is simulated: the printed body with its struts, or a continuum in place of the lattice "
+        "(default: homogenised).",
+    )
+    command.add_argument(
         "--lattice",
         metavar="FILE",
         help="Lattice law computed from struts and resin, the effective.toml of `homogenize`; a copy is "

@@ -35,7 +35,7 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
         unit, effects = modelled(options, context)
         extra = {
             "effects": effects,
-            "mesh": MeshSettings(order=options.order, refine=options.refine),
+            "mesh": MeshSettings(order=options.order, refine=options.refine, fidelity=options.fidelity),
             "times": options.times,
             "mesher": options.mesher,
             "solver": solver_of(options),

@@ -192,14 +192,13 @@ class Arc:
             stiffness, modes = self.inertia.modes(1)
         except ArithmeticError as why:
             raise ConvergenceError(str(why)) from None
-        mode = np.zeros_like(self._start.u)
-        mode.ravel()[self.model.free] = modes[:, 0]
+        mode = self.model.moved(np.zeros_like(self._start.u), modes[:, 0])
         return float(stiffness[0]), mode / np.linalg.norm(mode, axis=1).max()
 
     def _displacement(self, z: Array) -> Array:
         u = self._start.u.copy()
         u.ravel()[self.model.free] = z[:-1]
-        return u
+        return self.model.mesh.following(u)
 
     def _force(self, z: Array) -> tuple[Array, float]:
         force = self.model.residual(self._displacement(z), z[-1], self.parameters).ravel()[self.model.free]

@@ -91,8 +91,7 @@ class Descent:
         slope = float(self.force @ step)
         length = 1.0
         for _ in range(s.max_backtracks):
-            trial = self.u.copy()
-            trial.ravel()[model.free] += length * step
+            trial = model.moved(self.u, length * step)
             force, scale = self._out_of_balance(trial)
             level = float(np.linalg.norm(force))
             # A residual that shrinks fast needs no other proof (it is not a number where an element is

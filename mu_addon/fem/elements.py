@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -10,6 +10,9 @@ import numpy as np
 from ..errors import MeshingError
 from ..meshing.mesh import TET_EDGES, TRIANGLE_EDGES
 from ..meshing.quality import shapes
+
+if TYPE_CHECKING:
+    from ..meshing.mesh import Mesh
 
 Array = np.ndarray[Any, Any]
 
@@ -87,6 +90,32 @@ def reference_gradients(nodes: Array, tets: Array) -> ReferenceGradients:
         )
     gradients = np.einsum("qnj,mqji->mqni", dn, np.linalg.inv(jacobian))
     return ReferenceGradients(np.ascontiguousarray(gradients), det * weights)
+
+
+def even_points(steps: int) -> Array:
+    """Barycentric centres (q, 4) of a tetrahedron's even subdivision, `steps` to an edge, all inside.
+
+    >>> even_points(1).tolist(), len(even_points(4))
+    ([[0.25, 0.25, 0.25, 0.25]], 20)
+    """
+    whole = np.array(
+        [
+            (a, b, c, steps - 1 - a - b - c)
+            for a in range(steps)
+            for b in range(steps - a)
+            for c in range(steps - a - b)
+        ]
+    )
+    return (whole + 0.25) / steps
+
+
+def solid_volumes(mesh: Mesh) -> Array:
+    """Volumes (m, q) in mm3 that the quadrature points of a mesh's elements stand for, as far as filled.
+
+    Raises MeshingError as `reference_gradients`.
+    """
+    volumes = reference_gradients(mesh.nodes, mesh.tets).volumes
+    return volumes * mesh.filled if mesh.resolved else volumes
 
 
 def shape_functions(barycentric: Array, order: int) -> Array:

@@ -195,9 +195,7 @@ class Equilibrium:
             self.model.residual(last.u, p, self.parameters).ravel()[self.model.free]
             for p in (pressure, last.pressure_MPa)
         )
-        guess = last.u.copy()
-        guess.ravel()[self.model.free] += self.factor.solve(without - with_)
-        return guess
+        return self.model.moved(last.u, self.factor.solve(without - with_))
 
     def path(
         self,

@@ -126,6 +126,9 @@ def _tip_areas(mesh: Mesh) -> tuple[Array, Array]:
     height = mesh.nodes[mesh.tip[0], 2]
     faces, owner = boundary_faces(mesh.tets)
     on_tip = (mesh.nodes[faces][:, :, 2] == height).all(axis=1)
+    if mesh.resolved:
+        # Struts end in the same plane beside the cap.
+        on_tip &= np.isin(faces, mesh.tip).all(axis=1)
     faces, owner = faces[on_tip], owner[on_tip]
     a, b, c = (mesh.nodes[faces[:, i]] for i in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..meshing.mesh import Mesh
-from .elements import reference_gradients, shape_functions, tet_quadrature, triangle_shapes
+from .elements import shape_functions, solid_volumes, tet_quadrature, triangle_shapes
 
 Array = np.ndarray[Any, Any]
 
@@ -27,7 +27,7 @@ def gravity(
     """
     points, _ = tet_quadrature(mesh.order)
     shape = shape_functions(points, mesh.order)
-    volumes = reference_gradients(mesh.nodes, mesh.tets).volumes
+    volumes = solid_volumes(mesh)
     mass = np.broadcast_to(density_tonne_per_mm3, len(mesh.tets))[:, None] * (volumes @ shape)
     of_node = np.bincount(mesh.tets.ravel(), mass.ravel(), len(mesh.nodes))
     down = np.asarray(direction, float)

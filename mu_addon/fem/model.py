@@ -22,6 +22,7 @@ from .factor import Cholesky, SuperLU, make_factor, nested_dissection
 from .iterative import TwoLevel
 from .laws.tensors import mat33
 from .materials import Layer, Materials
+from .ties import folded_blocks
 
 if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
@@ -142,13 +143,14 @@ class Model:
         self.obstacles: tuple[Obstacle, ...] = ()
         self._least_force = 0.0
         reference = reference_gradients(mesh.nodes, mesh.tets)
-        self.volumes = reference.volumes.sum(axis=1)
+        weights = reference.volumes * mesh.filled if mesh.resolved else reference.volumes
+        self.volumes = weights.sum(axis=1)
         put = self._put
         n, m, f = len(mesh.nodes), len(mesh.tets), len(mesh.cavity)
         k, kf = mesh.tets.shape[1], mesh.cavity.shape[1]
         self._tets = put(mesh.tets.astype(np.int32), int)
         self._gradients = put(reference.gradients, wp.vec3d)
-        self._dV = put(reference.volumes, wp.float64)
+        self._dV = put(weights, wp.float64)
         shape, derivative, weight = triangle_shapes(mesh.order)
         self._faces = put(mesh.cavity.astype(np.int32).reshape(f, kf), int)
         self._face_rule = (
@@ -176,6 +178,7 @@ class Model:
         fixed[mesh.base] = True
         for axis in mesh.symmetry:
             fixed[mesh.symmetry_nodes(axis), AXES.index(axis)] = True
+        fixed[mesh.tied] = True
         self.free = np.nonzero(~fixed.ravel())[0]
         self._build_pattern(fixed)
 
@@ -201,6 +204,9 @@ class Model:
         self._block_parts = wp.zeros(len(pairs), dtype=mat33, device=self.device)
         self._blocks = wp.empty(len(keys), dtype=mat33, device=self.device)
         self._block_keys = keys
+        self._folding = None
+        if len(mesh.tied):
+            self._folding, keys = folded_blocks(mesh, keys)
         block_rows, block_columns = keys % n, keys // n
 
         number = np.full(3 * n, -1)
@@ -346,6 +352,15 @@ class Model:
                 )
             )
 
+    def moved(self, u: Array, step: Array) -> Array:
+        """Displacements (n, 3) in mm of u (n, 3) after a step (f,) in mm of the free unknowns.
+
+        Tied nodes follow.
+        """
+        found = u.copy()
+        found.ravel()[self.free] += step
+        return self.mesh.following(found)
+
     def _place(self, u: Array) -> None:
         self._u.assign(np.ascontiguousarray(u))
         self._x.assign(self.mesh.nodes + u)
@@ -399,7 +414,13 @@ class Model:
         residual: Array = self._residual.numpy().copy()
         for obstacle in self.obstacles:
             np.add.at(residual, *obstacle.forces(u))
-        return residual if self.load is None else residual - self.load
+        if self.load is not None:
+            residual -= self.load
+        tied, to = self.mesh.tied, self.mesh.tied_to
+        if len(tied):
+            np.add.at(residual, to, self.mesh.tied_weights[:, :, None] * residual[tied, None])
+            residual[tied] = 0.0
+        return residual
 
     def force_scale(self) -> float:
         """Root sum of squares of all element and face forces of the last residual, in N.
@@ -432,6 +453,8 @@ class Model:
             # Nodes of a face share an element, so each pair has its block; it is symmetric, as the pair is.
             keys = pairs.min(axis=1).astype(np.int64) * len(self.mesh.nodes) + pairs.max(axis=1)
             np.add.at(blocks, np.searchsorted(self._block_keys, keys), added)
+        if self._folding is not None:
+            blocks = self._folding(blocks)
         return np.asarray(blocks.ravel()[self._scalar_map])
 
     def matrix(self, values: Array) -> sparse.csc_matrix:

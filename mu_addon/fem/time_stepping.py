@@ -156,8 +156,5 @@ def _along_tangent(eq: Equilibrium, u: Array, pressure: float) -> Array:
         eq.factor.factor(model.tangent(u, pressure, eq.parameters))
     except IndefiniteError:
         raise ConvergenceError("the state to start from is unstable") from None
-    guess = u.copy()
-    guess.ravel()[model.free] -= eq.factor.solve(
-        model.residual(u, pressure, eq.parameters).ravel()[model.free]
-    )
-    return guess
+    force = model.residual(u, pressure, eq.parameters).ravel()[model.free]
+    return model.moved(u, -eq.factor.solve(force))

@@ -8,7 +8,9 @@ import numpy as np
 
 from ..design.printed import skin_stiffening
 from ..design.quantity import in_MPa
+from ..design.strut_cell import StrutCell, depth_below_surface
 from ..meshing.mesh import LATTICE
+from .elements import even_points, shape_functions
 from .laws import NeoHooke
 from .materials import Layer, Materials
 from .wall_law import wall_layers
@@ -20,14 +22,20 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, Any]
 
+# An element of a strut is divided this often along each edge to tell how much of it is skin.
+_SKIN_STEPS = 4
+
 
 def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> Materials:
     """Materials of a unit's mesh: neo-Hookean membrane and lattice, or the law that the unit's [wall] names.
 
-    lattice: a homogenised lattice law in place of the neo-Hookean one. A skin of other cure is spread
+    lattice: a homogenised lattice law in place of the neo-Hookean one. A resolved mesh is all of the wall's
+    resin, and takes neither the lattice's modulus nor a law for it. A skin of other cure is spread
     evenly over the wall's thickness (`skin_stiffening`): exact where the wall stretches, too soft where it
     bends.
     """
+    if mesh.resolved:
+        return _of_resin(unit, mesh)
     m, p = unit.material, unit.print
     stiffer = skin_stiffening(unit.printed.wall, p.skin_depth_mm, p.skin_factor)
     membrane_MPa = in_MPa(stiffer * m.membrane_modulus_kPa)
@@ -39,6 +47,34 @@ def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> M
         np.where(inside, m.lattice_modulus_MPa, membrane_MPa),
         np.where(inside, m.lattice_poisson, m.membrane_poisson),
     )
+
+
+def _of_resin(unit: Unit, mesh: Mesh) -> Materials:
+    """The wall's law in wall and struts alike, stiffer by as much of the skin as each has."""
+    m = unit.material
+    count = len(mesh.tets)
+    stiffer = _skin_stiffening(unit, mesh)
+    resin_MPa = in_MPa(m.membrane_modulus_kPa)
+    if not unit.wall.names:
+        return Materials.neo_hooke(resin_MPa * stiffer, np.full(count, m.membrane_poisson))
+    layers = wall_layers(unit.wall, np.arange(count), resin_MPa, m.membrane_poisson)
+    return Materials(tuple(Layer(f.law, f.elements, f.parameters, f.weight * stiffer) for f in layers))
+
+
+def _skin_stiffening(unit: Unit, mesh: Mesh) -> Array:
+    """Modulus (m,) of each element of a resolved mesh over the core's, by the skin's share of its volume."""
+    p, d = unit.print, unit.printed
+    found = np.full(len(mesh.tets), skin_stiffening(d.wall, p.skin_depth_mm, p.skin_factor))
+    if p.skin_depth_mm == 0.0 or p.skin_factor == 1.0:
+        return found
+    struts = np.flatnonzero(mesh.region == LATTICE)
+    cell = StrutCell(d.kind, d.cell, d.junction_diameter / 2.0, d.midspan_diameter / 2.0)
+    shape = shape_functions(even_points(_SKIN_STEPS), mesh.order)
+    points = np.einsum("qn,mnd->mqd", shape, mesh.nodes[mesh.tets[struts]]).reshape(-1, 3)
+    corner = np.array([d.cell / 2.0, d.cell / 2.0, 0.0])
+    depth = depth_below_surface(cell, points + corner).reshape(len(struts), -1)
+    found[struts] = 1.0 + (depth < p.skin_depth_mm).mean(axis=1) * (p.skin_factor - 1.0)
+    return found
 
 
 def _lattice_layers(unit: Unit, elements: Array, law: LatticeLaw | None) -> tuple[Layer, ...]:

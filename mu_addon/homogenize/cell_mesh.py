@@ -9,7 +9,7 @@ import numpy as np
 
 from ..design.strut_cell import Facets, StrutCell, depth_below_surface, octant_surface
 from ..errors import InputError, MeshingError
-from ..fem.elements import shape_functions
+from ..fem.elements import even_points, shape_functions
 from ..fem.laws import NeoHooke
 from ..fem.materials import Materials
 from ..meshing.mesh import Array, Mesh
@@ -99,23 +99,10 @@ def skin_share(cell: StrutCell, mesh: Mesh) -> Array:
 
     By 20 points in each element, so in steps of a twentieth.
     """
-    at = _lattice_points(_STEPS)
+    at = even_points(_STEPS)
     points = np.einsum("qn,mnd->mqd", shape_functions(at, mesh.order), mesh.nodes[mesh.tets])
     depth = depth_below_surface(cell, points.reshape(-1, 3)).reshape(points.shape[:2])
     return np.asarray((depth < cell.skin_depth_mm).mean(axis=1))
-
-
-def _lattice_points(steps: int) -> Array:
-    """Barycentric centres (q, 4) of a tetrahedron's even subdivision, all of them inside."""
-    whole = np.array(
-        [
-            (a, b, c, steps - 1 - a - b - c)
-            for a in range(steps)
-            for b in range(steps - a)
-            for c in range(steps - a - b)
-        ]
-    )
-    return (whole + 0.25) / steps
 
 
 def _thinnest(cell: StrutCell) -> float:

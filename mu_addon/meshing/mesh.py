@@ -45,6 +45,10 @@ class Mesh:
     order; region (m,) int8, MEMBRANE or LATTICE; cavity (f, 3 | 6) int32, triangles whose normals
     point out of the solid, into the cavity; base and tip, int32 nodes of the two end planes; symmetry,
     the axes whose zero plane is a mirror of the body.
+
+    A mesh of parts that overlap has two tables more, else empty. filled (m, q): the share, 0 to 1, of the
+    volume at each of an element's q quadrature points that counts. tied (t,), tied_to (t, k), tied_weights
+    (t, k): nodes that move as the weighted sum of others, which are not tied themselves.
     """
 
     nodes: Array = attrs.field(converter=_float64)
@@ -54,6 +58,21 @@ class Mesh:
     base: Array = attrs.field(converter=_int32)
     tip: Array = attrs.field(converter=_int32)
     symmetry: tuple[str, ...] = ()
+    filled: Array = attrs.field(factory=lambda: np.zeros((0, 0)), converter=_float64)
+    tied: Array = attrs.field(factory=lambda: np.zeros(0), converter=_int32)
+    tied_to: Array = attrs.field(factory=lambda: np.zeros((0, 0)), converter=_int32)
+    tied_weights: Array = attrs.field(factory=lambda: np.zeros((0, 0)), converter=_float64)
+
+    @property
+    def resolved(self) -> bool:
+        """Whether the mesh is of a printed body, strut by strut, in parts that overlap."""
+        return self.filled.size > 0
+
+    def following(self, u: Array) -> Array:
+        """Displacements u (n, 3) in mm with those of tied nodes set to what they follow, in place."""
+        if len(self.tied):
+            u[self.tied] = np.einsum("tk,tki->ti", self.tied_weights, u[self.tied_to])
+        return u
 
     @property
     def order(self) -> int:
@@ -81,7 +100,10 @@ class Mesh:
     def hash(self) -> str:
         """SHA-256 of every array and the symmetry, equal only for identical meshes."""
         digest = hashlib.sha256(repr(self.symmetry).encode())
-        for array in (self.nodes, self.tets, self.region, self.cavity, self.base, self.tip):
+        parts = [self.nodes, self.tets, self.region, self.cavity, self.base, self.tip]
+        if self.resolved:
+            parts += [self.filled, self.tied, self.tied_to, self.tied_weights]
+        for array in parts:
             digest.update(repr((array.shape, array.dtype.str)).encode())
             digest.update(array.tobytes())
         return digest.hexdigest()
@@ -113,7 +135,20 @@ def mirror(mesh: Mesh, axis: str) -> Mesh:
         base=np.unique(np.concatenate([mesh.base, image[mesh.base]])),
         tip=np.unique(np.concatenate([mesh.tip, image[mesh.tip]])),
         symmetry=tuple(a for a in mesh.symmetry if a != axis),
+        # Each quadrature point is nearest to one corner, and two corners change places.
+        filled=np.vstack([mesh.filled, mesh.filled[:, FLIPPED_TET[: mesh.filled.shape[1]]]]),
+        **_mirrored_ties(mesh, image),
     )
+
+
+def _mirrored_ties(mesh: Mesh, image: Array) -> dict[str, Array]:
+    """Ties of a mesh and of its image, where image (n,) numbers each node's own."""
+    off = image[mesh.tied] != mesh.tied
+    return {
+        "tied": np.concatenate([mesh.tied, image[mesh.tied[off]]]),
+        "tied_to": np.vstack([mesh.tied_to, image[mesh.tied_to[off]]]),
+        "tied_weights": np.vstack([mesh.tied_weights, mesh.tied_weights[off]]),
+    }
 
 
 def mirror_displacement(mesh: Mesh, u: Array, axis: str) -> Array:

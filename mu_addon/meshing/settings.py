@@ -9,6 +9,7 @@ import attrs
 from ..errors import InputError
 
 FRACTIONS = ("half", "quarter", "full")
+FIDELITIES = ("resolved", "homogenised")
 CELL_MM = 12.5
 """The cell, in mm, that the element sizes are given for."""
 
@@ -39,8 +40,9 @@ class MeshSettings:
     fraction: "half" (x >= 0), "quarter" (also y >= 0) or "full" (the half and its mirror image). order: 1
     or 2; linear elements lock in thin walls. refine: divides every size and multiplies through_wall. Sizes
     in mm for a cell of 12.5 mm: along the membrane's meridian and around its apex, at the line of anchors
-    and at the lattice's envelope. through_wall: elements across the membrane. Raises InputError for a value
-    that is not offered or out of bounds.
+    and at the lattice's envelope. through_wall: elements across the membrane. fidelity: "homogenised", the
+    lattice as a continuum, or "resolved", its struts as printed, for which order 2, fraction and refine alone
+    count. Raises InputError for a value that is not offered or out of bounds.
 
     >>> MeshSettings().order, MeshSettings(refine=0.5).fraction
     (2, 'half')
@@ -54,3 +56,4 @@ class MeshSettings:
     through_wall: int = attrs.field(default=1, validator=_between(1, 8))
     anchor_mm: float = attrs.field(default=2.5, validator=_between(0.1, 100.0))
     envelope_mm: float = attrs.field(default=14.0, validator=_between(0.1, 100.0))
+    fidelity: str = attrs.field(default="homogenised", validator=_one_of(*FIDELITIES))

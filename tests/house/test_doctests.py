@@ -15,6 +15,7 @@ PACKAGES = (
     "measured",
     "meshing",
     "placement",
+    "resolved",
     "sensing",
 )
 

@@ -21,7 +21,7 @@ PACKAGES = (
     "placement",
     "report",
 )
-PACKAGES += ("sensing",)
+PACKAGES += ("resolved", "sensing")
 HEAVY = ("bpy", "gmsh", "matplotlib", "meshio", "scipy", "trimesh", "warp")
 FOLDER = Path(mu_addon.__file__).parent
 

@@ -34,12 +34,13 @@ from ...homogenize.foam_response import ellipticity
 from ...meshing.mesh import LATTICE, Mesh
 from ...meshing.quality import Quality, mesh_quality
 from ...meshing.settings import MeshSettings
-from ...meshing.unit import MeshingWarning, mesh_unit
+from ...meshing.unit import MeshingWarning
 from ...placement.candidates import Candidate, Evaluation, candidate_paths
 from ...placement.deviation import rank
 from ...reading import file_bytes, parse_json
 from ...report.results import CONTACT_COLUMNS, ContactHistory, LatticeSearch, Signals
 from ...report.vtk import write_mesh, write_trajectory
+from ...resolved.unit import mesh_of
 from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.folder import begin, keep_inputs, require_space
@@ -202,7 +203,7 @@ class Study:
             return Mesh(**found, symmetry=symmetry)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            mesh = mesh_unit(
+            mesh = mesh_of(
                 self.job.unit,
                 settings,
                 lambda _, share: self.progress.update(share),

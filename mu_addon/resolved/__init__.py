@@ -1,0 +1,23 @@
+"""The resolved unit: the printed body itself as a finite-element mesh, strut by strut.
+
+`mesh_printed` meshes struts and wall each by itself and ties them where they meet; `mesh_of` gives that mesh,
+or the homogenised one, by the fidelity that the settings ask for. See docs/resolved.md.
+
+    >>> from mu_addon.resolved import strut_mesh
+    >>> from mu_addon.design import load_preset
+    >>> len(strut_mesh(load_preset("mu-1.0x").printed, rings=1, layers=5).tets)
+    90
+"""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import public_face
+
+if TYPE_CHECKING:
+    from .strut import strut_mesh as strut_mesh
+    from .unit import mesh_of as mesh_of
+    from .unit import mesh_printed as mesh_printed
+else:
+    __getattr__, __dir__, __all__ = public_face(
+        __name__, {"strut": "strut_mesh", "unit": "mesh_of mesh_printed"}
+    )

@@ -1,0 +1,137 @@
+"""The struts of a unit: octants side by side in the envelope, as far as they lie outside the actuator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from ..design.body import Body, covering
+from ..design.dimensions import Dimensions
+from ..design.profile import outer_radius, outer_slope
+from ..design.strut_cell import StrutCell
+from ..fem.elements import even_points, reference_gradients, shape_functions, shape_gradients
+from ..homogenize.cell_mesh import CellMeshSettings, mesh_cell
+from ..meshing.mesh import FLIPPED_TET, Array, Mesh, mirror
+from ..meshing.surface import Surface, winding_number
+from ..meshing.tiling import tiled
+from .strut import is_half_diagonal, strut_mesh
+
+Depth = Callable[[Array], Array]
+
+# An element is divided this often along each edge to tell which part of it lies outside the actuator.
+_STEPS = 6
+# What is filled by less is left out.
+_LEAST = 1e-3
+
+
+def struts(
+    d: Dimensions,
+    rings: int,
+    layers: int,
+    full: bool = False,
+    cache: Path | None = None,
+    body: Body | None = None,
+) -> Mesh:
+    """Quadratic tetrahedra of a unit's struts at x >= 0, or with `full` of all, outside the wall.
+
+    rings, layers: as in `strut_mesh`; for other kinds of lattice pytetwild meshes the octant (`mesh_cell`)
+    with `rings` elements to half a strut's diameter, and the folder `cache` keeps it. body: a closed surface
+    that cuts the lattice in place of its box. The mesh has `filled`, and no element that is all cut away.
+    """
+    if body is not None:
+        d = covering(d, body)
+    if is_half_diagonal(d):
+        octant = strut_mesh(d, rings, layers)
+    else:
+        cell = StrutCell(d.kind, d.cell, d.junction_diameter / 2.0, d.midspan_diameter / 2.0)
+        octant = mesh_cell(cell, CellMeshSettings(per_diameter=float(rings)), cache)
+    half = d.cell / 2.0
+    (_, x1), (y0, y1), (z0, z1) = d.bounds
+    counts = (round(x1 / half), round((y1 - y0) / half), round((z1 - z0) / half))
+    right = tiled(octant, counts, (half,) * 3)
+    nodes = right.nodes * [-1.0, 1.0, 1.0] + [x1, y0, z0]
+    tets = right.tets[:, FLIPPED_TET]
+    for axis, planes in enumerate(((0.0, x1), (y0, y1), (z0, z1))):
+        for plane in planes:
+            nodes[np.abs(nodes[:, axis] - plane) < 1e-7 * half, axis] = plane
+    mesh = attrs.evolve(right, nodes=nodes, tets=tets, symmetry=("x",))
+    if full:
+        mesh = mirror(mesh, "x")
+    return filled_outside(mesh, cuts(d, body))
+
+
+def cuts(d: Dimensions, body: Body | None) -> list[Depth]:
+    """What the struts end at: functions of points (n, 3) in mm, positive (n,) where the struts remain."""
+    found: list[Depth] = [lambda points: clearance(d, points)]
+    if body is not None:
+        surface = Surface(body.vertices, body.triangles)
+        low, high = body.bounds
+
+        def inside(points: Array) -> Array:
+            kept = np.full(len(points), -1.0)
+            near = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
+            kept[near] = winding_number(surface, points[near]) - 0.5
+            return kept
+
+        found.append(inside)
+    return found
+
+
+def clearance(d: Dimensions, points: Array) -> Array:
+    """Distance (n,) in mm of points (n, 3) in mm from the actuator's outer profile, negative inside it.
+
+    To first order: along the normal of the profile at the point's own height.
+    """
+    z = np.clip(points[:, 2], 0.0, d.height)
+    radius = np.hypot(points[:, 0], points[:, 1])
+    return np.asarray((radius - outer_radius(d, z)) / np.hypot(1.0, outer_slope(d, z)))
+
+
+def filled_outside(mesh: Mesh, kept: list[Depth]) -> Mesh:
+    """The mesh with the shares of its elements' volume where every function of `kept` is positive.
+
+    kept: of points (n, 3) in mm, (n,) each. Elements of which nothing is left go, with their nodes.
+    """
+    at = even_points(_STEPS)
+    own = at.argmax(axis=1)  # the quadrature point that each is nearest to
+    lies_in = np.min([depth(mesh.nodes) for depth in kept], axis=0) > 0
+    filled = np.repeat(lies_in[mesh.tets].all(axis=1)[:, None].astype(float), own.max() + 1, axis=1)
+    # An element may bulge over a side that its nodes do not cross, by less than it is long.
+    reach = np.ptp(mesh.nodes[mesh.tets], axis=1).max(axis=1)
+    middle = mesh.nodes[mesh.tets].mean(axis=1)
+    near = np.abs(np.min([depth(middle) for depth in kept], axis=0)) < reach
+    mixed = np.flatnonzero(near | (lies_in[mesh.tets].any(axis=1) & ~lies_in[mesh.tets].all(axis=1)))
+    nodes = mesh.nodes[mesh.tets[mixed]]
+    points = np.einsum("qn,mnd->mqd", shape_functions(at, mesh.order), nodes)
+    volume = np.linalg.det(np.einsum("mnd,qnr->mqdr", nodes, shape_gradients(at, mesh.order)))
+    flat = points.reshape(-1, 3)
+    outside = np.min([depth(flat) for depth in kept], axis=0).reshape(volume.shape) > 0
+    for point in range(filled.shape[1]):
+        rows = own == point
+        filled[mixed, point] = (volume[:, rows] * outside[:, rows]).sum(axis=1) / volume[:, rows].sum(axis=1)
+    keep = filled.sum(axis=1) > _LEAST
+    used, tets = np.unique(mesh.tets[keep], return_inverse=True)
+    return Mesh(
+        mesh.nodes[used],
+        np.reshape(tets, (-1, mesh.tets.shape[1])),
+        mesh.region[keep],
+        mesh.cavity[:0],
+        mesh.base[:0],
+        mesh.tip[:0],
+        mesh.symmetry,
+        filled[keep],
+    )
+
+
+def support(mesh: Mesh) -> Array:
+    """Share (n,) of the elements' volume around each node that is filled."""
+    volumes = reference_gradients(mesh.nodes, mesh.tets).volumes
+    per = mesh.tets.shape[1]
+    whole, solid = (
+        np.bincount(mesh.tets.ravel(), np.repeat(v.sum(axis=1), per), len(mesh.nodes))
+        for v in (volumes, volumes * mesh.filled)
+    )
+    return np.asarray(solid / whole)

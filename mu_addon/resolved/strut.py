@@ -1,0 +1,121 @@
+"""One strut of a body-centred lattice, swept from junction to junction: an eighth of its cell.
+
+The half diagonal from a cell's corner to its centre fills the octant between them: of the eight struts that
+meet at either end, each has its own octant, and the planes between octants cut them where they merge. So a
+disc swept along the strut, its ends pressed onto the three planes of either corner, is the printed lattice
+exactly, fillets and all; mirror images of it are the whole lattice.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..design.dimensions import Dimensions
+from ..errors import InputError
+from ..meshing.mesh import LATTICE, Array, Mesh, edges_of, oriented, second_order
+
+_ALONG = np.ones(3) / math.sqrt(3.0)
+# Across the strut: towards an edge between two planes of the octant, so that a sector lies in one plane.
+_ACROSS = np.array([[2.0, -1.0, -1.0], [0.0, 1.0, -1.0]]) / np.sqrt([[6.0], [2.0]])
+# The strut's radius changes along it: its ends are found by iteration, at slopes below 0.3 to rounding.
+_ITERATIONS = 60
+
+
+def strut_mesh(d: Dimensions, rings: int, layers: int) -> Mesh:
+    """Quadratic tetrahedra of one octant [0, cell/2]^3 mm of a body-centred lattice, curved as its strut is.
+
+    rings: of elements from the strut's axis to its surface, six to the first; layers: along it. Nothing is
+    clamped. Raises InputError for a lattice of another kind, and for struts as wide as the octant.
+    """
+    half = d.cell / 2.0
+    if not is_half_diagonal(d):
+        raise InputError(
+            f"struts of lattice {d.kind.name!r} are not the half diagonals of its cell",
+            "[lattice] kind",
+            "choose body-centred or body-centred-straight",
+        )
+    if max(d.junction_diameter, d.midspan_diameter) > 0.8 * half:
+        raise InputError(
+            f"struts of {max(d.junction_diameter, d.midspan_diameter):g} mm fill their cell of {d.cell:g} mm",
+            "[lattice] midspan_diameter_mm",
+            f"choose at most {0.8 * half:g} mm",
+        )
+    points, triangles = disc(rings)
+    count = len(points)
+    levels = np.linspace(0.0, 1.0, layers + 1)
+    at = np.column_stack([np.tile(points, (layers + 1, 1)), np.repeat(levels, count)])
+    below = (np.sort(triangles, axis=1) + count * np.arange(layers)[:, None, None]).reshape(-1, 3)
+    a, b, c = below.T
+    # Each prism in three, its sides cut from the lower number to the higher, so that neighbours agree.
+    tets = np.concatenate(
+        [
+            np.stack([a, b, c, c + count], axis=1),
+            np.stack([a, b, b + count, c + count], axis=1),
+            np.stack([a, a + count, b + count, c + count], axis=1),
+        ]
+    )
+    nodes = _placed(d, at)
+    tets = oriented(nodes, tets)
+    edges, _ = edges_of(tets)
+    middles = at[edges].mean(axis=1)
+    radius = np.hypot(at[:, 0], at[:, 1])[edges]
+    around = (np.abs(radius[:, 0] - radius[:, 1]) < 1e-12) & (radius[:, 0] > 0)
+    chord = np.hypot(middles[:, 0], middles[:, 1])
+    middles[around, :2] *= (radius[around, 0] / chord[around])[:, None]
+    nodes, tets, nothing = second_order(nodes, tets, tets[:0, :3], _placed(d, middles))
+    return Mesh(nodes, tets, np.full(len(tets), LATTICE), nothing, tets[0, :0], tets[0, :0])
+
+
+def is_half_diagonal(d: Dimensions) -> bool:
+    """Whether the struts of a unit's lattice are the half diagonals of its cells."""
+    ends = d.kind.nodes[d.kind.struts]
+    half = np.abs(np.diff(ends, axis=1)) == 0.5
+    return bool(half.all() and len(ends) == 8)
+
+
+def disc(rings: int) -> tuple[Array, Array]:
+    """Points (n, 2) of the unit disc, the centre first, and triangles (t, 3): six sectors of equal rings.
+
+    >>> points, triangles = disc(2)
+    >>> len(points), len(triangles)
+    (19, 24)
+    """
+    points, triangles = [np.zeros((1, 2))], []
+    inner, first = np.zeros(1, int), 1
+    for ring in range(1, rings + 1):
+        angle = 2.0 * np.pi * np.arange(6 * ring) / (6 * ring)
+        points.append(ring / rings * np.column_stack([np.cos(angle), np.sin(angle)]))
+        outer = first + np.arange(6 * ring)
+        first += 6 * ring
+        step = np.arange(6 * ring)
+        sector, place = step // ring, step % ring
+        own = (sector * (ring - 1) + place) % len(inner)
+        triangles.append(np.column_stack([inner[own], outer, np.roll(outer, -1)]))
+        more = place < ring - 1
+        following = np.roll(inner, -1)[own[more]]
+        triangles.append(np.column_stack([inner[own[more]], np.roll(outer, -1)[more], following]))
+        inner = outer
+    return np.vstack(points), np.vstack(triangles)
+
+
+def _placed(d: Dimensions, at: Array) -> Array:
+    """Points (n, 3) in mm of places (n, 3): two across the strut in radii, and 0 .. 1 from end to end."""
+    half = d.cell / 2.0
+    length = half * math.sqrt(3.0)
+    across = at[:, :2] @ _ACROSS
+
+    def away(along: Array) -> Array:
+        t = np.clip(along / length, 0.0, 1.0)
+        return d.kind.radius(t, d.junction_diameter / 2.0, d.midspan_diameter / 2.0)[:, None] * across
+
+    low, high = np.zeros(len(at)), np.full(len(at), length)
+    for _ in range(_ITERATIONS):
+        low = -math.sqrt(3.0) * away(low).min(axis=1)
+        high = length - math.sqrt(3.0) * away(high).max(axis=1)
+    along = low + at[:, 2] * (high - low)
+    found = along[:, None] * _ALONG + away(along)
+    for plane in (0.0, half):
+        found[np.abs(found - plane) < 1e-9 * half] = plane
+    return found

@@ -1,0 +1,104 @@
+"""The printed unit's mesh: what is filled, what is tied, and what its solutions are."""
+
+import attrs
+import numpy as np
+import pytest
+
+from mu_addon.design import load_preset, shapes
+from mu_addon.design.lattice import lattice_of
+from mu_addon.design.profile import cavity_polygon, outer_polygon
+from mu_addon.design.solid import QUALITY, lattice_solid
+from mu_addon.errors import InputError
+from mu_addon.fem.equilibrium import Equilibrium
+from mu_addon.fem.kinematics import bending_angle_deg
+from mu_addon.fem.loads import gravity
+from mu_addon.fem.model import Model
+from mu_addon.fem.unit import materials_of
+from mu_addon.meshing.mesh import mirror, mirror_displacement
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.resolved.unit import mesh_printed
+
+SMALL = load_preset("mu-1.0x")
+SMALL = attrs.evolve(SMALL, chambers=attrs.evolve(SMALL.chambers, count=3))
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return mesh_printed(SMALL)
+
+
+def printed_volume_mm3(unit):
+    """Half the volume that manifold3d gives the union of lattice and actuator, less the cavity."""
+    from manifold3d import Manifold, OpType
+
+    d, facets = unit.dimensions, QUALITY["export"]
+    whole = [lattice_solid(d, lattice_of(d), facets)]
+    whole += [shapes.revolved(outer_polygon(d, facets.along_arc), facets.around_axis)]
+    hollow = Manifold.batch_boolean(whole, OpType.Add)
+    hollow -= shapes.revolved(cavity_polygon(d, facets.along_arc), facets.around_axis)
+    return hollow.volume() / 2.0
+
+
+def test_it_holds_as_much_resin_as_the_drawn_solid(mesh):
+    assert Model(mesh).volumes.sum() == pytest.approx(printed_volume_mm3(SMALL), rel=2e-3)
+
+
+def test_the_same_input_gives_the_same_mesh(mesh):
+    assert mesh_printed(SMALL).hash() == mesh.hash()
+
+
+def test_ties_keep_straight_what_is_straight(mesh):
+    """A linear motion of what is not tied is one of what is."""
+    gradient = np.array([[0.01, 0.02, -0.03], [0.0, 0.04, 0.01], [0.05, -0.02, 0.03]])
+    exact = mesh.nodes @ gradient.T
+    u = exact.copy()
+    u[mesh.tied] = np.nan
+    assert np.abs(mesh.following(u) - exact).max() < 1e-9
+
+
+def test_no_node_is_tied_to_a_tied_one(mesh):
+    assert not np.isin(mesh.tied_to, mesh.tied).any()
+
+
+def test_forces_are_the_energy_s_slope_and_the_tangent_the_forces_slope(mesh):
+    model = Model(mesh)
+    m = model.parameters(materials_of(SMALL, mesh))
+    rng = np.random.default_rng(4)
+    u = model.moved(np.zeros_like(mesh.nodes), 1e-3 * rng.normal(size=len(model.free)))
+    step = rng.normal(size=len(model.free))
+    h = 1e-6
+    ahead, behind = (model.moved(u, sign * h * step) for sign in (1, -1))
+    slope = (model.potential(ahead, -0.01, m) - model.potential(behind, -0.01, m)) / (2 * h)
+    force = model.residual(u, -0.01, m).ravel()[model.free]
+    assert slope == pytest.approx(force @ step, rel=1e-6)
+    change = model.residual(ahead, -0.01, m) - model.residual(behind, -0.01, m)
+    stiffness = model.matrix(model.tangent(u, -0.01, m)) @ step
+    assert np.abs(change.ravel()[model.free] / (2 * h) - stiffness).max() < 1e-5 * np.abs(stiffness).max()
+
+
+def test_weight_is_that_of_the_resin_and_lost_to_no_tie(mesh):
+    model = Model(mesh)
+    model.load = gravity(mesh, 1.1e-9, [0.0, 0.0, -1.0])
+    m = model.parameters(materials_of(SMALL, mesh))
+    weight = 1.1e-9 * 9806.65 * model.volumes.sum()
+    reactions = model.residual(np.zeros_like(mesh.nodes), 0.0, m)
+    assert reactions[:, 2].sum() == pytest.approx(weight, rel=1e-9)
+    assert not reactions[mesh.tied].any()
+
+
+def test_a_half_bends_as_the_whole_does(mesh):
+    half = Equilibrium(Model(mesh), materials_of(SMALL, mesh), explains=False)
+    state = half.reach(0.002, [half.at_zero_pressure()])
+    whole = mirror(mesh, "x")
+    body = Model(whole)
+    u = mirror_displacement(mesh, state.u, "x")
+    m = body.parameters(materials_of(SMALL, whole))
+    force = body.residual(u, 0.002, m).ravel()[body.free]
+    assert np.linalg.norm(force) < 1e-8 * body.force_scale()
+    assert bending_angle_deg(whole, u) == pytest.approx(bending_angle_deg(mesh, state.u), rel=1e-9)
+
+
+def test_quarters_and_linear_elements_are_refused():
+    for settings in (MeshSettings(fraction="quarter"), MeshSettings(order=1)):
+        with pytest.raises(InputError, match="quadratic elements"):
+            mesh_printed(SMALL, settings)
