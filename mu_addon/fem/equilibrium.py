@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from typing import Any
 
+import attrs
 import numpy as np
 
 from ..design.quantity import in_kPa
@@ -16,7 +17,7 @@ from .descent import Descent
 from .factor import IndefiniteError
 from .materials import Materials
 from .model import Model
-from .newton_settings import NewtonSettings
+from .newton_settings import SNAP_NEWTON, NewtonSettings
 from .state import State, extrapolate, rest
 
 Array = np.ndarray[Any, Any]
@@ -161,28 +162,55 @@ class Equilibrium:
         """The state at a pressure in MPa, from converged states before it, the last of them the nearest.
 
         Steps are predicted and halved until they converge to where they were predicted, so that no
-        snap to another branch passes for the path. Raises ConvergenceError naming pressure, place and
-        cause where the smallest step fails.
+        snap to another branch passes for the path. Where the smallest step fails the path goes on beyond the
+        limit point if the settings say so, and a state so found tells it (`State.snapped_mm`). Raises
+        ConvergenceError naming pressure, place and cause otherwise.
         """
         s = self.settings
         history = list(history[-3:])
         step = np.clip(target - history[-1].pressure_MPa, -s.max_step_MPa, s.max_step_MPa)
+        smooth = True
         while history[-1].pressure_MPa != target:
             last = history[-1]
             if abs(target - last.pressure_MPa) <= abs(step) * (1 + 1e-9):
                 step = target - last.pressure_MPa
             pressure = target if step == target - last.pressure_MPa else last.pressure_MPa + step
             try:
-                guess = self._predict(history, pressure)
+                # A polynomial through states far apart is wrong about the slope at any step, the tangent is
+                # right about the smallest.
+                guess = self._predict(history if smooth else history[-1:], pressure)
                 state = self.newton(guess, pressure, s.predictor_tolerance * np.abs(guess - last.u).max())
             except ConvergenceError as why:
-                if abs(step) / 2 < s.min_step_MPa:
+                smooth = False
+                if abs(step) / 2 >= s.min_step_MPa:
+                    step /= 2
+                    continue
+                if not s.follow_snaps:
                     raise self._failure(last, pressure, why.what) from None
-                step /= 2
+                history, smooth = [self._snapped(last, pressure)], True
                 continue
-            history = [*history[-2:], state]
-            step = np.clip(2 * step, -s.max_step_MPa, s.max_step_MPa)
+            history, smooth = [*history[-2:], attrs.evolve(state, snapped_mm=last.snapped_mm)], True
+            if state.factorisations <= s.easy_factorisations:
+                step = np.clip(2 * step, -s.max_step_MPa, s.max_step_MPa)
+            elif state.factorisations > 2 * s.easy_factorisations:
+                step /= 2
         return history[-1]
+
+    def _snapped(self, last: State, pressure: float) -> State:
+        """The stable state that the body falls to from one before a limit point, at a pressure beyond it.
+
+        Every step of the way lowers the potential, is short, and is damped by a share of the undeformed
+        body's stiffness where the tangent is not definite. Raises ConvergenceError where there is none.
+        """
+        own, self.settings = self.settings, attrs.evolve(SNAP_NEWTON, tolerance=self.settings.tolerance)
+        try:
+            state = self.newton(last.u, pressure)
+        except ConvergenceError as why:
+            raise self._failure(last, pressure, why.what) from None
+        finally:
+            self.settings = own
+        moved = float(np.linalg.norm(state.u - last.u, axis=1).max())
+        return attrs.evolve(state, snapped_mm=max(moved, last.snapped_mm))
 
     def _predict(self, history: Sequence[State], pressure: float) -> Array:
         """Start at another pressure: along the tangent from one state, by extrapolation from several."""

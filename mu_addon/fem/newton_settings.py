@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import attrs
+import numpy as np
 
 
 @attrs.frozen
@@ -21,12 +22,31 @@ class NewtonSettings:
     keep_factor: float = 0.7
     max_step_MPa: float = 0.01
     min_step_MPa: float = 1e-4
+    # Load steps grow after one with at most so many factorisations, and shrink after one with over twice as
+    # many.
+    easy_factorisations: int = 12
     max_backtracks: int = 6
     # Shares of the undeformed body's tangent added, in turn, to one that is not definite.
     regularisation: tuple[float, ...] = (0.03, 0.3, 3.0, 30.0)
+    # Whether a path that ends at a limit point goes on with the state that the body snaps to: the minimum of
+    # the potential that damped motion from the limit point leads to.
+    follow_snaps: bool = False
+    # Largest move of a node in one iteration, as a share of the body's longest side.
+    max_move: float = np.inf
     # A state may lie this much of the predicted move away from its prediction.
     predictor_tolerance: float = 0.5
     # Many bodies on one factorisation: their tolerance, which leaves less than 1e-6 mm on the unit, and the
     # steps after which a body goes on with its own.
     shared_tolerance: float = 2e-8
     max_shared_steps: int = 40
+
+
+RESOLVED_NEWTON = NewtonSettings(
+    max_step_MPa=0.0025, easy_factorisations=2, max_iterations=40, follow_snaps=True
+)
+"""For a body strut by strut: single struts snap long before the body does."""
+
+SNAP_NEWTON = NewtonSettings(
+    max_iterations=400, max_factorisations=120, max_backtracks=12, max_move=0.02, keep_factor=0.9
+)
+"""For the motion after a limit point: short, damped, and as long as it takes."""

@@ -19,6 +19,7 @@ class State:
     """A converged equilibrium: pressure in MPa, displacement u (n, 3) in mm, relative residual, and its cost.
 
     residual: over the root sum of squares of all element forces; iterations, factorisations: those it took.
+    snapped_mm: how far a node moved at a limit point before the state, 0 where the path is smooth.
 
     >>> import numpy as np
     >>> State(0.02, np.zeros((4, 3))).pressure_kPa
@@ -30,6 +31,7 @@ class State:
     residual: float = 0.0
     iterations: int = 0
     factorisations: int = 0
+    snapped_mm: float = 0.0
 
     @property
     def pressure_kPa(self) -> float:

@@ -38,7 +38,7 @@ from .study_file import read as read_tables
 if TYPE_CHECKING:
     from ...fem.materials import Materials
     from ...fem.model import Model
-    from ...fem.newton_settings import NewtonSettings
+    from ...fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
     from ...meshing.mesh import Mesh
 
 GRASP = "protocols/grasp.csv"
@@ -211,7 +211,9 @@ class Job:
     @property
     def newton(self) -> NewtonSettings:
         """Settings of Newton's method for this unit."""
-        return CONTACT_NEWTON if self.in_time else self.effects.newton
+        if self.in_time:
+            return CONTACT_NEWTON
+        return self.effects.newton if self.mesh.fidelity == "homogenised" else RESOLVED_NEWTON
 
     @property
     def in_time(self) -> bool:

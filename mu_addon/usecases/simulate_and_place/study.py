@@ -661,6 +661,7 @@ def _state(arrays: dict[str, Array]) -> State:
         float(arrays["residual"]),
         int(arrays["iterations"]),
         int(arrays["factorisations"]),
+        float(arrays.get("snapped_mm", 0.0)),
     )
 
 
