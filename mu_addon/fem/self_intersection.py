@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..meshing.mesh import TET_EDGES, Mesh, boundary_faces, mirror, mirror_displacement
+from ..meshing.mesh import LATTICE, TET_EDGES, Mesh, boundary_faces, mirror, mirror_displacement
 from .state import State
 
 Array = np.ndarray[Any, Any]
@@ -104,6 +104,10 @@ class _Boundary:
         for axis in mesh.symmetry:
             whole = mirror(whole, axis)
         faces, owner = boundary_faces(whole.tets)
+        if whole.resolved:
+            # Struts reach into the wall as drawn; what of them is outside it is surface.
+            outside = (whole.filled[owner] == 1.0).all(axis=1)
+            faces, owner = faces[outside], owner[outside]
         cavity = {tuple(f) for f in np.sort(whole.cavity_corners, axis=1).tolist()}
         inner = np.array([tuple(f) in cavity for f in np.sort(faces, axis=1).tolist()])
         own = owner < len(mesh.tets)
@@ -113,6 +117,8 @@ class _Boundary:
         repeats = len(self.facets) // len(faces)
         self._inner, self._own = np.tile(inner, repeats), np.tile(own, repeats)
         self._rest = whole.nodes
+        # Where a strut meets the wall their surfaces cut each other as drawn.
+        self._of_strut = np.tile(whole.resolved & (whole.region[owner] == LATTICE), repeats)
 
     def crossings(self, u: Array) -> tuple[Crossing, ...]:
         """See the module's `crossings`."""
@@ -137,8 +143,12 @@ class _Boundary:
             (self._own[a] | self._own[b]) & (low[a] <= high[b]).all(axis=1) & (low[b] <= high[a]).all(axis=1)
         )
         a, b = pairs[keep].T
-        common = (self.facets[a][:, :, None] == self.facets[b][:, None, :]).any(axis=(1, 2))
-        return pairs[keep][~common]
+        apart = ~(self.facets[a][:, :, None] == self.facets[b][:, None, :]).any(axis=(1, 2))
+        mixed = self._of_strut[a] != self._of_strut[b]
+        if mixed.any():
+            middle = self._rest[self.facets].mean(axis=1)
+            apart &= ~mixed | (np.linalg.norm(middle[a] - middle[b], axis=1) > 2 * radius)
+        return pairs[keep][apart]
 
     def _groups(self, pairs: Array) -> list[Array]:
         """Pairs (p, 2) of facets in groups, those whose facets share nodes together, the largest first."""

@@ -53,11 +53,14 @@ class Quality:
     cavity_volume_error: float
 
 
-def mesh_quality(mesh: Mesh, unit: Unit, body: Body | None = None) -> Quality:
+def mesh_quality(
+    mesh: Mesh, unit: Unit, body: Body | None = None, struts_mm3: float | None = None
+) -> Quality:
     """Counts, angles, Jacobians and volumes of a unit's mesh, beside the exact volumes of the design.
 
     Half and quarter meshes count as the whole body they stand for. body: the closed surface that took the
-    place of the envelope's box, if one did. See `Quality` for units.
+    place of the envelope's box, if one did. struts_mm3: volume of the struts outside the actuator, with which
+    the lattice of a resolved mesh is compared. See `Quality` for units.
     """
     d = unit.printed
     (x0, x1), (y0, y1), (z0, z1) = d.bounds
@@ -65,11 +68,14 @@ def mesh_quality(mesh: Mesh, unit: Unit, body: Body | None = None) -> Quality:
     envelope = box if body is None else volume(body.vertices, body.triangles)
     exact = {
         "membrane": membrane_volume(d),
-        "lattice": envelope - outer_volume(d),
+        "lattice": envelope - outer_volume(d) if struts_mm3 is None else struts_mm3,
         "cavity": cavity_volume(d),
     }
     copies = 2 ** len(mesh.symmetry)
     volumes = element_volumes(mesh)
+    if mesh.resolved:
+        at_points = _determinants(mesh, GAUSS)
+        volumes = volumes * (at_points * mesh.filled).sum(axis=1) / at_points.sum(axis=1)
     measured = {
         "membrane": copies * float(volumes[mesh.region == MEMBRANE].sum()),
         "lattice": copies * float(volumes[mesh.region == LATTICE].sum()),

@@ -8,9 +8,13 @@ from pathlib import Path
 import attrs
 import numpy as np
 
+from ..design import shapes
 from ..design.body import Body, covering
 from ..design.dimensions import Dimensions
-from ..design.profile import outer_radius, outer_slope
+from ..design.lattice import lattice_of
+from ..design.parameters import Unit
+from ..design.profile import outer_polygon, outer_radius, outer_slope
+from ..design.solid import QUALITY, lattice_solid
 from ..design.strut_cell import StrutCell
 from ..fem.elements import even_points, reference_gradients, shape_functions, shape_gradients
 from ..homogenize.cell_mesh import CellMeshSettings, mesh_cell
@@ -61,6 +65,19 @@ def struts(
     if full:
         mesh = mirror(mesh, "x")
     return filled_outside(mesh, cuts(d, body))
+
+
+def strut_volume_mm3(unit: Unit, body: Body | None = None) -> float:
+    """Volume in mm3 of a unit's struts outside its actuator, of the drawn solid by manifold3d."""
+    from manifold3d import Manifold, OpType
+
+    d = unit.printed if body is None else covering(unit.printed, body)
+    facets = QUALITY["export"]
+    solid = lattice_solid(d, lattice_of(d), facets)
+    if body is not None:
+        solid = solid ^ body.manifold
+    profile = shapes.revolved(outer_polygon(d, facets.along_arc), facets.around_axis)
+    return float(Manifold.batch_boolean([solid, profile], OpType.Subtract).volume())
 
 
 def cuts(d: Dimensions, body: Body | None) -> list[Depth]:

@@ -18,6 +18,7 @@ from ...design.parameters import Unit, read_unit, to_toml
 from ...design.rigid_body import FRICTION, RigidBody, mirrored, read_rigid_bodies, require_beside, to_obj
 from ...design.solid import QUALITY
 from ...errors import InputError
+from ...fem.newton_settings import RESOLVED_NEWTON
 from ...fem.obstacle import CONTACT_NEWTON
 from ...fem.protocol import Protocol, read_protocol
 from ...fem.solver import SolverChoice
@@ -38,7 +39,7 @@ from .study_file import read as read_tables
 if TYPE_CHECKING:
     from ...fem.materials import Materials
     from ...fem.model import Model
-    from ...fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
+    from ...fem.newton_settings import NewtonSettings
     from ...meshing.mesh import Mesh
 
 GRASP = "protocols/grasp.csv"

@@ -40,6 +40,7 @@ from ...placement.deviation import rank
 from ...reading import file_bytes, parse_json
 from ...report.results import CONTACT_COLUMNS, ContactHistory, LatticeSearch, Signals
 from ...report.vtk import write_mesh, write_trajectory
+from ...resolved.lattice import strut_volume_mm3
 from ...resolved.unit import mesh_of
 from ...run.cache import Cache, key
 from ...run.context import RunContext
@@ -184,7 +185,8 @@ class Study:
         with self.progress.stage("mesh"):
             self.mesh = self._mesh(self.job.mesh)
             self._require_space(len(self.mesh.nodes))
-            self.quality = mesh_quality(self.mesh, self.job.unit, self.job.body)
+            struts = strut_volume_mm3(self.job.unit, self.job.body) if self.mesh.resolved else None
+            self.quality = mesh_quality(self.mesh, self.job.unit, self.job.body, struts)
             modulus, _ = self.job.materials(self.mesh).small_strain(len(self.mesh.tets))
             write_mesh(self.folder / "mesh.vtu", self.mesh, modulus)
         self.context.summary["mesh"] = {**attrs.asdict(self.quality), "hash": self.mesh.hash()}
