@@ -29,6 +29,8 @@ Depth = Callable[[Array], Array]
 _STEPS = 6
 # What is filled by less is left out.
 _LEAST = 1e-3
+# Least share of a quadrature point of an element of which anything is filled.
+_FLOOR = 0.01
 
 
 def struts(
@@ -107,10 +109,11 @@ def clearance(d: Dimensions, points: Array) -> Array:
     return np.asarray((radius - outer_radius(d, z)) / np.hypot(1.0, outer_slope(d, z)))
 
 
-def filled_outside(mesh: Mesh, kept: list[Depth]) -> Mesh:
+def filled_outside(mesh: Mesh, kept: list[Depth], drop: bool = True) -> Mesh:
     """The mesh with the shares of its elements' volume where every function of `kept` is positive.
 
-    kept: of points (n, 3) in mm, (n,) each. Elements of which nothing is left go, with their nodes.
+    kept: of points (n, 3) in mm, (n,) each. Elements of which nothing is left go, with their nodes, unless
+    `drop` is off.
     """
     at = even_points(_STEPS)
     own = at.argmax(axis=1)  # the quadrature point that each is nearest to
@@ -129,7 +132,12 @@ def filled_outside(mesh: Mesh, kept: list[Depth]) -> Mesh:
     for point in range(filled.shape[1]):
         rows = own == point
         filled[mixed, point] = (volume[:, rows] * outside[:, rows]).sum(axis=1) / volume[:, rows].sum(axis=1)
-    keep = filled.sum(axis=1) > _LEAST
+    # Points without volume leave an element motions without stiffness.
+    some = (filled > 0).any(axis=1)
+    filled[some] = np.maximum(filled[some], _FLOOR)
+    if not drop:
+        return attrs.evolve(mesh, filled=filled)
+    keep = filled.mean(axis=1) > max(_LEAST, 1.01 * _FLOOR)
     used, tets = np.unique(mesh.tets[keep], return_inverse=True)
     return Mesh(
         mesh.nodes[used],
@@ -151,4 +159,5 @@ def support(mesh: Mesh) -> Array:
         np.bincount(mesh.tets.ravel(), np.repeat(v.sum(axis=1), per), len(mesh.nodes))
         for v in (volumes, volumes * mesh.filled)
     )
-    return np.asarray(solid / whole)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(solid / whole)
