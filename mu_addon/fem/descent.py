@@ -88,9 +88,6 @@ class Descent:
         ConvergenceError where no length tried does either.
         """
         model, s = self.model, self.settings
-        longest = float(np.abs(step).max()) / float(np.ptp(model.mesh.nodes, axis=0).max())
-        if longest > s.max_move:
-            step = step * (s.max_move / longest)
         slope = float(self.force @ step)
         length = 1.0
         for _ in range(s.max_backtracks):

@@ -13,11 +13,12 @@ import numpy as np
 from ..design.quantity import in_kPa
 from ..errors import ConvergenceError
 from .continuation import limit_pressure
+from .damped import damped_minimum
 from .descent import Descent
 from .factor import IndefiniteError
 from .materials import Materials
 from .model import Model
-from .newton_settings import SNAP_NEWTON, NewtonSettings
+from .newton_settings import NewtonSettings
 from .state import State, extrapolate, rest
 
 Array = np.ndarray[Any, Any]
@@ -196,19 +197,31 @@ class Equilibrium:
                 step /= 2
         return history[-1]
 
+    def settled(self, u: Array, pressure: float) -> State:
+        """The stable state at a pressure in MPa that damped motion from u (n, 3) in mm leads to.
+
+        For starts far from equilibrium, see `damped_minimum`. The cavity must be closed, so that its pressure
+        has a potential. Raises ConvergenceError where it leads to none.
+        """
+        return damped_minimum(
+            self.model,
+            self.parameters,
+            self.factor,
+            self._rest_tangent,
+            State(pressure, u),
+            pressure,
+            self.settings.tolerance,
+        )
+
     def _snapped(self, last: State, pressure: float) -> State:
         """The stable state that the body falls to from one before a limit point, at a pressure beyond it.
 
-        Every step of the way lowers the potential, is short, and is damped by a share of the undeformed
-        body's stiffness where the tangent is not definite. Raises ConvergenceError where there is none.
+        Raises ConvergenceError where there is none.
         """
-        own, self.settings = self.settings, attrs.evolve(SNAP_NEWTON, tolerance=self.settings.tolerance)
         try:
-            state = self.newton(last.u, pressure)
+            state = self.settled(last.u, pressure)
         except ConvergenceError as why:
             raise self._failure(last, pressure, why.what) from None
-        finally:
-            self.settings = own
         moved = float(np.linalg.norm(state.u - last.u, axis=1).max())
         return attrs.evolve(state, snapped_mm=max(moved, last.snapped_mm))
 

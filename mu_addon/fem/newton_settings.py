@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import attrs
-import numpy as np
 
 
 @attrs.frozen
@@ -31,8 +30,6 @@ class NewtonSettings:
     # Whether a path that ends at a limit point goes on with the state that the body snaps to: the minimum of
     # the potential that damped motion from the limit point leads to.
     follow_snaps: bool = False
-    # Largest move of a node in one iteration, as a share of the body's longest side.
-    max_move: float = np.inf
     # A state may lie this much of the predicted move away from its prediction.
     predictor_tolerance: float = 0.5
     # Many bodies on one factorisation: their tolerance, which leaves less than 1e-6 mm on the unit, and the
@@ -45,8 +42,3 @@ RESOLVED_NEWTON = NewtonSettings(
     max_step_MPa=0.0025, easy_factorisations=2, max_iterations=40, follow_snaps=True
 )
 """For a body strut by strut: single struts snap long before the body does."""
-
-SNAP_NEWTON = NewtonSettings(
-    max_iterations=400, max_factorisations=120, max_backtracks=12, max_move=0.02, keep_factor=0.9
-)
-"""For the motion after a limit point: short, damped, and as long as it takes."""

@@ -16,7 +16,7 @@ from ..fem.model import Model
 from ..fem.trajectory import Trajectory, simulate
 from ..meshing.mesh import LATTICE, Mesh
 from .deviation import Deviation, centreline, centreline_deviation
-from .inclusion import Inclusion, sensor_share, stiffened_volume_mm3
+from .inclusion import PRINTED, Inclusion, sensor_share, stiffened_volume_mm3
 from .polyline import polyline_inclusion
 
 Array = np.ndarray[Any, Any]
@@ -105,8 +105,13 @@ def evaluation(
     """Deviation of one candidate's monitored points (k, p, 3) in mm from Model A's at the same k instants.
 
     moved, baseline: the points with and without the sensor; radius_mm: of the inclusion; stations: number of
-    uniform arc lengths compared.
+    uniform arc lengths compared. A printed waveguide stiffens what it fills itself.
     """
+    deviation = centreline_deviation(centreline(moved, stations), centreline(baseline, stations))
+    if rule == PRINTED:
+        length = float(np.linalg.norm(np.diff(candidate.points, axis=0), axis=1).sum())
+        volume = np.pi * radius_mm**2 * length
+        return Evaluation(candidate.name, rule, deviation, volume, volume)
     found = roi(mesh, candidate, radius_mm)
     # A mesh of one half holds half of the cylinder and of what it stiffens.
     whole = 2 ** len(mesh.symmetry)
@@ -114,7 +119,7 @@ def evaluation(
     return Evaluation(
         candidate.name,
         rule,
-        centreline_deviation(centreline(moved, stations), centreline(baseline, stations)),
+        deviation,
         whole * stiffened_volume_mm3(rule, found, volumes),
         found.cylinder_volume_mm3,
     )

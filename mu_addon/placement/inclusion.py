@@ -11,6 +11,8 @@ import numpy as np
 Array = np.ndarray[Any, Any]
 
 RULES = ("intersect", "volume_fraction")
+PRINTED = "printed"
+"""In place of a rule: the waveguide itself, with its wells and seats, in a mesh of the printed unit."""
 
 # Between two vertex heights the slice area is smooth but where an edge meets the circle: many short
 # Gauss rules lose less at such a kink than one long one.

@@ -176,6 +176,26 @@ def test_a_collapsing_arch_is_the_one_that_displacement_control_finds():
     np.testing.assert_allclose(branch.pressure_MPa[1:], found, rtol=1e-7)
 
 
+def test_damped_motion_turns_an_arch_over_that_bears_its_load_no_more():
+    """From its midline's mirror image, which is on the other side already, it comes to the same state."""
+    mesh = arch()
+    body = equilibrium(mesh, 1.0, 0.3, far_side(mesh))
+    model = body.model
+    model.load = np.zeros_like(mesh.nodes)
+    model.load[crown(mesh), 1] = -0.01
+    with pytest.raises(ConvergenceError):
+        body.newton(rest(mesh).u, 0.0, reach_mm=1.0)
+    found = body.settled(rest(mesh).u, 0.0)
+    feet = mesh.nodes[mesh.base, 1].mean()
+    turned = np.zeros_like(mesh.nodes)
+    turned[:, 1] = 2 * (feet + 50.0 - np.sqrt(50.0**2 - mesh.nodes[:, 0] ** 2))
+    turned[mesh.base] = 0.0
+    over = body.settled(turned, 0.0)
+    assert found.u[crown(mesh), 1] < 1.5 * feet
+    assert np.abs(found.u - over.u).max() < 1e-6
+    assert body.newton(found.u, 0.0).iterations == 0
+
+
 def test_a_whole_arch_buckles_sideways_before_its_limit_point():
     """The half arch cannot; its tangent under the antisymmetric mode's supports says when the whole does."""
     half = arch()

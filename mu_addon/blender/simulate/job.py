@@ -43,6 +43,8 @@ def job_of(root: Any) -> Job:
         extra["mesh"] = MeshSettings(order=1, refine=0.5)
         if settings.command == "place":
             extra |= {"rules": ("volume_fraction",), "mesh_check": False}
+    elif settings.detail == "resolved":
+        extra["mesh"] = MeshSettings(fidelity="resolved")
     body = bodies.envelope_in(root, unit)
     if body is not None:
         require_paths_inside(unit, body, stages, settings.paths)

@@ -122,9 +122,14 @@ class MU_PG_study(bpy.types.PropertyGroup):
     )
     detail: EnumProperty(
         name="Detail",
-        description="How fine the mesh is, and of which order its elements",
+        description="What is simulated, how fine its mesh is, and of which order its elements",
         items=[
-            ("full", "Full", "Quadratic elements on the default mesh: what a design is decided by"),
+            ("full", "Full", "A continuum in place of the lattice, quadratic elements on the default mesh"),
+            (
+                "resolved",
+                "Printed Struts",
+                "The printed body strut by strut; paths are ranked by the waveguide itself. Some minutes",
+            ),
             (
                 "quick",
                 "Quick Look",

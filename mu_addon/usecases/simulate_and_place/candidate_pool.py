@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import attrs
 import numpy as np
 
+from ...errors import InputError
 from ...fem.kinematics import probe
 from ...fem.materials import Materials
 from ...fem.model import Model
@@ -17,6 +18,7 @@ from ...meshing.mesh import Mesh
 from ...placement.batch import CandidateBatch
 from ...placement.candidates import Candidate, roi
 from ...placement.inclusion import sensor_share
+from ...resolved.candidates import PrintedWaveguides
 from ...run.pool import Pool
 
 if TYPE_CHECKING:
@@ -54,6 +56,49 @@ class Moved(NamedTuple):
     whole: Array
 
 
+class PrintedEvaluator:
+    """As `Evaluator`, where the mesh is of the printed unit and the candidates are printed waveguides."""
+
+    def __init__(self, setting: CandidateProblem, threads: int) -> None:
+        job = setting.study
+        assert job is not None
+        self._candidates = PrintedWaveguides(
+            job.unit,
+            setting.mesh,
+            tuple(candidate.name for candidate, _ in setting.jobs),
+            setting.anchors,
+            job.materials,
+            lambda mesh: job.model(mesh, threads),
+            job.newton,
+        )
+        self._whole = setting.whole
+
+    def __call__(self, state: State) -> Moved:
+        """What all jobs do at a state of Model A. Raises ConvergenceError."""
+        states = self._candidates.states(state)
+        count = len(state.u)
+        apart = [(states[job].u[:count] - state.u).astype(np.float32) for job in self._whole]
+        moved = self._candidates.points(states)
+        return Moved(moved, np.array(apart, np.float32).reshape(-1, *state.u.shape))
+
+    def alone(self, job: int, pressures_MPa: Array) -> Array:
+        """Anchors (s, p, 3) in mm that a job moves along its path from rest. Raises ConvergenceError."""
+        return self._candidates.alone(job, pressures_MPa)
+
+    def simulated_in_time(self, job: int, time_s: Array, pressure_kPa: Array) -> Array:
+        """Raises InputError: nothing that remembers is simulated with a printed waveguide yet."""
+        raise InputError(
+            "printed waveguides are ranked by pressure alone, without obstacles or a wall that remembers",
+            "fidelity",
+            'choose fidelity "homogenised"',
+        )
+
+
+def evaluator_of(setting: CandidateProblem, threads: int) -> Evaluator | PrintedEvaluator:
+    """What solves a setting's jobs on its mesh."""
+    return (PrintedEvaluator if setting.mesh.resolved else Evaluator)(setting, threads)
+
+
 class Evaluator:
     """Solves all jobs of a setting at one state of Model A, having built its model once."""
 
@@ -82,12 +127,12 @@ class Evaluator:
         return self._sweep.simulated_in_time(job, time_s, pressure_kPa)
 
 
-_evaluator: Evaluator | None = None
+_evaluator: Evaluator | PrintedEvaluator | None = None
 
 
 def _start(setting: CandidateProblem) -> None:
     global _evaluator
-    _evaluator = Evaluator(setting, threads=1)
+    _evaluator = evaluator_of(setting, threads=1)
 
 
 def _work(state: State) -> Moved:
@@ -110,7 +155,7 @@ class CandidatePool:
 
     def __init__(self, setting: CandidateProblem, workers: int) -> None:
         self.setting, self.workers = setting, workers
-        self._alone: Evaluator | None = None
+        self._alone: Evaluator | PrintedEvaluator | None = None
         self._pool = Pool(workers, "candidates", _start, (setting,))
         self._submitted: dict[float, Future[Moved]] = {}
 
@@ -122,7 +167,7 @@ class CandidatePool:
     def alone(self, tasks: Sequence[tuple[int, Array]]) -> list[Array]:
         """Anchors (s, p, 3) in mm that jobs, by number, move along their paths through pressures (s,)."""
         if self.workers == 1:
-            self._alone = self._alone or Evaluator(self.setting, threads=1)
+            self._alone = self._alone or evaluator_of(self.setting, threads=1)
             return [self._alone.alone(*task) for task in tasks]
         waiting = [self._pool.submit(_work_alone, *task) for task in tasks]
         return [self._pool.result(done) for done in waiting]
@@ -133,7 +178,7 @@ class CandidatePool:
         """Each of some jobs, by number, as it is done, and anchors (k, p, 3) in mm it moves at k instants."""
         if self.workers == 1:
             for job in jobs:
-                self._alone = self._alone or Evaluator(self.setting, threads=1)
+                self._alone = self._alone or evaluator_of(self.setting, threads=1)
                 yield job, self._alone.simulated_in_time(job, time_s, pressure_kPa)
             return
         waiting = {self._pool.submit(_work_in_time, job, time_s, pressure_kPa): job for job in jobs}
@@ -147,7 +192,7 @@ class CandidatePool:
         """
         if self.workers == 1:
             for number, state in enumerate(states):
-                self._alone = self._alone or Evaluator(self.setting, threads=1)
+                self._alone = self._alone or evaluator_of(self.setting, threads=1)
                 yield number, self._alone(state)
             return
         for state in states:

@@ -26,7 +26,7 @@ from ...fem.unit import materials_of
 from ...homogenize.effective import Effective, read_effective
 from ...meshing.settings import MeshSettings
 from ...placement.graph import Limits
-from ...placement.inclusion import RULES
+from ...placement.inclusion import PRINTED, RULES
 from ...run.folder import claim, keep_inputs
 from ...run.inputs import digest
 from ...run.lock import FolderLock
@@ -55,6 +55,8 @@ def _whole(low: int, high: int, what: str) -> Any:
 
 
 def _rules(_: object, field: attrs.Attribute[Any], value: tuple[str, ...]) -> None:
+    if value == (PRINTED,):
+        return
     if not value or any(rule not in RULES for rule in value):
         raise InputError(f"the rules are {value!r}", field.name, f"give some of {', '.join(RULES)}")
 
@@ -99,6 +101,10 @@ class Job:
     path: str = attrs.field(default="", validator=attrs.validators.instance_of(str))
 
     def __attrs_post_init__(self) -> None:
+        if self.mesh.fidelity == "resolved":
+            # The waveguide is what is printed: the rules are for a continuum in place of the lattice.
+            object.__setattr__(self, "rules", (PRINTED,))
+            self._require_resolvable()
         if self.obstacles and "place" in self.stages and self.paths == "graph":
             raise InputError(
                 "the search of the whole lattice does not support obstacles",
@@ -145,6 +151,23 @@ class Job:
                 "times",
                 "give more samples, or a protocol that leaves 0 kPa",
             )
+
+    def _require_resolvable(self) -> None:
+        """Raise InputError for what the resolved model of a unit does not cover."""
+        refused = {
+            "a law for the lattice": ("--lattice", self.lattice is not None),
+            "linear elements": ("--order", self.mesh.order == 1),
+            "a search of the whole lattice": ("--paths graph", self.paths == "graph"),
+            "printed waveguides beside obstacles or with a wall that remembers": (
+                "--obstacle, [wall]",
+                "place" in self.stages and self.in_time,
+            ),
+        }
+        for what, (where, asked) in refused.items():
+            if asked and "simulate" in self.stages:
+                raise InputError(
+                    f"the resolved model does not support {what}", where, "choose fidelity homogenised"
+                )
 
     @cached_property
     def samples(self) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:

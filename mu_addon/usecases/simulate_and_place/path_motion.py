@@ -8,7 +8,7 @@ import numpy as np
 
 from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, roi, with_sensor
-from ...placement.inclusion import sensor_share
+from ...placement.inclusion import PRINTED, sensor_share
 from .motion import IMAGE, REGIONS, SurfaceFields, surface_of, write_path
 
 if TYPE_CHECKING:
@@ -45,8 +45,10 @@ def keep_motion(
     for name, pressure_kPa, difference_mm in solver.whole(trajectory):
         still = [by_pressure[p] for p in pressure_kPa]
         without = without or looked.of_states(still, materials)
-        share = sensor_share(rule, roi(mesh, candidates[name], unit.dimensions.inclusion_radius))
-        stiff = with_sensor(materials, share, unit.material.sensor_modulus_MPa)
+        stiff = materials
+        if rule != PRINTED:
+            share = sensor_share(rule, roi(mesh, candidates[name], unit.dimensions.inclusion_radius))
+            stiff = with_sensor(materials, share, unit.material.sensor_modulus_MPa)
         moved = [u + apart for u, apart in zip(still, difference_mm, strict=True)]
         fields = {key: values - without[key] for key, values in looked.of_states(moved, stiff).items()}
         further = {}

@@ -24,6 +24,7 @@ from .light_charts import front_chart, response_chart
 RULE = {
     "volume_fraction": "volume fraction",
     "intersect": "intersect",
+    "printed": "as printed",
 }
 RULE_MEANS = {
     "volume_fraction": (
@@ -33,6 +34,7 @@ RULE_MEANS = {
     "intersect": (
         "The rule of the paper: every element that the sensor intersects gets the sensor's E; mesh-dependent"
     ),
+    "printed": "No rule: the waveguide itself with wells and seats, in the mesh of the printed unit",
 }
 
 

@@ -1,0 +1,93 @@
+"""Minimisation of the potential by damped steps, from where no stable path leads on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..errors import ConvergenceError
+from .factor import IndefiniteError
+from .model import MaterialData, Model
+from .state import State
+
+Array = np.ndarray[Any, Any]
+
+MOST_STEPS = 300
+# Shares of the undeformed body's tangent: the first, and below which there is none; by how much it grows and
+# shrinks, and shares of the predicted decrease below and above which it does.
+_FIRST, _LEAST, _MOST = 0.01, 1e-5, 1e4
+_GROWS, _SHRINKS = 4.0, 1 / 3
+_POOR, _GOOD = 0.1, 0.7
+# Largest move of a node in a step, as a share of the body's longest side.
+_LONGEST = 0.02
+# A decrease below this share of the potential's parts is lost in rounding.
+_ROUNDING = 1e-13
+
+
+def damped_minimum(
+    model: Model,
+    parameters: MaterialData,
+    factor: Any,
+    rest_tangent: Array,
+    start: State,
+    pressure_MPa: float,
+    tolerance: float,
+    end_of_step: Callable[[Array, Array], float] = lambda u, step: 1.0,
+) -> State:
+    """The stable state at a pressure in MPa that damped motion from a start leads to.
+
+    Each step minimises the potential's quadratic model with a share of the undeformed body's stiffness about
+    the last iterate added, which is a step in time of a motion that this stiffness damps; the share follows
+    how well the model tells the decrease (Levenberg and Marquardt). factor: as `Model.factor`; rest_tangent
+    (nnz,): its values for the undeformed body. tolerance: of the residual over the root sum of squares of
+    element forces. end_of_step: the share of a step (f,) from u (n, 3) that contact permits. Raises
+    ConvergenceError.
+    """
+    u, damping = start.u, _FIRST
+    force, scale = _force(model, parameters, u, pressure_MPa)
+    potential = model.potential(u, pressure_MPa, parameters)
+    longest = _LONGEST * float(np.ptp(model.mesh.nodes, axis=0).max())
+    factorisations = 0
+    for step_number in range(MOST_STEPS):
+        values = model.tangent(u, pressure_MPa, parameters)
+        level = float(np.linalg.norm(force))
+        if level <= tolerance * scale:
+            try:
+                factor.factor(values)
+            except IndefiniteError:
+                pass
+            else:
+                return State(pressure_MPa, u, level / scale, step_number, factorisations + 1)
+        while True:
+            if damping > _MOST:
+                raise ConvergenceError("no step lowers the potential")
+            try:
+                factorisations += 1
+                factor.factor(values + damping * rest_tangent if damping else values)
+                step = -factor.solve(force)
+            except IndefiniteError:
+                damping = max(_GROWS * damping, _LEAST)
+                continue
+            far = float(np.abs(step).max())
+            step *= min(1.0, longest / far if far else 1.0, end_of_step(u, step))
+            moved = model.moved(u, step)
+            found = model.potential(moved, pressure_MPa, parameters)
+            after, new_scale = _force(model, parameters, moved, pressure_MPa)
+            # What the two ends' forces say of the decrease, where the energy's own difference is rounding.
+            told = -0.5 * float((force + after) @ step)
+            decrease = potential - found if abs(told) > _ROUNDING * abs(potential) else told
+            expected = -float(force @ step)
+            if np.isfinite(found) and decrease > _POOR * 0.5 * expected:
+                break
+            damping = max(_GROWS * damping, _LEAST)
+        if decrease > _GOOD * 0.5 * expected:
+            damping = damping * _SHRINKS if damping * _SHRINKS > _LEAST else 0.0
+        u, force, scale, potential = moved, after, new_scale, found
+    raise ConvergenceError(f"the motion does not come to rest within {MOST_STEPS} steps")
+
+
+def _force(model: Model, parameters: MaterialData, u: Array, pressure_MPa: float) -> tuple[Array, float]:
+    force = model.residual(u, pressure_MPa, parameters).ravel()[model.free]
+    return force, model.force_scale()
