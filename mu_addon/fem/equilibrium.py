@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from .factor import IndefiniteError
 from .materials import Materials
 from .model import Model
 from .newton_settings import NewtonSettings
+from .pattern import Pattern
 from .state import State, extrapolate, rest
 
 Array = np.ndarray[Any, Any]
@@ -51,12 +51,20 @@ class Equilibrium:
         self.settings = settings or NewtonSettings()
         self.explains = explains
         self.parameters = model.parameters(materials)
-        self.factor = model.factor
+        self._stiffening: tuple[Pattern, Array] | None = None
 
-    @cached_property
+    @property
+    def factor(self) -> Any:
+        """The model's solver: another one after self-contact has made the tangent's pattern grow."""
+        return self.model.factor
+
+    @property
     def _rest_tangent(self) -> Array:
         """Tangent of the undeformed body: positive definite, of the same pattern, and about as stiff."""
-        return self.model.tangent(rest(self.model.mesh).u, 0.0, self.parameters)
+        if self._stiffening is None or self._stiffening[0] is not self.model.pattern:
+            values = self.model.tangent(rest(self.model.mesh).u, 0.0, self.parameters)
+            self._stiffening = self.model.pattern, values
+        return self._stiffening[1]
 
     def _factorise(self, u: Array, pressure: float) -> bool:
         """Factorise the tangent; where it is indefinite, with a share of the undeformed body's added.
@@ -173,7 +181,7 @@ class Equilibrium:
                 step = target - last.pressure_MPa
             pressure = target if step == target - last.pressure_MPa else last.pressure_MPa + step
             try:
-                guess = self._predict(history, pressure)
+                guess = self.model.before_touch(last.u, self._predict(history, pressure))
                 state = self.newton(guess, pressure, s.predictor_tolerance * np.abs(guess - last.u).max())
             except ConvergenceError as why:
                 if abs(step) / 2 < s.min_step_MPa:

@@ -1,0 +1,71 @@
+"""Sparsity of a symmetric tangent, and how it grows where contact joins what no element does."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import attrs
+import numpy as np
+from scipy import sparse
+
+from .factor import nested_dissection
+
+Array = np.ndarray[Any, Any]
+
+
+@attrs.define(eq=False, slots=False)
+class Pattern:
+    """Sparsity of the tangent between the f free unknowns.
+
+    indptr (f + 1,), indices (nnz,): its lower triangle by columns; order (f,): a fill-reducing permutation.
+    """
+
+    indptr: Array
+    indices: Array
+    order: Array
+
+    @classmethod
+    def of(cls, rows: Array, columns: Array, free: Array) -> Pattern:
+        """The pattern of entries (nnz,), sorted by column, then row, ordered node by node.
+
+        rows, columns: of free unknowns, of the lower triangle with its diagonal; free (f,): number 3 node +
+        axis of each.
+        """
+        count = len(free)
+        indptr = np.zeros(count + 1, dtype=np.int64)
+        np.cumsum(np.bincount(columns, minlength=count), out=indptr[1:])
+        nodes, of_unknown = np.unique(free // 3, return_inverse=True)
+        graph = sparse.csr_matrix(
+            (np.ones(len(rows)), (of_unknown[rows], of_unknown[columns])), shape=(len(nodes),) * 2
+        )
+        place = np.empty(len(nodes), int)
+        place[nested_dissection(graph + graph.T)] = np.arange(len(nodes))
+        return cls(indptr, rows, np.argsort(place[of_unknown], kind="stable"))
+
+    @cached_property
+    def entries(self) -> tuple[Array, Array]:
+        """Rows and columns (nnz,) of all entries."""
+        return self.indices, np.repeat(np.arange(len(self.indptr) - 1), np.diff(self.indptr))
+
+    @cached_property
+    def _keys(self) -> Array:
+        rows, columns = self.entries
+        return np.asarray(columns * (len(self.indptr) - 1) + rows)
+
+    def places(self, rows: Array, columns: Array) -> tuple[Array, Array]:
+        """Where entries (j,) of the lower triangle are among the nnz, and which of them are there at all."""
+        keys = columns.astype(np.int64) * (len(self.indptr) - 1) + rows
+        at = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
+        return at, self._keys[at] == keys
+
+
+def with_entries(pattern: Pattern, rows: Array, columns: Array, free: Array) -> Pattern:
+    """A pattern with more entries (j,) of the lower triangle, in an order of its own.
+
+    free (f,): number 3 node + axis of each unknown.
+    """
+    count = len(free)
+    own_rows, own_columns = pattern.entries
+    keys = np.unique(np.concatenate([own_columns * count + own_rows, columns.astype(np.int64) * count + rows]))
+    return Pattern.of(keys % count, keys // count, free)

@@ -1,0 +1,282 @@
+"""Self-contact: a barrier that keeps the pieces of a body's surface apart, wall from wall, strut from strut."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+from scipy import sparse
+
+from ..errors import InputError
+from ..meshing.mesh import AXES, LATTICE, Mesh, boundary_faces
+from .newton_settings import NewtonSettings
+from .self_intersection import facets_of, with_middles
+
+Array = np.ndarray[Any, Any]
+
+# Pairs that begin to touch make an old factor of no use; a body that closes ends far from its prediction, and
+# steps that touch cut short are many.
+SELF_CONTACT_NEWTON = NewtonSettings(
+    keep_factor=0.2, max_factorisations=80, max_iterations=200, max_backtracks=12, predictor_tolerance=3.0
+)
+# Distances in gaps: around a strut's foot where it does not touch the wall; and of pairs that the tangent's
+# pattern makes room for, so that it grows seldom.
+_FOOT = 2.0
+_ROOM = 3.0
+# Share of the way to a mirror plane that a step may go, as ipctk has it for the way to a touch.
+_SHORT_OF_TOUCH = 0.8
+
+
+def _ipctk() -> Any:
+    try:
+        import ipctk
+    except ImportError:
+        raise InputError(
+            "self-contact needs the package ipctk, which is not installed",
+            "self-contact",
+            "pip install 'mu_addon[contact]', or simulate without self-contact",
+        ) from None
+    # It takes every core otherwise, and its sums would depend on how many.
+    ipctk.set_num_threads(1)
+    return ipctk
+
+
+@attrs.frozen(eq=False)
+class _Pairs:
+    """Places (v, 3) in mm of the surface's nodes, and the pairs of ipctk nearer than a distance there."""
+
+    places: Array
+    near: Any
+
+
+@attrs.frozen(eq=False)
+class _Plane:
+    """A mirror plane: its axis, and of the surface's k nodes off it number, area in mm2, and side, 1 or -1."""
+
+    column: int
+    nodes: Array
+    area: Array
+    side: Array
+
+    def distance(self, places: Array) -> Array:
+        """Distances (k,) in mm of the nodes from their images, from the places (n, 3) of all."""
+        return np.asarray(2 * self.side * places[self.nodes, self.column])
+
+
+class SelfContact:
+    """Energy of a body's surface that comes near itself, as `Model.self_contact` takes it.
+
+    gap_mm: the distance d at which two pieces of the surface begin to repel each other; they stay apart by
+    some of it, and never touch. stiffness_MPa, k: how soon. Each unit of area at distance s < d holds, in
+    N/mm, -k d ((s/d)^2 - 1)^2 ln((s/d)^2), so the pressure between two plates is its slope and grows without
+    bound as they close (Li et al., ACM Trans. Graph. 39 (2020) 49; by area: Li et al., arXiv 2307.15908). Both
+    stay what they are along a path: energy, forces and tangent are those of one potential.
+
+    Quadratic faces count as four flat triangles each. A node of a half or quarter mesh is kept off the mirror
+    planes by the same energy, of its own area: a body that mirrors itself meets its image there and nowhere
+    else. Of a resolved mesh the struts begin to touch some gaps away from the wall that they stand on. Faces of the
+    base do not touch. A pair of facets with a common node is not kept apart.
+
+    facets (t, 3): the triangles that touch, as node numbers. Raises InputError where ipctk is missing, and where
+    the surface is nearer to itself than the gap as it is drawn: a gap below a third of the wall's thickness is safe.
+    """
+
+    def __init__(self, mesh: Mesh, gap_mm: float, stiffness_MPa: float) -> None:
+        if not (0 < gap_mm < np.inf and 0 < stiffness_MPa < np.inf):
+            raise InputError(
+                f"self-contact with a gap of {gap_mm:g} mm and a stiffness of {stiffness_MPa:g} MPa",
+                "self-contact",
+                "give both above 0: a third of the wall or less, and a tenth of its modulus",
+            )
+        self._ipctk = _ipctk()
+        self.gap_mm, self.stiffness_MPa = gap_mm, stiffness_MPa
+        self._rest = mesh.nodes
+        self._potential = self._ipctk.BarrierPotential(gap_mm, stiffness_MPa, True)
+        facets = _free_facets(mesh)
+        if mesh.resolved:
+            facets = self._without_feet(mesh, facets)
+        self.facets = facets
+        self._surface, self._nodes = self._collision_mesh(facets)
+        self._planes = [self._mirror_plane(mesh, axis) for axis in mesh.symmetry]
+        # Half the time of ipctk's default, and as safe: it advances by what distance and speed allow.
+        self._detection = self._ipctk.AdditiveCCD()
+        self._last: dict[float, _Pairs] = {}
+        self._refuse_overlap()
+
+    def _collision_mesh(self, facets: Array) -> tuple[Any, Array]:
+        nodes, triangles = np.unique(facets, return_inverse=True)
+        triangles = np.asfortranarray(np.reshape(triangles, (-1, 3)), dtype=np.int32)
+        edges = self._ipctk.edges(triangles)
+        return self._ipctk.CollisionMesh(np.asfortranarray(self._rest[nodes]), edges, triangles), nodes
+
+    def _without_feet(self, mesh: Mesh, facets: Array) -> Array:
+        """Facets without those of struts that lie at the wall as drawn: their nodes there are the wall's own."""
+        of_strut = np.zeros(len(mesh.nodes), bool)
+        of_strut[mesh.tets[mesh.region == LATTICE]] = True
+        surface, nodes = self._collision_mesh(facets)
+        near = self._ipctk.NormalCollisions()
+        near.build(surface, surface.rest_positions, _FOOT * self.gap_mm)
+        foot = np.zeros(len(mesh.nodes), bool)
+        for number in range(len(near)):
+            ids = np.array(near[number].vertex_ids(surface.edges, surface.faces))
+            ids = nodes[ids[ids >= 0]]
+            if len(np.unique(of_strut[ids])) == 2:
+                foot[ids[of_strut[ids]]] = True
+        return facets[~foot[facets].any(axis=1)]
+
+    def _mirror_plane(self, mesh: Mesh, axis: str) -> _Plane:
+        column = AXES.index(axis)
+        x = mesh.nodes[self._nodes, column]
+        # Nodes nearer than that to the plane belong to faces that end on it.
+        off = np.flatnonzero(np.abs(x) > self.gap_mm)
+        return _Plane(column, self._nodes[off], np.asarray(self._surface.vertex_areas)[off], np.sign(x[off]))
+
+    def _refuse_overlap(self) -> None:
+        near = self._pairs(np.zeros_like(self._rest), self.gap_mm)
+        if len(near.near):
+            ids = np.array(near.near[0].vertex_ids(self._surface.edges, self._surface.faces))
+            place = near.places[ids[ids >= 0]].mean(axis=0)
+            raise InputError(
+                f"the surface is within {self.gap_mm:g} mm of itself as drawn, in {len(near.near)} pairs",
+                f"self-contact, near ({place[0]:.1f}, {place[1]:.1f}, {place[2]:.1f}) mm",
+                "choose a smaller gap",
+            )
+
+    def energy_mJ(self, u: Array) -> float:
+        """Energy in mJ at u (n, 3) in mm; infinite where a mirror plane is crossed."""
+        found = self._pairs(u, self.gap_mm)
+        energy = self._potential(found.near, self._surface, found.places) if len(found.near) else 0.0
+        for plane in self._planes:
+            # Half of what the whole body has there, as of everything else.
+            energy += 0.5 * plane.area @ self._barrier(plane.distance(self._rest + u))[0]
+        return float(energy)
+
+    def forces(self, u: Array) -> tuple[Array, Array]:
+        """Nodes (j,) of the surface, each once, and the energy's derivative by them, (j, 3) in N.
+
+        u: displacements (n, 3) in mm.
+        """
+        found = self._pairs(u, self.gap_mm)
+        total = np.zeros_like(self._rest)
+        if len(found.near):
+            gradient = self._potential.gradient(found.near, self._surface, found.places)
+            total[self._nodes] = gradient.reshape(-1, 3)
+        for plane in self._planes:
+            slope = self._barrier(plane.distance(self._rest + u))[1]
+            total[plane.nodes, plane.column] += plane.area * plane.side * slope
+        return self._nodes, total[self._nodes]
+
+    def stiffness(self, u: Array, projected: bool = False) -> sparse.coo_matrix:
+        """Second derivative (3 n, 3 n) in N/mm of the energy at u (n, 3) in mm, symmetric.
+
+        projected: each pair's made positive semidefinite, for directions of search alone.
+        """
+        found = self._pairs(u, self.gap_mm)
+        kinds = self._ipctk.PSDProjectionMethod
+        rows, columns, values = self._entries(found, self._potential, kinds.CLAMP if projected else kinds.NONE)
+        for plane in self._planes:
+            at = 3 * plane.nodes + plane.column
+            rows, columns = np.concatenate([rows, at]), np.concatenate([columns, at])
+            bend = self._barrier(plane.distance(self._rest + u))[2]
+            values = np.concatenate([values, 2 * plane.area * bend])
+        return sparse.coo_matrix((values, (rows, columns)), shape=(self._rest.size,) * 2)
+
+    def room(self, u: Array) -> tuple[Array, Array]:
+        """Rows and columns (j,) of 3 n that `stiffness` may fill while the surface moves by about a gap.
+
+        u: displacements (n, 3) in mm.
+        """
+        gap = _ROOM * self.gap_mm
+        potential = self._ipctk.BarrierPotential(gap, 1.0, True)
+        kind = self._ipctk.PSDProjectionMethod.NONE
+        rows, columns, _ = self._entries(self._pairs(u, gap), potential, kind)
+        return rows, columns
+
+    def least_gap_mm(self, u: Array) -> float:
+        """Least distance in mm between two pieces of the surface at u (n, 3) in mm; infinite beyond the gap."""
+        found = self._pairs(u, self.gap_mm)
+        least = np.inf
+        if len(found.near):
+            least = float(np.sqrt(found.near.compute_minimum_distance(self._surface, found.places)))
+        images = min((float(p.distance(self._rest + u).min()) for p in self._planes), default=np.inf)
+        return min(least, images if images < self.gap_mm else np.inf)
+
+    def count(self, u: Array) -> int:
+        """How many pairs of vertices, edges and facets are within the gap at u (n, 3) in mm."""
+        return len(self._pairs(u, self.gap_mm).near)
+
+    def intersects(self, u: Array) -> bool:
+        """Whether the surface cuts itself or a mirror plane at u (n, 3) in mm."""
+        if any((plane.distance(self._rest + u) <= 0).any() for plane in self._planes):
+            return True
+        return bool(self._ipctk.has_intersections(self._surface, self._places(u)))
+
+    def free_share(self, u: Array, to: Array) -> float:
+        """Share, up to 1, of the straight way between displacements u and to, (n, 3) in mm, without a touch.
+
+        u must be free of intersections. Where something would touch, the share ends before it does.
+        """
+        start, end = self._places(u), self._places(to)
+        candidates = self._ipctk.Candidates()
+        candidates.build(self._surface, start, end)
+        share = float(
+            candidates.compute_collision_free_stepsize(self._surface, start, end, 0.0, self._detection)
+        )
+        for plane in self._planes:
+            before, after = (plane.distance(self._rest + v) for v in (u, to))
+            crosses = after <= 0
+            if crosses.any():
+                share = min(share, float((_SHORT_OF_TOUCH * before / (before - after))[crosses].min()))
+        return share
+
+    def _places(self, u: Array) -> Array:
+        return np.asfortranarray((self._rest + u)[self._nodes])
+
+    def _pairs(self, u: Array, gap_mm: float) -> _Pairs:
+        """The pairs nearer than gap_mm at u, those of the last call where u is the same."""
+        places = self._places(u)
+        last = self._last.get(gap_mm)
+        if last is not None and np.array_equal(last.places, places):
+            return last
+        near = self._ipctk.NormalCollisions()
+        near.use_area_weighting = True
+        near.collision_set_type = self._ipctk.NormalCollisions.IMPROVED_MAX_APPROX
+        near.build(self._surface, places, gap_mm)
+        self._last[gap_mm] = found = _Pairs(places, near)
+        return found
+
+    def _entries(self, found: _Pairs, potential: Any, kind: Any) -> tuple[Array, Array, Array]:
+        """Rows, columns and values (j,) of the pairs' second derivative, numbered by the mesh's nodes."""
+        if not len(found.near):
+            return np.empty(0, int), np.empty(0, int), np.empty(0)
+        h = potential.hessian(found.near, self._surface, found.places, kind).tocoo()
+        numbers = (3 * self._nodes.astype(np.int64)[:, None] + np.arange(3)).ravel()
+        return numbers[h.row], numbers[h.col], h.data
+
+    def _barrier(self, distance: Array) -> tuple[Array, Array, Array]:
+        """Energy per area in N/mm at distances (k,) in mm, its slope in MPa and the slope's in MPa/mm."""
+        d = self.gap_mm
+        near = distance < d
+        s = np.where(near, np.maximum(distance, 0.0), d) / d
+        energy, slope, bend = np.zeros((3, len(distance)))
+        with np.errstate(divide="ignore"):
+            q, log = s * s - 1, 2 * np.log(s)
+            energy[near] = (-(q**2) * log)[near]
+            slope[near] = (-4 * s * q * log - 2 * q**2 / s)[near]
+            bend[near] = (-4 * (3 * s**2 - 1) * log - 16 * q + 2 * q**2 / s**2)[near]
+        k = self.stiffness_MPa
+        return k * d * energy, k * slope, k / d * bend
+
+
+def _free_facets(mesh: Mesh) -> Array:
+    """Triangles (t, 3) of a mesh's surface that can touch: not the base's, mirror planes', or buried ones."""
+    faces, owner = boundary_faces(mesh.tets)
+    keep = ~np.isin(faces, mesh.base).all(axis=1)
+    for axis in mesh.symmetry:
+        keep &= ~(mesh.nodes[faces, AXES.index(axis)] == 0.0).all(axis=1)
+    faces, owner = faces[keep], owner[keep]
+    if mesh.order == 2:
+        faces = with_middles(faces, mesh.tets[owner])
+    # Of parts that overlap, what is tied lies inside another.
+    return facets_of(faces[~np.isin(faces, mesh.tied).any(axis=1)])
