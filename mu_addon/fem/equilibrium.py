@@ -181,8 +181,9 @@ class Equilibrium:
                 step = target - last.pressure_MPa
             pressure = target if step == target - last.pressure_MPa else last.pressure_MPa + step
             try:
-                guess = self.model.before_touch(last.u, self._predict(history, pressure))
-                state = self.newton(guess, pressure, s.predictor_tolerance * np.abs(guess - last.u).max())
+                guess = self._predict(history, pressure)
+                allowed = s.predictor_tolerance * np.abs(guess - last.u).max()
+                state = self.newton(self.model.before_touch(last.u, guess), pressure, allowed)
             except ConvergenceError as why:
                 if abs(step) / 2 < s.min_step_MPa:
                     raise self._failure(last, pressure, why.what) from None

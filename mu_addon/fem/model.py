@@ -37,6 +37,8 @@ LEAST_STRAIN = 1e-5
 # wall one element thick bends 40 % too easily: one face grows, the other shrinks, and the mean sees neither.
 # Chosen by the tables in docs/locking.md.
 POINTWISE_BULK = 5.0
+# Entries of self-contact stay in the tangent's pattern until it has grown by this factor.
+MOST_GROWTH = 1.03
 
 
 @attrs.frozen(eq=False)
@@ -211,7 +213,7 @@ class Model:
         sorting = np.lexsort((row, column))
         self._scalar_map = keep[sorting]
         # Where the body's own entries are in a pattern that has grown by those of self-contact.
-        self._own = slice(None)
+        self._own: Any = slice(None)
         self.pattern = self._own_pattern = Pattern.of(row[sorting], column[sorting], self.free)
 
     @cached_property
@@ -430,11 +432,10 @@ class Model:
         parts = self._parts.numpy()
         return max(float(np.sqrt(np.einsum("ij,ij->", parts, parts))), self._least_force)
 
-    def tangent(self, u: Array, pressure: float, m: MaterialData, projected: bool = False) -> Array:
+    def tangent(self, u: Array, pressure: float, m: MaterialData) -> Array:
         """Values (nnz,) in N/mm of the tangent's lower triangle by columns, as in `pattern`.
 
         u: (n, 3) in mm; pressure in MPa, whose follower stiffness is included, as is that of contact.
-        projected: self-contact's part made positive semidefinite, for directions of search alone.
         """
         self._place(u)
         self._launch_layers("stiffness", m, [self._mean_slope, self._block_parts])
@@ -443,24 +444,31 @@ class Model:
             inputs += [self._element_blocks, self._block_parts]
             wp.launch(kernels.pressure_stiffness, len(self.mesh.cavity), inputs, device=self.device)
         values = self._gathered(u)
-        return values if self.self_contact is None else self._with_self_contact(values, u, projected)
+        if self.self_contact is None and self.pattern is self._own_pattern:
+            return values
+        return self._with_self_contact(values, u)
 
-    def _with_self_contact(self, own: Array, u: Array, projected: bool) -> Array:
+    def _with_self_contact(self, own: Array, u: Array) -> Array:
         """The tangent's values (nnz,) of the body's own and of self-contact, its pattern grown if need be."""
+        found = np.zeros(len(self.pattern.indices))
+        found[self._own] = own
         contact = self.self_contact
-        assert contact is not None
-        h = contact.stiffness(u, projected)
+        if contact is None:
+            return found
+        h = contact.stiffness(u)
         rows, columns, values = self._lower(h.row, h.col, h.data)
         places, has = self.pattern.places(rows, columns)
         if not has.all():
             more = self._lower(*contact.room(u))
             wanted = np.concatenate([rows, more[0]]), np.concatenate([columns, more[1]])
-            self.pattern = with_entries(self._own_pattern, *wanted, self.free)
-            self._own = self.pattern.places(*self._own_pattern.entries)[0]
+            if len(self.pattern.indices) > MOST_GROWTH * len(own):
+                self.pattern, self._own = self._own_pattern, slice(None)
+            self.pattern, kept = with_entries(self.pattern, *wanted, self.free)
+            self._own = kept[self._own]
             self.__dict__.pop("factor", None)
             places, _ = self.pattern.places(rows, columns)
-        found = np.zeros(len(self.pattern.indices))
-        found[self._own] = own
+            found = np.zeros(len(self.pattern.indices))
+            found[self._own] = own
         np.add.at(found, places, values)
         return found
 

@@ -44,28 +44,28 @@ class Pattern:
         return cls(indptr, rows, np.argsort(place[of_unknown], kind="stable"))
 
     @cached_property
-    def entries(self) -> tuple[Array, Array]:
-        """Rows and columns (nnz,) of all entries."""
-        return self.indices, np.repeat(np.arange(len(self.indptr) - 1), np.diff(self.indptr))
-
-    @cached_property
-    def _keys(self) -> Array:
-        rows, columns = self.entries
-        return np.asarray(columns * (len(self.indptr) - 1) + rows)
+    def keys(self) -> Array:
+        """One number (nnz,) for each entry, ascending: f times its column, plus its row."""
+        columns = np.repeat(np.arange(len(self.order)), np.diff(self.indptr))
+        return np.asarray(columns * len(self.order) + self.indices)
 
     def places(self, rows: Array, columns: Array) -> tuple[Array, Array]:
         """Where entries (j,) of the lower triangle are among the nnz, and which of them are there at all."""
-        keys = columns.astype(np.int64) * (len(self.indptr) - 1) + rows
-        at = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
-        return at, self._keys[at] == keys
+        keys = columns.astype(np.int64) * len(self.order) + rows
+        at = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
+        return at, self.keys[at] == keys
 
 
-def with_entries(pattern: Pattern, rows: Array, columns: Array, free: Array) -> Pattern:
-    """A pattern with more entries (j,) of the lower triangle, in an order of its own.
+def with_entries(pattern: Pattern, rows: Array, columns: Array, free: Array) -> tuple[Pattern, Array]:
+    """A pattern with more entries (j,) of the lower triangle, and where its own (nnz,) are in it.
 
-    free (f,): number 3 node + axis of each unknown.
+    free (f,): number 3 node + axis of each unknown. The order is made anew: the old one, kept, made the factor
+    of a unit whose walls touch 2.5 to 14 times slower.
     """
     count = len(free)
-    own_rows, own_columns = pattern.entries
-    keys = np.unique(np.concatenate([own_columns * count + own_rows, columns.astype(np.int64) * count + rows]))
-    return Pattern.of(keys % count, keys // count, free)
+    new = np.unique(columns.astype(np.int64) * count + rows)
+    new = new[~pattern.places(new % count, new // count)[1]]
+    at = np.searchsorted(pattern.keys, new)
+    own = np.arange(len(pattern.keys)) + np.cumsum(np.bincount(at, minlength=len(pattern.keys) + 1))[:-1]
+    keys = np.insert(pattern.keys, at, new)
+    return Pattern.of(keys % count, keys // count, free), own

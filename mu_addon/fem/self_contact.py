@@ -167,14 +167,9 @@ class SelfContact:
             total[plane.nodes, plane.column] += plane.area * plane.side * slope
         return self._nodes, total[self._nodes]
 
-    def stiffness(self, u: Array, projected: bool = False) -> sparse.coo_matrix:
-        """Second derivative (3 n, 3 n) in N/mm of the energy at u (n, 3) in mm, symmetric.
-
-        projected: each pair's made positive semidefinite, for directions of search alone.
-        """
-        found = self._pairs(u, self.gap_mm)
-        kinds = self._ipctk.PSDProjectionMethod
-        rows, columns, values = self._entries(found, self._potential, kinds.CLAMP if projected else kinds.NONE)
+    def stiffness(self, u: Array) -> sparse.coo_matrix:
+        """Second derivative (3 n, 3 n) in N/mm of the energy at u (n, 3) in mm: symmetric, not always definite."""
+        rows, columns, values = self._entries(self._pairs(u, self.gap_mm), self._potential)
         for plane in self._planes:
             at = 3 * plane.nodes + plane.column
             rows, columns = np.concatenate([rows, at]), np.concatenate([columns, at])
@@ -189,8 +184,7 @@ class SelfContact:
         """
         gap = _ROOM * self.gap_mm
         potential = self._ipctk.BarrierPotential(gap, 1.0, True)
-        kind = self._ipctk.PSDProjectionMethod.NONE
-        rows, columns, _ = self._entries(self._pairs(u, gap), potential, kind)
+        rows, columns, _ = self._entries(self._pairs(u, gap), potential)
         return rows, columns
 
     def least_gap_mm(self, u: Array) -> float:
@@ -227,7 +221,8 @@ class SelfContact:
             before, after = (plane.distance(self._rest + v) for v in (u, to))
             crosses = after <= 0
             if crosses.any():
-                share = min(share, float((_SHORT_OF_TOUCH * before / (before - after))[crosses].min()))
+                way = before[crosses] / (before - after)[crosses]
+                share = min(share, _SHORT_OF_TOUCH * float(way.min()))
         return share
 
     def _places(self, u: Array) -> Array:
@@ -246,11 +241,11 @@ class SelfContact:
         self._last[gap_mm] = found = _Pairs(places, near)
         return found
 
-    def _entries(self, found: _Pairs, potential: Any, kind: Any) -> tuple[Array, Array, Array]:
+    def _entries(self, found: _Pairs, potential: Any) -> tuple[Array, Array, Array]:
         """Rows, columns and values (j,) of the pairs' second derivative, numbered by the mesh's nodes."""
         if not len(found.near):
             return np.empty(0, int), np.empty(0, int), np.empty(0)
-        h = potential.hessian(found.near, self._surface, found.places, kind).tocoo()
+        h = potential.hessian(found.near, self._surface, found.places).tocoo()
         numbers = (3 * self._nodes.astype(np.int64)[:, None] + np.arange(3)).ravel()
         return numbers[h.row], numbers[h.col], h.data
 
