@@ -113,8 +113,8 @@ class Model:
     the mean J of an element; every law must then split the volume off.
 
     Attributes to set: load, dead forces on the nodes (n, 3) in N, or None; obstacles, rigid bodies that it
-    may touch; self_contact, what keeps its own surface apart, or None. With self-contact `pattern` grows where
-    pairs meet that it has no entry for, and `factor` is another after that.
+    may touch; self_contact, what keeps its own surface apart, or None. With self-contact `pattern` grows
+    where pairs meet that it has no entry for, and `factor` is another after that.
     """
 
     def __init__(
@@ -349,7 +349,7 @@ class Model:
         return self.mesh.following(found)
 
     def before_touch(self, u: Array, to: Array) -> Array:
-        """The displacements `to`, (n, 3) in mm, or those on the straight way from u before the surface meets itself.
+        """Displacements `to`, (n, 3) in mm, or before them on the straight way from u where surfaces meet.
 
         u must be free of intersections. Without self-contact that is always `to`.
         """
@@ -473,7 +473,7 @@ class Model:
         return found
 
     def _lower(self, rows: Array, columns: Array, values: Array | None = None) -> tuple[Array, Array, Array]:
-        """Rows, columns and values (j,) among the free unknowns, lower triangle, of entries (k,) among all."""
+        """Entries (j,) of the lower triangle among free unknowns, of all (k,): row, column, value."""
         rows, columns = self._number[rows], self._number[columns]
         keep = (rows >= columns) & (columns >= 0)
         return rows[keep], columns[keep], np.zeros(0) if values is None else values[keep]

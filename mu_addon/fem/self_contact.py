@@ -1,4 +1,4 @@
-"""Self-contact: a barrier that keeps the pieces of a body's surface apart, wall from wall, strut from strut."""
+"""Self-contact: a barrier that keeps the pieces of a body's surface apart, walls and struts alike."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _ipctk() -> Any:
 
 @attrs.frozen(eq=False)
 class _Pairs:
-    """Places (v, 3) in mm of the surface's nodes, and the pairs of ipctk nearer than a distance there."""
+    """Places (v, 3) in mm of the surface's nodes, and ipctk's pairs nearer than a distance there."""
 
     places: Array
     near: Any
@@ -52,7 +52,7 @@ class _Pairs:
 
 @attrs.frozen(eq=False)
 class _Plane:
-    """A mirror plane: its axis, and of the surface's k nodes off it number, area in mm2, and side, 1 or -1."""
+    """A mirror plane: its axis, and number, area in mm2 and side, 1 or -1, of the surface's k nodes off it."""
 
     column: int
     nodes: Array
@@ -67,19 +67,23 @@ class _Plane:
 class SelfContact:
     """Energy of a body's surface that comes near itself, as `Model.self_contact` takes it.
 
-    gap_mm: the distance d at which two pieces of the surface begin to repel each other; they stay apart by
-    some of it, and never touch. stiffness_MPa, k: how soon. Each unit of area at distance s < d holds, in
-    N/mm, -k d ((s/d)^2 - 1)^2 ln((s/d)^2), so the pressure between two plates is its slope and grows without
-    bound as they close (Li et al., ACM Trans. Graph. 39 (2020) 49; by area: Li et al., arXiv 2307.15908). Both
-    stay what they are along a path: energy, forces and tangent are those of one potential.
+    gap_mm: the distance d at which two pieces of the surface begin to repel each other; they never touch.
+    stiffness_MPa, k: how hard. An area at distance s < d from what faces it holds -k d ((s/d)^2 - 1)^2
+    ln((s/d)^2) in N/mm, so that the pressure between them grows without bound as they close (Li et al., ACM
+    Trans. Graph. 39 (2020) 49; weighted by area: Li et al., arXiv 2307.15908). The sum over pairs of vertices
+    with facets and of edges with edges counts an area more than once: two flat plates press on each other
+    like a k 2.3 to 3.1 times as large, by how their meshes lie. Forces balance exactly all the same, and the
+    gap left hardly depends on k. Gap and k stay what they are along a path: energy, forces and tangent are
+    those of one potential.
 
-    Quadratic faces count as four flat triangles each. A node of a half or quarter mesh is kept off the mirror
-    planes by the same energy, of its own area: a body that mirrors itself meets its image there and nowhere
-    else. Of a resolved mesh the struts begin to touch some gaps away from the wall that they stand on. Faces of the
-    base do not touch. A pair of facets with a common node is not kept apart.
+    Quadratic faces count as four flat triangles each. A node of a half or quarter mesh is kept off its mirror
+    image by the same energy, of its own area: a body that mirrors itself meets its image on the plane and
+    nowhere else. Of a resolved mesh the struts begin to touch two gaps away from the wall that they stand on.
+    Faces of the base do not touch, and facets with a common node are not kept apart.
 
-    facets (t, 3): the triangles that touch, as node numbers. Raises InputError where ipctk is missing, and where
-    the surface is nearer to itself than the gap as it is drawn: a gap below a third of the wall's thickness is safe.
+    facets (t, 3): the triangles that touch, as node numbers. Raises InputError where ipctk is missing, and
+    where the surface is nearer to itself than the gap as drawn: a third of the wall's thickness is safe, if
+    the facets' edges are longer.
     """
 
     def __init__(self, mesh: Mesh, gap_mm: float, stiffness_MPa: float) -> None:
@@ -111,7 +115,7 @@ class SelfContact:
         return self._ipctk.CollisionMesh(np.asfortranarray(self._rest[nodes]), edges, triangles), nodes
 
     def _without_feet(self, mesh: Mesh, facets: Array) -> Array:
-        """Facets without those of struts that lie at the wall as drawn: their nodes there are the wall's own."""
+        """Facets without those of struts that lie at the wall as drawn, which they stand on."""
         of_strut = np.zeros(len(mesh.nodes), bool)
         of_strut[mesh.tets[mesh.region == LATTICE]] = True
         surface, nodes = self._collision_mesh(facets)
@@ -168,7 +172,7 @@ class SelfContact:
         return self._nodes, total[self._nodes]
 
     def stiffness(self, u: Array) -> sparse.coo_matrix:
-        """Second derivative (3 n, 3 n) in N/mm of the energy at u (n, 3) in mm: symmetric, not always definite."""
+        """Second derivative (3 n, 3 n) in N/mm of the energy at u (n, 3) in mm, symmetric if not definite."""
         rows, columns, values = self._entries(self._pairs(u, self.gap_mm), self._potential)
         for plane in self._planes:
             at = 3 * plane.nodes + plane.column
@@ -188,7 +192,7 @@ class SelfContact:
         return rows, columns
 
     def least_gap_mm(self, u: Array) -> float:
-        """Least distance in mm between two pieces of the surface at u (n, 3) in mm; infinite beyond the gap."""
+        """Least distance in mm of the surface from itself at u (n, 3) in mm; infinite beyond the gap."""
         found = self._pairs(u, self.gap_mm)
         least = np.inf
         if len(found.near):

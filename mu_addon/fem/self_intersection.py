@@ -1,4 +1,4 @@
-"""Where walls of a deformed body have passed through each other, which no contact here prevents."""
+"""Where walls of a deformed body have passed through each other, as they may without self-contact."""
 
 from __future__ import annotations
 

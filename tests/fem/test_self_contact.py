@@ -1,4 +1,4 @@
-"""Self-contact: a potential and its derivatives, steps that end before a touch, and bodies that close on themselves."""
+"""Self-contact: a potential and its derivatives, steps that end before a touch, bodies that close."""
 
 import sys
 
@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import InputError
+from mu_addon.fem.batched_newton import BatchedNewton
+from mu_addon.fem.continuation import trace_branch
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.loads import traction
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.obstacle import outer_faces
+from mu_addon.fem.self_contact import SELF_CONTACT_NEWTON, SelfContact
 from mu_addon.fem.self_intersection import crossings
 from mu_addon.fem.state import rest
 
@@ -20,7 +23,6 @@ from .derivatives import assert_consistent
 from .test_self_intersection import GAP, fork, lean, pouch
 
 pytest.importorskip("ipctk")
-from mu_addon.fem.self_contact import SELF_CONTACT_NEWTON, SelfContact
 
 E, NU = 1.0, 0.3
 D, K = 0.05, 0.1
@@ -30,7 +32,7 @@ def plates(below, above, order=1, apart=0.5):
     """A block of 2 x 2 x 1 clamped at its foot, and another above it, its mesh another."""
     one, first = bodies._grid((below, below, 1), (2.0, 2.0, 1.0))
     other, second = bodies._grid((above, above, 1), (2.0, 2.0, 1.0))
-    nodes = np.vstack([one, other + [0.0, 0.0, 1.0 + apart]])
+    nodes = np.vstack([one, other + np.array([0.0, 0.0, 1.0 + apart])])
     return bodies.make(nodes, np.vstack([first, second + len(one)]), order, base=(lambda p: p[2] == 0,))
 
 
@@ -48,7 +50,7 @@ def body(mesh, gap=D, stiffness=K, supports=None, material=(E, NU)):
 def onto_mirror(depth=0.02):
     """A box that stands 0.2 off its mirror plane x = 0, and the displacement that brings it near."""
     mesh = bodies.box((2, 2, 2), symmetry=("x",))
-    mesh = attrs.evolve(mesh, nodes=mesh.nodes + [0.2, 0.0, 0.0])
+    mesh = attrs.evolve(mesh, nodes=mesh.nodes + np.array([0.2, 0.0, 0.0]))
     return mesh, np.tile([depth - 0.2, 0.0, 0.0], (len(mesh.nodes), 1))
 
 
@@ -107,7 +109,7 @@ def test_what_presses_on_itself_is_in_balance():
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_block_on_another_passes_on_its_pressure(order):
-    """The upper block, 2 x 2 mm, bears 20 kPa: so does the lower one, and the gap is what the barrier says."""
+    """The upper block, 2 x 2 mm, bears 20 kPa, so the lower one does; the gap is what the barrier says."""
     mesh = plates(4, 5, order)
     x, y, z = mesh.nodes.T
     supports = np.zeros(mesh.nodes.shape, bool)
@@ -160,9 +162,9 @@ def test_nothing_crosses_its_mirror_plane():
 
 
 def test_a_block_on_its_mirror_image_leaves_the_gap_that_the_barrier_says():
-    """Pressed by p, the faces are apart by s with p = k (-4 s q ln s^2 - 2 q^2/s)(-1), s in gaps, q = s^2 - 1."""
+    """The faces are apart by s where k (4 s q ln s^2 + 2 q^2/s) is the pressure, s in gaps, q = s^2 - 1."""
     mesh = bodies.box((1, 1, 1), symmetry=("x",))
-    mesh = attrs.evolve(mesh, nodes=mesh.nodes + [0.2, 0.0, 0.0])
+    mesh = attrs.evolve(mesh, nodes=mesh.nodes + np.array([0.2, 0.0, 0.0]))
     supports = np.zeros(mesh.nodes.shape, bool)
     supports[:, 1:] = True
     eq = body(mesh, supports=supports, material=(E, 0.0))
@@ -198,6 +200,23 @@ def test_a_vacuum_closes_a_pouch_but_never_crosses_it():
     # Flat against its image: the middle has gone half the gap, but for what the barrier keeps open.
     middle = np.linalg.norm(mesh.nodes - [0.0, 0.0, GAP / 2], axis=1).argmin()
     assert -GAP / 2 < states[-1].u[middle, 2] < -GAP / 2 + 0.02
+
+
+def test_a_branch_closes_a_pouch_by_arc_length_as_load_steps_do():
+    mesh = pouch()
+    eq = body(mesh, gap=0.04, material=(1.0, 0.45))
+    contact, target = eq.model.self_contact, -0.002
+    branch = trace_branch(eq, rest(mesh), until_MPa=target)
+    assert contact.energy_mJ(branch.points[-1].state.u) > 0
+    assert not any(contact.intersects(point.state.u) for point in branch.points)
+    stepped = eq.path([target / 10, target], rest(mesh))[-1]
+    np.testing.assert_allclose(branch.points[-1].state.u, stepped.u, atol=1e-6)
+
+
+def test_bodies_that_share_a_factor_have_no_self_contact():
+    eq = body(fork())
+    with pytest.raises(InputError, match="self-contact"):
+        BatchedNewton(eq.model, filled(eq.model.mesh, E, NU), [])
 
 
 def test_a_gap_that_reaches_across_a_wall_is_refused():
