@@ -36,9 +36,11 @@ class Pattern:
         indptr = np.zeros(count + 1, dtype=np.int64)
         np.cumsum(np.bincount(columns, minlength=count), out=indptr[1:])
         nodes, of_unknown = np.unique(free // 3, return_inverse=True)
-        graph = sparse.csr_matrix(
-            (np.ones(len(rows)), (of_unknown[rows], of_unknown[columns])), shape=(len(nodes),) * 2
-        )
+        # Two nodes are joined by all of their unknowns, or by none: the first of each tells.
+        first = np.append(True, np.diff(of_unknown) > 0)
+        joins = first[rows] & first[columns]
+        ends = of_unknown[rows[joins]], of_unknown[columns[joins]]
+        graph = sparse.csr_matrix((np.ones(len(ends[0])), ends), shape=(len(nodes),) * 2)
         place = np.empty(len(nodes), int)
         place[nested_dissection(graph + graph.T)] = np.arange(len(nodes))
         return cls(indptr, rows, np.argsort(place[of_unknown], kind="stable"))

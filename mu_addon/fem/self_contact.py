@@ -35,7 +35,7 @@ def _ipctk() -> Any:
         raise InputError(
             "self-contact needs the package ipctk, which is not installed",
             "self-contact",
-            "pip install 'mu_addon[contact]', or simulate without self-contact",
+            "pip install -e '.[contact]', or simulate without self-contact",
         ) from None
     # It takes every core otherwise, and its sums would depend on how many.
     ipctk.set_num_threads(1)
@@ -52,7 +52,7 @@ class _Pairs:
 
 @attrs.frozen(eq=False)
 class _Plane:
-    """A mirror plane: its axis, and number, area in mm2 and side, 1 or -1, of the surface's k nodes off it."""
+    """A mirror plane: its axis, and of the surface's k nodes number, area in mm2 and side (1 or -1)."""
 
     column: int
     nodes: Array
