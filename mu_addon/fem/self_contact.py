@@ -7,6 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 from scipy import sparse
+from scipy.sparse.csgraph import dijkstra
 
 from ..errors import InputError
 from ..meshing.mesh import AXES, LATTICE, Mesh, boundary_faces
@@ -24,6 +25,10 @@ SELF_CONTACT_NEWTON = NewtonSettings(
 # pattern makes room for, so that it grows seldom.
 _FOOT = 2.0
 _ROOM = 3.0
+# A way along the surface, over the straight one, up to which pieces near each other are one neighbourhood.
+_ROUND = 2.5
+# Pairs of such neighbours, over the number of facets, up to which their facets may go.
+_SLIVERS = 0.05
 # Share of the way to a mirror plane that a step may go, as ipctk has it for the way to a touch.
 _SHORT_OF_TOUCH = 0.8
 
@@ -78,12 +83,13 @@ class SelfContact:
 
     Quadratic faces count as four flat triangles each. A node of a half or quarter mesh is kept off its mirror
     image by the same energy, of its own area: a body that mirrors itself meets its image on the plane and
-    nowhere else. Of a resolved mesh the struts begin to touch two gaps away from the wall that they stand on.
-    Faces of the base do not touch, and facets with a common node are not kept apart.
+    nowhere else. Of a resolved mesh the struts begin to touch two gaps away from the wall that they stand on:
+    their feet may cut into it where it bends.
+    Faces of the base do not touch, nor do facets nearer than the gap to their own neighbourhood as drawn, as
+    around the axis of a cap. Facets with a common node are not kept apart.
 
     facets (t, 3): the triangles that touch, as node numbers. Raises InputError where ipctk is missing, and
-    where the surface is nearer to itself than the gap as drawn: a third of the wall's thickness is safe, if
-    the facets' edges are longer.
+    where pieces of the surface are nearer than the gap as drawn: a third of the wall's thickness is safe.
     """
 
     def __init__(self, mesh: Mesh, gap_mm: float, stiffness_MPa: float) -> None:
@@ -100,13 +106,12 @@ class SelfContact:
         facets = _free_facets(mesh)
         if mesh.resolved:
             facets = self._without_feet(mesh, facets)
-        self.facets = facets
-        self._surface, self._nodes = self._collision_mesh(facets)
+        self.facets = self._without_slivers(facets)
+        self._surface, self._nodes = self._collision_mesh(self.facets)
         self._planes = [self._mirror_plane(mesh, axis) for axis in mesh.symmetry]
         # Half the time of ipctk's default, and as safe: it advances by what distance and speed allow.
         self._detection = self._ipctk.AdditiveCCD()
         self._last: dict[float, _Pairs] = {}
-        self._refuse_overlap()
 
     def _collision_mesh(self, facets: Array) -> tuple[Any, Array]:
         nodes, triangles = np.unique(facets, return_inverse=True)
@@ -114,20 +119,58 @@ class SelfContact:
         edges = self._ipctk.edges(triangles)
         return self._ipctk.CollisionMesh(np.asfortranarray(self._rest[nodes]), edges, triangles), nodes
 
+    def _close_as_drawn(self, facets: Array, gap_mm: float) -> list[Array]:
+        """Nodes (2 to 4,) of each pair of vertices, edges and facets that is nearer than gap_mm as drawn."""
+        surface, nodes = self._collision_mesh(facets)
+        near = self._ipctk.NormalCollisions()
+        near.build(surface, surface.rest_positions, gap_mm)
+        ids = (np.array(near[k].vertex_ids(surface.edges, surface.faces)) for k in range(len(near)))
+        return [nodes[pair[pair >= 0]] for pair in ids]
+
     def _without_feet(self, mesh: Mesh, facets: Array) -> Array:
         """Facets without those of struts that lie at the wall as drawn, which they stand on."""
         of_strut = np.zeros(len(mesh.nodes), bool)
         of_strut[mesh.tets[mesh.region == LATTICE]] = True
-        surface, nodes = self._collision_mesh(facets)
-        near = self._ipctk.NormalCollisions()
-        near.build(surface, surface.rest_positions, _FOOT * self.gap_mm)
         foot = np.zeros(len(mesh.nodes), bool)
-        for number in range(len(near)):
-            ids = np.array(near[number].vertex_ids(surface.edges, surface.faces))
-            ids = nodes[ids[ids >= 0]]
-            if len(np.unique(of_strut[ids])) == 2:
-                foot[ids[of_strut[ids]]] = True
+        for pair in self._close_as_drawn(facets, _FOOT * self.gap_mm):
+            if len(np.unique(of_strut[pair])) == 2:
+                foot[pair[of_strut[pair]]] = True
         return facets[~foot[facets].any(axis=1)]
+
+    def _without_slivers(self, facets: Array) -> Array:
+        """Facets without those nearer than the gap as drawn to others of their own neighbourhood.
+
+        So they are where facets narrow to a point, as around a cap's axis. Raises InputError where pieces
+        are near that do not hang together there, a wall's faces or two walls, and where facets are small.
+        """
+        count = len(facets)
+        while close := self._close_as_drawn(facets, self.gap_mm):
+            apart = self._not_neighbours(facets, close)
+            if apart is not None or len(close) > _SLIVERS * count:
+                x, y, z = self._rest[close[0] if apart is None else apart].mean(axis=0)
+                raise InputError(
+                    f"the surface is within {self.gap_mm:g} mm of itself as drawn, in {len(close)} pairs",
+                    f"self-contact, near ({x:.1f}, {y:.1f}, {z:.1f}) mm",
+                    "choose a smaller gap: below a third of the wall, and below the size of the facets",
+                )
+            goes = np.zeros(len(facets), bool)
+            for pair in close:
+                # A pair's facet goes, and the facets of its edges; of two vertices, all of theirs.
+                goes |= np.isin(facets, pair).sum(axis=1) >= min(2, len(pair) - 1)
+            facets = facets[~goes]
+        return facets
+
+    def _not_neighbours(self, facets: Array, close: list[Array]) -> Array | None:
+        """The first pair whose nodes are far from each other along the surface, as it is drawn, or None."""
+        ends = facets[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).T
+        length = np.linalg.norm(self._rest[ends[0]] - self._rest[ends[1]], axis=1)
+        graph = sparse.csr_matrix((length, ends), shape=(len(self._rest),) * 2)
+        for pair in close:
+            place = self._rest[pair]
+            most = _ROUND * np.linalg.norm(place[:, None] - place, axis=2).max()
+            if np.isinf(dijkstra(graph, False, pair, limit=most)[:, pair]).any():
+                return pair
+        return None
 
     def _mirror_plane(self, mesh: Mesh, axis: str) -> _Plane:
         column = AXES.index(axis)
@@ -135,17 +178,6 @@ class SelfContact:
         # Nodes nearer than that to the plane belong to faces that end on it.
         off = np.flatnonzero(np.abs(x) > self.gap_mm)
         return _Plane(column, self._nodes[off], np.asarray(self._surface.vertex_areas)[off], np.sign(x[off]))
-
-    def _refuse_overlap(self) -> None:
-        near = self._pairs(np.zeros_like(self._rest), self.gap_mm)
-        if len(near.near):
-            ids = np.array(near.near[0].vertex_ids(self._surface.edges, self._surface.faces))
-            place = near.places[ids[ids >= 0]].mean(axis=0)
-            raise InputError(
-                f"the surface is within {self.gap_mm:g} mm of itself as drawn, in {len(near.near)} pairs",
-                f"self-contact, near ({place[0]:.1f}, {place[1]:.1f}, {place[2]:.1f}) mm",
-                "choose a smaller gap",
-            )
 
     def energy_mJ(self, u: Array) -> float:
         """Energy in mJ at u (n, 3) in mm; infinite where a mirror plane is crossed."""
