@@ -200,6 +200,12 @@ class Arc:
         u.ravel()[self.model.free] = z[:-1]
         return self.model.mesh.following(u)
 
+    def _check_way(self, z: Array, to: Array) -> None:
+        """Refuse a step in which the surface would meet itself: what lies beyond is no state."""
+        contact = self.model.self_contact
+        if contact is not None and contact.free_share(self._displacement(z), self._displacement(to)) < 1:
+            raise ConvergenceError("the surface would meet itself within the step")
+
     def _force(self, z: Array) -> tuple[Array, float]:
         force = self.model.residual(self._displacement(z), z[-1], self.parameters).ravel()[self.model.free]
         return force, self.model.force_scale()
@@ -237,6 +243,7 @@ class Arc:
         # Whatever stops this must not leave a factor of some state in between.
         self._linear = False
         steps: list[Array] = []
+        self._check_way(near.z, z)
         for iteration in range(s.max_iterations):
             force, scale = self._force(z)
             level = float(np.linalg.norm(force))
@@ -261,6 +268,7 @@ class Arc:
                 last = steps[-1]
                 step /= 1 - self.product(last, step) / self.product(last, last)
             steps.append(step)
+            self._check_way(z, z + step)
             z, before = z + step, level
         raise ConvergenceError("no convergence")
 

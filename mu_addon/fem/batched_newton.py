@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 from scipy import sparse
 
-from ..errors import ConvergenceError
+from ..errors import ConvergenceError, InputError
 from ..meshing.mesh import Mesh
 from .conjugate_gradients import Change
 from .descent import Descent
@@ -45,7 +45,8 @@ class BatchedNewton:
     """Equilibria of many variants of one body, each state from the body's own at the same pressure.
 
     Every step is a quasi-Newton step with the variant's exact tangent at the body's state, for the price
-    of solving once with the tangent that all variants share (see `variants`).
+    of solving once with the tangent that all variants share (see `variants`). Raises InputError for a model
+    with self-contact.
     """
 
     def __init__(
@@ -55,6 +56,12 @@ class BatchedNewton:
         variants: Sequence[Variant],
         settings: NewtonSettings | None = None,
     ) -> None:
+        if model.self_contact is not None:
+            raise InputError(
+                "bodies with self-contact each have a tangent of their own pattern",
+                "BatchedNewton",
+                "solve each by itself, with Equilibrium",
+            )
         self.model, self.materials, self.variants = model, materials, list(variants)
         self.settings = settings or NewtonSettings()
         self._base = model.parameters(materials)

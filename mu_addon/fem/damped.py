@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..errors import ConvergenceError
 from .factor import IndefiniteError
 from .model import MaterialData, Model
+from .newton_settings import NewtonSettings
 from .state import State
 
 Array = np.ndarray[Any, Any]
@@ -26,26 +26,35 @@ _LONGEST = 0.02
 _ROUNDING = 1e-13
 
 
-def damped_minimum(
-    model: Model,
-    parameters: MaterialData,
-    factor: Any,
-    rest_tangent: Array,
-    start: State,
-    pressure_MPa: float,
-    tolerance: float,
-    end_of_step: Callable[[Array, Array], float] = lambda u, step: 1.0,
-) -> State:
-    """The stable state at a pressure in MPa that damped motion from a start leads to.
+class Body(Protocol):
+    """What is moved: a model, its materials, its solver, and the undeformed body's tangent (nnz,).
+
+    An `Equilibrium` is one.
+    """
+
+    model: Model
+    parameters: MaterialData
+    settings: NewtonSettings
+
+    @property
+    def factor(self) -> Any:
+        """As `Model.factor`."""
+
+    @property
+    def rest_tangent(self) -> Array:
+        """Values (nnz,) in N/mm, as `Model.tangent`."""
+
+
+def damped_minimum(body: Body, start: Array, pressure_MPa: float) -> State:
+    """The stable state at a pressure in MPa that damped motion from a start (n, 3) in mm leads to.
 
     Each step minimises the potential's quadratic model with a share of the undeformed body's stiffness about
     the last iterate added, which is a step in time of a motion that this stiffness damps; the share follows
-    how well the model tells the decrease (Levenberg and Marquardt). factor: as `Model.factor`; rest_tangent
-    (nnz,): its values for the undeformed body. tolerance: of the residual over the root sum of squares of
-    element forces. end_of_step: the share of a step (f,) from u (n, 3) that contact permits. Raises
-    ConvergenceError.
+    how well the model tells the decrease (Levenberg and Marquardt). Steps end before surfaces touch. The
+    cavity must be closed, so that its pressure has a potential. Raises ConvergenceError.
     """
-    u, damping = start.u, _FIRST
+    model, parameters, tolerance = body.model, body.parameters, body.settings.tolerance
+    u, damping = start, _FIRST
     force, scale = _force(model, parameters, u, pressure_MPa)
     potential = model.potential(u, pressure_MPa, parameters)
     longest = _LONGEST * float(np.ptp(model.mesh.nodes, axis=0).max())
@@ -55,7 +64,7 @@ def damped_minimum(
         level = float(np.linalg.norm(force))
         if level <= tolerance * scale:
             try:
-                factor.factor(values)
+                body.factor.factor(values)
             except IndefiniteError:
                 pass
             else:
@@ -65,14 +74,15 @@ def damped_minimum(
                 raise ConvergenceError("no step lowers the potential")
             try:
                 factorisations += 1
-                factor.factor(values + damping * rest_tangent if damping else values)
-                step = -factor.solve(force)
+                body.factor.factor(values + damping * body.rest_tangent if damping else values)
+                step = -body.factor.solve(force)
             except IndefiniteError:
                 damping = max(_GROWS * damping, _LEAST)
                 continue
             far = float(np.abs(step).max())
-            step *= min(1.0, longest / far if far else 1.0, end_of_step(u, step))
-            moved = model.moved(u, step)
+            step *= min(1.0, longest / far if far else 1.0)
+            moved = model.before_touch(u, model.moved(u, step))
+            step = (moved - u).ravel()[model.free]
             found = model.potential(moved, pressure_MPa, parameters)
             after, new_scale = _force(model, parameters, moved, pressure_MPa)
             # What the two ends' forces say of the decrease, where the energy's own difference is rounding.

@@ -85,11 +85,13 @@ class Descent:
         """Go along a step (f,) in mm as far as it helps; returns the residual's new norm over the old one.
 
         The step is halved until the residual halves or the potential falls enough (Armijo). Raises
-        ConvergenceError where no length tried does either.
+        ConvergenceError where no length tried does either. With self-contact no step goes as far as a touch.
         """
         model, s = self.model, self.settings
         slope = float(self.force @ step)
         length = 1.0
+        if model.self_contact is not None:
+            length = model.self_contact.free_share(self.u, model.moved(self.u, step))
         for _ in range(s.max_backtracks):
             trial = model.moved(self.u, length * step)
             force, scale = self._out_of_balance(trial)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property
 from typing import Any
 
 import attrs
@@ -19,6 +18,7 @@ from .factor import IndefiniteError
 from .materials import Materials
 from .model import Model
 from .newton_settings import NewtonSettings
+from .pattern import Pattern
 from .state import State, extrapolate, rest
 
 Array = np.ndarray[Any, Any]
@@ -53,12 +53,20 @@ class Equilibrium:
         self.settings = settings or NewtonSettings()
         self.explains = explains
         self.parameters = model.parameters(materials)
-        self.factor = model.factor
+        self._stiffening: tuple[Pattern, Array] | None = None
 
-    @cached_property
-    def _rest_tangent(self) -> Array:
+    @property
+    def factor(self) -> Any:
+        """The model's solver: another one after self-contact has made the tangent's pattern grow."""
+        return self.model.factor
+
+    @property
+    def rest_tangent(self) -> Array:
         """Tangent of the undeformed body: positive definite, of the same pattern, and about as stiff."""
-        return self.model.tangent(rest(self.model.mesh).u, 0.0, self.parameters)
+        if self._stiffening is None or self._stiffening[0] is not self.model.pattern:
+            values = self.model.tangent(rest(self.model.mesh).u, 0.0, self.parameters)
+            self._stiffening = self.model.pattern, values
+        return self._stiffening[1]
 
     def _factorise(self, u: Array, pressure: float) -> bool:
         """Factorise the tangent; where it is indefinite, with a share of the undeformed body's added.
@@ -69,7 +77,7 @@ class Equilibrium:
         values = self.model.tangent(u, pressure, self.parameters)
         for share in (0.0, *self.settings.regularisation):
             try:
-                self.factor.factor(values + share * self._rest_tangent if share else values)
+                self.factor.factor(values + share * self.rest_tangent if share else values)
                 return share == 0.0
             except IndefiniteError:
                 continue
@@ -180,7 +188,8 @@ class Equilibrium:
                 # A polynomial through states far apart is wrong about the slope at any step, the tangent is
                 # right about the smallest.
                 guess = self._predict(history if smooth else history[-1:], pressure)
-                state = self.newton(guess, pressure, s.predictor_tolerance * np.abs(guess - last.u).max())
+                allowed = s.predictor_tolerance * np.abs(guess - last.u).max()
+                state = self.newton(self.model.before_touch(last.u, guess), pressure, allowed)
             except ConvergenceError as why:
                 smooth = False
                 if abs(step) / 2 >= s.min_step_MPa:
@@ -203,15 +212,7 @@ class Equilibrium:
         For starts far from equilibrium, see `damped_minimum`. The cavity must be closed, so that its pressure
         has a potential. Raises ConvergenceError where it leads to none.
         """
-        return damped_minimum(
-            self.model,
-            self.parameters,
-            self.factor,
-            self._rest_tangent,
-            State(pressure, u),
-            pressure,
-            self.settings.tolerance,
-        )
+        return damped_minimum(self, u, pressure)
 
     def _snapped(self, last: State, pressure: float) -> State:
         """The stable state that the body falls to from one before a limit point, at a pressure beyond it.

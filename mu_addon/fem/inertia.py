@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from .factor import LDL, IndefiniteError
 from .model import Model
+from .pattern import Pattern
 
 Array = np.ndarray[Any, Any]
 
@@ -36,13 +36,19 @@ class Inertia:
         self._release: tuple[Array, Array] | None = None
         self._suspect: Array | None = None
         self._places = model.mesh.nodes[model.free // 3]
-        # A column of the lower triangle begins with its diagonal entry.
-        self._diagonal = model.pattern.indptr[:-1]
+        self._ldl_of: tuple[Pattern, LDL] | None = None
 
-    @cached_property
+    @property
+    def _diagonal(self) -> Array:
+        """Where the diagonal's entries (n,) are: a column of the lower triangle begins with its own."""
+        return self.model.pattern.indptr[:-1]
+
+    @property
     def _ldl(self) -> LDL:
         pattern = self.model.pattern
-        return LDL(pattern.indptr, pattern.indices, pattern.order)
+        if self._ldl_of is None or self._ldl_of[0] is not pattern:
+            self._ldl_of = pattern, LDL(pattern.indptr, pattern.indices, pattern.order)
+        return self._ldl_of[1]
 
     def suspect(self, mode: Array) -> None:
         """Name a displacement (free unknowns,) that may become unstable next.

@@ -18,15 +18,17 @@ from ..meshing.mesh import AXES
 from . import kernels
 from .conjugate_gradients import ConjugateGradients
 from .elements import reference_gradients, triangle_shapes
-from .factor import Cholesky, SuperLU, make_factor, nested_dissection
+from .factor import Cholesky, SuperLU, make_factor
 from .iterative import TwoLevel
 from .laws.tensors import mat33
 from .materials import Layer, Materials
+from .pattern import Pattern, with_entries
 from .ties import folded_blocks
 
 if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
     from .obstacle import Obstacle
+    from .self_contact import SelfContact
 
 Array = np.ndarray[Any, Any]
 
@@ -35,6 +37,8 @@ LEAST_STRAIN = 1e-5
 # wall one element thick bends 40 % too easily: one face grows, the other shrinks, and the mean sees neither.
 # Chosen by the tables in docs/locking.md.
 POINTWISE_BULK = 5.0
+# Entries of self-contact stay in the tangent's pattern until it has grown by this factor.
+MOST_GROWTH = 1.03
 
 
 @attrs.frozen(eq=False)
@@ -89,18 +93,6 @@ class MaterialData:
             layer.history.zero_()
 
 
-@attrs.frozen(eq=False)
-class Pattern:
-    """Sparsity of the tangent between the f free unknowns.
-
-    indptr (f + 1,), indices (nnz,): its lower triangle by columns; order (f,): a fill-reducing permutation.
-    """
-
-    indptr: Array
-    indices: Array
-    order: Array
-
-
 def _lists(target: Array, count: int) -> tuple[Array, Array]:
     """For each of `count` targets the list of positions that add to it, as (start, index)."""
     index = np.argsort(target, kind="stable")
@@ -121,7 +113,8 @@ class Model:
     the mean J of an element; every law must then split the volume off.
 
     Attributes to set: load, dead forces on the nodes (n, 3) in N, or None; obstacles, rigid bodies that it
-    may touch.
+    may touch; self_contact, what keeps its own surface apart, or None. With self-contact `pattern` grows
+    where pairs meet that it has no entry for, and `factor` is another after that.
     """
 
     def __init__(
@@ -141,6 +134,7 @@ class Model:
         self.solver = "factorisation" if device == "cpu" else "conjugate gradients"
         self.load: Array | None = None
         self.obstacles: tuple[Obstacle, ...] = ()
+        self.self_contact: SelfContact | None = None
         self._least_force = 0.0
         reference = reference_gradients(mesh.nodes, mesh.tets)
         weights = reference.volumes * mesh.filled if mesh.resolved else reference.volumes
@@ -209,7 +203,7 @@ class Model:
             self._folding, keys = folded_blocks(mesh, keys)
         block_rows, block_columns = keys % n, keys // n
 
-        number = np.full(3 * n, -1)
+        self._number = number = np.full(3 * n, -1)
         number[self.free] = np.arange(len(self.free))
         i, j = np.meshgrid(np.arange(3), np.arange(3), indexing="ij")
         row = number[3 * block_rows[:, None] + i.ravel()]
@@ -218,16 +212,9 @@ class Model:
         row, column = row.ravel()[keep], column.ravel()[keep]
         sorting = np.lexsort((row, column))
         self._scalar_map = keep[sorting]
-        indptr = np.zeros(len(self.free) + 1, dtype=np.int64)
-        np.cumsum(np.bincount(column, minlength=len(self.free)), out=indptr[1:])
-
-        ones = np.ones(len(keys))
-        graph = sparse.coo_matrix((ones, (block_rows, block_columns)), shape=(n, n)).tocsr()
-        graph = graph + graph.T
-        free_nodes = np.nonzero(~fixed.all(axis=1))[0]
-        by_node = free_nodes[nested_dissection(graph[free_nodes][:, free_nodes])]
-        unknowns = number[(3 * by_node[:, None] + np.arange(3)).ravel()]
-        self.pattern = Pattern(indptr, row[sorting], unknowns[unknowns >= 0])
+        # Where the body's own entries are in a pattern that has grown by those of self-contact.
+        self._own: Any = slice(None)
+        self.pattern = self._own_pattern = Pattern.of(row[sorting], column[sorting], self.free)
 
     @cached_property
     def factor(self) -> Cholesky | SuperLU | ConjugateGradients | TwoLevel:
@@ -361,6 +348,16 @@ class Model:
         found.ravel()[self.free] += step
         return self.mesh.following(found)
 
+    def before_touch(self, u: Array, to: Array) -> Array:
+        """Displacements `to`, (n, 3) in mm, or before them on the straight way from u where surfaces meet.
+
+        u must be free of intersections. Without self-contact that is always `to`.
+        """
+        if self.self_contact is None:
+            return to
+        share = self.self_contact.free_share(u, to)
+        return to if share == 1.0 else u + share * (to - u)
+
     def _place(self, u: Array) -> None:
         self._u.assign(np.ascontiguousarray(u))
         self._x.assign(self.mesh.nodes + u)
@@ -378,6 +375,8 @@ class Model:
         if self.load is not None:
             work += np.einsum("ij,ij->", self.load, u)
         work -= sum(obstacle.energy_mJ(u) for obstacle in self.obstacles)
+        if self.self_contact is not None:
+            work -= self.self_contact.energy_mJ(u)
         return float(self._energy.numpy().sum() - work)
 
     def _volume(self) -> float:
@@ -414,6 +413,9 @@ class Model:
         residual: Array = self._residual.numpy().copy()
         for obstacle in self.obstacles:
             np.add.at(residual, *obstacle.forces(u))
+        if self.self_contact is not None:
+            nodes, forces = self.self_contact.forces(u)
+            residual[nodes] += forces
         if self.load is not None:
             residual -= self.load
         tied, to = self.mesh.tied, self.mesh.tied_to
@@ -441,7 +443,40 @@ class Model:
             inputs = [pressure, self._x, self._faces, *self._face_rule]
             inputs += [self._element_blocks, self._block_parts]
             wp.launch(kernels.pressure_stiffness, len(self.mesh.cavity), inputs, device=self.device)
-        return self._gathered(u)
+        values = self._gathered(u)
+        if self.self_contact is None and self.pattern is self._own_pattern:
+            return values
+        return self._with_self_contact(values, u)
+
+    def _with_self_contact(self, own: Array, u: Array) -> Array:
+        """The tangent's values (nnz,) of the body's own and of self-contact, its pattern grown if need be."""
+        found = np.zeros(len(self.pattern.indices))
+        found[self._own] = own
+        contact = self.self_contact
+        if contact is None:
+            return found
+        h = contact.stiffness(u)
+        rows, columns, values = self._lower(h.row, h.col, h.data)
+        places, has = self.pattern.places(rows, columns)
+        if not has.all():
+            more = self._lower(*contact.room(u))
+            wanted = np.concatenate([rows, more[0]]), np.concatenate([columns, more[1]])
+            if len(self.pattern.indices) > MOST_GROWTH * len(own):
+                self.pattern, self._own = self._own_pattern, slice(None)
+            self.pattern, kept = with_entries(self.pattern, *wanted, self.free)
+            self._own = kept[self._own]
+            self.__dict__.pop("factor", None)
+            places, _ = self.pattern.places(rows, columns)
+            found = np.zeros(len(self.pattern.indices))
+            found[self._own] = own
+        np.add.at(found, places, values)
+        return found
+
+    def _lower(self, rows: Array, columns: Array, values: Array | None = None) -> tuple[Array, Array, Array]:
+        """Entries (j,) of the lower triangle among free unknowns, of all (k,): row, column, value."""
+        rows, columns = self._number[rows], self._number[columns]
+        keep = (rows >= columns) & (columns >= 0)
+        return rows[keep], columns[keep], np.zeros(0) if values is None else values[keep]
 
     def _gathered(self, u: Array) -> Array:
         """The tangent's values (nnz,) of the blocks' parts, and of contact with obstacles."""

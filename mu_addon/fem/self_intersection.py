@@ -1,4 +1,4 @@
-"""Where walls of a deformed body have passed through each other, which no contact here prevents."""
+"""Where walls of a deformed body have passed through each other, as they may without self-contact."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = np.ndarray[Any, Any]
 _FLAT = 1e-9
 
 
-def _facets(faces: Array) -> Array:
+def facets_of(faces: Array) -> Array:
     """Flat triangles of faces (f, 3 | 6): four for one with mid-edge nodes."""
     if faces.shape[1] == 3:
         return faces
@@ -113,7 +113,7 @@ class _Boundary:
         own = owner < len(mesh.tets)
         if mesh.order == 2:
             faces = with_middles(faces, whole.tets[owner])
-        self.facets = _facets(faces)
+        self.facets = facets_of(faces)
         repeats = len(self.facets) // len(faces)
         self._inner, self._own = np.tile(inner, repeats), np.tile(own, repeats)
         self._rest = whole.nodes

@@ -132,13 +132,13 @@ def _step(eq: Equilibrium, last: Instant, time: float, pressure: float) -> Insta
     else:
         guess = _along_tangent(eq, u, pressure)
     try:
-        state = eq.newton(guess, pressure, _reach(eq, u, guess))
+        state = eq.newton(eq.model.before_touch(u, guess), pressure, _reach(eq, u, guess))
     except ConvergenceError:
         if last.rate is None:
             raise
         # Pressure may have turned round: the rate so far says nothing of what comes.
         guess = _along_tangent(eq, u, pressure)
-        state = eq.newton(guess, pressure, _reach(eq, u, guess))
+        state = eq.newton(eq.model.before_touch(u, guess), pressure, _reach(eq, u, guess))
     eq.model.commit(state.u, m)
     rate = (state.u - u) / m.dt_s if m.dt_s > 0 else None
     return Instant(time, state, rate)
@@ -152,8 +152,9 @@ def _reach(eq: Equilibrium, u: Array, guess: Array) -> float:
 def _along_tangent(eq: Equilibrium, u: Array, pressure: float) -> Array:
     """One Newton step from the last state, whose tangent must be definite."""
     model = eq.model
+    values = model.tangent(u, pressure, eq.parameters)
     try:
-        eq.factor.factor(model.tangent(u, pressure, eq.parameters))
+        eq.factor.factor(values)
     except IndefiniteError:
         raise ConvergenceError("the state to start from is unstable") from None
     force = model.residual(u, pressure, eq.parameters).ravel()[model.free]

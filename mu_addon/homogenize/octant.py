@@ -19,7 +19,8 @@ from scipy import sparse
 from ..errors import InputError, MeshingError
 from ..fem.factor import Cholesky, IndefiniteError, SuperLU, make_factor
 from ..fem.materials import Materials
-from ..fem.model import Model, Pattern
+from ..fem.model import Model
+from ..fem.pattern import Pattern
 from ..meshing.mesh import AXES, Array, Mesh
 from ..meshing.tiling import box_of
 

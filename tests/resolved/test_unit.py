@@ -13,8 +13,9 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg
 from mu_addon.fem.loads import gravity
 from mu_addon.fem.model import Model
+from mu_addon.fem.self_contact import SelfContact
 from mu_addon.fem.unit import materials_of
-from mu_addon.meshing.mesh import mirror, mirror_displacement
+from mu_addon.meshing.mesh import LATTICE, MEMBRANE, boundary_faces, mirror, mirror_displacement
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.unit import mesh_printed
 
@@ -54,6 +55,23 @@ def test_ties_keep_straight_what_is_straight(mesh):
     u = exact.copy()
     u[mesh.tied] = np.nan
     assert np.abs(mesh.following(u) - exact).max() < 1e-9
+
+
+def test_all_of_a_strut_touches_but_its_feet(mesh):
+    pytest.importorskip("ipctk")
+    contact = SelfContact(mesh, 0.1, 0.1)
+    still = np.zeros_like(mesh.nodes)
+    assert contact.energy_mJ(still) == 0.0
+    assert not contact.intersects(still)
+    assert not np.isin(contact.facets, mesh.tied).any()
+    faces, owner = boundary_faces(mesh.tets)
+    of_strut = mesh.region[owner] == LATTICE
+    bare = of_strut & ~np.isin(faces, mesh.tied).any(axis=1)
+    bare &= ~(mesh.nodes[faces, 0] == 0.0).all(axis=1)
+    of_wall = np.zeros(len(mesh.nodes), bool)
+    of_wall[mesh.tets[mesh.region == MEMBRANE]] = True
+    left = np.count_nonzero(~of_wall[contact.facets].any(axis=1))
+    assert 0.8 < left / (4 * np.count_nonzero(bare)) <= 1.0
 
 
 def test_no_node_is_tied_to_a_tied_one(mesh):

@@ -1,0 +1,313 @@
+"""Self-contact: a barrier that keeps the pieces of a body's surface apart, walls and struts alike."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import dijkstra
+
+from ..errors import InputError
+from ..meshing.mesh import AXES, LATTICE, Mesh, boundary_faces
+from .newton_settings import NewtonSettings
+from .self_intersection import facets_of, with_middles
+
+Array = np.ndarray[Any, Any]
+
+# Pairs that begin to touch make an old factor of no use; a body that closes ends far from its prediction, and
+# steps that touch cut short are many.
+SELF_CONTACT_NEWTON = NewtonSettings(
+    keep_factor=0.2, max_factorisations=80, max_iterations=200, max_backtracks=12, predictor_tolerance=3.0
+)
+# Distances in gaps: around a strut's foot where it does not touch the wall; and of pairs that the tangent's
+# pattern makes room for, so that it grows seldom.
+_FOOT = 2.0
+_ROOM = 3.0
+# A way along the surface, over the straight one, up to which pieces near each other are one neighbourhood.
+_ROUND = 2.5
+# Pairs of such neighbours, over the number of facets, up to which their facets may go.
+_SLIVERS = 0.05
+# Share of the way to a mirror plane that a step may go, as ipctk has it for the way to a touch.
+_SHORT_OF_TOUCH = 0.8
+
+
+def _ipctk() -> Any:
+    try:
+        import ipctk
+    except ImportError:
+        raise InputError(
+            "self-contact needs the package ipctk, which is not installed",
+            "self-contact",
+            "pip install -e '.[contact]', or simulate without self-contact",
+        ) from None
+    # It takes every core otherwise, and its sums would depend on how many.
+    ipctk.set_num_threads(1)
+    return ipctk
+
+
+@attrs.frozen(eq=False)
+class _Pairs:
+    """Places (v, 3) in mm of the surface's nodes, and ipctk's pairs nearer than a distance there."""
+
+    places: Array
+    near: Any
+
+
+@attrs.frozen(eq=False)
+class _Plane:
+    """A mirror plane: its axis, and of the surface's k nodes number, area in mm2 and side (1 or -1)."""
+
+    column: int
+    nodes: Array
+    area: Array
+    side: Array
+
+    def distance(self, places: Array) -> Array:
+        """Distances (k,) in mm of the nodes from their images, from the places (n, 3) of all."""
+        return np.asarray(2 * self.side * places[self.nodes, self.column])
+
+
+class SelfContact:
+    """Energy of a body's surface that comes near itself, as `Model.self_contact` takes it.
+
+    gap_mm: the distance d at which two pieces of the surface begin to repel each other; they never touch.
+    stiffness_MPa, k: how hard. An area at distance s < d from what faces it holds -k d ((s/d)^2 - 1)^2
+    ln((s/d)^2) in N/mm, so that the pressure between them grows without bound as they close (Li et al., ACM
+    Trans. Graph. 39 (2020) 49; weighted by area: Li et al., arXiv 2307.15908). The sum over pairs of vertices
+    with facets and of edges with edges counts an area more than once: two flat plates press on each other
+    like a k 2.3 to 3.1 times as large, by how their meshes lie. Forces balance exactly all the same, and the
+    gap left hardly depends on k. Gap and k stay what they are along a path: energy, forces and tangent are
+    those of one potential.
+
+    Quadratic faces count as four flat triangles each. A node of a half or quarter mesh is kept off its mirror
+    image by the same energy, of its own area: a body that mirrors itself meets its image on the plane and
+    nowhere else. Of a resolved mesh the struts begin to touch two gaps away from the wall that they stand on:
+    their feet may cut into it where it bends.
+    Faces of the base do not touch, nor do facets nearer than the gap to their own neighbourhood as drawn, as
+    around the axis of a cap. Facets with a common node are not kept apart.
+
+    facets (t, 3): the triangles that touch, as node numbers. Raises InputError where ipctk is missing, and
+    where pieces of the surface are nearer than the gap as drawn: a third of the wall's thickness is safe.
+    """
+
+    def __init__(self, mesh: Mesh, gap_mm: float, stiffness_MPa: float) -> None:
+        if not (0 < gap_mm < np.inf and 0 < stiffness_MPa < np.inf):
+            raise InputError(
+                f"self-contact with a gap of {gap_mm:g} mm and a stiffness of {stiffness_MPa:g} MPa",
+                "self-contact",
+                "give both above 0: a third of the wall or less, and a tenth of its modulus",
+            )
+        self._ipctk = _ipctk()
+        self.gap_mm, self.stiffness_MPa = gap_mm, stiffness_MPa
+        self._rest = mesh.nodes
+        self._potential = self._ipctk.BarrierPotential(gap_mm, stiffness_MPa, True)
+        facets = _free_facets(mesh)
+        if mesh.resolved:
+            facets = self._without_feet(mesh, facets)
+        self.facets = self._without_slivers(facets)
+        self._surface, self._nodes = self._collision_mesh(self.facets)
+        self._planes = [self._mirror_plane(mesh, axis) for axis in mesh.symmetry]
+        # Half the time of ipctk's default, and as safe: it advances by what distance and speed allow.
+        self._detection = self._ipctk.AdditiveCCD()
+        self._last: dict[float, _Pairs] = {}
+
+    def _collision_mesh(self, facets: Array) -> tuple[Any, Array]:
+        nodes, triangles = np.unique(facets, return_inverse=True)
+        triangles = np.asfortranarray(np.reshape(triangles, (-1, 3)), dtype=np.int32)
+        edges = self._ipctk.edges(triangles)
+        return self._ipctk.CollisionMesh(np.asfortranarray(self._rest[nodes]), edges, triangles), nodes
+
+    def _close_as_drawn(self, facets: Array, gap_mm: float) -> list[Array]:
+        """Nodes (2 to 4,) of each pair of vertices, edges and facets that is nearer than gap_mm as drawn."""
+        surface, nodes = self._collision_mesh(facets)
+        near = self._ipctk.NormalCollisions()
+        near.build(surface, surface.rest_positions, gap_mm)
+        ids = (np.array(near[k].vertex_ids(surface.edges, surface.faces)) for k in range(len(near)))
+        return [nodes[pair[pair >= 0]] for pair in ids]
+
+    def _without_feet(self, mesh: Mesh, facets: Array) -> Array:
+        """Facets without those of struts that lie at the wall as drawn, which they stand on."""
+        of_strut = np.zeros(len(mesh.nodes), bool)
+        of_strut[mesh.tets[mesh.region == LATTICE]] = True
+        foot = np.zeros(len(mesh.nodes), bool)
+        for pair in self._close_as_drawn(facets, _FOOT * self.gap_mm):
+            if len(np.unique(of_strut[pair])) == 2:
+                foot[pair[of_strut[pair]]] = True
+        return facets[~foot[facets].any(axis=1)]
+
+    def _without_slivers(self, facets: Array) -> Array:
+        """Facets without those nearer than the gap as drawn to others of their own neighbourhood.
+
+        So they are where facets narrow to a point, as around a cap's axis. Raises InputError where pieces
+        are near that do not hang together there, a wall's faces or two walls, and where facets are small.
+        """
+        count = len(facets)
+        while close := self._close_as_drawn(facets, self.gap_mm):
+            apart = self._not_neighbours(facets, close)
+            if apart is not None or len(close) > _SLIVERS * count:
+                x, y, z = self._rest[close[0] if apart is None else apart].mean(axis=0)
+                raise InputError(
+                    f"the surface is within {self.gap_mm:g} mm of itself as drawn, in {len(close)} pairs",
+                    f"self-contact, near ({x:.1f}, {y:.1f}, {z:.1f}) mm",
+                    "choose a smaller gap: below a third of the wall, and below the size of the facets",
+                )
+            goes = np.zeros(len(facets), bool)
+            for pair in close:
+                # A pair's facet goes, and the facets of its edges; of two vertices, all of theirs.
+                goes |= np.isin(facets, pair).sum(axis=1) >= min(2, len(pair) - 1)
+            facets = facets[~goes]
+        return facets
+
+    def _not_neighbours(self, facets: Array, close: list[Array]) -> Array | None:
+        """The first pair whose nodes are far from each other along the surface, as it is drawn, or None."""
+        ends = facets[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).T
+        length = np.linalg.norm(self._rest[ends[0]] - self._rest[ends[1]], axis=1)
+        graph = sparse.csr_matrix((length, ends), shape=(len(self._rest),) * 2)
+        for pair in close:
+            place = self._rest[pair]
+            most = _ROUND * np.linalg.norm(place[:, None] - place, axis=2).max()
+            if np.isinf(dijkstra(graph, False, pair, limit=most)[:, pair]).any():
+                return pair
+        return None
+
+    def _mirror_plane(self, mesh: Mesh, axis: str) -> _Plane:
+        column = AXES.index(axis)
+        x = mesh.nodes[self._nodes, column]
+        # Nodes nearer than that to the plane belong to faces that end on it.
+        off = np.flatnonzero(np.abs(x) > self.gap_mm)
+        return _Plane(column, self._nodes[off], np.asarray(self._surface.vertex_areas)[off], np.sign(x[off]))
+
+    def energy_mJ(self, u: Array) -> float:
+        """Energy in mJ at u (n, 3) in mm; infinite where a mirror plane is crossed."""
+        found = self._pairs(u, self.gap_mm)
+        energy = self._potential(found.near, self._surface, found.places) if len(found.near) else 0.0
+        for plane in self._planes:
+            # Half of what the whole body has there, as of everything else.
+            energy += 0.5 * plane.area @ self._barrier(plane.distance(self._rest + u))[0]
+        return float(energy)
+
+    def forces(self, u: Array) -> tuple[Array, Array]:
+        """Nodes (j,) of the surface, each once, and the energy's derivative by them, (j, 3) in N.
+
+        u: displacements (n, 3) in mm.
+        """
+        found = self._pairs(u, self.gap_mm)
+        total = np.zeros_like(self._rest)
+        if len(found.near):
+            gradient = self._potential.gradient(found.near, self._surface, found.places)
+            total[self._nodes] = gradient.reshape(-1, 3)
+        for plane in self._planes:
+            slope = self._barrier(plane.distance(self._rest + u))[1]
+            total[plane.nodes, plane.column] += plane.area * plane.side * slope
+        return self._nodes, total[self._nodes]
+
+    def stiffness(self, u: Array) -> sparse.coo_matrix:
+        """Second derivative (3 n, 3 n) in N/mm of the energy at u (n, 3) in mm, symmetric if not definite."""
+        rows, columns, values = self._entries(self._pairs(u, self.gap_mm), self._potential)
+        for plane in self._planes:
+            at = 3 * plane.nodes + plane.column
+            rows, columns = np.concatenate([rows, at]), np.concatenate([columns, at])
+            bend = self._barrier(plane.distance(self._rest + u))[2]
+            values = np.concatenate([values, 2 * plane.area * bend])
+        return sparse.coo_matrix((values, (rows, columns)), shape=(self._rest.size,) * 2)
+
+    def room(self, u: Array) -> tuple[Array, Array]:
+        """Rows and columns (j,) of 3 n that `stiffness` may fill while the surface moves by about a gap.
+
+        u: displacements (n, 3) in mm.
+        """
+        gap = _ROOM * self.gap_mm
+        potential = self._ipctk.BarrierPotential(gap, 1.0, True)
+        rows, columns, _ = self._entries(self._pairs(u, gap), potential)
+        return rows, columns
+
+    def least_gap_mm(self, u: Array) -> float:
+        """Least distance in mm of the surface from itself at u (n, 3) in mm; infinite beyond the gap."""
+        found = self._pairs(u, self.gap_mm)
+        least = np.inf
+        if len(found.near):
+            least = float(np.sqrt(found.near.compute_minimum_distance(self._surface, found.places)))
+        images = min((float(p.distance(self._rest + u).min()) for p in self._planes), default=np.inf)
+        return min(least, images if images < self.gap_mm else np.inf)
+
+    def count(self, u: Array) -> int:
+        """How many pairs of vertices, edges and facets are within the gap at u (n, 3) in mm."""
+        return len(self._pairs(u, self.gap_mm).near)
+
+    def intersects(self, u: Array) -> bool:
+        """Whether the surface cuts itself or a mirror plane at u (n, 3) in mm."""
+        if any((plane.distance(self._rest + u) <= 0).any() for plane in self._planes):
+            return True
+        return bool(self._ipctk.has_intersections(self._surface, self._places(u)))
+
+    def free_share(self, u: Array, to: Array) -> float:
+        """Share, up to 1, of the straight way between displacements u and to, (n, 3) in mm, without a touch.
+
+        u must be free of intersections. Where something would touch, the share ends before it does.
+        """
+        start, end = self._places(u), self._places(to)
+        candidates = self._ipctk.Candidates()
+        candidates.build(self._surface, start, end)
+        share = float(
+            candidates.compute_collision_free_stepsize(self._surface, start, end, 0.0, self._detection)
+        )
+        for plane in self._planes:
+            before, after = (plane.distance(self._rest + v) for v in (u, to))
+            crosses = after <= 0
+            if crosses.any():
+                way = before[crosses] / (before - after)[crosses]
+                share = min(share, _SHORT_OF_TOUCH * float(way.min()))
+        return share
+
+    def _places(self, u: Array) -> Array:
+        return np.asfortranarray((self._rest + u)[self._nodes])
+
+    def _pairs(self, u: Array, gap_mm: float) -> _Pairs:
+        """The pairs nearer than gap_mm at u, those of the last call where u is the same."""
+        places = self._places(u)
+        last = self._last.get(gap_mm)
+        if last is not None and np.array_equal(last.places, places):
+            return last
+        near = self._ipctk.NormalCollisions()
+        near.use_area_weighting = True
+        near.collision_set_type = self._ipctk.NormalCollisions.IMPROVED_MAX_APPROX
+        near.build(self._surface, places, gap_mm)
+        self._last[gap_mm] = found = _Pairs(places, near)
+        return found
+
+    def _entries(self, found: _Pairs, potential: Any) -> tuple[Array, Array, Array]:
+        """Rows, columns and values (j,) of the pairs' second derivative, numbered by the mesh's nodes."""
+        if not len(found.near):
+            return np.empty(0, int), np.empty(0, int), np.empty(0)
+        h = potential.hessian(found.near, self._surface, found.places).tocoo()
+        numbers = (3 * self._nodes.astype(np.int64)[:, None] + np.arange(3)).ravel()
+        return numbers[h.row], numbers[h.col], h.data
+
+    def _barrier(self, distance: Array) -> tuple[Array, Array, Array]:
+        """Energy per area in N/mm at distances (k,) in mm, its slope in MPa and the slope's in MPa/mm."""
+        d = self.gap_mm
+        near = distance < d
+        s = np.where(near, np.maximum(distance, 0.0), d) / d
+        energy, slope, bend = np.zeros((3, len(distance)))
+        with np.errstate(divide="ignore"):
+            q, log = s * s - 1, 2 * np.log(s)
+            energy[near] = (-(q**2) * log)[near]
+            slope[near] = (-4 * s * q * log - 2 * q**2 / s)[near]
+            bend[near] = (-4 * (3 * s**2 - 1) * log - 16 * q + 2 * q**2 / s**2)[near]
+        k = self.stiffness_MPa
+        return k * d * energy, k * slope, k / d * bend
+
+
+def _free_facets(mesh: Mesh) -> Array:
+    """Triangles (t, 3) of a mesh's surface that can touch: not the base's, mirror planes', or buried ones."""
+    faces, owner = boundary_faces(mesh.tets)
+    keep = ~np.isin(faces, mesh.base).all(axis=1)
+    for axis in mesh.symmetry:
+        keep &= ~(mesh.nodes[faces, AXES.index(axis)] == 0.0).all(axis=1)
+    faces, owner = faces[keep], owner[keep]
+    if mesh.order == 2:
+        faces = with_middles(faces, mesh.tets[owner])
+    # Of parts that overlap, what is tied lies inside another.
+    return facets_of(faces[~np.isin(faces, mesh.tied).any(axis=1)])

@@ -1,0 +1,237 @@
+"""Self-contact: a potential and its derivatives, steps that end before a touch, bodies that close."""
+
+import sys
+
+import attrs
+import numpy as np
+import pytest
+
+from mu_addon.errors import InputError
+from mu_addon.fem.batched_newton import BatchedNewton
+from mu_addon.fem.continuation import trace_branch
+from mu_addon.fem.equilibrium import Equilibrium
+from mu_addon.fem.loads import traction
+from mu_addon.fem.materials import Materials
+from mu_addon.fem.model import Model
+from mu_addon.fem.obstacle import outer_faces
+from mu_addon.fem.self_contact import SELF_CONTACT_NEWTON, SelfContact
+from mu_addon.fem.self_intersection import crossings
+from mu_addon.fem.state import rest
+
+from . import bodies
+from .derivatives import assert_consistent
+from .test_self_intersection import GAP, fork, lean, pouch
+
+pytest.importorskip("ipctk")
+
+E, NU = 1.0, 0.3
+D, K = 0.05, 0.1
+
+
+def plates(below, above, order=1, apart=0.5):
+    """A block of 2 x 2 x 1 clamped at its foot, and another above it, its mesh another."""
+    one, first = bodies._grid((below, below, 1), (2.0, 2.0, 1.0))
+    other, second = bodies._grid((above, above, 1), (2.0, 2.0, 1.0))
+    nodes = np.vstack([one, other + np.array([0.0, 0.0, 1.0 + apart])])
+    return bodies.make(nodes, np.vstack([first, second + len(one)]), order, base=(lambda p: p[2] == 0,))
+
+
+def filled(mesh, modulus, poisson):
+    count = len(mesh.tets)
+    return Materials.neo_hooke(np.full(count, modulus), np.full(count, poisson))
+
+
+def body(mesh, gap=D, stiffness=K, supports=None, material=(E, NU)):
+    model = Model(mesh, supports, threads=1)
+    model.self_contact = SelfContact(mesh, gap, stiffness)
+    return Equilibrium(model, filled(mesh, *material), SELF_CONTACT_NEWTON, explains=False)
+
+
+def onto_mirror(depth=0.02):
+    """A box that stands 0.2 off its mirror plane x = 0, and the displacement that brings it near."""
+    mesh = bodies.box((2, 2, 2), symmetry=("x",))
+    mesh = attrs.evolve(mesh, nodes=mesh.nodes + np.array([0.2, 0.0, 0.0]))
+    return mesh, np.tile([depth - 0.2, 0.0, 0.0], (len(mesh.nodes), 1))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_force_and_tangent_are_derivatives_of_the_energy(order):
+    mesh = fork(order)
+    eq = body(mesh)
+    random = np.random.default_rng(0)
+    u = lean(mesh, 0.48) + 1e-3 * random.standard_normal(mesh.nodes.shape)
+    contact = eq.model.self_contact
+    assert contact.count(u) > 10
+    assert contact.energy_mJ(u) > 1e-6
+    assert_consistent(eq.model, eq.parameters, u, random, 1e-5)
+
+
+def test_force_and_tangent_at_a_mirror_plane_are_derivatives_too():
+    mesh, u = onto_mirror(0.04)
+    eq = body(mesh, gap=0.1)
+    random = np.random.default_rng(1)
+    u += 1e-3 * random.standard_normal(u.shape)
+    assert eq.model.self_contact.energy_mJ(u) > 1e-6
+    assert_consistent(eq.model, eq.parameters, u, random, 1e-5)
+
+
+def test_the_tangent_is_symmetric_and_gets_room_for_what_touches():
+    mesh = fork()
+    eq = body(mesh)
+    model, u = eq.model, lean(mesh, 0.48)
+    apart = model.tangent(rest(mesh).u, 0.0, eq.parameters)
+    own, factor = model.matrix(apart), model.factor
+    values = model.tangent(u, 0.0, eq.parameters)
+    assert len(values) > len(apart)
+    assert model.factor is not factor
+    whole = model.self_contact.stiffness(u).tocsr()
+    assert abs(whole - whole.T).max() < 1e-12 * abs(whole).max()
+    without = Model(mesh, threads=1)
+    expected = without.matrix(without.tangent(u, 0.0, without.parameters(filled(mesh, E, NU))))
+    expected = expected + whole[model.free][:, model.free]
+    assert abs(model.matrix(values) - expected).max() < 1e-12 * abs(expected).max()
+    # What has grown holds the rest as it was, without contact or with none left.
+    model.self_contact, contact = None, model.self_contact
+    for model.self_contact in (None, contact):
+        assert abs(model.matrix(model.tangent(rest(mesh).u, 0.0, eq.parameters)) - own).max() == 0.0
+
+
+def test_what_presses_on_itself_is_in_balance():
+    mesh = plates(4, 5)
+    contact = SelfContact(mesh, D, K)
+    u = np.where(mesh.nodes[:, 2:] > 1.2, [0.0, 0.0, -0.47], 0.0)
+    nodes, forces = contact.forces(u)
+    assert np.abs(forces).sum() > 0.1
+    assert np.abs(forces.sum(axis=0)).max() < 1e-12
+    moment = np.cross((mesh.nodes + u)[nodes], forces).sum(axis=0)
+    assert np.abs(moment).max() < 1e-12
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_block_on_another_passes_on_its_pressure(order):
+    """The upper block, 2 x 2 mm, bears 20 kPa, so the lower one does; the gap is what the barrier says."""
+    mesh = plates(4, 5, order)
+    x, y, z = mesh.nodes.T
+    supports = np.zeros(mesh.nodes.shape, bool)
+    supports[:, :2] = True
+    eq = body(mesh, supports=supports, material=(E, 0.0))
+    pressure = 0.02
+    faces = outer_faces(mesh)
+    top = faces[(z[faces] > z.max() - 1e-9).all(axis=1)]
+    eq.model.load = traction(mesh, top, np.array([0.0, 0.0, -pressure]))
+    state = eq.newton(np.where(mesh.nodes[:, 2:] > 1.2, [0.0, 0.0, -0.46], 0.0), 0.0)
+    reaction = eq.model.residual(state.u, 0.0, eq.parameters)[mesh.base, 2].sum()
+    assert reaction == pytest.approx(4.0 * pressure, rel=1e-8)
+    below, above = (np.abs(z - level) < 1e-9 for level in (1.0, 1.5))
+    # Sharp edges carry more than their share, since the faces beside them count as theirs.
+    inside = (np.abs(x - 1) < 0.8) & (np.abs(y - 1) < 0.8)
+    gap = 0.5 + state.u[above & inside, 2].mean() - state.u[below & inside, 2].mean()
+    shares = np.linspace(0.01, 0.999, 1000)
+    carried = -eq.model.self_contact._barrier(shares * D)[1]
+    # One-sided, and three times that: two plates face each other, and their edges count beside their faces.
+    least, most = (np.interp(-pressure, -factor * carried, shares) for factor in (1, 3))
+    assert least < gap / D < most
+
+
+def test_no_step_ends_in_a_touch():
+    mesh = fork()
+    contact = SelfContact(mesh, D, K)
+    random = np.random.default_rng(2)
+    cut_short = 0
+    for size in (0.3, 0.6, 1.0):
+        for _ in range(6):
+            u = np.zeros_like(mesh.nodes)
+            for _ in range(3):
+                # A wave of the whole body, so that prongs stay prongs.
+                a, b = random.standard_normal((2, 3))
+                to = u + size * np.sin(mesh.nodes @ a)[:, None] * b
+                share = contact.free_share(u, to)
+                cut_short += share < 1
+                u = u + share * (to - u)
+                assert not contact.intersects(u)
+    assert cut_short > 5
+
+
+def test_nothing_crosses_its_mirror_plane():
+    mesh, u = onto_mirror(-0.1)
+    contact = SelfContact(mesh, D, K)
+    share = contact.free_share(np.zeros_like(u), u)
+    assert share == pytest.approx(0.8 * 2 / 3)
+    assert contact.intersects(u)
+    assert contact.least_gap_mm(0.95 * onto_mirror(0.0)[1]) == pytest.approx(0.02)
+
+
+def test_a_block_on_its_mirror_image_leaves_the_gap_that_the_barrier_says():
+    """The faces are apart by s where k (4 s q ln s^2 + 2 q^2/s) is the pressure, s in gaps, q = s^2 - 1."""
+    mesh = bodies.box((1, 1, 1), symmetry=("x",))
+    mesh = attrs.evolve(mesh, nodes=mesh.nodes + np.array([0.2, 0.0, 0.0]))
+    supports = np.zeros(mesh.nodes.shape, bool)
+    supports[:, 1:] = True
+    eq = body(mesh, supports=supports, material=(E, 0.0))
+    contact = eq.model.self_contact
+    near = np.abs(mesh.nodes[:, 0] - 0.2) < 1e-9
+    (plane,) = contact._planes
+    touching = np.isin(plane.nodes, np.flatnonzero(near))
+    s = 0.3 * D
+    pressure = -contact._barrier(np.array([s]))[1]
+    load = np.zeros_like(mesh.nodes)
+    load[plane.nodes[touching], 0] = -pressure * plane.area[touching]
+    eq.model.load = load
+    start = np.tile([-0.2 + 0.02, 0.0, 0.0], (len(mesh.nodes), 1))
+    state = eq.newton(start, 0.0)
+    np.testing.assert_allclose(2 * (mesh.nodes + state.u)[near, 0], s, rtol=1e-6)
+
+
+def test_a_vacuum_closes_a_pouch_but_never_crosses_it():
+    mesh = pouch()
+    eq = body(mesh, gap=0.04, material=(1.0, 0.45))
+    contact = eq.model.self_contact
+    free = Equilibrium(Model(mesh, threads=1), filled(mesh, 1.0, 0.45))
+    history = [rest(mesh)]
+    for pressure in (-0.00005, -0.0001, -0.0002, -0.002, -0.02):
+        history.append(eq.reach(pressure, history))
+    states = history[1:]
+    apart = [s for s in states if contact.energy_mJ(s.u) == 0.0]
+    assert 0 < len(apart) < len(states)
+    before = free.path([s.pressure_MPa for s in apart], rest(mesh))
+    np.testing.assert_allclose(apart[-1].u, before[-1].u, atol=1e-7)
+    assert not any(contact.intersects(s.u) or crossings(mesh, s.u) for s in states)
+    assert crossings(mesh, free.newton(before[-1].u, states[-1].pressure_MPa).u)
+    # Flat against its image: the middle has gone half the gap, but for what the barrier keeps open.
+    middle = np.linalg.norm(mesh.nodes - [0.0, 0.0, GAP / 2], axis=1).argmin()
+    assert -GAP / 2 < states[-1].u[middle, 2] < -GAP / 2 + 0.02
+
+
+def test_a_branch_closes_a_pouch_by_arc_length_as_load_steps_do():
+    mesh = pouch()
+    eq = body(mesh, gap=0.04, material=(1.0, 0.45))
+    contact, target = eq.model.self_contact, -0.002
+    branch = trace_branch(eq, rest(mesh), until_MPa=target)
+    assert contact.energy_mJ(branch.points[-1].state.u) > 0
+    assert not any(contact.intersects(point.state.u) for point in branch.points)
+    stepped = eq.path([target / 10, target], rest(mesh))[-1]
+    np.testing.assert_allclose(branch.points[-1].state.u, stepped.u, atol=1e-6)
+
+
+def test_bodies_that_share_a_factor_have_no_self_contact():
+    eq = body(fork())
+    with pytest.raises(InputError, match="self-contact"):
+        BatchedNewton(eq.model, filled(eq.model.mesh, E, NU), [])
+
+
+def test_a_gap_that_reaches_across_a_wall_is_refused():
+    with pytest.raises(InputError, match="as drawn") as refused:
+        SelfContact(fork(), 1.1, K)
+    assert "smaller gap" in str(refused.value)
+
+
+@pytest.mark.parametrize(("gap", "stiffness"), [(0.0, 1.0), (0.1, -1.0), (np.nan, 1.0), (np.inf, 1.0)])
+def test_gap_and_stiffness_must_be_above_0(gap, stiffness):
+    with pytest.raises(InputError, match="self-contact"):
+        SelfContact(fork(), gap, stiffness)
+
+
+def test_a_missing_package_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ipctk", None)
+    with pytest.raises(InputError, match="ipctk"):
+        SelfContact(fork(), D, K)
