@@ -195,6 +195,12 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
         "(default: homogenised).",
     )
     command.add_argument(
+        "--self-contact",
+        action="store_true",
+        help="Keep walls and struts of a resolved unit apart, at several times the cost (default: they may "
+        "cross, and the run says from which pressure on).",
+    )
+    command.add_argument(
         "--lattice",
         metavar="FILE",
         help="Lattice law computed from struts and resin, the effective.toml of `homogenize`; a copy is "

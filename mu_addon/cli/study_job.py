@@ -36,6 +36,7 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
         extra = {
             "effects": effects,
             "mesh": MeshSettings(order=options.order, refine=options.refine, fidelity=options.fidelity),
+            "self_contact": options.self_contact,
             "times": options.times,
             "mesher": options.mesher,
             "solver": solver_of(options),

@@ -40,7 +40,7 @@ def _ipctk() -> Any:
         raise InputError(
             "self-contact needs the package ipctk, which is not installed",
             "self-contact",
-            "pip install -e '.[contact]', or simulate without self-contact",
+            "pip install ipctk, or simulate without self-contact",
         ) from None
     # It takes every core otherwise, and its sums would depend on how many.
     ipctk.set_num_threads(1)

@@ -15,12 +15,14 @@ from ...design.anchors import windows
 from ...design.assets import asset_root
 from ...design.body import Body, envelope, read_body, require_path_inside
 from ...design.parameters import Unit, read_unit, to_toml
+from ...design.quantity import in_MPa
 from ...design.rigid_body import FRICTION, RigidBody, mirrored, read_rigid_bodies, require_beside, to_obj
 from ...design.solid import QUALITY
 from ...errors import InputError
-from ...fem.newton_settings import RESOLVED_NEWTON
+from ...fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
 from ...fem.obstacle import CONTACT_NEWTON
 from ...fem.protocol import Protocol, read_protocol
+from ...fem.self_contact import SELF_CONTACT_NEWTON, SelfContact
 from ...fem.solver import SolverChoice
 from ...fem.unit import materials_of
 from ...homogenize.effective import Effective, read_effective
@@ -39,10 +41,15 @@ from .study_file import read as read_tables
 if TYPE_CHECKING:
     from ...fem.materials import Materials
     from ...fem.model import Model
-    from ...fem.newton_settings import NewtonSettings
     from ...meshing.mesh import Mesh
 
 GRASP = "protocols/grasp.csv"
+# Of self-contact: the gap over the wall's thickness, and the barrier's stiffness over the resin's modulus;
+# docs/mechanics.md says what they move.
+GAP_SHARE, BARRIER_SHARE = 1 / 9, 0.04
+RESOLVED_CONTACT_NEWTON: NewtonSettings = attrs.evolve(
+    SELF_CONTACT_NEWTON, max_step_MPa=RESOLVED_NEWTON.max_step_MPa, follow_snaps=True, easy_factorisations=6
+)
 LATTICE_LAW = FILES["lattice"]
 
 
@@ -93,6 +100,8 @@ class Job:
     obstacles: tuple[RigidBody, ...] = attrs.field(default=(), converter=tuple)
     # What measured data named beside what the unit has parameters for, and the direction of gravity.
     effects: StaticEffects = attrs.field(factory=StaticEffects)
+    # Whether walls and struts of a resolved unit keep apart, at a cost of several times the time.
+    self_contact: bool = attrs.field(default=False, validator=attrs.validators.instance_of(bool))
     # How linear systems are solved: within their tolerance it decides nothing.
     solver: SolverChoice = attrs.field(factory=SolverChoice)
     # What is run of it: the first, the first two or all.
@@ -105,6 +114,12 @@ class Job:
             # The waveguide is what is printed: the rules are for a continuum in place of the lattice.
             object.__setattr__(self, "rules", (PRINTED,))
             self._require_resolvable()
+        elif self.self_contact:
+            raise InputError(
+                "self-contact needs walls and struts as they are printed",
+                "--self-contact",
+                "give --fidelity resolved, too, or leave it out",
+            )
         if self.obstacles and "place" in self.stages and self.paths == "graph":
             raise InputError(
                 "the search of the whole lattice does not support obstacles",
@@ -186,6 +201,7 @@ class Job:
             | {"quality": self.quality},
             "simulate": _named("protocol", self.protocol_text())
             | {"times": self.times, "mesher": self.mesher}
+            | ({"self_contact": True} if self.self_contact else {})
             | _named("lattice", self.lattice_text())
             | _named("obstacles", self.obstacles_text())
             | ({"friction": [o.friction for o in self.obstacles]} if self.obstacles else {})
@@ -230,6 +246,11 @@ class Job:
         model.solver = solver
         if self.obstacles:
             model.obstacles = obstacles_of(self.obstacles, self.unit, mesh)
+        if self.self_contact:
+            resin_MPa = in_MPa(self.unit.material.membrane_modulus_kPa)
+            model.self_contact = SelfContact(
+                mesh, GAP_SHARE * self.unit.printed.wall, BARRIER_SHARE * resin_MPa
+            )
         return model
 
     @property
@@ -237,7 +258,9 @@ class Job:
         """Settings of Newton's method for this unit."""
         if self.in_time:
             return CONTACT_NEWTON
-        return self.effects.newton if self.mesh.fidelity == "homogenised" else RESOLVED_NEWTON
+        if self.mesh.fidelity == "homogenised":
+            return self.effects.newton
+        return RESOLVED_CONTACT_NEWTON if self.self_contact else RESOLVED_NEWTON
 
     @property
     def in_time(self) -> bool:
@@ -403,7 +426,7 @@ OF_FILES = ("friction",)
 # Keys of each stage's table besides files and inner tables.
 SETTINGS = {
     "design": ("quality",),
-    "simulate": ("times", "mesher", "orientation_deg"),
+    "simulate": ("times", "mesher", "orientation_deg", "self_contact"),
     "place": ("stations", "rules", "mesh_check", "paths"),
 }
 

@@ -247,6 +247,7 @@ class Study:
             materials = self.job.materials(self.mesh)
             write_model_a(self.folder, self.mesh, materials, self.trajectory, self._remembered(model))
             self._look_for_self_intersection(self.trajectory.states)
+            self._tell_of_snaps(self.trajectory.states)
             self._look_beyond_the_fit(self.trajectory.states)
         states = [s for s in self.trajectory.states if s.loaded]
         self.solver = {
@@ -420,7 +421,8 @@ class Study:
         """Name the first pressure, on either side, at which walls pass through each other, and which."""
         assert self.mesh is not None
         found: dict[str, Any] = {}
-        for sign in (-1, 1):
+        # With self-contact no step passes a touch.
+        for sign in () if self.job.self_contact else (-1, 1):
             outward = sorted(
                 (s for s in states if s.pressure_MPa * sign > 0), key=lambda s: abs(s.pressure_MPa)
             )
@@ -429,13 +431,26 @@ class Study:
             if first is None:
                 continue
             pressure = f"{in_kPa(first.pressure_MPa):.4g}"
+            instead = ", --self-contact" if self.job.mesh.fidelity == "resolved" else ""
             found[pressure] = [str(c) for c in first.crossings]
             self.warn(
                 f"From {pressure} kPa on, walls intersect: {first.crossings[0]}. Self-contact is not "
-                "modelled, so states beyond this pressure are invalid. Use a thicker wall or a smaller "
-                "pressure."
+                f"modelled, so states beyond this pressure are invalid. Use a thicker wall{instead} or a "
+                "smaller pressure."
             )
         self.context.summary["walls_cross_at_kPa"] = found
+
+    def _tell_of_snaps(self, states: tuple[State, ...]) -> None:
+        """Name the first pressure on either side that lies beyond a limit point, and how far a node moved."""
+        for sign in (-1, 1):
+            beyond = [s for s in states if s.pressure_MPa * sign > 0 and s.snapped_mm]
+            if beyond:
+                first = min(beyond, key=lambda s: abs(s.pressure_MPa))
+                self.warn(
+                    f"Before {first.pressure_kPa:.4g} kPa parts of the unit snap, by {first.snapped_mm:.2g} "
+                    "mm at most: states from there on are those that damped motion leads to, and the way "
+                    "back differs."
+                )
 
     def _look_beyond_the_fit(self, states: tuple[State, ...]) -> None:
         """Warn where the lattice is strained further than its law was fitted, or than it is stable."""
