@@ -57,3 +57,11 @@ class MeshSettings:
     anchor_mm: float = attrs.field(default=2.5, validator=_between(0.1, 100.0))
     envelope_mm: float = attrs.field(default=14.0, validator=_between(0.1, 100.0))
     fidelity: str = attrs.field(default="homogenised", validator=_one_of(*FIDELITIES))
+
+    def table(self) -> dict[str, Any]:
+        """The settings as a file of inputs has them; fidelity only where it is not homogenised."""
+        found = attrs.asdict(self)
+        if self.fidelity == "homogenised":
+            # As files were written before there was another.
+            del found["fidelity"]
+        return found

@@ -75,7 +75,7 @@ class Job:
             "cubes": [attrs.asdict(cube) for cube in self.cubes],
             "rules": self.rules,
             "grip": attrs.asdict(self.grip),
-            "mesh": attrs.asdict(self.mesh),
+            "mesh": self.mesh.table(),
             "optics": attrs.asdict(self.optics),
         }
         return {

@@ -68,7 +68,7 @@ class Settings:
             "held_cells": self.held_cells,
             "gripper": self.gripper,
             "values": dict(sorted(self.values.items())),
-            "mesh": attrs.asdict(self.mesh),
+            "mesh": self.mesh.table(),
         }
 
     def texts(self) -> dict[str, str]:

@@ -194,7 +194,7 @@ class Job:
 
         Not `workers` and `solver`, which decide nothing.
         """
-        mesh = attrs.asdict(self.mesh)
+        mesh = self.mesh.table()
         tables: Tables = {
             "design": _named("unit", self.unit_text())
             | _named("body", self.body_text())

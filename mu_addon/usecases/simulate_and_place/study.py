@@ -119,7 +119,7 @@ class Study:
         """Settings of the simulation in the summary, and warnings of what they leave out."""
         job, summary = self.job, self.context.summary
         summary["study"] = {"times": job.times, "stations": job.stations, "rules": job.rules}
-        summary["study"] |= {"mesh": attrs.asdict(job.mesh), "mesher": job.mesher}
+        summary["study"] |= {"mesh": job.mesh.table(), "mesher": job.mesher}
         if job.lattice is not None:
             summary["study"]["lattice"] = attrs.asdict(job.lattice)
             self._warn_of_another_cell()
