@@ -124,9 +124,12 @@ def divided(nodes, tets):
         tets = oriented(nodes, tets)
 
 
-def curved(nodes, tets, d: Dimensions, reference: Reference) -> Mesh:
-    """Second-order elements whose mid-edge nodes lie on the surface, as far as no element folds."""
-    planes = [(0, 0.0), *((axis, plane) for axis in range(3) for plane in d.bounds[axis])]
+def curved(nodes, tets, d: Dimensions, reference: Reference, planes=()) -> Mesh:
+    """Second-order elements whose mid-edge nodes lie on the surface, as far as no element folds.
+
+    planes: (axis, place) of flat sides, those of the half unit if not given.
+    """
+    planes = planes or [(0, 0.0), *((axis, plane) for axis in range(3) for plane in d.bounds[axis])]
     for axis, plane in planes:
         nodes[np.abs(nodes[:, axis] - plane) < 1e-6, axis] = plane
     faces, _ = boundary_faces(tets)
