@@ -46,9 +46,15 @@ def strut_mesh(d: Dimensions, rings: int, layers: int) -> Mesh:
     count = len(points)
     levels = np.linspace(0.0, 1.0, layers + 1)
     at = np.column_stack([np.tile(points, (layers + 1, 1)), np.repeat(levels, count)])
-    below = (np.sort(triangles, axis=1) + count * np.arange(layers)[:, None, None]).reshape(-1, 3)
-    a, b, c = below.T
-    # Each prism in three, its sides cut from the lower number to the higher, so that neighbours agree.
+    nodes = _placed(d, at)
+    # Layers are tilted: a diagonal from what lies farther along to what lies less far leans least. The other
+    # ones make E[100] of the lattice up to 70 % too high in place of 10 (docs/resolved.md).
+    along = np.round(nodes @ _ALONG / half, 9).reshape(layers + 1, count)
+    first = np.argsort(np.argsort(-(along[1:] + along[:-1]), axis=1, kind="stable"), axis=1)
+    turn = np.argsort(first[:, triangles], axis=2)
+    below = np.take_along_axis(np.broadcast_to(triangles, turn.shape), turn, axis=2)
+    a, b, c = (below + count * np.arange(layers)[:, None, None]).reshape(-1, 3).T
+    # Each prism in three, its sides cut by one order of the corners, so that neighbours agree.
     tets = np.concatenate(
         [
             np.stack([a, b, c, c + count], axis=1),
@@ -56,7 +62,6 @@ def strut_mesh(d: Dimensions, rings: int, layers: int) -> Mesh:
             np.stack([a, a + count, b + count, c + count], axis=1),
         ]
     )
-    nodes = _placed(d, at)
     tets = oriented(nodes, tets)
     edges, _ = edges_of(tets)
     middles = at[edges].mean(axis=1)

@@ -23,13 +23,33 @@ from .lattice import clearance, struts, support
 
 Progress = Callable[[str, float], None]
 
-# Element sizes in mm of a cell of 12.5 mm at a refinement of 1, chosen by docs/resolved.md.
-MERIDIAN_MM = 1.5
-HOOP_MM = 2.0
-RINGS = 1
-LAYERS = 5
 # A strut's node outside the wall with less of its elements than this belongs to the wall, too.
 _SUPPORT = 0.02
+
+
+@attrs.frozen
+class Sizes:
+    """Element sizes of a resolved mesh; docs/resolved.md says what they cost and how they were chosen.
+
+    Of the wall in mm for a cell of 12.5 mm, growing with it: along its meridian, and around its largest
+    radius; through_wall: elements across it. Of struts rings and layers as in `strut_mesh`.
+    """
+
+    meridian_mm: float = 1.5
+    hoop_mm: float = 2.0
+    through_wall: int = 1
+    rings: int = 1
+    layers: int = 5
+
+    def refined(self, by: float) -> Sizes:
+        """Sizes divided and counts multiplied by a factor."""
+        return Sizes(
+            self.meridian_mm / by,
+            self.hoop_mm / by,
+            max(1, int(by * 0.7 + 0.5)) * self.through_wall,
+            max(1, round(self.rings * by)),
+            max(3, round(self.layers * by)),
+        )
 
 
 def mesh_of(
@@ -55,14 +75,15 @@ def mesh_printed(
     progress: Progress | None = None,
     cache: Path | None = None,
     body: Body | None = None,
+    sizes: Sizes | None = None,
 ) -> Mesh:
     """The printed unit as quadratic tetrahedra: wall and caps, and struts whose nodes in the wall follow it.
 
     Elements of struts count as far as they lie outside the actuator (`filled`); nodes inside it are tied to
     the wall. The base is clamped, the inlet is left out. settings: of it the fraction ("half" or "full") and
     `refine` count. cache: folder for the octants of lattices other than body-centred. body: a closed surface
-    that cuts the lattice in place of its box. progress: called with a stage and the share done. Raises
-    InputError and MeshingError.
+    that cuts the lattice in place of its box. progress: called with a stage and the share done. sizes: of
+    elements before `refine` divides them. Raises InputError and MeshingError.
     """
     s = settings or MeshSettings()
     report = progress or (lambda stage, share: None)
@@ -73,16 +94,17 @@ def mesh_printed(
             'choose fraction "half" or "full" and order 2, or fidelity "homogenised"',
         )
     d = unit.printed
+    sizes = (sizes or Sizes()).refined(s.refine)
     report("mesh of the wall", 0.0)
     full = body is not None
-    wall = wall_mesh(d, s.refine)
+    wall = wall_mesh(d, sizes)
     if s.fraction == "full" or full:
         wall = mirror(wall, "x")
     report("mesh of the struts", 0.1)
     lattice = struts(
         d,
-        max(1, round(RINGS * s.refine)),
-        max(3, round(LAYERS * s.refine)),
+        sizes.rings,
+        sizes.layers,
         s.fraction == "full" or full,
         cache,
         body,
@@ -94,16 +116,16 @@ def mesh_printed(
     return mesh
 
 
-def wall_mesh(d: Dimensions, refine: float = 1.0) -> Mesh:
+def wall_mesh(d: Dimensions, sizes: Sizes) -> Mesh:
     """Quadratic tetrahedra of a unit's wall and caps at x >= 0, base and tip those of its own end planes."""
-    meridian, size = Meridian.of(d), d.cell / CELL_MM / refine
+    meridian, scale = Meridian.of(d), d.cell / CELL_MM
     found = membrane_mesh(
         meridian,
         turn=math.pi,
-        p=stations(meridian, MERIDIAN_MM * size),
-        sectors=2 * division(d.R * math.pi / 2, HOOP_MM * size),
-        layers=max(1, int(refine * 0.7 + 0.5)),
-        rings=division(d.r, HOOP_MM * size),
+        p=stations(meridian, sizes.meridian_mm * scale),
+        sectors=2 * division(d.R * math.pi / 2, sizes.hoop_mm * scale),
+        layers=sizes.through_wall,
+        rings=division(d.r, sizes.hoop_mm * scale),
     )
     nodes, tets, cavity = second_order(found.nodes, found.tets, found.cavity, found.middles)
     nodes[np.abs(nodes[:, 0]) < 1e-9 * d.cell, 0] = 0.0
