@@ -86,8 +86,8 @@ def damped_minimum(body: Body, start: Array, pressure_MPa: float) -> State:
             found = model.potential(moved, pressure_MPa, parameters)
             after, new_scale = _force(model, parameters, moved, pressure_MPa)
             # What the two ends' forces say of the decrease, where the energy's own difference is rounding.
-            told = -0.5 * float((force + after) @ step)
-            decrease = potential - found if abs(told) > _ROUNDING * abs(potential) else told
+            by_forces = -0.5 * float((force + after) @ step)
+            decrease = potential - found if abs(by_forces) > _ROUNDING * abs(potential) else by_forces
             expected = -float(force @ step)
             if np.isfinite(found) and decrease > _POOR * 0.5 * expected:
                 break
