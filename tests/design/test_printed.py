@@ -159,7 +159,7 @@ def test_a_skin_stiffens_by_its_share_of_the_wall():
 
 def test_a_units_membrane_is_as_stiff_as_its_skin_makes_it():
     """0.9 mm of wall with skins of 0.09 mm, twice as stiff: 1.2; less if printed 0.1 mm thicker all over."""
-    elements = SimpleNamespace(region=np.array([MEMBRANE, LATTICE]))
+    elements = SimpleNamespace(region=np.array([MEMBRANE, LATTICE]), resolved=False)
 
     def stiffness(unit):
         (layer,) = materials_of(unit, elements).layers
