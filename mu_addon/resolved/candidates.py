@@ -91,7 +91,7 @@ class PrintedWaveguides:
         return np.asarray(away.argmin(axis=1))
 
     def _equilibrium(self, bar: Bar) -> Equilibrium:
-        mesh = with_waveguide(self.mesh, self.unit, bar)
+        mesh = with_waveguide(self.mesh, bar)
         return Equilibrium(self.model_of(mesh), self.materials_of(mesh), self.settings, explains=False)
 
     def _started(self, mesh: Mesh, bar: Bar, u: Array) -> Array:

@@ -31,6 +31,8 @@ _STEPS = 6
 _LEAST = 1e-3
 # Least share of a quadrature point of an element of which anything is filled.
 _FLOOR = 0.01
+# A node of which less than this is filled has next to no stiffness: it is tied.
+LEAST_SUPPORT = 0.02
 
 
 def struts(
@@ -159,5 +161,4 @@ def support(mesh: Mesh) -> Array:
         np.bincount(mesh.tets.ravel(), np.repeat(v.sum(axis=1), per), len(mesh.nodes))
         for v in (volumes, volumes * mesh.filled)
     )
-    with np.errstate(invalid="ignore"):
-        return np.asarray(solid / whole)
+    return np.asarray(solid / whole)

@@ -19,12 +19,9 @@ from ..meshing.mesh import MEMBRANE, Array, Mesh, mirror, second_order
 from ..meshing.quality import check_positive
 from ..meshing.settings import CELL_MM, MeshSettings
 from ..meshing.unit import mesh_unit
-from .lattice import clearance, struts, support
+from .lattice import LEAST_SUPPORT, clearance, struts, support
 
 Progress = Callable[[str, float], None]
-
-# A strut's node outside the wall with less of its elements than this belongs to the wall, too.
-_SUPPORT = 0.02
 
 TIE_MM = 0.1
 """Struts' nodes this near the wall outside are tied to it, too, for a cell of 12.5 mm at a refinement of 1.
@@ -103,19 +100,12 @@ def mesh_printed(
     d = unit.printed
     sizes = (sizes or Sizes()).refined(s.refine)
     report("mesh of the wall", 0.0)
-    full = body is not None
+    full = body is not None or s.fraction == "full"
     wall = wall_mesh(d, sizes)
-    if s.fraction == "full" or full:
+    if full:
         wall = mirror(wall, "x")
     report("mesh of the struts", 0.1)
-    lattice = struts(
-        d,
-        sizes.rings,
-        sizes.layers,
-        s.fraction == "full" or full,
-        cache,
-        body,
-    )
+    lattice = struts(d, sizes.rings, sizes.layers, full, cache, body)
     report("ties", 0.5)
     near = TIE_MM * d.cell / CELL_MM / s.refine
     mesh = tied(wall, lattice, clearance(d, lattice.nodes) - near)
@@ -148,7 +138,7 @@ def tied(wall: Mesh, lattice: Mesh, clear_mm: Array) -> Mesh:
     inner face and just outside it, its displacement is continued with its gradient (`embed`). Nodes of which
     next to nothing is filled are tied, too. Struts in the plane of the wall's base are clamped with it.
     """
-    within = np.flatnonzero((clear_mm <= 0) | (support(lattice) < _SUPPORT))
+    within = np.flatnonzero((clear_mm <= 0) | (support(lattice) < LEAST_SUPPORT))
     follows = embed(wall, lattice.nodes[within])
     count = len(wall.nodes)
     free = np.ones(len(lattice.nodes), bool)

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..design.anchors import Window
 from ..design.block import Block
-from ..design.dimensions import Dimensions
 from ..design.lattice import lattice_of
 from ..design.parameters import Unit
 from ..design.waveguide import Bar, Seat, strut_radii, waveguide
@@ -18,11 +17,10 @@ from ..errors import InputError
 from ..fem.embedding import embed
 from ..meshing.mesh import LATTICE, Array, Mesh
 from .grid import box_grid, cut_levels
-from .lattice import filled_outside, support
+from .lattice import LEAST_SUPPORT, filled_outside, support
 
 # Longest element of a bar and of a seat, as a share of the bar's section.
 _LONGEST = 0.9
-_SUPPORT = 0.02
 # An element of a strut of which the bar leaves less than this is all replaced.
 _LEAST = 0.02
 
@@ -46,7 +44,7 @@ def bar_of(unit: Unit, window: Window) -> Bar:
     return bar
 
 
-def with_waveguide(mesh: Mesh, unit: Unit, bar: Bar) -> Mesh:
+def with_waveguide(mesh: Mesh, bar: Bar) -> Mesh:
     """The mesh of a printed unit with a straight waveguide in its mirror plane, along z.
 
     mesh: of `mesh_printed`, a half or a whole; its own nodes and elements come first, in their order. What of
@@ -61,8 +59,7 @@ def with_waveguide(mesh: Mesh, unit: Unit, bar: Bar) -> Mesh:
             'choose a window of anchors, or fidelity "homogenised"',
         )
     half = "x" in mesh.symmetry
-    d = unit.printed
-    parts = [_bar_mesh(bar, d, half), *(_seat_mesh(bar, seat, half) for seat in bar.seats)]
+    parts = [_bar_mesh(bar, half), *(_seat_mesh(bar, seat, half) for seat in bar.seats)]
     struts = mesh.region == LATTICE
     outside: list[Callable[[Array], Array]] = [lambda points: _outside_bar(bar, points)]
     outside += [partial(_outside_seat, seat) for seat in bar.seats]
@@ -72,7 +69,7 @@ def with_waveguide(mesh: Mesh, unit: Unit, bar: Bar) -> Mesh:
     filled[filled.mean(axis=1) < _LEAST] = 0.0
     found = attrs.evolve(mesh, filled=filled)
     within = np.min([away(mesh.nodes) for away in outside], axis=0) <= 0
-    within |= _left(found) < _SUPPORT
+    within |= support(found) < LEAST_SUPPORT
     within[mesh.tied] = False
     of_struts = np.zeros(len(mesh.nodes), bool)
     of_struts[np.unique(mesh.tets[struts])] = True
@@ -81,7 +78,7 @@ def with_waveguide(mesh: Mesh, unit: Unit, bar: Bar) -> Mesh:
     nodes, tets, shares = [mesh.nodes], [mesh.tets], [filled]
     for number, part in enumerate(parts):
         if number:
-            inside = np.flatnonzero((_outside_bar(bar, part.nodes) <= 0) | (support(part) < _SUPPORT))
+            inside = np.flatnonzero((_outside_bar(bar, part.nodes) <= 0) | (support(part) < LEAST_SUPPORT))
             own = _tie(inside, part.nodes, parts[0], len(mesh.nodes))
             tied.append((own[0] + first, own[1], own[2]))
         nodes.append(part.nodes)
@@ -113,13 +110,6 @@ def _struts_of(mesh: Mesh, rows: Array) -> Mesh:
     )
 
 
-def _left(mesh: Mesh) -> Array:
-    """As `support`, and 1 at nodes of no strut."""
-    found = support(mesh)
-    found[~np.isfinite(found)] = 1.0
-    return found
-
-
 def _tie(rows: Array, nodes: Array, to: Mesh, first: int) -> tuple[Array, Array, Array]:
     """Nodes that follow a part whose own nodes are numbered from `first` on, what they follow and how."""
     follows = embed(to, nodes[rows])
@@ -134,23 +124,24 @@ def _outside_bar(bar: Bar, points: Array) -> Array:
     return np.maximum(across, along)
 
 
-def _bar_mesh(bar: Bar, d: Dimensions, half: bool) -> Mesh:
+def _bar_mesh(bar: Bar, half: bool) -> Mesh:
     """The bar without what its wells cut out."""
     low, high = sorted((float(bar.points[0, 2]), float(bar.points[-1, 2])))
     wells = [block.corners for block in bar.wells]
     edges = np.array([z for corners in wells for z in (corners[:, 2].min(), corners[:, 2].max())])
-    floors = np.array([y for c in wells for y in (c[:, 1].min(), c[:, 1].max())]) - bar.points[0, 1]
+    floors = np.array([y for c in wells for y in (c[:, 1].min(), c[:, 1].max())])
     longest = _LONGEST * 2.0 * bar.half
     x = np.array([0.0, bar.half]) if half else np.array([-bar.half, 0.0, bar.half])
-    y = cut_levels(-bar.half, bar.half, longest, np.unique(floors.round(9)))
+    middle = float(bar.points[0, 1])
+    y = cut_levels(middle - bar.half, middle + bar.half, longest, np.unique(floors.round(9)))
     z = cut_levels(low, high, longest, edges)
-    middles = [(a[1:] + a[:-1]) / 2 for a in (x, y + bar.points[0, 1], z)]
+    middles = [(a[1:] + a[:-1]) / 2 for a in (x, y, z)]
     centres = np.stack(np.meshgrid(*middles, indexing="ij"), axis=-1)
     solid = np.ones(centres.shape[:3], bool)
     for corners in wells:
         inside = (centres > corners.min(axis=0)) & (centres < corners.max(axis=0))
         solid &= ~inside.all(axis=-1)
-    return box_grid((x, y, z), solid, np.eye(3), np.array([0.0, bar.points[0, 1], 0.0]))
+    return box_grid((x, y, z), solid)
 
 
 def _seat_mesh(bar: Bar, seat: Seat, half: bool) -> Mesh:
@@ -170,7 +161,7 @@ def _seat_mesh(bar: Bar, seat: Seat, half: bool) -> Mesh:
         for axis, (low, high) in enumerate(spans)
     )
     solid = np.ones((len(x) - 1, len(y) - 1, len(z) - 1), bool)
-    return filled_outside(box_grid((x, y, z), solid, np.eye(3), np.zeros(3)), kept)
+    return filled_outside(box_grid((x, y, z), solid), kept)
 
 
 def _outside_seat(seat: Seat, points: Array) -> Array:
