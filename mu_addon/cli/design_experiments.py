@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_measured_folder, add_report, add_unit, unit_if_named
+from .options import add_fidelity, add_measured_folder, add_report, add_unit, unit_if_named
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -27,6 +27,7 @@ def add(commands: Commands[Any]) -> None:
         "numbers.",
     )
     add_unit(command, required=False)
+    add_fidelity(command)
     add_report(command)
     command.add_argument(
         "--noise",
@@ -45,4 +46,5 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 
     unit = unit_if_named(options)
     noise = noise_of(options.noise)
-    USE_CASE.start(Job(read_folder(Path(options.folder)), unit, noise), Path(options.out), context)
+    job = Job(read_folder(Path(options.folder)), unit, noise, options.fidelity)
+    USE_CASE.start(job, Path(options.out), context)

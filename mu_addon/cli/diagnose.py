@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_measured_folder, add_report, add_unit, unit_if_named
+from .options import add_fidelity, add_measured_folder, add_report, add_unit, unit_if_named
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -23,6 +23,7 @@ def add(commands: Commands[Any]) -> None:
     )
     add_measured_folder(command)
     add_unit(command, required=False)
+    add_fidelity(command)
     add_report(command)
 
 
@@ -33,4 +34,5 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
     from ..usecases.diagnose.run import USE_CASE
 
     unit = unit_if_named(options)
-    USE_CASE.start(Job(read_folder(Path(options.folder)), unit), Path(options.out), context)
+    job = Job(read_folder(Path(options.folder)), unit, fidelity=options.fidelity)
+    USE_CASE.start(job, Path(options.out), context)

@@ -187,13 +187,7 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
         metavar="F",
         help="Mesh refinement: every element size is divided by F (default: 1).",
     )
-    command.add_argument(
-        "--fidelity",
-        choices=("resolved", "homogenised"),
-        default="homogenised",
-        help="What is simulated: the printed body with its struts, or a continuum in place of the lattice "
-        "(default: homogenised).",
-    )
+    add_fidelity(command)
     command.add_argument(
         "--self-contact",
         action="store_true",
@@ -221,6 +215,19 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
         help="Mesh generator (default: auto).",
     )
     add_solver(command)
+
+
+def add_fidelity(command: argparse.ArgumentParser) -> None:
+    """What of the unit is simulated."""
+    from ..meshing.settings import FIDELITIES, HOMOGENISED
+
+    command.add_argument(
+        "--fidelity",
+        choices=FIDELITIES,
+        default=HOMOGENISED,
+        help="What is simulated: the printed body with its struts, or a continuum in place of the lattice "
+        "(default: homogenised).",
+    )
 
 
 def require_out(options: argparse.Namespace) -> None:

@@ -19,15 +19,15 @@ from ..fem.laws import Foam, Layered, NeoHooke, Yeoh
 from ..fem.loads import gravity
 from ..fem.materials import Layer, Materials
 from ..fem.model import Model
-from ..fem.newton_settings import NewtonSettings
+from ..fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
 from ..fem.obstacle import CONTACT_NEWTON, Obstacle
 from ..fem.rigid import Plane
 from ..fem.unit import materials_of
 from ..fem.wall_law import LAYER_NORMAL, layer_stiffness
 from ..meshing.mesh import LATTICE, MEMBRANE, Mesh
 from ..meshing.morph import morphed
-from ..meshing.settings import CELL_MM, MeshSettings
-from ..meshing.unit import mesh_unit
+from ..meshing.settings import CELL_MM, RESOLVED, MeshSettings
+from ..resolved.unit import mesh_of
 from .effect import Effect, Parameter
 from .prediction import beam, coupon, lattice
 from .prediction.flat_obstacle import NAME as CONTACT
@@ -69,9 +69,17 @@ class Body:
     device: str = "cpu"
 
     def meshed(self, cache: Path | None = None) -> Mesh:
-        """The unit's mesh; raises InputError and MeshingError. cache: see `mesh_unit`."""
-        mesh = mesh_unit(self.drawn or self.unit, self.mesh, cache=cache)
+        """The unit's mesh; raises InputError and MeshingError. cache: see `mesh_of`."""
+        if self.mesh.fidelity == RESOLVED:
+            # Made anew: no mesher moves its nodes, and struts cannot be moved through the wall.
+            return mesh_of(self.unit, self.mesh, cache=cache)
+        mesh = mesh_of(self.drawn or self.unit, self.mesh, cache=cache)
         return morphed(mesh, self.drawn, self.unit, self.mesh) if self.drawn else mesh
+
+    def newton(self, effect: UnitEffect | None = None) -> NewtonSettings:
+        """Settings of Newton's method for a run of this body, with an effect or none."""
+        own = effect.newton if effect else SMOOTH
+        return RESOLVED_NEWTON if self.mesh.fidelity == RESOLVED and own != CONTACT_NEWTON else own
 
     def materials(self, mesh: Mesh) -> Materials:
         """The base model's materials on a mesh; raises InputError if the unit's wall has a law of its own."""
@@ -137,7 +145,8 @@ def down(orientation_deg: float) -> Array:
 
 
 def _weight(body: Body, mesh: Mesh, density_kg_m3: float) -> Array:
-    solid = np.where(mesh.region == LATTICE, relative_density(strut_cell(body.unit)), 1.0)
+    hollow = (mesh.region == LATTICE) & (not mesh.resolved)
+    solid = np.where(hollow, relative_density(strut_cell(body.unit)), 1.0)
     return gravity(mesh, density_kg_m3 * TONNE_PER_MM3 * solid, down(body.orientation_deg))
 
 
@@ -190,9 +199,16 @@ def _refined(body: Body, share: float) -> Body:
     return attrs.evolve(body, mesh=body.finer) if share else body
 
 
-def parted(materials: Materials, mesh: Mesh, region: int) -> tuple[tuple[Layer, ...], tuple[Layer, ...]]:
-    """The material layers of the elements in a region of the mesh, and those of all others."""
-    inside = mesh.region == region
+def _in_region(mesh: Mesh, region: int) -> Array:
+    """Elements (m,) that an effect of the wall's resin, or of the lattice, acts on.
+
+    Struts of a resolved mesh are of the wall's resin, and what is the lattice's law else is the resin's.
+    """
+    return np.ones(len(mesh.tets), bool) if mesh.resolved else mesh.region == region
+
+
+def parted(materials: Materials, inside: Array) -> tuple[tuple[Layer, ...], tuple[Layer, ...]]:
+    """The material layers of some elements, inside (m,), and those of all others."""
     found: tuple[list[Layer], list[Layer]] = ([], [])
     for layer in materials.layers:
         here = inside[layer.elements]
@@ -206,15 +222,15 @@ def _shares(layers: Sequence[Layer], share: float) -> tuple[Layer, ...]:
     return tuple(attrs.evolve(layer, weight=share * layer.weight) for layer in layers)
 
 
-def _elastic(materials: Materials, mesh: Mesh, region: int) -> tuple[Array, Array, Array]:
-    """Elements (k,) of a region, Young's moduli (k,) in MPa and Poisson's ratios (k,) at small strain."""
-    elements = np.flatnonzero(mesh.region == region)
-    modulus, poisson = materials.small_strain(len(mesh.tets))
+def _elastic(materials: Materials, inside: Array) -> tuple[Array, Array, Array]:
+    """Numbers (k,) of the elements inside (m,), their Young's moduli in MPa and Poisson's ratios (k,)."""
+    elements = np.flatnonzero(inside)
+    modulus, poisson = materials.small_strain(len(inside))
     return elements, modulus[elements], poisson[elements]
 
 
 def _stiffening(materials: Materials, mesh: Mesh, c2_over_c1: float) -> Materials:
-    wall, rest = parted(materials, mesh, MEMBRANE)
+    wall, rest = parted(materials, _in_region(mesh, MEMBRANE))
     stiffer = []
     for layer in wall:
         if layer.law is not NeoHooke:
@@ -230,13 +246,14 @@ def _stiffening(materials: Materials, mesh: Mesh, c2_over_c1: float) -> Material
 
 
 def _asymmetric(materials: Materials, mesh: Mesh, excess: float) -> Materials:
-    """Struts stiffer by `excess` where the lattice shortens; below 0 less stiff there, as if they buckled.
+    """Lattice stiffer by `excess` where it shortens; below 0 less stiff there, as if its struts buckled.
 
     In parallel with the lattice's law a foam that resists one side only; for less stiff struts it resists
     tension, and takes the place of as much of the law. Two such foams are the lattice at small strain.
     """
-    lattice_, rest = parted(materials, mesh, LATTICE)
-    elements, E, nu = _elastic(materials, mesh, LATTICE)
+    inside = _in_region(mesh, LATTICE)
+    lattice_, rest = parted(materials, inside)
+    elements, E, nu = _elastic(materials, inside)
     both = Foam.parameters(E, nu, 2.0, 2.0)
     both[:, 2 if excess < 0 else 0] *= NEXT_TO_NOTHING
     both[:, 4] /= 2
@@ -247,20 +264,21 @@ def _asymmetric(materials: Materials, mesh: Mesh, excess: float) -> Materials:
 def _layered(materials: Materials, mesh: Mesh, in_plane: float) -> Materials:
     """The wall stiffer along the print's layers, which lie across the axis; the lattice as it is.
 
-    All struts of a body-centred cell make one angle with the layers: to them it is another modulus.
+    All struts of a body-centred cell make one angle with the layers: to a homogenised lattice it is another
+    modulus. Struts of a resolved mesh are printed in layers, too.
     """
-    wall, rest = parted(materials, mesh, MEMBRANE)
+    wall, rest = parted(materials, _in_region(mesh, MEMBRANE))
     layered: list[Layer] = []
     for layer in wall:
-        # The unit's membrane is neo-Hookean, alike everywhere.
+        # The unit's resin is neo-Hookean, alike everywhere but for its skin, which is only stiffer.
         shear, bulk = layer.parameters[0]
         added, share = layer_stiffness(1 + in_plane, float(shear), float(bulk))
         less = min(added, 0.0)
-        base = layer.parameters + np.array([less / 2, less / 3])
+        base = layer.parameters[0] + np.array([less / 2, less / 3])
         more = Layered.parameters(max(added, 0.0), -less, LAYER_NORMAL)
-        more = np.tile(more, (len(layer.elements), 1))
-        layered += _shares((attrs.evolve(layer, parameters=base),), share)
-        layered.append(Layer(Layered, layer.elements, more, share * layer.weight))
+        weight = share * layer.weight * (layer.parameters[:, 0] / shear)
+        for law, row in ((layer.law, base), (Layered, more)):
+            layered.append(Layer(law, layer.elements, np.tile(row, (len(layer.elements), 1)), weight))
     return Materials((*layered, *rest))
 
 

@@ -23,8 +23,8 @@ from ..fem.state import State
 from ..fem.trajectory import branches
 from ..measured import Experiment
 from ..meshing.mesh import AXES
-from ..meshing.settings import MeshSettings
-from ..meshing.unit import mesh_unit
+from ..meshing.settings import RESOLVED, MeshSettings
+from ..resolved.unit import mesh_of
 from ..run.cache import Cache
 from ..run.pool import each
 from ..run.processes import cores
@@ -32,7 +32,7 @@ from .markers import Marker, attached, material_points
 from .prediction.flat_obstacle import NAME as CONTACT
 from .prediction.flat_obstacle import NEAREST, ObstacleResponse
 from .prediction.unit import KIND, UnitResponse, Variant
-from .unit_effects import EFFECTS, FLAT_OBSTACLE, SMOOTH, Body, UnitEffect, with_flat_obstacle
+from .unit_effects import EFFECTS, FLAT_OBSTACLE, Body, UnitEffect, with_flat_obstacle
 
 Array = np.ndarray[Any, Any]
 Progress = Callable[[str, float], None]
@@ -46,6 +46,9 @@ FEWEST = 4
 COARSE = MeshSettings(refine=0.6, meridian_mm=0.9)
 # Finer in all its sizes: what a mesh misses along the meridian is another curve than the rest of it.
 FINE = MeshSettings(meridian_mm=1.0)
+# A printed unit's struts need five layers each, and finer ones as much time again.
+STRUTS = MeshSettings(fidelity=RESOLVED)
+STRUTS_FINE = MeshSettings(fidelity=RESOLVED, refine=1.2)
 # Share of the progress that walls take.
 CONTACT_SHARE = 0.2
 # Walls as shares of how far the free unit gets, pressures as shares of the way on from where one is met.
@@ -77,6 +80,11 @@ class UnitSettings:
     lattice: LatticeLaw | None = None
     farthest_mm: float = 4.0
     workers: int = attrs.field(factory=cores)
+
+    @classmethod
+    def of(cls, fidelity: str) -> UnitSettings:
+        """The settings by which a unit is simulated homogenised or resolved (`MeshSettings.fidelity`)."""
+        return cls(mesh=STRUTS, finer=STRUTS_FINE) if fidelity == RESOLVED else cls()
 
     def __attrs_post_init__(self) -> None:
         for name in self.effects:
@@ -138,7 +146,7 @@ class Run:
             # No such body: its failure is kept, too.
             body, effect = self.body, _effect(self.effect)
         parts = [REVISION, body.unit.hash(), attrs.astuple(body.mesh), self.pressures_kPa, self.points]
-        parts += [effect.newton if effect else SMOOTH, body.lattice.hash() if body.lattice else ""]
+        parts += [body.newton(effect), body.lattice.hash() if body.lattice else ""]
         if body.drawn:
             parts += [body.drawn.hash()]
         if effect:
@@ -180,8 +188,7 @@ def run(case: Run, cache: Path | None = None) -> Result:
             model = effect.model(body, mesh, case.size)
         if effect and effect.load:
             model.load = effect.load(body, mesh, case.size)
-        newton = effect.newton if effect else SMOOTH
-        equilibrium = Equilibrium(model, materials, newton, explains=not case.effect)
+        equilibrium = Equilibrium(model, materials, body.newton(effect), explains=not case.effect)
         # Out of reach, it only lends the points at which the unit would touch.
         outline = with_flat_obstacle(body, mesh, 1e6).obstacles[0] if case.outline else None
         places = slice(1, 1 + 3 * len(case.points))
@@ -335,7 +342,7 @@ class _Plan:
         here = [e for e in chosen if e.scale == scale]
         scaled = attrs.evolve(unit, scale=scale)
         readings = np.concatenate([e["pressure_kPa"] for e in here])
-        mesh = mesh_unit(scaled, settings.mesh, cache=cache)
+        mesh = mesh_of(scaled, settings.mesh, cache=cache)
         reduced = similar(scaled)
         body = Body(reduced, settings.mesh, settings.finer, settings.distal, settings.lattice)
         markers = attached(mesh, here, settings.farthest_mm * scale)

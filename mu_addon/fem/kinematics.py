@@ -111,7 +111,8 @@ class TipSection:
 def bending_angle_deg(mesh: Mesh, u: Array) -> float:
     """Rotation of the tip's cross-section against the fixed base, positive toward +y, in degrees.
 
-    Area-weighted best-fit rotation (orthogonal Procrustes) of the end plane in the sagittal (y, z) plane.
+    Area-weighted best-fit rotation (orthogonal Procrustes) of the end plane in the sagittal (y, z) plane: of
+    cap and lattice, or of a resolved unit's cap and ends of struts.
     Toward +y because that is how the unit bends when pressure grows; as a right-hand rotation about x it is
     negative. u: (n, 3) in mm. For many states of one mesh, `TipSection` finds the plane once.
     """
@@ -119,19 +120,19 @@ def bending_angle_deg(mesh: Mesh, u: Array) -> float:
 
 
 def _tip_areas(mesh: Mesh) -> tuple[Array, Array]:
-    """Tip nodes with weights that integrate over the end plane, a third of a triangle a node.
+    """Tip nodes with weights that integrate over what fills the end plane, a third of a triangle a node.
 
     On quadratic triangles these nodes are the mid-edge ones, which makes the rule exact to degree 2.
     """
     height = mesh.nodes[mesh.tip[0], 2]
     faces, owner = boundary_faces(mesh.tets)
     on_tip = (mesh.nodes[faces][:, :, 2] == height).all(axis=1)
-    if mesh.resolved:
-        # Struts end in the same plane beside the cap.
-        on_tip &= np.isin(faces, mesh.tip).all(axis=1)
     faces, owner = faces[on_tip], owner[on_tip]
     a, b, c = (mesh.nodes[faces[:, i]] for i in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    if mesh.resolved:
+        # Struts end in the same plane beside the cap; what of them lies within it counts once.
+        area *= mesh.filled[owner].mean(axis=1)
     if mesh.order == 2:
         faces = np.array([_middles(mesh.tets[e], face) for e, face in zip(owner, faces, strict=True)])
     weight = np.zeros(len(mesh.nodes))

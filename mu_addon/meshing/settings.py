@@ -9,7 +9,7 @@ import attrs
 from ..errors import InputError
 
 FRACTIONS = ("half", "quarter", "full")
-FIDELITIES = ("resolved", "homogenised")
+FIDELITIES = RESOLVED, HOMOGENISED = ("resolved", "homogenised")
 CELL_MM = 12.5
 """The cell, in mm, that the element sizes are given for."""
 
@@ -56,12 +56,12 @@ class MeshSettings:
     through_wall: int = attrs.field(default=1, validator=_between(1, 8))
     anchor_mm: float = attrs.field(default=2.5, validator=_between(0.1, 100.0))
     envelope_mm: float = attrs.field(default=14.0, validator=_between(0.1, 100.0))
-    fidelity: str = attrs.field(default="homogenised", validator=_one_of(*FIDELITIES))
+    fidelity: str = attrs.field(default=HOMOGENISED, validator=_one_of(*FIDELITIES))
 
     def table(self) -> dict[str, Any]:
         """The settings as a file of inputs has them; fidelity only where it is not homogenised."""
         found = attrs.asdict(self)
-        if self.fidelity == "homogenised":
+        if self.fidelity == HOMOGENISED:
             # As files were written before there was another.
             del found["fidelity"]
         return found

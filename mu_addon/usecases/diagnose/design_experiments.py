@@ -17,8 +17,10 @@ from ...evidence.noise import Source
 from ...evidence.record import KNOWN, Record, record
 from ...evidence.sensitivity import Sensitivity, sensitivities, similarity
 from ...evidence.simulator import Composite
+from ...evidence.unit_fem import UnitSettings
 from ...files import write_csv, write_text
 from ...measured import Experiment, Measured, read_folder
+from ...meshing.settings import FIDELITIES, HOMOGENISED
 from ...report.html import facts_table, note, page, table
 from ...run.context import RunContext
 from ...run.folder import FolderLayout
@@ -27,7 +29,7 @@ from ...run.usecase import UseCase
 from ...run.versions import package_versions
 from ...toml_writer import toml_text
 from ..measured_data import described, experiments_digest, require_same_data
-from .job import UNIT, unit_behind
+from .job import UNIT, fidelity_in, unit_behind
 from .simulators import simulators_of
 from .words import bare, listed, readable
 
@@ -86,12 +88,14 @@ class Job:
     """Inputs of a design of experiments.
 
     measured: laid out as for `diagnose`; what would be measured may hold any numbers. unit: the preset
-    without one. noise: standard deviation of a reading, by quantity.
+    without one. noise: standard deviation of a reading, by quantity. fidelity: whether the unit is simulated
+    homogenised or resolved.
     """
 
     measured: Measured
     unit: Unit | None = None
     noise: Mapping[str, float] = attrs.field(factory=lambda: dict(NOISE))
+    fidelity: str = attrs.field(default=HOMOGENISED, validator=attrs.validators.in_(FIDELITIES))
 
     @property
     def subject(self) -> Unit | None:
@@ -104,6 +108,7 @@ class Job:
             "format": FORMAT,
             "experiments_sha256": experiments_digest(self.measured),
             **self.noise,
+            "fidelity": None if self.fidelity == HOMOGENISED else self.fidelity,
             "data": described(self.measured),
             "run": {"data": str(self.measured.folder.resolve())},
         }
@@ -119,7 +124,7 @@ def read_job(folder: Path) -> Job:
     require_same_data(measured, values.get("data"), described(measured))
     unit = folder / UNIT
     noise = noise_of([f"{name}={values[name]}" for name in NOISE if name in values])
-    return Job(measured, read_unit(unit) if unit.is_file() else None, noise)
+    return Job(measured, read_unit(unit) if unit.is_file() else None, noise, fidelity_in(values, path))
 
 
 def design_experiments(job: Job, folder: Path, context: RunContext) -> Plan:
@@ -128,7 +133,10 @@ def design_experiments(job: Job, folder: Path, context: RunContext) -> Plan:
     Raises InputError, OutputError.
     """
     measured, progress = job.measured, context.progress
-    simulators, remarks = simulators_of(measured.experiments, job.subject, folder / "cache", progress)
+    settings = UnitSettings.of(job.fidelity)
+    simulators, remarks = simulators_of(
+        measured.experiments, job.subject, folder / "cache", progress, settings
+    )
     simulator = Composite(simulators)
     with progress.stage("sensitivities", expected_s=5.0):
         found = plan(measured.experiments, simulator, job.noise)

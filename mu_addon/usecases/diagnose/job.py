@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import attrs
 
@@ -15,6 +15,7 @@ from ...errors import InputError
 from ...evidence.prediction import unit as unit_pressure
 from ...measured import Experiment, Measured, read_folder
 from ...measured.folder import FILE
+from ...meshing.settings import FIDELITIES, HOMOGENISED
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, named_path, read_inputs
 from ...toml_writer import toml_text
@@ -38,12 +39,14 @@ class Job:
     """Inputs of a diagnosis.
 
     unit: what unit_pressure experiments and blocks of counted cells are of, whatever its scale; the preset
-    `PRESET` without one. settings: how it is simulated.
+    `PRESET` without one. fidelity: whether it is simulated homogenised or resolved. settings: how it is
+    simulated, where not as its fidelity has it.
     """
 
     measured: Measured
     unit: Unit | None = None
     settings: UnitSettings | None = None
+    fidelity: str = attrs.field(default=HOMOGENISED, validator=attrs.validators.in_(FIDELITIES))
 
     def __attrs_post_init__(self) -> None:
         if not any(e.role == "fit" for e in self.measured.experiments):
@@ -58,6 +61,13 @@ class Job:
         """The unit that the experiments are of."""
         return unit_behind(self.measured.experiments, self.unit)
 
+    @property
+    def unit_settings(self) -> UnitSettings:
+        """How the unit is simulated."""
+        from ...evidence.unit_fem import UnitSettings
+
+        return self.settings or UnitSettings.of(self.fidelity)
+
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; diagnose.toml is the first."""
         values = {
@@ -65,6 +75,7 @@ class Job:
             "experiments_sha256": experiments_digest(self.measured),
             "program_sha256": _program(),
             "settings": None if self.settings is None else repr(self.settings),
+            "fidelity": None if self.fidelity == HOMOGENISED else self.fidelity,
             "data": described(self.measured),
             "run": {"data": str(self.measured.folder.resolve())},
         }
@@ -81,7 +92,17 @@ def read_job(folder: Path) -> Job:
     measured = read_folder(named_path(path, run, "data", "folder of measured data"))
     require_same_data(measured, values.get("data"), described(measured))
     unit = folder / UNIT
-    return Job(measured, read_unit(unit) if unit.is_file() else None)
+    return Job(measured, read_unit(unit) if unit.is_file() else None, fidelity=fidelity_in(values, path))
+
+
+def fidelity_in(values: Mapping[str, Any], path: Path) -> str:
+    """The fidelity that a file of inputs names, homogenised where it names none; raises InputError."""
+    found = values.get("fidelity", HOMOGENISED)
+    if found not in FIDELITIES:
+        raise InputError(
+            f"fidelity = {found!r} is unknown", str(path), f"write one of {', '.join(FIDELITIES)}"
+        )
+    return str(found)
 
 
 def unit_behind(experiments: Sequence[Experiment], unit: Unit | None = None) -> Unit | None:

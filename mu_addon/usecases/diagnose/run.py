@@ -68,7 +68,9 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | No
     if "verdict" in context.summary:
         with progress.stage("verdict of the same data, from the cache"):
             return None
-    simulators, notes = simulators_of(measured.experiments, unit, folder / "cache", progress, job.settings)
+    simulators, notes = simulators_of(
+        measured.experiments, unit, folder / "cache", progress, job.unit_settings
+    )
     simulator = Composite(simulators)
     with _stages(progress, simulator) as on_model:
         verdict = diagnose(measured.experiments, simulator, on_model)
