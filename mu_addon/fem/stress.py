@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import attrs
 import numpy as np
 
 from ..errors import InputError
 from ..meshing.mesh import TET_EDGES
-from .elements import reference_gradients, tet_quadrature
-from .lattice_law import deformation_gradients
+from .elements import reference_gradients, shape_functions, tet_quadrature
+from .lattice_law import deformation_gradients, stretches
 from .point import stress
 
 if TYPE_CHECKING:
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from .materials import Materials
 
 Array = np.ndarray[Any, Any]
+
+_CUT_AWAY = 1e-6
 
 
 def cauchy(mesh: Mesh, u: Array, materials: Materials, history: Sequence[Array] = ()) -> tuple[Array, Array]:
@@ -59,11 +62,48 @@ def von_mises(sigma: Array) -> Array:
     return np.asarray(np.sqrt(1.5 * np.einsum("...ij,...ij->...", deviator, deviator)))
 
 
+@attrs.frozen(eq=False)
+class PeakStretch:
+    """The largest principal stretch in a region of a deformed body.
+
+    largest: of all quadrature points; place_mm (3,): where, in the undeformed body. exceeded: the stretch
+    that 1 % of the region's volume exceeds; the largest depends on the mesh where struts meet a wall.
+    """
+
+    largest: float
+    place_mm: Array
+    exceeded: float
+
+
+def peak_stretch(mesh: Mesh, u: Array, region: int) -> PeakStretch:
+    """The largest principal stretch of a region under displacements u (n, 3) in mm.
+
+    Points of a resolved mesh's struts of which less than half is filled do not count.
+    """
+    elements = np.flatnonzero(mesh.region == region)
+    F, volumes = deformation_gradients(mesh, u, elements)
+    largest = stretches(F)[..., 2]
+    if mesh.resolved:
+        share = mesh.filled[elements]
+        volumes = np.where(share < 0.5, 0.0, volumes * share)
+        largest = np.where(share < 0.5, 0.0, largest)
+    element, point = np.unravel_index(largest.argmax(), largest.shape)
+    shape = shape_functions(tet_quadrature(mesh.order)[0], mesh.order)[point]
+    order = np.argsort(-largest, axis=None)
+    above = np.cumsum(volumes.ravel()[order])
+    rank = np.searchsorted(above, 0.01 * above[-1])
+    return PeakStretch(
+        float(largest.max()),
+        shape @ mesh.nodes[mesh.tets[elements[element]]],
+        float(largest.ravel()[order[rank]]),
+    )
+
+
 class NodalMean:
     """Values at the quadrature points of some elements (e,) of a mesh, carried to the nodes.
 
     They go on linearly from the points to an element's nodes (its mean where it has one point) and are
-    averaged over the elements around a node, by volume.
+    averaged over the elements around a node, by volume; of a resolved mesh by what of it is filled.
     """
 
     def __init__(self, mesh: Mesh, elements: Array) -> None:
@@ -74,6 +114,9 @@ class NodalMean:
         middles = corners[TET_EDGES].mean(axis=1)
         self._to_nodes = corners if mesh.order == 1 else np.vstack([corners, middles])
         volumes = reference_gradients(mesh.nodes, tets).volumes.sum(axis=1)
+        if mesh.resolved:
+            # What is cut away follows its neighbours: it counts only where nothing else is.
+            volumes *= np.maximum(mesh.filled[elements].mean(axis=1), _CUT_AWAY)
         self.nodes, place = np.unique(tets, return_inverse=True)
         self._place = place.reshape(tets.shape)
         self._share = (

@@ -22,6 +22,7 @@ BY_START = ("-", "--", ":", "-.")
 INK, QUIET, GRID = "#222222", "#8A8F98", "#E3E6EA"
 WIDTH = 4.0  # inches: at a phone's width the text is still 10 pixels high
 MAP = "viridis"  # perceptually uniform, and monotone in grey
+STRETCH_MAP = "YlOrRd"  # light where nothing is stretched: a shaded surface in a dark colour shows no shape
 
 _STYLE: Any = {
     "axes.axisbelow": True,
@@ -230,6 +231,27 @@ def color_bar(top: float) -> str:
         ticks = [0.0, *series[(series > 0.01 * top) & (series <= top)]]
         bar = figure.colorbar(mappable, cax=axes, orientation="horizontal", ticks=ticks, format="%g")
         bar.set_label("deviation Δ [mm]", fontsize=8, labelpad=2)
+        bar.outline.set_linewidth(0.6)
+    return svg()
+
+
+def stretch_colors(stretch: Floats, top: float) -> Floats:
+    """sRGB (n, 3) of largest principal stretches (n,), from 1 to `top`, as in `stretch_bar`."""
+    from matplotlib import colormaps
+
+    return np.asarray(colormaps[STRETCH_MAP](np.clip((stretch - 1.0) / (top - 1.0), 0.0, 1.0))[:, :3])
+
+
+def stretch_bar(top: float) -> str:
+    """SVG of the colour scale of largest principal stretches from 1 to `top`."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    with canvas(WIDTH, 0.62) as (figure, svg):
+        axes = figure.add_axes((0.04, 0.68, 0.92, 0.26))
+        mappable = ScalarMappable(Normalize(1.0, top), STRETCH_MAP)
+        bar = figure.colorbar(mappable, cax=axes, orientation="horizontal", format="%.3g", extend="max")
+        bar.set_label("largest principal stretch", fontsize=8, labelpad=2)
         bar.outline.set_linewidth(0.6)
     return svg()
 

@@ -92,6 +92,26 @@ class LatticeSearch:
     risk: float  # probability, at most, that an unsolved path is better
 
 
+STRETCH_COLUMNS = (
+    "pressure_kPa",
+    "part",
+    "largest_stretch",
+    "x_mm",
+    "y_mm",
+    "z_mm",
+    "exceeded_by_1_percent_of_volume",
+)
+"""Of stretch.csv: the largest principal stretch of each part, and where at rest."""
+
+
+@attrs.frozen(eq=False)
+class StretchPictures:
+    """States painted by their largest principal stretch, on one scale from 1 to `top`."""
+
+    pictures: Sequence[Picture]
+    top: float
+
+
 CONTACT_COLUMNS = (
     "time_s",
     "pressure_kPa",
@@ -238,6 +258,8 @@ class ReportData:
     search_picture: Picture | None = None
     light: Signals | None = None
     contact: ContactHistory | None = None
+    stretch: Sequence[tuple[Any, ...]] = ()  # rows of STRETCH_COLUMNS
+    stretched: StretchPictures | None = None
     effects: Sequence[str] = ()  # that measured data named and the simulation has, in words
     pressure_kPa: Floats = attrs.field(factory=lambda: np.zeros(0))  # per converged state
     angle_deg: Floats = attrs.field(factory=lambda: np.zeros(0))

@@ -80,26 +80,26 @@ def motion(
     states: Sequence[tuple[Floats, str, str]],
     width: int = 560,
     beside: Sequence[RigidBody] = (),
+    colors: Sequence[dict[int, Floats]] = (),
 ) -> list[Picture]:
     """One picture for each state, all to one scale, of the mesh cut open along its sagittal plane.
 
     A state is displacement (n, 3) in mm, caption and alternative text. beside: rigid bodies, of which the
-    part at x <= 0 and within the picture is shown; width: in pixels.
+    part at x <= 0 and within the picture is shown; width: in pixels. colors: of each state, by region, sRGB
+    (n, 3) of every node, in place of one colour a region.
     """
-    skins = {region: skin(mesh.tets[mesh.region == region]) for region in (MEMBRANE, LATTICE)}
-    colors = {MEMBRANE: MEMBRANE_COLOR, LATTICE: LATTICE_COLOR}
+    skins = {region: region_skin(mesh, region) for region in (MEMBRANE, LATTICE)}
+    plain = {MEMBRANE: MEMBRANE_COLOR, LATTICE: LATTICE_COLOR}
     # A half mesh lies at x >= 0; its mirror image shows the same section to a viewer at +x.
     flip = mesh.nodes[:, 0].min() > -1e-9
     scenes = []
-    for displacement, _, _ in states:
+    for number, (displacement, _, _) in enumerate(states):
+        color = colors[number] if colors else plain
         nodes = mesh.nodes + displacement
         if flip:
             nodes = nodes * [-1.0, 1.0, 1.0]
         scenes.append(
-            [
-                Part(nodes, faces[:, ::-1] if flip else faces, colors[region])
-                for region, faces in skins.items()
-            ]
+            [Part(nodes, faces[:, ::-1] if flip else faces, color[region]) for region, faces in skins.items()]
         )
     every = [part for scene in scenes for part in scene]
     standing = _behind(beside)
@@ -134,6 +134,15 @@ def _behind(bodies: Sequence[RigidBody]) -> list[Part]:
                 Part(vertices, np.asarray(mesh.tri_verts).astype(np.int64), OBSTACLE_COLOR, whole=True)
             )
     return found
+
+
+def region_skin(mesh: Mesh, region: int) -> NDArray[np.int64]:
+    """Outward triangles (f, 3) on the boundary of a region of a mesh, four for a face with mid nodes.
+
+    Struts of a resolved mesh end where they are tied: what of them lies within the wall is left out.
+    """
+    triangles = skin(mesh.tets[mesh.region == region])
+    return triangles[~np.isin(triangles, mesh.tied).all(axis=1)]
 
 
 def skin(tets: NDArray[np.integer]) -> NDArray[np.int64]:

@@ -1,5 +1,6 @@
 """Stress at the nodes against closed forms: uniform states exactly, a thick sphere under pressure nearly."""
 
+import attrs
 import numpy as np
 import pytest
 
@@ -9,7 +10,7 @@ from mu_addon.fem.laws import NeoHooke, OgdenRoxburgh
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import NewtonSettings
 from mu_addon.fem.state import rest
-from mu_addon.fem.stress import NodalMean, cauchy, von_mises
+from mu_addon.fem.stress import NodalMean, cauchy, peak_stretch, von_mises
 
 from . import bodies, thick
 
@@ -69,3 +70,29 @@ def test_a_law_with_history_is_refused():
     materials = bodies.everywhere(mesh, OgdenRoxburgh, *np.ones(len(OgdenRoxburgh.parameter_names)))
     with pytest.raises(InputError, match="how the state was reached"):
         cauchy(mesh, np.zeros_like(mesh.nodes), materials)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_uniform_stretch_is_the_peak_and_what_all_exceeds(order):
+    mesh = bodies.box((2, 2, 2), (1.0, 2.0, 1.5), order=order, jiggle=0.1)
+    F = np.diag([0.9, 0.9, 1.3])
+    found = peak_stretch(mesh, mesh.nodes @ (F - np.eye(3)).T, mesh.region[0])
+    assert found.largest == pytest.approx(1.3)
+    assert found.exceeded == pytest.approx(1.3)
+
+
+def test_the_peak_stretch_is_told_with_its_place_and_without_what_is_cut_away():
+    mesh = bodies.box((4, 1, 4), (1.0, 1.0, 4.0))
+    u = np.zeros_like(mesh.nodes)
+    u[:, 2] = 0.05 * mesh.nodes[:, 2] ** 2
+    found = peak_stretch(mesh, u, mesh.region[0])
+    z = found.place_mm[2]
+    assert z > 3.7
+    assert found.largest == pytest.approx(1 + 0.1 * z)
+    # A hundredth of the volume is the uppermost 0.04 mm, less than between two points.
+    assert found.largest - 0.02 < found.exceeded <= found.largest
+    low = mesh.nodes[mesh.corners].mean(axis=1)[:, 2] < 2.0
+    cut = attrs.evolve(mesh, filled=np.where(low[:, None], 1.0, 0.3) * np.ones((1, 4)))
+    left = peak_stretch(cut, u, mesh.region[0])
+    assert left.place_mm[2] < 2.0
+    assert left.largest == pytest.approx(1 + 0.1 * left.place_mm[2])

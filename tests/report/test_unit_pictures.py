@@ -2,14 +2,18 @@
 
 import io
 
+import attrs
 import numpy as np
 import pytest
 from PIL import Image
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.meshing.mesh import LATTICE, MEMBRANE, Mesh, mirror, second_order
+from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report import unit_pictures as pictures
 from mu_addon.report.render import Part
+from mu_addon.report.unit_pictures import region_skin, skin
+from mu_addon.resolved.unit import mesh_printed
 
 
 def cube(order, low=(0.0, -1.0, 0.0), high=(1.0, 1.0, 2.0)):
@@ -120,3 +124,16 @@ def test_portrait_is_opaque_white_around_the_unit():
     image = pictures.portrait([body], np.zeros((0, 3)), np.zeros((0, 3)), 1.0, width=120)
     assert image[0, 0].tolist() == [255, 255, 255, 255]
     assert (image[..., :3] < 230).any(axis=2).mean() > 0.5
+
+
+def test_struts_of_a_resolved_unit_are_drawn_up_to_their_wall():
+    """No triangle of a strut lies within the wall by all its nodes, and none of those outside is missing."""
+    unit = load_preset("mu-1.0x")
+    unit = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3))
+    mesh = mesh_printed(unit, MeshSettings(fidelity="resolved", refine=0.5))
+    drawn = region_skin(mesh, LATTICE)
+    every = skin(mesh.tets[mesh.region == LATTICE])
+    within = np.isin(every, mesh.tied).all(axis=1)
+    assert within.any()
+    assert np.array_equal(drawn, every[~within])
+    assert np.array_equal(region_skin(mesh, MEMBRANE), skin(mesh.tets[mesh.region == MEMBRANE]))

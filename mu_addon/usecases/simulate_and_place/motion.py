@@ -268,9 +268,9 @@ class SurfaceFields:
 
 def surface_of(mesh: Mesh, region: int) -> Surface:
     """Surface of a region of a mesh."""
-    from ...report.unit_pictures import skin
+    from ...report.unit_pictures import region_skin
 
-    triangles = skin(mesh.tets[mesh.region == region])
+    triangles = region_skin(mesh, region)
     node, numbered = np.unique(triangles, return_inverse=True)
     cut = np.zeros(len(triangles), bool)
     if "x" in mesh.symmetry:

@@ -318,7 +318,27 @@ def _motion(r: ReportData) -> str:
         html += (
             '<div class="triple">' + "".join(picture_figure(picture) for picture in r.pictures[1:]) + "</div>"
         )
-    return html
+    return html + _stretch(r)
+
+
+def _stretch(r: ReportData) -> str:
+    """How far wall and lattice are stretched: painted on the extreme states, and in numbers for all."""
+    if not r.stretch:
+        return ""
+    html = "<h3>Stretch</h3>"
+    if r.stretched is not None:
+        bar = figure(plots.stretch_bar(r.stretched.top), "", "Colour scale of the stretch.", "bar")
+        shown = "".join(picture_figure(picture) for picture in r.stretched.pictures)
+        html += f"{bar}<div class='pair'>{shown}</div>"
+    columns = ["largest stretch", "x [mm]", "y [mm]", "z [mm]", "1 % of volume exceeds"]
+    head = [("pressure [kPa]", "n"), ("part", ""), *((name, "n") for name in columns)]
+    rows = [([signed(row[0]), row[1], *map(signed, row[2:])], False) for row in r.stretch]
+    return html + table(
+        "Largest principal stretch of each part without a sensor, and where it is at rest. Compare it with "
+        "the resin's elongation at break; the largest value depends on the mesh where a strut meets a wall.",
+        head,
+        rows,
+    )
 
 
 def _contact(r: ReportData) -> str:

@@ -9,8 +9,20 @@ import numpy as np
 
 from ...design.parameters import assumed, stated
 from ...evidence.unit_effects import EFFECTS
+from ...fem.lattice_law import deformation_gradients, stretches
+from ...fem.stress import NodalMean
 from ...files import write_bytes
-from ...report.results import Gate, Parameter, Path, Picture, ReportData, RuleResult, SideView
+from ...meshing.mesh import LATTICE, MEMBRANE
+from ...report.results import (
+    Gate,
+    Parameter,
+    Path,
+    Picture,
+    ReportData,
+    RuleResult,
+    SideView,
+    StretchPictures,
+)
 from ...run.versions import package_versions
 from .job import LATTICE_LAW
 
@@ -32,6 +44,7 @@ FILES = {
     "mesh.vtu": "analysis mesh with regions and moduli",
     "model_a.pvd": "motion without a sensor, one state per sample (ParaView)",
     "angle.csv": "bending angle of every converged state",
+    "stretch.csv": "largest principal stretch of wall and lattice in every state, and where",
     "contact.csv": "contact force, penetration and slip on each obstacle over time",
     "deviation.csv": "deviation and rank of every path and rule",
     "delta.npz": "deviation over time and length of every path and rule, mm",
@@ -112,6 +125,8 @@ def report_data(
         search_picture=search_picture,
         light=study.light,
         contact=study.contact,
+        stretch=tuple(study.stretch),
+        stretched=_stretched(study),
         effects=tuple(_effect_words(job.effects)),
         pressure_kPa=np.array([s.pressure_kPa for s in states]),
         angle_deg=np.array([study.bending_angle_deg(s.u) for s in states if study.mesh]),
@@ -276,6 +291,36 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
             texts.append((state.u, words, f"The analysis mesh at {words}."))
         pictures += motion(study.mesh, texts, beside=study.job.obstacles)
     return side_view(parts, study.anchors, path, radius), pictures
+
+
+def _stretched(study: Study) -> StretchPictures | None:
+    """The states of least and largest pressure painted by how far they are stretched."""
+    from ...report.charts import stretch_colors
+    from ...report.unit_pictures import motion
+
+    if study.trajectory is None or study.mesh is None:
+        return None
+    mesh = study.mesh
+    states = sorted(study.trajectory.states, key=lambda s: s.pressure_MPa)
+    shown = [s for s in dict.fromkeys((states[0], states[-1])) if s.loaded]
+    means = {region: NodalMean(mesh, np.flatnonzero(mesh.region == region)) for region in (MEMBRANE, LATTICE)}
+    painted = []
+    for state in shown:
+        F, _ = deformation_gradients(mesh, state.u, np.arange(len(mesh.tets)))
+        by_region = {}
+        for region, mean in means.items():
+            by_region[region] = np.ones(len(mesh.nodes))
+            by_region[region][mean.nodes] = stretches(mean(F))[:, 2]
+        painted.append(by_region)
+    # Single nodes where a strut meets the wall are no reason to darken the rest.
+    every = np.concatenate([values[means[r].nodes] for paint in painted for r, values in paint.items()])
+    top = max(1.01, float(np.quantile(every, 0.999)))
+    texts = []
+    for state in shown:
+        words = f"{state.pressure_kPa:g} kPa"
+        texts.append((state.u, words, f"The deformed unit at {words}, coloured by stretch."))
+    colors = [{r: stretch_colors(values, top) for r, values in paint.items()} for paint in painted]
+    return StretchPictures(motion(mesh, texts, colors=colors), top)
 
 
 def _search_picture(study: Study) -> Picture | None:

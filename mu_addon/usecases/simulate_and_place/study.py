@@ -27,18 +27,25 @@ from ...fem.model import Model
 from ...fem.obstacle import ObstacleContact
 from ...fem.self_intersection import first_self_intersection
 from ...fem.state import State, rest
+from ...fem.stress import peak_stretch
 from ...fem.time_stepping import Instant, simulate_in_time
 from ...fem.trajectory import Trajectory, simulate
 from ...files import write_csv, write_npz
 from ...homogenize.foam_response import ellipticity
-from ...meshing.mesh import LATTICE, Mesh
+from ...meshing.mesh import LATTICE, MEMBRANE, Mesh
 from ...meshing.quality import Quality, mesh_quality
 from ...meshing.settings import MeshSettings
 from ...meshing.unit import MeshingWarning
 from ...placement.candidates import Candidate, Evaluation, candidate_paths
 from ...placement.deviation import rank
 from ...reading import file_bytes, parse_json
-from ...report.results import CONTACT_COLUMNS, ContactHistory, LatticeSearch, Signals
+from ...report.results import (
+    CONTACT_COLUMNS,
+    STRETCH_COLUMNS,
+    ContactHistory,
+    LatticeSearch,
+    Signals,
+)
 from ...report.vtk import write_mesh, write_trajectory
 from ...resolved.lattice import strut_volume_mm3
 from ...resolved.unit import mesh_of
@@ -83,6 +90,7 @@ class Study:
     warnings: list[str] = attrs.field(factory=list)
     solver: dict[str, Any] = attrs.field(factory=dict)
     contact: ContactHistory | None = None
+    stretch: list[tuple[str, ...]] = attrs.field(factory=list)
     search: LatticeSearch | None = None
     light: Signals | None = None
     _ahead: CandidateSolver | None = None
@@ -244,6 +252,7 @@ class Study:
                 raise
             self._write_motion(self.trajectory.states)
             self._write_contact()
+            self._write_stretch(self.trajectory.states)
             materials = self.job.materials(self.mesh)
             write_model_a(self.folder, self.mesh, materials, self.trajectory, self._remembered(model))
             self._look_for_self_intersection(self.trajectory.states)
@@ -416,6 +425,19 @@ class Study:
             return
         write_csv(self.folder / "contact.csv", CONTACT_COLUMNS, self.contact.rows())
         self.context.summary["contact"] = self.contact.summary()
+
+    def _write_stretch(self, states: tuple[State, ...]) -> None:
+        """How far wall and lattice are stretched in every state, and where most."""
+        assert self.mesh is not None
+        self.stretch = []
+        struts = "struts" if self.mesh.resolved else "homogenised lattice"
+        for state in states:
+            for part, region in (("wall", MEMBRANE), (struts, LATTICE)):
+                peak = peak_stretch(self.mesh, state.u, region)
+                place = (f"{x:.2f}" for x in peak.place_mm)
+                values = (f"{peak.largest:.4f}", *place, f"{peak.exceeded:.4f}")
+                self.stretch.append((f"{state.pressure_kPa:.6g}", part, *values))
+        write_csv(self.folder / "stretch.csv", list(STRETCH_COLUMNS), self.stretch)
 
     def _look_for_self_intersection(self, states: tuple[State, ...]) -> None:
         """Name the first pressure, on either side, at which walls pass through each other, and which."""

@@ -39,6 +39,7 @@ LAYOUT = FolderLayout(
         "model_a.pvd",
         "model_a",
         "angle.csv",
+        "stretch.csv",
         "contact.csv",
         "deviation.csv",
         "delta.npz",
