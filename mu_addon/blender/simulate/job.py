@@ -44,7 +44,7 @@ def job_of(root: Any) -> Job:
         if settings.command == "place":
             extra |= {"rules": ("volume_fraction",), "mesh_check": False}
     elif settings.detail == "resolved":
-        extra["mesh"] = MeshSettings(fidelity="resolved")
+        extra |= {"mesh": MeshSettings(fidelity="resolved"), "self_contact": settings.self_contact}
     body = bodies.envelope_in(root, unit)
     if body is not None:
         require_paths_inside(unit, body, stages, settings.paths)

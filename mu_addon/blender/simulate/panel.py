@@ -32,6 +32,8 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
         if study.command == "place":
             layout.prop(study, "paths")
         layout.prop(study, "detail")
+        if study.detail == "resolved":
+            layout.prop(study, "self_contact")
         layout.prop(study, "protocol")
         _effects(layout, root)
         child = SIMULATION.child(root)

@@ -138,6 +138,11 @@ class MU_PG_study(bpy.types.PropertyGroup):
         ],
         default="full",
     )
+    self_contact: BoolProperty(
+        name="Self-Contact",
+        description="Keep walls and struts apart where they meet under vacuum, in several times the time. "
+        "Without it they may cross, and the run says from which pressure on",
+    )
     solver: EnumProperty(
         name="Solver",
         description="What solves the linear systems; answers agree within its tolerance",

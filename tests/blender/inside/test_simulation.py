@@ -4,6 +4,7 @@ import importlib.util
 import json
 
 import bpy
+import numpy as np
 import pytest
 
 import mu_addon
@@ -14,10 +15,11 @@ from mu_addon.blender.printing import panel as print_panel
 from mu_addon.blender.results import panel as results_panel
 from mu_addon.blender.simulate import panel as simulate_panel
 from mu_addon.blender.simulate import study_folder as studies
-from mu_addon.blender.simulate.job import SIMULATION
+from mu_addon.blender.simulate.job import SIMULATION, job_of
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit import panel as unit_panel
 from mu_addon.errors import InputError
+from mu_addon.usecases.simulate_and_place.motion import read_motion
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by
@@ -161,3 +163,38 @@ def test_a_quick_look_from_start_to_stale(tmp_path):
     assert not studies.findings(root).stale, "found again on reopen"
     (summary,) = tmp_path.glob("seat.mu/*/summary.json")
     assert json.loads(summary.read_text())["status"] == "complete"
+
+
+def test_printed_struts_are_the_resolved_model_and_may_keep_apart():
+    root = add()
+    study = root.mu_unit.study
+    study.command, study.self_contact = "simulate", True
+    assert job_of(root).mesh.fidelity == "homogenised"
+    assert not job_of(root).self_contact, "it is of printed struts alone"
+    study.detail = "resolved"
+    assert job_of(root).mesh.fidelity == "resolved"
+    assert job_of(root).self_contact
+    study.self_contact = False
+    assert not job_of(root).self_contact
+
+
+@pytest.mark.slow
+def test_printed_struts_are_simulated_and_played(tmp_path):
+    """A short unit, inflated a little: its motion is that of its struts, drawn up to their wall."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "struts.blend"))
+    root = add()
+    root.mu_unit.chambers.count = 3
+    protocol = tmp_path / "inflate.csv"
+    protocol.write_text("time_s,pressure_kPa\n0,0\n1,5\n")
+    root.mu_unit.study.command, root.mu_unit.study.detail = "simulate", "resolved"
+    root.mu_unit.study.protocol = str(protocol)
+    assert bpy.ops.mu.simulate() == {"FINISHED"}
+    child = SIMULATION.child(root)
+    watch(lambda: child.state != "running")
+    assert child.state == "done", child.error
+    found = studies.findings(root)
+    assert found.angles[-1][1] > 1.0
+    motion = read_motion(studies.folder_of(root))
+    assert motion.mesh.resolved
+    skin = motion.skin("lattice", cut=False)
+    assert not np.isin(skin.node[skin.triangles], motion.mesh.tied).all(axis=1).any()
