@@ -6,7 +6,6 @@ would predict better than the model that is right, and be named for it: errors i
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,6 +13,7 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
+from .resolution import between_steps, divided, dwell
 from .simulator import Composite
 
 Array = np.ndarray[Any, Any]
@@ -31,21 +31,24 @@ ORDERS = (2, 3, 4, 5, 6, 7, 8)
 # Noise smaller than this share of a record's range changes no verdict, and is not looked at.
 NEGLIGIBLE = 1e-6
 FEWEST = 9
+# Readings that stay so many samples before each change come in steps coarser than their noise.
+STAYS = 2.0
 
 
-def reading_noise(values: Array) -> float:
-    """Standard deviation of white noise in readings (n,), in their unit, by the median of higher differences.
+def reading_noise(time_s: Array, values: Array) -> float:
+    """Standard deviation of white noise in readings (n,) at times (n,) in s, in their unit.
 
-    >>> rng = np.random.default_rng(0)
-    >>> round(float(reading_noise(np.linspace(0, 50, 400) + rng.normal(0, 0.2, 400))), 2)
+    By the median of higher differences, divided ones, so that samples may be missing or uneven.
+
+    >>> rng, t = np.random.default_rng(0), np.arange(400.0)
+    >>> round(float(reading_noise(t, 0.1 * t + rng.normal(0, 0.2, 400))), 2)
     0.2
     """
     found = []
     for order in ORDERS:
         if len(values) < 4 * order:
             break
-        d = np.abs(np.diff(values, order))
-        found.append(float(np.median(d)) / 0.6745 / math.sqrt(math.comb(2 * order, order)))
+        found.append(float(np.median(np.abs(divided(time_s, values, order)))) / 0.6745)
     return min(found, default=0.0)
 
 
@@ -57,7 +60,7 @@ def denoised(time_s: Array, values: Array, sd: float | None = None) -> Array:
     around it, each as wide as agrees with all narrower ones; the three estimates are averaged with weights of
     one over their variances. Source: Goldenshluger and Nemirovski 1997 (intersecting confidence intervals).
     """
-    sd = reading_noise(values) if sd is None else sd
+    sd = reading_noise(time_s, values) if sd is None else sd
     weight, total = np.zeros(len(values)), np.zeros(len(values))
     for before, after in ((True, True), (True, False), (False, True)):
         found, variance = _widest(time_s, values, sd, before, after)
@@ -127,7 +130,11 @@ def denoised_drives(
             drives = [c for c in DRIVES if c in e.columns and c not in predicted and np.isfinite(e[c]).all()]
         once, twice = dict(e.columns), dict(e.columns)
         for c in drives:
-            sd = reading_noise(e[c])
+            if dwell(e[c]) > STAYS and len(np.unique(e[c])) > FEWEST:
+                # Steps of the display, not of what was done.
+                once[c] = between_steps(e["time_s"], e[c])
+                continue
+            sd = reading_noise(e["time_s"], e[c])
             if sd > NEGLIGIBLE * float(np.ptp(e[c])):
                 once[c] = denoised(e["time_s"], e[c], sd)
                 twice[c] = denoised(e["time_s"], once[c] + rng.normal(0.0, sd, len(e)))

@@ -67,8 +67,9 @@ class Parameter:
     low, high, null and starts are in `unit`. starts: values from which a fit begins. linear: the prediction
     is affine in it, with one slope whatever the other values are. spread: standard deviation of what is known
     before any data, in `unit`; inf where nothing is. experiment: name of the only experiment whose prediction
-    depends on it; empty where any may. Raises InputError where low is not below high, or the null or a start
-    is out of bounds.
+    depends on it; empty where any may. plausible: what a real specimen may have, in `unit`; a value beyond is
+    a sign that the data are not what their columns say. Raises InputError where low is not below high, or the
+    null or a start is out of bounds.
     """
 
     name: str
@@ -81,6 +82,7 @@ class Parameter:
     linear: bool = False
     spread: float = math.inf
     experiment: str = ""
+    plausible: tuple[float, float] = (-math.inf, math.inf)
 
     def __attrs_post_init__(self) -> None:
         inside = [self.null, *self.starts]

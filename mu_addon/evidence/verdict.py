@@ -15,7 +15,9 @@ from .fit import Fitter
 from .gain import Gain, gain
 from .next_experiment import Proposal, propose_experiment
 from .noise import Source, estimate, span
+from .plausibility import require_plausible
 from .record import Record, record
+from .resolution import without_wrong_readings
 from .selection import Selection, interval, one_more, reselected, select
 from .sensitivity import ABSORBED, SEEN, Sensitivity, at_bounds, best_seen, sensitivities, signatures
 from .simulator import Composite
@@ -36,7 +38,8 @@ class Verdict:
     kind: one of `KINDS` (none, named, ambiguous, unidentifiable, unexplained). experiments: all of them,
     their drives freed of gauge noise (`drive.denoised_drives`). sources: noise by group of series. intervals:
     95 % bounds by key, in the parameters' units. identifiability: effects that these data cannot show, with
-    the reason. `as_json` is the content of verdict.json.
+    the reason. set_aside: readings that do not count, in words (`resolution.wrong_readings`). `as_json` is
+    the content of verdict.json.
     """
 
     kind: str
@@ -49,6 +52,7 @@ class Verdict:
     identifiability: dict[str, str]
     intervals: dict[str, tuple[float, float]]
     experiments: tuple[Experiment, ...]
+    set_aside: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -103,6 +107,7 @@ class Verdict:
             ],
             "next_experiment": {"what": next_.what, "separates": list(next_.separates)} if next_ else None,
             "identifiability": dict(self.identifiability),
+            "set_aside": list(self.set_aside),
         }
 
 
@@ -138,8 +143,9 @@ def diagnose(
     simulator: of their kinds. progress: called with what is being done. Noise is estimated first and the
     residuals whitened; every effect of the library is then fitted as a rival, and one is named only where
     it is significant, predicts left-out experiments better and leaves no structure. Raises InputError where
-    no experiment can be predicted.
+    no experiment can be predicted, and where `require_plausible` does.
     """
+    experiments, set_aside = without_wrong_readings(experiments, simulator)
     experiments, again = denoised_drives(experiments, simulator)
     measured = record([e for e in experiments if e.role == "fit"], simulator)
     if again:
@@ -149,6 +155,7 @@ def diagnose(
     sources = noise_of(measured, simulator)
     fitter = Fitter(measured, simulator, sources)
     base = fitter.fit()
+    require_plausible(fitter, base)
     progress("sensitivities")
     curved = {p.name: base.values[p.name] for p in fitter.curved}
     seen = at_bounds(fitter, curved, sensitivities(fitter, curved))
@@ -181,6 +188,7 @@ def diagnose(
         identifiability,
         bounds,
         tuple(experiments),
+        tuple(set_aside),
     )
 
 

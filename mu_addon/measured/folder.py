@@ -21,6 +21,10 @@ from .table import Remark, read_table
 
 FILE = "experiments.toml"
 # Strain and displacement over length may differ by this share of the largest strain before it is told.
+ATMOSPHERE_kPa = 101.325
+PRESSURES = ("gauge", "absolute")
+# A unit at rest or under vacuum has about the atmosphere's absolute pressure or less.
+SURELY_ABSOLUTE_kPa = 90.0
 DISAGREE = 0.02
 # Spread of a weighed mass whose mass_sd_g is not given, as a share of it.
 MASS_SPREAD = 0.01
@@ -114,6 +118,8 @@ def _experiment(entry: dict[str, Any], at: _Place) -> tuple[Experiment, list[Rem
     text = _text(path, f"{FILE} names it; correct the name or put the file there")
     table = read_table(text, kind, path)
     columns, remarks = dict(table.columns), list(table.remarks)
+    if "pressure_kPa" in columns:
+        columns["pressure_kPa"] = _gauge_pressure(columns["pressure_kPa"], entry, path, at)
     if kind.name in ("coupon", "lattice_compression"):
         columns = _strained(columns, fields, kind, path, remarks)
         _check_strain(columns["strain"], table.rows, kind, path, remarks)
@@ -133,6 +139,24 @@ def _experiment(entry: dict[str, Any], at: _Place) -> tuple[Experiment, list[Rem
         kind=kind.name, file=path, columns=columns, rows=table.rows, sha256=digest, **fields
     )
     return experiment, remarks
+
+
+def _gauge_pressure(pressure_kPa: Array, entry: dict[str, Any], path: Path, at: _Place) -> Array:
+    """Gauge pressure (n,) in kPa: as read, or less the atmosphere where the experiment says it is absolute.
+
+    Raises InputError where nothing is said and no reading is near the atmosphere's gauge pressure, 0.
+    """
+    if "pressure" in entry:
+        absolute = _choice(entry, "pressure", PRESSURES, at) == "absolute"
+        return pressure_kPa - ATMOSPHERE_kPa if absolute else pressure_kPa
+    least = float(np.nanmin(pressure_kPa))
+    if least > SURELY_ABSOLUTE_kPa:
+        raise InputError(
+            f"no pressure is below {least:.4g} kPa, as if it were absolute; it is read as gauge pressure",
+            f"{path}, column pressure_kPa",
+            f'write pressure = "absolute" or pressure = "gauge" in the experiment in {FILE}',
+        )
+    return pressure_kPa
 
 
 def _described(entry: dict[str, Any], kind: Kind, at: _Place) -> dict[str, Any]:

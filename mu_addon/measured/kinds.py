@@ -104,7 +104,7 @@ KINDS = {
             "unit_pressure",
             (("pressure_kPa", "angle_deg"), ("pressure_kPa", "marker1_y_mm", "marker1_z_mm")),
             ("angle_sd_deg",),
-            may_have_keys=("added_mass_g", "chamber_volume_mm3", "valve"),
+            may_have_keys=("added_mass_g", "chamber_volume_mm3", "valve", "pressure"),
             marked=True,
         ),
         Kind(
@@ -122,7 +122,7 @@ KINDS = {
             needs_keys=("mode",),
             may_have_keys=("section_mm", "length_mm", "axis", "mass_g"),
         ),
-        Kind("pressure_hold", (("pressure_kPa",),), may_have_keys=("chamber_volume_mm3",)),
+        Kind("pressure_hold", (("pressure_kPa",),), may_have_keys=("chamber_volume_mm3", "pressure")),
         Kind(
             "beam_deadweight",
             (("added_mass_g", "tip_deflection_mm"),),

@@ -18,7 +18,7 @@ def test_noise_is_told_from_what_is_read(sd, many, seed):
     rng = np.random.default_rng(seed)
     t = np.arange(many) * 0.2
     for signal in (3.0 * t, np.where(t > t.mean(), 30.0, 0.0), 20.0 * np.sin(2 * np.pi * t / 3.2)):
-        found = reading_noise(signal + rng.normal(0.0, sd, many))
+        found = reading_noise(t, signal + rng.normal(0.0, sd, many))
         assert found == pytest.approx(sd, rel=0.5)
 
 

@@ -21,7 +21,16 @@ GRAVITY = 9.80665
 SHEAR = 15.0 / 17.5
 NODES = 24
 
-MODULUS = Parameter("beam_modulus_kPa", "kPa", 10.0, 1e6, 300.0, (), "soft silicones to hard rubber")
+MODULUS = Parameter(
+    "beam_modulus_kPa",
+    "kPa",
+    10.0,
+    1e6,
+    300.0,
+    (),
+    "soft silicones to hard rubber",
+    plausible=(20.0, 1e7),
+)
 # Of the clamp, or of what was taken for no sag. A sag of its own weight and a tilt look alike: only what is
 # known of clamps tells them apart, and it belongs to the uncertainty of the weight.
 TILT = Parameter("tilt_deg", "deg", -10.0, 10.0, 0.0, (), "clamps set by eye or level", spread=1.0)

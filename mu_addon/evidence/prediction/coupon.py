@@ -16,7 +16,16 @@ Array = np.ndarray[Any, Any]
 
 KIND = "coupon"
 
-MODULUS = Parameter("coupon_modulus_kPa", "kPa", 1.0, 1e6, 1000.0, (), "soft gels to hard rubber")
+MODULUS = Parameter(
+    "coupon_modulus_kPa",
+    "kPa",
+    1.0,
+    1e6,
+    1000.0,
+    (),
+    "soft gels to hard rubber",
+    plausible=(30.0, 1e7),
+)
 
 STRAIN_STIFFENING = Effect(
     "strain_stiffening",

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import attrs
 import numpy as np
 
 from ...measured import Experiment
+from ...measured.folder import ATMOSPHERE_kPa
 from ..effect import Effect, Parameter
 from .unit import TIMED, first_order_lag
 
 Array = np.ndarray[Any, Any]
 
 KIND = "pressure_hold"
-ATMOSPHERE_kPa = 101.325
 ROOM_K = 296.0
+AIR_GAMMA = 1.4
+SUPPLY_K = 5.0
 # Creep is spread over these decades after its onset.
 DECADES = 6
 # The readings of this time tell where a hold begins, to within this share of the absolute pressure.
@@ -67,10 +70,9 @@ class ChamberPressure:
     growth of the volume a kPa; it matters only while the pressure changes and a hold does not show it.
     """
 
-    effects = EFFECTS
-
     def __init__(self, experiments: Sequence[Experiment], compliance_per_kPa: float = 0.0) -> None:
         self._compliance = compliance_per_kPa
+        self.effects = tuple(map(partial(_warmed, experiments), EFFECTS))
         nuisances = []
         for e in experiments:
             if e.kind != KIND:
@@ -110,6 +112,21 @@ class ChamberPressure:
         )
         p = p * (1 + get("pressure_gain.gain", 0.0)) + get("pressure_offset.offset_kPa", 0.0)
         return p[None]
+
+
+def _warmed(experiments: Sequence[Experiment], effect: Effect) -> Effect:
+    """The effect; a temperature drift no larger than gas can warm or cool as it is compressed or drawn out.
+
+    Without any heat lost on the way (adiabatic): T / T0 = (P / P0)^((gamma - 1) / gamma), gamma of air.
+    """
+    if effect.name != "temperature_drift":
+        return effect
+    begun = [0.0, *(beginning_kPa(e) for e in experiments if e.kind == KIND)]
+    ratio = np.array([max(1.0 + p / ATMOSPHERE_kPa, 0.05) for p in (min(begun), max(begun))])
+    # A few kelvin more: supplies and rooms differ.
+    low, high = ROOM_K * (ratio ** (1.0 - 1.0 / AIR_GAMMA) - 1.0) + np.array([-SUPPLY_K, SUPPLY_K])
+    cooling, lasts = effect.parameters
+    return attrs.evolve(effect, parameters=(cooling.narrowed(float(low), float(high)), lasts))
 
 
 def beginning_kPa(experiment: Experiment) -> float:

@@ -80,6 +80,7 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | No
         notes += _resin(model, unit)
     notes += _bounds_met(verdict, simulator)
     notes += _noisy_gauges(measured, verdict)
+    notes += verdict.set_aside
     remarks = [*(f"{r.what} ({_place(r.where)})" for r in measured.remarks), *notes]
     unknown = dict.fromkeys(e.kind for e in measured.experiments if not simulator.knows(e))
     remarks += [f"there is no model for {kind}: its experiments were left out" for kind in unknown]
@@ -118,8 +119,10 @@ def _noisy_gauges(measured: Measured, verdict: Verdict) -> list[str]:
     noise: dict[str, float] = {}
     for e, judged in zip(measured.experiments, verdict.experiments, strict=True):
         for column, values in judged.columns.items():
-            if not np.array_equal(values, e.columns[column], equal_nan=True):
-                noise[column] = max(noise.get(column, 0.0), reading_noise(e.columns[column]))
+            read = e.columns[column]
+            drive = np.array_equal(np.isfinite(values), np.isfinite(read))
+            if drive and not np.array_equal(values, read, equal_nan=True):
+                noise[column] = max(noise.get(column, 0.0), reading_noise(e["time_s"], read))
     return [
         f"{column} was read with white noise of up to {sd:.2g}; this noise was removed by averaging "
         "over straight stretches, and no effect is named for its remainder"

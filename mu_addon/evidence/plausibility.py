@@ -1,0 +1,63 @@
+"""What no specimen can have: a sign that a column is not in the unit, or of the sign, that its name says."""
+
+from __future__ import annotations
+
+from collections.abc import Container
+
+import numpy as np
+
+from ..errors import InputError
+from .effect import Parameter
+from .fit import Fit, Fitter
+
+# Mistaken units: N for kN, kPa for MPa or Pa, mm for m.
+FACTORS = (1e3, 1e-3, 1e6, 1e-6)
+# Readings go against the prediction if their correlation with it is below this.
+AGAINST = -0.8
+
+
+def require_plausible(fitter: Fitter, base: Fit) -> None:
+    """Raise InputError where a fit without effects needs a value that no specimen has.
+
+    Which those are `Parameter.plausible` says. The error names the experiment's file and column, and the
+    factor, or the sign, that would make the value plausible.
+    """
+    for p in fitter.curved:
+        low, high = p.plausible
+        if not low <= base.values[p.name] <= high:
+            _refuse(fitter, p, base.values[p.name])
+
+
+def _refuse(fitter: Fitter, p: Parameter, fitted: float) -> None:
+    """Raise InputError for a parameter by the experiment whose readings depend on it most."""
+    record = fitter.record
+    slope = fitter.predict({p.name: p.null + p.step}) - fitter.predict({})
+    series = max(record.series, key=lambda s: float(np.abs(slope[s.at]).sum()))
+    e = record.experiments[series.experiment]
+    predicted, read = fitter.predict({})[series.at], record.values[series.at]
+    size = float(predicted @ predicted) or 1.0
+    implied = p.null * float(predicted @ read) / size
+    low, high = p.plausible
+    unit = f" {p.unit}" if p.unit else ""
+    remedy = f"check its unit and that of every length; a value from {low:g} to {high:g}{unit} is expected"
+    if np.corrcoef(predicted, read)[0, 1] < AGAINST:
+        remedy = "its sign is opposite to what it should be: check its direction, or that of the strain"
+    else:
+        for factor in FACTORS:
+            if low <= implied * factor <= high:
+                remedy = (
+                    f"{factor:g} times as large it would be {implied * factor:.3g}{unit}: check whether the "
+                    "column is in the unit that its name ends with"
+                )
+                break
+    name = p.name.removesuffix(f"_{p.unit}").replace("_", " ")
+    raise InputError(
+        f"{name} would be {fitted:.3g}{unit}, which no specimen of this kind has",
+        f"{e.file}, column {_source(e.columns, series.channel)}",
+        remedy,
+    )
+
+
+def _source(columns: Container[str], channel: str) -> str:
+    """The column that a channel was read from: the force where stress was computed from it."""
+    return "force_N" if channel == "stress_kPa" and "force_N" in columns else channel

@@ -1,0 +1,139 @@
+"""Readings as gauges give them: in steps, at uneven times, now and then plainly wrong."""
+
+import math
+
+import attrs
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mu_addon.errors import InputError
+from mu_addon.evidence.drive import reading_noise
+from mu_addon.evidence.prediction.bench import bench_simulators
+from mu_addon.evidence.resolution import between_steps, divided, dwell, quantum, wrong_readings
+from mu_addon.evidence.simulator import Composite
+from mu_addon.evidence.verdict import diagnose
+from tests.evidence import bench
+
+
+@given(
+    st.sampled_from([1.0, 0.5, 0.2, 0.05, 1e-3]), st.lists(st.integers(-500, 500), min_size=2, max_size=50)
+)
+def test_the_step_of_readings_is_their_common_measure(step, counts):
+    counts = [*counts, 0, 1]
+    assert quantum(step * np.array(counts)) == pytest.approx(step)
+
+
+def test_what_was_not_read_off_a_display_has_no_step():
+    rng = np.random.default_rng(0)
+    assert quantum(rng.normal(size=100)) == 0.0
+    assert quantum(np.full(9, math.pi)) == 0.0
+
+
+def test_a_hold_after_a_ramp_is_no_display_that_stands():
+    ramp = np.concatenate([np.linspace(0.0, 1.0, 21), np.ones(200)])
+    assert dwell(ramp) == 1.0
+    assert dwell(np.round(np.linspace(0.0, 5.0, 501))) > 50
+
+
+def test_a_slow_ramp_read_in_steps_comes_back():
+    t = np.linspace(0.0, 100.0, 1001)
+    truth = 20.0 * np.sin(2 * np.pi * t / 100.0)
+    read = np.round(truth / 0.5) * 0.5
+    found = between_steps(t, read)
+    assert np.abs(found - truth).max() <= 0.5
+    assert np.sqrt(np.mean((found - truth) ** 2)) < 0.3 * np.sqrt(np.mean((read - truth) ** 2))
+
+
+@given(st.integers(1, 6), st.integers(0, 1000))
+def test_at_even_times_divided_differences_are_plain_ones(order, seed):
+    y = np.random.default_rng(seed).normal(size=40)
+    plain = np.abs(np.diff(y, order)) / math.sqrt(math.comb(2 * order, order))
+    np.testing.assert_allclose(np.abs(divided(0.2 * np.arange(40), y, order)), plain, rtol=1e-6, atol=1e-9)
+
+
+def test_missing_rows_are_no_noise():
+    """A wave without noise, of which a third of the rows is missing."""
+    rng = np.random.default_rng(2)
+    t = np.sort(rng.choice(np.arange(600) * 0.1, 400, replace=False))
+    wave = 0.1 * np.sin(2 * np.pi * t / 20.0)
+    assert reading_noise(t, wave) < 1e-6
+    noise = 1e-3 * rng.normal(size=len(t))
+    assert reading_noise(t, wave + noise) == pytest.approx(1e-3, rel=0.2)
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 10_000), st.integers(5, 118), st.sampled_from([-1.0, 1.0]))
+def test_one_wrong_reading_is_found_and_nothing_else(seed, place, sign):
+    rng = np.random.default_rng(seed)
+    t = np.arange(200) * 0.1
+    clean = np.abs(t - 7.03) + np.where(t > 12.34, 5.0, 0.0)
+    y = clean + 0.02 * rng.normal(size=200)
+    assert not wrong_readings(t, y).any(), "a corner and a step are none"
+    y[place] += sign * 30.0
+    assert np.flatnonzero(wrong_readings(t, y)).tolist() == [place]
+
+
+def test_what_happens_often_is_no_accident():
+    rng = np.random.default_rng(0)
+    y = 0.01 * rng.normal(size=200)
+    y[10:190:9] += 5.0
+    assert not wrong_readings(np.arange(200.0), y).any()
+
+
+def verdict(*experiments):
+    return diagnose(experiments, Composite(bench_simulators(experiments)))
+
+
+@pytest.mark.parametrize(("step", "seed"), [(0.5, 0), (1.0, 1), (1.0, 2)])
+def test_a_tight_hold_read_in_coarse_steps_is_clean(step, seed):
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, 400.0, 0.5)
+    made = []
+    for number, kPa in enumerate((50.0, 30.2)):
+        read = np.round((kPa + 0.05 * rng.normal(size=len(t))) / step) * step
+        columns = {"time_s": t, "pressure_kPa": read}
+        made.append(bench.experiment("pressure_hold", columns, f"hold {number}"))
+    assert verdict(*made).kind == "none"
+
+
+def coupons(rng):
+    t = np.arange(0.0, 40.0, 0.1)
+    strain = 0.3 * (1 - np.abs((t % 20.0) / 10.0 - 1.0))
+    stress = 1000.0 / 3.0 * ((1 + strain) - (1 + strain) ** -2.0) + 0.3 * rng.normal(size=len(t))
+    columns = {"time_s": t, "strain": strain, "stress_kPa": stress}
+    return [bench.experiment("coupon", columns, f"test {n}", mode="uniaxial") for n in range(2)]
+
+
+def test_one_wrong_reading_decides_no_verdict_and_is_told():
+    first, second = coupons(np.random.default_rng(3))
+    stress = np.array(first["stress_kPa"])
+    stress[123] += 40.0
+    found = verdict(attrs.evolve(first, columns={**first.columns, "stress_kPa": stress}), second)
+    assert found.kind == "none"
+    (words,) = found.set_aside
+    assert "test 0, stress_kPa: 1 of 400 readings" in words
+    assert "12.3 s" in words
+
+
+@pytest.mark.parametrize(("factor", "says"), [(1e-3, "1000 times as large"), (-1.0, "opposite")])
+def test_a_mistaken_unit_or_sign_is_asked_about_before_any_cause(factor, says):
+    made = [
+        attrs.evolve(e, columns={**e.columns, "stress_kPa": factor * e["stress_kPa"]})
+        for e in coupons(np.random.default_rng(4))
+    ]
+    with pytest.raises(InputError, match="which no specimen of this kind has") as error:
+        verdict(*made)
+    assert says in error.value.remedy
+    assert "made.csv, column stress_kPa" in error.value.where
+
+
+def test_gas_is_no_warmer_than_compressing_it_makes_it():
+    t = np.arange(0.0, 100.0, 0.5)
+    holds = [bench.experiment("pressure_hold", {"time_s": t, "pressure_kPa": np.full(len(t), 40.0)}, "a")]
+    simulator = bench_simulators(holds)["pressure_hold"]
+    drift = next(e for e in simulator.effects if e.name == "temperature_drift")
+    # 296 K (141.325 / 101.325)^(2/7), by hand.
+    assert drift.parameters[0].high == pytest.approx(296.0 * 0.09973 + 5.0, abs=0.1)
+    assert drift.parameters[0].low == pytest.approx(-5.0)
