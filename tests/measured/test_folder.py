@@ -308,3 +308,19 @@ def test_numbers_are_read_to_their_last_digit(strain):
     table = read_table(text, KINDS["coupon"], Path("a.csv"))
     assert table.columns["strain"].tolist() == strain
     assert table.columns["stress_kPa"].tolist() == [2 * s for s in strain]
+
+
+@pytest.mark.parametrize(("said", "expected"), [("", None), ("absolute", 151.0 - 101.325), ("gauge", 151.0)])
+def test_pressures_that_may_be_absolute_are_asked_about(tmp_path, said, expected):
+    (tmp_path / "a.csv").write_text("time_s,pressure_kPa\n0,151\n1,150.5\n2,150\n")
+    line = f'pressure = "{said}"\n' if said else ""
+    (tmp_path / "experiments.toml").write_text(
+        f'[[experiment]]\nname = "h"\nkind = "pressure_hold"\nfile = "a.csv"\nrole = "fit"\n{line}'
+    )
+    if expected is None:
+        with pytest.raises(InputError, match="as if they were absolute") as error:
+            read_folder(tmp_path)
+        assert "a.csv, column pressure_kPa" in error.value.where
+    else:
+        (hold,) = read_folder(tmp_path).experiments
+        assert hold["pressure_kPa"][0] == pytest.approx(expected)
