@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import InputError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
-from .specimen import NEW, machine, recorded, strain_histories
+from .specimen import NEW, load_zeros, machine, recorded, strain_histories
 
 Array = np.ndarray[Any, Any]
 
@@ -55,10 +55,10 @@ class CouponStress:
     strain of each specimen is known.
     """
 
-    nuisances = (MODULUS,)
     effects = EFFECTS
 
     def __init__(self, experiments: Sequence[Experiment] = ()) -> None:
+        self.nuisances = (MODULUS, *load_zeros(experiments, KIND))
         self._histories = strain_histories(experiments, KIND)
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:

@@ -22,6 +22,8 @@ Law = Callable[[Array], Array]
 LENGTH_mm = 25.0
 # A preload needs faces to bear it: it comes in over this much of the gap, so that seating has one size.
 ONSET_mm = 0.01
+# Rows of a record whose load cell has a zero of its own.
+FEWEST = 20
 # Strain up to which a preload is looked for.
 FARTHEST = 0.5
 FRAME = Parameter("mm_per_N", "mm/N", 0.0, 0.1, 0.0, (0.005,), "steel 1e-5, printed plates 0.1")
@@ -93,10 +95,27 @@ def strain_histories(experiments: Sequence[Experiment], kind: str) -> dict[str, 
     return found
 
 
+def load_zeros(experiments: Sequence[Experiment], kind: str) -> tuple[Parameter, ...]:
+    """The load cell's zero in each experiment of a kind that was recorded over time, as stress in kPa.
+
+    Cells are set to zero before each test, to a reading's noise at best. Records of a few rows, and those of
+    given spread, have nothing to tell it by.
+    """
+    return tuple(
+        Parameter(_zero(e), "kPa", -1e6, 1e6, 0.0, (), "set by hand", linear=True, experiment=e.name)
+        for e in experiments
+        if e.kind == kind and "time_s" in e.columns and "stress_sd_kPa" not in e.columns and len(e) >= FEWEST
+    )
+
+
+def _zero(experiment: Experiment) -> str:
+    return f"zero_kPa of {experiment.name}"
+
+
 def recorded(
     experiment: Experiment, law: Law, values: Mapping[str, float], past: StrainHistory = NEW
 ) -> Array:
-    """Nominal stress (n,) in kPa that the machine records at the experiment's strains.
+    """Nominal stress (n,) in kPa that the machine records at the experiment's strains, its zero included.
 
     law: stress (n,) in kPa of strain (n,) in slow loading. Faces close a gap g while the load builds up: the
     specimen strains by e - g/L (1 - exp(-e L/g)). The machine's zero is where the preload was reached. A
@@ -104,6 +123,13 @@ def recorded(
     section_mm and length_mm; without them they have no effect. Raises ConvergenceError where the frame's
     share is not found.
     """
+    found = _borne(experiment, law, values, past)
+    zero = values.get(_zero(experiment), 0.0)
+    return found + zero if zero else found
+
+
+def _borne(experiment: Experiment, law: Law, values: Mapping[str, float], past: StrainHistory) -> Array:
+    """Nominal stress (n,) in kPa of the specimen in the machine, as `recorded` without its zero."""
     strain = experiment["strain"]
     factor = _factor(experiment, values, past)
     seated = _seated(experiment, (lambda e: factor * law(e)) if factor != 1 else law, values)
