@@ -33,6 +33,12 @@ csv.field_size_limit(_LONGEST)
 
 def file_bytes(path: str | Path, most: int = _LONGEST) -> bytes:
     """What a regular file holds; raises OSError, also for pipes and devices and beyond `most` bytes."""
+    require_readable(path, most)
+    return Path(path).read_bytes()
+
+
+def require_readable(path: str | Path, most: int = _LONGEST) -> None:
+    """Raise OSError for what is no regular file, and for one of more than `most` bytes."""
     path = Path(path)
     try:
         found = path.stat()
@@ -46,7 +52,6 @@ def file_bytes(path: str | Path, most: int = _LONGEST) -> bytes:
     if found.st_size > most:
         words = f"its {_size(found.st_size)} are more than the {_size(most)} that are read"
         raise OSError(errno.EFBIG, words, str(path))
-    return path.read_bytes()
 
 
 def file_text(path: str | Path, most: int = _LONGEST) -> str:

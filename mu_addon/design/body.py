@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..reading import file_bytes, require_readable
 from . import shapes
 from .dimensions import Dimensions
 from .printing.crossing import crossings
@@ -24,12 +25,18 @@ if TYPE_CHECKING:
 
 MOST_TRIANGLES = 60_000
 """A finer body would take minutes to examine and to mesh, and say no more: the mesh is coarser by far."""
+MOST_BYTES = 100_000_000
+"""Of a body's file: several times what so many triangles take as text."""
 QUANTUM_MM = 1e-5
 """Vertices closer than that are one: files repeat them for every triangle."""
 AROUND = 96
 """Flat pieces around the actuator where it is asked whether a body holds it."""
 SLACK_MM = 1e-3
 """A body may miss an end plane by so much."""
+# Bytes within which a PLY file's header ends.
+_HEAD = 100_000
+# What meshio raises over files that are not what their names say.
+_DAMAGED = (OSError, ValueError, LookupError, TypeError, AssertionError, ArithmeticError, MemoryError)
 _UNITS = {1000.0: "metres", 25.4: "inches", 10.0: "centimetres", 0.001: "micrometres"}
 
 
@@ -122,8 +129,12 @@ def read_body(path: str | Path) -> Body:
             f"the file type {path.suffix or '(none)'} is not supported for a body", str(path), remedy
         )
     try:
+        require_readable(path, MOST_BYTES)
+        if path.suffix.lower() == ".ply" and b"end_header" not in file_bytes(path, MOST_BYTES)[:_HEAD]:
+            # meshio waits for the header's end for ever.
+            raise ValueError("the header does not end")
         mesh = readers[path.suffix.lower()](path)
-    except (OSError, ValueError, LookupError, TypeError, AssertionError, ReadError) as error:
+    except (*_DAMAGED, ReadError) as error:
         why = getattr(error, "strerror", None) or "the file is damaged or of another type"
         raise InputError(f"no body can be read from it: {why}", str(path), remedy) from error
     found = [np.empty((0, 3), np.int64)]

@@ -1,8 +1,10 @@
 """A body of the user's own: what is wrong with it is found, and where; a sound one holds the lattice."""
 
+import os
+
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mu_addon.design.anchors import window
@@ -222,3 +224,32 @@ def test_steps_take_the_body(ellipse):
     before = dict(stack.counts)
     stack.value("trim", StepInputs(UNIT))
     assert {name for name in stack.counts if stack.counts[name] > before[name]} == {"cells", "trim"}
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".obj", ".ply"])
+def test_a_file_of_gigabytes_or_a_pipe_is_no_body(tmp_path, suffix):
+    large = tmp_path / f"large{suffix}"
+    large.touch()
+    os.truncate(large, 3 << 30)
+    with pytest.raises(InputError, match="its 3221 MB are more than the 100 MB"):
+        read_body(large)
+    pipe = tmp_path / f"pipe{suffix}"
+    os.mkfifo(pipe)
+    with pytest.raises(InputError, match="no body can be read"):
+        read_body(pipe)
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.binary(max_size=400), st.sampled_from([".stl", ".obj", ".ply"]), st.integers(0, 2))
+def test_random_bytes_are_no_body_and_end_in_a_clear_error(tmp_path, data, suffix, known):
+    """A truncated header of a PLY file is what a reader of others waited on for ever."""
+    ply = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
+    heads = {
+        ".stl": (b"solid a\n facet normal 0 0 1\n  outer loop\n", b"solid a\n"),
+        ".obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf ", b"v 0 0 0\n"),
+        ".ply": (ply, ply + b"end_header\n"),
+    }
+    path = tmp_path / f"body{suffix}"
+    path.write_bytes(b"".join(heads[suffix][known - 1 : known]) + data)
+    with pytest.raises(InputError):
+        read_body(path)

@@ -15,6 +15,7 @@ import numpy as np
 from ...errors import InputError, OutputError
 from ...files import write_csv
 from ...materials.library import load_material, read_material
+from ...reading import file_text
 from ...run.cache import Cache
 from ...run.context import RunContext
 from ...run.progress import Progress
@@ -176,8 +177,7 @@ def _extended(plan: Plan, folder: Path, add: int) -> tuple[list[dict[str, Any]],
 def _places(path: Path, names: list[str]) -> Array | None:
     """Places (n, d) that a plan.csv holds, or None where there is none or it is damaged."""
     try:
-        with path.open(newline="", encoding="utf-8") as stream:
-            head, *rows = csv.reader(stream)
+        head, *rows = csv.reader(file_text(path).splitlines())
         found = np.array([[float(value) for value in row] for row in rows])
     except (OSError, ValueError):
         return None
