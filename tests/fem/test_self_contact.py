@@ -13,7 +13,7 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.loads import traction
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.fem.obstacle import outer_faces
+from mu_addon.fem.outer_faces import outer_faces
 from mu_addon.fem.self_contact import SELF_CONTACT_NEWTON, SelfContact
 from mu_addon.fem.self_intersection import crossings
 from mu_addon.fem.state import rest
@@ -116,7 +116,7 @@ def test_a_block_on_another_passes_on_its_pressure(order):
     supports[:, :2] = True
     eq = body(mesh, supports=supports, material=(E, 0.0))
     pressure = 0.02
-    faces = outer_faces(mesh)
+    faces = outer_faces(mesh).nodes
     top = faces[(z[faces] > z.max() - 1e-9).all(axis=1)]
     eq.model.load = traction(mesh, top, np.array([0.0, 0.0, -pressure]))
     state = eq.newton(np.where(mesh.nodes[:, 2:] > 1.2, [0.0, 0.0, -0.46], 0.0), 0.0)

@@ -21,7 +21,8 @@ from ...fem.kinematics import TipSection, probe
 from ...fem.loads import STANDARD_GRAVITY
 from ...fem.materials import Materials
 from ...fem.model import Model
-from ...fem.obstacle import CONTACT_NEWTON, Obstacle, outer_faces
+from ...fem.obstacle import CONTACT_NEWTON, Obstacle
+from ...fem.outer_faces import OuterFaces, outer_faces
 from ...fem.rigid import Box, Pose
 from ...fem.state import State
 from ...fem.time_stepping import simulate_in_time
@@ -205,13 +206,13 @@ def obstacle_of(gripper: Gripper, cube: Cube, grip: Grip, mesh: Mesh) -> Obstacl
     )
 
 
-def _facing(gripper: Gripper, mesh: Mesh) -> Array:
-    """Faces (f, 3 | 6) of a finger that can meet the cube: of its inner side and its tip."""
+def _facing(gripper: Gripper, mesh: Mesh) -> OuterFaces:
+    """Faces of a finger that can meet the cube: of its inner side and its tip."""
     faces = outer_faces(mesh)
     (_, inner), (_, tip) = gripper.unit.printed.bounds[1:]
-    y, z = mesh.nodes[faces[:, :3]][:, :, 1], mesh.nodes[faces[:, :3]][:, :, 2]
+    y, z = mesh.nodes[faces.nodes[:, :3]][:, :, 1], mesh.nodes[faces.nodes[:, :3]][:, :, 2]
     near = 1e-6 * tip
-    return faces[(y > inner - near).all(axis=1) | (z > tip - near).all(axis=1)]
+    return faces.of((y > inner - near).all(axis=1) | (z > tip - near).all(axis=1))
 
 
 def grasp(
