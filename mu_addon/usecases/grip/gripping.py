@@ -18,12 +18,13 @@ from ...fem.materials import Materials
 from ...fem.unit import materials_of
 from ...files import write_bytes, write_csv
 from ...meshing.mesh import Mesh
-from ...meshing.unit import mesh_unit
+from ...resolved.unit import mesh_of
 from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.progress import Progress
 from ...sensing.embedded_waveguide import Joints, embed_waveguide
 from ...sensing.signal import Signal, traced_signal
+from ..simulate_and_place.job import in_time_newton, self_contact_of
 from .grasp import Cube, Grasp, Lift, grasp
 from .job import Job
 from .motion import write_grasp
@@ -105,7 +106,7 @@ class Gripping:
     def make_mesh(self) -> None:
         """Analysis mesh of half a finger."""
         with self.progress.stage("mesh", 5.0):
-            mesh = self.mesh = mesh_unit(self.job.gripper.unit, self.job.mesh)
+            mesh = self.mesh = mesh_of(self.job.gripper.unit, self.job.mesh)
         self.context.summary["mesh"] = {"nodes": len(mesh.nodes), "tetrahedra": len(mesh.tets)}
 
     @property
@@ -116,13 +117,14 @@ class Gripping:
 
     def _key(self, *parts: Any) -> str:
         assert self.mesh is not None
-        own = attrs.astuple(self.job.grip), self.job.gripper.fingers.gap_mm
+        own = attrs.astuple(self.job.grip), self.job.gripper.fingers.gap_mm, self.job.self_contact
         return key(self.mesh.hash(), self.materials.hash(), own, *parts)
 
     def close_on(self, cube: Cube) -> None:
         """The grasp of one cube, phase by phase."""
         assert self.mesh is not None
         job, name = self.job, f"cube-{cube.side_mm:g}"
+        apart = self_contact_of(job.gripper.unit, self.mesh) if job.self_contact else None
         entry = self._key("grasp", attrs.astuple(cube), job.phases.text())
         with self.progress.stage(f"grasp of {cube.side_mm:g} mm"):
             kept = self.cache.get("grasp", entry)
@@ -135,6 +137,8 @@ class Gripping:
                     self.materials,
                     job.grip,
                     on_instant=self.progress.update,
+                    newton=in_time_newton(self.mesh.resolved, job.self_contact),
+                    self_contact=apart,
                 )
                 self.cache.put("grasp", entry, _arrays(found))
             else:
@@ -149,6 +153,14 @@ class Gripping:
             )
             write_grasp(self.folder / name, job.gripper, self.mesh, self.materials, found)
         self.context.summary.setdefault("grasps", {})[f"{cube.side_mm:g}"] = grasp_figures(found)
+        if found.snapped_mm.any():
+            first = int(np.flatnonzero(found.snapped_mm)[0])
+            self.warn(
+                f"Closing on {cube.side_mm:g} mm parts of the finger snap, first before "
+                f"{found.time_s[first]:g} s ({found.pressure_kPa[first]:.4g} kPa), by "
+                f"{found.snapped_mm.max():.2g} mm at most: from there on the states are those that damped "
+                "motion leads to."
+            )
         if not found.lift.held:
             self.warn(
                 f"The cube of {cube.side_mm:g} mm ({cube.mass_g:.3g} g) is not lifted: friction can carry "
@@ -203,6 +215,7 @@ class Gripping:
                 rule,
                 cube,
                 self.job.grip,
+                self_contact=self.job.self_contact,
                 load=load,
                 store=store,
                 on_path=self.progress.update,
@@ -285,7 +298,7 @@ def _grasp(cube: Cube, arrays: dict[str, Array]) -> Grasp:
 
 def _write_grasp_csv(path: Path, found: Grasp, signal: Signal | None = None) -> None:
     names = ["time_s", "pressure_kPa", "angle_deg", "normal_N", "down_N", "area_mm2", "sticking", "slid_mm"]
-    names += ["deepest_mm", "lost_mJ", "volume_mm3"]
+    names += ["deepest_mm", "lost_mJ", "volume_mm3", "snapped_mm"]
     values = [getattr(found, name) for name in names] + [found.cube_mm[:, 2]]
     columns = ["phase", *names, "cube_z_mm"]
     if signal is not None:
