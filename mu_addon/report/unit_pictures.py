@@ -20,6 +20,7 @@ LATTICE_COLOR = (0.62, 0.69, 0.77)
 PATH_COLOR = (0.835, 0.369, 0.0)  # plots.CHOSEN
 ANCHOR_COLOR = (0.10, 0.11, 0.16)
 OBSTACLE_COLOR = (0.47, 0.45, 0.43)
+COLORS = {MEMBRANE: MEMBRANE_COLOR, LATTICE: LATTICE_COLOR}
 SAGITTAL = Cut((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), color=(0.95, 0.86, 0.72))
 WHITE = (1.0, 1.0, 1.0)
 
@@ -86,8 +87,7 @@ def motion(
     A state is displacement (n, 3) in mm, caption and alternative text. beside: rigid bodies, of which the
     part at x <= 0 and within the picture is shown; width: in pixels.
     """
-    skins = {region: skin(mesh.tets[mesh.region == region]) for region in (MEMBRANE, LATTICE)}
-    colors = {MEMBRANE: MEMBRANE_COLOR, LATTICE: LATTICE_COLOR}
+    skins, colors = skins_of(mesh), COLORS
     # A half mesh lies at x >= 0; its mirror image shows the same section to a viewer at +x.
     flip = mesh.nodes[:, 0].min() > -1e-9
     scenes = []
@@ -134,6 +134,15 @@ def _behind(bodies: Sequence[RigidBody]) -> list[Part]:
                 Part(vertices, np.asarray(mesh.tri_verts).astype(np.int64), OBSTACLE_COLOR, whole=True)
             )
     return found
+
+
+def skins_of(mesh: Mesh) -> dict[int, NDArray[np.int64]]:
+    """Outward triangles (f, 3) of a unit's wall and of its lattice, by region.
+
+    Of a resolved mesh without what struts have inside the wall, where they would be seen in the chambers.
+    """
+    found = {region: skin(mesh.tets[mesh.region == region]) for region in (MEMBRANE, LATTICE)}
+    return {region: faces[np.isin(faces, mesh.tied).sum(axis=1) < 2] for region, faces in found.items()}
 
 
 def skin(tets: NDArray[np.integer]) -> NDArray[np.int64]:

@@ -10,11 +10,14 @@ import numpy as np
 
 from ...design.anchors import anchor_points, window
 from ...design.gripper import GripperSolid, build_gripper
+from ...design.quantity import in_kPa, in_MPa
 from ...design.surface import stl_bytes
 from ...design.threemf import Part, read_3mf, write_3mf
 from ...design.waveguide import waveguide
 from ...errors import OutputError
 from ...fem.materials import Materials
+from ...fem.self_intersection import first_self_intersection
+from ...fem.state import State, rest
 from ...fem.unit import materials_of
 from ...files import write_bytes, write_csv
 from ...meshing.mesh import Mesh
@@ -153,6 +156,7 @@ class Gripping:
             )
             write_grasp(self.folder / name, job.gripper, self.mesh, self.materials, found)
         self.context.summary.setdefault("grasps", {})[f"{cube.side_mm:g}"] = grasp_figures(found)
+        self._look_for_self_intersection(found)
         if found.snapped_mm.any():
             first = int(np.flatnonzero(found.snapped_mm)[0])
             self.warn(
@@ -165,6 +169,22 @@ class Gripping:
             self.warn(
                 f"The cube of {cube.side_mm:g} mm ({cube.mass_g:.3g} g) is not lifted: friction can carry "
                 f"at most {found.lift.capacity_N:.3g} N of its {cube.weight_N:.3g} N."
+            )
+
+    def _look_for_self_intersection(self, found: Grasp) -> None:
+        """Name the first pressure at which walls of the free finger pass through each other as it opens."""
+        assert self.mesh is not None
+        # With self-contact no step passes a touch.
+        if self.job.self_contact:
+            return
+        opening = range(1, found.end("i") + 1)
+        states = [State(in_MPa(float(found.pressure_kPa[k])), found.u[k]) for k in opening]
+        first = first_self_intersection(self.mesh, [rest(self.mesh), *states])
+        if first is not None:
+            instead = " or --self-contact" if self.mesh.resolved else ""
+            self.warn(
+                f"From {in_kPa(first.pressure_MPa):.4g} kPa on, walls of the opening finger intersect: "
+                f"{first.crossings[0]}. States beyond are invalid. Use a smaller vacuum{instead}."
             )
 
     def follow_light(self) -> None:
