@@ -1,12 +1,17 @@
 """A gripper's run: its phases, a grasp with and without friction, its table of paths, its folder."""
 
+import csv
 import json
+import re
 
+import attrs
 import numpy as np
 import pytest
 
 from mu_addon.cli.main import main
+from mu_addon.design.assets import asset_root
 from mu_addon.design.gripper import load_gripper
+from mu_addon.design.parameters import to_toml
 from mu_addon.design.surface import bad_edges, stl_surface
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
@@ -207,3 +212,43 @@ def test_a_grasp_with_friction_from_the_command_line(tmp_path):
     again = json.loads((out / "summary.json").read_text())
     assert again["seconds"]["grasp of 25 mm"] < 0.3 * summary["seconds"]["grasp of 25 mm"]
     assert (out / "grasp_25.csv").read_text() == before
+
+
+def test_self_contact_and_rules_must_suit_the_fidelity():
+    gripper = load_gripper("gripper")
+    with pytest.raises(InputError, match="walls and struts as they are printed"):
+        Job(gripper, self_contact=True)
+    with pytest.raises(InputError, match="rules of a resolved finger are intersect"):
+        Job(gripper, mesh=MeshSettings(fidelity="resolved"))
+    job = Job(gripper, mesh=MeshSettings(fidelity="resolved"), rules=("printed",), self_contact=True)
+    assert "self_contact = true" in job.texts()["grip.toml"]
+
+
+@pytest.mark.slow
+def test_a_resolved_finger_grasps_from_the_command_line(tmp_path):
+    """Three chambers strut by strut: forces within Coulomb's bound, work into friction, frames, a ranking."""
+    whole = load_gripper("gripper").unit
+    short = attrs.evolve(whole, chambers=attrs.evolve(whole.chambers, count=3))
+    (tmp_path / "unit.toml").write_text(to_toml(short))
+    text = (asset_root() / "presets" / "gripper.toml").read_text()
+    text = re.sub("(?m)^unit = .*", 'unit = "unit.toml"', text)
+    # So short a finger reaches no farther.
+    text = text.replace("gap_mm = 30.0", "gap_mm = 26.0")
+    (tmp_path / "g.toml").write_text(re.sub("(?m)^path = .*", 'path = "alpha1"', text))
+    (tmp_path / "p.csv").write_text(
+        "time_s,pressure_kPa,phase\n0,0,i\n1,-5,i\n4,30,ii\n5,30,iii\n6,30,iv\n9,0,v\n10,0,v\n"
+    )
+    line = ["grip", "--gripper", tmp_path / "g.toml", "--protocol", tmp_path / "p.csv", "--cube", "25"]
+    line += ["--coarse", "--refine", "0.4", "--fidelity", "resolved", "--no-paths", "--out", tmp_path / "out"]
+    assert main([str(word) for word in line]) == 0
+    rows = list(csv.DictReader((tmp_path / "out" / "grasp_25.csv").open()))
+    normal, down, lost, gap = (
+        np.array([float(r[c]) for r in rows]) for c in ("normal_N", "down_N", "lost_mJ", "deepest_mm")
+    )
+    assert normal.max() > 0.05
+    assert (np.abs(down) <= 0.5 * normal * (1 + 1e-3) + 1e-9).all()
+    assert 0 < gap.max() < 0.15
+    assert normal[-1] == 0.0
+    g = json.loads((tmp_path / "out" / "summary.json").read_text())["grasps"]["25"]
+    assert g["pressure_work_mJ"] + g["cube_work_mJ"] == pytest.approx(lost[-1], rel=0.15)
+    assert (tmp_path / "out" / "frame_25_iii.png").exists()
