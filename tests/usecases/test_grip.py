@@ -261,10 +261,10 @@ def test_a_resolved_finger_grasps_from_the_command_line(tmp_path):
     """Three chambers strut by strut: forces within Coulomb's bound, work into friction, frames."""
     gripper = short_gripper(tmp_path)
     (tmp_path / "p.csv").write_text(
-        "time_s,pressure_kPa,phase\n0,0,i\n1,0,i\n3,20,ii\n4,20,iii\n5,20,iv\n7,0,v\n"
+        "time_s,pressure_kPa,phase\n0,0,i\n0.5,0,i\n2.5,20,ii\n3,20,iii\n3.5,20,iv\n5.5,0,v\n"
     )
     line = ["grip", "--gripper", gripper, "--protocol", tmp_path / "p.csv", "--cube", "25"]
-    line += ["--coarse", "--refine", "0.4", "--fidelity", "resolved", "--no-paths", "--out", tmp_path / "out"]
+    line += ["--refine", "0.4", "--fidelity", "resolved", "--no-paths", "--out", tmp_path / "out"]
     assert main([str(word) for word in line]) == 0
     rows = list(csv.DictReader((tmp_path / "out" / "grasp_25.csv").open()))
     normal, down, lost, gap = (
@@ -275,5 +275,6 @@ def test_a_resolved_finger_grasps_from_the_command_line(tmp_path):
     assert 0 < gap.max() < 0.15
     assert normal[-1] == 0.0
     g = json.loads((tmp_path / "out" / "summary.json").read_text())["grasps"]["25"]
+    # Steps of 5 kPa: 9 % apart; of 10 kPa 21 %, of 2.5 kPa 2 %.
     assert g["pressure_work_mJ"] + g["cube_work_mJ"] == pytest.approx(lost[-1], rel=0.15)
     assert (tmp_path / "out" / "frame_25_iii.png").exists()
