@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_report, add_results, require_out
+from .options import add_fidelity, add_report, add_results, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -67,6 +67,7 @@ def add(commands: Commands[Any]) -> None:
         metavar="F",
         help="Mesh refinement: element sizes are divided by F (default: 0.5).",
     )
+    add_fidelity(command)
     command.add_argument(
         "--coarse",
         action="store_true",
@@ -88,8 +89,8 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
     """Design the gripper and let it grasp."""
     from ..design.gripper import load_gripper, read_gripper
     from ..meshing.settings import MeshSettings
-    from ..placement.inclusion import RULES
-    from ..usecases.grip.grasp import Cube, Grip
+    from ..placement.inclusion import PRINTED, RULES
+    from ..usecases.grip.grasp import OF_FIDELITY, Cube, Grip
     from ..usecases.grip.job import COARSE, REFINE, Job
     from ..usecases.grip.phases import read_phases, shipped_phases
     from ..usecases.grip.run import USE_CASE
@@ -97,14 +98,21 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
     require_out(options)
     gripper = load_gripper(options.preset) if options.preset is not None else read_gripper(options.gripper)
     refine = options.refine or (COARSE if options.coarse else REFINE)
-    rules = ("volume_fraction",) if options.coarse else RULES
+    resolved = options.fidelity == "resolved"
+    rules = (PRINTED,) if resolved else ("volume_fraction",) if options.coarse else RULES
     step_s = 1.0 if options.coarse else 0.5
     job = Job(
         gripper=gripper,
         cubes=() if options.solid_only else tuple(Cube(side, options.density) for side in options.cube),
-        grip=Grip(friction=options.friction, beyond_mm=options.beyond, step_s=step_s),
+        grip=Grip(
+            friction=options.friction,
+            beyond_mm=options.beyond,
+            step_s=step_s,
+            **OF_FIDELITY[options.fidelity],
+        ),
         phases=shipped_phases() if options.protocol is None else read_phases(Path(options.protocol)),
-        mesh=MeshSettings(refine=refine),
+        mesh=MeshSettings(refine=refine, fidelity=options.fidelity),
+        self_contact=options.self_contact,
         rules=() if options.solid_only or options.no_paths else rules,
         quality=options.quality,
     )

@@ -169,6 +169,23 @@ class _Friction(argparse.Action):
         namespace.obstacles = [*before, (path, value)]
 
 
+def add_fidelity(command: Any) -> None:
+    """What is simulated of a unit's lattice, and whether its parts feel each other."""
+    command.add_argument(
+        "--fidelity",
+        choices=("resolved", "homogenised"),
+        default="homogenised",
+        help="What is simulated: the printed body with its struts, or a continuum in place of the lattice "
+        "(default: homogenised).",
+    )
+    command.add_argument(
+        "--self-contact",
+        action="store_true",
+        help="Keep walls and struts of a resolved unit apart, at several times the cost (default: they may "
+        "cross, and the run says from which pressure on).",
+    )
+
+
 def add_simulation(command: argparse.ArgumentParser) -> None:
     """Protocol, mesh and material of a simulation."""
     command.add_argument(
@@ -188,12 +205,6 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
         help="Mesh refinement: every element size is divided by F (default: 1).",
     )
     add_fidelity(command)
-    command.add_argument(
-        "--self-contact",
-        action="store_true",
-        help="Keep walls and struts of a resolved unit apart, at several times the cost (default: they may "
-        "cross, and the run says from which pressure on).",
-    )
     command.add_argument(
         "--lattice",
         metavar="FILE",

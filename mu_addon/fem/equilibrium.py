@@ -117,14 +117,27 @@ class Equilibrium:
         stops, the equilibrium found is unstable, or a component of the displacement differs from the start's
         by more than `reach_mm`.
         """
-        obstacles, state = self.model.obstacles, State(pressure, u)
+
+        def found(start: State, again: bool) -> State:
+            # The last factor is still about right where only friction's bound has moved.
+            state = self._descend(start, factored=again)
+            if np.abs(state.u - u).max() > reach_mm:
+                raise ConvergenceError("the unit snaps to a distant equilibrium (limit point)")
+            return state
+
+        return self._with_friction(State(pressure, u), found)
+
+    def _with_friction(self, state: State, found: Callable[[State, bool], State]) -> State:
+        """The equilibrium from a start whose friction's bound belongs to it.
+
+        found: the equilibrium from a start with the bound held, and whether it is not the first. Raises
+        ConvergenceError.
+        """
+        obstacles = self.model.obstacles
         for obstacle in obstacles:
             obstacle.lag_from_memory()
         for number in range(MOST_LAGS):
-            # The last factor is still about right where only friction's bound has moved.
-            state = self._descend(state, factored=number > 0)
-            if np.abs(state.u - u).max() > reach_mm:
-                raise ConvergenceError("the unit snaps to a distant equilibrium (limit point)")
+            state = found(state, number > 0)
             lag_change = max((obstacle.lag_change(state.u) for obstacle in obstacles), default=0.0)
             if lag_change <= FRICTION_TOLERANCE:
                 return state
@@ -197,7 +210,10 @@ class Equilibrium:
                     continue
                 if not s.follow_snaps:
                     raise self._failure(last, pressure, why.what) from None
-                history, smooth = [self._snapped(last, pressure)], True
+                try:
+                    history, smooth = [self.snapped(last, pressure)], True
+                except ConvergenceError as none:
+                    raise self._failure(last, pressure, none.what) from None
                 continue
             history, smooth = [*history[-2:], attrs.evolve(state, snapped_mm=last.snapped_mm)], True
             if state.factorisations <= s.easy_factorisations:
@@ -210,19 +226,24 @@ class Equilibrium:
         """The stable state at a pressure in MPa that damped motion from u (n, 3) in mm leads to.
 
         For starts far from equilibrium, see `damped_minimum`. The cavity must be closed, so that its pressure
-        has a potential. Raises ConvergenceError where it leads to none.
+        has a potential. With friction its bound belongs to the state: the motion is that of each bound in
+        turn. Raises ConvergenceError where it leads to none.
         """
-        return damped_minimum(self, u, pressure)
 
-    def _snapped(self, last: State, pressure: float) -> State:
-        """The stable state that the body falls to from one before a limit point, at a pressure beyond it.
+        def found(start: State, again: bool) -> State:
+            if again:
+                with contextlib.suppress(ConvergenceError):
+                    return self._descend(start, factored=False)
+            return damped_minimum(self, start.u, pressure)
 
-        Raises ConvergenceError where there is none.
+        return self._with_friction(State(pressure, u), found)
+
+    def snapped(self, last: State, pressure: float) -> State:
+        """The stable state that the body falls to from one before a limit point, at a pressure in MPa beyond.
+
+        It tells how far (`State.snapped_mm`). Raises ConvergenceError where there is none.
         """
-        try:
-            state = self.settled(last.u, pressure)
-        except ConvergenceError as why:
-            raise self._failure(last, pressure, why.what) from None
+        state = self.settled(last.u, pressure)
         moved = float(np.linalg.norm(state.u - last.u, axis=1).max())
         return attrs.evolve(state, snapped_mm=max(moved, last.snapped_mm))
 

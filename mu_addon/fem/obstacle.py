@@ -9,20 +9,22 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
-from ..meshing.mesh import AXES, TRIANGLE_EDGES, Mesh, boundary_faces
+from ..meshing.mesh import TRIANGLE_EDGES, Mesh
 from ..meshing.quality import shapes
 from . import friction
 from .elements import triangle_quadrature
 from .friction import Lag, Memory
 from .newton_settings import NewtonSettings
+from .outer_faces import OuterFaces, outer_faces
 from .rigid import Pose, Rigid
-from .self_intersection import with_middles
 
 Array = np.ndarray[Any, Any]
 
 # Points that begin to touch change the tangent, so an old factor is soon of no use; and a body that is
 # stopped ends far from where it was predicted.
 CONTACT_NEWTON = NewtonSettings(keep_factor=0.2, max_factorisations=40, predictor_tolerance=3.0)
+RESOLVED_OBSTACLE_NEWTON: NewtonSettings = attrs.evolve(CONTACT_NEWTON, max_step_MPa=0.005, follow_snaps=True)
+"""For a body strut by strut beside an obstacle: struts snap one by one long before the body does."""
 # A point slides where its friction is at least this share of its bound, which lags by less than the rest.
 _AT_BOUND = 0.999
 
@@ -70,7 +72,8 @@ class Obstacle:
     does so in `simulate_in_time`. Faces of the base, the cavity and mirror planes do not touch. halvings: of
     a face's sides, before the quadrature's points are laid on the pieces: large faces feel an obstacle up to
     near their edges only with some. faces: those of `outer_faces` that can touch, where others cannot: it
-    saves time. Raises InputError.
+    saves time. Of a resolved mesh what a strut has inside another part does not touch, and forces on tied
+    nodes go to those that they follow, as `Model` folds them. Raises InputError.
     """
 
     def __init__(
@@ -84,7 +87,7 @@ class Obstacle:
         stick_mm: float | None = None,
         pose: Pose | None = None,
         path: Callable[[float], Pose] | None = None,
-        faces: Array | None = None,
+        faces: OuterFaces | None = None,
     ) -> None:
         stick_mm = depth_mm if stick_mm is None else stick_mm
         if not (pressure_MPa > 0 and depth_mm > 0):
@@ -104,11 +107,15 @@ class Obstacle:
         self.stiffness = 2 * pressure_MPa / depth_mm
         self.stick_stiffness = friction * pressure_MPa / stick_mm
         self._rest = mesh.nodes
-        self.faces = outer_faces(mesh) if faces is None else faces
+        outer = outer_faces(mesh) if faces is None else faces
+        self.faces = outer.nodes
         points, weight = _subdivided(*triangle_quadrature(mesh.order), halvings)
         self._shape, derivative = shapes(points, TRIANGLE_EDGES, mesh.order)
         tangents = np.einsum("fni,qnk->kfqi", mesh.nodes[self.faces], derivative)
-        self._area = np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=-1) * weight
+        bare = outer.bare[:, points.argmax(axis=1)]
+        self._area = np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=-1) * weight * bare
+        # What is all inside another part of the body is out of reach.
+        self._out_of_reach = np.where(bare > 0, 0.0, np.inf)
         self._pairs = np.stack(np.triu_indices(self.faces.shape[1]), axis=1)
         self.begin()
 
@@ -343,12 +350,13 @@ class Obstacle:
 
     def _points(self, u: Array, faces: Array | None = None) -> tuple[Array, Array, Array, Array]:
         """In the obstacle's frame, at points of faces: place (f, q, 3), distance (f, q), its derivatives."""
-        chosen = self.faces if faces is None else self.faces[faces]
-        x = np.einsum("qa,fai->fqi", self._shape, (self._rest + u)[chosen])
+        chosen = slice(None) if faces is None else faces
+        x = np.einsum("qa,fai->fqi", self._shape, (self._rest + u)[self.faces[chosen]])
         y = (x - self.pose.shift) @ self.pose.rotation
         g, n, h = self.rigid.distance(y.reshape(-1, 3))
         shape = x.shape[:2]
-        return y, g.reshape(shape), n.reshape(*shape, 3), h.reshape(*shape, 3, 3)
+        gap = g.reshape(shape) + self._out_of_reach[chosen]
+        return y, gap, n.reshape(*shape, 3), h.reshape(*shape, 3, 3)
 
     def _contact_candidates(self, u: Array) -> tuple[Array, ...]:
         """Faces (f,) that press or rub, and what `_points` says of them."""
@@ -407,19 +415,3 @@ def _subdivided(points: Array, weight: Array, halvings: int) -> tuple[Array, Arr
         corners = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (bc, ca, ab))
         pieces = np.concatenate([np.stack(t, axis=1) for t in corners])
     return (points @ pieces).reshape(-1, 3), np.tile(weight, len(pieces)) / len(pieces)
-
-
-def outer_faces(mesh: Mesh) -> Array:
-    """Faces (f, 3 | 6), as node numbers, of a mesh that something outside can touch.
-
-    These are the boundary faces that belong to neither cavity, base nor a mirror plane; they have six nodes
-    where the mesh is quadratic.
-    """
-    faces, owner = boundary_faces(mesh.tets)
-    cavity = {tuple(f) for f in np.sort(mesh.cavity_corners, axis=1).tolist()}
-    keep = np.array([tuple(f) not in cavity for f in np.sort(faces, axis=1).tolist()])
-    keep &= ~np.isin(faces, mesh.base).all(axis=1)
-    for axis in mesh.symmetry:
-        keep &= ~(mesh.nodes[faces, AXES.index(axis)] == 0.0).all(axis=1)
-    faces, owner = faces[keep], owner[keep]
-    return with_middles(faces, mesh.tets[owner]) if mesh.order == 2 else faces

@@ -10,9 +10,10 @@ from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 
 from ..errors import InputError
-from ..meshing.mesh import AXES, LATTICE, Mesh, boundary_faces
+from ..meshing.mesh import AXES, LATTICE, Mesh
 from .newton_settings import NewtonSettings
-from .self_intersection import facets_of, with_middles
+from .outer_faces import free_boundary
+from .self_intersection import facets_of
 
 Array = np.ndarray[Any, Any]
 
@@ -302,12 +303,6 @@ class SelfContact:
 
 def _free_facets(mesh: Mesh) -> Array:
     """Triangles (t, 3) of a mesh's surface that can touch: not the base's, mirror planes', or buried ones."""
-    faces, owner = boundary_faces(mesh.tets)
-    keep = ~np.isin(faces, mesh.base).all(axis=1)
-    for axis in mesh.symmetry:
-        keep &= ~(mesh.nodes[faces, AXES.index(axis)] == 0.0).all(axis=1)
-    faces, owner = faces[keep], owner[keep]
-    if mesh.order == 2:
-        faces = with_middles(faces, mesh.tets[owner])
+    faces, _ = free_boundary(mesh)
     # Of parts that overlap, what is tied lies inside another.
     return facets_of(faces[~np.isin(faces, mesh.tied).any(axis=1)])

@@ -22,6 +22,8 @@ Array = np.ndarray[Any, Any]
 LEAP = 4.0
 # Below this share of an interval a step is not halved again.
 SMALLEST = 1e-4
+# Nor below this share of the largest step where the settings follow snaps: what takes a smaller one is one.
+SNAPS_BELOW = 1 / 16
 
 
 @attrs.frozen(eq=False)
@@ -53,10 +55,11 @@ def simulate_in_time(
     The body starts without history, at rest or, where the model has a load, where that takes it; the first
     instant's pressure comes at once. Pressure is
     linear between instants, in steps of at most `max_step_s` and the settings' largest pressure step, halved
-    where they do not converge; obstacles with a path are where they are at each step's time. `on_state` is
-    called when its instant is the last that materials and contacts remember. `load` gives an instant of an
-    earlier run by its number, if it kept one with `store`. Raises InputError where time runs backward, and
-    ConvergenceError naming instant and cause.
+    where they do not converge; obstacles with a path are where they are at each step's time. Where the
+    settings follow snaps, a small step that fails goes on beyond the limit point, and the instant's state
+    tells it (`State.snapped_mm`). `on_state` is called when its instant is the last that materials and
+    contacts remember. `load` gives an instant of an earlier run by its number, if it kept one with `store`.
+    Raises InputError where time runs backward, and ConvergenceError naming instant and cause.
     """
     time, pressure = np.asarray(time_s, float), in_MPa(np.asarray(pressure_kPa, float))
     if (np.diff(time) < 0).any():
@@ -97,21 +100,24 @@ def _start(eq: Equilibrium, time: float) -> Instant:
 def _interval(eq: Equilibrium, start: Instant, time: float, pressure: float, max_step_s: float) -> Instant:
     """Step to an instant, in equal shares of the interval where one step is too much."""
     span, rise = time - start.time_s, pressure - start.state.pressure_MPa
+    start = attrs.evolve(start, state=attrs.evolve(start.state, snapped_mm=0.0))
     if span == 0 and rise == 0:
         return start
     largest = 1 / max(1.0, np.ceil(span / max_step_s), np.ceil(abs(rise) / eq.settings.max_step_MPa - 1e-9))
     last, done, step = start, 0.0, largest
+    smallest = SNAPS_BELOW * largest if eq.settings.follow_snaps else SMALLEST
     while done < 1:
         step = min(step, 1 - done)
         # The last share ends on the instant itself, whatever rounding has left.
         share = 1.0 if 1 - done - step < SMALLEST / 2 else done + step
         target = pressure if share == 1 else start.state.pressure_MPa + share * rise
+        instant = start.time_s + share * span
         try:
-            last = _step(eq, last, start.time_s + share * span, target)
+            snaps = eq.settings.follow_snaps and step / 2 < smallest
+            last = (_step_or_snap if snaps else _step)(eq, last, instant, target)
         except ConvergenceError as why:
             step /= 2
-            if step < SMALLEST:
-                instant = start.time_s + share * span
+            if step < smallest:
                 raise ConvergenceError(
                     f"no equilibrium at {instant:.6g} s, {in_kPa(target):.4g} kPa: {why.what}",
                     f"the last converged state is at {last.time_s:.6g} s, {last.state.pressure_kPa:.4g} kPa",
@@ -141,7 +147,18 @@ def _step(eq: Equilibrium, last: Instant, time: float, pressure: float) -> Insta
         state = eq.newton(eq.model.before_touch(u, guess), pressure, _reach(eq, u, guess))
     eq.model.commit(state.u, m)
     rate = (state.u - u) / m.dt_s if m.dt_s > 0 else None
-    return Instant(time, state, rate)
+    return Instant(time, attrs.evolve(state, snapped_mm=last.state.snapped_mm), rate)
+
+
+def _step_or_snap(eq: Equilibrium, last: Instant, time: float, pressure: float) -> Instant:
+    """As `_step`; where it finds no state nearby, the one that the body falls to."""
+    try:
+        return _step(eq, last, time, pressure)
+    except ConvergenceError:
+        state = eq.snapped(last.state, pressure)
+    eq.model.commit(state.u, eq.parameters)
+    # The fall says nothing of how fast it goes on.
+    return Instant(time, state)
 
 
 def _reach(eq: Equilibrium, u: Array, guess: Array) -> float:

@@ -20,6 +20,7 @@ LATTICE_COLOR = (0.62, 0.69, 0.77)
 PATH_COLOR = (0.835, 0.369, 0.0)  # plots.CHOSEN
 ANCHOR_COLOR = (0.10, 0.11, 0.16)
 OBSTACLE_COLOR = (0.47, 0.45, 0.43)
+COLORS = {MEMBRANE: MEMBRANE_COLOR, LATTICE: LATTICE_COLOR}
 SAGITTAL = Cut((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), color=(0.95, 0.86, 0.72))
 WHITE = (1.0, 1.0, 1.0)
 
@@ -88,8 +89,7 @@ def motion(
     part at x <= 0 and within the picture is shown; width: in pixels. colors: of each state, by region, sRGB
     (n, 3) of every node, in place of one colour a region.
     """
-    skins = {region: region_skin(mesh, region) for region in (MEMBRANE, LATTICE)}
-    plain = {MEMBRANE: MEMBRANE_COLOR, LATTICE: LATTICE_COLOR}
+    skins, plain = skins_of(mesh), COLORS
     # A half mesh lies at x >= 0; its mirror image shows the same section to a viewer at +x.
     flip = mesh.nodes[:, 0].min() > -1e-9
     scenes = []
@@ -143,6 +143,11 @@ def region_skin(mesh: Mesh, region: int) -> NDArray[np.int64]:
     """
     triangles = skin(mesh.tets[mesh.region == region])
     return triangles[~np.isin(triangles, mesh.tied).all(axis=1)]
+
+
+def skins_of(mesh: Mesh) -> dict[int, NDArray[np.int64]]:
+    """`region_skin` of a unit's wall and of its lattice, by region."""
+    return {region: region_skin(mesh, region) for region in (MEMBRANE, LATTICE)}
 
 
 def skin(tets: NDArray[np.integer]) -> NDArray[np.int64]:

@@ -17,6 +17,7 @@ from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.newton_settings import NewtonSettings
 from ..fem.state import State
+from ..fem.time_stepping import simulate_in_time
 from ..meshing.mesh import Mesh
 from .waveguide import bar_of, with_waveguide
 
@@ -69,6 +70,14 @@ class PrintedWaveguides:
         """
         equilibrium = self._equilibrium(self.bar(self.names[number]))
         return self.points(equilibrium.path(pressures_MPa, equilibrium.at_zero_pressure()))
+
+    def simulated_in_time(self, number: int, time_s: Array, pressure_kPa: Array) -> Array:
+        """Anchors (k, p, 3) in mm of one candidate at k instants, each from the one before.
+
+        time_s (k,), pressure_kPa (k,): as `simulate_in_time` takes them. Raises ConvergenceError.
+        """
+        motion = simulate_in_time(self._equilibrium(self.bar(self.names[number])), time_s, pressure_kPa)
+        return motion.of_time(self.points(motion.states))
 
     def points(self, states: Sequence[State]) -> Array:
         """Anchors (s, p, 3) in mm moved by some states."""

@@ -2,6 +2,7 @@
 
 import itertools
 
+import attrs
 import numpy as np
 import pytest
 from scipy import sparse
@@ -9,6 +10,7 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.sparse.linalg import splu
 
 from mu_addon.errors import ConvergenceError
+from mu_addon.fem import time_stepping
 from mu_addon.fem.arc import ContinuationSettings
 from mu_addon.fem.continuation import limit_pressure, trace_branch
 from mu_addon.fem.equilibrium import Equilibrium
@@ -17,7 +19,10 @@ from mu_addon.fem.inertia import Inertia
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import NewtonSettings
+from mu_addon.fem.obstacle import RESOLVED_OBSTACLE_NEWTON, Obstacle
+from mu_addon.fem.rigid import Plane, Pose
 from mu_addon.fem.state import rest
+from mu_addon.fem.time_stepping import simulate_in_time
 from mu_addon.meshing.mesh import boundary_faces, edges_of, mirror
 
 from . import bodies
@@ -194,6 +199,44 @@ def test_damped_motion_turns_an_arch_over_that_bears_its_load_no_more():
     assert found.u[crown(mesh), 1] < 1.5 * feet
     assert np.abs(found.u - over.u).max() < 1e-6
     assert body.newton(found.u, 0.0).iterations == 0
+
+
+@pytest.mark.slow
+def test_a_motion_in_time_goes_on_beyond_a_limit_point(monkeypatch):
+    """A loaded arch whose prop is drawn away at once turns over and falls on it, lower down."""
+    # Newton's method would find the arch on the other side by itself, and not tell.
+    monkeypatch.setattr(time_stepping, "LEAP", 1e-3)
+    mesh = arch()
+    mesh = attrs.evolve(mesh, cavity=mesh.cavity[:0])
+    model = Model(mesh, supports=far_side(mesh), threads=1)
+    prop = Obstacle(
+        mesh,
+        Plane((0.0, -1.0, 0.0), (0.0, 1.0, 0.0)),
+        4e-4,
+        0.01,
+        friction=0.3,
+        path=lambda t: Pose(shift=(0.0, -5.0 * (t > 1.0), 0.0)),
+    )
+    model.obstacles = (prop,)
+    model.load = np.zeros_like(mesh.nodes)
+    model.load[crown(mesh), 1] = -0.01
+    body = Equilibrium(model, bodies.uniform(mesh, 1.0, 0.3), RESOLVED_OBSTACLE_NEWTON, explains=False)
+    times, none = np.array([0.0, 1.0, 2.0]), np.zeros(3)
+    before, _, after = simulate_in_time(body, times, none).states
+    assert before.snapped_mm == 0.0
+    assert after.snapped_mm > 3.0
+    contact = prop.contact(after.u)
+    assert contact.normal_N[1] < -1e-3
+    assert np.hypot(*contact.tangential_N[[0, 2]]) < 0.3 * -contact.normal_N[1]
+    reaction = model.residual(after.u, 0.0, body.parameters)[mesh.base, 1].sum()
+    assert reaction - contact.force_N[1] == pytest.approx(0.01, rel=1e-6)
+    # Without friction there is one place to lie, whatever the way there.
+    prop.friction = 0.0
+    again, otherwise = (body.settled(state.u, 0.0) for state in (after, before))
+    assert np.abs(again.u - otherwise.u).max() < 1e-6
+    prop.friction, body.settings = 0.3, attrs.evolve(body.settings, follow_snaps=False)
+    with pytest.raises(ConvergenceError, match="no equilibrium at"):
+        simulate_in_time(body, times, none)
 
 
 def test_a_whole_arch_buckles_sideways_before_its_limit_point():

@@ -13,7 +13,9 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.loads import traction
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.fem.obstacle import outer_faces
+from mu_addon.fem.obstacle import Obstacle
+from mu_addon.fem.outer_faces import outer_faces
+from mu_addon.fem.rigid import Plane, Pose
 from mu_addon.fem.self_contact import SELF_CONTACT_NEWTON, SelfContact
 from mu_addon.fem.self_intersection import crossings
 from mu_addon.fem.state import rest
@@ -116,7 +118,7 @@ def test_a_block_on_another_passes_on_its_pressure(order):
     supports[:, :2] = True
     eq = body(mesh, supports=supports, material=(E, 0.0))
     pressure = 0.02
-    faces = outer_faces(mesh)
+    faces = outer_faces(mesh).nodes
     top = faces[(z[faces] > z.max() - 1e-9).all(axis=1)]
     eq.model.load = traction(mesh, top, np.array([0.0, 0.0, -pressure]))
     state = eq.newton(np.where(mesh.nodes[:, 2:] > 1.2, [0.0, 0.0, -0.46], 0.0), 0.0)
@@ -131,6 +133,41 @@ def test_a_block_on_another_passes_on_its_pressure(order):
     # One-sided, and three times that: two plates face each other, and their edges count beside their faces.
     least, most = (np.interp(-pressure, -factor * carried, shares) for factor in (1, 3))
     assert least < gap / D < most
+
+
+def test_a_plate_presses_a_block_on_another_without_a_touch():
+    """Self-contact and an obstacle in one model: what the plate presses with arrives at the base."""
+    mesh = plates(4, 5)
+    supports = np.zeros(mesh.nodes.shape, bool)
+    supports[:, :2] = True
+    eq = body(mesh, supports=supports, material=(E, 0.0))
+    contact = eq.model.self_contact
+    start = np.where(mesh.nodes[:, 2:] > 1.2, [0.0, 0.0, -0.47], 0.0)
+    plate = Obstacle(
+        mesh,
+        Plane((0.0, 0.0, 2.03), (0.0, 0.0, -1.0)),
+        0.05,
+        0.01,
+        friction=0.3,
+        path=lambda t: Pose(shift=(0.0, 0.0, -0.1 * t)),
+    )
+    eq.model.obstacles = (plate,)
+    assert not contact.intersects(start)
+    first = eq.settled(start, 0.0)
+    plate.begin(first.u)
+    states = [first]
+    for time in (0.5, 1.0):
+        plate.move(time)
+        states.append(eq.newton(states[-1].u, 0.0))
+        eq.model.commit(states[-1].u, eq.parameters)
+    for state in states:
+        assert not contact.intersects(state.u)
+    last = states[-1]
+    pressed = plate.contact(last.u).normal_N[2]
+    assert pressed > 0.1
+    reaction = eq.model.residual(last.u, 0.0, eq.parameters)[mesh.base, 2].sum()
+    assert reaction == pytest.approx(pressed, rel=1e-8)
+    assert 0.0 < contact.least_gap_mm(last.u) < D
 
 
 def test_no_step_ends_in_a_touch():

@@ -1,12 +1,17 @@
 """A gripper's run: its phases, a grasp with and without friction, its table of paths, its folder."""
 
+import csv
 import json
+import re
 
+import attrs
 import numpy as np
 import pytest
 
 from mu_addon.cli.main import main
-from mu_addon.design.gripper import load_gripper
+from mu_addon.design.assets import asset_root
+from mu_addon.design.gripper import load_gripper, read_gripper
+from mu_addon.design.parameters import to_toml
 from mu_addon.design.surface import bad_edges, stl_surface
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
@@ -15,7 +20,9 @@ from mu_addon.files import read_npz
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from mu_addon.report.pc2 import read_pc2
-from mu_addon.usecases.grip.grasp import Cube, Grip, grasp
+from mu_addon.resolved.unit import mesh_printed
+from mu_addon.usecases.grip import path_deviation
+from mu_addon.usecases.grip.grasp import OF_FIDELITY, Cube, Grip, grasp
 from mu_addon.usecases.grip.motion import even
 from mu_addon.usecases.grip.path_deviation import PathDeviations, path_deviations, published_deviations
 from mu_addon.usecases.grip.phases import NAMES, Phases, read_phases, shipped_phases
@@ -207,3 +214,67 @@ def test_a_grasp_with_friction_from_the_command_line(tmp_path):
     again = json.loads((out / "summary.json").read_text())
     assert again["seconds"]["grasp of 25 mm"] < 0.3 * summary["seconds"]["grasp of 25 mm"]
     assert (out / "grasp_25.csv").read_text() == before
+
+
+def test_self_contact_and_rules_must_suit_the_fidelity():
+    gripper = load_gripper("gripper")
+    with pytest.raises(InputError, match="walls and struts as they are printed"):
+        Job(gripper, self_contact=True)
+    with pytest.raises(InputError, match="rules of a resolved finger are intersect"):
+        Job(gripper, mesh=MeshSettings(fidelity="resolved"))
+    job = Job(gripper, mesh=MeshSettings(fidelity="resolved"), rules=("printed",), self_contact=True)
+    assert "self_contact = true" in job.texts()["grip.toml"]
+
+
+def short_gripper(folder):
+    """A gripper of fingers of three chambers, which reach no farther than a narrow gap, as a file."""
+    whole = load_gripper("gripper").unit
+    short = attrs.evolve(whole, chambers=attrs.evolve(whole.chambers, count=3))
+    (folder / "unit.toml").write_text(to_toml(short))
+    text = (asset_root() / "presets" / "gripper.toml").read_text().replace("gap_mm = 30.0", "gap_mm = 26.0")
+    for key, value in (("unit", "unit.toml"), ("path", "alpha1")):
+        text = re.sub(f"(?m)^{key} = .*", f'{key} = "{value}"', text)
+    (folder / "g.toml").write_text(text)
+    return folder / "g.toml"
+
+
+@pytest.mark.slow
+def test_a_printed_waveguide_disturbs_a_finger_on_a_cube(tmp_path, monkeypatch):
+    """One load of the protocol: what is printed moves the backbone, and a rerun finds it solved."""
+    monkeypatch.setattr(path_deviation, "_samples", lambda: (np.array([0.0, 1.0]), np.array([0.0, 15.0])))
+    gripper = read_gripper(short_gripper(tmp_path))
+    mesh = mesh_printed(gripper.unit, MeshSettings(refine=0.4))
+    kept = {}
+
+    def ranked(**more):
+        materials, grip = materials_of(gripper.unit, mesh), Grip(**OF_FIDELITY["resolved"])
+        return path_deviations(gripper, mesh, materials, "printed", Cube(25.0), grip, **more).J_hat_mm
+
+    found = ranked(store=kept.__setitem__)
+    assert set(kept) == {"model_a", "alpha1"}
+    assert 0.005 < found["alpha1"] < 1.0
+    assert ranked(load=kept.get) == found
+
+
+@pytest.mark.slow
+def test_a_resolved_finger_grasps_from_the_command_line(tmp_path):
+    """Three chambers strut by strut: forces within Coulomb's bound, work into friction, frames."""
+    gripper = short_gripper(tmp_path)
+    (tmp_path / "p.csv").write_text(
+        "time_s,pressure_kPa,phase\n0,0,i\n0.5,0,i\n2.5,20,ii\n3,20,iii\n3.5,20,iv\n5.5,0,v\n"
+    )
+    line = ["grip", "--gripper", gripper, "--protocol", tmp_path / "p.csv", "--cube", "25"]
+    line += ["--refine", "0.4", "--fidelity", "resolved", "--no-paths", "--out", tmp_path / "out"]
+    assert main([str(word) for word in line]) == 0
+    rows = list(csv.DictReader((tmp_path / "out" / "grasp_25.csv").open()))
+    normal, down, lost, gap = (
+        np.array([float(r[c]) for r in rows]) for c in ("normal_N", "down_N", "lost_mJ", "deepest_mm")
+    )
+    assert normal.max() > 0.03
+    assert (np.abs(down) <= 0.5 * normal * (1 + 1e-3) + 1e-9).all()
+    assert 0 < gap.max() < 0.15
+    assert normal[-1] == 0.0
+    g = json.loads((tmp_path / "out" / "summary.json").read_text())["grasps"]["25"]
+    # Steps of 5 kPa: 9 % apart; of 10 kPa 21 %, of 2.5 kPa 2 %.
+    assert g["pressure_work_mJ"] + g["cube_work_mJ"] == pytest.approx(lost[-1], rel=0.15)
+    assert (tmp_path / "out" / "frame_25_iii.png").exists()

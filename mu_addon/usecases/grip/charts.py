@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from ...design.gripper import ROOT, Gripper, GripperSolid
-from ...meshing.mesh import LATTICE, MEMBRANE, Mesh
+from ...meshing.mesh import Mesh
 from ...report import charts as plots
 from ...report.render import Camera, Cut, Part, fit, png, render
 from ...report.results import Picture
-from ...report.unit_pictures import LATTICE_COLOR, MEMBRANE_COLOR, WHITE, region_skin, unit_parts
+from ...report.unit_pictures import COLORS, WHITE, skins_of, unit_parts
 from .grasp import Grasp
 from .path_deviation import PathDeviations
 
@@ -69,8 +69,7 @@ def frames(gripper: Gripper, mesh: Mesh, found: Grasp, width: int = 420) -> list
         "iv": (found.end("iv"), "iv, lifted" if found.lift.held else "iv, not lifted"),
         "v": (_opened(found), "v, released"),
     }
-    skins = {region: region_skin(mesh, region) for region in (MEMBRANE, LATTICE)}
-    colors = {MEMBRANE: MEMBRANE_COLOR, LATTICE: LATTICE_COLOR}
+    skins, colors = skins_of(mesh), COLORS
     x, y = (extent / 2.0 for extent in gripper.size_mm)
     half = found.cube.side_mm / 2.0
     scenes = []

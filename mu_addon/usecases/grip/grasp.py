@@ -21,8 +21,11 @@ from ...fem.kinematics import TipSection, probe
 from ...fem.loads import STANDARD_GRAVITY
 from ...fem.materials import Materials
 from ...fem.model import Model
-from ...fem.obstacle import CONTACT_NEWTON, Obstacle, outer_faces
+from ...fem.newton_settings import NewtonSettings
+from ...fem.obstacle import CONTACT_NEWTON, Obstacle
+from ...fem.outer_faces import OuterFaces, outer_faces
 from ...fem.rigid import Box, Pose
+from ...fem.self_contact import SelfContact
 from ...fem.state import State
 from ...fem.time_stepping import simulate_in_time
 from ...meshing.mesh import Mesh
@@ -99,6 +102,13 @@ class Grip:
             raise InputError(f"instants {self.step_s:g} s apart", "step_s", "give a time up to 2 s")
 
 
+OF_FIDELITY: dict[str, dict[str, Any]] = {
+    "homogenised": {},
+    "resolved": {"pressure_MPa": 0.1, "depth_mm": 0.05, "halvings": 1},
+}
+"""Values of `Grip` that go with a fidelity: struts bear on few small places, and their faces are small."""
+
+
 @attrs.frozen(eq=False)
 class Lift:
     """A cube without support in the closed grasp.
@@ -140,7 +150,8 @@ class Grasp:
     cube_mm (k, 3): the cube's middle in that frame. normal_N (k,): toward the other finger; down_N (k,):
     along +z, friction but for what edges press. sticking (k,): share of the touching area that does not
     slide; slid_mm (k,): the farthest that a point has slid so far; deepest_mm (k,): the error of the gap;
-    lost_mJ (k,): what friction has taken, of one finger; volume_mm3 (k,): of its cavity.
+    lost_mJ (k,): what friction has taken, of one finger; volume_mm3 (k,): of its cavity; snapped_mm (k,): how
+    far a node moved where parts of the finger snapped on the way to an instant, else 0.
     """
 
     cube: Cube
@@ -156,6 +167,7 @@ class Grasp:
     deepest_mm: Array
     lost_mJ: Array
     volume_mm3: Array
+    snapped_mm: Array
     cube_mm: Array
     backbone: Array
     u: Array
@@ -205,13 +217,13 @@ def obstacle_of(gripper: Gripper, cube: Cube, grip: Grip, mesh: Mesh) -> Obstacl
     )
 
 
-def _facing(gripper: Gripper, mesh: Mesh) -> Array:
-    """Faces (f, 3 | 6) of a finger that can meet the cube: of its inner side and its tip."""
+def _facing(gripper: Gripper, mesh: Mesh) -> OuterFaces:
+    """Faces of a finger that can meet the cube: of its inner side and its tip, as deep as struts are open."""
     faces = outer_faces(mesh)
     (_, inner), (_, tip) = gripper.unit.printed.bounds[1:]
-    y, z = mesh.nodes[faces[:, :3]][:, :, 1], mesh.nodes[faces[:, :3]][:, :, 2]
-    near = 1e-6 * tip
-    return faces[(y > inner - near).all(axis=1) | (z > tip - near).all(axis=1)]
+    y, z = mesh.nodes[faces.nodes[:, :3]][:, :, 1], mesh.nodes[faces.nodes[:, :3]][:, :, 2]
+    near = gripper.unit.printed.cell if mesh.resolved else 1e-6 * tip
+    return faces.of((y > inner - near).all(axis=1) | (z > tip - near).all(axis=1))
 
 
 def grasp(
@@ -223,15 +235,20 @@ def grasp(
     grip: Grip | None = None,
     threads: int = 1,
     on_instant: Callable[[float, str], None] = lambda share, words: None,
+    newton: NewtonSettings = CONTACT_NEWTON,
+    self_contact: SelfContact | None = None,
 ) -> Grasp:
     """Close a finger on a cube phase by phase, in time order, and lift the cube.
 
-    mesh and materials: of the gripper's unit, the half mesh. on_instant is told the share done. Raises
+    mesh and materials: of the gripper's unit, the half mesh, homogenised or resolved. on_instant is told the
+    share done. newton: settings that suit the mesh; self_contact: what keeps the finger's parts apart. Raises
     InputError for a cube that does not fit, ConvergenceError where an instant has no equilibrium.
     """
     grip = grip or Grip()
-    hand = _Hand(gripper, cube, phases, mesh, materials, grip, threads, on_instant)
-    return hand.work()
+    model = Model(mesh, threads=threads)
+    model.self_contact = self_contact
+    equilibrium = Equilibrium(model, materials, newton, explains=False)
+    return _Hand(gripper, cube, phases, equilibrium, grip, on_instant).work()
 
 
 class _Hand:
@@ -242,21 +259,19 @@ class _Hand:
         gripper: Gripper,
         cube: Cube,
         phases: Phases,
-        mesh: Mesh,
-        materials: Materials,
+        equilibrium: Equilibrium,
         grip: Grip,
-        threads: int,
         on_instant: Callable[[float, str], None],
     ) -> None:
+        mesh = equilibrium.model.mesh
         self.cube, self.grip, self.phases, self.mesh = cube, grip, phases, mesh
         self.anchors = anchor_points(gripper.unit)
         self.tip = TipSection.of(mesh)
         self.place = place_of(gripper, grip)
         self.obstacle = obstacle_of(gripper, cube, grip, mesh)
         self.obstacle.path = self.pose
-        model = Model(mesh, threads=threads)
-        model.obstacles = (self.obstacle,)
-        self.equilibrium = Equilibrium(model, materials, CONTACT_NEWTON)
+        self.equilibrium = equilibrium
+        equilibrium.model.obstacles = (self.obstacle,)
         self.time, self.pressure, self.phase = phases.sample(grip.step_s)
         self.on_instant = on_instant
         self.sunk = 0.0
@@ -297,6 +312,7 @@ class _Hand:
             deepest_mm=columns[6],
             lost_mJ=columns[7],
             volume_mm3=columns[8],
+            snapped_mm=columns[9],
             cube_mm=np.array(self.at),
             backbone=np.array([points + monitor.displacement(one) for one in u]),
             u=u,
@@ -318,6 +334,7 @@ class _Hand:
                 contact.deepest_mm,
                 2.0 * contact.lost_mJ,
                 2.0 * self.equilibrium.model.cavity_volume(state.u),
+                state.snapped_mm,
             )
         )
         self.at.append(self.obstacle.pose.shift)

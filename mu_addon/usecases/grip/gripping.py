@@ -10,20 +10,24 @@ import numpy as np
 
 from ...design.anchors import anchor_points, window
 from ...design.gripper import GripperSolid, build_gripper
+from ...design.quantity import in_kPa, in_MPa
 from ...design.surface import stl_bytes
 from ...design.threemf import Part, read_3mf, write_3mf
 from ...design.waveguide import waveguide
 from ...errors import OutputError
 from ...fem.materials import Materials
+from ...fem.self_intersection import first_self_intersection
+from ...fem.state import State, rest
 from ...fem.unit import materials_of
 from ...files import write_bytes, write_csv
 from ...meshing.mesh import Mesh
-from ...meshing.unit import mesh_unit
+from ...resolved.unit import mesh_of
 from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.progress import Progress
 from ...sensing.embedded_waveguide import Joints, embed_waveguide
 from ...sensing.signal import Signal, traced_signal
+from ..simulate_and_place.job import in_time_newton, self_contact_of
 from .grasp import Cube, Grasp, Lift, grasp
 from .job import Job
 from .motion import write_grasp
@@ -105,7 +109,7 @@ class Gripping:
     def make_mesh(self) -> None:
         """Analysis mesh of half a finger."""
         with self.progress.stage("mesh", 5.0):
-            mesh = self.mesh = mesh_unit(self.job.gripper.unit, self.job.mesh)
+            mesh = self.mesh = mesh_of(self.job.gripper.unit, self.job.mesh)
         self.context.summary["mesh"] = {"nodes": len(mesh.nodes), "tetrahedra": len(mesh.tets)}
 
     @property
@@ -116,13 +120,14 @@ class Gripping:
 
     def _key(self, *parts: Any) -> str:
         assert self.mesh is not None
-        own = attrs.astuple(self.job.grip), self.job.gripper.fingers.gap_mm
+        own = attrs.astuple(self.job.grip), self.job.gripper.fingers.gap_mm, self.job.self_contact
         return key(self.mesh.hash(), self.materials.hash(), own, *parts)
 
     def close_on(self, cube: Cube) -> None:
         """The grasp of one cube, phase by phase."""
         assert self.mesh is not None
         job, name = self.job, f"cube-{cube.side_mm:g}"
+        apart = self_contact_of(job.gripper.unit, self.mesh) if job.self_contact else None
         entry = self._key("grasp", attrs.astuple(cube), job.phases.text())
         with self.progress.stage(f"grasp of {cube.side_mm:g} mm"):
             kept = self.cache.get("grasp", entry)
@@ -135,6 +140,8 @@ class Gripping:
                     self.materials,
                     job.grip,
                     on_instant=self.progress.update,
+                    newton=in_time_newton(self.mesh.resolved, job.self_contact),
+                    self_contact=apart,
                 )
                 self.cache.put("grasp", entry, _arrays(found))
             else:
@@ -149,10 +156,35 @@ class Gripping:
             )
             write_grasp(self.folder / name, job.gripper, self.mesh, self.materials, found)
         self.context.summary.setdefault("grasps", {})[f"{cube.side_mm:g}"] = grasp_figures(found)
+        self._look_for_self_intersection(found)
+        if found.snapped_mm.any():
+            first = int(np.flatnonzero(found.snapped_mm)[0])
+            self.warn(
+                f"Closing on {cube.side_mm:g} mm parts of the finger snap, first before "
+                f"{found.time_s[first]:g} s ({found.pressure_kPa[first]:.4g} kPa), by "
+                f"{found.snapped_mm.max():.2g} mm at most: from there on the states are those that damped "
+                "motion leads to."
+            )
         if not found.lift.held:
             self.warn(
                 f"The cube of {cube.side_mm:g} mm ({cube.mass_g:.3g} g) is not lifted: friction can carry "
                 f"at most {found.lift.capacity_N:.3g} N of its {cube.weight_N:.3g} N."
+            )
+
+    def _look_for_self_intersection(self, found: Grasp) -> None:
+        """Name the first pressure at which walls of the free finger pass through each other as it opens."""
+        assert self.mesh is not None
+        # With self-contact no step passes a touch.
+        if self.job.self_contact:
+            return
+        opening = range(1, found.end("i") + 1)
+        states = [State(in_MPa(float(found.pressure_kPa[k])), found.u[k]) for k in opening]
+        first = first_self_intersection(self.mesh, [rest(self.mesh), *states])
+        if first is not None:
+            instead = " or --self-contact" if self.mesh.resolved else ""
+            self.warn(
+                f"From {in_kPa(first.pressure_MPa):.4g} kPa on, walls of the opening finger intersect: "
+                f"{first.crossings[0]}. States beyond are invalid. Use a smaller vacuum{instead}."
             )
 
     def follow_light(self) -> None:
@@ -203,6 +235,7 @@ class Gripping:
                 rule,
                 cube,
                 self.job.grip,
+                self_contact=self.job.self_contact,
                 load=load,
                 store=store,
                 on_path=self.progress.update,
@@ -285,7 +318,7 @@ def _grasp(cube: Cube, arrays: dict[str, Array]) -> Grasp:
 
 def _write_grasp_csv(path: Path, found: Grasp, signal: Signal | None = None) -> None:
     names = ["time_s", "pressure_kPa", "angle_deg", "normal_N", "down_N", "area_mm2", "sticking", "slid_mm"]
-    names += ["deepest_mm", "lost_mJ", "volume_mm3"]
+    names += ["deepest_mm", "lost_mJ", "volume_mm3", "snapped_mm"]
     values = [getattr(found, name) for name in names] + [found.cube_mm[:, 2]]
     columns = ["phase", *names, "cube_z_mm"]
     if signal is not None:

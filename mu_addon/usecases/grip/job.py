@@ -11,11 +11,12 @@ from ...design.parameters import to_toml as unit_toml
 from ...design.solid import QUALITY
 from ...errors import InputError
 from ...meshing.settings import MeshSettings
-from ...placement.inclusion import RULES
+from ...placement.inclusion import PRINTED, RULES
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...sensing.optics import Optics
 from ...toml_writer import toml_text
+from ..simulate_and_place.job import require_self_contact_resolvable
 from .grasp import Cube, Grip
 from .phases import Phases, read_phases, shipped_phases
 
@@ -42,7 +43,10 @@ REFINE, COARSE = 0.5, 0.4
 
 @attrs.frozen
 class Job:
-    """Inputs of a run. cubes: none leaves the grasp out; rules: none leaves the table of paths out."""
+    """Inputs of a run. cubes: none leaves the grasp out; rules: none leaves the table of paths out.
+
+    self_contact: whether walls and struts of a resolved finger keep apart. Raises InputError.
+    """
 
     gripper: Gripper
     cubes: tuple[Cube, ...] = tuple(Cube(side) for side in CUBES)
@@ -52,8 +56,17 @@ class Job:
     rules: tuple[str, ...] = RULES
     quality: str = attrs.field(default="interactive", validator=attrs.validators.in_(tuple(QUALITY)))
     optics: Optics = attrs.field(factory=Optics)
+    self_contact: bool = attrs.field(default=False, validator=attrs.validators.instance_of(bool))
 
     def __attrs_post_init__(self) -> None:
+        require_self_contact_resolvable(self.mesh, self.self_contact)
+        offered = (PRINTED,) if self.mesh.fidelity == "resolved" else RULES
+        if any(rule not in offered for rule in self.rules):
+            raise InputError(
+                f"the rules of a {self.mesh.fidelity} finger are {', '.join(self.rules)}",
+                "rules, fidelity",
+                f"give some of {', '.join(offered)}",
+            )
         self.gripper.unit.wall.require_without_memory("a grasp")
         sides = [cube.side_mm for cube in self.cubes]
         if len(set(sides)) < len(sides):
@@ -78,6 +91,8 @@ class Job:
             "mesh": self.mesh.table(),
             "optics": attrs.asdict(self.optics),
         }
+        if self.self_contact:
+            values["self_contact"] = True
         return {
             LAYOUT.inputs: toml_text(values, LAYOUT.header),
             GRIPPER: to_toml(self.gripper, UNIT),

@@ -23,12 +23,16 @@ from ...fem.kinematics import Probe, probe
 from ...fem.materials import Materials
 from ...fem.model import Model
 from ...fem.obstacle import CONTACT_NEWTON
+from ...fem.time_stepping import simulate_in_time
 from ...fem.trajectory import Trajectory, simulate
+from ...fem.unit import materials_of
 from ...meshing.mesh import Mesh
 from ...placement.batch import CandidateBatch
 from ...placement.candidates import candidate_paths, evaluation, moved_points, roi, with_sensor
-from ...placement.inclusion import sensor_share
+from ...placement.inclusion import PRINTED, sensor_share
+from ...resolved.candidates import PrintedWaveguides
 from ..simulate_and_place.job import grasp as grasp_protocol
+from ..simulate_and_place.job import in_time_newton, self_contact_of
 from .grasp import Cube, Grip, obstacle_of
 
 Array = np.ndarray[Any, Any]
@@ -77,52 +81,110 @@ def path_deviations(
     cube: Cube | None,
     grip: Grip | None = None,
     threads: int = 1,
+    self_contact: bool = False,
     load: Callable[[str], Array | None] = lambda name: None,
     store: Callable[[str, Array], None] = lambda name, moved: None,
     on_path: Callable[[float, str], None] = lambda share, name: None,
 ) -> PathDeviations:
     """J_hat of every window's path against the finger without a sensor, through the grasp protocol.
 
+    mesh: homogenised, or resolved with the rule PRINTED, whose candidates are the waveguides as printed.
     `load` gives the monitored points (k, p, 3) in mm of a path's unit ("model_a" for none) that an earlier
     run kept with `store`. Raises ConvergenceError where a unit has no equilibrium.
     """
-    unit, grip = gripper.unit, grip or Grip()
+    unit, grip = gripper.unit, attrs.evolve(grip or Grip(), friction=0.0)
     points = anchor_points(unit)
-    monitored = (points, probe(mesh, points))
-    radius, sensor = unit.dimensions.inclusion_radius, unit.material.sensor_modulus_MPa
-    time, pressure = grasp_protocol().sample(TIMES)
+    radius = unit.dimensions.inclusion_radius
     every = candidate_paths(points, windows(len(points)))
-    shares = {c.name: sensor_share(rule, roi(mesh, c, radius)) for c in every}
-    model = Model(mesh, threads=threads)
-    if cube is not None:
-        model.obstacles = (obstacle_of(gripper, cube, attrs.evolve(grip, friction=0.0), mesh),)
+    names = ["model_a", *(c.name for c in every)]
+    known = {name: moved for name in names if (moved := load(name)) is not None}
 
-    known = {name: moved for name in ("model_a", *shares) if (moved := load(name)) is not None}
+    def model_of(own: Mesh) -> Model:
+        model = Model(own, threads=threads)
+        if cube is not None:
+            model.obstacles = (obstacle_of(gripper, cube, grip, own),)
+        if self_contact:
+            model.self_contact = self_contact_of(unit, own)
+        return model
 
-    def alone(name: str, own: Materials) -> Array:
-        """The monitored points of one unit along its own path."""
-        if name not in known:
-            settings = None if cube is None else CONTACT_NEWTON
-            found = simulate(Equilibrium(model, own, settings), time, pressure)
-            known[name] = moved_points(monitored, found)
-            store(name, known[name])
-        return known[name]
+    def solved(name: str, moved: Array) -> Array:
+        known[name] = moved
+        store(name, moved)
+        return moved
 
-    if cube is None and len(known) <= len(shares):
-        base = simulate(Equilibrium(model, materials), time, pressure)
-        known["model_a"] = moved_points(monitored, base)
-        known |= _together(model, materials, monitored, base, shares, sensor)
-        for name, moved in known.items():
-            store(name, moved)
-    still = alone("model_a", materials)
-    on_path(1.0 / (len(every) + 1), "no sensor")
+    if rule == PRINTED:
+        alone = _printed(gripper, mesh, materials, points, model_of, self_contact)
+    else:
+        monitored = (points, probe(mesh, points))
+        sensor = unit.material.sensor_modulus_MPa
+        shares = {c.name: sensor_share(rule, roi(mesh, c, radius)) for c in every}
+        model = model_of(mesh)
+        if cube is None and len(known) < len(names):
+            base = simulate(Equilibrium(model, materials), *_samples())
+            solved("model_a", moved_points(monitored, base))
+            for name, moved in _together(model, materials, monitored, base, shares, sensor).items():
+                solved(name, moved)
+        alone = _stiffened(model, materials, monitored, shares, sensor)
+
+    def moved_of(name: str) -> Array:
+        return known[name] if name in known else solved(name, alone(name))
+
+    still = moved_of("model_a")
+    on_path(1.0 / len(names), "no sensor")
     J = {}
     for number, candidate in enumerate(every, 2):
-        name = candidate.name
-        moved = alone(name, with_sensor(materials, shares[name], sensor))
-        J[name] = evaluation(mesh, candidate, rule, radius, moved, still, STATIONS).deviation.J_hat
-        on_path(number / (len(every) + 1), name)
+        moved = moved_of(candidate.name)
+        found = evaluation(mesh, candidate, rule, radius, moved, still, STATIONS)
+        J[candidate.name] = found.deviation.J_hat
+        on_path(number / len(names), candidate.name)
     return PathDeviations(rule, cube, J)
+
+
+def _samples() -> tuple[Array, Array]:
+    return grasp_protocol().sample(TIMES)
+
+
+def _stiffened(
+    model: Model,
+    materials: Materials,
+    monitored: tuple[Array, Probe],
+    shares: dict[str, Array],
+    sensor_MPa: float,
+) -> Callable[[str], Array]:
+    """The monitored points (k, p, 3) in mm of one unit, by name, along its own path of equilibria."""
+
+    def alone(name: str) -> Array:
+        own = materials if name == "model_a" else with_sensor(materials, shares[name], sensor_MPa)
+        settings = CONTACT_NEWTON if model.obstacles else None
+        return moved_points(monitored, simulate(Equilibrium(model, own, settings), *_samples()))
+
+    return alone
+
+
+def _printed(
+    gripper: Gripper,
+    mesh: Mesh,
+    materials: Materials,
+    points: Array,
+    model_of: Callable[[Mesh], Model],
+    self_contact: bool,
+) -> Callable[[str], Array]:
+    """As `_stiffened`, of units with printed waveguides: instant by instant, since struts may snap."""
+    unit = gripper.unit
+    newton = in_time_newton(True, self_contact)
+    names = tuple(w.name for w in windows(len(points)))
+    units = PrintedWaveguides(
+        unit, mesh, names, points, lambda own: materials_of(unit, own), model_of, newton
+    )
+
+    def alone(name: str) -> Array:
+        if name != "model_a":
+            return units.simulated_in_time(names.index(name), *_samples())
+        base = Equilibrium(model_of(mesh), materials, newton, explains=False)
+        motion = simulate_in_time(base, *_samples())
+        return motion.of_time(units.points(motion.states))
+
+    return alone
 
 
 def _together(

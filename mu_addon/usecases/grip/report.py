@@ -264,6 +264,11 @@ def _assumed(run: Gripping) -> str:
     words = (
         "The paper does not print the size of its gripper, the pressures of its grasp other than 0, −20 and "
         "40 kPa, or the mass of its cubes. The plate is clamped, the weight of the fingers is neglected, "
-        "and both fingers are equal."
+        "and both fingers are equal. "
     )
+    if run.job.mesh.fidelity == "resolved":
+        parts = "keep apart" if run.job.self_contact else "may pass through each other"
+        words += f"The fingers are simulated as printed, strut by strut; their own walls and struts {parts}."
+    else:
+        words += "The lattice is simulated as a continuum."
     return f"<p>{escape(words)}</p>" + table("", head, rows)

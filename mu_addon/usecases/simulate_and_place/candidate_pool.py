@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import attrs
 import numpy as np
 
-from ...errors import InputError
 from ...fem.kinematics import probe
 from ...fem.materials import Materials
 from ...fem.model import Model
@@ -86,12 +85,8 @@ class PrintedEvaluator:
         return self._candidates.alone(job, pressures_MPa)
 
     def simulated_in_time(self, job: int, time_s: Array, pressure_kPa: Array) -> Array:
-        """Raises InputError: nothing that remembers is simulated with a printed waveguide yet."""
-        raise InputError(
-            "printed waveguides are ranked by pressure alone, without obstacles or a wall that remembers",
-            "fidelity",
-            'choose fidelity "homogenised"',
-        )
+        """Anchors (k, p, 3) in mm that a job moves at k instants, in their order; ConvergenceError."""
+        return self._candidates.simulated_in_time(job, time_s, pressure_kPa)
 
 
 def evaluator_of(setting: CandidateProblem, threads: int) -> Evaluator | PrintedEvaluator:

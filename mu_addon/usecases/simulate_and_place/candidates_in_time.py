@@ -10,13 +10,12 @@ import numpy as np
 
 from ...design.anchors import anchor_points
 from ...fem.kinematics import probe
-from ...fem.obstacle import CONTACT_NEWTON
 from ...fem.trajectory import Trajectory
 from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, Evaluation, evaluation
 from ...run.cache import Cache, key
 from .candidate_pool import CandidatePool, CandidateProblem
-from .contact_history import HALVINGS, DEPTH_mm, PRESSURE_MPa
+from .contact_history import PRESSURE_AND_HALVINGS, DEPTH_mm
 from .job import Job
 
 Array = np.ndarray[Any, Any]
@@ -40,7 +39,8 @@ def evaluations(
     sensor = unit.material.sensor_modulus_MPa
     time, pressure = trajectory.time_s, trajectory.pressure_kPa
     setting = CandidateProblem(mesh, materials, points, tuple(jobs), radius, sensor, study=job)
-    contact = CONTACT_NEWTON, PRESSURE_MPa, DEPTH_mm, HALVINGS, [o.friction for o in job.obstacles]
+    friction = [o.friction for o in job.obstacles]
+    contact = job.newton, *PRESSURE_AND_HALVINGS[job.mesh.fidelity], DEPTH_mm, friction
     names = [
         key(
             mesh.hash(),

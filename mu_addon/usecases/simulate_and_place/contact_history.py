@@ -20,10 +20,11 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, Any]
 
-# At this contact pressure the gap is off by so much at 1.0x, and friction gives by as much before it slides.
-PRESSURE_MPa, DEPTH_mm = 0.02, 0.05
-# Faces of the envelope are some 15 mm long: contact is felt at points four times as close.
-HALVINGS = 2
+# By so much the gap is off at 1.0x at the contact pressure expected, and friction gives before it slides.
+DEPTH_mm = 0.05
+# The contact pressure in MPa, and how often faces are halved: contact is felt at their points. Faces of a
+# homogenised envelope are some 15 mm long; struts bear on few small places.
+PRESSURE_AND_HALVINGS = {"homogenised": (0.02, 2), "resolved": (0.1, 1)}
 # Deeper than this at rest, as a share of DEPTH_mm, is an overlap and no rounding of the mesh.
 _OVERLAP = 0.2
 
@@ -31,10 +32,11 @@ _OVERLAP = 0.2
 def obstacles_of(bodies: Sequence[RigidBody], unit: Unit, mesh: Mesh) -> tuple[Obstacle, ...]:
     """The bodies as obstacles of a unit's mesh; InputError where it overlaps one at rest: where, how deep."""
     depth = DEPTH_mm * unit.dimensions.cell / CELL_MM
+    pressure, halvings = PRESSURE_AND_HALVINGS["resolved" if mesh.resolved else "homogenised"]
     found = []
     for rigid in bodies:
         surface = Surface(rigid.body.vertices, rigid.body.triangles, rigid.name)
-        obstacle = Obstacle(mesh, surface, PRESSURE_MPa, depth, HALVINGS, rigid.friction)
+        obstacle = Obstacle(mesh, surface, pressure, depth, halvings, rigid.friction)
         at_rest = np.zeros_like(mesh.nodes)
         deep = obstacle.deepest_mm(at_rest)
         if deep > _OVERLAP * depth:

@@ -20,7 +20,7 @@ from ...design.rigid_body import FRICTION, RigidBody, mirrored, read_rigid_bodie
 from ...design.solid import QUALITY
 from ...errors import InputError
 from ...fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
-from ...fem.obstacle import CONTACT_NEWTON
+from ...fem.obstacle import CONTACT_NEWTON, RESOLVED_OBSTACLE_NEWTON
 from ...fem.protocol import Protocol, read_protocol
 from ...fem.self_contact import SELF_CONTACT_NEWTON, SelfContact
 from ...fem.solver import SolverChoice
@@ -114,12 +114,7 @@ class Job:
             # The waveguide is what is printed: the rules are for a continuum in place of the lattice.
             object.__setattr__(self, "rules", (PRINTED,))
             self._require_resolvable()
-        elif self.self_contact:
-            raise InputError(
-                "self-contact needs walls and struts as they are printed",
-                "--self-contact",
-                "give --fidelity resolved, too, or leave it out",
-            )
+        require_self_contact_resolvable(self.mesh, self.self_contact)
         if self.obstacles and "place" in self.stages and self.paths == "graph":
             raise InputError(
                 "the search of the whole lattice does not support obstacles",
@@ -173,10 +168,6 @@ class Job:
             "a law for the lattice": ("--lattice", self.lattice is not None),
             "linear elements": ("--order", self.mesh.order == 1),
             "a search of the whole lattice": ("--paths graph", self.paths == "graph"),
-            "printed waveguides beside obstacles or with a wall that remembers": (
-                "--obstacle, [wall]",
-                "place" in self.stages and self.in_time,
-            ),
         }
         for what, (where, asked) in refused.items():
             if asked and "simulate" in self.stages:
@@ -247,17 +238,14 @@ class Job:
         if self.obstacles:
             model.obstacles = obstacles_of(self.obstacles, self.unit, mesh)
         if self.self_contact:
-            resin_MPa = in_MPa(self.unit.material.membrane_modulus_kPa)
-            model.self_contact = SelfContact(
-                mesh, GAP_SHARE * self.unit.printed.wall, BARRIER_SHARE * resin_MPa
-            )
+            model.self_contact = self_contact_of(self.unit, mesh)
         return model
 
     @property
     def newton(self) -> NewtonSettings:
         """Settings of Newton's method for this unit."""
         if self.in_time:
-            return CONTACT_NEWTON
+            return in_time_newton(self.mesh.fidelity == "resolved", self.self_contact)
         if self.mesh.fidelity == "homogenised":
             return self.effects.newton
         return RESOLVED_CONTACT_NEWTON if self.self_contact else RESOLVED_NEWTON
@@ -328,6 +316,29 @@ class Job:
     def protocol_text(self) -> str:
         """protocol.csv: corner points of the pressure protocol."""
         return protocol_text(self.protocol)
+
+
+def self_contact_of(unit: Unit, mesh: Mesh) -> SelfContact:
+    """What keeps walls and struts of a unit's resolved mesh apart. Raises InputError."""
+    resin_MPa = in_MPa(unit.material.membrane_modulus_kPa)
+    return SelfContact(mesh, GAP_SHARE * unit.printed.wall, BARRIER_SHARE * resin_MPa)
+
+
+def require_self_contact_resolvable(mesh: MeshSettings, self_contact: bool) -> None:
+    """Raise InputError where self-contact is asked for without walls and struts."""
+    if self_contact and mesh.fidelity != "resolved":
+        raise InputError(
+            "self-contact needs walls and struts as they are printed",
+            "--self-contact",
+            "give --fidelity resolved, too, or leave it out",
+        )
+
+
+def in_time_newton(resolved: bool, self_contact: bool) -> NewtonSettings:
+    """Settings of Newton's method where a motion is solved instant by instant."""
+    if self_contact:
+        return RESOLVED_CONTACT_NEWTON
+    return RESOLVED_OBSTACLE_NEWTON if resolved else CONTACT_NEWTON
 
 
 def protocol_text(protocol: Protocol) -> str:

@@ -463,11 +463,19 @@ class Study:
         self.context.summary["walls_cross_at_kPa"] = found
 
     def _tell_of_snaps(self, states: tuple[State, ...]) -> None:
-        """Name the first pressure on either side that lies beyond a limit point, and how far a node moved."""
-        for sign in (-1, 1):
-            beyond = [s for s in states if s.pressure_MPa * sign > 0 and s.snapped_mm]
-            if beyond:
-                first = min(beyond, key=lambda s: abs(s.pressure_MPa))
+        """Name the first pressure on either side that lies beyond a limit point, and how far a node moved.
+
+        Of a motion solved instant by instant, the first instant.
+        """
+        snapped = [s for s in states if s.snapped_mm]
+        if self.job.in_time:
+            ways = [snapped]
+        else:
+            outward = sorted(snapped, key=lambda s: abs(s.pressure_MPa))
+            ways = [[s for s in outward if s.pressure_MPa * sign > 0] for sign in (-1, 1)]
+        for way in ways:
+            if way:
+                first = way[0]
                 self.warn(
                     f"Before {first.pressure_kPa:.4g} kPa parts of the unit snap, by {first.snapped_mm:.2g} "
                     "mm at most: states from there on are those that damped motion leads to, and the way "

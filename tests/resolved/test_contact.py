@@ -1,0 +1,140 @@
+"""The resolved unit against rigid bodies: balance of forces and work, with friction and without."""
+
+import attrs
+import numpy as np
+import pytest
+
+from mu_addon.design import load_preset
+from mu_addon.design.strut_cell import strut_cell
+from mu_addon.fem.equilibrium import Equilibrium
+from mu_addon.fem.model import Model
+from mu_addon.fem.obstacle import CONTACT_NEWTON, Obstacle
+from mu_addon.fem.outer_faces import outer_faces
+from mu_addon.fem.rigid import Plane, Pose, Sphere
+from mu_addon.fem.state import rest
+from mu_addon.fem.time_stepping import simulate_in_time
+from mu_addon.fem.unit import materials_of
+from mu_addon.homogenize.cell_mesh import cell_materials
+from mu_addon.homogenize.specimen import block_specimen
+from mu_addon.meshing.mesh import LATTICE
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.unit import mesh_unit
+from mu_addon.resolved.lattice import clearance
+from mu_addon.resolved.strut import strut_mesh
+from mu_addon.resolved.unit import mesh_printed
+
+SMALL = load_preset("mu-1.0x")
+SMALL = attrs.evolve(SMALL, chambers=attrs.evolve(SMALL.chambers, count=3))
+TIP = SMALL.dimensions.height
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return mesh_printed(SMALL, MeshSettings(refine=0.5))
+
+
+def beside(mesh, obstacle):
+    model = Model(mesh, threads=1)
+    model.obstacles = (obstacle,)
+    return Equilibrium(model, materials_of(SMALL, mesh), CONTACT_NEWTON, explains=False)
+
+
+def test_struts_inside_the_wall_cannot_be_touched(mesh):
+    """A bare point of a strut lies outside the actuator but for what a third of a face straddles."""
+    found = outer_faces(mesh)
+    of_strut = np.zeros(len(mesh.nodes), bool)
+    of_strut[mesh.tets[mesh.region == LATTICE]] = True
+    struts = found.of(of_strut[found.nodes].all(axis=1))
+    clear = clearance(SMALL.printed, mesh.nodes[struts.nodes[:, :3]].reshape(-1, 3)).reshape(-1, 3)
+    assert clear[struts.bare == 1.0].min() > -0.2
+    assert (struts.bare[clear < -1.0] < 0.2).all()
+    sides = np.diff(mesh.nodes[struts.nodes[:, :3]], axis=1)
+    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    buried = (clear < 0).all(axis=1)
+    assert (area * struts.bare.mean(axis=1))[buried].sum() < 0.01 * area.sum()
+
+
+def test_a_rigid_plate_presses_a_lattice_as_a_prescribed_displacement_does():
+    """A cell of the lattice that goes on to all sides: its junctions stay pressed, so both must agree."""
+    cell = strut_cell(SMALL)
+    octant = strut_mesh(SMALL.printed, 1, 5)
+    block = block_specimen(octant, 1, cell_materials(cell, octant, 2.5, 0.45))
+    mesh, half, strain = block.mesh, block.side_mm / 2, 0.01
+    held = (mesh.nodes == half) & [True, True, False]
+    top = mesh.nodes[:, 2] == half
+    moved = held.copy()
+    moved[top, 2] = True
+    eq = Equilibrium(Model(mesh, moved, threads=1), block.materials, CONTACT_NEWTON, explains=False)
+    u = eq.newton(-strain * mesh.nodes * [0.0, 0.0, 1.0], 0.0).u
+    prescribed = -eq.model.residual(u, 0.0, eq.parameters)[top, 2].sum()
+    plate = Obstacle(mesh, Plane((0.0, 0.0, half), (0.0, 0.0, -1.0)), 0.1, 1e-4)
+    model = Model(mesh, held, threads=1)
+    model.obstacles = (plate,)
+    plate.pose = Pose(shift=(0.0, 0.0, -strain * half))
+    pressed = Equilibrium(model, block.materials, CONTACT_NEWTON, explains=False).newton(0.0 * u, 0.0)
+    assert plate.force_N(pressed.u)[2] == pytest.approx(prescribed, rel=2e-3)
+    assert plate.deepest_mm(pressed.u) < 2e-3 * strain * half
+
+
+@pytest.mark.slow
+def test_a_plate_on_the_tip_is_held_by_the_base_and_its_work_is_stored(mesh):
+    """Frictionless: the plate's force is the base's, and its work over small steps the energy's change."""
+    plate = Obstacle(mesh, Plane((0.0, 0.0, TIP), (0.0, 0.0, -1.0)), 0.1, 0.02)
+    eq = beside(mesh, plate)
+    state, way, force, energy = rest(mesh), np.linspace(0.1, 0.3, 3), [], []
+    for by in way:
+        plate.pose = Pose(shift=(0.0, 0.0, -by))
+        state = eq.newton(state.u, 0.0)
+        force.append(plate.force_N(state.u)[2])
+        energy.append(eq.model.potential(state.u, 0.0, eq.parameters))
+        reaction = eq.model.residual(state.u, 0.0, eq.parameters)[mesh.base]
+        assert reaction[:, 2].sum() == pytest.approx(force[-1], rel=1e-5)
+        assert reaction[:, 1].sum() == pytest.approx(0.0, abs=1e-6 * force[-1])
+    simpson = (way[2] - way[0]) / 6 * (force[0] + 4 * force[1] + force[2])
+    assert energy[2] - energy[0] == pytest.approx(simpson, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_a_ball_on_the_cap_alone_is_pressed_back_as_by_the_homogenised_unit(mesh):
+    """Where only the wall is touched both meshes of it agree as well as two of one kind, within 7 %."""
+    force = []
+    for body in (mesh, mesh_unit(SMALL, MeshSettings(refine=0.7))):
+        ball = Obstacle(body, Sphere((0.0, 0.0, TIP + 3.0), 3.0), 0.1, 0.05, 2)
+        eq, u = beside(body, ball), rest(body).u
+        for by in (0.02, 0.05):
+            ball.pose = Pose(shift=(0.0, 0.0, -by))
+            u = eq.newton(u, 0.0).u
+        force.append(ball.force_N(u)[2])
+    assert force[0] > 4e-3
+    assert force[0] == pytest.approx(force[1], rel=0.1)
+
+
+@pytest.mark.slow
+def test_a_plate_drawn_along_the_struts_takes_what_it_gives(mesh):
+    """Pressed on the lattice's side and drawn along z: Coulomb's force, and what its work went into."""
+    side, friction = SMALL.printed.bounds[1][1], 0.3
+
+    def path(t):
+        return Pose(shift=(0.0, -0.3 * min(t, 1.0), 1.5 * max(t - 1.0, 0.0)))
+
+    plate = Obstacle(mesh, Plane((0.0, side, 0.0), (0.0, -1.0, 0.0)), 0.1, 0.05, friction=friction, path=path)
+    eq = beside(mesh, plate)
+    time, force, energy = np.linspace(0.0, 2.0, 11), [], []
+
+    def reached(state):
+        contact = plate.contact(state.u)
+        stored = eq.model.potential(state.u, 0.0, eq.parameters)
+        force.append(contact.force_N)
+        energy.append([stored, contact.lost_mJ])
+
+    found = simulate_in_time(eq, time, np.zeros_like(time), reached).states[-1]
+    contact = plate.contact(found.u)
+    assert contact.sticking < 0.05
+    assert contact.tangential_N[2] == pytest.approx(-friction * contact.normal_N[1], rel=0.01)
+    reaction = eq.model.residual(found.u, 0.0, eq.parameters)[mesh.base].sum(axis=0)
+    np.testing.assert_allclose(reaction[1:], contact.force_N[1:], rtol=1e-4)
+    way = np.array([path(t).shift for t in time])
+    force = np.array(force)
+    work = -((force[1:] + force[:-1]) / 2 * np.diff(way, axis=0)).sum()
+    stored, lost = energy[-1]
+    assert stored + lost == pytest.approx(work, rel=5e-3)
