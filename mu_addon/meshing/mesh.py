@@ -109,6 +109,12 @@ class Mesh:
         return digest.hexdigest()
 
 
+def part(mesh: Mesh, rows: Array) -> Mesh:
+    """Some elements (m,) of a mesh, with all its nodes and its base, without other surfaces and ties."""
+    region = mesh.region[rows]
+    return Mesh(mesh.nodes, mesh.tets[rows], region, mesh.cavity[:0], mesh.base, mesh.tip[:0], mesh.symmetry)
+
+
 def mirror(mesh: Mesh, axis: str) -> Mesh:
     """The whole body from the part on one side of its mirror plane `axis` = 0 ("x", "y" or "z").
 
