@@ -55,9 +55,9 @@ def started(unit: Mesh, mesh: Mesh, path: Array, u: Array) -> Array:
     """Displacements (m, 3) in mm of a mesh with a waveguide, of those of the unit without it, u (n, 3).
 
     unit, mesh: of `mesh_printed` and `with_waveguide`; path (h, 3): the waveguide's lattice nodes in mm.
-    Nodes of thickened struts move with the deformation gradient around them. The waveguide's axis becomes Hermite's
-    cubic from joint to joint of the path, each turned as its legs are; sections turn by the rotation between
-    both joints' and the least one onto the curve; beyond the ends the waveguide is rigid.
+    Nodes of thickened struts move with the deformation gradient around them. The waveguide's axis becomes
+    Hermite's cubic from joint to joint of the path, each turned as its legs are; sections turn by the
+    rotation between both joints' and the least one onto the curve; beyond its ends the waveguide is rigid.
     """
     count = len(u)
     moved = u.copy()

@@ -36,8 +36,8 @@ def bar_of(unit: Unit, path: Window | ArrayLike, body: Body | None = None) -> Ba
     bar = waveguide(unit, path, d)
     if not is_half_diagonal(d) and is_thickening(d, bar):
         raise InputError(
-            f"struts of {d.junction_diameter:.3g} mm of lattice {d.kind.name!r} are thickened where they meet "
-            f"a waveguide of {d.waveguide_section:.3g} mm: the resolved model thickens body-centred ones only",
+            f"struts of {d.junction_diameter:.3g} mm are thickened where they meet a waveguide of "
+            f"{d.waveguide_section:.3g} mm, which the resolved model follows in body-centred lattices alone",
             "[lattice] kind, junction_diameter_mm, fidelity",
             'make junctions as wide as the waveguide, or choose fidelity "homogenised"',
         )
