@@ -78,7 +78,8 @@ def _bent(unit: Mesh, path: Array, u: Array, points: Array) -> Array:
     from scipy.spatial.transform import Rotation, Slerp
 
     joints = numbers_of(unit, path)
-    at, way = path + u[joints], np.diff(path, axis=0)
+    way = np.diff(path, axis=0)
+    at = _no_shorter(path + u[joints], np.linalg.norm(way, axis=1))
     turn = _turns(mean_gradients(unit, u, joints), way, np.diff(at, axis=0))
     length = np.linalg.norm(way, axis=1)
     share = np.einsum("ksi,si->ks", points[:, None] - path[:-1], way) / length**2
@@ -96,6 +97,17 @@ def _bent(unit: Mesh, path: Array, u: Array, points: Array) -> Array:
         across = rotation.apply(points[rows] - foot[rows, i])
         found[rows] = curve + _onto(rotation.apply(step / length[i]), along, across)
     return found
+
+
+def _no_shorter(points: Array, length: Array) -> Array:
+    """A polyline (h, 3) in mm about its middle, with legs stretched to lengths (h - 1,) if they are shorter.
+
+    A slender bar that is as short as the lattice around it would be far beyond buckling.
+    """
+    way = np.diff(points, axis=0)
+    way *= np.maximum(length / np.linalg.norm(way, axis=1), 1.0)[:, None]
+    found = np.vstack([np.zeros(3), np.cumsum(way, axis=0)])
+    return np.asarray(found + (points - found).mean(axis=0))
 
 
 def _turns(around: Array, way: Array, bent: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The adjoint map of a resolved unit, whose parts are tied, against real solutions with one strut stiffened."""
+"""The adjoint map of a resolved unit, whose parts are tied, against solutions with some of it stiffened."""
 
 import attrs
 import numpy as np

@@ -172,7 +172,6 @@ class Job:
         refused = {
             "a law for the lattice": ("--lattice", self.lattice is not None),
             "linear elements": ("--order", self.mesh.order == 1),
-            "a search of the whole lattice": ("--paths graph", self.paths == "graph"),
             "printed waveguides beside obstacles or with a wall that remembers": (
                 "--obstacle, [wall]",
                 "place" in self.stages and self.in_time,
