@@ -3,13 +3,12 @@
 A waveguide holds on to the lattice at the joints of its path. Model A's tangent answers forces and couples on
 every joint; a path is a chain of straight bars between joints that have moved and turned as in Model A, each
 with six ways to deform, less the struts whose place they take. That is of first order about Model A; seats,
-thickened struts and the size of joints are left out.
+and thickened struts are left out, and joints are rigid.
 """
 
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 from scipy import sparse
@@ -87,7 +86,7 @@ def bar_response(
 
 def _around(mesh: Mesh, node: Array, d: Dimensions) -> Array:
     """Nodes (k,) of struts that a bar's end at a lattice node (3,) holds on to."""
-    near = np.linalg.norm(mesh.nodes - node, axis=1) < math.sqrt(3.0) / 2.0 * d.waveguide_section
+    near = np.linalg.norm(mesh.nodes - node, axis=1) < _reach(d)
     near[mesh.tied] = False
     near[mesh.tets[mesh.region != LATTICE]] = False
     found = np.flatnonzero(near)
@@ -99,6 +98,11 @@ def _around(mesh: Mesh, node: Array, d: Dimensions) -> Array:
             "refine the mesh, or widen the lattice",
         )
     return found
+
+
+def _reach(d: Dimensions) -> float:
+    """Radius of a joint in mm: to the corners of a bar's section and as far along it."""
+    return math.sqrt(3.0) / 2.0 * d.waveguide_section
 
 
 def _frame(way: Array) -> Array:
@@ -185,22 +189,32 @@ def _bar_stiffness(d: Dimensions, modulus: float, poisson: float, length: float)
     bending = (along(a**4, a * left**3) + along(a**4, a**3 * left)) / 24.0
     torsion = _TORSION * along(a**4, (a * left) ** 2)
     one = np.ones(_STATIONS)
-    return _stiffness(modulus * area * one, shear * torsion * one, modulus * bending * one, length)
+    t = _clear(d, length)
+    return _stiffness(t, modulus * area * one, shear * torsion * one, modulus * bending * one, length)
 
 
 def _strut_stiffness(d: Dimensions, modulus: float, poisson: float, length: float) -> Array:
     """As `_bar_stiffness`, of a round strut."""
-    r = radius_of(d)(np.linspace(0.0, 1.0, _STATIONS))
+    t = _clear(d, length)
+    r = radius_of(d)(t)
     bending = modulus * np.pi * r**4 / 4.0
-    return _stiffness(modulus * np.pi * r**2, bending / (1.0 + poisson), bending, length)
+    return _stiffness(t, modulus * np.pi * r**2, bending / (1.0 + poisson), bending, length)
 
 
-def _stiffness(stretch: Array, twist: Array, bending: Array, length: float) -> Array:
-    """Stiffness (6, 6) of a beam by that of its sections (s,), evenly spaced, by Bernoulli's theory."""
-    t = np.linspace(0.0, 1.0, len(stretch))
+def _clear(d: Dimensions, length: float) -> Array:
+    """Places (s,), as shares of the length in mm, where a step bends: between its joints."""
+    joint = _reach(d) / length
+    return np.linspace(joint, 1.0 - joint, _STATIONS)
+
+
+def _stiffness(t: Array, stretch: Array, twist: Array, bending: Array, length: float) -> Array:
+    """Stiffness (6, 6) of a beam by that of its sections (s,) at places t (s,), rigid beyond; after Bernoulli.
+
+    t: evenly spaced shares, 0 to 1, of the length in mm.
+    """
 
     def total(values: Array) -> float:
-        return length * float(sum((a + b) / 2.0 for a, b in pairwise(values.tolist()))) / (len(t) - 1)
+        return length * float(((values[1:] + values[:-1]) / 2.0 * np.diff(t)).sum())
 
     found = np.zeros((6, 6))
     found[0, 0], found[1, 1] = 1.0 / total(1.0 / stretch), 1.0 / total(1.0 / twist)
