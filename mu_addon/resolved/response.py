@@ -208,7 +208,7 @@ def _clear(d: Dimensions, length: float) -> Array:
 
 
 def _stiffness(t: Array, stretch: Array, twist: Array, bending: Array, length: float) -> Array:
-    """Stiffness (6, 6) of a beam by that of its sections (s,) at places t (s,), rigid beyond; after Bernoulli.
+    """Stiffness (6, 6) of a beam by that of its sections (s,) at places t (s,), rigid beyond; Bernoulli's.
 
     t: evenly spaced shares, 0 to 1, of the length in mm.
     """
