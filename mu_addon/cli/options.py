@@ -169,15 +169,21 @@ class _Friction(argparse.Action):
         namespace.obstacles = [*before, (path, value)]
 
 
-def add_fidelity(command: Any) -> None:
-    """What is simulated of a unit's lattice, and whether its parts feel each other."""
+def add_fidelity(command: argparse.ArgumentParser) -> None:
+    """What is simulated of a unit's lattice."""
+    from ..meshing.settings import FIDELITIES, HOMOGENISED
+
     command.add_argument(
         "--fidelity",
-        choices=("resolved", "homogenised"),
-        default="homogenised",
+        choices=FIDELITIES,
+        default=HOMOGENISED,
         help="What is simulated: the printed body with its struts, or a continuum in place of the lattice "
         "(default: homogenised).",
     )
+
+
+def add_self_contact(command: argparse.ArgumentParser) -> None:
+    """Whether the parts of a resolved unit feel each other."""
     command.add_argument(
         "--self-contact",
         action="store_true",
@@ -205,6 +211,7 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
         help="Mesh refinement: every element size is divided by F (default: 1).",
     )
     add_fidelity(command)
+    add_self_contact(command)
     command.add_argument(
         "--lattice",
         metavar="FILE",
@@ -226,19 +233,6 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
         help="Mesh generator (default: auto).",
     )
     add_solver(command)
-
-
-def add_fidelity(command: argparse.ArgumentParser) -> None:
-    """What of the unit is simulated."""
-    from ..meshing.settings import FIDELITIES, HOMOGENISED
-
-    command.add_argument(
-        "--fidelity",
-        choices=FIDELITIES,
-        default=HOMOGENISED,
-        help="What is simulated: the printed body with its struts, or a continuum in place of the lattice "
-        "(default: homogenised).",
-    )
 
 
 def require_out(options: argparse.Namespace) -> None:

@@ -84,6 +84,17 @@ class Bar:
     path_mm: float
 
     @property
+    def directions(self) -> Array:
+        """Unit vectors (n - 1, 3) along each straight leg."""
+        return _directions(self.points)
+
+    @property
+    def planes(self) -> Array:
+        """Normals (n, 3), of any length, of the planes that legs end in; at a bend it halves the angle."""
+        way = self.directions
+        return np.concatenate([way[:1], way[:-1] + way[1:], way[-1:]])
+
+    @property
     def legs(self) -> Array:
         """Corners (n - 1, 8, 3) in mm of each straight leg, in the order of `Block.corners`."""
         rings = self.rings()
@@ -101,10 +112,9 @@ class Bar:
         offset (3,): outward move of faces along x, y and z in mm; where two legs then have unequal sections,
         they meet in the mean of their corners.
         """
-        way = _directions(self.points)
+        way, planes = self.directions, self.planes
         moves = np.zeros((len(way), 3)) if offset is None else _leg_moves(way, self.normals, offset)
         side = np.cross(way, self.normals)
-        planes = np.concatenate([way[:1], way[:-1] + way[1:], way[-1:]])
         rings = np.zeros((len(self.points), 4, 3))
         count = np.zeros(len(self.points))
         for leg in range(len(way)):

@@ -418,11 +418,7 @@ class Model:
             residual[nodes] += forces
         if self.load is not None:
             residual -= self.load
-        tied, to = self.mesh.tied, self.mesh.tied_to
-        if len(tied):
-            np.add.at(residual, to, self.mesh.tied_weights[:, :, None] * residual[tied, None])
-            residual[tied] = 0.0
-        return residual
+        return self.mesh.folded(residual)
 
     def force_scale(self) -> float:
         """Root sum of squares of all element and face forces of the last residual, in N.

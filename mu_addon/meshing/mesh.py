@@ -69,10 +69,18 @@ class Mesh:
         return self.filled.size > 0
 
     def following(self, u: Array) -> Array:
-        """Displacements u (n, 3) in mm with those of tied nodes set to what they follow, in place."""
+        """Displacements u (n, ...) in mm with those of tied nodes set to what they follow, in place."""
         if len(self.tied):
-            u[self.tied] = np.einsum("tk,tki->ti", self.tied_weights, u[self.tied_to])
+            u[self.tied] = np.einsum("tk,tk...->t...", self.tied_weights, u[self.tied_to])
         return u
+
+    def folded(self, forces: Array) -> Array:
+        """Forces (n, ...) in N with those on tied nodes passed on to what they follow, in place."""
+        if len(self.tied):
+            weights = self.tied_weights.reshape(*self.tied_to.shape, *(1,) * (forces.ndim - 1))
+            np.add.at(forces, self.tied_to, weights * forces[self.tied, None])
+            forces[self.tied] = 0.0
+        return forces
 
     @property
     def order(self) -> int:
@@ -107,6 +115,12 @@ class Mesh:
             digest.update(repr((array.shape, array.dtype.str)).encode())
             digest.update(array.tobytes())
         return digest.hexdigest()
+
+
+def part(mesh: Mesh, rows: Array) -> Mesh:
+    """Some elements (m,) of a mesh, with all its nodes and its base, without other surfaces and ties."""
+    region = mesh.region[rows]
+    return Mesh(mesh.nodes, mesh.tets[rows], region, mesh.cavity[:0], mesh.base, mesh.tip[:0], mesh.symmetry)
 
 
 def mirror(mesh: Mesh, axis: str) -> Mesh:

@@ -60,14 +60,15 @@ def parities(model: Model) -> list[Parity]:
 def probe_loads(mesh: Mesh, monitor: Probe, components: Sequence[int]) -> Array:
     """Nodal loads (3n, p, c) whose work is the displacement of p monitored points along c components.
 
-    components: numbers 0 to 2 of the axes. A load is 1 N on the point, shared among its element's nodes.
+    components: numbers 0 to 2 of the axes. A load is 1 N on the point, shared among its element's nodes, and
+    passed on where these are tied.
     """
     points = len(monitor.nodes)
     loads = np.zeros((3 * len(mesh.nodes), points, len(components)))
     for i in range(points):
         for c, component in enumerate(components):
             np.add.at(loads[:, i, c], 3 * monitor.nodes[i] + component, monitor.weights[i])
-    return loads
+    return mesh.folded(loads.reshape(len(mesh.nodes), 3, points, -1)).reshape(loads.shape)
 
 
 def loaded(trajectory: Trajectory, pressures_MPa: Array | None = None) -> list[State]:
@@ -140,7 +141,8 @@ def influence_map(
             tangent = side.model.tangent(state.u, state.pressure_MPa, data)
             solved = np.zeros((loads.shape[0], loads[0].size))
             solved[free] = side.model.factor.factor(tangent).solve(loads[free].reshape(len(free), -1))
-            adjoint = solved.reshape(len(mesh.nodes), 3, -1)[mesh.tets].reshape(*forces.shape, -1)
+            followed = mesh.following(solved.reshape(len(mesh.nodes), 3, -1))
+            adjoint = followed[mesh.tets].reshape(*forces.shape, -1)
             moved = np.einsum("ei,eic->ce", forces, adjoint).reshape(*loads.shape[1:], -1)
             found[s][:, list(side.components)] = -moved / len(sides)
     return Influence(np.array([state.pressure_MPa for state in states]), found)

@@ -35,7 +35,7 @@ from .sampling import polynomials
 Array = np.ndarray[Any, Any]
 
 # Patterns solved at once, so that their solutions need not all be held.
-_BLOCK = 128
+BLOCK = 128
 # A step of a longer path is pulled at its ends by its neighbours: its pattern of stretch is that of a
 # bar that goes on by this share of its length at the first end, the second, or both.
 _BEYOND = 0.5
@@ -160,12 +160,12 @@ def reduced_response(
         for i, parity in enumerate(sides):
             free = parity.model.free
             tangent = parity.model.tangent(state.u, state.pressure_MPa, data)
-            solve = _solver(parity.model, tangent)
+            solve = solver_of(parity.model, tangent)
             loads = probe_loads(mesh, monitor, parity.components)[free]
             # What lies in the mirror plane has no odd part.
             active = np.flatnonzero(np.repeat(side[kept] != 0, k)) if parity.odd else np.arange(q)
             applied = forces[free][:, active].tocsc()
-            for columns in np.array_split(np.arange(len(active)), -(-len(active) // _BLOCK)):
+            for columns in np.array_split(np.arange(len(active)), -(-len(active) // BLOCK)):
                 solved = solve(applied[:, columns].toarray().T).T / len(sides)
                 where = active[columns]
                 flexibility[s, i][np.ix_(active, where)] = applied.T @ solved
@@ -177,7 +177,7 @@ def reduced_response(
     return Response(graph, pressure, flexibility, drive, reach, np.repeat(whole, k), k, step, side, odd)
 
 
-def _solver(model: Model, tangent: Array) -> Callable[[Array], Array]:
+def solver_of(model: Model, tangent: Array) -> Callable[[Array], Array]:
     """Solves with a tangent for right-hand sides (k, n), many at once where its factor is at hand."""
     factor = model.factor.factor(tangent)
     if isinstance(factor, Cholesky | SuperLU):

@@ -34,7 +34,7 @@ class Search:
 
     exact_mm is NaN where unchecked. risk: probability that an unchecked path beats the best, as
     `probability_of_better` has it; complete: whether every path was checked or the risk is as small as was
-    asked for.
+    asked for; left_out (k,): numbers of paths that turned out impossible.
     """
 
     predicted_mm: Array
@@ -42,6 +42,7 @@ class Search:
     best: int
     risk: float
     complete: bool
+    left_out: Array
 
     @property
     def checked(self) -> Array:
@@ -81,8 +82,9 @@ def search_paths(
     """Solve paths in the order of their predicted deviation until no other is likely to beat the best.
 
     predicted_mm (n,): positive predictions of J_hat. check: maps numbers (k,) of paths to their exact J_hat
-    (k,) in mm. on_check: called with how many were checked and the risk left. Raises InputError where a
-    prediction is not positive, and whatever `check` raises.
+    (k,) in mm, NaN for those that are impossible and left out. on_check: called with how many were checked
+    and the risk left. Raises InputError where a prediction is not positive or no path is possible, and
+    whatever `check` raises.
     """
     s = settings or SearchSettings()
     predicted_mm = np.asarray(predicted_mm, float)
@@ -93,14 +95,21 @@ def search_paths(
     # Two at least, or there is no error to speak of.
     now = np.unique(np.append(order[: max(s.first - s.spread, 2)], order[across]))
     exact = np.full(len(order), np.nan)
+    possible = np.ones(len(order), bool)
     while True:
         exact[now] = check(now)
+        possible[now] = np.isfinite(exact[now])
         checked = int(np.isfinite(exact).sum())
-        risk = probability_of_better(predicted_mm, exact)
-        on_check(checked, risk)
-        if risk <= s.risk or checked >= s.most:
-            return Search(predicted_mm, exact, int(np.nanargmin(exact)), risk, risk <= s.risk)
-        left = order[np.isnan(exact[order])]
+        left = order[np.isnan(exact[order]) & possible[order]]
+        # An error has no spread below two.
+        if checked >= 2 or not len(left):
+            if not checked:
+                raise InputError("none of the paths is possible", "search", "allow other paths")
+            risk = probability_of_better(predicted_mm[possible], exact[possible])
+            on_check(checked, risk)
+            if risk <= s.risk or checked >= s.most:
+                out = np.flatnonzero(~possible)
+                return Search(predicted_mm, exact, int(np.nanargmin(exact)), risk, risk <= s.risk, out)
         now = left[: min(s.batch, s.most - checked)]
 
 

@@ -13,15 +13,14 @@ from ..meshing.mesh import LATTICE, Array, Mesh, edges_of, oriented, second_orde
 _SIX = np.array([[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]])
 
 
-def box_grid(levels: tuple[Array, Array, Array], solid: Array) -> Mesh:
-    """Straight quadratic tetrahedra of a grid's boxes.
+def box_grid(points: Array, solid: Array) -> Mesh:
+    """Straight quadratic tetrahedra of a grid's boxes, which may be oblique.
 
-    levels: where the grid is cut along x, y and z, (a,), (b,) and (c,) in mm, ascending; solid (a - 1, b - 1,
-    c - 1): which boxes there are. Nothing is clamped.
+    points (a, b, c, 3): the grid in mm; solid (a - 1, b - 1, c - 1): which boxes there are. Nothing is
+    clamped.
     """
-    shape = tuple(len(level) for level in levels)
-    points = np.stack(np.meshgrid(*levels, indexing="ij"), axis=-1).reshape(-1, 3)
-    number = np.arange(len(points)).reshape(shape)
+    number = np.arange(points[..., 0].size).reshape(points.shape[:3])
+    points = points.reshape(-1, 3)
     i, j, k = np.nonzero(solid)
     corners = np.stack([number[i + a, j + b, k + c] for a in (0, 1) for b in (0, 1) for c in (0, 1)], axis=1)
     used, tets = np.unique(corners[:, _SIX].reshape(-1, 4), return_inverse=True)

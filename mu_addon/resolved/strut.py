@@ -9,12 +9,16 @@ exactly, fillets and all; mirror images of it are the whole lattice.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
 from ..design.dimensions import Dimensions
 from ..errors import InputError
 from ..meshing.mesh import LATTICE, Array, Mesh, edges_of, oriented, second_order
+
+# Radius in mm of a strut at fractions 0 .. 1 of its way from the cell's corner to its centre, of any shape.
+Radius = Callable[[Array], Array]
 
 _ALONG = np.ones(3) / math.sqrt(3.0)
 # Across the strut: towards an edge between two planes of the octant, so that a sector lies in one plane.
@@ -46,7 +50,8 @@ def strut_mesh(d: Dimensions, rings: int, layers: int) -> Mesh:
     count = len(points)
     levels = np.linspace(0.0, 1.0, layers + 1)
     at = np.column_stack([np.tile(points, (layers + 1, 1)), np.repeat(levels, count)])
-    nodes = _placed(d, at)
+    law = radius_of(d)
+    nodes = _placed(half, law, at)
     # Layers are tilted: a diagonal from what lies farther along to what lies less far leans least. The other
     # ones make E[100] of the lattice up to 70 % too high in place of 10 (docs/resolved.md).
     along = np.round(nodes @ _ALONG / half, 9).reshape(layers + 1, count)
@@ -69,7 +74,7 @@ def strut_mesh(d: Dimensions, rings: int, layers: int) -> Mesh:
     around = (np.abs(radius[:, 0] - radius[:, 1]) < 1e-12) & (radius[:, 0] > 0)
     chord = np.hypot(middles[:, 0], middles[:, 1])
     middles[around, :2] *= (radius[around, 0] / chord[around])[:, None]
-    nodes, tets, nothing = second_order(nodes, tets, tets[:0, :3], _placed(d, middles))
+    nodes, tets, nothing = second_order(nodes, tets, tets[:0, :3], _placed(half, law, middles))
     return Mesh(nodes, tets, np.full(len(tets), LATTICE), nothing, tets[0, :0], tets[0, :0])
 
 
@@ -105,22 +110,43 @@ def disc(rings: int) -> tuple[Array, Array]:
     return np.vstack(points), np.vstack(triangles)
 
 
-def _placed(d: Dimensions, at: Array) -> Array:
+def radius_of(d: Dimensions) -> Radius:
+    """Radius of a unit's struts along them."""
+    return lambda t: d.kind.radius(t, d.junction_diameter / 2.0, d.midspan_diameter / 2.0)
+
+
+def thickened(half: float, points: Array, law: Radius, other: Radius) -> Array:
+    """Points (n, 3) in mm of an octant's mesh where a strut of another radius has them.
+
+    half: edge of the octant [0, half]^3 in mm; law: the radius that the mesh was made with. Nodes keep their
+    place along the strut and, in radii, across it; those on the octant's planes stay on them.
+    """
+    length = half * math.sqrt(3.0)
+    along = points @ _ALONG
+    away = points - along[:, None] * _ALONG
+    across = (away @ _ACROSS.T) / law(np.clip(along / length, 0.0, 1.0))[:, None]
+    low, high = _ends(half, law, across @ _ACROSS)
+    return _placed(half, other, np.column_stack([across, (along - low) / (high - low)]))
+
+
+def _placed(half: float, law: Radius, at: Array) -> Array:
     """Points (n, 3) in mm of places (n, 3): two across the strut in radii, and 0 .. 1 from end to end."""
-    half = d.cell / 2.0
     length = half * math.sqrt(3.0)
     across = at[:, :2] @ _ACROSS
-
-    def away(along: Array) -> Array:
-        t = np.clip(along / length, 0.0, 1.0)
-        return d.kind.radius(t, d.junction_diameter / 2.0, d.midspan_diameter / 2.0)[:, None] * across
-
-    low, high = np.zeros(len(at)), np.full(len(at), length)
-    for _ in range(_ITERATIONS):
-        low = -math.sqrt(3.0) * away(low).min(axis=1)
-        high = length - math.sqrt(3.0) * away(high).max(axis=1)
+    low, high = _ends(half, law, across)
     along = low + at[:, 2] * (high - low)
-    found = along[:, None] * _ALONG + away(along)
+    found = along[:, None] * _ALONG + law(np.clip(along / length, 0.0, 1.0))[:, None] * across
     for plane in (0.0, half):
         found[np.abs(found - plane) < 1e-9 * half] = plane
     return found
+
+
+def _ends(half: float, law: Radius, across: Array) -> tuple[Array, Array]:
+    """Both ends (n,) in mm of lines along the strut in its octant; across (n, 3): off its axis, in radii."""
+    length = half * math.sqrt(3.0)
+    least, most = across.min(axis=1), across.max(axis=1)
+    low, high = np.zeros(len(across)), np.full(len(across), length)
+    for _ in range(_ITERATIONS):
+        low = -math.sqrt(3.0) * law(np.clip(low / length, 0.0, 1.0)) * least
+        high = length - math.sqrt(3.0) * law(np.clip(high / length, 0.0, 1.0)) * most
+    return low, high

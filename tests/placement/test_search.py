@@ -180,3 +180,22 @@ def test_the_front_holds_what_is_neither_shorter_nor_worse_than_another():
     length = np.array([25.0, 25.0, 30.0, 40.0, 40.0, 50.0])
     J = np.array([0.10, 0.05, 0.04, 0.20, 0.30, np.nan])
     assert front(length, J).tolist() == [2, 3]
+
+
+def test_paths_that_cannot_be_made_are_left_out_and_the_best_of_the_rest_is_found():
+    J = np.linspace(1.0, 2.0, 40)
+    impossible = np.arange(40) % 3 == 0
+
+    def check(numbers):
+        return np.where(impossible[numbers], np.nan, J[numbers])
+
+    outcome = search_paths(J, check)
+    assert outcome.best == 1
+    assert set(outcome.left_out) <= set(np.flatnonzero(impossible))
+    assert 0 in outcome.left_out
+    assert not set(outcome.left_out) & set(outcome.checked)
+
+
+def test_a_search_of_impossible_paths_alone_says_so():
+    with pytest.raises(InputError, match="none of the paths is possible"):
+        search_paths(np.ones(5), lambda numbers: np.full(len(numbers), np.nan))

@@ -39,9 +39,9 @@ def candidates(mesh, unit=SMALL, beside=False):
             found.obstacles = (Obstacle(own, plane, 0.1, 0.05, friction=0.3),)
         return found
 
-    names = (ALONG_ALL.name,)
+    paths = (ANCHORS[list(ALONG_ALL.indices)],)
     settings = attrs.evolve(RESOLVED_OBSTACLE_NEWTON, tolerance=1e-8)
-    return PrintedWaveguides(unit, mesh, names, ANCHORS, lambda own: materials_of(unit, own), model, settings)
+    return PrintedWaveguides(unit, mesh, paths, ANCHORS, lambda own: materials_of(unit, own), model, settings)
 
 
 def test_what_remembers_nothing_is_where_pressure_alone_takes_it(mesh):

@@ -172,9 +172,11 @@ def _printed(
     """As `_stiffened`, of units with printed waveguides: instant by instant, since struts may snap."""
     unit = gripper.unit
     newton = in_time_newton(True, self_contact)
-    names = tuple(w.name for w in windows(len(points)))
+    every = windows(len(points))
+    names = [w.name for w in every]
+    paths = tuple(points[list(w.indices)] for w in every)
     units = PrintedWaveguides(
-        unit, mesh, names, points, lambda own: materials_of(unit, own), model_of, newton
+        unit, mesh, paths, points, lambda own: materials_of(unit, own), model_of, newton
     )
 
     def alone(name: str) -> Array:

@@ -64,19 +64,20 @@ class PrintedEvaluator:
         self._candidates = PrintedWaveguides(
             job.unit,
             setting.mesh,
-            tuple(candidate.name for candidate, _ in setting.jobs),
+            tuple(candidate.points for candidate, _ in setting.jobs),
             setting.anchors,
             job.materials,
             lambda mesh: job.model(mesh, threads),
             job.newton,
+            job.body,
         )
         self._whole = setting.whole
 
     def __call__(self, state: State) -> Moved:
         """What all jobs do at a state of Model A. Raises ConvergenceError."""
         states = self._candidates.states(state)
-        count = len(state.u)
-        apart = [(states[job].u[:count] - state.u).astype(np.float32) for job in self._whole]
+        own = [self._candidates.of_unit(job, states[job]) for job in self._whole]
+        apart = [(u - state.u).astype(np.float32) for u in own]
         moved = self._candidates.points(states)
         return Moved(moved, np.array(apart, np.float32).reshape(-1, *state.u.shape))
 

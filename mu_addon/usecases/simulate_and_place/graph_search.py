@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import InputError
-from ...fem.kinematics import probe
+from ...fem.kinematics import Probe, probe
 from ...files import write_csv
 from ...placement.candidates import Candidate
 from ...placement.graph import Graph, lattice_graph
+from ...placement.inclusion import PRINTED
 from ...placement.influence import (
     deviation_map,
     gradients_of,
@@ -21,11 +22,13 @@ from ...placement.influence import (
     representative_pressures,
     shares_of_time,
 )
-from ...placement.response import reduced_response
+from ...placement.response import Response, reduced_response
 from ...placement.search import SearchSettings, front, search_paths
 from ...placement.whole import whole_body
 from ...report.results import LatticePath, LatticeSearch
 from ...report.vtk import write_fields
+from ...resolved.response import bar_response
+from ...resolved.waveguide import bar_of
 from .motion import write_sensitivity
 
 if TYPE_CHECKING:
@@ -101,8 +104,12 @@ def search_graph(study: Study) -> LatticeSearch:
     mesh, trajectory = whole_body(study.mesh, study.trajectory)
 
     def check(numbers: Array) -> Array:
-        jobs = [(Candidate(f"path{n}", 0, graph.nodes[list(chains[n])]), rule) for n in numbers]
-        return np.array([e.deviation.J_hat for e in study.solve_candidates(mesh, trajectory, jobs)])
+        paths = {n: graph.nodes[list(chains[n])] for n in numbers.tolist()}
+        made = [n for n, points in paths.items() if rule != PRINTED or _is_printable(study, points)]
+        jobs = [(Candidate(f"path{n}", 0, paths[n]), rule) for n in made]
+        solved = study.solve_candidates(mesh, trajectory, jobs) if jobs else []
+        found = dict(zip(made, (e.deviation.J_hat for e in solved), strict=True))
+        return np.array([found.get(n, np.nan) for n in paths])
 
     with study.progress.stage("check of the best paths"):
         outcome = search_paths(predicted, check, SearchSettings(most=job.most_checks))
@@ -111,9 +118,15 @@ def search_graph(study: Study) -> LatticeSearch:
             f"After {job.most_checks} full solutions, the probability that an unsolved path is better than "
             f"the best one is up to {outcome.risk:.0%}: increase --checks."
         )
+    if len(outcome.left_out):
+        study.warn(
+            f"{len(outcome.left_out)} paths that the search came to are left out: no waveguide can be "
+            "printed along them."
+        )
     best = set(front(lengths, outcome.exact_mm).tolist())
     known = np.isfinite(outcome.exact_mm)
-    order = np.lexsort((predicted, np.where(known, outcome.exact_mm, np.inf))).tolist()
+    order = np.lexsort((predicted, np.where(known, outcome.exact_mm, np.inf)))
+    order = order[~np.isin(order, outcome.left_out)]
     every = [
         LatticePath(
             f"path{n}",
@@ -123,7 +136,7 @@ def search_graph(study: Study) -> LatticeSearch:
             float(outcome.exact_mm[n]),
             n in best,
         )
-        for n in order
+        for n in order.tolist()
     ]
     _write(study, every)
     study.search = LatticeSearch(rule, every[: len(outcome.checked)], len(chains), outcome.risk)
@@ -149,16 +162,27 @@ def search_graph(study: Study) -> LatticeSearch:
     return study.search
 
 
-def _predicted(study: Study, graph: Graph, chains: list[tuple[int, ...]], rule: str) -> Array:
-    """Predicted J_hat (n,) in mm of every chain."""
+def _is_printable(study: Study, points: Array) -> bool:
+    """Whether a waveguide can be printed along a path (h, 3) in mm."""
+    try:
+        bar_of(study.job.unit, points)
+    except InputError:
+        return False
+    return True
+
+
+def _response(study: Study, graph: Graph, rule: str, monitor: Probe) -> Response:
+    """The response that ranks paths: of bars between joints as printed, else of stiffened elements."""
     assert study.mesh is not None
     assert study.trajectory is not None
-    unit = study.job.unit
-    model = study.job.model(study.mesh)
-    monitor = probe(study.mesh, study.anchors)
-    found = reduced_response(
-        model,
-        study.job.materials(study.mesh),
+    job, unit = study.job, study.job.unit
+    if rule == PRINTED:
+        mesh, trajectory = whole_body(study.mesh, study.trajectory)
+        whole = probe(mesh, study.anchors)
+        return bar_response(job.model(mesh), job.materials(mesh), unit.printed, trajectory, whole, graph)
+    return reduced_response(
+        job.model(study.mesh),
+        job.materials(study.mesh),
         unit.material.sensor_modulus_MPa,
         study.trajectory,
         monitor,
@@ -166,6 +190,14 @@ def _predicted(study: Study, graph: Graph, chains: list[tuple[int, ...]], rule: 
         rule,
         unit.dimensions.inclusion_radius,
     )
+
+
+def _predicted(study: Study, graph: Graph, chains: list[tuple[int, ...]], rule: str) -> Array:
+    """Predicted J_hat (n,) in mm of every chain."""
+    assert study.mesh is not None
+    assert study.trajectory is not None
+    monitor = probe(study.mesh, study.anchors)
+    found = _response(study, graph, rule, monitor)
     pressures = np.array([s.pressure_MPa for s in loaded(study.trajectory)])
     gradients = gradients_of(study.trajectory, study.anchors, monitor, study.job.stations)
     shares = shares_of_time(study.trajectory)

@@ -167,7 +167,6 @@ class Job:
         refused = {
             "a law for the lattice": ("--lattice", self.lattice is not None),
             "linear elements": ("--order", self.mesh.order == 1),
-            "a search of the whole lattice": ("--paths graph", self.paths == "graph"),
         }
         for what, (where, asked) in refused.items():
             if asked and "simulate" in self.stages:

@@ -46,9 +46,7 @@ def run_stages(study: Study) -> None:
                 "whose state depends on pressure only."
             )
         else:
-            if job.mesh.fidelity == "resolved":
-                study.warn("The sensitivity map is not computed for the resolved model.")
-            elif job.effects.clogged:
+            if job.effects.clogged:
                 study.warn("The sensitivity map is not computed for a unit with a clogged neck.")
             else:
                 sensitivity_map(study)

@@ -1,0 +1,158 @@
+"""Displacements to begin with: a unit's own state, and the waveguide bent through the joints of its path."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+from ..fem.elements import reference_gradients
+from ..meshing.mesh import Array, Mesh
+
+# How much the surroundings' rotation counts beside the legs of a path.
+_TWIST = 0.05
+_MIRROR = np.array([-1.0, 1.0, 1.0])
+
+
+def numbers_of(mesh: Mesh, points: Array) -> Array:
+    """Numbers (p,) of a resolved mesh's nodes at points (p, 3) in mm; raises InputError where none is."""
+    from scipy.spatial import cKDTree
+
+    away, found = cKDTree(mesh.nodes).query(points)
+    if away.max() > 1e-6 * np.ptp(mesh.nodes[:, 2]):
+        x, y, z = points[away.argmax()].round(3).tolist()
+        raise InputError(
+            f"({x:g}, {y:g}, {z:g}) mm is no node of the lattice's mesh",
+            "path, [waveguide] row",
+            "choose nodes within the envelope, and a lattice with a node at the cells' centres",
+        )
+    return np.asarray(found)
+
+
+def mean_gradients(mesh: Mesh, u: Array, nodes: Array) -> Array:
+    """Mean deformation gradient (k, 3, 3) of the elements around each of some nodes (k,).
+
+    u: displacements (n, 3) in mm. In the mirror plane of a half mesh the image's elements count, too.
+    """
+    place = np.full(len(mesh.nodes), -1)
+    place[nodes] = np.arange(len(nodes))
+    rows = np.flatnonzero((place[mesh.tets] >= 0).any(axis=1))
+    reference = reference_gradients(mesh.nodes, mesh.tets[rows])
+    volume = reference.volumes * mesh.filled[rows] if mesh.resolved else reference.volumes
+    weighted = np.einsum("eai,eqaj,eq->eij", u[mesh.tets[rows]], reference.gradients, volume)
+    row, corner = np.nonzero(place[mesh.tets[rows]] >= 0)
+    at = place[mesh.tets[rows]][row, corner]
+    found, total = np.zeros((len(nodes), 3, 3)), np.zeros(len(nodes))
+    np.add.at(found, at, weighted[row])
+    np.add.at(total, at, volume.sum(axis=1)[row])
+    found /= np.maximum(total, 1e-300)[:, None, None]
+    if "x" in mesh.symmetry:
+        on = mesh.nodes[nodes, 0] == 0.0
+        found[on] = (found[on] + _MIRROR[:, None] * found[on] * _MIRROR) / 2.0
+    return np.asarray(found + np.eye(3))
+
+
+def started(unit: Mesh, mesh: Mesh, path: Array, u: Array) -> Array:
+    """Displacements (m, 3) in mm of a mesh with a waveguide, of those of the unit without it, u (n, 3).
+
+    unit, mesh: of `mesh_printed` and `with_waveguide`; path (h, 3): the waveguide's lattice nodes in mm.
+    Nodes of thickened struts move with the deformation gradient around them. The waveguide's axis becomes
+    Hermite's cubic from joint to joint of the path, each turned as its legs are; sections turn by the
+    rotation between both joints' and the least one onto the curve; beyond its ends the waveguide is rigid.
+    """
+    count = len(u)
+    moved = u.copy()
+    shift = mesh.nodes[:count] - unit.nodes
+    rows = np.flatnonzero(shift.any(axis=1))
+    if len(rows):
+        slope = mean_gradients(unit, u, rows) - np.eye(3)
+        moved[rows] += np.einsum("kij,kj->ki", slope, shift[rows])
+    own = mesh.nodes[count:]
+    bent = _bent(unit, path, u, own) - own
+    if "x" in mesh.symmetry:
+        bent[own[:, 0] == 0.0, 0] = 0.0
+    return mesh.following(np.vstack([moved, bent]))
+
+
+def _bent(unit: Mesh, path: Array, u: Array, points: Array) -> Array:
+    """Places (k, 3) in mm of points (k, 3) of a waveguide, bent with the joints of its path (h, 3)."""
+    from scipy.spatial.transform import Rotation, Slerp
+
+    joints = numbers_of(unit, path)
+    way = np.diff(path, axis=0)
+    at = _no_shorter(path + u[joints], np.linalg.norm(way, axis=1))
+    turn = _turns(mean_gradients(unit, u, joints), way, np.diff(at, axis=0))
+    length = np.linalg.norm(way, axis=1)
+    share = np.einsum("ksi,si->ks", points[:, None] - path[:-1], way) / length**2
+    share = np.clip(share, 0.0, 1.0)
+    foot = path[:-1] + share[:, :, None] * way
+    leg = np.linalg.norm(points[:, None] - foot, axis=2).argmin(axis=1)
+    found = np.empty_like(points)
+    for i, step in enumerate(way):
+        rows = np.flatnonzero(leg == i)
+        t = share[rows, i]
+        ends, slopes = at[i : i + 2], turn[i : i + 2] @ step
+        curve, slope = _hermite(ends, slopes, t)
+        rotation = Slerp([0.0, 1.0], Rotation.from_matrix(turn[i : i + 2]))(t)
+        along = slope / np.linalg.norm(slope, axis=1, keepdims=True)
+        across = rotation.apply(points[rows] - foot[rows, i])
+        found[rows] = curve + _onto(rotation.apply(step / length[i]), along, across)
+    return found
+
+
+def _no_shorter(points: Array, length: Array) -> Array:
+    """A polyline (h, 3) in mm about its middle, with legs stretched to lengths (h - 1,) if they are shorter.
+
+    A slender bar that is as short as the lattice around it would be far beyond buckling.
+    """
+    way = np.diff(points, axis=0)
+    way *= np.maximum(length / np.linalg.norm(way, axis=1), 1.0)[:, None]
+    found = np.vstack([np.zeros(3), np.cumsum(way, axis=0)])
+    return np.asarray(found + (points - found).mean(axis=0))
+
+
+def _turns(around: Array, way: Array, bent: Array) -> Array:
+    """Rotations (h, 3, 3) of a path's joints: those that fit the legs before and after best.
+
+    way, bent (h - 1, 3): legs at rest and deformed; around (h, 3, 3): deformation gradients of what is around
+    the joints, which decide about the axes of straight legs alone. By Kabsch's method.
+    """
+    scale = np.linalg.norm(way, axis=1)[:, None, None] ** 2
+    leg = bent[:, :, None] * way[:, None, :] / scale
+    wanted = _TWIST * around
+    wanted[:-1] += leg
+    wanted[1:] += leg
+    found = _nearest(wanted)
+    if len(way) > 1:
+        # Beyond the last inner joint a leg goes on bending as it does there.
+        for end, inner, last in ((0, 1, 0), (-1, -2, -1)):
+            slope = 2.0 * bent[last] - found[inner] @ way[last]
+            wanted[end] = _TWIST * around[end] + slope[:, None] * way[last] / scale[last]
+        found = _nearest(wanted)
+    return found
+
+
+def _nearest(matrices: Array) -> Array:
+    """The rotations (h, 3, 3) nearest to some matrices (h, 3, 3)."""
+    left, _, right = np.linalg.svd(matrices)
+    # A reflection would fit no body.
+    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
+    return np.asarray(left @ right)
+
+
+def _hermite(ends: Array, slopes: Array, t: Array) -> tuple[Array, Array]:
+    """Points and slopes (k, 3) at t (k,) of the cubic between two ends (2, 3) with slopes (2, 3) there."""
+    s = t[:, None]
+    h = 2 * s**3 - 3 * s**2 + 1, s**3 - 2 * s**2 + s, 3 * s**2 - 2 * s**3, s**3 - s**2
+    dh = 6 * s**2 - 6 * s, 3 * s**2 - 4 * s + 1, 6 * s - 6 * s**2, 3 * s**2 - 2 * s
+    parts = ends[0], slopes[0], ends[1], slopes[1]
+    return sum(a * b for a, b in zip(h, parts, strict=True)), sum(
+        a * b for a, b in zip(dh, parts, strict=True)
+    )
+
+
+def _onto(first: Array, second: Array, vectors: Array) -> Array:
+    """Vectors (k, 3) under the least rotations that turn unit vectors `first` (k, 3) into `second` (k, 3)."""
+    axis = np.cross(first, second)
+    cosine = (first * second).sum(axis=1, keepdims=True)
+    once = np.cross(axis, vectors)
+    return np.asarray(vectors + once + np.cross(axis, once) / (1.0 + cosine))
