@@ -63,6 +63,9 @@ class MU_PT_grasp(GripperPanel, bpy.types.Panel):
                 column.prop(cube, "location", index=2, text="Its Height")
             column.prop(props, "density_g_per_ml")
             column.prop(props, "friction")
+            layout.prop(props, "printed_struts")
+            if props.printed_struts:
+                layout.prop(props, "self_contact")
         child = grasps.GRASP.child(root)
         start_button(layout, child, "mu.grasp", "PLAY")
         job_state(layout, child, "see below", JOB)

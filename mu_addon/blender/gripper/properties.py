@@ -100,6 +100,15 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
                 ("part", "Part to Print", "Only the printable part as STL and 3MF"),
             ],
         ),
+        "printed_struts": BoolProperty(
+            name="Printed Struts",
+            description="Simulate the fingers strut by strut, and paths as printed waveguides, in place of a "
+            "continuum for the lattice: about ten times the time",
+        ),
+        "self_contact": BoolProperty(
+            name="Self-Contact",
+            description="Keep walls and struts apart where they meet under vacuum, in several times the time",
+        ),
         "folder": StringProperty(
             name="Grasp Folder",
             description="Folder of the results. Empty: beside the .blend file, or the user's folder",
