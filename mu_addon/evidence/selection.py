@@ -34,6 +34,11 @@ ALONE = 0.9
 PROMISING = 4.0
 
 
+# Share of a misfit that one effect must take to be named though structure is left, and how many times as
+# much any other one in its place must leave.
+MAINLY, APART = 0.99, 10.0
+
+
 @attrs.frozen(eq=False)
 class Cause:
     """One effect of the chosen model.
@@ -186,6 +191,48 @@ def one_more(
         return found
     causes = _causes(fitter, effects, best, [*(c.p_value for c in found.causes), p], [pool])
     return attrs.evolve(found, chosen=best, causes=causes, table=table)
+
+
+def share_taken(fitter: Fitter, base: Fit, fit: Fit) -> float:
+    """Share of the base model's misfit that another one takes: of chi squared beyond what noise leaves."""
+    noise = float(len(fitter.record))
+    return 1.0 - max(fit.chi2 - noise, 0.0) / max(base.chi2 - noise, 1.0)
+
+
+def mainly(fitter: Fitter, found: Selection) -> Selection | None:
+    """A selection of the one effect that takes nearly all of a misfit, though structure is left; None else.
+
+    Its law may be another than the library's. It must take `MAINLY` of the misfit, leave a tenth of what any
+    other effect leaves in its place, predict left-out experiments better, rest on no single experiment, have
+    no value at a bound but its null, and do better than a step change.
+    """
+    if not found.singles:
+        return None
+    best, base = found.singles[0], found.base
+    left = 1.0 - share_taken(fitter, base, best)
+    others = [f for f in found.singles if f.names != best.names]
+    rival = min((1.0 - share_taken(fitter, base, f) for f in others), default=1.0)
+    if left > 1.0 - MAINLY or rival < APART * max(left, 1e-6) or _at_a_bound(best):
+        return None
+    shares = _share_by_experiment(fitter, best)
+    if (len(shares) > 1 and max(shares.values()) > ALONE) or _loss(fitter, base, best) <= 0.0:
+        return None
+    if _sudden(found.table_base, base, best):
+        return None
+    cause = Cause(best.effects[0], found.p_best, base.chi2 - best.chi2, ())
+    table = tuple(strict_table(fitter, best))
+    return attrs.evolve(found, chosen=best, causes=(cause,), table=table, doubted="")
+
+
+def _at_a_bound(fit: Fit) -> bool:
+    """Whether a fitted value of an effect lies at a bound that is not its null."""
+    for e in fit.effects:
+        for key, p in zip(e.keys, e.parameters, strict=True):
+            near = 1e-3 * (p.high - p.low)
+            value = fit.values[key]
+            if any(abs(value - b) < near and b != p.null for b in (p.low, p.high)):
+                return True
+    return False
 
 
 def _sudden(table: Sequence[Dependence], base: Fit, chosen: Fit) -> str:

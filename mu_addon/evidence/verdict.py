@@ -18,7 +18,7 @@ from .noise import Source, estimate, span
 from .plausibility import require_plausible
 from .record import Record, record
 from .resolution import without_wrong_readings
-from .selection import Selection, interval, one_more, reselected, select
+from .selection import Selection, interval, mainly, one_more, reselected, select, share_taken
 from .sensitivity import ABSORBED, SEEN, Sensitivity, at_bounds, best_seen, sensitivities, signatures
 from .simulator import Composite
 
@@ -38,7 +38,8 @@ class Verdict:
     kind: one of `KINDS` (none, named, ambiguous, unidentifiable, unexplained). experiments: all of them,
     their drives freed of gauge noise (`drive.denoised_drives`). sources: noise by group of series. intervals:
     95 % bounds by key, in the parameters' units. identifiability: effects that these data cannot show, with
-    the reason. set_aside: readings that do not count, in words (`resolution.wrong_readings`). `as_json` is
+    the reason. set_aside: readings that do not count, in words (`resolution.wrong_readings`). share_taken: of the base
+    model's misfit by the chosen one; a verdict `named` may leave structure (`selection.mainly`). `as_json` is
     the content of verdict.json.
     """
 
@@ -53,6 +54,7 @@ class Verdict:
     intervals: dict[str, tuple[float, float]]
     experiments: tuple[Experiment, ...]
     set_aside: tuple[str, ...] = ()
+    share_taken: float = 0.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -94,6 +96,7 @@ class Verdict:
             "causes": causes if self.names else [],
             "partly_explained_by": [] if self.names else causes,
             "remaining_structure": {"detected": bool(left), "where": list(left)},
+            "share_of_misfit": self.share_taken,
             "gain": self.gain.as_json(),
             "residual_table": [
                 {
@@ -171,6 +174,8 @@ def diagnose(
                 seen = at_bounds(fitter, curved, sensitivities(fitter, curved))
                 chosen = one_more(fitter, seen, chosen, progress)
     kind = _kind(fitter, chosen)
+    if kind == "unexplained" and (most := mainly(fitter, chosen)) is not None:
+        kind, chosen = "named", most
     progress("gain")
     gained = gain(fitter, chosen.base, chosen.chosen, [e for e in experiments if e.role == "held_out"])
     proposal = propose_experiment(fitter, chosen, seen)
@@ -189,6 +194,7 @@ def diagnose(
         bounds,
         tuple(experiments),
         tuple(set_aside),
+        share_taken(fitter, chosen.base, chosen.chosen),
     )
 
 

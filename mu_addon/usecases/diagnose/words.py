@@ -59,7 +59,16 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
     found = verdict.selection
     if verdict.kind == "named":
         sizes = [f"{_upper(c.effect.mechanism)}; {sized(verdict, c)}." for c in found.causes]
-        return listed([readable(n) for n in verdict.names]), " ".join(sizes)
+        names = listed([readable(n) for n in verdict.names])
+        if not found.left:
+            return names, " ".join(sizes)
+        rest = listed([readable(n) for n in found.left])
+        sizes.append(
+            f"It takes {100 * verdict.share_taken:.4g} % of the misfit (of χ² beyond noise). What remains "
+            f"depends on {rest}: the effect may follow another law, or something small acts beside it, so "
+            "the intervals are too narrow."
+        )
+        return f"mainly {names}", " ".join(sizes)
     if verdict.kind == "ambiguous":
         choices = [listed([readable(n) for n in (c.effect.name, *c.rivals)], "or") for c in found.causes]
         sizes = [f"{readable(c.effect.name)} has {sized(verdict, c)}" for c in found.causes]
