@@ -38,9 +38,9 @@ class Verdict:
     kind: one of `KINDS` (none, named, ambiguous, unidentifiable, unexplained). experiments: all of them,
     their drives freed of gauge noise (`drive.denoised_drives`). sources: noise by group of series. intervals:
     95 % bounds by key, in the parameters' units. identifiability: effects that these data cannot show, with
-    the reason. set_aside: readings that do not count, in words (`resolution.wrong_readings`). share_taken: of the base
-    model's misfit by the chosen one; a verdict `named` may leave structure (`selection.mainly`). `as_json` is
-    the content of verdict.json.
+    the reason. set_aside: readings that do not count, in words (`resolution.wrong_readings`). share_taken: of
+    the base model's misfit by the chosen one; a verdict `named` may leave structure (`selection.mainly`).
+    `as_json` is the content of verdict.json.
     """
 
     kind: str

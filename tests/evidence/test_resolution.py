@@ -14,6 +14,7 @@ from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.resolution import between_steps, divided, dwell, quantum, wrong_readings
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
+from mu_addon.usecases.diagnose.words import sentence
 from tests.evidence import bench
 
 
@@ -137,3 +138,35 @@ def test_gas_is_no_warmer_than_compressing_it_makes_it():
     # 296 K (141.325 / 101.325)^(2/7), by hand.
     assert drift.parameters[0].high == pytest.approx(296.0 * 0.09973 + 5.0, abs=0.1)
     assert drift.parameters[0].low == pytest.approx(-5.0)
+
+
+def softened(noise, seed=6):
+    """One coupon stretched three times, that softens by a law of their own: tanh for the library's erf."""
+    rng = np.random.default_rng(seed)
+    made, farthest = [], 0.0
+    for number, most in enumerate((0.4, 0.4, 0.4)):
+        t = np.arange(0.0, 40.0, 0.1)
+        strain = most * (1 - np.abs((t % 20.0) / 10.0 - 1.0))
+        before = np.maximum.accumulate(np.maximum(strain, farthest))
+        farthest = max(farthest, most)
+        virgin = 1000.0 / 3.0 * ((1 + strain) - (1 + strain) ** -2.0)
+        energy, most_so_far = (1000.0 / 6.0 * ((1 + e) ** 2 + 2 / (1 + e) - 3) for e in (strain, before))
+        stress = virgin * (1 - 0.25 * np.tanh((most_so_far - energy) / 40.0)) + noise * rng.normal(
+            size=len(t)
+        )
+        columns = {"time_s": t, "strain": strain, "stress_kPa": stress}
+        made.append(bench.experiment("coupon", columns, f"test {number}", mode="uniaxial", specimen="A"))
+    return made
+
+
+def test_a_mechanism_by_another_law_is_named_with_what_remains():
+    found = verdict(*softened(0.02))
+    assert found.names == ("mullins_softening",)
+    assert found.selection.left, "the library's law is another, and so little noise shows it"
+    assert found.share_taken > 0.99
+    written = found.as_json()
+    assert written["remaining_structure"]["detected"]
+    assert written["share_of_misfit"] == found.share_taken
+    headline, words = sentence(found)
+    assert headline == "mainly mullins softening"
+    assert "% of the misfit" in words
