@@ -12,7 +12,6 @@ import numpy as np
 
 from ..measured import Experiment
 from .record import KNOWN, Record, Series
-from .resolution import dwell, quantum
 
 Array = np.ndarray[Any, Any]
 
@@ -182,25 +181,23 @@ def estimate(record: Record, residual: Array, columns: Sequence[Array]) -> dict[
             continue
         members = [i for i, s in enumerate(record.series) if s.group == group]
         found[group] = _rounded(
-            _estimate(record, group, members, residual, columns), record, [record.series[i] for i in members]
+            _estimate(record, group, members, residual, columns), [record.series[i] for i in members]
         )
     return found
 
 
-def _rounded(source: Source, record: Record, series: Sequence[Series]) -> Source:
+def _rounded(source: Source, series: Sequence[Series]) -> Source:
     """A source no smaller than what rounding to a gauge's steps does to its readings.
 
     A reading is off by up to half a step, evenly. Where it stays for several samples so does the error: it is
     slow, for as long as readings stay on average.
     """
     for s in series:
-        values = record.experiments[s.experiment][s.channel]
-        off = quantum(values) / math.sqrt(12.0)
-        stays = dwell(values)
-        slow = off if stays > 2.0 and not math.isnan(s.sample_s) else 0.0
+        off = s.step / math.sqrt(12.0)
+        slow = off if s.stays > 2.0 and not math.isnan(s.sample_s) else 0.0
         time_s = source.time_s
         if slow > source.slow:
-            time_s = min(stays, 0.5 * len(values)) * s.sample_s
+            time_s = min(s.stays, 0.5 * float(s.count.sum())) * s.sample_s
         source = Source(max(source.white, off), max(source.slow, slow), time_s)
     return source
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..measured import Experiment
+from .resolution import dwell, quantum
 from .simulator import Composite
 
 Array = np.ndarray[Any, Any]
@@ -27,7 +28,9 @@ class Series:
 
     experiment: its number in the record. group: name that series of the same noise share. row: of the
     prediction (channels, n). time_s (b,): mean times of the b blocks in s, nan where the record has no clock;
-    count (b,): samples in each block; sample_s: median time between samples in s, or nan.
+    count (b,): samples in each block; sample_s: median time between samples in s, or nan. step: in which its
+    readings come, in the channel's unit, 0 where they come in none; stays: how many of them, in the median,
+    follow one another unchanged (`resolution`).
     """
 
     experiment: int
@@ -38,6 +41,8 @@ class Series:
     time_s: Array
     count: Array
     sample_s: float
+    step: float
+    stays: float
     _seen: Array = attrs.field(repr=False)
     _first: Array = attrs.field(repr=False)
     _kept: Array = attrs.field(repr=False)
@@ -209,6 +214,8 @@ def _series(i: int, e: Experiment, row: int, channel: str, blocks: int) -> tuple
         "time_s": centre,
         "count": count[kept],
         "sample_s": sample,
+        "step": quantum(values),
+        "stays": dwell(values),
         "seen": seen,
         "first": first,
         "kept": kept,
