@@ -16,7 +16,7 @@ Array = np.ndarray[Any, Any]
 
 # Digits behind the point that a gauge may have; what has more was not read off a display.
 DIGITS = 9
-# A reading is set aside if it is so many deviations from all that its neighbours foretell.
+# A reading is set aside if it is so many deviations from all that its neighbours predict.
 WRONG = 8.0
 # Of a record so few readings may be wrong: what happens more often is no accident.
 MOST_WRONG = 0.02
@@ -91,7 +91,7 @@ def divided(time_s: Array, values: Array, order: int) -> Array:
 def wrong_readings(time_s: Array, values: Array) -> Array:
     """Which readings (n,) at times (n,) in s stand alone, away from all around them: (n,) bool.
 
-    A reading is foretold by the lines through its neighbours on both sides, through the next but one on both
+    Each is compared with the lines through its neighbours on both sides, through the next but one on both
     sides, and through two before and two after it. A corner or a step agrees with one of the latter two; what
     lies beyond all four, on one side and by `WRONG` deviations, belongs to nothing.
     """

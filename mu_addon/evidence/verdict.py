@@ -18,7 +18,7 @@ from .noise import Source, estimate, span
 from .plausibility import require_plausible
 from .record import Record, record
 from .resolution import without_wrong_readings
-from .selection import Selection, interval, mainly, one_more, reselected, select, share_taken
+from .selection import Cause, Selection, interval, mainly, one_more, reselected, select, share_taken
 from .sensitivity import ABSORBED, SEEN, Sensitivity, at_bounds, best_seen, sensitivities, signatures
 from .simulator import Composite
 
@@ -70,6 +70,11 @@ class Verdict:
             return frozenset()
         return frozenset(self.names) | {r for c in self.selection.causes for r in c.rivals}
 
+    def _share(self, cause: Cause) -> float:
+        """Share of the base model's misfit that is lost where one of several causes is taken away."""
+        gained = self.selection.base.chi2 - self.selection.chosen.chi2
+        return self.share_taken * min(cause.loss / gained, 1.0) if gained > 0 else 0.0
+
     def _value(self, key: str) -> dict[str, float]:
         low, high = self.intervals[key]
         return {"value": self.selection.chosen.values[key], "low95": low, "high95": high}
@@ -85,6 +90,7 @@ class Verdict:
                 "mechanism": c.effect.mechanism,
                 "parameters": {k.partition(".")[2]: self._value(k) for k in c.effect.keys},
                 "p_value": c.p_value,
+                "share": self.share_taken if len(self.selection.causes) == 1 else self._share(c),
                 "rivals": list(c.rivals),
             }
             for c in self.selection.causes
@@ -95,8 +101,12 @@ class Verdict:
             "verdict": self.kind,
             "causes": causes if self.names else [],
             "partly_explained_by": [] if self.names else causes,
-            "remaining_structure": {"detected": bool(left), "where": list(left)},
-            "share_of_misfit": self.share_taken,
+            "remaining_structure": {
+                "detected": bool(left),
+                "where": list(left),
+                "size": self.gain.fit.after,
+                "unit": self.gain.fit.unit,
+            },
             "gain": self.gain.as_json(),
             "residual_table": [
                 {
@@ -110,7 +120,6 @@ class Verdict:
             ],
             "next_experiment": {"what": next_.what, "separates": list(next_.separates)} if next_ else None,
             "identifiability": dict(self.identifiability),
-            "set_aside": list(self.set_aside),
         }
 
 

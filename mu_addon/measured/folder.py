@@ -74,6 +74,7 @@ def read_folder(folder: Path) -> Measured:
         _check_apart(found, experiments, at)
         experiments.append(found)
         remarks += notes
+    _require_gauge_pressures(experiments, entries)
     return Measured(Path(folder), _as_run(experiments, path), tuple(remarks))
 
 
@@ -119,7 +120,7 @@ def _experiment(entry: dict[str, Any], at: _Place) -> tuple[Experiment, list[Rem
     table = read_table(text, kind, path)
     columns, remarks = dict(table.columns), list(table.remarks)
     if "pressure_kPa" in columns:
-        columns["pressure_kPa"] = _gauge_pressure(columns["pressure_kPa"], entry, path, at)
+        columns["pressure_kPa"] = _gauge_pressure(columns["pressure_kPa"], entry, at)
     if kind.name in ("coupon", "lattice_compression"):
         columns = _strained(columns, fields, kind, path, remarks)
         _check_strain(columns["strain"], table.rows, kind, path, remarks)
@@ -141,24 +142,28 @@ def _experiment(entry: dict[str, Any], at: _Place) -> tuple[Experiment, list[Rem
     return experiment, remarks
 
 
-def _gauge_pressure(pressure_kPa: Array, entry: dict[str, Any], path: Path, at: _Place) -> Array:
-    """Gauge pressure (n,) in kPa: as read, or less the atmosphere where the experiment says it is absolute.
+def _gauge_pressure(pressure_kPa: Array, entry: dict[str, Any], at: _Place) -> Array:
+    """Gauge pressure (n,) in kPa: as read, or less the atmosphere where it is said to be absolute."""
+    if "pressure" in entry and _choice(entry, "pressure", PRESSURES, at) == "absolute":
+        return pressure_kPa - ATMOSPHERE_kPa
+    return pressure_kPa
 
-    Raises InputError where nothing is said and all readings are what a unit's absolute pressures would be.
-    """
-    if "pressure" in entry:
-        absolute = _choice(entry, "pressure", PRESSURES, at) == "absolute"
-        return pressure_kPa - ATMOSPHERE_kPa if absolute else pressure_kPa
-    least, most = float(np.nanmin(pressure_kPa)), float(np.nanmax(pressure_kPa))
+
+def _require_gauge_pressures(experiments: Sequence[Experiment], entries: Sequence[dict[str, Any]]) -> None:
+    """Raise InputError where nothing is said and all readings are like a unit's absolute pressures."""
+    read = [e for e in experiments if "pressure_kPa" in e.columns]
+    if not read or any("pressure" in entry for entry in entries):
+        return
+    least = min(float(np.nanmin(e["pressure_kPa"])) for e in read)
+    most = max(float(np.nanmax(e["pressure_kPa"])) for e in read)
     low, high = LIKE_ABSOLUTE_kPa
     if low < least and most < high:
         raise InputError(
             f"pressures are from {least:.4g} to {most:.4g} kPa, as if they were absolute; they are read as "
             "gauge pressures",
-            f"{path}, column pressure_kPa",
-            f'write pressure = "absolute" or pressure = "gauge" in the experiment in {FILE}',
+            f"{read[0].file}, column pressure_kPa",
+            f'write pressure = "absolute" or pressure = "gauge" in each such experiment in {FILE}',
         )
-    return pressure_kPa
 
 
 def _described(entry: dict[str, Any], kind: Kind, at: _Place) -> dict[str, Any]:

@@ -166,7 +166,8 @@ def test_a_mechanism_by_another_law_is_named_with_what_remains():
     assert found.share_taken > 0.99
     written = found.as_json()
     assert written["remaining_structure"]["detected"]
-    assert written["share_of_misfit"] == found.share_taken
+    assert written["remaining_structure"]["size"] == found.gain.fit.after
+    assert [cause["share"] for cause in written["causes"]] == [found.share_taken]
     headline, words = sentence(found)
     assert headline == "mainly mullins softening"
     assert "% of the misfit" in words

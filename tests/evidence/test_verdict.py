@@ -80,7 +80,9 @@ def test_the_file_says_what_the_design_asks(lagging):
     }
     assert written["partly_explained_by"] == []
     cause = written["causes"][0]
-    assert set(cause) == {"effect", "mechanism", "parameters", "p_value", "rivals"}
+    assert set(cause) == {"effect", "mechanism", "parameters", "p_value", "rivals", "share"}
+    assert 0.9 < cause["share"] <= 1.0
+    assert set(written["remaining_structure"]) == {"detected", "where", "size", "unit"}
     assert set(cause["parameters"]["share"]) == {"value", "low95", "high95"}
     assert {d["against"] for d in written["residual_table"]} >= {"pressure", "loading_direction", "time"}
 

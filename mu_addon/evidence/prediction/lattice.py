@@ -13,7 +13,7 @@ import numpy as np
 from ...homogenize.offset_response import OffsetResponse
 from ...measured import Experiment
 from ..effect import Effect, Parameter
-from .specimen import NEW, load_zeros, machine, recorded, strain_histories
+from .specimen import NEW, machine, recorded, strain_histories
 
 Array = np.ndarray[Any, Any]
 
@@ -188,13 +188,14 @@ class LatticeStress:
     and length_mm.
     """
 
+    nuisances = (MODULUS, DENSITY)
+
     def __init__(
         self,
         experiments: Sequence[Experiment] = (),
         scalings: Mapping[str, Scaling] = MappingProxyType({}),
         curve: Callable[[Array], Array] = _linear,
     ) -> None:
-        self.nuisances = (MODULUS, DENSITY, *load_zeros(experiments, KIND))
         self._histories = strain_histories(experiments, KIND)
         self.scalings = scalings
         most = min(

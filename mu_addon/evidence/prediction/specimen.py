@@ -24,6 +24,8 @@ LENGTH_mm = 25.0
 ONSET_mm = 0.01
 # Rows of a record whose load cell has a zero of its own.
 FEWEST = 20
+# Of the largest load: what such cells' sheets allow a zero to wander, and hands to miss it.
+ZERO_SHARE = 0.01
 # Strain up to which a preload is looked for.
 FARTHEST = 0.5
 FRAME = Parameter("mm_per_N", "mm/N", 0.0, 0.1, 0.0, (0.005,), "steel 1e-5, printed plates 0.1")
@@ -98,14 +100,20 @@ def strain_histories(experiments: Sequence[Experiment], kind: str) -> dict[str, 
 def load_zeros(experiments: Sequence[Experiment], kind: str) -> tuple[Parameter, ...]:
     """The load cell's zero in each experiment of a kind that was recorded over time, as stress in kPa.
 
-    Cells are set to zero before each test, to a reading's noise at best. Records of a few rows, and those of
-    given spread, have nothing to tell it by.
+    Cells are set to zero before each test, and keep it to a share of the load (`ZERO_SHARE`): a zero that was
+    known to nothing would take the place of faces that close. Between plates a preload says where zero is
+    (`seating`), and cells have none of their own. Records of a few rows, and those of given
+    spread, have nothing to tell it by.
     """
-    return tuple(
-        Parameter(_zero(e), "kPa", -1e6, 1e6, 0.0, (), "set by hand", linear=True, experiment=e.name)
-        for e in experiments
-        if e.kind == kind and "time_s" in e.columns and "stress_sd_kPa" not in e.columns and len(e) >= FEWEST
-    )
+    found = []
+    for e in experiments:
+        if e.kind != kind or "time_s" not in e.columns or "stress_sd_kPa" in e.columns or len(e) < FEWEST:
+            continue
+        most = float(np.abs(e["stress_kPa"]).max()) or 1.0
+        spread = ZERO_SHARE * most
+        zero = Parameter(_zero(e), "kPa", -most, most, 0.0, (), "set by hand", spread=spread)
+        found.append(attrs.evolve(zero, experiment=e.name))
+    return tuple(found)
 
 
 def _zero(experiment: Experiment) -> str:
