@@ -36,13 +36,17 @@ class Ring:
     def create(cls, path: Path, columns: int, capacity: int = 1 << 16) -> Ring:
         """A new, empty ring in the file `path`, 65536 rows by default; raises OutputError."""
         size = _START + 8 * columns * capacity
+        # Whole before it has its name: who waits for the file attaches at once.
+        making = path.with_name(f"{path.stem}-making{path.suffix}")
         try:
-            with path.open("wb+") as stream:
+            with making.open("wb") as stream:
+                stream.write(_HEAD.pack(_MAGIC, columns, capacity, 0))
                 stream.truncate(size)
+            making.replace(path)
+            with path.open("rb+") as stream:
                 mapped = mmap.mmap(stream.fileno(), size)
         except OSError as error:
             raise output_error(error, path) from error
-        mapped[: _HEAD.size] = _HEAD.pack(_MAGIC, columns, capacity, 0)
         return cls(_rows(mapped, columns, capacity), mapped)
 
     @classmethod
