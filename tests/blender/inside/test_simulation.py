@@ -185,7 +185,7 @@ def test_printed_struts_are_simulated_and_played(tmp_path):
     root = add()
     root.mu_unit.chambers.count = 3
     protocol = tmp_path / "inflate.csv"
-    protocol.write_text("time_s,pressure_kPa\n0,0\n1,5\n")
+    protocol.write_text("time_s,pressure_kPa\n0,0\n1,2\n")
     root.mu_unit.study.command, root.mu_unit.study.detail = "simulate", "resolved"
     root.mu_unit.study.protocol = str(protocol)
     assert bpy.ops.mu.simulate() == {"FINISHED"}
@@ -193,7 +193,7 @@ def test_printed_struts_are_simulated_and_played(tmp_path):
     watch(lambda: child.state != "running")
     assert child.state == "done", child.error
     found = studies.findings(root)
-    assert found.angles[-1][1] > 1.0
+    assert found.angles[-1][1] > 0.5
     motion = read_motion(studies.folder_of(root))
     assert motion.mesh.resolved
     skin = motion.skin("lattice", cut=False)
