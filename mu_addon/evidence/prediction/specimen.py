@@ -107,9 +107,10 @@ def load_zeros(experiments: Sequence[Experiment], kind: str) -> tuple[Parameter,
     """
     found = []
     for e in experiments:
-        if e.kind != kind or "time_s" not in e.columns or "stress_sd_kPa" in e.columns or len(e) < FEWEST:
+        timed = {"time_s", "stress_kPa"} <= set(e.columns) and "stress_sd_kPa" not in e.columns
+        if e.kind != kind or not timed or len(e) < FEWEST:
             continue
-        most = float(np.abs(e["stress_kPa"]).max()) or 1.0
+        most = float(np.nanmax(np.abs(e["stress_kPa"]))) or 1.0
         spread = ZERO_SHARE * most
         zero = Parameter(_zero(e), "kPa", -most, most, 0.0, (), "set by hand", spread=spread)
         found.append(attrs.evolve(zero, experiment=e.name))
