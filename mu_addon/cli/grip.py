@@ -99,8 +99,8 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
     require_out(options)
     gripper = load_gripper(options.preset) if options.preset is not None else read_gripper(options.gripper)
     refine = options.refine or (COARSE if options.coarse else REFINE)
-    resolved = options.fidelity == "resolved"
-    rules = (PRINTED,) if resolved else ("volume_fraction",) if options.coarse else RULES
+    mesh = MeshSettings(refine=refine, fidelity=options.fidelity)
+    rules = (PRINTED,) if mesh.resolved else ("volume_fraction",) if options.coarse else RULES
     step_s = 1.0 if options.coarse else 0.5
     job = Job(
         gripper=gripper,
@@ -112,7 +112,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
             **OF_FIDELITY[options.fidelity],
         ),
         phases=shipped_phases() if options.protocol is None else read_phases(Path(options.protocol)),
-        mesh=MeshSettings(refine=refine, fidelity=options.fidelity),
+        mesh=mesh,
         self_contact=options.self_contact,
         rules=() if options.solid_only or options.no_paths else rules,
         quality=options.quality,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ..reading import file_bytes, require_readable
+from ..reading import require_readable
 from . import shapes
 from .dimensions import Dimensions
 from .printing.crossing import crossings
@@ -130,9 +130,10 @@ def read_body(path: str | Path) -> Body:
         )
     try:
         require_readable(path, MOST_BYTES)
-        if path.suffix.lower() == ".ply" and b"end_header" not in file_bytes(path, MOST_BYTES)[:_HEAD]:
-            # meshio waits for the header's end for ever.
-            raise ValueError("the header does not end")
+        with path.open("rb") as stream:
+            if path.suffix.lower() == ".ply" and b"end_header" not in stream.read(_HEAD):
+                # meshio waits for the header's end for ever.
+                raise ValueError("the header does not end")
         mesh = readers[path.suffix.lower()](path)
     except (*_DAMAGED, ReadError) as error:
         why = getattr(error, "strerror", None) or "the file is damaged or of another type"

@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
-from .resolution import between_steps, divided, dwell
+from .resolution import STAYS, between_steps, divided, dwell
 from .simulator import Composite
 
 Array = np.ndarray[Any, Any]
@@ -31,8 +31,6 @@ ORDERS = (2, 3, 4, 5, 6, 7, 8)
 # Noise smaller than this share of a record's range changes no verdict, and is not looked at.
 NEGLIGIBLE = 1e-6
 FEWEST = 9
-# Readings that stay so many samples before each change come in steps coarser than their noise.
-STAYS = 2.0
 
 
 def reading_noise(time_s: Array, values: Array) -> float:
@@ -119,7 +117,8 @@ def denoised_drives(
     Drives are the columns of `DRIVES` that no simulator predicts, in experiments with time_s, at least
     `FEWEST` rows and finite values. The copy holds the same drives with as much simulated noise, denoised
     again: what a model driven by the copy misses of data made with the first list is due to the gauge's noise
-    alone. None in its place where no drive is noisy.
+    alone. A drive in steps of a display is freed of them (`between_steps`), and its copy is as it was read.
+    None in its place where no drive is noisy.
     """
     rng = np.random.default_rng(0)
     found, again = [], []

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..measured import Experiment
 from .record import KNOWN, Record, Series
+from .resolution import STAYS
 
 Array = np.ndarray[Any, Any]
 
@@ -194,7 +195,7 @@ def _rounded(source: Source, series: Sequence[Series]) -> Source:
     """
     for s in series:
         off = s.step / math.sqrt(12.0)
-        slow = off if s.stays > 2.0 and not math.isnan(s.sample_s) else 0.0
+        slow = off if s.stays > STAYS and not math.isnan(s.sample_s) else 0.0
         time_s = source.time_s
         if slow > source.slow:
             time_s = min(s.stays, 0.5 * float(s.count.sum())) * s.sample_s

@@ -31,10 +31,11 @@ def require_plausible(fitter: Fitter, base: Fit) -> None:
 def _refuse(fitter: Fitter, p: Parameter, fitted: float) -> None:
     """Raise InputError for a parameter by the experiment whose readings depend on it most."""
     record = fitter.record
-    slope = fitter.predict({p.name: p.null + p.step}) - fitter.predict({})
+    at_null = fitter.predict({})
+    slope = fitter.predict({p.name: p.null + p.step}) - at_null
     series = max(record.series, key=lambda s: float(np.abs(slope[s.at]).sum()))
     e = record.experiments[series.experiment]
-    predicted, read = fitter.predict({})[series.at], record.values[series.at]
+    predicted, read = at_null[series.at], record.values[series.at]
     size = float(predicted @ predicted) or 1.0
     implied = p.null * float(predicted @ read) / size
     low, high = p.plausible

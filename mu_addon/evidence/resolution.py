@@ -21,6 +21,8 @@ WRONG = 8.0
 # Of a record so few readings may be wrong: what happens more often is no accident.
 MOST_WRONG = 0.02
 FEWEST = 9
+# Readings that stay so many samples before each change come in steps coarser than their noise.
+STAYS = 2.0
 
 
 def quantum(values: Array) -> float:

@@ -26,7 +26,7 @@ from ..fem.unit import materials_of
 from ..fem.wall_law import LAYER_NORMAL, layer_stiffness
 from ..meshing.mesh import LATTICE, MEMBRANE, Mesh
 from ..meshing.morph import morphed
-from ..meshing.settings import CELL_MM, RESOLVED, MeshSettings
+from ..meshing.settings import CELL_MM, MeshSettings
 from ..resolved.unit import mesh_of
 from .effect import Effect, Parameter
 from .prediction import beam, coupon, lattice
@@ -70,7 +70,7 @@ class Body:
 
     def meshed(self, cache: Path | None = None) -> Mesh:
         """The unit's mesh; raises InputError and MeshingError. cache: see `mesh_of`."""
-        if self.mesh.fidelity == RESOLVED:
+        if self.mesh.resolved:
             # Made anew: no mesher moves its nodes, and struts cannot be moved through the wall.
             return mesh_of(self.unit, self.mesh, cache=cache)
         mesh = mesh_of(self.drawn or self.unit, self.mesh, cache=cache)
@@ -79,7 +79,7 @@ class Body:
     def newton(self, effect: UnitEffect | None = None) -> NewtonSettings:
         """Settings of Newton's method for a run of this body, with an effect or none."""
         own = effect.newton if effect else SMOOTH
-        return RESOLVED_NEWTON if self.mesh.fidelity == RESOLVED and own != CONTACT_NEWTON else own
+        return RESOLVED_NEWTON if self.mesh.resolved and own != CONTACT_NEWTON else own
 
     def materials(self, mesh: Mesh) -> Materials:
         """The base model's materials on a mesh; raises InputError if the unit's wall has a law of its own."""

@@ -58,6 +58,11 @@ class MeshSettings:
     envelope_mm: float = attrs.field(default=14.0, validator=_between(0.1, 100.0))
     fidelity: str = attrs.field(default=HOMOGENISED, validator=_one_of(*FIDELITIES))
 
+    @property
+    def resolved(self) -> bool:
+        """Whether struts are meshed as printed."""
+        return self.fidelity == RESOLVED
+
     def table(self) -> dict[str, Any]:
         """The settings as a file of inputs has them; fidelity only where it is not homogenised."""
         found = attrs.asdict(self)

@@ -68,7 +68,7 @@ def mesh_of(
 
     Raises InputError and MeshingError.
     """
-    if settings.fidelity == "resolved":
+    if settings.resolved:
         return mesh_printed(unit, settings, progress, cache, body)
     return mesh_unit(unit, settings, progress, mesher, cache, body)
 

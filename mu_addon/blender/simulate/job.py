@@ -26,7 +26,7 @@ def job_of(root: Any) -> Job:
     # Only now: they bring in the solver's packages, which a Blender may lack.
     try:
         from ...fem.solver import SolverChoice
-        from ...meshing.settings import MeshSettings
+        from ...meshing.settings import RESOLVED, MeshSettings
         from ...usecases.simulate_and_place.job import Job, protocol_of, require_paths_inside
     except (ImportError, OSError, RuntimeError) as error:
         raise InputError(
@@ -44,7 +44,7 @@ def job_of(root: Any) -> Job:
         if settings.command == "place":
             extra |= {"rules": ("volume_fraction",), "mesh_check": False}
     elif settings.detail == "resolved":
-        extra |= {"mesh": MeshSettings(fidelity="resolved"), "self_contact": settings.self_contact}
+        extra |= {"mesh": MeshSettings(fidelity=RESOLVED), "self_contact": settings.self_contact}
     body = bodies.envelope_in(root, unit)
     if body is not None:
         require_paths_inside(unit, body, stages, settings.paths)

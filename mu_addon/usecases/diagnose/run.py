@@ -16,6 +16,7 @@ from ...errors import InputError
 from ...evidence.drive import reading_noise
 from ...evidence.extended import ExtendedModel, extended_model
 from ...evidence.prediction import lattice
+from ...evidence.resolution import STAYS, dwell, quantum
 from ...evidence.simulator import Composite
 from ...evidence.verdict import Verdict, diagnose
 from ...files import write_csv, write_json
@@ -117,16 +118,24 @@ def _resin(model: ExtendedModel, unit: Unit | None) -> list[str]:
 def _noisy_gauges(measured: Measured, verdict: Verdict) -> list[str]:
     """Which readings drove the model with less noise than they have, in words."""
     noise: dict[str, float] = {}
+    stepped: dict[str, float] = {}
     for e, judged in zip(measured.experiments, verdict.experiments, strict=True):
         for column, values in judged.columns.items():
             read = e.columns[column]
             drive = np.array_equal(np.isfinite(values), np.isfinite(read))
-            if drive and not np.array_equal(values, read, equal_nan=True):
+            if not drive or np.array_equal(values, read, equal_nan=True):
+                continue
+            if dwell(read) > STAYS:
+                stepped[column] = max(stepped.get(column, 0.0), quantum(read))
+            else:
                 noise[column] = max(noise.get(column, 0.0), reading_noise(e["time_s"], read))
     return [
         f"{column} was read with white noise of up to {sd:.2g}; this noise was removed by averaging "
         "over straight stretches, and no effect is named for its remainder"
         for column, sd in noise.items()
+    ] + [
+        f"{column} was read in steps of {step:.2g}; the model is driven by lines from change to change"
+        for column, step in stepped.items()
     ]
 
 

@@ -29,6 +29,7 @@ from ...fem.self_contact import SelfContact
 from ...fem.state import State
 from ...fem.time_stepping import simulate_in_time
 from ...meshing.mesh import Mesh
+from ...meshing.settings import HOMOGENISED, RESOLVED
 from .phases import Phases
 
 Array = np.ndarray[Any, Any]
@@ -103,8 +104,8 @@ class Grip:
 
 
 OF_FIDELITY: dict[str, dict[str, Any]] = {
-    "homogenised": {},
-    "resolved": {"pressure_MPa": 0.1, "depth_mm": 0.05, "halvings": 1},
+    HOMOGENISED: {},
+    RESOLVED: {"pressure_MPa": 0.1, "depth_mm": 0.05, "halvings": 1},
 }
 """Values of `Grip` that go with a fidelity: struts bear on few small places, and their faces are small."""
 

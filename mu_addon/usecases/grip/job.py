@@ -60,7 +60,7 @@ class Job:
 
     def __attrs_post_init__(self) -> None:
         require_self_contact_resolvable(self.mesh, self.self_contact)
-        offered = (PRINTED,) if self.mesh.fidelity == "resolved" else RULES
+        offered = (PRINTED,) if self.mesh.resolved else RULES
         if any(rule not in offered for rule in self.rules):
             raise InputError(
                 f"the rules of a {self.mesh.fidelity} finger are {', '.join(self.rules)}",

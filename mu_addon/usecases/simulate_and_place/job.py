@@ -110,7 +110,7 @@ class Job:
     path: str = attrs.field(default="", validator=attrs.validators.instance_of(str))
 
     def __attrs_post_init__(self) -> None:
-        if self.mesh.fidelity == "resolved":
+        if self.mesh.resolved:
             # The waveguide is what is printed: the rules are for a continuum in place of the lattice.
             object.__setattr__(self, "rules", (PRINTED,))
             self._require_resolvable()
@@ -244,8 +244,8 @@ class Job:
     def newton(self) -> NewtonSettings:
         """Settings of Newton's method for this unit."""
         if self.in_time:
-            return in_time_newton(self.mesh.fidelity == "resolved", self.self_contact)
-        if self.mesh.fidelity == "homogenised":
+            return in_time_newton(self.mesh.resolved, self.self_contact)
+        if not self.mesh.resolved:
             return self.effects.newton
         return RESOLVED_CONTACT_NEWTON if self.self_contact else RESOLVED_NEWTON
 
@@ -325,7 +325,7 @@ def self_contact_of(unit: Unit, mesh: Mesh) -> SelfContact:
 
 def require_self_contact_resolvable(mesh: MeshSettings, self_contact: bool) -> None:
     """Raise InputError where self-contact is asked for without walls and struts."""
-    if self_contact and mesh.fidelity != "resolved":
+    if self_contact and not mesh.resolved:
         raise InputError(
             "self-contact needs walls and struts as they are printed",
             "--self-contact",

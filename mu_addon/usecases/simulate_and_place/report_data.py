@@ -8,11 +8,9 @@ import attrs
 import numpy as np
 
 from ...design.parameters import assumed, stated
+from ...errors import InputError
 from ...evidence.unit_effects import EFFECTS
-from ...fem.lattice_law import deformation_gradients, stretches
-from ...fem.stress import NodalMean
 from ...files import write_bytes
-from ...meshing.mesh import LATTICE, MEMBRANE
 from ...report.results import (
     Gate,
     Parameter,
@@ -25,6 +23,7 @@ from ...report.results import (
 )
 from ...run.versions import package_versions
 from .job import LATTICE_LAW
+from .motion import REGIONS, read_motion
 
 if TYPE_CHECKING:
     from ...homogenize.effective import Effective
@@ -298,29 +297,29 @@ def _stretched(study: Study) -> StretchPictures | None:
     from ...report.charts import stretch_colors
     from ...report.unit_pictures import motion
 
-    if study.trajectory is None or study.mesh is None:
+    if study.trajectory is None:
         return None
-    mesh = study.mesh
-    states = sorted(study.trajectory.states, key=lambda s: s.pressure_MPa)
-    shown = [s for s in dict.fromkeys((states[0], states[-1])) if s.loaded]
-    means = {region: NodalMean(mesh, np.flatnonzero(mesh.region == region)) for region in (MEMBRANE, LATTICE)}
-    painted = []
-    for state in shown:
-        F, _ = deformation_gradients(mesh, state.u, np.arange(len(mesh.tets)))
-        by_region = {}
-        for region, mean in means.items():
-            by_region[region] = np.ones(len(mesh.nodes))
-            by_region[region][mean.nodes] = stretches(mean(F))[:, 2]
-        painted.append(by_region)
+    try:
+        played = read_motion(study.folder)
+    except InputError:
+        # It stopped before its motion was written.
+        return None
+    ends = int(played.state_kPa.argmin()), int(played.state_kPa.argmax())
+    shown = [k for k in dict.fromkeys(ends) if study.trajectory.states[k].loaded]
+    painted = {name: played.fields[name]["largest_stretch"][shown] for name in REGIONS}
     # Single nodes where a strut meets the wall are no reason to darken the rest.
-    every = np.concatenate([values[means[r].nodes] for paint in painted for r, values in paint.items()])
+    every = np.concatenate([values.ravel() for values in painted.values()])
     top = max(1.01, float(np.quantile(every, 0.999)))
-    texts = []
-    for state in shown:
-        words = f"{state.pressure_kPa:g} kPa"
-        texts.append((state.u, words, f"The deformed unit at {words}, coloured by stretch."))
-    colors = [{r: stretch_colors(values, top) for r, values in paint.items()} for paint in painted]
-    return StretchPictures(motion(mesh, texts, colors=colors), top)
+    texts, colors = [], []
+    for number, k in enumerate(shown):
+        words = f"{played.state_kPa[k]:g} kPa"
+        texts.append((played.model_a[k], words, f"The deformed unit at {words}, coloured by stretch."))
+        by_region = {}
+        for name, region in REGIONS.items():
+            by_region[region] = np.ones((len(played.mesh.nodes), 3))
+            by_region[region][played.surfaces[name].node] = stretch_colors(painted[name][number], top)
+        colors.append(by_region)
+    return StretchPictures(motion(played.mesh, texts, colors=colors), top)
 
 
 def _search_picture(study: Study) -> Picture | None:

@@ -453,7 +453,7 @@ class Study:
             if first is None:
                 continue
             pressure = f"{in_kPa(first.pressure_MPa):.4g}"
-            instead = ", --self-contact" if self.job.mesh.fidelity == "resolved" else ""
+            instead = ", --self-contact" if self.job.mesh.resolved else ""
             found[pressure] = [str(c) for c in first.crossings]
             self.warn(
                 f"From {pressure} kPa on, walls intersect: {first.crossings[0]}. Self-contact is not "
