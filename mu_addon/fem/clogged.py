@@ -73,10 +73,10 @@ class CloggedModel(Model):
         self._add_cone(residual, self.mesh.nodes + u, lost)
         return residual
 
-    def tangent(self, u: Array, pressure: float, m: MaterialData) -> Array:
+    def tangent(self, u: Array, pressure: float, m: MaterialData, convex: bool = False) -> Array:
         """Values (nnz,) in N/mm of the tangent, as `Model.tangent`, without the part of the clog's cone.
 
-        u: (n, 3) in mm; pressure in MPa.
+        u: (n, 3) in mm; pressure in MPa; convex changes nothing, since such a body has no self-contact.
         """
         self._place(u)
         self._launch_layers("stiffness", m, [self._mean_slope, self._block_parts])

@@ -15,6 +15,9 @@ from .state import State
 Array = np.ndarray[Any, Any]
 
 MOST_STEPS = 300
+# Residual below which directions come from the exact tangent of self-contact. Further away its negative
+# eigenvalues, of surfaces that would slip past each other, ask for a damping that hardly lets the body move.
+EXACT_BELOW = 1e-4
 # Shares of the undeformed body's tangent: the first, and below which there is none; by how much it grows and
 # shrinks, and shares of the predicted decrease below and above which it does.
 _FIRST, _LEAST, _MOST = 0.01, 1e-5, 1e4
@@ -60,8 +63,9 @@ def damped_minimum(body: Body, start: Array, pressure_MPa: float) -> State:
     longest = _LONGEST * float(np.ptp(model.mesh.nodes, axis=0).max())
     factorisations = 0
     for step_number in range(MOST_STEPS):
-        values = model.tangent(u, pressure_MPa, parameters)
         level = float(np.linalg.norm(force))
+        convex = model.self_contact is not None and level > EXACT_BELOW * scale
+        values = model.tangent(u, pressure_MPa, parameters, convex)
         if level <= tolerance * scale:
             try:
                 body.factor.factor(values)

@@ -12,7 +12,7 @@ import numpy as np
 from ..design.quantity import in_kPa
 from ..errors import ConvergenceError
 from .continuation import limit_pressure
-from .damped import damped_minimum
+from .damped import EXACT_BELOW, damped_minimum
 from .descent import Descent
 from .factor import IndefiniteError
 from .materials import Materials
@@ -68,19 +68,23 @@ class Equilibrium:
             self._stiffening = self.model.pattern, values
         return self._stiffening[1]
 
-    def _factorise(self, u: Array, pressure: float) -> bool:
+    def _factorise(self, u: Array, pressure: float, convex: bool = False) -> bool:
         """Factorise the tangent; where it is indefinite, with a share of the undeformed body's added.
 
         Away from equilibrium a thin wall easily carries more compression than it can, without any
-        instability at the equilibrium itself. Returns whether the tangent was definite as it is.
+        instability at the equilibrium itself. convex: as `Model.tangent` takes it; where that of self-contact
+        is needed and not asked for, it comes first. Returns whether the tangent asked for was definite.
         """
-        values = self.model.tangent(u, pressure, self.parameters)
-        for share in (0.0, *self.settings.regularisation):
-            try:
-                self.factor.factor(values + share * self.rest_tangent if share else values)
-                return share == 0.0
-            except IndefiniteError:
-                continue
+        touches = self.model.self_contact is not None
+        for with_convex in dict.fromkeys((convex, convex or touches)):
+            values = self.model.tangent(u, pressure, self.parameters, with_convex)
+            last = with_convex == (convex or touches)
+            for share in (0.0, *self.settings.regularisation) if last else (0.0,):
+                try:
+                    self.factor.factor(values + share * self.rest_tangent if share else values)
+                    return with_convex == convex and share == 0.0
+                except IndefiniteError:
+                    continue
         raise ConvergenceError("the tangent is far from definite")
 
     def at_zero_pressure(self) -> State:
@@ -154,10 +158,12 @@ class Equilibrium:
         """
         s, pressure = self.settings, start.pressure_MPa
         search = Descent(self.model, self.parameters, pressure, start.u, s)
-        factorisations, stale, definite = 0, not factored, True
+        touches = self.model.self_contact is not None
+        factorisations, stale, definite, convex = 0, not factored, True, False
         for iteration in range(s.max_iterations + 1):
             if search.converged:
-                if not definite and not self._factorise(search.u, pressure):
+                exact = definite and not convex
+                if not exact and not self._factorise(search.u, pressure):
                     raise ConvergenceError("the equilibrium is unstable (limit point or buckling)")
                 return State(
                     pressure,
@@ -169,7 +175,8 @@ class Equilibrium:
             if stale:
                 if factorisations == s.max_factorisations:
                     break
-                definite = self._factorise(search.u, pressure)
+                convex = touches and search.residual > EXACT_BELOW
+                definite = self._factorise(search.u, pressure, convex)
                 factorisations += 1
                 search.forget()
             try:
@@ -189,6 +196,8 @@ class Equilibrium:
         ConvergenceError naming pressure, place and cause otherwise.
         """
         s = self.settings
+        if len(history) == 1:
+            self.model.forget_contact()
         history = list(history[-3:])
         step = np.clip(target - history[-1].pressure_MPa, -s.max_step_MPa, s.max_step_MPa)
         smooth = True
@@ -202,7 +211,7 @@ class Equilibrium:
                 # right about the smallest.
                 guess = self._predict(history if smooth else history[-1:], pressure)
                 allowed = s.predictor_tolerance * np.abs(guess - last.u).max()
-                state = self.newton(self.model.before_touch(last.u, guess), pressure, allowed)
+                state = self.newton(self.start(last.u, guess), pressure, allowed)
             except ConvergenceError as why:
                 smooth = False
                 if abs(step) / 2 >= s.min_step_MPa:
@@ -246,6 +255,13 @@ class Equilibrium:
         state = self.settled(last.u, pressure)
         moved = float(np.linalg.norm(state.u - last.u, axis=1).max())
         return attrs.evolve(state, snapped_mm=max(moved, last.snapped_mm))
+
+    def start(self, u: Array, guess: Array) -> Array:
+        """What to start from, (n, 3) in mm: a prediction, or the last state u where surfaces would meet.
+
+        Cut short at the touch a prediction lies next to it, where the barrier's forces are largest.
+        """
+        return guess if self.model.before_touch(u, guess) is guess else u
 
     def _predict(self, history: Sequence[State], pressure: float) -> Array:
         """Start at another pressure: along the tangent from one state, by extrapolation from several."""

@@ -428,10 +428,11 @@ class Model:
         parts = self._parts.numpy()
         return max(float(np.sqrt(np.einsum("ij,ij->", parts, parts))), self._least_force)
 
-    def tangent(self, u: Array, pressure: float, m: MaterialData) -> Array:
+    def tangent(self, u: Array, pressure: float, m: MaterialData, convex: bool = False) -> Array:
         """Values (nnz,) in N/mm of the tangent's lower triangle by columns, as in `pattern`.
 
         u: (n, 3) in mm; pressure in MPa, whose follower stiffness is included, as is that of contact.
+        convex: self-contact without what makes it less than definite (`SelfContact.stiffness`).
         """
         self._place(u)
         self._launch_layers("stiffness", m, [self._mean_slope, self._block_parts])
@@ -442,23 +443,23 @@ class Model:
         values = self._gathered(u)
         if self.self_contact is None and self.pattern is self._own_pattern:
             return values
-        return self._with_self_contact(values, u)
+        return self._with_self_contact(values, u, convex)
 
-    def _with_self_contact(self, own: Array, u: Array) -> Array:
+    def _with_self_contact(self, own: Array, u: Array, convex: bool) -> Array:
         """The tangent's values (nnz,) of the body's own and of self-contact, its pattern grown if need be."""
         found = np.zeros(len(self.pattern.indices))
         found[self._own] = own
         contact = self.self_contact
         if contact is None:
             return found
-        h = contact.stiffness(u)
+        h = contact.stiffness(u, convex)
         rows, columns, values = self._lower(h.row, h.col, h.data)
         places, has = self.pattern.places(rows, columns)
         if not has.all():
             more = self._lower(*contact.room(u))
             wanted = np.concatenate([rows, more[0]]), np.concatenate([columns, more[1]])
             if len(self.pattern.indices) > MOST_GROWTH * len(own):
-                self.pattern, self._own = self._own_pattern, slice(None)
+                self.forget_contact()
             self.pattern, kept = with_entries(self.pattern, *wanted, self.free)
             self._own = kept[self._own]
             self.__dict__.pop("factor", None)
@@ -467,6 +468,12 @@ class Model:
             found[self._own] = own
         np.add.at(found, places, values)
         return found
+
+    def forget_contact(self) -> None:
+        """Go back to the body's own pattern, without what self-contact has added: factors take less time."""
+        if self.pattern is not self._own_pattern:
+            self.pattern, self._own = self._own_pattern, slice(None)
+            self.__dict__.pop("factor", None)
 
     def _lower(self, rows: Array, columns: Array, values: Array | None = None) -> tuple[Array, Array, Array]:
         """Entries (j,) of the lower triangle among free unknowns, of all (k,): row, column, value."""

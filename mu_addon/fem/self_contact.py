@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
 
 from ..errors import InputError
 from ..meshing.mesh import AXES, LATTICE, Mesh
@@ -17,15 +18,16 @@ from .self_intersection import facets_of
 
 Array = np.ndarray[Any, Any]
 
-# Pairs that begin to touch make an old factor of no use; a body that closes ends far from its prediction, and
-# steps that touch cut short are many.
+# A body that closes ends far from its prediction, and steps that touch cut short are many.
 SELF_CONTACT_NEWTON = NewtonSettings(
-    keep_factor=0.2, max_factorisations=80, max_iterations=200, max_backtracks=12, predictor_tolerance=3.0
+    keep_factor=0.8, max_factorisations=80, max_iterations=200, max_backtracks=12, predictor_tolerance=3.0
 )
-# Distances in gaps: around a strut's foot where it does not touch the wall; and of pairs that the tangent's
-# pattern makes room for, so that it grows seldom.
+# Distances in gaps: around a strut's foot where it does not touch the wall; and, with a facet's size added,
+# of nodes that the tangent's pattern makes room for, so that it grows seldom.
 _FOOT = 2.0
 _ROOM = 3.0
+# Times that reach which two nodes were apart as drawn, where they have come near each other.
+_CAME = 1.3
 # A way along the surface, over the straight one, up to which pieces near each other are one neighbourhood.
 _ROUND = 2.5
 # Pairs of such neighbours, over the number of facets, up to which their facets may go.
@@ -50,7 +52,7 @@ def _ipctk() -> Any:
 
 @attrs.frozen(eq=False)
 class _Pairs:
-    """Places (v, 3) in mm of the surface's nodes, and ipctk's pairs nearer than a distance there."""
+    """Places (v, 3) in mm of the surface's nodes, and ipctk's pairs within the gap there."""
 
     places: Array
     near: Any
@@ -109,10 +111,12 @@ class SelfContact:
             facets = self._without_feet(mesh, facets)
         self.facets = self._without_slivers(facets)
         self._surface, self._nodes = self._collision_mesh(self.facets)
+        edges = self._rest[self.facets] - self._rest[np.roll(self.facets, 1, axis=1)]
+        self._reach_mm = _ROOM * gap_mm + float(np.percentile(np.linalg.norm(edges, axis=2), 90))
         self._planes = [self._mirror_plane(mesh, axis) for axis in mesh.symmetry]
         # Half the time of ipctk's default, and as safe: it advances by what distance and speed allow.
         self._detection = self._ipctk.AdditiveCCD()
-        self._last: dict[float, _Pairs] = {}
+        self._last: _Pairs | None = None
 
     def _collision_mesh(self, facets: Array) -> tuple[Any, Array]:
         nodes, triangles = np.unique(facets, return_inverse=True)
@@ -182,7 +186,7 @@ class SelfContact:
 
     def energy_mJ(self, u: Array) -> float:
         """Energy in mJ at u (n, 3) in mm; infinite where a mirror plane is crossed."""
-        found = self._pairs(u, self.gap_mm)
+        found = self._pairs(u)
         energy = self._potential(found.near, self._surface, found.places) if len(found.near) else 0.0
         for plane in self._planes:
             # Half of what the whole body has there, as of everything else.
@@ -194,7 +198,7 @@ class SelfContact:
 
         u: displacements (n, 3) in mm.
         """
-        found = self._pairs(u, self.gap_mm)
+        found = self._pairs(u)
         total = np.zeros_like(self._rest)
         if len(found.near):
             gradient = self._potential.gradient(found.near, self._surface, found.places)
@@ -204,29 +208,39 @@ class SelfContact:
             total[plane.nodes, plane.column] += plane.area * plane.side * slope
         return self._nodes, total[self._nodes]
 
-    def stiffness(self, u: Array) -> sparse.coo_matrix:
-        """Second derivative (3 n, 3 n) in N/mm of the energy at u (n, 3) in mm, symmetric if not definite."""
-        rows, columns, values = self._entries(self._pairs(u, self.gap_mm), self._potential)
+    def stiffness(self, u: Array, convex: bool = False) -> sparse.coo_matrix:
+        """Second derivative (3 n, 3 n) in N/mm of the energy at u (n, 3) in mm, symmetric if not definite.
+
+        convex: that of each pair without its negative eigenvalues, as directions of descent want it.
+        """
+        rows, columns, values = self._entries(self._pairs(u), convex)
         for plane in self._planes:
             at = 3 * plane.nodes + plane.column
             rows, columns = np.concatenate([rows, at]), np.concatenate([columns, at])
+            # The barrier of a distance to a plane is convex as it is.
             bend = self._barrier(plane.distance(self._rest + u))[2]
             values = np.concatenate([values, 2 * plane.area * bend])
         return sparse.coo_matrix((values, (rows, columns)), shape=(self._rest.size,) * 2)
 
     def room(self, u: Array) -> tuple[Array, Array]:
-        """Rows and columns (j,) of 3 n that `stiffness` may fill while the surface moves by about a gap.
+        """Rows and columns (j,) of 3 n that `stiffness` may fill while the surface moves by a few gaps.
 
-        u: displacements (n, 3) in mm.
+        Those of nodes that are a facet's size and some gaps apart, and were not as drawn. u: displacements
+        (n, 3) in mm.
         """
-        gap = _ROOM * self.gap_mm
-        potential = self._ipctk.BarrierPotential(gap, 1.0, True)
-        rows, columns, _ = self._entries(self._pairs(u, gap), potential)
-        return rows, columns
+        places = self._places(u)
+        apart = cKDTree(places).query_pairs(self._reach_mm, output_type="ndarray")
+        first, second = (self._rest[self._nodes[apart[:, k]]] for k in (0, 1))
+        came = apart[np.linalg.norm(first - second, axis=1) > _CAME * self._reach_mm]
+        i, j = self._nodes[came].T.astype(np.int64)
+        three = np.arange(3)
+        rows = np.repeat(3 * i[:, None] + three, 3, axis=1).ravel()
+        columns = np.tile(3 * j[:, None] + three, 3).ravel()
+        return np.concatenate([rows, columns]), np.concatenate([columns, rows])
 
     def least_gap_mm(self, u: Array) -> float:
         """Least distance in mm of the surface from itself at u (n, 3) in mm; infinite beyond the gap."""
-        found = self._pairs(u, self.gap_mm)
+        found = self._pairs(u)
         least = np.inf
         if len(found.near):
             least = float(np.sqrt(found.near.compute_minimum_distance(self._surface, found.places)))
@@ -235,7 +249,7 @@ class SelfContact:
 
     def count(self, u: Array) -> int:
         """How many pairs of vertices, edges and facets are within the gap at u (n, 3) in mm."""
-        return len(self._pairs(u, self.gap_mm).near)
+        return len(self._pairs(u).near)
 
     def intersects(self, u: Array) -> bool:
         """Whether the surface cuts itself or a mirror plane at u (n, 3) in mm."""
@@ -265,24 +279,25 @@ class SelfContact:
     def _places(self, u: Array) -> Array:
         return np.asfortranarray((self._rest + u)[self._nodes])
 
-    def _pairs(self, u: Array, gap_mm: float) -> _Pairs:
-        """The pairs nearer than gap_mm at u, those of the last call where u is the same."""
+    def _pairs(self, u: Array) -> _Pairs:
+        """The pairs within the gap at u, those of the last call where u is the same."""
         places = self._places(u)
-        last = self._last.get(gap_mm)
-        if last is not None and np.array_equal(last.places, places):
-            return last
+        if self._last is not None and np.array_equal(self._last.places, places):
+            return self._last
         near = self._ipctk.NormalCollisions()
         near.use_area_weighting = True
         near.collision_set_type = self._ipctk.NormalCollisions.IMPROVED_MAX_APPROX
-        near.build(self._surface, places, gap_mm)
-        self._last[gap_mm] = found = _Pairs(places, near)
-        return found
+        near.build(self._surface, places, self.gap_mm)
+        self._last = _Pairs(places, near)
+        return self._last
 
-    def _entries(self, found: _Pairs, potential: Any) -> tuple[Array, Array, Array]:
+    def _entries(self, found: _Pairs, convex: bool) -> tuple[Array, Array, Array]:
         """Rows, columns and values (j,) of the pairs' second derivative, numbered by the mesh's nodes."""
         if not len(found.near):
             return np.empty(0, int), np.empty(0, int), np.empty(0)
-        h = potential.hessian(found.near, self._surface, found.places).tocoo()
+        method = self._ipctk.PSDProjectionMethod
+        projected = method.CLAMP if convex else method.NONE
+        h = self._potential.hessian(found.near, self._surface, found.places, projected).tocoo()
         numbers = (3 * self._nodes.astype(np.int64)[:, None] + np.arange(3)).ravel()
         return numbers[h.row], numbers[h.col], h.data
 

@@ -138,13 +138,13 @@ def _step(eq: Equilibrium, last: Instant, time: float, pressure: float) -> Insta
     else:
         guess = _along_tangent(eq, u, pressure)
     try:
-        state = eq.newton(eq.model.before_touch(u, guess), pressure, _reach(eq, u, guess))
+        state = eq.newton(eq.start(u, guess), pressure, _reach(eq, u, guess))
     except ConvergenceError:
         if last.rate is None:
             raise
         # Pressure may have turned round: the rate so far says nothing of what comes.
         guess = _along_tangent(eq, u, pressure)
-        state = eq.newton(eq.model.before_touch(u, guess), pressure, _reach(eq, u, guess))
+        state = eq.newton(eq.start(u, guess), pressure, _reach(eq, u, guess))
     eq.model.commit(state.u, m)
     rate = (state.u - u) / m.dt_s if m.dt_s > 0 else None
     return Instant(time, attrs.evolve(state, snapped_mm=last.state.snapped_mm), rate)

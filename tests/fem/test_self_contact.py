@@ -98,6 +98,37 @@ def test_the_tangent_is_symmetric_and_gets_room_for_what_touches():
         assert abs(model.matrix(model.tangent(rest(mesh).u, 0.0, eq.parameters)) - own).max() == 0.0
 
 
+def test_the_convex_tangent_is_the_exact_one_and_what_made_it_indefinite():
+    mesh = fork()
+    random = np.random.default_rng(2)
+    u = lean(mesh, 0.48) + 1e-3 * random.standard_normal(mesh.nodes.shape)
+    contact = SelfContact(mesh, D, K)
+    touched = np.unique(contact.stiffness(u).row)
+    exact, convex = (
+        contact.stiffness(u, convex).tocsr()[touched][:, touched].toarray() for convex in (False, True)
+    )
+    assert np.linalg.eigvalsh(exact).min() < -1e-3 * abs(exact).max()
+    assert np.linalg.eigvalsh(convex).min() > -1e-12 * abs(exact).max()
+    assert np.linalg.eigvalsh(convex - exact).min() > -1e-12 * abs(exact).max()
+
+
+def test_a_prediction_that_would_touch_is_no_start():
+    mesh = fork()
+    eq, none = body(mesh), rest(mesh).u
+    near, through = lean(mesh, 0.3), lean(mesh, 1.2)
+    assert eq.start(none, near) is near
+    assert eq.start(none, through) is none
+
+
+def test_a_new_path_begins_without_the_room_that_contact_took():
+    mesh = fork()
+    eq = body(mesh)
+    own = len(eq.model.tangent(rest(mesh).u, 0.0, eq.parameters))
+    assert len(eq.model.tangent(lean(mesh, 0.48), 0.0, eq.parameters)) > own
+    eq.model.forget_contact()
+    assert len(eq.model.tangent(rest(mesh).u, 0.0, eq.parameters)) == own
+
+
 def test_what_presses_on_itself_is_in_balance():
     mesh = plates(4, 5)
     contact = SelfContact(mesh, D, K)

@@ -48,7 +48,7 @@ GRASP = "protocols/grasp.csv"
 # docs/mechanics.md says what they move.
 GAP_SHARE, BARRIER_SHARE = 1 / 9, 0.04
 RESOLVED_CONTACT_NEWTON: NewtonSettings = attrs.evolve(
-    SELF_CONTACT_NEWTON, max_step_MPa=RESOLVED_NEWTON.max_step_MPa, follow_snaps=True, easy_factorisations=6
+    SELF_CONTACT_NEWTON, max_step_MPa=0.005, follow_snaps=True
 )
 LATTICE_LAW = FILES["lattice"]
 
