@@ -7,7 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from ..errors import InputError
@@ -86,8 +86,8 @@ class SelfContact:
 
     Quadratic faces count as four flat triangles each. A node of a half or quarter mesh is kept off its mirror
     image by the same energy, of its own area: a body that mirrors itself meets its image on the plane and
-    nowhere else. Of a resolved mesh the struts begin to touch two gaps away from the wall that they stand on:
-    their feet may cut into it where it bends.
+    nowhere else. Of a resolved mesh the struts begin to touch two gaps away from the wall, bar or seat that
+    they stand on: their feet may cut into it where it bends.
     Faces of the base do not touch, nor do facets nearer than the gap to their own neighbourhood as drawn, as
     around the axis of a cap. Facets with a common node are not kept apart.
 
@@ -133,13 +133,16 @@ class SelfContact:
         return [nodes[pair[pair >= 0]] for pair in ids]
 
     def _without_feet(self, mesh: Mesh, facets: Array) -> Array:
-        """Facets without those of struts that lie at the wall as drawn, which they stand on."""
-        of_strut = np.zeros(len(mesh.nodes), bool)
-        of_strut[mesh.tets[mesh.region == LATTICE]] = True
+        """Facets without those by which a part of the body stands on another as drawn.
+
+        Struts stand on the wall, on a waveguide's bar and its seats, and these on the wall.
+        """
+        number = _parts(mesh)
         foot = np.zeros(len(mesh.nodes), bool)
         for pair in self._close_as_drawn(facets, _FOOT * self.gap_mm):
-            if len(np.unique(of_strut[pair])) == 2:
-                foot[pair[of_strut[pair]]] = True
+            of = number[pair]
+            if (of != of[0]).any():
+                foot[pair[of == (of[of > 0].min())]] = True
         return facets[~foot[facets].any(axis=1)]
 
     def _without_slivers(self, facets: Array) -> Array:
@@ -314,6 +317,15 @@ class SelfContact:
             bend[near] = (-4 * (3 * s**2 - 1) * log - 16 * q + 2 * q**2 / s**2)[near]
         k = self.stiffness_MPa
         return k * d * energy, k * slope, k / d * bend
+
+
+def _parts(mesh: Mesh) -> Array:
+    """Number (n,) of the part of a resolved mesh that each node is of: the wall 0, struts, bar and seats."""
+    ends = mesh.tets[:, [0]].repeat(mesh.tets.shape[1] - 1, axis=1).ravel(), mesh.tets[:, 1:].ravel()
+    graph = sparse.coo_matrix((np.ones(len(ends[0]), bool), ends), shape=(len(mesh.nodes),) * 2)
+    number = connected_components(graph, directed=False)[1] + 1
+    number[mesh.tets[mesh.region != LATTICE]] = 0
+    return np.asarray(number)
 
 
 def _free_facets(mesh: Mesh) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
@@ -20,7 +21,7 @@ from ..fem.newton_settings import NewtonSettings
 from ..fem.state import State
 from ..fem.time_stepping import simulate_in_time
 from ..meshing.mesh import Mesh, part
-from .start import numbers_of, started
+from .start import eased, numbers_of, started
 from .waveguide import bar_of, with_waveguide
 
 Array = np.ndarray[Any, Any]
@@ -58,10 +59,7 @@ class PrintedWaveguides:
         for path in self.paths:
             equilibrium = self._equilibrium(path)
             start = started(self.mesh, equilibrium.model.mesh, path, state.u)
-            try:
-                found.append(equilibrium.newton(start, state.pressure_MPa))
-            except ConvergenceError:
-                found.append(equilibrium.settled(start, state.pressure_MPa))
+            found.append(_solved(equilibrium, eased(equilibrium, start, state.u), state.pressure_MPa))
         return found
 
     def alone(self, number: int, pressures_MPa: Array) -> Array:
@@ -108,3 +106,14 @@ class PrintedWaveguides:
     def _equilibrium(self, path: Array) -> Equilibrium:
         mesh = self._mesh(path)
         return Equilibrium(self.model_of(mesh), self.materials_of(mesh), self.settings, explains=False)
+
+
+def _solved(equilibrium: Equilibrium, start: Array, pressure: float) -> State:
+    """The state at a pressure in MPa near a start (m, 3) in mm, or by its own path from rest."""
+    touch = equilibrium.model.self_contact
+    # What has passed through itself can only come back the way it went.
+    if touch is None or not touch.intersects(start):
+        for method in (equilibrium.newton, equilibrium.settled):
+            with contextlib.suppress(ConvergenceError):
+                return method(start, pressure)
+    return equilibrium.reach(pressure, [equilibrium.at_zero_pressure()])

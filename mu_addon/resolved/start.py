@@ -6,11 +6,14 @@ import numpy as np
 
 from ..errors import InputError
 from ..fem.elements import reference_gradients
+from ..fem.equilibrium import Equilibrium
 from ..meshing.mesh import Array, Mesh
 
 # How much the surroundings' rotation counts beside the legs of a path.
 _TWIST = 0.05
 _MIRROR = np.array([-1.0, 1.0, 1.0])
+# A displacement in mm whose forces are linear in it, and how many times as stiff what is held is made.
+_SMALL, _HELD = 1e-6, 1e6
 
 
 def numbers_of(mesh: Mesh, points: Array) -> Array:
@@ -71,6 +74,31 @@ def started(unit: Mesh, mesh: Mesh, path: Array, u: Array) -> Array:
     if "x" in mesh.symmetry:
         bent[own[:, 0] == 0.0, 0] = 0.0
     return mesh.following(np.vstack([moved, bent]))
+
+
+def eased(equilibrium: Equilibrium, start: Array, u: Array) -> Array:
+    """A start (m, 3) in mm of `started` whose struts give way to the waveguide that they hang on.
+
+    equilibrium: of the unit with its waveguide; u (n, 3): the unit's own state in mm. Struts' nodes that
+    follow bar or seats have left what is around them, by tenths of a millimetre where the unit is bent
+    far, and elements there may be inverted. The rest of the unit moves as it would, were it linear and
+    undeformed, with the waveguide held where it is.
+    """
+    model, own = equilibrium.model, len(u)
+    left = np.zeros_like(start)
+    left[:own] = start[:own] - u
+    largest = np.abs(left).max()
+    if largest == 0.0:
+        return start
+    small = _SMALL / largest
+    still = model.residual(np.zeros_like(start), 0.0, equilibrium.parameters)
+    pulled = model.residual(small * left, 0.0, equilibrium.parameters) - still
+    tangent = equilibrium.rest_tangent.copy()
+    # The first entry of a column of the lower triangle is the diagonal's.
+    diagonal = model.pattern.indptr[:-1][model.free // 3 >= own]
+    tangent[diagonal] *= _HELD
+    model.factor.factor(tangent)
+    return model.moved(start, -model.factor.solve(pulled.ravel()[model.free] / small))
 
 
 def _bent(unit: Mesh, path: Array, u: Array, points: Array) -> Array:

@@ -14,6 +14,7 @@ from mu_addon.errors import InputError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import RESOLVED_NEWTON
+from mu_addon.fem.self_contact import SelfContact
 from mu_addon.fem.state import State
 from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.mesh import mirror
@@ -21,7 +22,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.bar import bar_mesh, outside_bar
 from mu_addon.resolved.candidates import PrintedWaveguides
 from mu_addon.resolved.octants import thickened_nodes
-from mu_addon.resolved.start import started
+from mu_addon.resolved.start import eased, started
 from mu_addon.resolved.unit import mesh_printed
 from mu_addon.resolved.waveguide import bar_of, with_waveguide
 
@@ -170,6 +171,29 @@ def test_a_candidate_is_found_from_model_a_s_state_as_along_its_own_path(mesh):
     # A bar as stiff as the lattice beside it changes the way of its anchors by tenths of their motion.
     apart = np.linalg.norm(moved - without, axis=1).max()
     assert 0.02 < apart / np.linalg.norm(without - anchors, axis=1).max() < 0.5
+
+
+def test_a_start_far_from_rest_inverts_nothing_once_its_struts_give_way(mesh, sensed):
+    """The unit is pressed shorter by a tenth; a bar has to stay as long as it is."""
+    u = np.zeros_like(mesh.nodes)
+    u[:, 2] = -0.1 * (mesh.nodes[:, 2] - mesh.nodes[mesh.base[0], 2])
+    mesh.following(u)
+    equilibrium = Equilibrium(Model(sensed), materials_of(SMALL, sensed), RESOLVED_NEWTON, explains=False)
+    least = equilibrium.model.smallest_jacobian
+    start = started(mesh, sensed, anchor_points(SMALL), u)
+    found = eased(equilibrium, start, u)
+    assert least(start, equilibrium.parameters)[0] < 0.3
+    assert least(found, equilibrium.parameters)[0] > 0.7
+    assert np.abs((found - start)[len(u) :]).max() < 1e-6
+    assert np.array_equal(eased(equilibrium, 0.0 * start, 0.0 * u), 0.0 * start)
+
+
+def test_a_waveguide_does_not_touch_what_stands_on_it(sensed):
+    contact = SelfContact(sensed, 0.1, 0.1)
+    assert not contact.intersects(np.zeros_like(sensed.nodes))
+    assert contact.count(np.zeros_like(sensed.nodes)) == 0
+    # Its bar touches as the struts do: its nodes lie behind those of the unit.
+    assert (contact.facets >= sensed.tets[sensed.filled.mean(axis=1) > 0.99].max() - 100).any()
 
 
 def test_the_unit_s_own_nodes_are_seen_where_they_would_be_without_thickening(thin):

@@ -23,8 +23,10 @@ Array = np.ndarray[Any, Any]
 
 # Pressures between those solved are interpolated where that changes no path's mean deviation by more.
 SAMPLING_ERROR = 0.02
-# A candidate along its whole path from rest and one that started from Model A's state agree to this.
+# A candidate along its whole path from rest and one that started from Model A's state agree to this, or, of
+# printed struts that snap and touch one by one, to this share of what the candidate deviates by.
 PATH_DIFFERENCE_MM = 1e-5
+PATH_DIFFERENCE_SHARE = 0.02
 
 
 class CandidateSolver:
@@ -73,6 +75,12 @@ class CandidateSolver:
         self.solved_kPa: list[float] = []
         self.error = 0.0
         self.path_difference_mm = 0.0
+        self._path_allowed_mm = PATH_DIFFERENCE_MM
+
+    @property
+    def independent_of_path(self) -> bool:
+        """Whether candidates that start from Model A's states are where their own paths lead to."""
+        return self.path_difference_mm <= self._path_allowed_mm
 
     def _rounds(self, distinct: Array) -> list[list[int]]:
         return solution_order(distinct, self._job.effects.has_gravity)
@@ -117,7 +125,7 @@ class CandidateSolver:
                 self.error = relative_error(full, sparse, weight)
             if self.error <= SAMPLING_ERROR:
                 break
-        if verify and known and not self._independent_of_path(distinct, known, still):
+        if verify and known and not self._follows_its_path(distinct, known, still):
             known = self._along_paths(distinct, still, known)
         self.solved_kPa = sorted(in_kPa(float(distinct[n])) for n in known)
         difference = between(distinct, known) if known else np.zeros((len(distinct), len(self._jobs), 1, 3))
@@ -128,16 +136,17 @@ class CandidateSolver:
             for i, (candidate, rule) in enumerate(self._jobs)
         ]
 
-    def _independent_of_path(self, distinct: Array, known: dict[int, Array], still: Array) -> bool:
+    def _follows_its_path(self, distinct: Array, known: dict[int, Array], still: Array) -> bool:
         """Whether the job that deviates most is, where it does, what its whole path from rest leads to.
 
         An elastic body without limit points has one state a pressure, and candidates may start from Model
         A's. Should this one have another, all are solved along their paths.
         """
         kept = self._cache.get("path", self._key)
-        if kept is not None:
+        if kept is not None and "allowed_mm" in kept:
             self.path_difference_mm = float(kept["difference_mm"])
-            return self.path_difference_mm <= PATH_DIFFERENCE_MM
+            self._path_allowed_mm = float(kept["allowed_mm"])
+            return self.independent_of_path
         numbers = [n for n in known if distinct[n]]
         size = np.array([np.linalg.norm(known[n], axis=2).max(axis=1) for n in numbers])
         state, job = np.unravel_index(size.argmax(), size.shape)
@@ -145,8 +154,11 @@ class CandidateSolver:
         way = _outward(distinct, distinct[number])
         (moved,) = self._sweeper.alone([(int(job), distinct[way])])
         self.path_difference_mm = float(np.abs(moved[-1] - still[number] - known[number][job]).max())
-        self._cache.put("path", self._key, {"difference_mm": self.path_difference_mm})
-        return self.path_difference_mm <= PATH_DIFFERENCE_MM
+        if self._mesh.resolved:
+            self._path_allowed_mm = max(PATH_DIFFERENCE_MM, PATH_DIFFERENCE_SHARE * float(size.max()))
+        told = {"difference_mm": self.path_difference_mm, "allowed_mm": self._path_allowed_mm}
+        self._cache.put("path", self._key, told)
+        return self.independent_of_path
 
     def _along_paths(self, distinct: Array, still: Array, before: dict[int, Array]) -> dict[int, Array]:
         """Differences (jobs, p, 3) in mm at every pressure but 0, each job along its whole path.
@@ -194,7 +206,7 @@ class CandidateSolver:
             for s in trajectory.states
             if any(abs(s.pressure_kPa - p) < 1e-9 for p in self.solved_kPa)
         }
-        if self.path_difference_mm > PATH_DIFFERENCE_MM or not found:
+        if not self.independent_of_path or not found:
             return
         kept = {p: arrays["difference_mm"] for p, arrays in found.items() if arrays is not None}
         for row, job in enumerate(self._whole if len(kept) == len(found) else ()):

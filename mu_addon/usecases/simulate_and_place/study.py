@@ -54,7 +54,7 @@ from ...run.context import RunContext
 from ...run.folder import begin, keep_inputs, require_space
 from ...run.progress import Progress
 from ...run.versions import package_versions
-from .candidate_states import PATH_DIFFERENCE_MM, CandidateSolver
+from .candidate_states import CandidateSolver
 from .candidates_in_time import evaluations
 from .contact_history import history
 from .job import Job
@@ -576,7 +576,7 @@ class Study:
             if to_look_at:
                 assert self.mesh is not None
                 keep_motion(self.job, self.folder, self.mesh, mesh, trajectory, solver, jobs)
-        if solver.path_difference_mm > PATH_DIFFERENCE_MM:
+        if not solver.independent_of_path:
             self.warn(
                 "A candidate started from Model A's states does not lie on its own equilibrium path from "
                 f"rest (difference {solver.path_difference_mm:.2g} mm), so every candidate was solved from "
