@@ -35,6 +35,18 @@ LIBRARY = {
         "a record at rest; pressure and vacuum",
     ),
     "pressure_gain": ("the pressure gauge has a gain error", "a dead load, or a second gauge"),
+    "pressure_drift": (
+        "the zero of the pressure gauge drifts while it records",
+        "the same hold at another pressure; the gauge read at rest for as long",
+    ),
+    "force_drift": (
+        "the zero of the load cell drifts while it records",
+        "the load cell read for as long without a specimen",
+    ),
+    "force_lag": (
+        "the filter of the load cell delays its reading",
+        "the filter switched off; one protocol at two rates a decade apart",
+    ),
     "line_lag": (
         "the resistance of the air line delays the chamber pressure behind the gauge",
         "steps and fast cycles",
@@ -47,6 +59,20 @@ LIBRARY = {
     "gravity": ("weight bends the unit", "one protocol in three orientations, or an added mass"),
     "contact": ("the unit touches an obstacle", "the same protocol away from every obstacle"),
     "angle_offset": ("the camera's zero angle differs from the unit's", "a record at rest"),
+    "angle_drift": (
+        "the camera turns slowly about its own axis",
+        "a mark on the bench, in the same picture",
+    ),
+    "camera_scale": ("the scale of the camera's picture is wrong", "a ruler in the plane of the markers"),
+    "camera_tilt": (
+        "the camera does not look at right angles to the plane of bending, so that one direction is "
+        "foreshortened",
+        "a square of known sides in the plane of bending",
+    ),
+    "lens_distortion": (
+        "the camera's lens distorts its picture",
+        "a calibration pattern; the camera from farther away",
+    ),
     "clock_offset": ("the clocks of camera and gauge differ", "steps and fast cycles"),
     "seating": (
         "gaps at the specimen's faces close before it carries load",
