@@ -8,6 +8,11 @@ import attrs
 
 from ..errors import InputError
 
+# Another modulus of one specimen: an effect of specimens alone, see `owned`.
+BATCH = "batch_variation"
+# Between a parameter's key and the specimen or experiment that its effect belongs to.
+OF = " of "
+
 # What each effect is, and the experiment that shows it best.
 LIBRARY = {
     "viscoelasticity": (
@@ -82,6 +87,10 @@ LIBRARY = {
     "led_drift": ("the light source fades", "a straight waveguide over the same time"),
     "ambient_light": ("ambient light adds to the signal", "the light source switched off"),
     "optical_nonlinearity": ("the light loss is not proportional to curvature", "an amplitude ladder"),
+    BATCH: (
+        "the modulus of one specimen differs from that of the others",
+        "another specimen of the same print",
+    ),
     "mesh_error": ("the mesh of the model is too coarse", "the same simulation on a finer mesh"),
 }
 
@@ -147,7 +156,8 @@ class Effect:
     """Physics that the base model lacks; `kinds` are the experiments it can be seen in.
 
     parameters: the first is its size, whose null switches the effect off exactly; the others give its shape.
-    mechanism, reveals: in words, of `LIBRARY` where not given. Raises InputError for a name not in `LIBRARY`.
+    mechanism, reveals: in words, of `LIBRARY` where not given. whose: the one specimen or experiment that has
+    it, "specimen B"; empty where all have. Raises InputError for a name not in `LIBRARY`.
     """
 
     name: str
@@ -155,6 +165,7 @@ class Effect:
     kinds: tuple[str, ...]
     mechanism: str = attrs.field()
     reveals: str = attrs.field()
+    whose: str = ""
 
     @mechanism.default
     def _of_library(self) -> str:
@@ -172,8 +183,17 @@ class Effect:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Keys of its parameters in the values of a prediction, "effect.parameter"; the size comes first."""
-        return tuple(f"{self.name}.{p.name}" for p in self.parameters)
+        """Keys of its parameters in the values of a prediction, "effect.parameter"; the size comes first.
+
+        Of one specimen's effect "effect.parameter of specimen B".
+        """
+        of = f"{OF}{self.whose}" if self.whose else ""
+        return tuple(f"{self.name}.{p.name}{of}" for p in self.parameters)
+
+    @property
+    def title(self) -> str:
+        """Its name, and whose it is."""
+        return f"{self.name}{OF}{self.whose}" if self.whose else self.name
 
     def starts(self) -> tuple[dict[str, float], ...]:
         """Values, by key, from which fits begin: every combination of its parameters' starts.

@@ -65,8 +65,10 @@ class UnitResponse:
 
     channels: columns as measured (angle_deg, marker1_y_mm, ...), which give the units. variants: by the name
     of their effect. walls: by the side of the unit they stand on, 1 for +y and -1 for -y. Interpolated by
-    cubic splines, and along their end slopes beyond the last pressures. Raises InputError for fewer than four
-    pressures and for shapes that do not match.
+    cubic splines, and along their end slopes beyond the last pressures. discrepancy: standard deviation of
+    what another code of the same physics would find, as a smooth change of the pressure over the largest one;
+    0 where the response is exact. Raises InputError for fewer than four pressures and for shapes that do not
+    match.
     """
 
     channels: tuple[str, ...]
@@ -76,6 +78,7 @@ class UnitResponse:
     scale: float = 1.0
     orientation_deg: float = 0.0
     walls: Mapping[int, ObstacleResponse] = attrs.field(factory=dict)
+    discrepancy: float = 0.0
     _splines: Mapping[str, Any] = attrs.field(init=False, repr=False)
     _curves: dict[Any, Any] = attrs.field(init=False, repr=False, factory=dict)
 
@@ -173,6 +176,25 @@ def nuisances(channels: Sequence[str]) -> tuple[Parameter, ...]:
     ]
     modulus = Parameter("modulus_factor", "", 0.2, 5.0, 1.0, (1.0,), "batches of resin differ")
     return (modulus, *zeros)
+
+
+DISCREPANCIES = ("discrepancy_second", "discrepancy_third")
+
+
+def discrepancies(spread: float) -> tuple[Parameter, ...]:
+    """What every model of a unit may miss, smoothly, by the square and the cube of the pressure; none at 0.
+
+    spread: standard deviation of each at the largest pressure, as a share of it. Kennedy and O'Hagan, J. R.
+    Stat. Soc. B 63 (2001) 425: a discrepancy of known size beside every hypothesis, so that no cause is named
+    for less.
+    """
+    if not spread:
+        return ()
+    most = 10.0 * spread
+    return tuple(
+        Parameter(name, "", -most, most, 0.0, (), "between codes of the same physics", spread=spread)
+        for name in DISCREPANCIES
+    )
 
 
 def _zero(channel: str) -> str:
@@ -276,7 +298,10 @@ class UnitPressure:
         self._nearest: dict[tuple[float, float], UnitResponse] = {}
         self._zeros = {r.channels: tuple(map(_zero, r.channels)) for r in self._responses}
         self.channels_known = self._responses[0].channels
-        self.nuisances = self._bounded(nuisances(self.channels_known), experiments)
+        self.nuisances = (
+            *self._bounded(nuisances(self.channels_known), experiments),
+            *discrepancies(max(r.discrepancy for r in self._responses)),
+        )
         known: dict[str, Parameter] = {}
         for r in self._responses:
             for name, v in r.variants.items():
@@ -325,7 +350,7 @@ class UnitPressure:
         Raises InputError where no response is near the experiment's scale and orientation.
         """
         response = self._response(experiment)
-        pressure = self.effective_kPa(experiment, values)
+        pressure = self._discrepant(self.effective_kPa(experiment, values), values)
         static = {name: values[key] for name, key in self._sizes.items() if key in values}
         if "gravity" in static:
             # Weight bends a unit of stiffer resin by as much less.
@@ -339,6 +364,14 @@ class UnitPressure:
         y = np.add(y, np.array(zeros)[:, None], order="C")
         kept = [i for i, c in enumerate(response.channels) if c in experiment.columns]
         return y if len(kept) == len(y) else y[kept]
+
+    def _discrepant(self, pressure: Array, values: Mapping[str, float]) -> Array:
+        """Effective pressures (n,) in kPa with the discrepancy of the model's response."""
+        second, third = (values.get(name, 0.0) for name in DISCREPANCIES)
+        if not (second or third):
+            return pressure
+        x = pressure / self._reference_kPa
+        return np.asarray(pressure + self._reference_kPa * (second * x**2 + third * x**3))
 
     def effective_kPa(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
         """Pressure (n,) in kPa at which the base unit would stand where the unit of these values stands.
