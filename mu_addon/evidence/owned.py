@@ -51,7 +51,7 @@ OF_EITHER = frozenset(("leak", "seating", "temperature_drift"))
 # Numerics are alike for all.
 OF_NONE = frozenset(("mesh_error", "gravity"))
 # Most effects fitted, those first that promise most.
-MOST_FITS = 24
+MOST_FITS = 12
 CHANGE = Parameter("change", "", -0.5, 1.0, 0.0, (0.1,), "prints and batches differ by 5 to 20 %")
 
 
@@ -125,7 +125,8 @@ def select_owned(
         if p >= FALSE_ALARM_RATE or at_a_bound(best) or loss(fitter, seed, best) <= 0.0:
             continue
         table = tuple(strict_table(fitter, best))
-        if structure(table) or sudden(found.table_base, found.base, best):
+        # An effect of the last experiment alone is like something that broke before it.
+        if structure(table) or sudden(found.table_base, found.base, best, RIVAL_DELTA_CHI2):
             continue
         tried = [f.effects[-1] for f in pool[:MOST_FITS]]
         level = [f for f in [*pool, *rivals] if len(f.effects) == 1]

@@ -235,17 +235,18 @@ def at_a_bound(fit: Fit) -> bool:
     return False
 
 
-def sudden(table: Sequence[Dependence], base: Fit, chosen: Fit) -> str:
+def sudden(table: Sequence[Dependence], base: Fit, chosen: Fit, margin: float = 0.0) -> str:
     """What something that broke or slipped at one moment would explain better than the chosen effects do.
 
-    By Akaike's criterion; its moment is one parameter more than its sizes.
+    By Akaike's criterion; its moment is one parameter more than its sizes. margin: of chi squared, by which
+    the effects must be better.
     """
     if chosen is base:
         return ""
     named = base.chi2 - chosen.chi2 - 2.0 * (len(chosen.keys) - len(base.keys))
     for d in table:
         gain = {"break": d.statistic, "jump": d.statistic**2}.get(d.against, 0.0)
-        if gain - 2.0 * (d.dof + 1) > named:
+        if gain - 2.0 * (d.dof + 1) > named - margin:
             return f"a step change explains more than {' and '.join(chosen.names)}: {d.where}"
     return ""
 
