@@ -8,6 +8,11 @@ import attrs
 
 from ..errors import InputError
 
+# Another modulus of one specimen: an effect of specimens alone, see `owned`.
+BATCH = "batch_variation"
+# Between a parameter's key and the specimen or experiment that its effect belongs to.
+OF = " of "
+
 # What each effect is, and the experiment that shows it best.
 LIBRARY = {
     "viscoelasticity": (
@@ -35,6 +40,18 @@ LIBRARY = {
         "a record at rest; pressure and vacuum",
     ),
     "pressure_gain": ("the pressure gauge has a gain error", "a dead load, or a second gauge"),
+    "pressure_drift": (
+        "the zero of the pressure gauge drifts while it records",
+        "the same hold at another pressure; the gauge read at rest for as long",
+    ),
+    "force_drift": (
+        "the zero of the load cell drifts while it records",
+        "the load cell read for as long without a specimen",
+    ),
+    "force_lag": (
+        "the filter of the load cell delays its reading",
+        "the filter switched off; one protocol at two rates a decade apart",
+    ),
     "line_lag": (
         "the resistance of the air line delays the chamber pressure behind the gauge",
         "steps and fast cycles",
@@ -47,6 +64,20 @@ LIBRARY = {
     "gravity": ("weight bends the unit", "one protocol in three orientations, or an added mass"),
     "contact": ("the unit touches an obstacle", "the same protocol away from every obstacle"),
     "angle_offset": ("the camera's zero angle differs from the unit's", "a record at rest"),
+    "angle_drift": (
+        "the camera turns slowly about its own axis",
+        "a mark on the bench, in the same picture",
+    ),
+    "camera_scale": ("the scale of the camera's picture is wrong", "a ruler in the plane of the markers"),
+    "camera_tilt": (
+        "the camera does not look at right angles to the plane of bending, so that one direction is "
+        "foreshortened",
+        "a square of known sides in the plane of bending",
+    ),
+    "lens_distortion": (
+        "the camera's lens distorts its picture",
+        "a calibration pattern; the camera from farther away",
+    ),
     "clock_offset": ("the clocks of camera and gauge differ", "steps and fast cycles"),
     "seating": (
         "gaps at the specimen's faces close before it carries load",
@@ -56,6 +87,10 @@ LIBRARY = {
     "led_drift": ("the light source fades", "a straight waveguide over the same time"),
     "ambient_light": ("ambient light adds to the signal", "the light source switched off"),
     "optical_nonlinearity": ("the light loss is not proportional to curvature", "an amplitude ladder"),
+    BATCH: (
+        "the modulus of one specimen differs from that of the others",
+        "another specimen of the same print",
+    ),
     "mesh_error": ("the mesh of the model is too coarse", "the same simulation on a finer mesh"),
 }
 
@@ -121,7 +156,8 @@ class Effect:
     """Physics that the base model lacks; `kinds` are the experiments it can be seen in.
 
     parameters: the first is its size, whose null switches the effect off exactly; the others give its shape.
-    mechanism, reveals: in words, of `LIBRARY` where not given. Raises InputError for a name not in `LIBRARY`.
+    mechanism, reveals: in words, of `LIBRARY` where not given. whose: the one specimen or experiment that has
+    it, "specimen B"; empty where all have. Raises InputError for a name not in `LIBRARY`.
     """
 
     name: str
@@ -129,6 +165,7 @@ class Effect:
     kinds: tuple[str, ...]
     mechanism: str = attrs.field()
     reveals: str = attrs.field()
+    whose: str = ""
 
     @mechanism.default
     def _of_library(self) -> str:
@@ -146,8 +183,17 @@ class Effect:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Keys of its parameters in the values of a prediction, "effect.parameter"; the size comes first."""
-        return tuple(f"{self.name}.{p.name}" for p in self.parameters)
+        """Keys of its parameters in the values of a prediction, "effect.parameter"; the size comes first.
+
+        Of one specimen's effect "effect.parameter of specimen B".
+        """
+        of = f"{OF}{self.whose}" if self.whose else ""
+        return tuple(f"{self.name}.{p.name}{of}" for p in self.parameters)
+
+    @property
+    def title(self) -> str:
+        """Its name, and whose it is."""
+        return f"{self.name}{OF}{self.whose}" if self.whose else self.name
 
     def starts(self) -> tuple[dict[str, float], ...]:
         """Values, by key, from which fits begin: every combination of its parameters' starts.

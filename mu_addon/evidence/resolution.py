@@ -23,6 +23,12 @@ MOST_WRONG = 0.02
 FEWEST = 9
 # Readings that stay so many samples before each change come in steps coarser than their noise.
 STAYS = 2.0
+# A noisy channel that reads its largest or smallest value so often in a row is at the end of its range.
+CLIPPED = 5
+# Readings around such a stretch are lost with it where this share of them is at the end: their noise is cut.
+AROUND, SHARE = 11, 0.2
+# Beyond this share nothing of a record would be left to judge.
+MOST_CLIPPED = 0.6
 
 
 def quantum(values: Array) -> float:
@@ -119,18 +125,55 @@ def wrong_readings(time_s: Array, values: Array) -> Array:
     return found
 
 
+def clipped_readings(time_s: Array, values: Array) -> Array:
+    """Which readings (n,) at times (n,) in s are at the end of their channel's range: (n,) bool.
+
+    Those that stay at the record's largest or smallest value for `CLIPPED` samples, though the channel is
+    noisy and does not read in steps; with them those between, whose noise is cut off on one side.
+    """
+    found = np.zeros(len(values), bool)
+    known = np.flatnonzero(np.isfinite(values))
+    if len(known) < 8 * CLIPPED or dwell(values) > STAYS:
+        return found
+    y = values[known]
+    for end in (y.max(), y.min()):
+        at = y == end
+        runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], at, [0]]))))[::2]
+        if not len(runs) or runs.max() < CLIPPED:
+            continue
+        free = ~at
+        if np.count_nonzero(free) < 4 * CLIPPED:
+            continue
+        noise = float(np.median(np.abs(divided(time_s[known[free]], y[free], 6))))
+        if noise > 1e-6 * float(np.ptp(y)):
+            near = np.convolve(at, np.ones(AROUND) / AROUND, mode="same")
+            found[known[at | (near >= SHARE)]] = True
+    return found if np.count_nonzero(found) <= MOST_CLIPPED * len(known) else np.zeros(len(values), bool)
+
+
 def without_wrong_readings(
     experiments: Sequence[Experiment], simulator: Composite
 ) -> tuple[list[Experiment], list[str]]:
-    """The experiments without predicted readings that stand alone (`wrong_readings`), and which, in words."""
+    """The experiments without predicted readings that stand alone or were clipped, and which, in words.
+
+    See `wrong_readings` and `clipped_readings`.
+    """
     found, words = [], []
     for e in experiments:
         columns = dict(e.columns)
         if simulator.knows(e) and "time_s" in columns:
             for channel in simulator.channels(e):
-                wrong = wrong_readings(e["time_s"], e[channel])
+                clipped = clipped_readings(e["time_s"], e[channel])
+                if clipped.any():
+                    columns[channel] = np.where(clipped, math.nan, e[channel])
+                    first = e["time_s"][clipped][0]
+                    words.append(
+                        f"{e.name}, {channel}: {np.count_nonzero(clipped)} of {len(e)} readings are at the "
+                        f"end of the channel's range or beside it, first at {first:.4g} s, and do not count"
+                    )
+                wrong = wrong_readings(e["time_s"], columns[channel])
                 if wrong.any():
-                    columns[channel] = np.where(wrong, math.nan, e[channel])
+                    columns[channel] = np.where(wrong, math.nan, columns[channel])
                     at = ", ".join(f"{t:.4g} s" for t in e["time_s"][wrong][:5])
                     more = " and others" if np.count_nonzero(wrong) > 5 else ""
                     words.append(

@@ -44,7 +44,7 @@ class Cause:
     """One effect of the chosen model.
 
     p_value: probability that noise alone lets any effect of the library gain as much. loss: rise of chi
-    squared when the effect is taken away and the rest fitted anew. rivals: names of effects whose fit in its
+    squared when the effect is taken away and the rest fitted anew. rivals: titles of effects whose fit in its
     place is not distinguishable, best first.
     """
 
@@ -97,7 +97,7 @@ def select(
     for e in effects:
         progress(e.name)
         pool.append(fitter.best([e], [{**base.values, **s} for s in e.starts()]))
-    pool.sort(key=_cost)
+    pool.sort(key=cost)
     singles = tuple(pool)
     chosen, ps, doubted, p_best = base, [], "", 1.0
     levels: list[list[Fit]] = []
@@ -106,23 +106,23 @@ def select(
             pool = _extended(fitter, effects, levels[-1][:1], progress)
         if not pool:
             break
-        p = _false_alarm_probability(fitter, chosen, seen, _gain(fitter, chosen, pool[0]))
+        p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
         p_best = p if level == 0 else p_best
         # What looked best alone may be neither of two that act together.
         if level and (p < FALSE_ALARM_RATE or structure(strict_table(fitter, chosen))):
             more = _extended(fitter, effects, levels[-1][1:SEEDS], progress)
-            pool = sorted([*pool, *more], key=_cost)
-            p = _false_alarm_probability(fitter, chosen, seen, _gain(fitter, chosen, pool[0]))
+            pool = sorted([*pool, *more], key=cost)
+            p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
         if p >= FALSE_ALARM_RATE:
             break
-        if _loss(fitter, chosen, pool[0]) <= 0.0:
+        if loss(fitter, chosen, pool[0]) <= 0.0:
             doubted = f"{pool[0].names[-1]} fits, but its leave-one-out prediction fails"
             break
         chosen = pool[0]
         ps.append(p)
         levels.append(pool)
-    doubted = doubted or _sudden(table_base, base, chosen)
-    causes = _causes(fitter, effects, chosen, ps, levels)
+    doubted = doubted or sudden(table_base, base, chosen)
+    causes = causes_of(fitter, effects, chosen, ps, levels)
     table = tuple(strict_table(fitter, chosen))
     if chosen is base and not doubted and not structure(table):
         table_base = table
@@ -137,13 +137,13 @@ def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) ->
     """
     base = fitter.fit((), found.base.values)
     chosen = fitter.fit(found.chosen.effects, found.chosen.values)
-    singles = tuple(sorted((fitter.fit(f.effects, f.values) for f in found.singles), key=_cost))
+    singles = tuple(sorted((fitter.fit(f.effects, f.values) for f in found.singles), key=cost))
     ps = [c.p_value for c in found.causes]
     doubted = found.doubted
     for e in chosen.effects:
         less = fitter.fit([o for o in chosen.effects if o is not e], chosen.values)
         own = attrs.evolve(chosen, effects=(*less.effects, e))
-        p = _false_alarm_probability(
+        p = false_alarm_probability(
             fitter, less, seen, less.chi2 - chosen.chi2 - _by_gauges(fitter, less, own)
         )
         ps.append(p)
@@ -152,9 +152,9 @@ def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) ->
                 doubted or f"{e.name} gives no significant gain at the noise that remains with the causes"
             )
     table_base = tuple(dependence_table(fitter, base))
-    doubted = doubted or _sudden(table_base, base, chosen)
+    doubted = doubted or sudden(table_base, base, chosen)
     effects = [f.effects[0] for f in singles]
-    causes = _causes(fitter, effects, chosen, ps, [singles])
+    causes = causes_of(fitter, effects, chosen, ps, [singles])
     table = tuple(strict_table(fitter, chosen))
     return Selection(base, chosen, causes, singles, table_base, table, found.p_best, doubted)
 
@@ -179,17 +179,17 @@ def one_more(
     if not pool:
         return found
     best = pool[0]
-    p = _false_alarm_probability(fitter, found.chosen, seen, _gain(fitter, found.chosen, best))
+    p = false_alarm_probability(fitter, found.chosen, seen, gain_of(fitter, found.chosen, best))
     if (
         p >= FALSE_ALARM_RATE
         or max(_share_by_experiment(fitter, best).values()) > ALONE
-        or _loss(fitter, found.chosen, best) <= 0.0
+        or loss(fitter, found.chosen, best) <= 0.0
     ):
         return found
     table = tuple(strict_table(fitter, best))
-    if structure(table) or _sudden(found.table_base, found.base, best):
+    if structure(table) or sudden(found.table_base, found.base, best):
         return found
-    causes = _causes(fitter, effects, best, [*(c.p_value for c in found.causes), p], [pool])
+    causes = causes_of(fitter, effects, best, [*(c.p_value for c in found.causes), p], [pool])
     return attrs.evolve(found, chosen=best, causes=causes, table=table)
 
 
@@ -212,19 +212,19 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
     left = 1.0 - share_taken(fitter, base, best)
     others = [f for f in found.singles if f.names != best.names]
     rival = min((1.0 - share_taken(fitter, base, f) for f in others), default=1.0)
-    if left > 1.0 - MAINLY or rival < APART * max(left, 1e-6) or _at_a_bound(best):
+    if left > 1.0 - MAINLY or rival < APART * max(left, 1e-6) or at_a_bound(best):
         return None
     shares = _share_by_experiment(fitter, best)
-    if (len(shares) > 1 and max(shares.values()) > ALONE) or _loss(fitter, base, best) <= 0.0:
+    if (len(shares) > 1 and max(shares.values()) > ALONE) or loss(fitter, base, best) <= 0.0:
         return None
-    if _sudden(found.table_base, base, best):
+    if sudden(found.table_base, base, best):
         return None
     cause = Cause(best.effects[0], found.p_best, base.chi2 - best.chi2, ())
     table = tuple(strict_table(fitter, best))
     return attrs.evolve(found, chosen=best, causes=(cause,), table=table, doubted="")
 
 
-def _at_a_bound(fit: Fit) -> bool:
+def at_a_bound(fit: Fit) -> bool:
     """Whether a fitted value of an effect lies at a bound that is not its null."""
     for e in fit.effects:
         for key, p in zip(e.keys, e.parameters, strict=True):
@@ -235,22 +235,23 @@ def _at_a_bound(fit: Fit) -> bool:
     return False
 
 
-def _sudden(table: Sequence[Dependence], base: Fit, chosen: Fit) -> str:
+def sudden(table: Sequence[Dependence], base: Fit, chosen: Fit, margin: float = 0.0) -> str:
     """What something that broke or slipped at one moment would explain better than the chosen effects do.
 
-    By Akaike's criterion; its moment is one parameter more than its sizes.
+    By Akaike's criterion; its moment is one parameter more than its sizes. margin: of chi squared, by which
+    the effects must be better.
     """
     if chosen is base:
         return ""
     named = base.chi2 - chosen.chi2 - 2.0 * (len(chosen.keys) - len(base.keys))
     for d in table:
         gain = {"break": d.statistic, "jump": d.statistic**2}.get(d.against, 0.0)
-        if gain - 2.0 * (d.dof + 1) > named:
+        if gain - 2.0 * (d.dof + 1) > named - margin:
             return f"a step change explains more than {' and '.join(chosen.names)}: {d.where}"
     return ""
 
 
-def _cost(fit: Fit) -> float:
+def cost(fit: Fit) -> float:
     """Akaike's: of models that fit alike the one with fewer parameters leads."""
     return fit.chi2 + 2.0 * len(fit.keys)
 
@@ -267,13 +268,17 @@ def _extended(
                 continue
             progress(" and ".join((*seed.names, e.name)))
             found[every] = fitter.best([*seed.effects, e], [{**seed.values, **s} for s in e.starts()])
-    return sorted(found.values(), key=_cost)
+    return sorted(found.values(), key=cost)
 
 
 def _promises(fitter: Fitter, fit: Fit, effect: Effect) -> bool:
-    """Whether what an effect does, at any of its starts or in the small, has a part in what a fit leaves.
+    return promise(fitter, fit, effect) > PROMISING
 
-    A fit of it, which takes many predictions, then is worth its time.
+
+def promise(fitter: Fitter, fit: Fit, effect: Effect) -> float:
+    """Chi squared that an effect, at any of its starts or in the small, takes from what a fit leaves.
+
+    To first order. A fit of it takes many predictions: above `PROMISING` it is worth its time.
     """
     size = effect.parameters[0]
     plain = fitter.predict(fit.values)
@@ -286,10 +291,10 @@ def _promises(fitter: Fitter, fit: Fit, effect: Effect) -> bool:
     length = np.linalg.norm(u, axis=0)
     resolved = length > ABSORBED * np.maximum(before, 1e-300)
     along = (u.T @ fit.residual)[resolved] / length[resolved]
-    return bool((along**2 > PROMISING).any())
+    return float(np.max(along**2, initial=0.0))
 
 
-def _false_alarm_probability(fitter: Fitter, fit: Fit, seen: Sequence[Sensitivity], gain: float) -> float:
+def false_alarm_probability(fitter: Fitter, fit: Fit, seen: Sequence[Sensitivity], gain: float) -> float:
     """Probability that noise alone lets some effect of the library gain as much on top of a fit.
 
     The parametric bootstrap of the linearised library: gains are squares of the noise along each effect's
@@ -329,7 +334,7 @@ def _false_alarm_probability(fitter: Fitter, fit: Fit, seen: Sequence[Sensitivit
     return min(1.0, max(alike, 1.0) * float(chi2.sf(max(gain, 0.0), 1)))
 
 
-def _gain(fitter: Fitter, less: Fit, more: Fit) -> float:
+def gain_of(fitter: Fitter, less: Fit, more: Fit) -> float:
     """Twice the log likelihood gained by an effect: the least under one noise and under each one's own.
 
     Without the second, slow noise estimated too small would pass for a cause; without the first, noise
@@ -359,7 +364,7 @@ def _by_gauges(fitter: Fitter, less: Fit, more: Fit) -> float:
     return 2.0 * max(without.chi2 - other.best(more.effects, starts).chi2, 0.0)
 
 
-def _loss(fitter: Fitter, less: Fit, more: Fit) -> float:
+def loss(fitter: Fitter, less: Fit, more: Fit) -> float:
     """Chi squared of experiments left out in turn that a model loses against one with an effect more.
 
     An experiment that holds most of what is known of the effects is left out in parts, not whole. What was
@@ -415,7 +420,7 @@ def _folds(fitter: Fitter, fit: Fit) -> list[Array]:
     return folds
 
 
-def _causes(
+def causes_of(
     fitter: Fitter,
     effects: Sequence[Effect],
     chosen: Fit,
@@ -436,11 +441,13 @@ def _causes(
         rivals: dict[str, float] = {}
         for f in tried:
             if f.chi2 - chosen.chi2 < RIVAL_DELTA_CHI2:
-                name = f.names[-1]
+                name = f.effects[-1].title
                 rivals[name] = min(f.chi2, rivals.get(name, f.chi2))
         if NUMERICS not in rivals:
             # Where the mesh alone does in its place, anything beside the mesh would.
-            rivals |= _by_numerics(fitter, effects, chosen, [f for f in tried if f.names[-1] not in rivals])
+            rivals |= _by_numerics(
+                fitter, effects, chosen, [f for f in tried if f.effects[-1].title not in rivals]
+            )
         less = fitter.best(others, [chosen.values])
         p = max(ps)
         found.append(Cause(e, p, less.chi2 - chosen.chi2, tuple(sorted(rivals, key=lambda n: rivals[n]))))
@@ -467,7 +474,7 @@ def _by_numerics(
         if f.names[-1] != NUMERICS and _promises(fitter, f, mesh):
             other = meshed(f)
             if other.chi2 - reference.chi2 < RIVAL_DELTA_CHI2:
-                found[f.names[-1]] = other.chi2
+                found[f.effects[-1].title] = other.chi2
     return found
 
 

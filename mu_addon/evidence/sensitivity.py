@@ -24,12 +24,18 @@ WORTH = 2.0
 # Below this share an effect is a nuisance by another name.
 ABSORBED = 2e-3
 
+# A zero that wanders is what slow noise is: nothing would be left to tell the noise by.
+WANDERING = ("pressure_drift", "force_drift", "angle_drift")
 
-def signatures(record: Record, simulator: Composite, values: Mapping[str, float]) -> Array:
+
+def signatures(
+    record: Record, simulator: Composite, values: Mapping[str, float], effects: Sequence[Effect] = ()
+) -> Array:
     """Changes (N, m) of the prediction by every effect, small and at its starts, and by every nuisance.
 
     In the record's units (slopes also over the parameter's). values: by key; around values that hold an
-    effect, its own columns are the derivatives by its parameters. Columns of zeros are left out.
+    effect, its own columns are the derivatives by its parameters. effects: others than the simulator's, of
+    one specimen or found before. Drifts of zeros are left out, and columns of zeros.
     """
     base = record.predict(simulator, values)
     columns = [
@@ -38,8 +44,10 @@ def signatures(record: Record, simulator: Composite, values: Mapping[str, float]
         for p in simulator.nuisances
         if not p.linear
     ]
-    for e in simulator.effects:
+    for e in (*simulator.effects, *effects):
         size = e.parameters[0]
+        if e.name in WANDERING and e not in effects:
+            continue
         if values.get(e.keys[0], size.null) != size.null:
             for key, p in zip(e.keys, e.parameters, strict=True):
                 now = values.get(key, p.null)
@@ -93,8 +101,10 @@ class Sensitivity:
         return self.linear or (self.unabsorbed > ABSORBED and self.at_bounds >= WORTH)
 
 
-def sensitivities(fitter: Fitter, values: Mapping[str, float]) -> list[Sensitivity]:
-    """Sensitivity of the data to every effect of the simulator, in each of its shapes, at its null.
+def sensitivities(
+    fitter: Fitter, values: Mapping[str, float], effects: Sequence[Effect] | None = None
+) -> list[Sensitivity]:
+    """Sensitivity of the data to every effect of the simulator, or to `effects`, in each shape, at its null.
 
     values: of the nuisances, by name and in their units, around which derivatives are taken. A nuisance at a
     bound absorbs nothing.
@@ -119,7 +129,7 @@ def sensitivities(fitter: Fitter, values: Mapping[str, float]) -> list[Sensitivi
     lengths = np.linalg.norm(n, axis=0)
     q = np.linalg.qr(n)[0]
     found: list[Sensitivity] = []
-    for e in simulator.effects:
+    for e in simulator.effects if effects is None else effects:
         size = e.parameters[0]
         for shape in e.shapes():
             slope = _slope(fitter, {**values, **shape}, e.keys[0], size)

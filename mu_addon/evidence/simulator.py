@@ -11,9 +11,12 @@ import numpy as np
 
 from ..errors import InputError
 from ..measured import Experiment
-from .effect import Effect, Parameter
+from .effect import BATCH, OF, Effect, Parameter
 
 Array = np.ndarray[Any, Any]
+
+# Part of the name of every modulus among the nuisances.
+MODULUS = "modulus"
 
 
 class Simulator(Protocol):
@@ -90,12 +93,12 @@ class Composite:
     def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
         """Prediction (channels, n) in the channels' units, read-only, from the cache where possible.
 
-        values: as in `Simulator.predict`; those the kind does not know are ignored. Raises InputError for a
+        values: as in `Simulator.predict`; those the kind does not know are ignored,
+        and so are those of other specimens (`Effect.whose`). Raises InputError for a
         kind without a simulator.
         """
         simulator = self._of(experiment)
-        knows = self._knows[experiment.kind]
-        own = {k: v for k, v in values.items() if k in knows and self._heeds(experiment, k)}
+        own = self._own(experiment, values)
         key = (experiment.name, id(experiment), tuple(sorted(own.items())))
         if key in self._kept:
             self._kept.move_to_end(key)
@@ -108,6 +111,30 @@ class Composite:
         if len(self._kept) > self._remembered:
             self._kept.popitem(last=False)
         return found
+
+    def _own(self, experiment: Experiment, values: Mapping[str, float]) -> dict[str, float]:
+        """The values that the experiment's simulator knows, and those of its specimen by their plain keys."""
+        knows = self._knows[experiment.kind]
+        own = {k: v for k, v in values.items() if k in knows and self._heeds(experiment, k)}
+        for key, value in values.items():
+            plain, of, whose = key.partition(OF)
+            if (
+                not of
+                or key in own
+                or whose
+                not in (
+                    f"specimen {experiment.specimen}",
+                    f"experiment {experiment.name}",
+                )
+            ):
+                continue
+            if plain in knows:
+                own[plain] = value
+            elif plain.startswith(BATCH):
+                for p in self.nuisances:
+                    if p.name in knows and MODULUS in p.name:
+                        own[p.name] = own.get(p.name, p.null) * (1.0 + value)
+        return own
 
     def _heeds(self, experiment: Experiment, key: str) -> bool:
         return self._only.get(key, experiment.name) == experiment.name

@@ -55,6 +55,9 @@ CONTACT_SHARE = 0.2
 REACHES = (0.2, 0.5, NEAREST)
 SHARES = (0.15, 0.4, 0.7, 1.0)
 KNOWN = (*EFFECTS, CONTACT)
+# A second code with another mesh and another volumetric law, the same unit: its angles are ours at pressures
+# changed by 0.047 of the largest one times the square of their share of it.
+DISCREPANCY = 0.04
 
 
 class UnitResponseWarning(UserWarning):
@@ -68,7 +71,8 @@ class UnitSettings:
     mesh: the model's; finer: what mesh_error compares it with. pressures: how many, about; margin: how far
     beyond the measured ones, as a share of their range. effects: names of those to run. distal: chambers
     behind a clog. lattice: a law for the lattice in place of the unit's moduli. farthest_mm: of a marker
-    from the unit, at scale 1. workers: processes, one a core by default.
+    from the unit, at scale 1. discrepancy: of the response, as in `UnitResponse`. workers: processes, one
+    a core by default.
     """
 
     mesh: MeshSettings = COARSE
@@ -79,6 +83,7 @@ class UnitSettings:
     distal: int = 1
     lattice: LatticeLaw | None = None
     farthest_mm: float = 4.0
+    discrepancy: float = DISCREPANCY
     workers: int = attrs.field(factory=cores)
 
     @classmethod
@@ -460,7 +465,9 @@ class _Plan:
             variants = {n: v for n, v in every.items() if v is not None}
             at = np.array(self.pressures_kPa)[reached]
             values_ = (self.larger * base.values)[kept]
-            yield UnitResponse(self.channels, at, values_, variants, self.scale, orientation, walls)
+            yield UnitResponse(
+                self.channels, at, values_, variants, self.scale, orientation, walls, settings.discrepancy
+            )
 
     def _variant(
         self, name: str, orientation: float, base: Result, found: dict[str, Result], kept: Any

@@ -11,15 +11,26 @@ import numpy as np
 
 from ..measured import Experiment
 from .drive import denoised_drives
+from .effect import Effect
 from .fit import Fitter
 from .gain import Gain, gain
 from .next_experiment import Proposal, propose_experiment
 from .noise import Source, estimate, span
+from .owned import select_owned
 from .plausibility import require_plausible
 from .record import Record, record
 from .resolution import without_wrong_readings
 from .selection import Cause, Selection, interval, mainly, one_more, reselected, select, share_taken
-from .sensitivity import ABSORBED, SEEN, Sensitivity, at_bounds, best_seen, sensitivities, signatures
+from .sensitivity import (
+    ABSORBED,
+    SEEN,
+    WANDERING,
+    Sensitivity,
+    at_bounds,
+    best_seen,
+    sensitivities,
+    signatures,
+)
 from .simulator import Composite
 
 Array = np.ndarray[Any, Any]
@@ -87,8 +98,11 @@ class Verdict:
         causes = [
             {
                 "effect": c.effect.name,
+                "of": c.effect.whose or None,
                 "mechanism": c.effect.mechanism,
-                "parameters": {k.partition(".")[2]: self._value(k) for k in c.effect.keys},
+                "parameters": {
+                    p.name: self._value(k) for k, p in zip(c.effect.keys, c.effect.parameters, strict=True)
+                },
                 "p_value": c.p_value,
                 "share": self.share_taken if len(self.selection.causes) == 1 else self._share(c),
                 "rivals": list(c.rivals),
@@ -124,19 +138,23 @@ class Verdict:
 
 
 def noise_of(
-    measured: Record, simulator: Composite, values: Mapping[str, float] | None = None
+    measured: Record,
+    simulator: Composite,
+    values: Mapping[str, float] | None = None,
+    effects: Sequence[Effect] = (),
 ) -> dict[str, Source]:
     """White and slow noise of a record, by group of series in its channel's unit (see `noise.estimate`).
 
     values: of nuisances and effects by key, in their units, around which the noise is estimated; those of the
-    base model's fit where None. What any effect of the library can do to the data is not counted as noise.
+    base model's fit where None. What any effect of the library, and those of `effects`, can do to the data is
+    not counted as noise.
     """
     if values is None:
         rough = Fitter(measured, simulator, {g: _rough(measured, g) for g in measured.groups})
         values = rough.fit().values
     zeros = {p.name for p in simulator.nuisances if p.linear}
     curved = {k: v for k, v in values.items() if k not in zeros}
-    columns = span(measured, signatures(measured, simulator, curved))
+    columns = span(measured, signatures(measured, simulator, curved, effects))
     return estimate(measured, measured.values - measured.predict(simulator, values), columns)
 
 
@@ -172,16 +190,22 @@ def diagnose(
     curved = {p.name: base.values[p.name] for p in fitter.curved}
     seen = at_bounds(fitter, curved, sensitivities(fitter, curved))
     chosen = select(fitter, seen, progress)
+    if _kind(fitter, chosen) == "unexplained":
+        chosen, seen = select_owned(fitter, seen, chosen, progress)
     if chosen.causes:
         progress("noise around the causes")
         # What is left of a large cause once its linear part is set aside had counted as noise.
-        renewed = noise_of(measured, simulator, chosen.chosen.values)
+        owned = [e for e in chosen.chosen.effects if e.whose]
+        named = [e for e in chosen.chosen.effects if e.whose or e.name in WANDERING]
+        renewed = noise_of(measured, simulator, chosen.chosen.values, named)
         if any(_apart(sources[g], renewed[g]) for g in sources):
             sources, fitter = renewed, Fitter(measured, simulator, renewed)
             chosen = reselected(fitter, seen, chosen)
             if chosen.left:
                 seen = at_bounds(fitter, curved, sensitivities(fitter, curved))
                 chosen = one_more(fitter, seen, chosen, progress)
+            if _kind(fitter, chosen) == "unexplained" and not owned:
+                chosen, seen = select_owned(fitter, seen, chosen, progress)
     kind = _kind(fitter, chosen)
     if kind == "unexplained" and (most := mainly(fitter, chosen)) is not None:
         kind, chosen = "named", most

@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 from mu_addon.errors import InputError
 from mu_addon.evidence.drive import reading_noise
 from mu_addon.evidence.prediction.bench import bench_simulators
-from mu_addon.evidence.resolution import between_steps, divided, dwell, quantum, wrong_readings
+from mu_addon.evidence.resolution import (
+    between_steps,
+    clipped_readings,
+    divided,
+    dwell,
+    quantum,
+    wrong_readings,
+)
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
 from mu_addon.usecases.diagnose.words import sentence
@@ -116,6 +123,32 @@ def test_one_wrong_reading_decides_no_verdict_and_is_told():
     (words,) = found.set_aside
     assert "test 0, stress_kPa: 1 of 400 readings" in words
     assert "12.3 s" in words
+
+
+def test_a_load_cell_at_the_end_of_its_range_decides_no_verdict_and_is_told():
+    first, second = coupons(np.random.default_rng(3))
+    clipped = np.minimum(first["stress_kPa"], 190.0)
+    assert np.count_nonzero(clipped == 190.0) > 40
+    made = attrs.evolve(first, columns={**first.columns, "stress_kPa": clipped})
+    found = verdict(made, second)
+    assert found.kind == "none"
+    (words,) = found.set_aside
+    assert "test 0, stress_kPa" in words
+    assert "end of the channel's range" in words
+
+
+def test_readings_are_clipped_at_an_end_and_nowhere_else():
+    rng = np.random.default_rng(2)
+    t = np.arange(0.0, 60.0, 0.1)
+    wave = 50.0 + 30.0 * np.sin(t / 5.0)
+    noisy = wave + 0.3 * rng.normal(size=len(t))
+    high, low = np.minimum(noisy, 70.0), np.maximum(noisy, 25.0)
+    assert clipped_readings(t, high)[wave > 70.5].all()
+    assert not clipped_readings(t, high)[wave < 68.5].any()
+    assert clipped_readings(t, low)[wave < 24.5].all()
+    held = np.minimum(wave, 70.0)
+    for clean in (noisy, np.round(noisy), held, held + 0.3 * rng.normal(size=len(t)), 0.0 * t + 3.0):
+        assert not clipped_readings(t, clean).any()
 
 
 @pytest.mark.parametrize(("factor", "says"), [(1e-3, "1000 times as large"), (-1.0, "opposite")])

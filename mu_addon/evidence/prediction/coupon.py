@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import InputError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
-from .specimen import NEW, load_zeros, machine, recorded, strain_histories
+from .specimen import NEW, load_cell, load_zeros, machine, recorded, strain_histories
 
 Array = np.ndarray[Any, Any]
 
@@ -55,9 +55,8 @@ class CouponStress:
     strain of each specimen is known.
     """
 
-    effects = EFFECTS
-
     def __init__(self, experiments: Sequence[Experiment] = ()) -> None:
+        self.effects = (*EFFECTS, *load_cell(experiments, KIND))
         self.nuisances = (MODULUS, *load_zeros(experiments, KIND))
         self._histories = strain_histories(experiments, KIND)
 

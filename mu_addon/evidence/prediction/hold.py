@@ -13,7 +13,8 @@ import numpy as np
 from ...measured import Experiment
 from ...measured.folder import ATMOSPHERE_kPa
 from ..effect import Effect, Parameter
-from .unit import TIMED, first_order_lag
+from .drift import drift, drifts, largest_reading
+from .unit import GAUGE_SHARE, TIMED, first_order_lag
 
 Array = np.ndarray[Any, Any]
 
@@ -50,6 +51,19 @@ EFFECTS = (
         "the wall creeps under pressure, so the chamber grows by as much in each decade of time",
     ),
     Effect(
+        "viscoelasticity",
+        (
+            Parameter(
+                "growth_per_MPa", "1/MPa", 0.0, 0.5, 0.0, (3e-3,), "the volume's, as the logarithm of time"
+            ),
+            Parameter(
+                "begins_s", "s", 0.5, 1e4, 30.0, (5.0, 50.0), "what it began before the valve was shut"
+            ),
+        ),
+        (KIND,),
+        "the wall creeps under pressure, so the chamber grows by as much in each decade of time",
+    ),
+    Effect(
         "temperature_drift",
         (
             Parameter("cooling_K", "K", -40.0, 120.0, 0.0, (-3.0, 3.0), "compressed gas is warm"),
@@ -72,7 +86,11 @@ class ChamberPressure:
 
     def __init__(self, experiments: Sequence[Experiment], compliance_per_kPa: float = 0.0) -> None:
         self._compliance = compliance_per_kPa
-        self.effects = tuple(map(partial(_warmed, experiments), EFFECTS))
+        most = GAUGE_SHARE * largest_reading("pressure_kPa", KIND, experiments)
+        self.effects = (
+            *map(partial(_warmed, experiments), EFFECTS),
+            *drifts("pressure_drift", "kPa", most, KIND, experiments),
+        )
         nuisances = []
         for e in experiments:
             if e.kind != KIND:
@@ -106,11 +124,14 @@ class ChamberPressure:
             inertia=get("leak.inertia", 0.0),
             creep_per_kPa=1e-3 * get("viscoelasticity.creep_per_MPa", 0.0),
             onset_s=get("viscoelasticity.onset_s", 1.0),
+            growth_per_kPa=1e-3 * get("viscoelasticity.growth_per_MPa", 0.0),
+            begins_s=get("viscoelasticity.begins_s", 30.0),
             cooling_K=get("temperature_drift.cooling_K", 0.0),
             cooling_s=get("temperature_drift.cooling_s", 30.0),
             compliance_per_kPa=self._compliance,
         )
         p = p * (1 + get("pressure_gain.gain", 0.0)) + get("pressure_offset.offset_kPa", 0.0)
+        p = p + drift("pressure_drift", experiment["time_s"], values)
         return p[None]
 
 
@@ -151,6 +172,8 @@ def chamber_pressure(
     inertia: float = 0.0,
     creep_per_kPa: float = 0.0,
     onset_s: float = 1.0,
+    growth_per_kPa: float = 0.0,
+    begins_s: float = 30.0,
     cooling_K: float = 0.0,
     cooling_s: float = 30.0,
     compliance_per_kPa: float = 0.0,
@@ -158,16 +181,18 @@ def chamber_pressure(
     """Gauge pressure (n,) in kPa at times (n,) in s after the valve was shut.
 
     Up to then it is initial_kPa. loss_per_s: k in 1/s; inertia: b, Forchheimer's, no unit; creep_per_kPa: c
-    in 1/kPa; onset_s: onset of creep; cooling_K, cooling_s: excess temperature of the gas at the start and
+    in 1/kPa; onset_s: onset of creep; growth_per_kPa, begins_s: creep as the logarithm of time, g and its
+    onset s; cooling_K, cooling_s: excess temperature of the gas at the start and
     its time constant; compliance_per_kPa: C in 1/kPa. With P absolute, P0 the atmosphere, V and T relative to
     the start: P V = P_i m T. Gas is lost by P_i dm/dt = -k P0 x, where x + b x^2 = (P^2 - P0^2)/(2 P0^2), so
     that a small overpressure falls by exp(-k t), and a large b makes it the flow of an orifice. The volume is
-    V = 1 + C (p - p_i) + sum over decades d of c x_d, where x_d follows p with the time onset 10^d.
+    V = 1 + C (p - p_i) + sum over decades d of c x_d, where x_d follows p with the time onset 10^d,
+    + g p log10(1 + t/s).
     """
     from scipy.interpolate import CubicSpline
 
     end = float(time_s[-1])
-    if not (loss_per_s or creep_per_kPa or cooling_K) or end <= 0:
+    if not (loss_per_s or creep_per_kPa or growth_per_kPa or cooling_K) or end <= 0:
         return np.full(len(time_s), float(initial_kPa))
     start = initial_kPa + ATMOSPHERE_kPa
     # Runge and Kutta's method is stable below 2.8 steps a time constant; four steps are accurate.
@@ -184,11 +209,13 @@ def chamber_pressure(
                 first_order_lag(t, p, tau) - p[0] * np.exp(-t / tau)
                 for tau in onset_s * 10.0 ** np.arange(DECADES)
             )
+        elif growth_per_kPa:
+            grown = growth_per_kPa * p * np.log10(1.0 + t / begins_s)
         gas = np.ones_like(t)
         if loss_per_s:
             gas = _lost(t, warm, grown, start, loss_per_s, inertia, compliance_per_kPa)
         p = _pressure(start, gas * warm, grown, compliance_per_kPa) - ATMOSPHERE_kPa
-        if not creep_per_kPa or np.abs(p - before).max() < 1e-8 * start:
+        if not (creep_per_kPa or growth_per_kPa) or np.abs(p - before).max() < 1e-8 * start:
             break
     found = np.full(len(time_s), p[0])
     found[time_s > 0] = CubicSpline(t, p)(time_s[time_s > 0])

@@ -13,7 +13,7 @@ import numpy as np
 from ...homogenize.offset_response import OffsetResponse
 from ...measured import Experiment
 from ..effect import Effect, Parameter
-from .specimen import NEW, machine, recorded, strain_histories
+from .specimen import NEW, load_cell, machine, recorded, strain_histories
 
 Array = np.ndarray[Any, Any]
 
@@ -202,7 +202,8 @@ class LatticeStress:
             (self._scaling(e).largest_offset_mm(e.scale) for e in experiments if e.kind == KIND),
             default=math.inf,
         )
-        self.effects = tuple(_within(e, most) if e.name == "overcure" else e for e in EFFECTS)
+        printed = (_within(e, most) if e.name == "overcure" else e for e in EFFECTS)
+        self.effects = (*printed, *load_cell(experiments, KIND))
         self._curve = curve
 
     @property

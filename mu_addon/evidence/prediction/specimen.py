@@ -12,7 +12,8 @@ import numpy as np
 from ...errors import ConvergenceError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
-from .unit import REFERENCE_C, TIMED, first_order_lag
+from .drift import drift, drifts, largest_reading
+from .unit import REFERENCE_C, RELAXING, TIMED, decades_lag, first_order_lag
 
 Array = np.ndarray[Any, Any]
 # Stress (n,) in kPa of strain (n,) at rest: 0 at 0, and rising.
@@ -28,6 +29,7 @@ FEWEST = 20
 ZERO_SHARE = 0.01
 # Strain up to which a preload is looked for.
 FARTHEST = 0.5
+FILTER = Parameter("time_s", "s", 0.0, 2.0, 0.0, (0.05, 0.5), "amplifiers average over 1 ms to 1 s")
 FRAME = Parameter("mm_per_N", "mm/N", 0.0, 0.1, 0.0, (0.005,), "steel 1e-5, printed plates 0.1")
 _TIMED = {e.name: e.parameters for e in TIMED}
 # Gauss-Legendre points on 0..1 for the energy: exact for laws up to degree 15.
@@ -40,6 +42,7 @@ def machine(kind: str) -> tuple[Effect, ...]:
     in_time = ("viscoelasticity", "mullins_softening", "fatigue_drift", "temperature_drift")
     return (
         *(Effect(name, _TIMED[name], (kind,)) for name in in_time),
+        attrs.evolve(RELAXING, kinds=(kind,)),
         Effect(
             "anisotropy",
             # One for x and y alike: with one each, an axis left out could not be predicted from the others.
@@ -121,6 +124,25 @@ def _zero(experiment: Experiment) -> str:
     return f"zero_kPa of {experiment.name}"
 
 
+def load_cell(experiments: Sequence[Experiment], kind: str) -> tuple[Effect, ...]:
+    """Effects, for a kind, of the load cell that reads experiments over time: a zero that drifts, a lag.
+
+    One cell reads all specimens, so that its zero drifts in N. A specimen whose section is not given is taken
+    for a cube of `LENGTH_mm`.
+    """
+    timed = [e for e in experiments if e.kind == kind and {"time_s", "stress_kPa"} <= set(e.columns)]
+    if not timed:
+        return ()
+    largest_N = max(largest_reading("stress_kPa", kind, [e]) / _kPa_per_N(e) for e in timed)
+    wandering = drifts("force_drift", "N", ZERO_SHARE * largest_N, kind, timed)
+    return (*wandering, Effect("force_lag", (FILTER,), (kind,)))
+
+
+def _kPa_per_N(experiment: Experiment) -> float:
+    section = experiment.section_mm or (LENGTH_mm * experiment.scale,) * 2
+    return 1e3 / math.prod(section)
+
+
 def recorded(
     experiment: Experiment, law: Law, values: Mapping[str, float], past: StrainHistory = NEW
 ) -> Array:
@@ -133,6 +155,9 @@ def recorded(
     share is not found.
     """
     found = _borne(experiment, law, values, past)
+    if "time_s" in experiment.columns:
+        found = first_order_lag(experiment["time_s"], found, values.get("force_lag.time_s", 0.0))
+        found = found + _kPa_per_N(experiment) * drift("force_drift", experiment["time_s"], values)
     zero = values.get(_zero(experiment), 0.0)
     return found + zero if zero else found
 
@@ -214,6 +239,9 @@ def _remembering(
         stress = stress - share * first_order_lag(
             experiment["time_s"], stress, values.get("viscoelasticity.time_s", 1.0)
         )
+    if (share := values.get("viscoelasticity.per_decade", 0.0)) and "time_s" in experiment.columns:
+        onset = values.get("viscoelasticity.onset_s", 1.0)
+        stress = stress - share * decades_lag(experiment["time_s"], stress, onset)
     return stress
 
 

@@ -13,6 +13,8 @@ import numpy as np
 from ...errors import InputError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
+from .camera import camera_effects, read_by_camera
+from .drift import drift, drifts, largest_reading
 from .flat_obstacle import NAME as CONTACT
 from .flat_obstacle import ObstacleResponse, contact_effect
 
@@ -24,6 +26,9 @@ REFERENCE_C = 23.0
 DEADBAND_kPa = 0.2
 # Times the last pressure computed, up to which the response is believed along its end's slope.
 BEYOND = 1.25
+# Of the largest reading, by which a gauge's zero may drift: sheets allow 0.25 to 2 % of full scale, which is
+# up to a few times what is read.
+GAUGE_SHARE = 0.05
 # Sizes of variants whose curves a response keeps.
 REMEMBERED = 64
 
@@ -60,8 +65,10 @@ class UnitResponse:
 
     channels: columns as measured (angle_deg, marker1_y_mm, ...), which give the units. variants: by the name
     of their effect. walls: by the side of the unit they stand on, 1 for +y and -1 for -y. Interpolated by
-    cubic splines, and along their end slopes beyond the last pressures. Raises InputError for fewer than four
-    pressures and for shapes that do not match.
+    cubic splines, and along their end slopes beyond the last pressures. discrepancy: standard deviation of
+    what another code of the same physics would find, as a smooth change of the pressure over the largest one;
+    0 where the response is exact. Raises InputError for fewer than four pressures and for shapes that do not
+    match.
     """
 
     channels: tuple[str, ...]
@@ -71,6 +78,7 @@ class UnitResponse:
     scale: float = 1.0
     orientation_deg: float = 0.0
     walls: Mapping[int, ObstacleResponse] = attrs.field(factory=dict)
+    discrepancy: float = 0.0
     _splines: Mapping[str, Any] = attrs.field(init=False, repr=False)
     _curves: dict[Any, Any] = attrs.field(init=False, repr=False, factory=dict)
 
@@ -170,6 +178,25 @@ def nuisances(channels: Sequence[str]) -> tuple[Parameter, ...]:
     return (modulus, *zeros)
 
 
+DISCREPANCIES = ("discrepancy_second", "discrepancy_third")
+
+
+def discrepancies(spread: float) -> tuple[Parameter, ...]:
+    """What every model of a unit may miss, smoothly, by the square and the cube of the pressure; none at 0.
+
+    spread: standard deviation of each at the largest pressure, as a share of it. Kennedy and O'Hagan, J. R.
+    Stat. Soc. B 63 (2001) 425: a discrepancy of known size beside every hypothesis, so that no cause is named
+    for less.
+    """
+    if not spread:
+        return ()
+    most = 10.0 * spread
+    return tuple(
+        Parameter(name, "", -most, most, 0.0, (), "between codes of the same physics", spread=spread)
+        for name in DISCREPANCIES
+    )
+
+
 def _zero(channel: str) -> str:
     head, _, unit = channel.rpartition("_")
     return f"{head}_zero_{unit}"
@@ -238,6 +265,20 @@ TIMED = (
 )
 
 
+# A second law of viscoelasticity: polymers relax over many decades of time, and a drift of the gauge would be
+# named in its place where one relaxation time is too few.
+RELAXING = Effect(
+    "viscoelasticity",
+    (
+        Parameter("per_decade", "", 0.0, 0.2, 0.0, (0.03,), "share of the modulus that relaxes in a decade"),
+        Parameter("onset_s", "s", 0.02, 1000.0, 1.0, (0.5, 5.0), "when that begins"),
+    ),
+    (KIND,),
+    "all moduli relax with time, by as much in each decade of it",
+)
+DECADES = 4
+
+
 class UnitPressure:
     """Predicts unit_pressure experiments from responses of the unit, one for each scale and orientation.
 
@@ -257,7 +298,10 @@ class UnitPressure:
         self._nearest: dict[tuple[float, float], UnitResponse] = {}
         self._zeros = {r.channels: tuple(map(_zero, r.channels)) for r in self._responses}
         self.channels_known = self._responses[0].channels
-        self.nuisances = self._bounded(nuisances(self.channels_known), experiments)
+        self.nuisances = (
+            *self._bounded(nuisances(self.channels_known), experiments),
+            *discrepancies(max(r.discrepancy for r in self._responses)),
+        )
         known: dict[str, Parameter] = {}
         for r in self._responses:
             for name, v in r.variants.items():
@@ -267,7 +311,10 @@ class UnitPressure:
         walls = [wall for r in self._responses for wall in r.walls.items()]
         if walls:
             static[CONTACT] = contact_effect(walls, KIND)
-        self.effects = (*TIMED, *static.values())
+        most = GAUGE_SHARE * largest_reading("pressure_kPa", KIND, experiments)
+        gauge = drifts("pressure_drift", "kPa", most, KIND, experiments)
+        camera = camera_effects(self.channels_known, KIND, experiments)
+        self.effects = (*TIMED, RELAXING, *static.values(), *gauge, *camera)
         self._sizes = {e.name: e.keys[0] for e in static.values()}
         self._reference_kPa = max(float(np.abs(r.pressures_kPa).max()) for r in self._responses)
 
@@ -303,7 +350,7 @@ class UnitPressure:
         Raises InputError where no response is near the experiment's scale and orientation.
         """
         response = self._response(experiment)
-        pressure = self.effective_kPa(experiment, values)
+        pressure = self._discrepant(self.effective_kPa(experiment, values), values)
         static = {name: values[key] for name, key in self._sizes.items() if key in values}
         if "gravity" in static:
             # Weight bends a unit of stiffer resin by as much less.
@@ -312,22 +359,33 @@ class UnitPressure:
             values.get(zero, 0.0) + (values.get("angle_offset.offset_deg", 0.0) if c == "angle_deg" else 0.0)
             for c, zero in zip(response.channels, self._zeros[response.channels], strict=True)
         ]
-        y = np.add(response.at(pressure, static), np.array(zeros)[:, None], order="C")
+        y = response.at(pressure, static)
+        y = read_by_camera(response.channels, y, experiment["time_s"], experiment.scale, values)
+        y = np.add(y, np.array(zeros)[:, None], order="C")
         kept = [i for i, c in enumerate(response.channels) if c in experiment.columns]
         return y if len(kept) == len(y) else y[kept]
+
+    def _discrepant(self, pressure: Array, values: Mapping[str, float]) -> Array:
+        """Effective pressures (n,) in kPa with the discrepancy of the model's response."""
+        second, third = (values.get(name, 0.0) for name in DISCREPANCIES)
+        if not (second or third):
+            return pressure
+        x = pressure / self._reference_kPa
+        return np.asarray(pressure + self._reference_kPa * (second * x**2 + third * x**3))
 
     def effective_kPa(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
         """Pressure (n,) in kPa at which the base unit would stand where the unit of these values stands.
 
-        values: by key, as in `Simulator`. Applied in this order: clock offset, gauge offset and gain, leak
-        and line lag (with an open valve), modulus with temperature and fatigue, viscoelasticity, hysteresis,
-        Mullins softening.
+        values: by key, as in `Simulator`. Applied in this order: clock offset, drift, offset and gain of the
+        gauge, leak and line lag (with an open valve), modulus with temperature and fatigue, viscoelasticity,
+        hysteresis, Mullins softening.
         """
         t, p = experiment["time_s"], experiment["pressure_kPa"]
         past = self._past.get(experiment.name, PressureHistory())
         get = values.get
         if delay := get("clock_offset.offset_s", 0.0):
             p = np.interp(t - delay, t, p)
+        p = p - drift("pressure_drift", t, values)
         p = (p - get("pressure_offset.offset_kPa", 0.0)) / (1.0 + get("pressure_gain.gain", 0.0))
         leak, lag = get("leak.conductance_ratio", 0.0), get("line_lag.time_s", 0.0)
         if experiment.valve == "shut":
@@ -348,6 +406,8 @@ class UnitPressure:
         if share := get("viscoelasticity.share", 0.0):
             time = get("viscoelasticity.time_s", 1.0) / (1.0 - share)
             p = (1.0 - share) * p + share * first_order_lag(t, p, time)
+        if share := get("viscoelasticity.per_decade", 0.0):
+            p = (1.0 - DECADES * share) * p + share * decades_lag(t, p, get("viscoelasticity.onset_s", 1.0))
         if share := get("rate_independent_hysteresis.share", 0.0):
             p = (1.0 - share) * p + share * play_operator(
                 p, get("rate_independent_hysteresis.threshold_kPa", 2.0)
@@ -404,6 +464,11 @@ def first_order_lag(t: Array, p: Array, time_s: float) -> Array:
     for ai, di in zip(a.tolist(), driven.tolist(), strict=True):
         x.append(ai * x[-1] + di)
     return np.array(x)
+
+
+def decades_lag(t: Array, p: Array, onset_s: float) -> Array:
+    """Sum (n,) of `first_order_lag` of p (n,) by times onset_s, ten times that, ..., over `DECADES`."""
+    return np.asarray(sum(first_order_lag(t, p, onset_s * 10.0**k) for k in range(DECADES)))
 
 
 def _weights(h: Any, time_s: float) -> tuple[Any, Any, Any]:

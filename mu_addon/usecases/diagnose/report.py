@@ -233,14 +233,12 @@ def _rivals(found: Diagnosis) -> str:
         return ""
     rivals = {r for c in selection.causes for r in c.rivals}
     base = max(selection.base.chi2, 1e-12)
-    names = [f.names[0] for f in selection.singles]
+    names = [f.effects[0].title for f in selection.singles]
     left = [f.chi2 / base for f in selection.singles]
-    chart = pictures.rivals_chart(
-        names, left, selection.chosen.chi2 / base, [*selection.chosen.names, *sorted(rivals)]
-    )
+    chosen = _titles(selection.chosen)
+    chart = pictures.rivals_chart(names, left, selection.chosen.chi2 / base, [*chosen, *sorted(rivals)])
     rows = []
     for f in selection.singles:
-        name = f.names[0]
         e = f.effects[0]
         size = ", ".join(
             f"{bare(p)} {_figures(f.values[k])}{' ' + p.unit if p.unit else ''}"
@@ -248,8 +246,8 @@ def _rivals(found: Diagnosis) -> str:
         )
         rows.append(
             (
-                [readable(name), size, f"{f.chi2:.4g}", _against(found, f, rivals)],
-                name in selection.chosen.names or name in rivals,
+                [readable(e.title), size, f"{f.chi2:.4g}", _against(found, f, rivals)],
+                e.title in chosen or e.title in rivals,
             )
         )
     picture = figure(
@@ -279,15 +277,14 @@ def _rivals(found: Diagnosis) -> str:
 
 def _against(found: Diagnosis, f: Fit, rivals: set[str]) -> str:
     selection = found.verdict.selection
-    name, gained = f.names[0], selection.base.chi2 - f.chi2
-    e = f.effects[0]
+    e, gained = f.effects[0], selection.base.chi2 - f.chi2
     at = [bare(p) for k, p in zip(e.keys, e.parameters, strict=True) if _ended(p, f.values[k])]
     bound = f"; {' and '.join(at)} at its bound" if at else ""
-    if name in selection.chosen.names and found.verdict.names:
+    if e.title in _titles(selection.chosen) and found.verdict.names:
         return "none: named" if found.verdict.kind == "named" else "none: best fit"
-    if name in selection.chosen.names:
+    if e.title in _titles(selection.chosen):
         return "part of the best fit"
-    if name in rivals:
+    if e.title in rivals:
         return f"none: a rival that these data do not distinguish{bound}"
     if gained < RIVAL_DELTA_CHI2:
         return f"no significant gain ({_figures(max(gained, 0.0))}){bound}"
@@ -295,6 +292,10 @@ def _against(found: Diagnosis, f: Fit, rivals: set[str]) -> str:
         return f"gains {gained:.3g}, not significant for this number of tests{bound}"
     more = f.chi2 - selection.chosen.chi2
     return f"leaves {more:.3g} more than the chosen model{bound}"
+
+
+def _titles(fit: Fit) -> list[str]:
+    return [e.title for e in fit.effects]
 
 
 def _ended(p: Parameter, value: float) -> bool:

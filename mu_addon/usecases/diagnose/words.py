@@ -58,8 +58,8 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
     """The verdict in words: its headline, and one plain sentence."""
     found = verdict.selection
     if verdict.kind == "named":
-        sizes = [f"{_upper(c.effect.mechanism)}; {sized(verdict, c)}." for c in found.causes]
-        names = listed([readable(n) for n in verdict.names])
+        sizes = [f"{_upper(c.effect.mechanism)}{_of_one_only(c)}; {sized(verdict, c)}." for c in found.causes]
+        names = listed([readable(c.effect.title) for c in found.causes])
         if not found.left:
             return names, " ".join(sizes)
         rest = listed([readable(n) for n in found.left])
@@ -70,8 +70,8 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
         )
         return f"mainly {names}", " ".join(sizes)
     if verdict.kind == "ambiguous":
-        choices = [listed([readable(n) for n in (c.effect.name, *c.rivals)], "or") for c in found.causes]
-        sizes = [f"{readable(c.effect.name)} has {sized(verdict, c)}" for c in found.causes]
+        choices = [listed([readable(n) for n in (c.effect.title, *c.rivals)], "or") for c in found.causes]
+        sizes = [f"{readable(c.effect.title)} has {sized(verdict, c)}" for c in found.causes]
         return (
             " and ".join(choices),
             "The model is wrong. Each of these effects explains the data, and these data do not "
@@ -127,6 +127,10 @@ def advice(verdict: Verdict) -> str:
         f"These data cannot identify {listed([readable(s.effect.name) for s in hidden])}. To identify "
         f"more: {'; or '.join(some)}."
     )
+
+
+def _of_one_only(cause: Cause) -> str:
+    return f", in {cause.effect.whose} only" if cause.effect.whose else ""
 
 
 def _upper(text: str) -> str:

@@ -1,0 +1,154 @@
+"""Effects of one specimen or of one experiment: one may leak, slip or drift while the others do not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import attrs
+
+from ..measured import Experiment
+from .effect import BATCH, Effect, Parameter
+from .fit import Fit, Fitter
+from .residuals import strict_table, structure
+from .selection import (
+    FALSE_ALARM_RATE,
+    PROMISING,
+    RIVAL_DELTA_CHI2,
+    Selection,
+    at_a_bound,
+    causes_of,
+    cost,
+    false_alarm_probability,
+    gain_of,
+    loss,
+    promise,
+    sudden,
+)
+from .sensitivity import Sensitivity, sensitivities
+
+# What measures or holds a specimen may fail in one experiment, and does not go with the specimen.
+OF_THE_BENCH = frozenset(
+    (
+        "pressure_offset",
+        "pressure_gain",
+        "pressure_drift",
+        "force_drift",
+        "force_lag",
+        "line_lag",
+        "clock_offset",
+        "angle_offset",
+        "angle_drift",
+        "camera_scale",
+        "camera_tilt",
+        "lens_distortion",
+        "led_drift",
+        "ambient_light",
+        "contact",
+    )
+)
+# What may come with a specimen or with the way in which it was held once.
+OF_EITHER = frozenset(("leak", "seating", "temperature_drift"))
+# Numerics are alike for all.
+OF_NONE = frozenset(("mesh_error", "gravity"))
+# Most effects fitted, those first that promise most.
+MOST_FITS = 12
+CHANGE = Parameter("change", "", -0.5, 1.0, 0.0, (0.1,), "prints and batches differ by 5 to 20 %")
+
+
+def owned_effects(effects: Sequence[Effect], experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
+    """Every effect as one of a single specimen, or of a single experiment, that is not alone in its kinds.
+
+    With them comes what most often tells specimens apart, another modulus of one of them (`BATCH`).
+    """
+    kinds = tuple(dict.fromkeys(e.kind for e in experiments))
+    batch = Effect(BATCH, (CHANGE,), kinds)
+    found = []
+    for effect in (*effects, batch):
+        if effect.name in OF_NONE:
+            continue
+        own = [e for e in experiments if e.kind in effect.kinds]
+        for whose, members in _owners(effect.name, own).items():
+            if len(members) < len(own):
+                found.append(attrs.evolve(effect, whose=whose))
+    return tuple(found)
+
+
+def _owners(name: str, experiments: Sequence[Experiment]) -> dict[str, list[str]]:
+    """Names of experiments by what they belong to, "specimen B" or "experiment hold 2"."""
+    found: dict[str, list[str]] = {}
+    if name not in OF_THE_BENCH:
+        for e in experiments:
+            if e.specimen:
+                found.setdefault(f"specimen {e.specimen}", []).append(e.name)
+    if name in OF_THE_BENCH or name in OF_EITHER:
+        alone = {members[0] for members in found.values() if len(members) == 1}
+        found |= {f"experiment {e.name}": [e.name] for e in experiments if e.name not in alone}
+    return found
+
+
+def select_owned(
+    fitter: Fitter,
+    seen: Sequence[Sensitivity],
+    found: Selection,
+    progress: Callable[[str], None] = lambda _: None,
+) -> tuple[Selection, list[Sensitivity]]:
+    """A selection that explains too little, with the effect of one specimen or experiment that explains it.
+
+    Unchanged where there is none. Which specimen is a choice that chance has, too: the false-alarm rate is
+    that of the whole library and of every effect of every owner. Returned beside it: sensitivities of all.
+    """
+    record = fitter.record
+    owned = owned_effects(fitter.simulator.effects, record.experiments)
+    if not owned:
+        return found, list(seen)
+    curved = {p.name: found.base.values[p.name] for p in fitter.curved}
+    every = [*seen, *sensitivities(fitter, curved, owned)]
+    usable = tuple({s.effect.keys: s.effect for s in every if s.effect.whose and s.worth_a_fit}.values())
+    seeds = [found.base] if found.chosen is found.base else [found.base, found.chosen]
+    singles = found.singles
+    for seed in seeds:
+        pool = _pool(fitter, seed, usable, progress)
+        if seed is found.base:
+            singles = tuple(sorted([*singles, *pool], key=cost))
+        if not pool:
+            continue
+        best = pool[0]
+        if cost(best) >= min(cost(found.chosen), *(cost(f) for f in found.singles)):
+            # What all have explains more.
+            continue
+        rivals = [f for f in singles if len(f.effects) == len(best.effects) and f is not best]
+        same = [f for f in [*pool[1:], *rivals] if f.names == best.names]
+        if any(f.chi2 - best.chi2 < RIVAL_DELTA_CHI2 and _owner(f) != _owner(best) for f in same):
+            # Whose it is cannot be told.
+            continue
+        p = false_alarm_probability(fitter, seed, every, gain_of(fitter, seed, best))
+        if p >= FALSE_ALARM_RATE or at_a_bound(best) or loss(fitter, seed, best) <= 0.0:
+            continue
+        table = tuple(strict_table(fitter, best))
+        # An effect of the last experiment alone is like something that broke before it.
+        if structure(table) or sudden(found.table_base, found.base, best, RIVAL_DELTA_CHI2):
+            continue
+        tried = [f.effects[-1] for f in pool[:MOST_FITS]]
+        level = [f for f in [*pool, *rivals] if len(f.effects) == 1]
+        causes = causes_of(fitter, tried, best, [*(c.p_value for c in found.causes), p], [level])
+        chosen = attrs.evolve(
+            found, chosen=best, causes=causes, table=table, singles=singles, doubted="", p_best=p
+        )
+        return chosen, every
+    return found, list(seen)
+
+
+def _owner(fit: Fit) -> str:
+    return fit.effects[-1].whose
+
+
+def _pool(fitter: Fitter, seed: Fit, effects: Sequence[Effect], progress: Callable[[str], None]) -> list[Fit]:
+    """Fits of a model with one more effect, of those that promise most, best first."""
+    promised = [(promise(fitter, seed, e), e) for e in effects if e.name not in seed.names]
+    promised.sort(key=lambda pair: -pair[0])
+    found = []
+    for promises, e in promised[:MOST_FITS]:
+        if promises > PROMISING:
+            progress(" and ".join((*seed.names, e.name)))
+            found.append(fitter.best([*seed.effects, e], [{**seed.values, **s} for s in e.starts()]))
+    return sorted(found, key=cost)

@@ -1,0 +1,65 @@
+"""Drift of an instrument's zero while it records: one mechanism, by three laws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...measured import Experiment
+from ..effect import Effect, Parameter
+
+Array = np.ndarray[Any, Any]
+
+# Times of a law's course in s, and where fits of it begin, as shares of the longest record.
+SHORTEST_s, LONGEST_s, NULL_s = 0.5, 1e4, 30.0
+EARLY = (0.02, 0.2)
+
+
+def drifts(name: str, unit: str, most: float, kind: str, experiments: Sequence[Experiment]) -> list[Effect]:
+    """The laws of a zero that drifts, as effects of one name for a kind; none without a clock.
+
+    most: largest size of the drift within a record, in `unit`. Zeros drift alike in every record, from its
+    beginning: linearly, as the logarithm of time, or settling as an exponential.
+    """
+    clocks = [e["time_s"] for e in experiments if e.kind == kind and "time_s" in e.columns and len(e) > 1]
+    lasts = max((float(t[-1] - t[0]) for t in clocks), default=0.0)
+    if not (lasts > 0.0 and most > 0.0):
+        return []
+
+    def size(key: str, of: str, most: float) -> Parameter:
+        return Parameter(key, of, -most, most, 0.0, (0.1 * most,), "sheets, by the largest reading")
+
+    def time(key: str) -> Parameter:
+        early = tuple(min(max(share * lasts, SHORTEST_s), LONGEST_s) for share in EARLY)
+        return Parameter(key, "s", SHORTEST_s, LONGEST_s, NULL_s, early, "warming, creep of the element")
+
+    return [
+        Effect(name, (size("per_hour", f"{unit}/h", most * 3600.0 / lasts),), (kind,)),
+        Effect(name, (size("per_decade", unit, most), time("onset_s")), (kind,)),
+        Effect(name, (size("settled", unit, most), time("settling_s")), (kind,)),
+    ]
+
+
+def drift(name: str, time_s: Array, values: Mapping[str, float]) -> Array | float:
+    """Drift (n,) of a zero at times (n,) in s since the record's first, in the unit of its effect; 0 without.
+
+    values: by "effect.parameter", see `drifts`. The sum of r t, a log10(1 + t/onset), b (1 - exp(-t/time)).
+    """
+    get = values.get
+    found: Array | float = 0.0
+    t = time_s - time_s[0]
+    if per_hour := get(f"{name}.per_hour", 0.0):
+        found = found + per_hour * t / 3600.0
+    if per_decade := get(f"{name}.per_decade", 0.0):
+        found = found + per_decade * np.log10(1.0 + t / get(f"{name}.onset_s", NULL_s))
+    if settled := get(f"{name}.settled", 0.0):
+        found = found - settled * np.expm1(-t / get(f"{name}.settling_s", NULL_s))
+    return found
+
+
+def largest_reading(column: str, kind: str, experiments: Sequence[Experiment]) -> float:
+    """The largest magnitude in a column of the experiments of a kind, in the column's unit; 0 without any."""
+    read = [e[column] for e in experiments if e.kind == kind and column in e.columns]
+    return max((float(np.nanmax(np.abs(v))) for v in read if np.isfinite(v).any()), default=0.0)
