@@ -10,6 +10,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
+from ..design.quantity import in_kPa
 from ..errors import InputError
 from ..meshing.mesh import AXES, LATTICE, Mesh
 from .newton_settings import NewtonSettings
@@ -56,6 +57,20 @@ class _Pairs:
 
     places: Array
     near: Any
+
+
+@attrs.frozen(eq=False)
+class Touch:
+    """Where a body touches itself in one state.
+
+    pressure_kPa (n,): the contact's force at each node of the mesh over the undeformed area around it;
+    force_N: what all pieces press on each other with, mirror images included; gap_mm: the least distance,
+    infinite where nothing is within the gap.
+    """
+
+    pressure_kPa: Array
+    force_N: float
+    gap_mm: float
 
 
 @attrs.frozen(eq=False)
@@ -249,6 +264,17 @@ class SelfContact:
             least = float(np.sqrt(found.near.compute_minimum_distance(self._surface, found.places)))
         images = min((float(p.distance(self._rest + u).min()) for p in self._planes), default=np.inf)
         return min(least, images if images < self.gap_mm else np.inf)
+
+    def touch(self, u: Array) -> Touch:
+        """Where the surface is within the gap of itself at u (n, 3) in mm, and how hard it presses there."""
+        nodes, forces = self.forces(u)
+        area = np.asarray(self._surface.vertex_areas)
+        size = np.linalg.norm(forces, axis=1)
+        pressure = np.zeros(len(self._rest))
+        pressure[nodes] = in_kPa(size / area)
+        # Both pieces of each contact feel its force.
+        force = 2.0 ** len(self._planes) * float(size.sum()) / 2.0
+        return Touch(pressure, force, self.least_gap_mm(u))
 
     def count(self, u: Array) -> int:
         """How many pairs of vertices, edges and facets are within the gap at u (n, 3) in mm."""

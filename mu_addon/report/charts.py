@@ -22,7 +22,7 @@ BY_START = ("-", "--", ":", "-.")
 INK, QUIET, GRID = "#222222", "#8A8F98", "#E3E6EA"
 WIDTH = 4.0  # inches: at a phone's width the text is still 10 pixels high
 MAP = "viridis"  # perceptually uniform, and monotone in grey
-STRETCH_MAP = "YlOrRd"  # light where nothing is stretched: a shaded surface in a dark colour shows no shape
+FIELD_MAP = "YlOrRd"  # light where there is little: a shaded surface in a dark colour shows no shape
 
 _STYLE: Any = {
     "axes.axisbelow": True,
@@ -235,23 +235,23 @@ def color_bar(top: float) -> str:
     return svg()
 
 
-def stretch_colors(stretch: Floats, top: float) -> Floats:
-    """sRGB (n, 3) of largest principal stretches (n,), from 1 to `top`, as in `stretch_bar`."""
+def field_colors(values: Floats, low: float, top: float) -> Floats:
+    """sRGB (n, 3) of a field's values (n,) from `low` to `top`, as in `field_bar`."""
     from matplotlib import colormaps
 
-    return np.asarray(colormaps[STRETCH_MAP](np.clip((stretch - 1.0) / (top - 1.0), 0.0, 1.0))[:, :3])
+    return np.asarray(colormaps[FIELD_MAP](np.clip((values - low) / (top - low), 0.0, 1.0))[:, :3])
 
 
-def stretch_bar(top: float) -> str:
-    """SVG of the colour scale of largest principal stretches from 1 to `top`."""
+def field_bar(low: float, top: float, name: str) -> str:
+    """SVG of the colour scale of a field from `low` to `top`; name: with its unit, if it has one."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
     with canvas(WIDTH, 0.62) as (figure, svg):
         axes = figure.add_axes((0.04, 0.68, 0.92, 0.26))
-        mappable = ScalarMappable(Normalize(1.0, top), STRETCH_MAP)
+        mappable = ScalarMappable(Normalize(low, top), FIELD_MAP)
         bar = figure.colorbar(mappable, cax=axes, orientation="horizontal", format="%.3g", extend="max")
-        bar.set_label("largest principal stretch", fontsize=8, labelpad=2)
+        bar.set_label(name, fontsize=8, labelpad=2)
         bar.outline.set_linewidth(0.6)
     return svg()
 

@@ -104,9 +104,21 @@ STRETCH_COLUMNS = (
 """Of stretch.csv: the largest principal stretch of each part, and where at rest."""
 
 
+SELF_CONTACT_COLUMNS = (
+    "pressure_kPa",
+    "force_N",
+    "least_gap_mm",
+    "largest_contact_pressure_kPa",
+    "x_mm",
+    "y_mm",
+    "z_mm",
+)
+"""Of self_contact.csv: what a unit presses on itself with, how near it comes, and where hardest at rest."""
+
+
 @attrs.frozen(eq=False)
-class StretchPictures:
-    """States painted by their largest principal stretch, on one scale from 1 to `top`."""
+class PaintedStates:
+    """States painted by one field, on one scale up to `top`."""
 
     pictures: Sequence[Picture]
     top: float
@@ -259,7 +271,9 @@ class ReportData:
     light: Signals | None = None
     contact: ContactHistory | None = None
     stretch: Sequence[tuple[Any, ...]] = ()  # rows of STRETCH_COLUMNS
-    stretched: StretchPictures | None = None
+    stretched: PaintedStates | None = None
+    self_contact: Sequence[tuple[str, ...]] = ()  # rows of SELF_CONTACT_COLUMNS
+    touched: PaintedStates | None = None
     effects: Sequence[str] = ()  # that measured data named and the simulation has, in words
     pressure_kPa: Floats = attrs.field(factory=lambda: np.zeros(0))  # per converged state
     angle_deg: Floats = attrs.field(factory=lambda: np.zeros(0))

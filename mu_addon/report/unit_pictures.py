@@ -82,8 +82,11 @@ def motion(
     width: int = 560,
     beside: Sequence[RigidBody] = (),
     colors: Sequence[dict[int, Floats]] = (),
+    outside: bool = False,
 ) -> list[Picture]:
     """One picture for each state, all to one scale, of the mesh cut open along its sagittal plane.
+
+    outside: whether the half is seen from the other side, whole.
 
     A state is displacement (n, 3) in mm, caption and alternative text. beside: rigid bodies, of which the
     part at x <= 0 and within the picture is shown; width: in pixels. colors: of each state, by region, sRGB
@@ -103,7 +106,8 @@ def motion(
         )
     every = [part for scene in scenes for part in scene]
     standing = _behind(beside)
-    camera, aspect = _framed(every, (1.0, 0.25, 0.12))
+    camera, aspect = _framed(every, (-1.0 if outside else 1.0, 0.25, 0.12))
+    cut = None if flip or outside else Cut(SAGITTAL.point, SAGITTAL.normal)
     return [
         Picture(
             png(
@@ -112,7 +116,7 @@ def motion(
                     camera,
                     width,
                     round(width / aspect),
-                    cut=None if flip else Cut(SAGITTAL.point, SAGITTAL.normal),
+                    cut=cut,
                     background=WHITE,
                 )
             ),

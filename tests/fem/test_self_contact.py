@@ -164,6 +164,12 @@ def test_a_block_on_another_passes_on_its_pressure(order):
     # One-sided, and three times that: two plates face each other, and their edges count beside their faces.
     least, most = (np.interp(-pressure, -factor * carried, shares) for factor in (1, 3))
     assert least < gap / D < most
+    touch = eq.model.self_contact.touch(state.u)
+    # Edges press sideways, too.
+    assert touch.force_N == pytest.approx(4.0 * pressure, rel=1e-5)
+    assert touch.gap_mm == pytest.approx(gap, rel=0.1)
+    assert touch.pressure_kPa[below & inside].mean() == pytest.approx(1000 * pressure, rel=0.3)
+    assert not touch.pressure_kPa[mesh.base].any()
 
 
 def test_a_plate_presses_a_block_on_another_without_a_touch():

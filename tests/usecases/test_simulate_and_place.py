@@ -1,5 +1,6 @@
 """A study's stages: what a change leaves as it is, what a smaller job keeps, what a damaged cache costs."""
 
+import csv
 import json
 import shutil
 
@@ -15,6 +16,7 @@ from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place import study as module
 from mu_addon.usecases.simulate_and_place.job import Job, read_job
+from mu_addon.usecases.simulate_and_place.motion import read_motion
 from mu_addon.usecases.simulate_and_place.run import run_stages
 from mu_addon.usecases.simulate_and_place.study import Study
 
@@ -37,6 +39,11 @@ def ran(job, folder):
         run_stages(Study.open(job, folder, context))
     assert context.status == 0, messages[-1]
     return json.loads((folder / "summary.json").read_text())
+
+
+def read_rows(path):
+    with open(path, newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
 
 
 @pytest.fixture(scope="module")
@@ -204,3 +211,31 @@ def test_what_a_study_writes_is_less_than_the_room_it_asks_for(placed):
     nodes, pressures = summary["mesh"]["nodes"], 3
     asked = module._BYTES["interactive"] + nodes * module._BYTES_A_NODE["place"] * pressures
     assert written < asked
+
+
+@pytest.mark.slow
+def test_a_study_says_where_walls_and_struts_touch(tmp_path):
+    unit = load_preset("mu-1.0x")
+    unit = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3, wall_mm=0.5))
+    job = Job(
+        unit=unit,
+        protocol=Protocol(np.arange(3.0), np.array([0.0, -10.0, 0.0])),
+        mesh=MeshSettings(refine=0.4, fidelity="resolved"),
+        times=3,
+        stages=("design", "simulate"),
+        self_contact=True,
+        workers=1,
+    )
+    ran(job, tmp_path)
+    rows = read_rows(tmp_path / "self_contact.csv")
+    by_pressure = {float(row["pressure_kPa"]): row for row in rows}
+    assert sorted(by_pressure) == [-10.0, 0.0]
+    assert float(by_pressure[-10.0]["force_N"]) > 0.01
+    assert 0.0 < float(by_pressure[-10.0]["least_gap_mm"]) < 0.5 / 9
+    assert float(by_pressure[0.0]["force_N"]) == 0.0
+    assert by_pressure[0.0]["least_gap_mm"] == ""
+    motion = read_motion(tmp_path)
+    k = int(motion.state_kPa.argmin())
+    pressed = max(values["contact_pressure_kPa"][k].max() for values in motion.fields.values())
+    assert pressed > 0.0
+    assert pressed <= float(by_pressure[-10.0]["largest_contact_pressure_kPa"]) * 1.001

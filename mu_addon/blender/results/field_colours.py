@@ -52,6 +52,12 @@ FIELDS = (
     Field("largest_stretch", "Largest Stretch", "", "Largest principal stretch"),
     Field("smallest_stretch", "Smallest Stretch", "", "Smallest principal stretch"),
     Field(
+        "contact_pressure_kPa",
+        "Self-Contact Pressure",
+        "kPa",
+        "Between walls and struts that touch each other; of Model A, simulated with self-contact",
+    ),
+    Field(
         "dJ_by_modulus_mm_per_MPa",
         "Sensitivity dJ/dE",
         "mm/MPa",

@@ -18,7 +18,6 @@ from bpy.app.handlers import persistent
 from ...errors import InputError
 from ...report.pc2 import read_pc2, write_pc2
 from ...usecases.simulate_and_place.motion import (
-    FIELDS,
     FOLDER,
     MODEL_A,
     PLAYED,
@@ -265,7 +264,7 @@ def _distances(moved: Any, still: Any) -> dict[str, Any]:
 def _fields_of(motion: Motion, name: str, region: str, skin: Skin) -> dict[str, Any]:
     still = skin.of_nodes(motion.model_a)
     found = _distances(skin.of_nodes(*motion.sides(name)), still)
-    for field in FIELDS:
+    for field in motion.fields[region]:
         values = motion.field(name, region, field, skin)
         if values is not None:
             found[field] = values

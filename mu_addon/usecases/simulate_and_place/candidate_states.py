@@ -156,8 +156,8 @@ class CandidateSolver:
         self.path_difference_mm = float(np.abs(moved[-1] - still[number] - known[number][job]).max())
         if self._mesh.resolved:
             self._path_allowed_mm = max(PATH_DIFFERENCE_MM, PATH_DIFFERENCE_SHARE * float(size.max()))
-        told = {"difference_mm": self.path_difference_mm, "allowed_mm": self._path_allowed_mm}
-        self._cache.put("path", self._key, told)
+        found = {"difference_mm": self.path_difference_mm, "allowed_mm": self._path_allowed_mm}
+        self._cache.put("path", self._key, found)
         return self.independent_of_path
 
     def _along_paths(self, distinct: Array, still: Array, before: dict[int, Array]) -> dict[int, Array]:

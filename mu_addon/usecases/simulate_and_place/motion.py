@@ -5,7 +5,8 @@ Written as the study finds them, in single precision, and read again by whatever
 - mesh.npz: the analysis mesh, and of both regions the surface: `REGION_node` (v,), `REGION_triangles` (t, 3)
   and `REGION_cut` (t,), whether a triangle lies in the mirror plane of a half mesh
 - model_a.npz: `time_s`, `pressure_kPa` and `state`, (k,) each, at the protocol's samples; `state_kPa` (s,),
-  `displacement_mm` (s, n, 3) and, at the surfaces, `REGION_FIELD` (s, v)
+  `displacement_mm` (s, n, 3) and, at the surfaces, `REGION_FIELD` (s, v); with self-contact
+  `REGION_contact_pressure_kPa` (s, v) as well
 - NAME.npz, of a sensor path: `state_kPa` (r,), and differences from Model A: `difference_mm` (r, n, 3) and
   `REGION_FIELD` (r, v); of a path off the mirror plane of a half mesh also those of the nodes' images,
   reflected into that half, `image_mm` and `image_REGION_FIELD`
@@ -45,6 +46,8 @@ IMAGE = "image_"
 """Begins the names of what is of the nodes' images in the mirror plane."""
 # Of a state, at the nodes of each region's surface. Stresses are Cauchy's.
 FIELDS = ("von_mises_kPa", "largest_principal_stress_kPa", "largest_stretch", "smallest_stretch")
+CONTACT_PRESSURE = "contact_pressure_kPa"
+"""Of a state with self-contact, between pieces of the unit's own surface."""
 # A path's motion is written only where its own file is named so.
 _NOT_PATHS = ("mesh", MODEL_A, "sensitivity")
 
@@ -95,8 +98,9 @@ class Skin:
 class Motion:
     """What `motion/` holds: the mesh, its surfaces by region, Model A's states and their fields.
 
-    fields: by region and name, (s, v); sensitivity: by region, (v,), empty where there is none; paths: names
-    of the sensor paths whose motion is there.
+    fields: by region and name, (s, v), with the pressure of self-contact where that was simulated;
+    sensitivity: by region, (v,), empty where there is none; paths: names of the sensor paths whose motion is
+    there.
     """
 
     folder: Path
@@ -153,7 +157,9 @@ class Motion:
 
     def field(self, name: str, region: str, field: str, skin: Skin) -> Array | None:
         """A field (s, v) of Model A or of a path's unit at a skin's vertices; None where it is not known."""
-        still = self.fields[region][field]
+        still = self.fields[region].get(field)
+        if still is None:
+            return None
         if name == MODEL_A:
             return skin.of_surface(still)
         found = self._path(name)
@@ -207,10 +213,12 @@ def write_model_a(
     materials: Materials,
     trajectory: Trajectory,
     history: Callable[[int], Sequence[Array]] = lambda number: (),
+    contact_kPa: Sequence[Array] = (),
 ) -> None:
     """Write mesh.npz and model_a.npz of a finished Model A into `folder`/motion. Raises OutputError.
 
-    history: what materials with memory remember of a state, by its number.
+    history: what materials with memory remember of a state, by its number; contact_kPa: of every state the
+    pressure (n,) at the mesh's nodes where the unit touches itself, or none without self-contact.
     """
     arrays = {f.name: getattr(mesh, f.name) for f in attrs.fields(Mesh)}
     arrays["symmetry"] = np.array(mesh.symmetry, dtype="U1")
@@ -219,6 +227,8 @@ def write_model_a(
         arrays |= {f"{name}_{part}": values for part, values in attrs.asdict(surface).items()}
     looked = SurfaceFields(mesh, {name: surface.node for name, surface in surfaces.items()})
     found = looked.of_states([state.u for state in trajectory.states], materials, history)
+    for name, surface in surfaces.items() if len(contact_kPa) else ():
+        found[f"{name}_{CONTACT_PRESSURE}"] = np.array([p[surface.node] for p in contact_kPa], np.float32)
     write_npz(folder / FOLDER / "mesh.npz", arrays)
     write_npz(
         folder / FOLDER / f"{MODEL_A}.npz",
@@ -332,12 +342,17 @@ def _motion(
         state=model["state"],
         state_kPa=model["state_kPa"],
         model_a=model["displacement_mm"],
-        fields={r: {f: model[f"{r}_{f}"] for f in FIELDS} for r in REGIONS},
+        fields={r: _fields(model, r) for r in REGIONS},
         sensitivity={
             r: sensitivity[f"{r}_{SENSITIVITY}"] for r in REGIONS if f"{r}_{SENSITIVITY}" in sensitivity
         },
         paths=tuple(sorted(names, key=lambda name: (len(name), name))),
     )
+
+
+def _fields(model: dict[str, Array], region: str) -> dict[str, Array]:
+    names = FIELDS + (CONTACT_PRESSURE,) * (f"{region}_{CONTACT_PRESSURE}" in model)
+    return {name: model[f"{region}_{name}"] for name in names}
 
 
 def _fits(m: Motion) -> bool:

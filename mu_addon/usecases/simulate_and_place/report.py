@@ -17,7 +17,7 @@ from ...files import write_text
 from ...report import charts as plots
 from ...report.charts import label, signed
 from ...report.html import cards, facts_table, figure, note, number, page, picture_figure, table
-from ...report.results import ReportData, RuleResult
+from ...report.results import PaintedStates, ReportData, RuleResult
 from ...run.progress import spell
 from .light_charts import front_chart, response_chart
 
@@ -318,7 +318,7 @@ def _motion(r: ReportData) -> str:
         html += (
             '<div class="triple">' + "".join(picture_figure(picture) for picture in r.pictures[1:]) + "</div>"
         )
-    return html + _stretch(r)
+    return html + _stretch(r) + _self_contact(r)
 
 
 def _stretch(r: ReportData) -> str:
@@ -327,15 +327,39 @@ def _stretch(r: ReportData) -> str:
         return ""
     html = "<h3>Stretch</h3>"
     if r.stretched is not None:
-        bar = figure(plots.stretch_bar(r.stretched.top), "", "Colour scale of the stretch.", "bar")
-        shown = "".join(picture_figure(picture) for picture in r.stretched.pictures)
-        html += f"{bar}<div class='pair'>{shown}</div>"
+        html += _painted(r.stretched, 1.0, "largest principal stretch")
     columns = ["largest stretch", "x [mm]", "y [mm]", "z [mm]", "1 % of volume exceeds"]
     head = [("pressure [kPa]", "n"), ("part", ""), *((name, "n") for name in columns)]
     rows = [([signed(row[0]), row[1], *map(signed, row[2:])], False) for row in r.stretch]
     return html + table(
         "Largest principal stretch of each part without a sensor, and where it is at rest. Compare it with "
         "the resin's elongation at break; the largest value depends on the mesh where a strut meets a wall.",
+        head,
+        rows,
+    )
+
+
+def _painted(states: PaintedStates, low: float, name: str) -> str:
+    bar = figure(plots.field_bar(low, states.top, name), "", f"Colour scale of the {name}.", "bar")
+    shown = "".join(picture_figure(picture) for picture in states.pictures)
+    return f"{bar}<div class='pair'>{shown}</div>"
+
+
+def _self_contact(r: ReportData) -> str:
+    """Where walls and struts touch each other: painted on the extreme states, and in numbers for all."""
+    if not r.self_contact:
+        return ""
+    html = "<h3>Self-contact</h3>"
+    if not any(row[2] for row in r.self_contact):
+        return html + "<p>No wall or strut touches another at these pressures.</p>"
+    if r.touched is not None:
+        html += _painted(r.touched, 0.0, "contact pressure [kPa]")
+    columns = ["force [N]", "least gap [mm]", "largest contact pressure [kPa]", "x [mm]", "y [mm]", "z [mm]"]
+    head = [("pressure [kPa]", "n"), *((name, "n") for name in columns)]
+    rows = [([signed(row[0]), *row[1:4], *map(signed, row[4:])], False) for row in r.self_contact]
+    return html + table(
+        "What walls and struts press on each other with, without a sensor, how near they come, and where at "
+        "rest the pressure is largest; at a single node it depends on the mesh.",
         head,
         rows,
     )

@@ -13,17 +13,17 @@ from ...evidence.unit_effects import EFFECTS
 from ...files import write_bytes
 from ...report.results import (
     Gate,
+    PaintedStates,
     Parameter,
     Path,
     Picture,
     ReportData,
     RuleResult,
     SideView,
-    StretchPictures,
 )
 from ...run.versions import package_versions
 from .job import LATTICE_LAW
-from .motion import REGIONS, read_motion
+from .motion import CONTACT_PRESSURE, REGIONS, read_motion
 
 if TYPE_CHECKING:
     from ...homogenize.effective import Effective
@@ -44,6 +44,7 @@ FILES = {
     "model_a.pvd": "motion without a sensor, one state per sample (ParaView)",
     "angle.csv": "bending angle of every converged state",
     "stretch.csv": "largest principal stretch of wall and lattice in every state, and where",
+    "self_contact.csv": "force, gap and largest pressure of the unit's contact with itself in every state",
     "contact.csv": "contact force, penetration and slip on each obstacle over time",
     "deviation.csv": "deviation and rank of every path and rule",
     "delta.npz": "deviation over time and length of every path and rule, mm",
@@ -125,7 +126,9 @@ def report_data(
         light=study.light,
         contact=study.contact,
         stretch=tuple(study.stretch),
-        stretched=_stretched(study),
+        stretched=_painted(study, "largest_stretch", 1.0, 0.01, "stretch"),
+        self_contact=tuple(study.self_contact),
+        touched=_painted(study, CONTACT_PRESSURE, 0.0, 1.0, "contact pressure"),
         effects=tuple(_effect_words(job.effects)),
         pressure_kPa=np.array([s.pressure_kPa for s in states]),
         angle_deg=np.array([study.bending_angle_deg(s.u) for s in states if study.mesh]),
@@ -292,9 +295,12 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
     return side_view(parts, study.anchors, path, radius), pictures
 
 
-def _stretched(study: Study) -> StretchPictures | None:
-    """The states of least and largest pressure painted by how far they are stretched."""
-    from ...report.charts import stretch_colors
+def _painted(study: Study, field: str, low: float, least: float, word: str) -> PaintedStates | None:
+    """The states of least and largest pressure painted by a field from `low` on; None where there is none.
+
+    least: by how much the scale exceeds `low` at least; word: what the field is called.
+    """
+    from ...report.charts import field_colors
     from ...report.unit_pictures import motion
 
     if study.trajectory is None:
@@ -304,22 +310,28 @@ def _stretched(study: Study) -> StretchPictures | None:
     except InputError:
         # It stopped before its motion was written.
         return None
+    if any(field not in found for found in played.fields.values()):
+        return None
     ends = int(played.state_kPa.argmin()), int(played.state_kPa.argmax())
     shown = [k for k in dict.fromkeys(ends) if study.trajectory.states[k].loaded]
-    painted = {name: played.fields[name]["largest_stretch"][shown] for name in REGIONS}
+    painted = {name: played.fields[name][field] for name in REGIONS}
+    shown = [k for k in shown if any((values[k] > low).any() for values in painted.values())]
+    if not shown:
+        return None
     # Single nodes where a strut meets the wall are no reason to darken the rest.
-    every = np.concatenate([values.ravel() for values in painted.values()])
-    top = max(1.01, float(np.quantile(every, 0.999)))
+    every = np.concatenate([values[shown].ravel() for values in painted.values()])
+    top = max(low + least, float(np.quantile(every[every > low], 0.999)))
     texts, colors = [], []
-    for number, k in enumerate(shown):
+    for k in shown:
         words = f"{played.state_kPa[k]:g} kPa"
-        texts.append((played.model_a[k], words, f"The deformed unit at {words}, coloured by stretch."))
+        texts.append((played.model_a[k], words, f"The deformed unit at {words}, coloured by {word}."))
         by_region = {}
         for name, region in REGIONS.items():
             by_region[region] = np.ones((len(played.mesh.nodes), 3))
-            by_region[region][played.surfaces[name].node] = stretch_colors(painted[name][number], top)
+            by_region[region][played.surfaces[name].node] = field_colors(painted[name][k], low, top)
         colors.append(by_region)
-    return StretchPictures(motion(played.mesh, texts, colors=colors), top)
+    outside = field == CONTACT_PRESSURE
+    return PaintedStates(motion(played.mesh, texts, colors=colors, outside=outside), top)
 
 
 def _search_picture(study: Study) -> Picture | None:

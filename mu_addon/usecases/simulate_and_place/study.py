@@ -41,6 +41,7 @@ from ...placement.deviation import rank
 from ...reading import file_bytes, parse_json
 from ...report.results import (
     CONTACT_COLUMNS,
+    SELF_CONTACT_COLUMNS,
     STRETCH_COLUMNS,
     ContactHistory,
     LatticeSearch,
@@ -91,6 +92,7 @@ class Study:
     solver: dict[str, Any] = attrs.field(factory=dict)
     contact: ContactHistory | None = None
     stretch: list[tuple[str, ...]] = attrs.field(factory=list)
+    self_contact: list[tuple[str, ...]] = attrs.field(factory=list)
     search: LatticeSearch | None = None
     light: Signals | None = None
     _ahead: CandidateSolver | None = None
@@ -254,7 +256,9 @@ class Study:
             self._write_contact()
             self._write_stretch(self.trajectory.states)
             materials = self.job.materials(self.mesh)
-            write_model_a(self.folder, self.mesh, materials, self.trajectory, self._remembered(model))
+            touching = self._write_self_contact(model, self.trajectory.states)
+            remembered = self._remembered(model)
+            write_model_a(self.folder, self.mesh, materials, self.trajectory, remembered, touching)
             self._look_for_self_intersection(self.trajectory.states)
             self._tell_of_snaps(self.trajectory.states)
             self._look_beyond_the_fit(self.trajectory.states)
@@ -425,6 +429,22 @@ class Study:
             return
         write_csv(self.folder / "contact.csv", CONTACT_COLUMNS, self.contact.rows())
         self.context.summary["contact"] = self.contact.summary()
+
+    def _write_self_contact(self, model: Model, states: tuple[State, ...]) -> list[Array]:
+        """Where the unit touches itself in every state; the pressure (n,) in kPa there at all nodes."""
+        self.self_contact = []
+        if model.self_contact is None:
+            return []
+        found = [model.self_contact.touch(state.u) for state in states]
+        for state, touch in zip(states, found, strict=True):
+            row = [f"{state.pressure_kPa:.6g}", f"{touch.force_N:.4g}", "", "", "", "", ""]
+            if touch.force_N:
+                node = int(touch.pressure_kPa.argmax())
+                place = (f"{x:.2f}" for x in model.mesh.nodes[node])
+                row[2:] = [f"{touch.gap_mm:.4f}", f"{touch.pressure_kPa[node]:.4g}", *place]
+            self.self_contact.append(tuple(row))
+        write_csv(self.folder / "self_contact.csv", list(SELF_CONTACT_COLUMNS), self.self_contact)
+        return [touch.pressure_kPa for touch in found]
 
     def _write_stretch(self, states: tuple[State, ...]) -> None:
         """How far wall and lattice are stretched in every state, and where most."""

@@ -40,6 +40,7 @@ LAYOUT = FolderLayout(
         "model_a",
         "angle.csv",
         "stretch.csv",
+        "self_contact.csv",
         "contact.csv",
         "deviation.csv",
         "delta.npz",
