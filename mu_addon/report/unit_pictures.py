@@ -90,7 +90,7 @@ def motion(
 
     A state is displacement (n, 3) in mm, caption and alternative text. beside: rigid bodies, of which the
     part at x <= 0 and within the picture is shown; width: in pixels. colors: of each state, by region, sRGB
-    (n, 3) of every node, in place of one colour a region.
+    (n, 3) of every node, in place of one colour a region; a region without any is left out.
     """
     skins, plain = skins_of(mesh), COLORS
     # A half mesh lies at x >= 0; its mirror image shows the same section to a viewer at +x.
@@ -102,7 +102,11 @@ def motion(
         if flip:
             nodes = nodes * [-1.0, 1.0, 1.0]
         scenes.append(
-            [Part(nodes, faces[:, ::-1] if flip else faces, color[region]) for region, faces in skins.items()]
+            [
+                Part(nodes, faces[:, ::-1] if flip else faces, color[region])
+                for region, faces in skins.items()
+                if region in color
+            ]
         )
     every = [part for scene in scenes for part in scene]
     standing = _behind(beside)

@@ -322,15 +322,17 @@ def _painted(study: Study, field: str, low: float, least: float, word: str) -> P
     every = np.concatenate([values[shown].ravel() for values in painted.values()])
     top = max(low + least, float(np.quantile(every[every > low], 0.999)))
     texts, colors = [], []
+    outside = field == CONTACT_PRESSURE
     for k in shown:
         words = f"{played.state_kPa[k]:g} kPa"
         texts.append((played.model_a[k], words, f"The deformed unit at {words}, coloured by {word}."))
         by_region = {}
-        for name, region in REGIONS.items():
+        # Struts would hide the creases where walls meet.
+        for name in ("membrane",) if outside else REGIONS:
+            region = REGIONS[name]
             by_region[region] = np.ones((len(played.mesh.nodes), 3))
             by_region[region][played.surfaces[name].node] = field_colors(painted[name][k], low, top)
         colors.append(by_region)
-    outside = field == CONTACT_PRESSURE
     return PaintedStates(motion(played.mesh, texts, colors=colors, outside=outside), top)
 
 
