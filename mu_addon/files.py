@@ -15,7 +15,7 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -110,6 +110,22 @@ def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]])
     writer.writerow(columns)
     writer.writerows(rows)
     write_text(path, stream.getvalue())
+
+
+def append_lines(stream: IO[bytes], lines: bytes) -> None:
+    """Add whole lines to the end of an unbuffered file; where not all find room, those that do.
+
+    Raises OSError.
+    """
+    end, written = stream.seek(0, os.SEEK_END), 0
+    try:
+        # An unbuffered file may take less than it is given.
+        while written < len(lines):
+            written += stream.write(lines[written:]) or 0
+    except OSError:
+        with suppress(OSError):
+            stream.truncate(end + lines.rfind(b"\n", 0, written) + 1)
+        raise
 
 
 # What a changed byte can raise, depending on where in the archive it lies.
