@@ -138,9 +138,10 @@ _DAMAGED = (
 # An archive unpacks to no more than this many times its size, or to no more than this many bytes at all.
 # Computed numbers shrink to a half or a third; what shrinks far more was made to fill the memory.
 _MOST_SHRUNK, _SMALL = 16, 1 << 26
+_MOST_UNPACKED = 1 << 32
 
 
-def read_npz(path: Path, most_bytes: int = 1 << 32) -> dict[str, Any] | None:
+def read_npz(path: Path, most_bytes: int = _MOST_UNPACKED) -> dict[str, Any] | None:
     """Arrays by name of an NPZ file, or None where there is none that can be read whole.
 
     Nothing of the file is run, and nothing is set aside for an array before the archive is known to hold as
