@@ -9,8 +9,9 @@ The tool needs bpy, which a plain `pip install -e .` leaves out: without it this
 Beside them it puts sample.blend, the sample scene.
 
 Blender wants the manifest beside the package's `__init__.py`; the checkout keeps them apart so that the core
-is an ordinary package. What ships is copied together first. Wheels come from pip, unmodified, and are kept in
-FOLDER/wheels; numpy is never among them, since Blender has its own and a second one would replace it.
+is an ordinary package. What ships is copied together first. Wheels come from pip, unmodified, each with the
+SHA-256 that wheels.csv pins, and are kept in FOLDER/wheels; numpy is never among them, since Blender has its
+own and a second one would replace it. sbom.cdx.json in the archive lists what it holds.
 """
 
 from __future__ import annotations
@@ -24,18 +25,10 @@ import tempfile
 import tomllib
 from pathlib import Path
 
+from bill import write_bill
+from wheels import PLATFORMS, PYTHONS, download, not_as_pinned, pinned
+
 ROOT = Path(__file__).resolve().parents[1]
-PYTHONS = ("3.11", "3.13", "3.14")
-"""Of Blender 4.5 and 5.0; of 5.1 and 5.2; of Linux distributions that build Blender with their own."""
-PLATFORMS = {
-    "linux-x64": [f"manylinux_2_{minor}_x86_64" for minor in (28, 27, 24, 17)] + ["manylinux2014_x86_64"],
-    "windows-x64": ["win_amd64"],
-    "macos-arm64": [f"macosx_{major}_0_arm64" for major in (15, 14, 13, 12, 11)],
-}
-LEFT_OUT = ("numpy",)
-"""numpy is Blender's own."""
-UNAVAILABLE = {"windows-x64": ("pymetis",)}
-"""No wheel for a platform; without METIS systems are ordered by minimum degree."""
 
 
 def blender_ext() -> Path | None:
@@ -96,33 +89,6 @@ def stage(folder: Path) -> None:
         shutil.copytree(ROOT / "assets", folder / "assets")
 
 
-def requirements(platform: str) -> list[str]:
-    """What the core needs at run time on a platform, pinned as in pyproject.toml."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    left_out = LEFT_OUT + UNAVAILABLE.get(platform, ())
-    return [r for r in project["dependencies"] if not r.startswith(left_out)]
-
-
-def download(folder: Path, platform: str, python: str) -> list[Path]:
-    """Wheels of one platform and Python, dependencies included, from pip; raises CalledProcessError."""
-    tags = [option for tag in [*PLATFORMS[platform], "any"] for option in ("--platform", tag)]
-    abis = [option for abi in (f"cp{python.replace('.', '')}", "abi3", "none") for option in ("--abi", abi)]
-    found = folder / platform / python
-    found.mkdir(parents=True, exist_ok=True)
-    subprocess.run(
-        [
-            *(sys.executable, "-m", "pip", "download", "--quiet", "--dest", str(found)),
-            *("--only-binary=:all:", "--implementation", "cp", "--python-version", python, *abis, *tags),
-            *requirements(platform),
-        ],
-        check=True,
-    )
-    for wheel in found.glob("*.whl"):
-        if wheel.name.split("-")[0] in LEFT_OUT:
-            wheel.unlink()
-    return sorted(found.glob("*.whl"))
-
-
 def bundle(source: Path, wheels: list[Path], platform: str) -> None:
     """Put wheels into a staged extension, each once, and name them in its manifest."""
     names = sorted({wheel.name for wheel in wheels})
@@ -146,11 +112,20 @@ def build(tool: Path, out: Path, platform: str | None, pythons: list[str]) -> in
             wheels = [wheel for python in pythons for wheel in download(out / "wheels", platform, python)]
             bundle(source, wheels, platform)
             version = tomllib.loads((source / "blender_manifest.toml").read_text(encoding="utf-8"))["version"]
-            target = ["--output-filepath", str(out / f"mu_addon-{version}-{platform}.zip")]
+            archive = out / f"mu_addon-{version}-{platform}.zip"
+            target = ["--output-filepath", str(archive)]
+        write_bill(source)
         for arguments in (["validate", str(source)], ["build", "--source-dir", str(source), *target]):
             status = subprocess.run([sys.executable, str(tool), *arguments], check=False).returncode
             if status:
                 return status
+    if platform is not None:
+        wanted = [w for w in pinned() if w.platform == platform and w.python in pythons]
+        wrong = not_as_pinned(archive, wanted)
+        if wrong:
+            archive.unlink()
+            sys.stderr.write("\n".join(wrong) + "\n")
+            return 1
     return 0
 
 
@@ -183,7 +158,7 @@ def main(arguments: list[str]) -> int:
         try:
             status = build(tool, out, platform, options.python)
         except subprocess.CalledProcessError as error:
-            sys.stderr.write(f"pip found no wheels for {platform}: {error}\n")
+            sys.stderr.write(f"pip did not find the wheels of {platform} as pinned: {error}\n")
             status = 1
         if status:
             return status

@@ -2,6 +2,7 @@
 
     python benchmarks/faults.py                 # all, 50 kills
     python benchmarks/faults.py --kills 5 disk  # some of them
+    python benchmarks/faults.py --every 4 calls # a quarter of the calls that can fail
 
 The study is the main job on a coarse mesh. Whatever is done to it, the same command must then find the same
 deviations, to the last digit, as a run that nothing happened to.
@@ -20,6 +21,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import attrs
@@ -32,12 +34,15 @@ from circumstances import circumstances  # noqa: E402
 
 from mu_addon.design.parameters import load_preset  # noqa: E402
 from mu_addon.meshing.settings import MeshSettings  # noqa: E402
+from mu_addon.run.cache import Cache  # noqa: E402
 from mu_addon.run.context import run_to_end  # noqa: E402
 from mu_addon.run.folder import keep_inputs  # noqa: E402
 from mu_addon.run.progress import Progress  # noqa: E402
+from mu_addon.usecases.simulate_and_place import study as study_module  # noqa: E402
 from mu_addon.usecases.simulate_and_place.job import Job, grasp  # noqa: E402
 from mu_addon.usecases.simulate_and_place.run import run_stages  # noqa: E402
 from mu_addon.usecases.simulate_and_place.study import Study  # noqa: E402
+from tests.run.failing_files import failing  # noqa: E402
 
 JOB = Job(
     load_preset("mu-1.0x"),
@@ -276,7 +281,61 @@ def two_at_once(work, reference):
     )
 
 
+def calls(work, reference, every):
+    """Each call that changes a file of a whole `place` fails, by turns once and for good.
+
+    Its computed states come from memory, and are written as if they had just been computed.
+    """
+    kept = {}
+    get, put = Cache.get, Cache.put
+
+    def keep(self, kind, name, arrays):
+        kept[kind, name] = {part: np.array(values) for part, values in arrays.items()}
+        put(self, kind, name, arrays)
+
+    def remember(self, kind, name):
+        found = get(self, kind, name)
+        if found is None and (kind, name) in kept:
+            put(self, kind, name, kept[kind, name])
+            return dict(kept[kind, name])
+        return found
+
+    def run(folder):
+        messages = []
+        with run_to_end(Progress([messages.append])) as context:
+            run_stages(Study.open(attrs.evolve(JOB, workers=1), folder, context))
+        return context.status, messages[-1]
+
+    study_module.build_solid = cache(study_module.build_solid)
+    Cache.get, Cache.put = remember, keep
+    try:
+        assert run(work / "calls-once")[0] == 0
+        with failing(work / "calls-0") as files:
+            assert run(work / "calls-0")[0] == 0
+        statuses, wrong, total = Counter(), [], len(files.calls)
+        for at in range(1, total + 1, every):
+            folder = work / f"calls-{at}"
+            with failing(folder, at, for_good=at % 2 == 0) as files:
+                status, message = run(folder)
+            where = f"{at}, {files.calls[at - 1]}"
+            statuses[status] += 1
+            half = [p.name for p in folder.rglob("*.part*")]
+            if status not in (0, 5) or half or not (status == 0 or message["what_to_do"]):
+                wrong.append(f"{where}: exit {status}, {message.get('what')}, {half}")
+            if run(folder)[0] != 0 or digits(folder) != reference:
+                wrong.append(f"{where}: not the same digits")
+            shutil.rmtree(folder)
+    finally:
+        Cache.get, Cache.put = get, put
+    ended = ", ".join(f"{count} times exit {status}" for status, count in sorted(statuses.items()))
+    yield (
+        f"{sum(statuses.values())} of the {total} calls that change a file fail, each in a run of its own",
+        f"{ended}; then same digits" if not wrong else "FAILED: " + "; ".join(wrong),
+    )
+
+
 FAULTS = {
+    "calls": calls,
     "kills": kills,
     "disk": disk,
     "small_files": small_files,
@@ -290,6 +349,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("faults", nargs="*", choices=[*FAULTS, []], help=", ".join(FAULTS))
     parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument(
+        "--every", type=int, default=1, help="of the calls that can fail only each N-th fails"
+    )
     parser.add_argument("--reference", type=Path, help="a folder of this study, finished, to compare with")
     given = parser.parse_args()
     print(circumstances())
@@ -305,7 +367,7 @@ def main():
         reference = digits(work / "reference")
         print("| fault | what came of it |\n| --- | --- |")
         for fault in given.faults or FAULTS:
-            more = (given.kills,) if fault == "kills" else ()
+            more = {"kills": (given.kills,), "calls": (given.every,)}.get(fault, ())
             for what, outcome in FAULTS[fault](work, reference, *more):
                 print(f"| {what} | {outcome} |", flush=True)
 

@@ -15,7 +15,7 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -112,6 +112,22 @@ def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]])
     write_text(path, stream.getvalue())
 
 
+def append_lines(stream: IO[bytes], lines: bytes) -> None:
+    """Add whole lines to the end of an unbuffered file; where not all find room, those that do.
+
+    Raises OSError.
+    """
+    end, written = stream.seek(0, os.SEEK_END), 0
+    try:
+        # An unbuffered file may take less than it is given.
+        while written < len(lines):
+            written += stream.write(lines[written:]) or 0
+    except OSError:
+        with suppress(OSError):
+            stream.truncate(end + lines.rfind(b"\n", 0, written) + 1)
+        raise
+
+
 # What a changed byte can raise, depending on where in the archive it lies.
 _DAMAGED = (
     OSError, ValueError, EOFError, KeyError, IndexError, RuntimeError, OverflowError, MemoryError,
@@ -122,9 +138,10 @@ _DAMAGED = (
 # An archive unpacks to no more than this many times its size, or to no more than this many bytes at all.
 # Computed numbers shrink to a half or a third; what shrinks far more was made to fill the memory.
 _MOST_SHRUNK, _SMALL = 16, 1 << 26
+_MOST_UNPACKED = 1 << 32
 
 
-def read_npz(path: Path, most_bytes: int = 1 << 32) -> dict[str, Any] | None:
+def read_npz(path: Path, most_bytes: int = _MOST_UNPACKED) -> dict[str, Any] | None:
     """Arrays by name of an NPZ file, or None where there is none that can be read whole.
 
     Nothing of the file is run, and nothing is set aside for an array before the archive is known to hold as

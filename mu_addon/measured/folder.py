@@ -14,7 +14,7 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
-from ..reading import file_text, parse_toml
+from ..reading import file_bytes, file_text, parse_toml
 from .experiment import Array, Experiment
 from .kinds import AXES, KINDS, MODES, PLATES, ROLES, VALVES, Kind
 from .table import Remark, read_table
@@ -135,7 +135,7 @@ def _experiment(entry: dict[str, Any], at: _Place) -> tuple[Experiment, list[Rem
     if kind.name == "beam_deadweight" and (columns["added_mass_g"] < 0).any():
         row = int(table.rows[np.argmax(columns["added_mass_g"] < 0)])
         raise InputError("added_mass_g is negative", f"{path}, row {row}", "give the mass that was added")
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    digest = hashlib.sha256(file_bytes(path)).hexdigest()
     experiment = Experiment(
         kind=kind.name, file=path, columns=columns, rows=table.rows, sha256=digest, **fields
     )

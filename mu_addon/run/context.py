@@ -15,8 +15,9 @@ from typing import Any
 
 import attrs
 
-from ..errors import MuError, OutputError
+from ..errors import InputError, MuError, OutputError
 from ..files import plain, write_json, write_text
+from ..reading import file_bytes, parse_json
 from .lock import FolderLock
 from .progress import Progress, log_file
 
@@ -79,6 +80,13 @@ class RunContext:
                 str(folder),
                 "do not start another run with the same folder",
             )
+        elif _says_running(folder / SUMMARY):
+            # Nobody has the lock, so that run is gone, and could not say so itself.
+            self.progress.warning(
+                "the last run in this folder was interrupted: it was killed, or the computer stopped",
+                str(folder),
+                "nothing: this run takes up what that one finished; log.ndjson says how far it came",
+            )
 
     def unlock(self) -> None:
         """Give the folder free."""
@@ -98,6 +106,15 @@ class RunContext:
         write_text(folder / SUMMARY, text.ljust(RESERVED) + "\n")
         self.folder = folder
         return folder
+
+
+def _says_running(path: Path) -> bool:
+    """Whether a summary is that of a run which has not ended."""
+    try:
+        found = parse_json(file_bytes(path), SUMMARY)
+    except (OSError, InputError):
+        return False
+    return isinstance(found, dict) and found.get("status") == "running"
 
 
 @contextmanager

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from ..errors import MuError
-from ..files import output_error, plain
+from ..files import append_lines, output_error, plain
 
 Message = dict[str, Any]
 Sink = Callable[[Message], None]
@@ -261,18 +261,6 @@ def json_lines(stream: TextIO = sys.stdout, clock: Clock = time.perf_counter) ->
     return sink
 
 
-def _add_whole(path: Path, line: bytes) -> None:
-    """Add a line to the end of a file, or nothing where only a part of it finds room; raises OSError."""
-    with path.open("ab", buffering=0) as stream:
-        end = stream.seek(0, os.SEEK_END)
-        if (written := stream.write(line)) < len(line):
-            try:
-                stream.write(line[written:])
-            except OSError:
-                stream.truncate(end)
-                raise
-
-
 def log_file(path: Path, clock: Clock = time.perf_counter) -> Sink:
     """A sink that adds to `path` (log.ndjson): messages with the time of day, running fractions every 5 s.
 
@@ -288,12 +276,18 @@ def log_file(path: Path, clock: Clock = time.perf_counter) -> Sink:
             last = clock()
         stamped = {"time": time.strftime("%Y-%m-%dT%H:%M:%S%z"), **plain(message)}
         try:
-            _add_whole(path, _json_line(stamped).encode())
+            with path.open("ab", buffering=0) as stream:
+                append_lines(stream, _json_line(stamped).encode())
         except OSError as error:
             raise output_error(error, path) from error
 
     try:
-        path.open("a").close()
+        with path.open("ab+", buffering=0) as stream:
+            if stream.seek(0, os.SEEK_END):
+                stream.seek(-1, os.SEEK_END)
+                # A line that a killed process left half must not take the next one with it.
+                if stream.read(1) != b"\n":
+                    append_lines(stream, b"\n")
     except OSError as error:
         raise output_error(error, path) from error
     return sink

@@ -16,6 +16,7 @@ import os
 import re
 from array import array
 from collections.abc import Iterable, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, Any
 
@@ -23,7 +24,7 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
-from ..files import make_folder, output_error, plain
+from ..files import append_lines, make_folder, output_error, plain
 from ..reading import file_bytes
 from .decoder import Reject, Samples
 
@@ -129,7 +130,7 @@ class Recorder:
         try:
             if self._rejects is None:
                 self._rejects = path.open("ab", buffering=0)
-            self._append(self._rejects, data)
+            append_lines(self._rejects, data)
         except OSError as error:
             raise output_error(error, path) from error
         self._rejects_left -= len(data)
@@ -156,17 +157,17 @@ class Recorder:
         )
 
     def close(self) -> None:
-        """Write everything to the disk and close the files; raises OutputError."""
-        self._sync()
-        for stream in (self._file, self._rejects):
-            if stream is not None:
-                stream.close()
-        self._index.close()
+        """Write everything to the disk and close the files, which may be closed; raises OutputError."""
+        with ExitStack() as closing:
+            for stream in self._open:
+                closing.callback(stream.close)
+            self._sync()
 
     def _begin(self, columns: tuple[str, ...]) -> None:
         if self._file is not None:
             self._sync()
             self._file.close()
+            self._file = None
         self._number += 1
         self._row, self._columns = 0, columns
         path = self.folder / f"recording-{self._number:03d}.csv"
@@ -180,29 +181,27 @@ class Recorder:
     def _write(self, data: bytes) -> None:
         assert self._file is not None
         try:
-            self._append(self._file, data)
+            append_lines(self._file, data)
         except OSError as error:
             raise output_error(error, Path(self._file.name)) from error
 
-    @staticmethod
-    def _append(stream: IO[bytes], data: bytes) -> None:
-        # An unbuffered file may take less than it is given.
-        while data:
-            data = data[stream.write(data) or 0 :]
-
     def _index_line(self, message: Mapping[str, Any]) -> None:
         try:
-            self._index.write(json.dumps(plain(message)).encode() + b"\n")
+            append_lines(self._index, json.dumps(plain(message)).encode() + b"\n")
         except OSError as error:
             raise output_error(error, self.folder / INDEX) from error
 
+    @property
+    def _open(self) -> list[IO[bytes]]:
+        """The files that are open now."""
+        return [s for s in (self._file, self._rejects, self._index) if s is not None and not s.closed]
+
     def _sync(self) -> None:
-        for stream in (self._file, self._rejects, self._index):
-            if stream is not None:
-                try:
-                    os.fsync(stream.fileno())
-                except OSError as error:
-                    raise output_error(error, Path(stream.name)) from error
+        for stream in self._open:
+            try:
+                os.fsync(stream.fileno())
+            except OSError as error:
+                raise output_error(error, Path(stream.name)) from error
 
 
 @attrs.frozen(eq=False)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import mmap
+import os
 import struct
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -42,10 +44,17 @@ class Ring:
             with making.open("wb") as stream:
                 stream.write(_HEAD.pack(_MAGIC, columns, capacity, 0))
                 stream.truncate(size)
+                stream.flush()
+                if hasattr(os, "posix_fallocate"):
+                    # Room that the disk turns out not to have later ends a process that writes to a map.
+                    os.posix_fallocate(stream.fileno(), 0, size)
             making.replace(path)
             with path.open("rb+") as stream:
                 mapped = mmap.mmap(stream.fileno(), size)
         except OSError as error:
+            for left in (making, path):
+                with suppress(OSError):
+                    left.unlink(missing_ok=True)
             raise output_error(error, path) from error
         return cls(_rows(mapped, columns, capacity), mapped)
 

@@ -18,6 +18,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..errors import OutputError
 from ..files import plain
 from .decoder import Decoder, Samples
 from .recording import Recorder, columns_of
@@ -105,10 +106,15 @@ def run_session(
         while not pieces.empty():
             _take(pieces, view, clock)
         view.take(view.decoder.finish(clock.now()), clock.now())
-        return view.end(clock.now())
+        status = view.end(clock.now())
+        recorder.close()
+        return status
     finally:
         control.stop.set()
-        recorder.close()
+        # What cannot be written now was told when it first could not.
+        with suppress(OutputError):
+            recorder.close()
+        view.close()
 
 
 class _Clock:
@@ -291,18 +297,22 @@ class _View:
         }
 
     def end(self, now: float) -> dict[str, Any]:
-        """The last status, with everything on disk; the live view is removed, the recording holds it all."""
+        """The last status, with everything on disk."""
         self.state = "ended"
         self.recorder.tick(np.inf, attrs.asdict(self.decoder.counters))
         status = {**self.status(now), "live": ""}
         self._write_status(status)
+        return status
+
+    def close(self) -> None:
+        """Remove the live view."""
         if self._ring is not None:
             self._ring.close()
+            self._ring = None
         for path in self.folder.glob("live-*.bin"):
             # Windows keeps a file that somebody looks into.
             with suppress(OSError):
                 path.unlink(missing_ok=True)
-        return status
 
     def _write_status(self, status: Mapping[str, Any]) -> None:
         # Not flushed to the disk: it is for those who look on, and gone with the session.
@@ -312,4 +322,5 @@ class _View:
             beside.replace(self.folder / STATUS)
         except OSError:
             # A reader on Windows may hold it open for a moment; the next one comes soon.
-            beside.unlink(missing_ok=True)
+            with suppress(OSError):
+                beside.unlink(missing_ok=True)

@@ -8,12 +8,13 @@ from typing import Any
 from ..errors import InputError
 from ..measured import Measured
 from ..measured.folder import FILE
+from ..reading import file_bytes
 from ..run.inputs import digest
 
 
 def experiments_digest(measured: Measured) -> str:
     """SHA-256 of the file that describes a folder's experiments."""
-    return digest((measured.folder / FILE).read_bytes())
+    return digest(file_bytes(measured.folder / FILE))
 
 
 def described(measured: Measured) -> dict[str, list[str]]:

@@ -1,6 +1,9 @@
 """The Blender extension: Blender's tool accepts it, it holds what ships, and it registers twice."""
 
+import hashlib
 import importlib.util
+import json
+import re
 import subprocess
 import sys
 import zipfile
@@ -10,6 +13,13 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 needs_bpy = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="bpy is not installed")
+
+
+@pytest.fixture
+def ci(monkeypatch):
+    """Imports a module of .ci by name."""
+    monkeypatch.syspath_prepend(ROOT / ".ci")
+    return importlib.import_module
 
 
 @pytest.fixture(scope="module")
@@ -27,19 +37,18 @@ def archive(tmp_path_factory):
 @needs_bpy
 def test_archive_holds_what_ships(archive):
     names = zipfile.ZipFile(archive).namelist()
-    assert {"blender_manifest.toml", "__init__.py", "LICENSE", "errors.py", "report/report.css"} <= set(names)
+    shipped = {"blender_manifest.toml", "__init__.py", "LICENSE", "errors.py", "report/report.css"}
+    assert shipped | {"sbom.cdx.json"} <= set(names)
+    bill = json.loads(zipfile.ZipFile(archive).read("sbom.cdx.json"))
+    assert (bill["metadata"]["component"]["name"], bill["components"]) == ("mu_addon", [])
     for name in names:
         assert not name.startswith(("tests/", "docs/", "benchmarks/", "."))
         assert "__pycache__" not in name
 
 
 @needs_bpy
-def test_blender_refuses_a_bad_manifest(tmp_path):
-    sys.path.insert(0, str(ROOT / ".ci"))
-    try:
-        import extension
-    finally:
-        sys.path.pop(0)
+def test_blender_refuses_a_bad_manifest(tmp_path, ci):
+    extension = ci("extension")
     source = tmp_path / "mu_addon"
     extension.stage(source)
     manifest = source / "blender_manifest.toml"
@@ -50,6 +59,79 @@ def test_blender_refuses_a_bad_manifest(tmp_path):
     )
     assert done.returncode != 0
     assert "tagline" in done.stdout + done.stderr
+
+
+def wheel(folder, name, metadata):
+    """A wheel of a package that vendors another."""
+    path = folder / f"{name}-1.2-py3-none-any.whl"
+    with zipfile.ZipFile(path, "w") as stream:
+        stream.writestr(f"{name}/_vendor/other-9.dist-info/METADATA", "Name: other\nVersion: 9\n")
+        stream.writestr(f"{name}-1.2.dist-info/METADATA", f"Name: {name}\nVersion: 1.2\n{metadata}\n")
+    return path
+
+
+def test_the_bill_of_materials_names_every_wheel(tmp_path, ci):
+    (tmp_path / "wheels").mkdir()
+    (tmp_path / "blender_manifest.toml").write_text((ROOT / "blender_manifest.toml").read_text())
+    one = wheel(tmp_path / "wheels", "one_a", "License-Expression: MIT AND Zlib")
+    wheel(tmp_path / "wheels", "three", "License: " + "All of its text, naïve " * 9)
+    wheel(tmp_path / "wheels", "two", "License: x\nClassifier: License :: OSI Approved :: BSD License")
+    ci("bill").write_bill(tmp_path)
+    bill = json.loads((tmp_path / "sbom.cdx.json").read_text())
+    assert (bill["bomFormat"], bill["specVersion"], bill["version"]) == ("CycloneDX", "1.6", 1)
+    assert bill["metadata"]["component"]["licenses"] == [{"license": {"id": "GPL-3.0-or-later"}}]
+    first, second, third = bill["components"]
+    digest = hashlib.sha256(one.read_bytes()).hexdigest()
+    assert (first["name"], first["version"]) == ("one_a", "1.2")
+    assert first["purl"] == "pkg:pypi/one-a@1.2?file_name=one_a-1.2-py3-none-any.whl"
+    assert first["hashes"] == [{"alg": "SHA-256", "content": digest}]
+    assert first["licenses"] == [{"expression": "MIT AND Zlib"}]
+    assert "licenses" not in second
+    assert third["licenses"] == [{"license": {"name": "BSD License"}}]
+    references = [c["bom-ref"] for c in bill["components"]]
+    assert bill["dependencies"] == [{"ref": "mu_addon", "dependsOn": references}]
+
+
+def test_an_archive_with_other_wheels_than_pinned_is_refused(tmp_path, ci):
+    wheels = ci("wheels")
+    content = {name: f"content of {name}".encode() for name in ("a.whl", "b.whl", "c.whl")}
+    pins = [
+        wheels.Wheel("linux-x64", "3.11", name[0], "1", name, hashlib.sha256(data).hexdigest())
+        for name, data in content.items()
+    ]
+
+    def archive_of(held):
+        path = tmp_path / "built.zip"
+        with zipfile.ZipFile(path, "w") as stream:
+            for name, data in held.items():
+                stream.writestr(f"wheels/{name}", data)
+        return path
+
+    assert wheels.not_as_pinned(archive_of(content), pins) == []
+    other = {"a.whl": content["a.whl"], "b.whl": b"another", "d.whl": b"one more"}
+    assert wheels.not_as_pinned(archive_of(other), pins) == [
+        "wheels/d.whl is not pinned in wheels.csv",
+        "wheels/c.whl is missing",
+        "wheels/b.whl has another SHA-256 than pinned",
+    ]
+
+
+def test_pins_are_those_of_the_project(ci):
+    """After a change of the dependencies: `python .ci/wheels.py`."""
+    wheels = ci("wheels")
+    pinned = wheels.pinned()
+    digests = {}
+    for wheel in pinned:
+        assert re.fullmatch("[0-9a-f]{64}", wheel.sha256)
+        assert wheel.file.endswith(".whl")
+        assert digests.setdefault(wheel.file, wheel.sha256) == wheel.sha256
+    named = {(w.platform, w.python, w.name.lower().replace("_", "-"), w.version) for w in pinned}
+    for platform in wheels.PLATFORMS:
+        for python in wheels.PYTHONS:
+            for requirement in wheels.requirements(platform):
+                name, version = requirement.split("==")
+                assert (platform, python, name, version) in named
+    assert not {"numpy", "bpy"} & {w.name for w in pinned}
 
 
 def test_without_bpy_it_says_what_to_do_before_any_work(tmp_path):

@@ -226,3 +226,21 @@ def test_a_run_is_not_complete_before_its_figures_are_written(tmp_path, monkeypa
         context.summary["rows"] = list(range(5000))
     assert context.status == 5
     assert json.loads((tmp_path / "summary.json").read_text())["status"] == "partial"
+
+
+def test_a_run_that_was_killed_is_told_by_the_next_one_in_its_folder(tmp_path):
+    """The lock is free, so that a summary which says "running" is of a run that is gone."""
+    process = start("wait", tmp_path)
+    assert process.stdout.readline() == "ready\n"
+    process.kill()
+    process.communicate()
+    assert json.loads((tmp_path / "summary.json").read_text())["status"] == "running"
+    warned = []
+    for _ in range(2):
+        messages = []
+        with run_to_end(Progress([messages.append])) as context:
+            context.open_folder(tmp_path)
+        assert context.status == 0
+        warned.append([m["what"] for m in messages if m["type"] == "warning"])
+    assert ["was interrupted" in what for what in warned[0]] == [True]
+    assert warned[1] == []

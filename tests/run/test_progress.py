@@ -180,3 +180,12 @@ def test_a_full_disk_leaves_no_half_line_in_the_log(tmp_path):
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert (tmp_path / "log.ndjson").read_bytes() == before
+
+
+def test_half_a_line_of_a_killed_process_does_not_take_the_next_one_with_it(tmp_path):
+    path = tmp_path / "log.ndjson"
+    path.write_text('{"type": "result"}\n{"type": "warn')
+    log_file(path)({"type": "warning", "what": "next"})
+    lines = path.read_text().splitlines()
+    assert lines[:2] == ['{"type": "result"}', '{"type": "warn']
+    assert json.loads(lines[2])["what"] == "next"

@@ -342,3 +342,12 @@ def test_a_ring_overwrites_its_oldest(tmp_path: Path) -> None:
     (tmp_path / "not").write_bytes(b"nothing")
     with pytest.raises(InputError, match="does not contain live data"):
         Ring.attach(tmp_path / "not")
+
+
+@pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="this system sets no room aside")
+def test_the_live_view_has_its_room_on_the_disk_before_it_is_written_to(tmp_path: Path) -> None:
+    """A map into a file with holes ends the process where the disk is full by then."""
+    ring = Ring.create(tmp_path / "live.bin", columns=4)
+    found = (tmp_path / "live.bin").stat()
+    ring.close()
+    assert 512 * found.st_blocks >= found.st_size > 2_000_000

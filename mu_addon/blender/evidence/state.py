@@ -4,8 +4,6 @@
 
 import csv
 import hashlib
-import json
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +17,7 @@ from ...errors import InputError, MuError
 from ...files import write_csv
 from ...measured import Measured, read_folder
 from ...measured.folder import FILE
+from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.folder import write_run
 from ..jobs.start_child import JobKind
 from ..shared.file_cache import FileCache
@@ -109,7 +108,7 @@ def measured_data(root: Any) -> MeasuredFolder | None:
 def _read_data(folder: Path) -> MeasuredFolder:
     try:
         measured = read_folder(folder)
-        described = hashlib.sha256((folder / FILE).read_bytes()).hexdigest()
+        described = hashlib.sha256(file_bytes(folder / FILE)).hexdigest()
     except MuError as error:
         return MeasuredFolder(None, error_text(error))
     except OSError as error:
@@ -133,8 +132,8 @@ def _read_run(
     summary: Path, verdict: Path, inputs: Path, unit: Path
 ) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any], str]:
     try:
-        named = tomllib.loads(inputs.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        named = parse_toml(file_text(inputs), inputs.name)
+    except (OSError, ValueError, MuError):
         named = {}
     try:
         of = read_unit(unit).hash() if unit.is_file() else ""
@@ -154,8 +153,8 @@ def write_inputs(root: Any, folder: Path) -> None:
 
 def _json(path: Path) -> dict[str, Any]:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        found = parse_json(file_bytes(path), path.name)
+    except (OSError, ValueError, MuError):
         return {}
     return found if isinstance(found, dict) else {}
 
@@ -203,7 +202,7 @@ def _having(root: Any) -> str:
 
 def _model(root: Any) -> str:
     try:
-        return hashlib.sha256((folder_of(root) / MODEL).read_bytes()).hexdigest()
+        return hashlib.sha256(file_bytes(folder_of(root) / MODEL)).hexdigest()
     except OSError:
         return ""
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +12,7 @@ import numpy as np
 from ...design import gripper as core
 from ...design.parameters import to_toml
 from ...errors import MuError
+from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.folder import write_run
 from ..jobs.start_child import JobKind
 from ..shared.file_cache import FileCache
@@ -113,9 +112,9 @@ def of(root: Any) -> Grasped | None:
 
 
 def _read_folder(folder: Path) -> Any:
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    asked = tomllib.loads((folder / "grip.toml").read_text(encoding="utf-8"))
-    texts = tuple((folder / name).read_text(encoding="utf-8") for name in ("gripper.toml", "unit.toml"))
+    summary = parse_json(file_bytes(folder / "summary.json"), "summary.json")
+    asked = parse_toml(file_text(folder / "grip.toml"), "grip.toml")
+    texts = tuple(file_text(folder / name) for name in ("gripper.toml", "unit.toml"))
     tables = {}
     for cube in asked["cubes"]:
         side = f"{cube['side_mm']:g}"

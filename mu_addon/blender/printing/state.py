@@ -6,8 +6,6 @@ A unit has one job for the printer at a time, a check, an export or its specimen
 from __future__ import annotations
 
 import hashlib
-import json
-import tomllib
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -24,6 +22,7 @@ from ...design.steps import require_whole
 from ...design.surface import stl_bytes
 from ...errors import InputError, MuError
 from ...files import write_bytes, write_json
+from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.folder import FolderLayout, write_run
 from ..body import state as bodies
 from ..jobs.start_child import OWN_FOLDER, JobKind, missing
@@ -213,18 +212,18 @@ def checked(root: Any) -> Checked | None:
     own = folder / OWN_FOLDER / OWN
 
     def read() -> Any:
-        content = found.read_bytes()
-        check = json.loads(content)
+        content = file_bytes(found)
+        check = parse_json(content, found.name)
         for finding in check["findings"]:
             finding["places"] = np.array(finding["places"], float).reshape(-1, 3)
-        of = tomllib.loads(inputs.read_text(encoding="utf-8"))
+        of = parse_toml(file_text(inputs), inputs.name)
         if "stl_sha256" in of:
-            shape = json.loads(own.read_text(encoding="utf-8"))
+            shape = parse_json(file_bytes(own), own.name)
             shape = shape["of"] if shape["stl_sha256"] == of["stl_sha256"] else []
         else:
             shape = [read_unit(unit).hash(), of.get("path", ""), ""]
         digest = hashlib.sha256(content).hexdigest()
-        return check, digest, shape, of["direction"], limits.read_text(encoding="utf-8")
+        return check, digest, shape, of["direction"], file_text(limits)
 
     known = _checks.read([found, inputs, unit, limits, own], read)
     return None if known is None else Checked(folder, _stale(root, *known[2:]), *known[:2])
@@ -257,7 +256,7 @@ def exported(root: Any) -> Exported | None:
     path = folder_of(root, EXPORT) / MANIFEST
 
     def read() -> dict[str, Any]:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
+        manifest = parse_json(file_bytes(path), path.name)
         return {name: manifest[name] for name in ("unit", "path", "resin", "files", "refused")}
 
     found = _exports.read([path], read)

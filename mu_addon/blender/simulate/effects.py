@@ -7,9 +7,10 @@ simulator's packages, which a Blender may lack.
 
 from __future__ import annotations
 
-import tomllib
 from typing import TYPE_CHECKING, Any
 
+from ...errors import InputError
+from ...reading import parse_toml
 from ..shared.texts import readable
 from ..unit.properties import exact
 
@@ -29,8 +30,8 @@ def keep(root: Any, text: str) -> None:
 
 def _tables(root: Any) -> dict[str, dict[str, dict[str, Any]]]:
     try:
-        found: dict[str, Any] = tomllib.loads(root.mu_unit.study.effects).get("effect", {})
-    except tomllib.TOMLDecodeError:
+        found: dict[str, Any] = parse_toml(root.mu_unit.study.effects, "").get("effect", {})
+    except InputError:
         return {}
     return found
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import hashlib
-import json
 import re
 from pathlib import Path
 from typing import Any
@@ -13,9 +12,11 @@ import attrs
 import bpy
 import numpy as np
 
+from ...design.body import MOST_BYTES
 from ...design.parameters import read_unit
 from ...design.rigid_body import read_rigid_bodies
 from ...errors import MuError
+from ...reading import file_bytes, parse_json
 from ...usecases.simulate_and_place import study_file
 from ..body import state as bodies
 from ..obstacles import state as obstacles
@@ -117,7 +118,7 @@ def findings(root: Any) -> Findings | None:
 
 
 def _read_findings(folder: Path) -> tuple[dict[str, Any], Any]:
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    summary = parse_json(file_bytes(folder / "summary.json"), "summary.json")
     unit = read_unit(folder / "unit.toml").hash()
     inputs = unit, _body_hash(folder), _obstacles(folder), _effects(folder)
     return summary if isinstance(summary, dict) else {}, inputs
@@ -126,7 +127,7 @@ def _read_findings(folder: Path) -> tuple[dict[str, Any], Any]:
 def _body_hash(folder: Path) -> str:
     """Hash of the body that a study was made with, as `Body.hash` has it; nothing where there was none."""
     try:
-        return hashlib.sha256((folder / "body.obj").read_bytes()).hexdigest()
+        return hashlib.sha256(file_bytes(folder / "body.obj", MOST_BYTES)).hexdigest()
     except OSError:
         return ""
 

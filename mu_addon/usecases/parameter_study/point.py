@@ -16,7 +16,7 @@ from typing import Any
 import attrs
 
 from ...errors import MuError
-from ...files import plain
+from ...files import output_error, plain
 from ...run.cache import REVISION, key
 from ...run.child import RUNNING, Child
 from ...run.folder import keep_inputs
@@ -55,7 +55,8 @@ def run_point(task: Task) -> dict[str, Any]:
     """What a study found or why it failed, as plain data; never raises for a study's own failure.
 
     status: "done" with the study's `summary`, or "failed" with what, where and what_to_do; and what it took,
-    seconds and memory_MB, and where. Raises MuError where this worker is of another version.
+    seconds and memory_MB, and where. Raises MuError where this worker is of another version,
+    and OutputError where it has no room for the study.
     """
     if task.version != version():
         raise MuError(
@@ -64,7 +65,11 @@ def run_point(task: Task) -> dict[str, Any]:
             "install the same version on every worker",
         )
     start = time.monotonic()
-    with tempfile.TemporaryDirectory(prefix="mu-point-", ignore_cleanup_errors=True) as name:
+    try:
+        scratch = tempfile.TemporaryDirectory(prefix="mu-point-", ignore_cleanup_errors=True)
+    except OSError as fault:
+        raise output_error(fault, Path(fault.filename or "temporary folder")) from fault
+    with scratch as name:
         folder = Path(name)
         keep_inputs(folder / "study", task.files)
         command = [

@@ -58,7 +58,7 @@ def published() -> Published:
     """The figures that come with the package. Raises InputError where they are missing or damaged."""
     folder = asset_root() / FOLDER
     try:
-        lines = (folder / TABLE).read_text(encoding="utf-8").splitlines()
+        lines = file_text(folder / TABLE).splitlines()
         rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
         measured = parse_toml(file_text(folder / MEASURED), str(folder / MEASURED))
         paths = tuple(Path(r["path"], int(r["start"]), int(r["length"])) for r in rows)

@@ -298,7 +298,7 @@ def write_experiment(found: Filmed, bench: Bench, name: str, folder: Path) -> tu
     before = ""
     if listed.exists():
         same = [e for e in read_folder(folder).experiments if e.name == name or e.file.name == table.name]
-        before = listed.read_text(encoding="utf-8")
+        before = file_text(listed)
         if same and block not in before:
             raise InputError(
                 f"an experiment named {same[0].name!r}, in {same[0].file.name}, already exists",

@@ -1,0 +1,78 @@
+"""The software bill of materials of an extension's archive: CycloneDX 1.6, as JSON."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+import zipfile
+from email.message import Message
+from email.parser import Parser
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+NAME = "sbom.cdx.json"
+_CLASSIFIER = "License :: "
+# A name of a licence, and not its text.
+_LONGEST_NAME = 60
+
+
+def write_bill(source: Path) -> None:
+    """Write the bill of a staged extension into it: what it is, and each wheel that it bundles.
+
+    It holds no time and no serial number, so that equal archives have equal bills.
+    """
+    manifest = tomllib.loads((source / "blender_manifest.toml").read_text(encoding="utf-8"))
+    own = {
+        "type": "application",
+        "bom-ref": manifest["id"],
+        "name": manifest["id"],
+        "version": manifest["version"],
+        "licenses": [{"license": {"id": name.removeprefix("SPDX:")}} for name in manifest["license"]],
+    }
+    components = [_component(wheel) for wheel in sorted((source / "wheels").glob("*.whl"))]
+    bill = {
+        "$schema": "http://cyclonedx.org/schema/bom-1.6.schema.json",
+        "bomFormat": "CycloneDX",
+        "specVersion": "1.6",
+        "version": 1,
+        "metadata": {"component": own},
+        "components": components,
+        "dependencies": [{"ref": manifest["id"], "dependsOn": [c["bom-ref"] for c in components]}],
+    }
+    (source / NAME).write_text(json.dumps(bill, indent=2) + "\n", encoding="utf-8")
+
+
+def _component(wheel: Path) -> dict[str, Any]:
+    """A wheel as a component: package, version, licences as it states them, and SHA-256."""
+    with zipfile.ZipFile(wheel) as package:
+        # A package may have vendored others, whose own folders lie deeper.
+        (path,) = (p for p in package.namelist() if p.count("/") == 1 and p.endswith(".dist-info/METADATA"))
+        metadata = Parser().parsestr(package.read(path).decode(), headersonly=True)
+    name, version = metadata["Name"], metadata["Version"]
+    purl = f"pkg:pypi/{name.lower().replace('_', '-')}@{version}?file_name={quote(wheel.name)}"
+    return {
+        "type": "library",
+        "bom-ref": wheel.name,
+        "name": name,
+        "version": version,
+        "purl": purl,
+        "hashes": [{"alg": "SHA-256", "content": hashlib.sha256(wheel.read_bytes()).hexdigest()}],
+        **({"licenses": licences} if (licences := _licences(metadata)) else {}),
+    }
+
+
+def _licences(metadata: Message) -> list[dict[str, Any]]:
+    """Licences in CycloneDX's terms: an SPDX expression, or the name that a package gives."""
+    if metadata["License-Expression"]:
+        return [{"expression": metadata["License-Expression"]}]
+    names = [
+        text.rpartition(" :: ")[2]
+        for text in metadata.get_all("Classifier", [])
+        if text.startswith(_CLASSIFIER) and text != "License :: OSI Approved"
+    ]
+    stated = (metadata["License"] or "").strip()
+    if not names and stated and len(stated) <= _LONGEST_NAME and "\n" not in stated:
+        names = [stated]
+    return [{"license": {"name": name}} for name in names]

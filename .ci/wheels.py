@@ -1,0 +1,134 @@
+"""The wheels that the extension's archives hold, each pinned by its SHA-256 in wheels.csv.
+
+    python .ci/wheels.py    pin them anew after a change of the dependencies in pyproject.toml
+
+pip chooses them, dependencies included, without downloading any: the digests are those of its index. What is
+downloaded later has to have them, and so has what a built archive holds.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+import subprocess
+import sys
+import tempfile
+import tomllib
+import zipfile
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[1]
+TABLE = Path(__file__).with_name("wheels.csv")
+PYTHONS = ("3.11", "3.13", "3.14")
+"""Of Blender 4.5 and 5.0; of 5.1 and 5.2; of Linux distributions that build Blender with their own."""
+PLATFORMS = {
+    "linux-x64": [f"manylinux_2_{minor}_x86_64" for minor in (28, 27, 24, 17)] + ["manylinux2014_x86_64"],
+    "windows-x64": ["win_amd64"],
+    "macos-arm64": [f"macosx_{major}_0_arm64" for major in (15, 14, 13, 12, 11)],
+}
+LEFT_OUT = ("numpy",)
+"""numpy is Blender's own."""
+UNAVAILABLE = {"windows-x64": ("pymetis",)}
+"""No wheel for a platform; without METIS systems are ordered by minimum degree."""
+
+
+class Wheel(NamedTuple):
+    """One wheel of one platform and Python: package, version, file name and SHA-256."""
+
+    platform: str
+    python: str
+    name: str
+    version: str
+    file: str
+    sha256: str
+
+
+def requirements(platform: str) -> list[str]:
+    """What the core needs at run time on a platform, pinned as in pyproject.toml."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    left_out = LEFT_OUT + UNAVAILABLE.get(platform, ())
+    return [r for r in project["dependencies"] if not r.startswith(left_out)]
+
+
+def pinned() -> list[Wheel]:
+    """Every wheel of wheels.csv."""
+    with TABLE.open(newline="", encoding="utf-8") as stream:
+        return [Wheel(**row) for row in csv.DictReader(stream)]
+
+
+def download(folder: Path, platform: str, python: str) -> list[Path]:
+    """The pinned wheels of one platform and Python, by pip, which refuses any other content.
+
+    Raises CalledProcessError.
+    """
+    wanted = [w for w in pinned() if (w.platform, w.python) == (platform, python)]
+    found = folder / platform / python
+    found.mkdir(parents=True, exist_ok=True)
+    listed = found / "requirements.txt"
+    listed.write_text("".join(f"{w.name}=={w.version} --hash=sha256:{w.sha256}\n" for w in wanted))
+    pip = [*_pip("download", platform, python), "--dest", str(found), "--no-deps", "--require-hashes"]
+    subprocess.run([*pip, "-r", str(listed)], check=True)
+    return [found / w.file for w in wanted]
+
+
+def _pip(command: str, platform: str, python: str) -> list[str]:
+    """pip's `command` for wheels of a platform and Python that may be another's."""
+    tags = [option for tag in [*PLATFORMS[platform], "any"] for option in ("--platform", tag)]
+    abis = [option for abi in (f"cp{python.replace('.', '')}", "abi3", "none") for option in ("--abi", abi)]
+    kind = ["--only-binary=:all:", "--implementation", "cp", "--python-version", python, *abis, *tags]
+    return [sys.executable, "-m", "pip", command, "--quiet", *kind]
+
+
+def not_as_pinned(archive: Path, wheels: Iterable[Wheel]) -> list[str]:
+    """What is wrong with the wheels of a built archive: other content, one too many, one that is missing."""
+    expected = {f"wheels/{w.file}": w.sha256 for w in wheels}
+    with zipfile.ZipFile(archive) as package:
+        found = {
+            name: hashlib.sha256(package.read(name)).hexdigest()
+            for name in package.namelist()
+            if name.startswith("wheels/") and not name.endswith("/")
+        }
+    wrong = [f"{name} is not pinned in {TABLE.name}" for name in sorted(found.keys() - expected.keys())]
+    wrong += [f"{name} is missing" for name in sorted(expected.keys() - found.keys())]
+    both = sorted(found.keys() & expected.keys())
+    return wrong + [
+        f"{name} has another SHA-256 than pinned" for name in both if found[name] != expected[name]
+    ]
+
+
+def _chosen(platform: str, python: str) -> list[Wheel]:
+    """The wheels that pip would install now; raises CalledProcessError."""
+    with tempfile.TemporaryDirectory() as scratch:
+        report = Path(scratch) / "report.json"
+        options = ["--dry-run", "--ignore-installed", "--target", scratch, "--report", str(report)]
+        subprocess.run([*_pip("install", platform, python), *options, *requirements(platform)], check=True)
+        installed = json.loads(report.read_text(encoding="utf-8"))["install"]
+    return [
+        Wheel(
+            platform,
+            python,
+            item["metadata"]["name"],
+            item["metadata"]["version"],
+            item["download_info"]["url"].rpartition("/")[2],
+            item["download_info"]["archive_info"]["hashes"]["sha256"],
+        )
+        for item in installed
+        if item["metadata"]["name"] not in LEFT_OUT
+    ]
+
+
+def main() -> int:
+    """Write wheels.csv anew."""
+    wheels = [w for platform in PLATFORMS for python in PYTHONS for w in _chosen(platform, python)]
+    with TABLE.open("w", newline="", encoding="utf-8") as stream:
+        rows = csv.writer(stream, lineterminator="\n")
+        rows.writerow(Wheel._fields)
+        rows.writerows(sorted(wheels))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
