@@ -27,6 +27,8 @@ MOST_TRIANGLES = 60_000
 """A finer body would take minutes to examine and to mesh, and say no more: the mesh is coarser by far."""
 MOST_BYTES = 100_000_000
 """Of a body's file: several times what so many triangles take as text."""
+MOST_MM = 1_000_000.0
+"""Of a coordinate: what lies farther away has other units, or is damaged."""
 QUANTUM_MM = 1e-5
 """Vertices closer than that are one: files repeat them for every triangle."""
 AROUND = 96
@@ -53,8 +55,8 @@ class Flaw:
 class Body:
     """A surface of triangles (m, 3) between vertices (n, 3) in mm, in the unit's frame.
 
-    Raises InputError where it is empty, has a coordinate that is not finite, or more than MOST_TRIANGLES
-    triangles. `flaws` tells whether the surface is closed.
+    Raises InputError where it is empty, has a coordinate that is not finite or beyond MOST_MM, or more than
+    MOST_TRIANGLES triangles. `flaws` tells whether the surface is closed.
     """
 
     vertices: Vertices
@@ -67,6 +69,12 @@ class Body:
                 "the file contains no surface, or a coordinate is not a number",
                 self.name,
                 "give a closed mesh of triangles",
+            )
+        if (farthest := float(np.abs(self.vertices).max(initial=0.0))) > MOST_MM:
+            raise InputError(
+                f"a coordinate of {farthest:.3g} mm lies beyond {MOST_MM:g} mm",
+                self.name,
+                "give it in mm, near the unit's frame",
             )
         if len(self.triangles) > MOST_TRIANGLES:
             raise InputError(
@@ -106,7 +114,8 @@ def body_of(vertices: ArrayLike, triangles: ArrayLike, name: str = "body") -> Bo
     A closed surface whose faces all look inward is reversed. Raises InputError as `Body` does.
     """
     given = np.asarray(vertices, float).reshape(-1, 3), np.asarray(triangles, np.int64).reshape(-1, 3)
-    if not (len(given[1]) and np.isfinite(given[0]).all()):
+    if not (len(given[1]) and np.isfinite(given[0]).all() and np.abs(given[0]).max(initial=0.0) <= MOST_MM):
+        # Which says what is wrong; welding would turn such numbers into others.
         return Body(*given, name)
     points, faces = weld(*given, QUANTUM_MM)
     if len(faces) and not len(_odd_edges(faces)[0]) and volume(points, faces) < 0.0:
@@ -134,21 +143,27 @@ def read_body(path: str | Path) -> Body:
             if path.suffix.lower() == ".ply" and b"end_header" not in stream.read(_HEAD):
                 # meshio waits for the header's end for ever.
                 raise ValueError("the header does not end")
-        mesh = readers[path.suffix.lower()](path)
+        points, triangles = _surface(readers[path.suffix.lower()](path))
     except (*_DAMAGED, ReadError) as error:
         why = getattr(error, "strerror", None) or "the file is damaged or of another type"
         raise InputError(f"no body can be read from it: {why}", str(path), remedy) from error
+    known = ((triangles >= 0) & (triangles < len(points))).all()
+    if points.ndim != 2 or points.shape[1] != 3 or not known:
+        raise InputError("no body can be read from it: its faces and points do not fit", str(path), remedy)
+    return body_of(points, triangles, path.name)
+
+
+def _surface(mesh: Any) -> tuple[Vertices, Triangles]:
+    """Points (n, 3) and triangles (m, 3) of a mesh of meshio's; what is damaged raises one of `_DAMAGED`."""
     found = [np.empty((0, 3), np.int64)]
     for block in mesh.cells:
         if block.type == "triangle":
             found.append(np.asarray(block.data))
         elif block.type == "quad":
             found += [block.data[:, [0, 1, 2]], block.data[:, [0, 2, 3]]]
-    triangles, points = np.concatenate(found), np.asarray(mesh.points, float)
-    known = ((triangles >= 0) & (triangles < len(points))).all()
-    if points.ndim != 2 or points.shape[1] != 3 or not known:
-        raise InputError("no body can be read from it: its faces and points do not fit", str(path), remedy)
-    return body_of(points, triangles, path.name)
+    if any(len(faces) and not np.issubdtype(faces.dtype, np.integer) for faces in found):
+        raise ValueError("a corner of a face is no whole number")
+    return np.asarray(mesh.points, float), np.concatenate(found)
 
 
 def flaws(body: Body) -> list[Flaw]:

@@ -253,3 +253,39 @@ def test_random_bytes_are_no_body_and_end_in_a_clear_error(tmp_path, data, suffi
     path.write_bytes(b"".join(heads[suffix][known - 1 : known]) + data)
     with pytest.raises(InputError):
         read_body(path)
+
+
+PLY = """ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+element face 4
+property list uchar {corner} vertex_indices
+end_header
+0 0 0
+{far} 0 0
+0 20 0
+0 0 20
+3 0 2 1
+3 0 1 3
+3 0 3 2
+3 1 2 3
+"""
+
+
+def test_a_file_whose_faces_are_no_numbers_of_points_is_refused(tmp_path):
+    path = tmp_path / "body.ply"
+    path.write_text(PLY.format(corner="int", far=20))
+    assert len(read_body(path).triangles) == 4
+    path.write_text(PLY.format(corner="float", far=20))
+    with pytest.raises(InputError, match="no body can be read"):
+        read_body(path)
+
+
+def test_coordinates_that_no_grid_holds_are_refused_and_not_changed(tmp_path):
+    path = tmp_path / "body.ply"
+    path.write_text(PLY.format(corner="int", far="1e30"))
+    with pytest.raises(InputError, match=r"1e\+30 mm lies beyond 1e\+06 mm"):
+        read_body(path)

@@ -1,0 +1,211 @@
+"""Files of every kind that is read, damaged at random: each is read or refused, and nothing else happens.
+
+The corpus is one sound file of each kind. `MUTANTS=2000 python -m pytest tests/run/test_mutated_files.py`
+draws so many of each; the same numbers give the same files.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import re
+import shutil
+import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mu_addon.design.body import read_body
+from mu_addon.design.surface import stl_bytes, stl_surface
+from mu_addon.errors import InputError
+from mu_addon.files import read_npz, write_npz
+from mu_addon.homogenize.effective import read_effective
+from mu_addon.measured.folder import read_folder
+from mu_addon.sensing.recording import read_recording
+from mu_addon.usecases.grip.phases import read_phases, shipped_phases
+from mu_addon.usecases.resume import use_case_of
+from mu_addon.usecases.track_video.run import read_pixels
+
+from ..homogenize.lattice_laws import body_centred
+from .test_reading import READERS
+
+COUNT = int(os.environ.get("MUTANTS", "15"))
+DATA = Path(__file__).parents[1] / "data"
+VERTICES = np.array([[x, y, z] for x in (0.0, 20.0) for y in (0.0, 20.0) for z in (0.0, 75.0)])
+FACES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6)]
+FACES += [(0, 6, 4), (1, 5, 7), (1, 7, 3)]
+# Pieces that no sound file has, put in the place of a number or a word, or anywhere.
+NASTY = [
+    b"nan", b"-inf", b"1e999", b"-1", b"0", b"1e-320", b"9" * 400, b"0x" + b"f" * 400, b"true", b'""', b"[]",
+    b"{}", b"[" * 300, b'"', b"'''", b"\0", b"\xff", b"\xef\xbb\xbf", b"\r", b"\n\n", b"\xe2\x80\xae",
+    b"\x1b[2J", b",,,", b"1979-05-27T07:32:00Z", b"../../x", b"#", b"4294967296", b"99999999999999999999",
+]  # fmt: skip
+_WORD = re.compile(rb"[-+.\w]+")
+
+
+def mutated(random_: random.Random, content: bytes) -> bytes:
+    """A file's content with one to four faults in it."""
+    changed = bytearray(content)
+    for _ in range(random_.randrange(1, 5)):
+        place = random_.randrange(len(changed) + 1)
+        length = random_.choice((1, 1, 4, 40, 400))
+        what = random_.randrange(8)
+        if what == 0 and changed:
+            changed[min(place, len(changed) - 1)] ^= 1 << random_.randrange(8)
+        elif what == 1:
+            del changed[place : place + length]
+        elif what == 2:
+            changed[place:place] = random_.choice(NASTY)
+        elif what == 3:
+            changed[place : place + length] = random_.randbytes(length)
+        elif what == 4:
+            # A word or number by another, most of what is wrong in files that people write.
+            words = list(_WORD.finditer(changed))
+            if words:
+                start, end = random_.choice(words).span()
+                changed[start:end] = random_.choice([*NASTY, random_.choice(words).group()])
+        elif what == 5:
+            lines = bytes(changed).splitlines(keepends=True)
+            if lines:
+                lines.insert(random_.randrange(len(lines)), random_.choice(lines))
+                changed = bytearray(b"".join(lines))
+        elif what == 6:
+            lines = bytes(changed).splitlines(keepends=True)
+            random_.shuffle(lines)
+            changed = bytearray(b"".join(lines))
+        else:
+            changed[place:place] = changed[place : place + length]
+    return bytes(changed)
+
+
+def ascii_stl() -> bytes:
+    corners = "".join(
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join(f"vertex {' '.join(map(str, VERTICES[v]))}\n" for v in face)
+        + "endloop\nendfacet\n"
+        for face in FACES
+    )
+    return f"solid box\n{corners}endsolid box\n".encode()
+
+
+def obj() -> bytes:
+    points = "".join(f"v {x} {y} {z}\n" for x, y, z in VERTICES)
+    return (points + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in FACES)).encode()
+
+
+def ply(binary: bool) -> bytes:
+    kind = "binary_little_endian" if binary else "ascii"
+    head = (
+        f"ply\nformat {kind} 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 12\nproperty list uchar int vertex_indices\nend_header\n"
+    ).encode()
+    if binary:
+        return head + VERTICES.astype("<f4").tobytes() + b"".join(struct.pack("<B3i", 3, *f) for f in FACES)
+    return (
+        head
+        + "".join(
+            [f"{x} {y} {z}\n" for x, y, z in VERTICES] + [f"3 {a} {b} {c}\n" for a, b, c in FACES]
+        ).encode()
+    )
+
+
+def npz(folder: Path) -> bytes:
+    write_npz(
+        folder / "a.npz", {"u": np.arange(300.0).reshape(-1, 3), "name": np.array(["alpha1", "alpha2"])}
+    )
+    return (folder / "a.npz").read_bytes()
+
+
+RECORDING = b"time_s,device_s,sequence,light_V\n" + b"".join(b"%f,%f,%d,1.5\n" % (k, k, k) for k in range(20))
+INDEX = b'{"type": "recording", "version": 1}\n{"type": "file", "file": "recording-000.csv"}\n'
+PIXELS = b"time_s,base right_px,base down_px\n" + b"".join(b"%d,100.5,%d\n" % (k, 50 + k) for k in range(9))
+
+# Name of the file, its content, and who reads it.
+CORPUS: dict[str, tuple[str, Callable[[Path], bytes], Callable[[Path], Any]]] = {
+    name: (f"{name.replace(' ', '-')}.toml", lambda _, text=text: text.encode(), reader)
+    for name, (reader, text) in READERS.items()
+    if text is not None
+}
+CORPUS |= {
+    "lattice law": ("effective.toml", lambda _: body_centred().text().encode(), read_effective),
+    "phases": ("phases.csv", lambda _: shipped_phases().text().encode(), read_phases),
+    "pixels": ("pixels.csv", lambda _: PIXELS, read_pixels),
+    "STL": ("body.stl", lambda _: stl_bytes(VERTICES, np.array(FACES)), read_body),
+    "STL in text": ("body.stl", lambda _: ascii_stl(), read_body),
+    "STL to check": (
+        "part.stl",
+        lambda _: stl_bytes(VERTICES, np.array(FACES)),
+        lambda path: stl_surface(path.read_bytes()),
+    ),
+    "OBJ": ("body.obj", lambda _: obj(), read_body),
+    "PLY": ("body.ply", lambda _: ply(binary=False), read_body),
+    "PLY of bytes": ("body.ply", lambda _: ply(binary=True), read_body),
+    "NPZ": ("b.npz", npz, read_npz),
+}  # fmt: skip
+
+
+def read_all(reader: Callable[[Path], Any], path: Path) -> int:
+    """1 where a file is read, 0 where it is refused with all three words."""
+    try:
+        reader(path)
+    except InputError as error:
+        if not all((error.what, error.where, error.remedy)):
+            raise AssertionError("an error without its three words") from error
+        return 0
+    return 1
+
+
+@pytest.mark.parametrize("name", CORPUS)
+def test_a_damaged_file_is_read_or_refused(name: str, tmp_path: Path) -> None:
+    file, made, reader = CORPUS[name]
+    content = made(tmp_path)
+    assert (tmp_path / file).write_bytes(content)
+    assert read_all(reader, tmp_path / file) == 1, "the corpus is sound"
+    for seed in range(COUNT):
+        path = tmp_path / file
+        path.write_bytes(mutated(random.Random(f"{name} {seed}"), content))
+        try:
+            read_all(reader, path)
+        except Exception as error:
+            raise AssertionError(f"{name}, seed {seed}: {error!r}") from error
+
+
+FOLDERS: dict[str, tuple[Callable[[Path], Any], Path]] = {
+    "measured": (read_folder, DATA / "measured"),
+    **{
+        kind: (lambda folder: use_case_of(folder).read(folder), DATA / "folders" / kind)
+        for kind in ("check", "grip", "homogenize", "place")
+    },
+}
+
+
+@pytest.mark.parametrize("name", FOLDERS)
+def test_a_folder_with_a_damaged_file_is_read_or_refused(name: str, tmp_path: Path) -> None:
+    reader, source = FOLDERS[name]
+    folder = shutil.copytree(source, tmp_path / "folder")
+    files = sorted(p for p in folder.iterdir() if p.suffix in (".toml", ".csv"))
+    for path in files:
+        content = path.read_bytes()
+        for seed in range(COUNT):
+            path.write_bytes(mutated(random.Random(f"{name} {path.name} {seed}"), content))
+            try:
+                read_all(reader, folder)
+            except Exception as error:
+                raise AssertionError(f"{name}, {path.name}, seed {seed}: {error!r}") from error
+        path.write_bytes(content)
+
+
+def test_a_damaged_recording_is_read_or_refused(tmp_path: Path) -> None:
+    for seed in range(4 * COUNT):
+        random_ = random.Random(f"recording {seed}")
+        files = {"index.ndjson": INDEX, "recording-000.csv": RECORDING}
+        name = random_.choice(sorted(files))
+        for file, content in files.items():
+            (tmp_path / file).write_bytes(mutated(random_, content) if file == name else content)
+        try:
+            read_all(read_recording, tmp_path)
+        except Exception as error:
+            raise AssertionError(f"seed {seed}: {error!r}") from error
