@@ -62,7 +62,8 @@ def test_a_thinner_wall_is_named_though_every_size_has_a_mesh_of_its_own(tmp_pat
         noisy = angle(p) + 0.02 * random.standard_normal(len(p))
         tests.append(analytic.experiment(name, t, p, {"angle_deg": noisy}))
     effects = ("wall_thickness", "gravity")
-    settings = UnitSettings(ROUGH, ROUGH, pressures=5, effects=effects)
+    # Data and model are of one code and one way of meshing: there is no discrepancy between them.
+    settings = UnitSettings(ROUGH, ROUGH, pressures=5, effects=effects, discrepancy=0.0)
     found = diagnose(
         tests,
         Composite({"unit_pressure": UnitPressure(unit_responses(SMALL, tests, settings, tmp_path), tests)}),
