@@ -25,6 +25,8 @@ MOST_EFFECTS = 3
 # Models that the next effect is added to: the best one may be wrong while two effects are seen as one.
 SEEDS = 4
 DRAWS = 20000
+# Faults of one camera, of which it has one at most: two of them imitate many pairs of physical effects.
+CAMERA = frozenset(("camera_scale", "camera_tilt", "lens_distortion"))
 # What the model's own mesh does: there in every set of data, seen or not.
 NUMERICS = "mesh_error"
 # An effect rests on one experiment alone where this share of what is known of it comes from there.
@@ -110,7 +112,10 @@ def select(
         p_best = p if level == 0 else p_best
         # What looked best alone may be neither of two that act together.
         if level and (p < FALSE_ALARM_RATE or structure(strict_table(fitter, chosen))):
-            more = _extended(fitter, effects, levels[-1][1:SEEDS], progress)
+            # Cameras' faults lead where each of two physical effects does little alone.
+            physical = [f for f in levels[-1] if not CAMERA.intersection(f.names)]
+            seeds = {id(f): f for f in (*levels[-1][1:SEEDS], *physical[:SEEDS])}
+            more = _extended(fitter, effects, list(seeds.values()), progress)
             pool = sorted([*pool, *more], key=cost)
             p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
         if p >= FALSE_ALARM_RATE:
@@ -264,7 +269,8 @@ def _extended(
     for seed in seeds:
         for e in effects:
             every = frozenset((*(o.keys for o in seed.effects), e.keys))
-            if e.name in seed.names or every in found or not _promises(fitter, seed, e):
+            twice = e.name in seed.names or (e.name in CAMERA and CAMERA.intersection(seed.names))
+            if twice or every in found or not _promises(fitter, seed, e):
                 continue
             progress(" and ".join((*seed.names, e.name)))
             found[every] = fitter.best([*seed.effects, e], [{**seed.values, **s} for s in e.starts()])
