@@ -38,7 +38,7 @@ LEAST_STRAIN = 1e-5
 # Chosen by the tables in docs/locking.md.
 POINTWISE_BULK = 5.0
 # Entries of self-contact stay in the tangent's pattern until it has grown by this factor.
-MOST_GROWTH = 1.03
+MOST_GROWTH = 1.1
 
 
 @attrs.frozen(eq=False)

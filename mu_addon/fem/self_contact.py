@@ -8,7 +8,6 @@ import attrs
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
-from scipy.spatial import cKDTree
 
 from ..design.quantity import in_kPa
 from ..errors import InputError
@@ -23,12 +22,10 @@ Array = np.ndarray[Any, Any]
 SELF_CONTACT_NEWTON = NewtonSettings(
     keep_factor=0.8, max_factorisations=80, max_iterations=200, max_backtracks=12, predictor_tolerance=3.0
 )
-# Distances in gaps: around a strut's foot where it does not touch the wall; and, with a facet's size added,
-# of nodes that the tangent's pattern makes room for, so that it grows seldom.
+# Distances in gaps: around a strut's foot where it does not touch the wall; and of pairs that the tangent's
+# pattern makes room for, so that it grows seldom.
 _FOOT = 2.0
-_ROOM = 3.0
-# Times that reach which two nodes were apart as drawn, where they have come near each other.
-_CAME = 1.3
+_ROOM = 2.0
 # A way along the surface, over the straight one, up to which pieces near each other are one neighbourhood.
 _ROUND = 2.5
 # Pairs of such neighbours, over the number of facets, up to which their facets may go.
@@ -120,14 +117,20 @@ class SelfContact:
         self._ipctk = _ipctk()
         self.gap_mm, self.stiffness_MPa = gap_mm, stiffness_MPa
         self._rest = mesh.nodes
-        self._potential = self._ipctk.BarrierPotential(gap_mm, stiffness_MPa, True)
+        self._potential, self._wider = (
+            self._ipctk.BarrierPotential(reach, stiffness_MPa, True) for reach in (gap_mm, _ROOM * gap_mm)
+        )
         facets = _free_facets(mesh)
         if mesh.resolved:
             facets = self._without_feet(mesh, facets)
         self.facets = self._without_slivers(facets)
         self._surface, self._nodes = self._collision_mesh(self.facets)
-        edges = self._rest[self.facets] - self._rest[np.roll(self.facets, 1, axis=1)]
-        self._reach_mm = _ROOM * gap_mm + float(np.percentile(np.linalg.norm(edges, axis=2), 90))
+        # Which of the surface's nodes share a facet.
+        three = np.searchsorted(self._nodes, self.facets)
+        ends = np.repeat(three, 3, axis=1).ravel(), np.tile(three, 3).ravel()
+        self._beside = sparse.csr_matrix((np.ones(len(ends[0])), ends), shape=(len(self._nodes),) * 2)
+        # Of the surface's unknowns among the mesh's.
+        self._numbers = (3 * self._nodes.astype(np.int64)[:, None] + np.arange(3)).ravel()
         self._planes = [self._mirror_plane(mesh, axis) for axis in mesh.symmetry]
         # Half the time of ipctk's default, and as safe: it advances by what distance and speed allow.
         self._detection = self._ipctk.AdditiveCCD()
@@ -241,20 +244,20 @@ class SelfContact:
         return sparse.coo_matrix((values, (rows, columns)), shape=(self._rest.size,) * 2)
 
     def room(self, u: Array) -> tuple[Array, Array]:
-        """Rows and columns (j,) of 3 n that `stiffness` may fill while the surface moves by a few gaps.
+        """Rows and columns (j,) of 3 n that `stiffness` may fill while the surface moves on a little.
 
-        Those of nodes that are a facet's size and some gaps apart, and were not as drawn. u: displacements
-        (n, 3) in mm.
+        Those of pairs within some gaps and of the facets around them: what slides past an edge or a corner
+        comes to face the next facet. u: displacements (n, 3) in mm.
         """
         places = self._places(u)
-        apart = cKDTree(places).query_pairs(self._reach_mm, output_type="ndarray")
-        first, second = (self._rest[self._nodes[apart[:, k]]] for k in (0, 1))
-        came = apart[np.linalg.norm(first - second, axis=1) > _CAME * self._reach_mm]
-        i, j = self._nodes[came].T.astype(np.int64)
+        h = self._hessian(self._wider, self._near(places, _ROOM * self.gap_mm), places)
+        count = len(self._nodes)
+        near = sparse.csr_matrix((np.ones(len(h.row)), (h.row // 3, h.col // 3)), shape=(count, count))
+        around = (self._beside @ near @ self._beside).tocoo()
+        i, j = (self._nodes.astype(np.int64)[side] for side in (around.row, around.col))
         three = np.arange(3)
         rows = np.repeat(3 * i[:, None] + three, 3, axis=1).ravel()
-        columns = np.tile(3 * j[:, None] + three, 3).ravel()
-        return np.concatenate([rows, columns]), np.concatenate([columns, rows])
+        return rows, np.tile(3 * j[:, None] + three, 3).ravel()
 
     def least_gap_mm(self, u: Array) -> float:
         """Least distance in mm of the surface from itself at u (n, 3) in mm; infinite beyond the gap."""
@@ -313,22 +316,29 @@ class SelfContact:
         places = self._places(u)
         if self._last is not None and np.array_equal(self._last.places, places):
             return self._last
+        self._last = _Pairs(places, self._near(places, self.gap_mm))
+        return self._last
+
+    def _near(self, places: Array, reach_mm: float) -> Any:
+        """ipctk's pairs of the surface nearer than reach_mm at its nodes' places (v, 3) in mm."""
         near = self._ipctk.NormalCollisions()
         near.use_area_weighting = True
         near.collision_set_type = self._ipctk.NormalCollisions.IMPROVED_MAX_APPROX
-        near.build(self._surface, places, self.gap_mm)
-        self._last = _Pairs(places, near)
-        return self._last
+        near.build(self._surface, places, reach_mm)
+        return near
+
+    def _hessian(self, potential: Any, near: Any, places: Array, convex: bool = False) -> sparse.coo_matrix:
+        """Second derivative of a potential over pairs, by the surface's own unknowns (3 v, 3 v)."""
+        method = self._ipctk.PSDProjectionMethod
+        projected = method.CLAMP if convex else method.NONE
+        return potential.hessian(near, self._surface, places, projected).tocoo()
 
     def _entries(self, found: _Pairs, convex: bool) -> tuple[Array, Array, Array]:
         """Rows, columns and values (j,) of the pairs' second derivative, numbered by the mesh's nodes."""
         if not len(found.near):
             return np.empty(0, int), np.empty(0, int), np.empty(0)
-        method = self._ipctk.PSDProjectionMethod
-        projected = method.CLAMP if convex else method.NONE
-        h = self._potential.hessian(found.near, self._surface, found.places, projected).tocoo()
-        numbers = (3 * self._nodes.astype(np.int64)[:, None] + np.arange(3)).ravel()
-        return numbers[h.row], numbers[h.col], h.data
+        h = self._hessian(self._potential, found.near, found.places, convex)
+        return self._numbers[h.row], self._numbers[h.col], h.data
 
     def _barrier(self, distance: Array) -> tuple[Array, Array, Array]:
         """Energy per area in N/mm at distances (k,) in mm, its slope in MPa and the slope's in MPa/mm."""

@@ -129,6 +129,21 @@ def test_a_new_path_begins_without_the_room_that_contact_took():
     assert len(eq.model.tangent(rest(mesh).u, 0.0, eq.parameters)) == own
 
 
+def test_what_slides_past_the_edges_of_facets_needs_no_more_room():
+    mesh = plates(4, 5)
+    eq = body(mesh)
+    down = np.where(mesh.nodes[:, 2:] > 1.2, [0.0, 0.0, -0.47], 0.0)
+    aside = np.where(mesh.nodes[:, 2:] > 1.2, [1.0, 0.6, 0.0], 0.0)
+    eq.model.tangent(down, 0.0, eq.parameters)
+    pattern, contact = eq.model.pattern, eq.model.self_contact
+    before = set(zip(*contact.stiffness(down).coords, strict=True))
+    # Edges of the plates' meshes are 0.5 and 0.4 mm.
+    for far in (0.05, 0.2, 0.4):
+        eq.model.tangent(down + far * aside, 0.0, eq.parameters)
+        assert eq.model.pattern is pattern
+    assert not set(zip(*contact.stiffness(down + far * aside).coords, strict=True)) <= before
+
+
 def test_what_presses_on_itself_is_in_balance():
     mesh = plates(4, 5)
     contact = SelfContact(mesh, D, K)
