@@ -11,6 +11,7 @@ from .effect import BATCH, Effect, Parameter
 from .fit import Fit, Fitter
 from .residuals import strict_table, structure
 from .selection import (
+    CAMERA,
     FALSE_ALARM_RATE,
     PROMISING,
     RIVAL_DELTA_CHI2,
@@ -27,7 +28,7 @@ from .selection import (
 from .sensitivity import Sensitivity, sensitivities
 
 # What measures or holds a specimen may fail in one experiment, and does not go with the specimen.
-OF_THE_BENCH = frozenset(
+OF_THE_BENCH = CAMERA.union(
     (
         "pressure_offset",
         "pressure_gain",
@@ -38,9 +39,6 @@ OF_THE_BENCH = frozenset(
         "clock_offset",
         "angle_offset",
         "angle_drift",
-        "camera_scale",
-        "camera_tilt",
-        "lens_distortion",
         "led_drift",
         "ambient_light",
         "contact",

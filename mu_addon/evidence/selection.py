@@ -34,8 +34,6 @@ ALONE = 0.9
 # Chi squared that an effect must take from a fit's residual, to first order, to be fitted beside it: a small
 # part of what `FALSE_ALARM_RATE` asks for.
 PROMISING = 4.0
-
-
 # Share of a misfit that one effect must take to be named though structure is left, and how many times as
 # much any other one in its place must leave.
 MAINLY, APART = 0.99, 10.0

@@ -116,24 +116,16 @@ class Composite:
         """The values that the experiment's simulator knows, and those of its specimen by their plain keys."""
         knows = self._knows[experiment.kind]
         own = {k: v for k, v in values.items() if k in knows and self._heeds(experiment, k)}
+        owners = (f"specimen {experiment.specimen}", f"experiment {experiment.name}")
         for key, value in values.items():
-            plain, of, whose = key.partition(OF)
-            if (
-                not of
-                or key in own
-                or whose
-                not in (
-                    f"specimen {experiment.specimen}",
-                    f"experiment {experiment.name}",
-                )
-            ):
+            plain, _, whose = key.partition(OF)
+            if key in own or whose not in owners:
                 continue
             if plain in knows:
                 own[plain] = value
             elif plain.startswith(BATCH):
-                for p in self.nuisances:
-                    if p.name in knows and MODULUS in p.name:
-                        own[p.name] = own.get(p.name, p.null) * (1.0 + value)
+                moduli = (p for p in self.nuisances if p.name in knows and MODULUS in p.name)
+                own |= {p.name: own.get(p.name, p.null) * (1.0 + value) for p in moduli}
         return own
 
     def _heeds(self, experiment: Experiment, key: str) -> bool:
