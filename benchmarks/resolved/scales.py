@@ -1,0 +1,74 @@
+"""J of printed waveguides and angles, walls and struts touching, at several scales and on several meshes.
+
+    python -m benchmarks.resolved.scales FOLDER [--presets mu-0.75x mu-1.0x mu-1.5x] [--refine 0.7 1]
+        [--chambers 4] [--pressure -20 -10 20 40] [--without-contact]
+
+Each row is a whole `place` of the resolved unit, every window of anchors a candidate, kept in a folder of its
+own below FOLDER: a run that was stopped goes on there. Seconds are of processor time; of a run that goes on,
+those since.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from mu_addon.design.parameters import load_preset
+from mu_addon.errors import MuError
+from mu_addon.fem.protocol import Protocol
+from mu_addon.meshing.settings import RESOLVED, MeshSettings
+from mu_addon.run.context import RunContext
+from mu_addon.run.progress import Progress
+from mu_addon.usecases.simulate_and_place.job import Job
+from mu_addon.usecases.simulate_and_place.run import simulate_and_place
+from mu_addon.usecases.simulate_and_place.study import begin_study
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--presets", nargs="*", default=["mu-0.75x", "mu-1.0x", "mu-1.5x"])
+    parser.add_argument("--refine", type=float, nargs="*", default=[0.7])
+    parser.add_argument("--chambers", type=int, default=4)
+    parser.add_argument("--pressure", type=float, nargs="*", default=[-20.0, -10.0, 20.0, 40.0])
+    parser.add_argument("--without-contact", action="store_true")
+    options = parser.parse_args()
+    # From rest outward on either side.
+    pressures = [0.0, *sorted((p for p in options.pressure if p < 0), reverse=True), 0.0]
+    pressures += sorted(p for p in options.pressure if p > 0)
+    protocol = Protocol(np.arange(float(len(pressures))), np.array(pressures))
+    columns = ["preset", "refine", "unknowns", *(f"{p:g} kPa, deg" for p in pressures if p), "J_hat mm", "s"]
+    print("| " + " | ".join(columns) + " |\n" + "| --- " * len(columns) + "|", flush=True)
+    for name in options.presets:
+        preset = load_preset(name)
+        unit = attrs.evolve(preset, chambers=attrs.evolve(preset.chambers, count=options.chambers))
+        for refine in options.refine:
+            began = time.process_time()
+            mesh = MeshSettings(fidelity=RESOLVED, refine=refine)
+            touch = not options.without_contact
+            job = Job(
+                unit, protocol, mesh, times=len(pressures), mesh_check=False, workers=1, self_contact=touch
+            )
+            folder = options.folder / f"{name}-{options.chambers}-{refine:g}{'' if touch else '-passing'}"
+            context = RunContext(Progress())
+            try:
+                begin_study(job, folder, context)
+                study = simulate_and_place(job, folder, context)
+            except MuError as why:
+                print(f"| {name} | {refine:g} | {why}", flush=True)
+                continue
+            angle = {float(p): a for p, a in context.summary["angle_deg"].items()}
+            J = context.summary["J_hat_mm"][job.headline_rule]
+            row = [name, f"{refine:g}", study.solver["unknowns"]]
+            row += [f"{angle[p]:.3f}" for p in pressures if p]
+            row += [", ".join(f"{n} {J[n]:.4f}" for n in sorted(J, key=J.get))]
+            row += [f"{time.process_time() - began:.0f}"]
+            print("| " + " | ".join(map(str, row)) + " |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
