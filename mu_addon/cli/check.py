@@ -38,6 +38,11 @@ def add(commands: Commands[Any]) -> None:
         "form-4-elastic-50a).",
     )
     command.add_argument(
+        "--limits",
+        metavar="FILE",
+        help="Filled-in limits.csv of `specimens`: measured limits, which replace those of the printer.",
+    )
+    command.add_argument(
         "--up",
         nargs=3,
         type=float,
@@ -55,6 +60,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
     from ..errors import InputError
     from ..usecases.check_print.job import Job, read_stl
     from ..usecases.check_print.run import USE_CASE
+    from ..usecases.export.limit_sheet import with_measured
 
     unit = unit_if_named(options)
     if unit is None and options.stl is None:
@@ -63,9 +69,12 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
         raise InputError("--path needs a unit", "--path", "give --preset or --unit as well")
     if not 1e-6 < sum(x * x for x in options.up) < 1e12:
         raise InputError(f"{options.up} is not a direction", "--up", "give three numbers, such as 0 0 1")
+    printer = load_printer(options.printer)
+    if options.limits is not None:
+        printer = with_measured(printer, Path(options.limits))
     stl = None if options.stl is None else Path(options.stl)
     job = Job(
-        printer=load_printer(options.printer),
+        printer=printer,
         unit=unit,
         window=None if options.path is None or unit is None else window(unit, options.path),
         quality=options.quality,

@@ -17,8 +17,8 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `specimens`."""
     command = commands.add_parser(
         "specimens",
-        help="Write test specimens as STL: lattice cubes, coupons and a gauge for the printer, with data "
-        "sheets for the measurements.",
+        help="Write test specimens as STL: lattice cubes, coupons, a gauge for the printer and a part "
+        "for each of its limits, with data sheets for the measurements.",
         epilog="example: run.py specimens --out out/specimens",
     )
     add_unit(command, required=False)
@@ -27,13 +27,22 @@ def add(commands: Commands[Any]) -> None:
         metavar="NAME|FILE",
         help="Resin: a material of the library or a TOML file (default: elastic-50a-v1).",
     )
+    command.add_argument(
+        "--printer",
+        default="form-4-elastic-50a",
+        metavar="NAME|FILE",
+        help="Printer whose limits the parts named limit-... show: a shipped name or a TOML file (default: "
+        "form-4-elastic-50a).",
+    )
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
     """Write the specimens of a unit, mu-1.0x unless one is named."""
     from ..design.parameters import load_preset
+    from ..design.printing.printer import load_printer
     from ..usecases.export.job import resin_of
     from ..usecases.export.specimens import USE_CASE, Job
 
     unit = unit_if_named(options) or load_preset("mu-1.0x")
-    USE_CASE.start(Job(unit, resin_of(options.resin)), Path(options.out), context)
+    job = Job(unit, resin_of(options.resin), load_printer(options.printer))
+    USE_CASE.start(job, Path(options.out), context)

@@ -50,6 +50,19 @@ def test_a_part_that_can_be_printed(tmp_path, capsys):
     assert '"type": "result"' in capsys.readouterr().out.splitlines()[-1].replace('"type":"', '"type": "')
 
 
+def test_a_limit_that_was_measured_decides(tmp_path):
+    sheet = tmp_path / "limits.csv"
+    sheet.write_text("limit,sizes,measured\ndrain_diameter_mm,2 5,4.5\n")
+    status, out = run(tmp_path, bottle(4.0), "--limits", str(sheet))
+    assert status == 0
+    found = {f["check"]: f for f in json.loads((out / "check.json").read_text())["findings"]}
+    assert found["drain"]["severity"] == "warning"
+    assert found["drain"]["limit"] == 4.5
+    assert not found["drain"]["assumed"]
+    assert "measured" in (out / "report.html").read_text()
+    assert read_printer(out / "printer.toml").limits["drain_diameter_mm"].measured
+
+
 def test_a_part_that_must_not_be_printed_ends_with_status_6(tmp_path):
     vertices, triangles = bottle(4.0)
     status, out = run(tmp_path, (vertices, triangles[5:]))

@@ -15,6 +15,7 @@ from mu_addon.design.anchors import window
 from mu_addon.design.beams import lattice_beams
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import Chambers, Unit
+from mu_addon.design.printing.printer import load_printer, printer_text, read_printer
 from mu_addon.design.threemf import Beams, Part, read_3mf, write_3mf
 from mu_addon.design.waveguide import waveguide
 from mu_addon.errors import InputError
@@ -26,6 +27,7 @@ from mu_addon.run.progress import Progress
 from mu_addon.usecases.export import run as exporting
 from mu_addon.usecases.export import specimens
 from mu_addon.usecases.export.job import Job, path_of
+from mu_addon.usecases.export.limit_sheet import with_measured
 from mu_addon.usecases.export.print_offsets import compensation_offsets, gauge_sheet, read_sheet
 from mu_addon.usecases.export.run import USE_CASE as EXPORT
 from mu_addon.usecases.export.specimens import USE_CASE as SPECIMENS
@@ -273,7 +275,9 @@ def printed(tmp_path_factory):
 def test_specimens_weigh_what_they_should(printed):
     folder, manifest = printed
     rows = {row["name"]: row for row in manifest["specimens"]}
-    assert list(rows) == ["gauge", "cube-0.75x", "cube-1x", "cube-1.5x", "strut", "wall", "beam", "waveguide"]
+    own = [name for name in rows if not name.startswith("limit-")]
+    assert own == ["gauge", "cube-0.75x", "cube-1x", "cube-1.5x", "strut", "wall", "beam", "waveguide"]
+    assert len(rows) - len(own) == 12
     for scale in (0.75, 1.0, 1.5):
         row = rows[f"cube-{scale:g}x"]
         assert row["size_mm"] == pytest.approx([37.5 * scale] * 3)
@@ -285,6 +289,57 @@ def test_specimens_weigh_what_they_should(printed):
         mesh = trimesh.load(folder / row["file"])
         assert mesh.is_watertight
         assert mesh.volume / 1e3 * 1.01 == pytest.approx(row["mass_g"], rel=1e-4)
+
+
+def filled(folder, path, **measured):
+    """The sheet of limits with some of its rows filled in."""
+    lines = (folder / "limits.csv").read_text().splitlines()
+    path.write_text("\n".join(f"{line}{measured.get(line.partition(',')[0], '')}" for line in lines) + "\n")
+    return path
+
+
+def test_limits_that_were_measured_take_the_place_of_those_that_were_not(printed, tmp_path):
+    printer = load_printer()
+    sheet = filled(printed[0], tmp_path / "limits.csv", wall_mm="0.42", bridge_mm="15")
+    found = with_measured(printer, sheet)
+    changed = {name for name in printer.limits if found.limits[name] != printer.limits[name]}
+    assert changed == {"wall_mm", "bridge_mm"}
+    assert found["wall_mm"] == 0.42
+    assert found.limits["wall_mm"].standing == "measured"
+    assert not found.limits["wall_mm"].assumed
+    assert found.limits["gap_mm"].standing == "assumed"
+    # It is kept with what is checked, and read again.
+    (tmp_path / "printer.toml").write_text(printer_text(found))
+    assert read_printer(tmp_path / "printer.toml") == found
+
+
+@pytest.mark.parametrize(
+    ("measured", "message"),
+    [
+        ({}, "no limit was measured"),
+        ({"wall_mm": "thin"}, "wall_mm measured as 'thin'; the part has 0.24 to 0.9"),
+        ({"wall_mm": "0.1"}, "wall_mm measured as '0.1'"),
+        ({"wall_mm": "nan"}, "wall_mm measured as 'nan'"),
+    ],
+)
+def test_a_sheet_of_limits_that_says_nothing_sensible_is_refused(printed, tmp_path, measured, message):
+    with pytest.raises(InputError, match=message):
+        with_measured(load_printer(), filled(printed[0], tmp_path / "limits.csv", **measured))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("limit,sizes,measured\nwall,1 2,1\n", "there is no limit 'wall'"),
+        ("limit,sizes,measured\nwall_mm,1 2,1\nwall_mm,1 2,2\n", "given twice"),
+        ("limit,sizes,measured\nwall_mm,,1\n", "has no sizes"),
+        ("limit,sizes,measured\nwall_mm,1 x,1\n", "has no sizes"),
+    ],
+)
+def test_a_sheet_of_limits_that_was_edited_too_much_is_refused(tmp_path, text, message):
+    (tmp_path / "limits.csv").write_text(text)
+    with pytest.raises(InputError, match=message):
+        with_measured(load_printer(), tmp_path / "limits.csv")
 
 
 def test_the_template_is_a_folder_of_measured_data_but_for_its_rows(printed):

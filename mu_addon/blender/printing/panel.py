@@ -79,6 +79,7 @@ class MU_PT_print_check(_OfPrint, bpy.types.Panel):
         layout.prop(settings, "printer")
         if settings.printer == OWN_PRINTER:
             layout.prop(settings, "printer_file")
+        layout.prop(settings, "limits_file")
         layout.prop(settings, "up")
         large_button(layout, "mu.print_check", "VIEWZOOM")
         found = printing.checked(root)

@@ -47,6 +47,12 @@ class MU_PG_print(bpy.types.PropertyGroup):
         subtype="FILE_PATH",
         options=BESIDE_BLEND_FILE,
     )
+    limits_file: StringProperty(
+        name="Measured",
+        description="limits.csv of the specimens, filled in: limits that were measured on printed parts",
+        subtype="FILE_PATH",
+        options=BESIDE_BLEND_FILE,
+    )
     up: FloatVectorProperty(
         name="Up",
         description="Build direction in the unit's frame, away from the platform. 0 0 1: inlet down",

@@ -24,6 +24,7 @@ from ...errors import InputError, MuError
 from ...files import write_bytes, write_json
 from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.folder import FolderLayout, write_run
+from ...usecases.export.limit_sheet import with_measured
 from ..body import state as bodies
 from ..jobs.start_child import OWN_FOLDER, JobKind, missing
 from ..shared.file_cache import FileCache
@@ -77,12 +78,26 @@ def latest_folder(root: Any) -> Path:
 PRINTING = JobKind("print", lambda root: root.mu_unit.uuid, latest_folder)
 
 _printers: FileCache[Printer] = FileCache()
+_measured: FileCache[tuple[str, Printer]] = FileCache()
 _checks: FileCache[Any] = FileCache()
 _exports: FileCache[dict[str, Any]] = FileCache()
 
 
 def printer_of(root: Any) -> Printer:
-    """The printer that is chosen; raises InputError for a file that is none."""
+    """The printer that is chosen, with the limits that were measured; raises InputError for bad files."""
+    if not root.mu_print.limits_file:
+        return _printer(root)
+    sheet = Path(bpy.path.abspath(root.mu_print.limits_file))
+    own = [Path(bpy.path.abspath(root.mu_print.printer_file))] if root.mu_print.printer == OWN_PRINTER else []
+
+    def read() -> tuple[str, Printer]:
+        return root.mu_print.printer, with_measured(_printer(root), sheet)
+
+    kept = _measured.read([sheet, *own], read)
+    return kept[1] if kept and kept[0] == root.mu_print.printer else read()[1]
+
+
+def _printer(root: Any) -> Printer:
     settings = root.mu_print
     if settings.printer != OWN_PRINTER:
         return _shipped(settings.printer)
@@ -186,7 +201,7 @@ def _specimens(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
     from ...usecases.export.job import resin_of
     from ...usecases.export.specimens import LAYOUT, Job
 
-    return LAYOUT, Job(unit, resin_of(None))
+    return LAYOUT, Job(unit, resin_of(None), _printer(root))
 
 
 def _own_stl(root: Any, unit: Unit, folder: Path) -> Path:

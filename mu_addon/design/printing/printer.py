@@ -39,7 +39,7 @@ MEANING = {
 
 @attrs.frozen
 class Limit:
-    """One limit of a printer with a resin, its source, and whether it is assumed and not published.
+    """One limit of a printer with a resin, its source, and whether it is assumed, measured or else published.
 
     The value's unit is the end of the limit's name in MEANING.
     """
@@ -47,6 +47,12 @@ class Limit:
     value: float
     source: str
     assumed: bool
+    measured: bool = False
+
+    @property
+    def standing(self) -> str:
+        """What the value rests on, in a word."""
+        return "measured" if self.measured else "assumed" if self.assumed else "published"
 
 
 # For files that do not give it, as those of older versions.
@@ -92,7 +98,8 @@ def read_printer(path: str | Path) -> Printer:
         text = file_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"cannot read the printer's limits: {error}", str(path), "check the name") from error
-    keys = {"": ("format", "name", "title"), **dict.fromkeys(MEANING, ("value", "source", "assumed"))}
+    of_limit = ("value", "source", "assumed", "measured")
+    keys = {"": ("format", "name", "title"), **dict.fromkeys(MEANING, of_limit)}
     document = parse(text, keys, str(path))
     if document.get("format") != 1 or document["format"] is True:
         raise InputError("the printer's file has no format = 1", place(str(path), None), "write format = 1")
@@ -118,18 +125,23 @@ def printer_text(printer: Printer) -> str:
     values: dict[str, Any] = {"format": 1, "name": printer.name, "title": printer.title}
     for name, limit in printer.limits.items():
         table = {"value": limit.value, "source": limit.source, "assumed": limit.assumed}
+        table |= {"measured": True} if limit.measured else {}
         values[name] = Commented(table, (MEANING[name],))
     return toml_text(values)
 
 
 def _limit(name: str, table: dict[str, object], origin: str) -> Limit:
-    value, source, assumed = table.get("value"), table.get("source"), table.get("assumed", False)
+    value, source = table.get("value"), table.get("source")
+    assumed, measured = table.get("assumed", False), table.get("measured", False)
     where = f"{origin}, [{name}]"
     real = isinstance(value, int | float) and not isinstance(value, bool)
     if not real or not math.isfinite(float(value)) or float(value) <= 0.0:  # type: ignore[arg-type]
         raise InputError(f"value = {value!r} is not a number above zero", where, MEANING[name])
     if not isinstance(source, str) or not source.strip():
         raise InputError("the limit has no source", where, 'write source = "where the figure is from"')
-    if not isinstance(assumed, bool):
-        raise InputError(f"assumed = {assumed!r} is not true or false", where, "write true or false")
-    return Limit(float(value), source, assumed)  # type: ignore[arg-type]
+    for key, flag in (("assumed", assumed), ("measured", measured)):
+        if not isinstance(flag, bool):
+            raise InputError(f"{key} = {flag!r} is not true or false", where, "write true or false")
+    if assumed and measured:
+        raise InputError("the limit is both assumed and measured", where, "leave one of them out")
+    return Limit(float(value), source, bool(assumed), bool(measured))  # type: ignore[arg-type]

@@ -62,7 +62,7 @@ def report(job: Job, found: PrintCheck, picture: Picture) -> str:
     notes = [
         (
             f"{assumed} of these limits are assumed, because no published values were found for this resin. "
-            "Replace them by measured ones."
+            "Print the parts of `specimens` named limit-..., and give what they show by --limits."
         )
     ]
     lead = f'<div class="lead"><div>{_headline(job, found)}</div>{picture_figure(picture)}</div>'
@@ -167,9 +167,9 @@ def _orientation(builds: Sequence[Build]) -> str:
 
 
 def _limits(job: Job) -> str:
-    head = [("limit", "text"), ("value", "n"), ("", ""), ("source", "text")]
+    head = [("limit", "text"), ("value", "n"), ("rests on", ""), ("source", "text")]
     rows = [
-        ([MEANING[name], f"{limit.value:g}", "assumed" if limit.assumed else "", limit.source], False)
+        ([MEANING[name], f"{limit.value:g}", limit.standing, limit.source], False)
         for name, limit in job.printer.limits.items()
     ]
     return table("mm, degrees, ml and g/ml", head, rows)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable, Mapping
 from html import escape
 from pathlib import Path
@@ -13,6 +14,8 @@ import numpy as np
 
 from ...design import coupons
 from ...design.parameters import Unit, read_unit, to_toml
+from ...design.printing.limit_parts import LimitPart, limit_parts
+from ...design.printing.printer import Printer, load_printer, printer_text, read_printer
 from ...design.strut_cell import specimen_solid, strut_cell
 from ...design.surface import Triangles, Vertices, bad_edges, stl_bytes, stl_surface, volume
 from ...errors import OutputError
@@ -26,6 +29,7 @@ from ...run.inputs import FORMAT, read_inputs
 from ...run.usecase import UseCase
 from ...toml_writer import toml_text, toml_value
 from .job import RESIN, UNIT, read_resin
+from .limit_sheet import limit_sheet
 from .print_offsets import gauge_sheet
 
 SCALES = (0.75, 1.0, 1.5)
@@ -34,8 +38,9 @@ TEMPLATE = "measured"
 LAYOUT = FolderLayout(
     "specimens.toml",
     "# The inputs of these specimens; unit.toml beside it belongs to them.",
-    results=("*.stl", "manifest.json", "gauge.csv", "sheet.html", TEMPLATE),
+    results=("*.stl", "manifest.json", "gauge.csv", "limits.csv", "sheet.html", TEMPLATE),
 )
+PRINTER = "printer.toml"
 
 Surface = tuple[Vertices, Triangles]
 
@@ -145,37 +150,47 @@ def specimens(unit: Unit, scales: tuple[float, ...] = SCALES, cells: int = CELLS
 
 @attrs.frozen(eq=False)
 class Job:
-    """Whose specimens are made: a unit's, of a resin."""
+    """Whose specimens are made: a unit's, of a resin, and those of a printer's limits."""
 
     unit: Unit
     resin: Material
+    printer: Printer = attrs.field(factory=load_printer)
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; specimens.toml is the first."""
-        values = {"format": FORMAT, "unit": UNIT, "resin": self.resin.name}
+        values = {"format": FORMAT, "unit": UNIT, "resin": self.resin.name, "printer": PRINTER}
         return {
             LAYOUT.inputs: toml_text(values, LAYOUT.header),
             UNIT: to_toml(self.unit),
             RESIN: material_text(self.resin),
+            PRINTER: printer_text(self.printer),
         }
+
+    @property
+    def limit_parts(self) -> list[LimitPart]:
+        """The parts that show what the printer's file says of it."""
+        return limit_parts(self.printer, math.sqrt(0.75) * self.unit.dimensions.cell)
 
 
 def read_job(folder: Path) -> Job:
     """The job that a folder of `specimens` describes; raises InputError."""
     values, _ = read_inputs(folder / LAYOUT.inputs)
-    return Job(read_unit(folder / UNIT), read_resin(folder, str(values.get("resin"))))
+    printer = read_printer(folder / PRINTER) if "printer" in values else load_printer()
+    return Job(read_unit(folder / UNIT), read_resin(folder, str(values.get("resin"))), printer)
 
 
 def make_specimens(job: Job, folder: Path, context: RunContext) -> None:
     """Write every specimen, the gauge's sheet, the manifest and the folder to fill; raises MuError."""
     unit, resin, progress = job.unit, job.resin, context.progress
-    every = specimens(unit)
+    limits = job.limit_parts
+    every = [*specimens(unit), *(Specimen(p.name, p.make, p.measure) for p in limits)]
     rows = []
     with progress.stage("specimens", 10.0):
         for done, specimen in enumerate(every, 1):
             rows.append(_written(specimen, folder, resin))
             progress.update(done / len(every))
     write_text(folder / "gauge.csv", gauge_sheet())
+    write_text(folder / "limits.csv", limit_sheet(limits))
     _write_template(every, folder / TEMPLATE)
     context.summary |= {"resin": resin.name, "density_g_per_ml": resin.density_g_per_ml, "specimens": rows}
     write_json(folder / "manifest.json", context.summary)
@@ -282,6 +297,11 @@ def _page(unit: Unit, resin: Material, every: list[Specimen], rows: list[dict[st
         "Solids come out larger by twice the offset, gaps smaller; the long sizes separate shrinkage from "
         "the offset.</p>"
     )
+    limits = (
+        "<p>Parts named limit-... have a row of features from too fine to safe, the first beside the notched "
+        "corner. Write into limits.csv which was made, with all safer ones. Then <code>run.py check --limits "
+        "limits.csv</code> goes by these instead of what is published or assumed.</p>"
+    )
     return page(
         "Specimens",
         f"of {unit.name}, scale {unit.scale:g}",
@@ -290,6 +310,7 @@ def _page(unit: Unit, resin: Material, every: list[Specimen], rows: list[dict[st
         [
             ("parts", "Parts", table("", head, parts)),
             ("gauge", "Gauge: caliper measurements", back + table("", gauge, sizes)),
+            ("limits", "Limits of the printer", limits),
         ],
     )
 

@@ -222,6 +222,14 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
     assert bpy.ops.mu.print_check.poll()
     own.write_text(text.replace("value = 0.6", "value = -1"))
     assert "is not a number above zero" in refused(bpy.ops.mu.print_check)
+    root.mu_print.printer = "form-4-elastic-50a"
+    sheet = tmp_path / "limits.csv"
+    sheet.write_text("limit,sizes,measured\nwall_mm,0.2 0.9,0.5\n")
+    root.mu_print.limits_file = str(sheet)
+    assert printing.printer_of(root)["wall_mm"] == 0.5
+    assert "Stale: it belongs to another printer" in drawn()
+    sheet.write_text("limit,sizes,measured\nwall_mm,0.2 0.9,5.0\n")
+    assert "the part has 0.2 to 0.9" in refused(bpy.ops.mu.print_check)
 
     unit_object.delete(root)
     assert not [o for o in bpy.data.objects if "mu_check" in o]

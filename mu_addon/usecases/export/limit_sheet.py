@@ -1,0 +1,82 @@
+"""The sheet of a printer's limits: written with the parts that show them, read back with what they showed."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import attrs
+
+from ...design.printing.limit_parts import LimitPart
+from ...design.printing.printer import MEANING, Limit, Printer
+from ...errors import InputError
+from ...reading import file_text, unreadable
+
+# Bytes of a filled sheet: a hundred times as many as the empty one has.
+_LONGEST = 1 << 17
+COLUMNS = ("limit", "meaning", "best", "sizes", "measured")
+# Between the sizes of a row.
+_BETWEEN = " "
+
+
+def limit_sheet(parts: Sequence[LimitPart]) -> str:
+    """The sheet of some parts as CSV text, its last column to be filled in."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for part in parts:
+        sizes = _BETWEEN.join(f"{size:g}" for size in part.sizes)
+        writer.writerow([part.limit, MEANING[part.limit], part.best, sizes, ""])
+    return text.getvalue()
+
+
+def with_measured(printer: Printer, path: Path) -> Printer:
+    """The printer with the limits that a filled sheet gives, in their units; empty rows leave theirs.
+
+    Raises InputError.
+    """
+    try:
+        rows = list(csv.DictReader(io.StringIO(file_text(path, _LONGEST))))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"cannot read the sheet: {unreadable(error)}", str(path), "give limits.csv of `specimens`"
+        ) from error
+    found = {}
+    for number, row in enumerate(rows, 2):
+        where = f"{path}, line {number}"
+        name, written = row.get("limit") or "", (row.get("measured") or "").strip()
+        if name not in MEANING:
+            raise InputError(
+                f"there is no limit {name!r}", where, "the limits are those of limits.csv of `specimens`"
+            )
+        if name in found:
+            raise InputError(f"{name} is given twice", where, "leave one of the rows out")
+        if written:
+            found[name] = Limit(_measured(row, name, written, where), f"measured, {path.name}", False, True)
+    if not found:
+        raise InputError("no limit was measured", str(path), "fill in the last column, or leave --limits out")
+    return attrs.evolve(printer, limits={**printer.limits, **found})
+
+
+def _measured(row: dict[str, str], name: str, written: str, where: str) -> float:
+    """The number that a row says, within the sizes that its part had."""
+    numbers = []
+    for text in (written, *(row.get("sizes") or "").split(_BETWEEN)):
+        try:
+            numbers.append(float(text))
+        except ValueError:
+            numbers.append(math.nan)
+    value, *sizes = numbers
+    if not (sizes and all(0.0 < size < math.inf for size in sizes)):
+        raise InputError(f"{name} has no sizes", where, "keep the column `sizes` as `specimens` wrote it")
+    if not min(sizes) <= value <= max(sizes):
+        raise InputError(
+            f"{name} measured as {written!r}; the part has {min(sizes):g} to {max(sizes):g}",
+            where,
+            "give a size of the part, or leave the cell empty; where none was made, print the parts of a "
+            "printer file with another limit",
+        )
+    return value
