@@ -14,6 +14,7 @@ from ...measured import Experiment
 from ..effect import Effect, Parameter
 from .drift import drift, drifts, largest_reading
 from .unit import REFERENCE_C, RELAXING, TIMED, decades_lag, first_order_lag
+from .yielding import elastic_strain, yielding
 
 Array = np.ndarray[Any, Any]
 # Stress (n,) in kPa of strain (n,) at rest: 0 at 0, and rising.
@@ -27,6 +28,8 @@ ONSET_mm = 0.01
 FEWEST = 20
 # Of the largest load: what such cells' sheets allow a zero to wander, and hands to miss it.
 ZERO_SHARE = 0.01
+# Iterations for the frame's share.
+_MOST = 1000
 # Strain up to which a preload is looked for.
 FARTHEST = 0.5
 FILTER = Parameter("time_s", "s", 0.0, 2.0, 0.0, (0.05, 0.5), "amplifiers average over 1 ms to 1 s")
@@ -43,6 +46,7 @@ def machine(kind: str) -> tuple[Effect, ...]:
     return (
         *(Effect(name, _TIMED[name], (kind,)) for name in in_time),
         attrs.evolve(RELAXING, kinds=(kind,)),
+        yielding(kind),
         Effect(
             "anisotropy",
             # One for x and y alike: with one each, an axis left out could not be predicted from the others.
@@ -175,15 +179,26 @@ def _borne(experiment: Experiment, law: Law, values: Mapping[str, float], past: 
     give = 1e-3 * compliance * experiment.section_mm[0] * experiment.section_mm[1] / experiment.length_mm
     grid = np.linspace(min(0.0, strain.min()), max(0.0, strain.max()), 101)
     steepest = float((np.diff(seated(grid)) / np.diff(grid)).max())
-    for _ in range(1000):
+    steepest += _steeper(seated, grid, values)
+    for _ in range(_MOST):
         off = stress - _remembering(experiment, seated, strain - give * stress, values, past)
-        # History only softens, so that the steepest slope at rest makes a contraction of it.
+        # No slope is steeper, so that this is a contraction.
         stress = stress - off / (1 + give * steepest)
         if np.abs(off).max() <= 1e-11 * np.abs(stress).max():
             return stress
     raise ConvergenceError(
         "the frame's share of the displacement was not found", experiment.name, "leave frame_compliance out"
     )
+
+
+def _steeper(law: Law, grid: Array, values: Mapping[str, float]) -> float:
+    """By how much in kPa softening on unloading makes a law's slope steeper than it is, at most."""
+    softening = values.get("mullins_softening.softening", 0.0)
+    if not softening:
+        return 0.0
+    width = values.get("mullins_softening.energy_share", 0.3) * float(_energy(law, grid).max())
+    # The slope of erf at 0, times the energy's by the strain, times the stress.
+    return 2 / math.sqrt(math.pi) * softening * float((law(grid) ** 2).max()) / width
 
 
 def _factor(experiment: Experiment, values: Mapping[str, float], past: StrainHistory) -> float:
@@ -225,6 +240,7 @@ def _remembering(
     experiment: Experiment, law: Law, strain: Array, values: Mapping[str, float], past: StrainHistory
 ) -> Array:
     """Stress (n,) of a specimen whose strain (n,) is known, with what it remembers of earlier strain."""
+    strain = elastic_strain(strain, values)
     stress = law(strain)
     if softening := values.get("mullins_softening.softening", 0.0):
         from scipy.special import erf

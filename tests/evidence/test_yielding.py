@@ -1,0 +1,55 @@
+"""A material that yields: its first loading, Masing's rule, what stays after unloading."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from mu_addon.evidence.prediction.yielding import NAME, elastic_strain
+
+M, H = 0.04, 0.2
+VALUES = {f"{NAME}.per_strain": 1 / M, f"{NAME}.hardening": H}
+UP = np.linspace(0.0, 0.12, 241)
+
+
+def first(strain):
+    """The closed form of a first loading."""
+    return H * strain + (1 - H) * M * -np.expm1(-strain / M)
+
+
+def test_without_it_strain_is_elastic_to_the_last_bit():
+    assert elastic_strain(UP, {}) is UP
+
+
+def test_the_first_loading_is_the_closed_form():
+    assert elastic_strain(UP, VALUES) == pytest.approx(first(UP), abs=0.01 * M)
+    assert elastic_strain(-UP, VALUES) == pytest.approx(-first(UP), abs=0.01 * M)
+
+
+def test_after_a_reversal_it_is_the_first_loading_twice_as_large():
+    way = np.concatenate([UP, UP[-2::-1]])
+    found = elastic_strain(way, VALUES)[len(UP) - 1 :]
+    back = UP[-1] - way[len(UP) - 1 :]
+    assert found == pytest.approx(first(UP[-1]) - 2 * first(back / 2), abs=0.02 * M)
+
+
+def test_strain_stays_after_unloading():
+    way = np.concatenate([UP, UP[-2::-1]])
+    found = elastic_strain(way, VALUES)
+    stays = np.interp(0.0, found[len(UP) - 1 :][::-1], way[len(UP) - 1 :][::-1])
+    assert 0.02 < stays < 0.08
+    # A loop closes where it began: what was within it is forgotten.
+    loop = np.concatenate([UP, UP[-2:100:-1], UP[101:]])
+    assert elastic_strain(loop, VALUES)[-1] == pytest.approx(elastic_strain(UP, VALUES)[-1], rel=1e-12)
+
+
+@given(arrays(float, st.integers(1, 30), elements=st.floats(-0.2, 0.2)), st.integers(1, 5))
+def test_rows_between_change_nothing(strain, between):
+    """It is the way that counts, not how often it was read."""
+    ends = np.concatenate([[0.0], strain])
+    fine = np.concatenate([np.linspace(a, b, between + 1)[1:] for a, b in itertools.pairwise(ends)])
+    found = elastic_strain(fine, VALUES)[between - 1 :: between]
+    assert found == pytest.approx(elastic_strain(strain, VALUES), abs=1e-12)
