@@ -42,6 +42,7 @@ class Coupons:
         "tension_compression_asymmetry",
         "viscoelasticity",
         "mullins_softening",
+        "rate_independent_hysteresis",
         "fatigue_drift",
         "temperature_drift",
         "anisotropy",
@@ -51,6 +52,7 @@ class Coupons:
     shapes = (
         ("viscoelasticity.time_s", 1.0, 60.0),
         ("mullins_softening.energy_share", 0.1, 0.6),
+        ("rate_independent_hysteresis.hardening", 0.02, 0.4),
         ("seating.preload_kPa", 0.5, 2.0),
     )
 
@@ -159,6 +161,8 @@ def pulled(e, law, values, done, most):
         own = np.linspace(min(strain.min(), 0.0) - 1e-9, max(strain.max(), 0.0) + 1e-9, 20001)
         travel = own + 1e-3 * give * width * thickness * rest(own) / e.length_mm
         strain = np.interp(strain, travel, own)
+    if per_strain := get("rate_independent_hysteresis.per_strain", 0.0):
+        strain = yielded(strain, 1.0 / per_strain, values["rate_independent_hysteresis.hardening"])
     stress = rest(strain)
     if softening := get("mullins_softening.softening", 0.0):
         every = np.linspace(0.0, 1.0, 2001)
@@ -174,6 +178,18 @@ def pulled(e, law, values, done, most):
     return stress[places]
 
 
+def yielded(strain, mean, hardening):
+    """Strain that stress goes by, of many elements side by side that slide at strains of their own."""
+    count = 10000
+    slides = -mean * np.log1p(-(np.arange(count) + 0.5) / count)
+    state, before, found = np.zeros(count), 0.0, []
+    for e in strain:
+        state = np.clip(state + (e - before), -slides, slides)
+        found.append(hardening * e + (1.0 - hardening) * state.mean())
+        before = e
+    return np.array(found)
+
+
 class Lattices(Coupons):
     """Blocks of slender struts of three scales, weighed, pressed along and across the layers."""
 
@@ -184,6 +200,7 @@ class Lattices(Coupons):
         "strain_stiffening",
         "viscoelasticity",
         "mullins_softening",
+        "rate_independent_hysteresis",
         "fatigue_drift",
         "temperature_drift",
         "anisotropy",

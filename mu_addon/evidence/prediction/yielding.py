@@ -1,8 +1,8 @@
-"""A material that yields: elements side by side that slide at strains of their own (Prandtl, Ishlinskii)."""
+"""A material that yields, as elements side by side do that slide at strains of their own (Ishlinskii)."""
 
 from __future__ import annotations
 
-import itertools
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,13 +13,7 @@ from ..effect import Effect, Parameter
 Array = np.ndarray[Any, Any]
 
 NAME = "rate_independent_hysteresis"
-# Elements that slide, all with the same say.
-_ELEMENTS = 48
 _HARDENING = 0.1
-# Strains at which they slide, over the mean one: an exponential distribution's, at its even quantiles. The
-# middle of each share has a mean a little too small, which the last takes.
-_SLIDES = -np.log1p(-(np.arange(_ELEMENTS) + 0.5) / _ELEMENTS)
-_SLIDES[-1] += _ELEMENTS - _SLIDES.sum()
 
 
 def yielding(kind: str) -> Effect:
@@ -56,23 +50,27 @@ def elastic_strain(strain: Array, values: Mapping[str, float]) -> Array:
     per_strain = values.get(f"{NAME}.per_strain", 0.0)
     if not per_strain:
         return strain
-    slides = _SLIDES / per_strain
-    found, state, before = np.empty_like(strain), np.zeros(_ELEMENTS), 0.0
-    for start, stop in _straight(strain):
-        moved = np.clip(state + (strain[start:stop, None] - before), -slides, slides)
-        found[start:stop] = moved.mean(axis=1)
-        state, before = moved[-1], float(strain[stop - 1])
     hardening = values.get(f"{NAME}.hardening", _HARDENING)
-    return np.asarray(hardening * strain + (1.0 - hardening) * found)
+    mean, yields = 1.0 / per_strain, (1.0 - hardening) / per_strain
 
+    def first(e: float) -> float:
+        return hardening * e + math.copysign(yields * math.expm1(-abs(e) / mean), e)
 
-def _straight(strain: Array) -> list[tuple[int, int]]:
-    """First rows and ends of the runs in which strain (n,) only rises or only falls."""
-    up = np.diff(strain, prepend=0.0)
-    way = np.sign(up)
-    # What stands still goes on with the run before it.
-    for k in np.flatnonzero(way == 0.0):
-        way[k] = way[k - 1] if k else 1.0
-    turns = np.flatnonzero(np.diff(way)) + 1
-    bounds = [0, *turns.tolist(), len(strain)]
-    return list(itertools.pairwise(bounds))
+    found = []
+    # Where the way turned, in pairs of strain and elastic strain, as far as the material remembers.
+    turns = [(0.0, 0.0)]
+    last, elastic, rising = 0.0, 0.0, True
+    for e in strain.tolist():
+        if e != last and (e > last) != rising:
+            rising = e > last
+            if turns[-1] != (last, elastic):
+                turns.append((last, elastic))
+        # A loop that closes is forgotten, and so is the first turn beyond its mirror image.
+        while len(turns) > 2 and (e > turns[-2][0] if rising else e < turns[-2][0]):
+            del turns[-2:]
+        if len(turns) == 2 and abs(e) > abs(turns[1][0]):
+            del turns[1]
+        at, then = turns[-1]
+        last, elastic = e, first(e) if len(turns) == 1 else then + 2.0 * first(0.5 * (e - at))
+        found.append(elastic)
+    return np.array(found)
