@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .evaluation import Evaluation as Evaluation
     from .evaluation import Kept as Kept
     from .evaluation import Order as Order
+    from .evaluation import Record as Record
     from .evaluation import State as State
     from .tree import Node as Node
     from .tree import NodeTree as NodeTree
@@ -31,7 +32,7 @@ else:
         {
             "check": "Fault faults",
             "definition": "Call Definition Input Output Setting",
-            "evaluation": "Evaluation Kept Order State",
+            "evaluation": "Evaluation Kept Order Record State",
             "tree": "Node NodeTree Source",
             "tree_file": "parse_tree read_tree tree_text",
         },

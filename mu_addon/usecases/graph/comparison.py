@@ -19,8 +19,8 @@ from ...report.charts import BY_LENGTH, BY_START, QUIET, canvas
 from ...report.html import figure, number, table
 from ..export.job import USUAL_RESIN
 from ..parameter_study.csv_columns import figures
-from .design_nodes import Design
 from .orders import Study
+from .parts import Design
 
 Row = dict[str, Any]
 

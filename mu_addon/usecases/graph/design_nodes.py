@@ -3,27 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from functools import cache
 from typing import Any
 
 import attrs
 
 from ...design.anchors import window
-from ...design.body import Body, envelope, read_body
 from ...design.lattice import Graph
-from ...design.parameters import SECTIONS, Unit, from_toml, load_preset, preset_names, read_unit
-from ...design.quantity import Description, describe
+from ...design.parameters import from_toml, load_preset, preset_names, read_unit
 from ...design.solid import QUALITY
-from ...design.steps import STEPS, Path, Stack, Step, StepInputs, Struts, TrimmedStruts, require_whole
+from ...design.steps import STEPS, Path, Stack, Step, Struts, TrimmedStruts
 from ...design.waveguide import Bar
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
-from ...graph.evaluation import NodeError
+from .loading import of_orders
+from .parts import (
+    SCALE,
+    Design,
+    Part,
+    blamed,
+    described,
+    first_choosing,
+    known_path,
+    part_of,
+    rest,
+    whole_unit,
+)
 
 STACK = Stack()
 """Values of the steps of every tree in this process."""
 DESIGN, UNIT = "Design", "Unit"
-BOTH = "both"
 # Fields of `StepInputs` that are set at the first step which depends on them.
 _CHOSEN = {
     "path": setting("path", "", "path of the waveguide, alpha1 and on; empty: none"),
@@ -34,72 +42,6 @@ _CHOSEN = {
         "body", "", "closed surface that the lattice fills in place of its box: STL, OBJ or PLY", path=FILE
     ),
 }
-_SCALE = next(d for d in describe(Unit) if d.name == "scale")
-
-
-@attrs.frozen
-class Part:
-    """What steps have made so far: their parameters, by `section.name`, and which node each is from.
-
-    chosen: of `StepInputs`, by name; muted: names of muted steps; step: the last of them.
-    """
-
-    step: str
-    parameters: Mapping[str, Any]
-    chosen: Mapping[str, str]
-    muted: frozenset[str]
-    origin: Mapping[str, str]
-
-    def unit(self, name: str = "custom", more: Mapping[str, Any] | None = None) -> Unit:
-        """The unit with these parameters, all others at their defaults; raises InputError by a rule."""
-        values = {**self.parameters, **(more or {})}
-        return Unit(name=name, scale=values.get("scale", 1.0), **_sections(values))
-
-    def inputs(self, unit: Unit) -> StepInputs:
-        """What the steps make a unit from. Raises InputError for a body that does not fit."""
-        body = body_in(self.chosen.get("body", ""), unit)
-        quality = self.chosen.get("quality", "interactive")
-        return StepInputs(unit, self.chosen.get("path", ""), self.muted, quality, body)  # type: ignore[arg-type]
-
-
-@attrs.frozen(eq=False)
-class Design:
-    """A whole unit: its parameters, the path of its waveguide or "", its body in place of the lattice's box.
-
-    origin: which node a parameter is from, by `section.name`.
-    """
-
-    unit: Unit
-    path: str = ""
-    body: Body | None = None
-    muted: frozenset[str] = frozenset()
-    origin: Mapping[str, str] = attrs.field(factory=dict)
-
-
-def body_in(path: str, unit: Unit) -> Body | None:
-    """The body in a file, cut to the unit's length, or None without one; raises InputError."""
-    return envelope(read_body(path), unit.dimensions) if path else None
-
-
-def _sections(values: Mapping[str, Any]) -> dict[str, Any]:
-    """A unit's sections with the values that are given by `section.name`."""
-    found: dict[str, Any] = {}
-    for section in SECTIONS:
-        own = _name_of(section)
-        given = {d.name: values[f"{own}.{d.name}"] for d in describe(section) if f"{own}.{d.name}" in values}
-        found[own] = section(**given)
-    return found
-
-
-def _name_of(section: Any) -> str:
-    return str(section.section)
-
-
-@cache
-def _described() -> dict[str, Description]:
-    """Every parameter of a unit by `section.name`, the scale by its own name."""
-    found = {f"{_name_of(s)}.{d.name}": d for s in SECTIONS for d in describe(s)}
-    return {"scale": _SCALE, **found}
 
 
 def _ancestors(names: Iterable[str]) -> set[str]:
@@ -120,13 +62,9 @@ def _sources(step: Step) -> tuple[str, ...]:
     return (*step.after, *more)
 
 
-def _first_choosing(name: str) -> str:
-    return next(step.name for step in STEPS.values() if name in step.chosen)
-
-
 def _needs_path(name: str) -> bool:
     """Whether a step makes nothing of a unit without a waveguide."""
-    return _first_choosing("path") in _ancestors([name])
+    return first_choosing("path") in _ancestors([name])
 
 
 def _may_lack(step: Step, name: str) -> bool:
@@ -135,10 +73,10 @@ def _may_lack(step: Step, name: str) -> bool:
 
 
 def _settings(step: Step) -> tuple[Setting, ...]:
-    own = [Setting(_described()[path]) for path in step.own]
+    own = [Setting(described()[path]) for path in step.own]
     # The scale is of every length, so it is set where the first of them are.
-    scale = [] if step.after else [Setting(_SCALE)]
-    chosen = [_CHOSEN[name] for name in step.chosen if _first_choosing(name) == step.name]
+    scale = [] if step.after else [Setting(SCALE)]
+    chosen = [_CHOSEN[name] for name in step.chosen if first_choosing(name) == step.name]
     return (*chosen, *own, *scale)
 
 
@@ -155,18 +93,9 @@ def _of_step(step: Step) -> Definition:
         for name in _sources(step)
     )
 
-    def part_of(call: Call) -> Part:
-        return _part(step, call)
-
     def make(call: Call) -> Outputs:
-        part = part_of(call)
+        part = part_of(step, call)
         return {step.name: part, "value": _value(part)}
-
-    def order(call: Call) -> Any:
-        # Loads the solver, as every run does.
-        from .orders import solid_order
-
-        return solid_order(call)
 
     solid = step.gives == "solid"
     return Definition(
@@ -179,41 +108,11 @@ def _of_step(step: Step) -> Definition:
         settings=_settings(step),
         muting=step.muting,
         make=None if solid else make,
-        order=order if solid else None,
+        order=of_orders("solid_order") if solid else None,
         read=(lambda call, done: {step.name: done}) if solid else None,
         mute=make if step.muting else None,
         remark=(lambda outputs: _solid_remark(outputs[step.name].summary)) if solid else _remark,
         named=True,
-    )
-
-
-def _part(step: Step, call: Call) -> Part:
-    """What the linked parts and the node's own settings come to; InputError where two parts differ."""
-    parameters: dict[str, Any] = {}
-    chosen: dict[str, str] = {}
-    origin: dict[str, str] = {}
-    muted: set[str] = set()
-    for name, part in call.inputs.items():
-        if part is None:
-            continue
-        for path, value in part.parameters.items():
-            if path in parameters and parameters[path] != value:
-                raise InputError(
-                    f"the inputs are parts of two designs: {path} is {parameters[path]!r} by "
-                    f"{origin[path]!r} and {value!r} by {part.origin[path]!r}",
-                    name,
-                    "link parts that were made from the same nodes",
-                )
-            parameters[path], origin[path] = value, part.origin[path]
-        chosen |= part.chosen
-        muted |= part.muted
-    for path in step.own:
-        parameters[path], origin[path] = call.settings[path.split(".")[1]], call.node
-    if not step.after:
-        parameters["scale"], origin["scale"] = call.settings["scale"], call.node
-    chosen |= {name: call.settings[name] for name in step.chosen if name in call.settings}
-    return Part(
-        step.name, parameters, chosen, frozenset(muted | ({step.name} if call.muted else set())), origin
     )
 
 
@@ -227,46 +126,6 @@ def _value(part: Part) -> Any:
         # A rule may be broken only with the defaults of what is not linked yet: the unit's node will say so.
         return None
     return STACK.value(part.step, given)
-
-
-def _whole(part: Part, node: str, more: Mapping[str, Any], name: str = "custom") -> Unit:
-    """The part's unit; an error by a rule is that of the node whose parameter breaks it."""
-    try:
-        return part.unit(name, more)
-    except InputError as error:
-        raise _blamed(error, part.origin, node) from error
-
-
-def _blamed(error: InputError, origin: Mapping[str, str], node: str) -> NodeError:
-    """The error with the node that set the first parameter which it names."""
-    words = error.where.replace("[", "").replace("]", "").replace(",", " ").split()
-    section = words[0] if len(words) > 1 else ""
-    for word in words:
-        cause = origin.get(word) or origin.get(f"{section}.{word}")
-        if cause:
-            return NodeError(error, cause)
-    return NodeError(error, node)
-
-
-def solid_of(call: Call) -> tuple[Unit, StepInputs, str]:
-    """Unit, steps' inputs and path of the node Solid; InputError where a step that it needs is muted."""
-    part = _part(STEPS["solid"], call)
-    unit = _whole(part, call.node, {})
-    given = part.inputs(unit)
-    require_whole(given)
-    path = "" if "path" in given.muted or call.inputs.get("wells") is None else given.path
-    return unit, given, _known(unit, path)
-
-
-def refuse_body(design: Design, what: str) -> None:
-    """Raise InputError for a unit with a body in place of the lattice's box."""
-    if design.body is not None:
-        raise InputError(f"{what} knows no body in place of the lattice's box", "unit", "leave the body out")
-
-
-def _known(unit: Unit, path: str) -> str:
-    """The path's name; raises InputError for one that the unit has not."""
-    return window(unit, path).name if path else ""
 
 
 def _remark(outputs: Outputs) -> str:
@@ -290,24 +149,19 @@ def _solid_remark(summary: Mapping[str, Any]) -> str:
 # The unit: by its steps, from a file, and one of which a parameter is changed.
 
 
-def _rest() -> tuple[str, ...]:
-    """Parameters that no step owns: of material, wall and printer."""
-    owned = {path for step in STEPS.values() for path in step.own}
-    return tuple(path for path in _described() if path not in owned and path != "scale")
-
-
 def _assembled(call: Call) -> Outputs:
     # As a step that is made from all parts of the solid.
-    part = _part(attrs.evolve(STEPS["solid"], own=(), chosen=()), attrs.evolve(call, muted=False))
-    more = {path: call.settings[path.replace(".", "_")] for path in _rest()}
+    part = part_of(attrs.evolve(STEPS["solid"], own=(), chosen=()), attrs.evolve(call, muted=False))
+    more = {path: call.settings[path.replace(".", "_")] for path in rest()}
     origin = {**part.origin, **dict.fromkeys(more, call.node)}
-    unit = _whole(attrs.evolve(part, origin=origin), call.node, more, call.settings["name"])
+    unit = whole_unit(attrs.evolve(part, origin=origin), call.node, more, call.settings["name"])
     try:
         given = part.inputs(unit)
-        path = "" if "path" in part.muted or call.inputs.get("wells") is None else _known(unit, given.path)
+        wanted = "" if "path" in part.muted or call.inputs["wells"] is None else given.path
+        path = known_path(unit, wanted)
         STACK.value("struts", given)
     except InputError as error:
-        raise _blamed(error, {**origin, **_chosen_origin(part, origin)}, call.node) from error
+        raise blamed(error, {**origin, **_chosen_origin(part, origin)}, call.node) from error
     return {"unit": Design(unit, path, given.body, part.muted, origin)}
 
 
@@ -315,7 +169,7 @@ def _chosen_origin(part: Part, origin: Mapping[str, str]) -> dict[str, str]:
     """Which node has set what is chosen: the one with a parameter of the same step."""
     found = {}
     for name in part.chosen:
-        own = STEPS[_first_choosing(name)].own
+        own = STEPS[first_choosing(name)].own
         found[name] = next((origin[path] for path in own if path in origin), "")
     return found
 
@@ -326,14 +180,14 @@ def _read_unit(call: Call) -> Outputs:
         unit = from_toml(s["parameters"], "parameters")
     else:
         unit = read_unit(s["file"]) if s["file"] else load_preset(s["preset"])
-    origin = dict.fromkeys(_described(), call.node)
-    return {"unit": Design(unit, _known(unit, s["path"]), origin=origin)}
+    origin = dict.fromkeys(described(), call.node)
+    return {"unit": Design(unit, known_path(unit, s["path"]), origin=origin)}
 
 
 def _with_parameter(call: Call) -> Outputs:
     design: Design = call.inputs["unit"]
     path, value = call.settings["parameter"], call.settings["value"]
-    d = _described()[path]
+    d = described()[path]
     value = Setting(d).checked(value)
     section, _, name = path.rpartition(".")
     if section:
@@ -352,12 +206,12 @@ def unit_remark(outputs: Outputs) -> str:
 
 def _renamed(path: str) -> Setting:
     """A parameter under the name of its section, too: sections have parameters of the same name."""
-    return Setting(_described()[path]._replace(name=path.replace(".", "_")))
+    return Setting(described()[path]._replace(name=path.replace(".", "_")))
 
 
 def design_nodes() -> tuple[Definition, ...]:
     """Definitions of the nodes of the design."""
-    numbers = tuple(path for path, d in _described().items() if d.type in (int, float))
+    numbers = tuple(path for path, d in described().items() if d.type in (int, float))
     assembled = tuple(
         Input(
             name,
@@ -377,7 +231,7 @@ def design_nodes() -> tuple[Definition, ...]:
             "the unit of these parts, with its material, wall law and printer",
             assembled,
             (Output("unit", "unit", "the unit"),),
-            (setting("name", "custom", "name of the unit"), *map(_renamed, _rest())),
+            (setting("name", "custom", "name of the unit"), *map(_renamed, rest())),
             make=_assembled,
             remark=unit_remark,
             named=True,

@@ -9,7 +9,7 @@ from ...errors import InputError
 from ...graph.definition import FOLDER, Call, Definition, Input, Output, Outputs, setting
 from ...measured import read_folder
 from ...meshing.settings import FIDELITIES, HOMOGENISED
-from .study_nodes import of_orders
+from .loading import of_orders
 
 DATA, NUMBERS = "Data", "Number"
 COMPARED = ("unit", "study", "grasp", "diagnosis")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import attrs
@@ -49,6 +50,11 @@ class Job:
         run = {"wanted": list(self.wanted)} if self.wanted else {}
         reports = {"node_reports": True} if self.node_reports else {}
         return {NAME: tree_text(self.tree, {**run, **reports})}
+
+
+def file_name(node: str) -> str:
+    """A node's name as part of a file's: letters, digits, dots, hyphens and underscores."""
+    return re.sub(r"[^\w.-]+", "_", node)
 
 
 def job_of_file(path: Path, wanted: tuple[str, ...] = (), node_reports: bool = False) -> Job:

@@ -36,7 +36,8 @@ from ..simulate_and_place.extended_unit import read_extended, require_same_print
 from ..simulate_and_place.job import Job, grasp, protocol_of
 from ..simulate_and_place.run import USE_CASE as STUDY
 from ..simulate_and_place.static_effects import StaticEffects
-from .design_nodes import BOTH, Design, refuse_body, solid_of
+from .parts import Design, refuse_body, solid_of
+from .study_nodes import BOTH
 
 
 @attrs.frozen(eq=False)

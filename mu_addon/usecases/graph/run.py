@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from ...run.context import RunContext
 from ...run.usecase import UseCase
 from .comparison import Comparison, write_comparison
 from .definitions import definitions
-from .job import LAYOUT, STATES, Job, read_job
+from .job import LAYOUT, STATES, Job, file_name, read_job
 from .report import write_report
 
 
@@ -60,11 +59,6 @@ def run_graph(job: Job, folder: Path, context: RunContext) -> Evaluation:
         error.status = first.status
         raise error
     return found
-
-
-def file_name(node: str) -> str:
-    """A node's name as part of a file's: letters, digits, dots, hyphens and underscores."""
-    return re.sub(r"[^\w.-]+", "_", node)
 
 
 def states_as_plain(found: Evaluation) -> dict[str, Any]:

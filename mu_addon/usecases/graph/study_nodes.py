@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from importlib import import_module
-from typing import Any
-
 from ...design.gripper import Fingers, Gripper, Plate
 from ...design.quantity import describe
 from ...design.solid import QUALITY
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
 from ...meshing.settings import FIDELITIES, HOMOGENISED
 from ...placement.inclusion import RULES
-from .design_nodes import BOTH, refuse_body
+from .loading import of_orders
+from .parts import refuse_body
 
 SIMULATE, PLACE, PRINT, GRASP = "Simulate", "Sensor", "Print", "Gripper"
+BOTH = "both"
 # As the use cases name them, which are not loaded for a look at their nodes; a test compares them.
 SPECIMENS = ("slide", "stick")
 FORMATS = ("stl", "3mf", "3mf-beams", "step", "txt")
@@ -26,11 +24,6 @@ _FIDELITY = setting(
 )
 _SELF_CONTACT = setting("self_contact", False, "keep walls and struts of a resolved unit apart")
 _QUALITY = setting("quality", "interactive", "how fine the facets are", choices=tuple(QUALITY))
-
-
-def of_orders(name: str) -> Callable[..., Any]:
-    """A function of `orders`, which is loaded when it is called."""
-    return lambda *given: getattr(import_module(".orders", __package__), name)(*given)
 
 
 def _gripper(call: Call) -> Outputs:
