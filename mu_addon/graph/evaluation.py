@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import attrs
 
 from ..errors import MuError
-from ..reading import file_bytes
+from ..reading import file_bytes, is_number
 from ..run.cache import key as hashed
 from ..run.inputs import digest
 from ..run.usecase import UseCase
@@ -67,6 +67,12 @@ class Finished:
     folder: Path
     summary: Mapping[str, Any]
 
+    @property
+    def cost_s(self) -> float:
+        """Seconds that its stages took."""
+        found = self.summary.get("seconds")
+        return sum(s for s in found.values() if is_number(s)) if isinstance(found, Mapping) else 0.0
+
 
 class Runs(Protocol):
     """Runs of an evaluation."""
@@ -80,9 +86,13 @@ class Runs(Protocol):
 
 @attrs.frozen
 class Record:
-    """What an evaluation left of a node: words on its outputs, those that are numbers, folder of its run."""
+    """What an evaluation left of a node: words on its outputs, those that are numbers, folder of its run.
+
+    cost_s: how long it took to compute.
+    """
 
     remark: str = ""
+    cost_s: float = 0.0
     numbers: Mapping[str, float] = attrs.field(factory=dict)
     folder: Path | None = None
 
@@ -91,11 +101,13 @@ class Record:
 class State:
     """What became of a node: one of the states, the seconds it took, its key and a few words on its outputs.
 
-    folder: of its run; error: why it failed; because: the node that it waits for, or that failed.
+    cost_s: how long it took when it was computed, now or before; folder: of its run; error: why it failed;
+    because: the node that it waits for, or that failed.
     """
 
     state: str
     seconds: float = 0.0
+    cost_s: float = 0.0
     key: str = ""
     remark: str = ""
     folder: Path | None = None
@@ -214,18 +226,20 @@ class Evaluation:
         if found is None:
             self._set(name, State(WAITING, key=key, because=self.states[behind].because if behind else name))
         else:
-            self._set(name, State(CACHED, key=key, remark=found.remark, folder=found.folder))
+            state = State(CACHED, cost_s=found.cost_s, key=key, remark=found.remark, folder=found.folder)
+            self._set(name, state)
 
     def _of_call(self, name: str, definition: Definition, call: Call, key: str, start: float) -> None:
-        outputs = self.kept.get(key)
+        found: tuple[Outputs, float] | None = self.kept.get(key)
         state = CACHED
-        if outputs is None:
+        if found is None:
             make = definition.mute if call.muted else definition.make
             assert make is not None
-            outputs, state = make(call), COMPUTED
-            self.kept.put(key, outputs)
+            found, state = (make(call), time.perf_counter() - start), COMPUTED
+            self.kept.put(key, found)
             self.kept.counts[name] += 1
-        self._done(name, definition, outputs, State(state, time.perf_counter() - start, key))
+        outputs, cost = found
+        self._done(name, definition, outputs, State(state, time.perf_counter() - start, cost, key))
 
     def _of_run(self, name: str, definition: Definition, call: Call, key: str, start: float) -> None:
         assert definition.order is not None
@@ -238,7 +252,8 @@ class Evaluation:
             self.kept.counts[name] += 1
         outputs = definition.read(call, done)
         seconds = time.perf_counter() - start
-        self._done(name, definition, outputs, State(state, seconds, key, folder=done.folder))
+        cost = seconds if state == COMPUTED else done.cost_s
+        self._done(name, definition, outputs, State(state, seconds, cost, key, folder=done.folder))
 
     def _done(self, name: str, definition: Definition, outputs: Outputs, state: State) -> None:
         self.outputs[name] = outputs
@@ -246,7 +261,7 @@ class Evaluation:
 
     def _failed(self, name: str, error: MuError, key: str, seconds: float) -> None:
         cause = error.node if isinstance(error, NodeError) else ""
-        self._set(name, State(FAILED, seconds, key, error=error, because=cause))
+        self._set(name, State(FAILED, seconds, key=key, error=error, because=cause))
         if cause in self.states and cause != name:
             # What is to be mended stands there.
             found = self.states[cause]

@@ -21,7 +21,7 @@ LONGEST, MOST_RECORDS = 1 << 24, 5000
 def record_of(definition: Definition, outputs: Outputs, state: State) -> Record:
     """What is kept of a node that was made."""
     numbers = {o.name: float(outputs[o.name]) for o in definition.outputs if o.type == NUMBER}
-    return Record(state.remark, numbers, state.folder)
+    return Record(state.remark, state.cost_s, numbers, state.folder)
 
 
 def read_records(folder: Path) -> dict[str, Record]:
@@ -43,6 +43,7 @@ def write_records(folder: Path, records: Mapping[str, Record]) -> None:
     tables = {
         key: {
             "remark": record.remark,
+            "cost_s": round(record.cost_s, 4),
             "numbers": dict(record.numbers),
             **({"run": record.folder.name} if record.folder is not None else {}),
         }
@@ -55,11 +56,14 @@ def _record(table: Any, folder: Path) -> Record | None:
     if not isinstance(table, dict):
         return None
     remark, numbers, run = table.get("remark", ""), table.get("numbers", {}), table.get("run")
+    cost = table.get("cost_s", 0.0)
     if not (isinstance(remark, str) and isinstance(numbers, dict) and all(map(is_number, numbers.values()))):
         return None
+    if not is_number(cost):
+        return None
     if run is None:
-        return Record(remark, numbers)
+        return Record(remark, cost, numbers)
     # A name alone: what leads out of the folder is no run of this tree.
     if not isinstance(run, str) or Path(run).name != run or not (folder / FOLDER / run).is_dir():
         return None
-    return Record(remark, numbers, folder / FOLDER / run)
+    return Record(remark, cost, numbers, folder / FOLDER / run)

@@ -9,7 +9,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty, StringProperty
 
 from ...graph.definition import FILE, FOLDER, Definition, Setting
-from ...graph.evaluation import BLOCKED, CACHED, COMPUTED, FAILED, MUTED, WAITING
+from ...graph.evaluation import BLOCKED, CACHED, COMPUTED, FAILED, MADE, MUTED, WAITING
 from ...run.progress import spell
 from ...usecases.graph.definitions import definitions
 from ..shared.panels import wrapped
@@ -34,6 +34,15 @@ _ICONS = {
 }
 _STATES = {}
 """What drawing knows of nodes: see `state_of`."""
+
+
+_RUNNING = {}
+"""Of each tree that is being evaluated the node, its stage and fraction: see `set_running`."""
+
+
+def set_running(tree, node="", stage="", fraction=None) -> None:
+    """Have a node drawn as the one that is being computed; none with ""."""
+    _RUNNING[tree.session_uid] = {"node": node, "stage": stage, "fraction": fraction}
 
 
 def set_states(tree, found) -> None:
@@ -188,19 +197,24 @@ def draw_state(node, layout) -> None:
     if found is None:
         return
     text = found.state
-    if found.state == COMPUTED and found.seconds:
-        text = (
-            f"{text} in {spell(found.seconds) if found.seconds >= 0.1 else f'{1e3 * found.seconds:.1f} ms'}"
-        )
+    now = _RUNNING.get(node.id_data.session_uid, {})
+    if found.state == WAITING and now.get("node") == node.name:
+        layout.progress(factor=now.get("fraction") or 0.0, text=now.get("stage", ""))
+        return
+    if found.state in MADE and found.cost_s >= 1e-4:
+        taken = spell(found.cost_s) if found.cost_s >= 0.1 else f"{1e3 * found.cost_s:.1f} ms"
+        text += f" in {taken}" if found.state == COMPUTED else f", took {taken}"
     if found.state in (BLOCKED, WAITING) and found.because and found.because != node.name:
-        text = f"{text}: {found.because}"
+        text += f": {found.because}"
     layout.label(text=text, icon=_ICONS[found.state])
     if found.remark:
         layout.label(text=found.remark, icon="BLANK1")
-    if found.error is not None:
+    if found.error is not None and found.because not in ("", node.name):
+        layout.label(text=f"see {found.because}", icon="BLANK1")
+    elif found.error is not None:
         box = layout.box()
         box.alert = True
-        width = max(16, int(node.width / 6.2))
+        width = max(16, int(node.width / 7.4))
         wrapped(box, found.error.what, "ERROR", width)
         if found.error.remedy:
             wrapped(box, found.error.remedy, "NONE", width)

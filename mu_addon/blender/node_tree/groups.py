@@ -194,4 +194,31 @@ class MU_OT_node_group_edit(TreeOperator, bpy.types.Operator):
 CLASSES = (MU_OT_node_group_make, MU_OT_node_group_ungroup, MU_OT_node_group_edit)
 
 
-register, unregister = bpy.utils.register_classes_factory(CLASSES)
+_KEYS = (
+    ("mu.node_group_make", "G", {"ctrl": True}),
+    ("mu.node_group_ungroup", "G", {"ctrl": True, "alt": True}),
+    ("mu.node_group_edit", "TAB", {}),
+)
+"""The keys that Blender's own groups have: those operators do not take trees of other kinds."""
+_keymaps: list = []
+
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
+
+
+def register() -> None:
+    """Operators, and their keys in node editors; in background there are none."""
+    _register_classes()
+    config = bpy.context.window_manager.keyconfigs.addon if bpy.context.window_manager else None
+    if config is not None:
+        keymap = config.keymaps.new(name="Node Editor", space_type="NODE_EDITOR")
+        _keymaps.extend(
+            (keymap, keymap.keymap_items.new(name, key, "PRESS", **held)) for name, key, held in _KEYS
+        )
+
+
+def unregister() -> None:
+    """Take them out again."""
+    for keymap, item in _keymaps:
+        keymap.keymap_items.remove(item)
+    _keymaps.clear()
+    _unregister_classes()

@@ -44,6 +44,7 @@ _records: FileCache[dict[str, Record]] = FileCache()
 _pending: set[int] = set()
 _looked: dict[int, float] = {}
 _seconds: dict[int, float] = {}
+_written: dict[int, int] = {}
 
 
 def trees() -> Iterator[Any]:
@@ -195,8 +196,20 @@ def start(tree: Any, wanted: tuple[str, ...] = ()) -> Any:
 
 
 def _redraw_running() -> float | None:
+    """Show which node is being computed, and those that are done meanwhile."""
+    running = [tree for tree in trees() if RUN.is_running(tree)]
+    for tree in running:
+        child = RUN.child(tree)
+        found = child.progress if child is not None else {}
+        node, _, stage = str(found.get("stage", "")).rpartition(": ")
+        classes.set_running(tree, node, stage, found.get("fraction"))
+        path = folder_of(tree) / FOLDER / RECORDS
+        written = path.stat().st_mtime_ns if path.is_file() else 0
+        if written != _written.get(tree.session_uid):
+            _written[tree.session_uid] = written
+            schedule(tree)
     redraw()
-    return INTERVAL_S if any(RUN.is_running(tree) for tree in trees()) else None
+    return INTERVAL_S if running else None
 
 
 def tree_of_unit(root: Any, steps: bool = False) -> Any:

@@ -69,6 +69,7 @@ def states_as_plain(found: Evaluation) -> dict[str, Any]:
             "kind": found.tree.nodes[name].kind,
             "state": state.state,
             "seconds": round(state.seconds, 4),
+            "cost_s": round(state.cost_s, 4),
             "key": state.key,
         }
         if state.remark:
