@@ -38,6 +38,14 @@ class Comparison:
     results: Mapping[str, tuple[Any, ...]]
     angles: tuple[tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]], ...] = ()
 
+    def remark(self) -> str:
+        """How many, and the largest angles of studies less that of the first, in a few words."""
+        angles = self.results.get("angle_highest_deg", ())
+        more = [
+            f"{difference(angles[0], a):+.1f}" for a in angles[1:] if _is_number(a) and _is_number(angles[0])
+        ]
+        return f"{len(self.names)} side by side" + (f", {', '.join(more)} deg" if more else "")
+
     def rows(self) -> list[tuple[str, tuple[Any, ...]]]:
         """Inputs that are not all equal, then all results."""
         differing = [(k, v) for k, v in self.inputs.items() if any(x != v[0] for x in v)]

@@ -96,7 +96,7 @@ def evidence_nodes() -> tuple[Definition, ...]:
             (Output("table", "table", "the comparison"),),
             make=_compared,
             muting="nothing is compared",
-            remark=lambda outputs: f"{len(outputs['table'].names)} side by side",
+            remark=lambda outputs: str(outputs["table"].remark()),
         ),
         Definition(
             "number",
