@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -45,12 +46,18 @@ class NodeError(MuError):
 class Order:
     """A run that a node wants: its use case and its job.
 
-    after: folder of a run that this one goes on from, whose cache it takes up; decides no result.
+    after: folder of a run that this one goes on from, whose cache it takes up; decides no result. answers:
+    whether a verdict in its summary is its answer, also where it ends with an error because of that.
     """
 
     use_case: UseCase[Any]
     job: Any
     after: Path | None = None
+    answers: bool = False
+
+    def is_done(self, summary: Mapping[str, Any]) -> bool:
+        """Whether the run that left this summary need not be repeated."""
+        return summary.get("status") == "complete" or (self.answers and "verdict" in summary)
 
     @property
     def key(self) -> str:
@@ -329,7 +336,8 @@ def _content(path: str, value: str) -> Any:
     place = Path(value)
     try:
         if path == FILE:
-            return digest(file_bytes(place, LONGEST_FILE))
+            found = place.stat()
+            return _digest(place, found.st_size, found.st_mtime_ns)
         if path == FOLDER:
             return sorted(
                 (p.name, p.stat().st_size, p.stat().st_mtime_ns) for p in place.iterdir() if p.is_file()
@@ -338,3 +346,9 @@ def _content(path: str, value: str) -> Any:
         # Whoever reads it says so.
         return "unreadable"
     return ""
+
+
+@lru_cache(256)
+def _digest(place: Path, size: int, mtime_ns: int) -> str:
+    """SHA-256 of a file, read once as long as neither size nor time changes: a slider asks at every move."""
+    return digest(file_bytes(place, LONGEST_FILE))

@@ -46,7 +46,7 @@ class FolderRuns:
         """The run where it lies there whole, of the same inputs."""
         place = self.place(order)
         summary = _summary(place)
-        if summary.get("status") != "complete" or not order.use_case.layout.is_of(place):
+        if not order.is_done(summary) or not order.use_case.layout.is_of(place):
             return None
         return Finished(place, summary) if same_inputs(place, order.job.texts()) else None
 
@@ -60,7 +60,9 @@ class FolderRuns:
         with run_to_end(inner) as context:
             context.wants_report = self.reports
             order.use_case.start(order.job, place, context)
-        if context.status:
+        summary = _summary(place)
+        stopped = context.status in _STOPPED
+        if context.status and (stopped or not order.is_done(summary)):
             message = errors[-1] if errors else {}
             found = MuError(
                 str(message.get("what", "the run failed")),
@@ -68,10 +70,10 @@ class FolderRuns:
                 str(message.get("what_to_do", "")),
             )
             found.status = context.status
-            if context.status in _STOPPED:
+            if stopped:
                 raise Stopped(found)
             raise found
-        return Finished(place, _summary(place))
+        return Finished(place, summary)
 
 
 class Stopped(Exception):

@@ -48,8 +48,8 @@ _written: dict[int, int] = {}
 
 
 def trees() -> Iterator[Any]:
-    """Every node tree of ours in the file."""
-    return (group for group in bpy.data.node_groups if group.bl_idname == TREE)
+    """Every node tree of ours in the file; those linked from another one are evaluated there."""
+    return (g for g in bpy.data.node_groups if g.bl_idname == TREE and g.library is None)
 
 
 def _is_group(tree: Any) -> bool:

@@ -9,6 +9,7 @@ from typing import Any
 import attrs
 
 from ...design.anchors import window
+from ...design.gates import GateError
 from ...design.printing.printer import load_printer
 from ...errors import InputError
 from ...graph.definition import Call, Outputs
@@ -174,7 +175,7 @@ def check_order(call: Call) -> Order:
         quality=s["quality"],
         direction=direction,
     )
-    return Order(CHECK, job)
+    return Order(CHECK, job, answers=True)
 
 
 def export_order(call: Call) -> Order:
@@ -244,3 +245,11 @@ def diagnose_order(call: Call) -> Order:
 def law_of(call: Call, done: Finished) -> Outputs:
     """The lattice's law that a run of `homogenize` found."""
     return {"law": read_effective(done.folder / "effective.toml"), "run": done}
+
+
+def check_of(call: Call, done: Finished) -> Outputs:
+    """The findings of a print check; GateError where the part must not be printed."""
+    if done.summary.get("verdict") == "error":
+        faults = done.summary.get("faults") or ["see its report"]
+        raise GateError(f"not printable: {faults[0]}", str(done.folder), "see report.html in that folder")
+    return {"check": done}

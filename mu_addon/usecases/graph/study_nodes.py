@@ -188,7 +188,7 @@ def study_nodes() -> tuple[Definition, ...]:
                 _QUALITY,
             ),
             order=of_orders("check_order"),
-            read=lambda call, done: {"check": done},
+            read=of_orders("check_of"),
             muting=_LEFT_OUT,
             remark=lambda outputs: "verdict: {verdict}".format(**outputs["check"].summary),
         ),
