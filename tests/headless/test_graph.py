@@ -8,6 +8,7 @@ import time
 import pytest
 
 from mu_addon.graph import Node, NodeTree, Source, tree_text
+from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.graph.templates import template
 
 from .processes import ROOT, assert_clear_failure, command, run
@@ -142,3 +143,55 @@ def test_the_shipped_unit_is_evaluated_from_its_file(tmp_path):
     out = evaluated(ROOT / "assets" / "graphs" / "unit.toml", tmp_path / "unit")
     assert states(out) == dict.fromkeys(template("unit").nodes, "computed") | {}
     assert out["nodes"]["Trim"]["remark"].endswith("struts")
+
+
+def every_kind():
+    """A tree with every kind of node, as coarse as each goes."""
+    nodes = dict(template("unit").nodes)
+
+    def add(name, kind, links=None, **settings):
+        found = {}
+        for key, texts in (links or {}).items():
+            texts = [texts] if isinstance(texts, str) else texts
+            found[key] = tuple(Source(*text.rsplit(".", 1)) for text in texts)
+        nodes[name] = Node(kind, settings, found)
+
+    nodes["Solid"] = Node("solid", links=nodes["Assemble Unit"].links)
+    add("U", "unit", preset="mu-0.75x", path="alpha4")
+    add("Thick", "set_parameter", {"unit": "U.unit"}, value=1.0)
+    add("Move", "simulate", {"unit": "U.unit"}, **COARSE)
+    add(
+        "Rank", "place", {"study": "Move.study"},
+        rule="volume_fraction", stations=11, mesh_check=False, workers=1,
+    )  # fmt: skip
+    add("Map", "sensitivity", {"study": "Rank.study"})
+    add("Light", "light", {"study": "Rank.study"})
+    add("Angle", "figure", {"study": "Move.study"})
+    add("Number", "number", value=0.05)
+    add("Scaled", "calculate", {"a": "Angle.number", "b": "Number.number"}, operation="multiply")
+    add("Law", "homogenize", {"unit": "U.unit"}, specimen="none", refine=0.5)
+    add("By Law", "simulate", {"unit": "U.unit", "law": "Law.law"}, **COARSE)
+    add("Check", "check", {"unit": "U.unit"})
+    add("Export", "export", {"unit": "U.unit"}, formats="stl txt", quality="interactive")
+    add("Data", "data", folder=str(ROOT / "assets" / "examples" / "paper-moduli"))
+    add("Cause", "diagnose", {"data": "Data.data"})
+    add("As Measured", "simulate", {"unit": "U.unit", "model": "Cause.model"}, **COARSE)
+    add("Compare", "compare", {"items": ["Move.study", "By Law.study", "As Measured.study"]})
+    add("Gripper", "gripper", {"unit": "U.unit"})
+    add("Grasp", "grip", {"gripper": "Gripper.gripper"}, coarse=True, cubes_mm="20", rank_paths=False)
+    return NodeTree("every kind", nodes)
+
+
+def test_every_kind_of_node_is_computed_and_found_again(tmp_path):
+    tree = every_kind()
+    assert {node.kind for node in tree.nodes.values()} == set(definitions())
+    (tmp_path / "every.toml").write_text(tree_text(tree), encoding="utf-8")
+    first = evaluated(tmp_path / "every.toml", tmp_path / "out")
+    assert set(states(first).values()) == {"computed"}
+    again = evaluated(tmp_path / "every.toml", tmp_path / "out")
+    assert {n for n, s in states(again).items() if s == "cached"} == {
+        name for name, node in tree.nodes.items() if definitions()[node.kind].runs
+    }
+    for name, node in first["nodes"].items():
+        assert again["nodes"][name]["key"] == node["key"]
+        assert again["nodes"][name].get("remark") == node.get("remark")
