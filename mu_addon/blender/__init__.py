@@ -20,6 +20,9 @@ _MODULES = (
     "sensor.twin",
     "sensor.state",
     "sensor.properties",
+    "node_tree.sockets",
+    "node_tree.classes",
+    "node_tree.state",
     "gripper.object",
     "results.thumbnails",
     # Operators.
@@ -38,6 +41,8 @@ _MODULES = (
     "evidence.operators",
     "track.operators",
     "sensor.operators",
+    "node_tree.groups",
+    "node_tree.operators",
     # What draws; panels stand in the sidebar in this order.
     "unit.panel",
     "path.panel",
@@ -50,6 +55,7 @@ _MODULES = (
     "sensor.panel",
     "gripper.panel",
     "track.panel",
+    "node_tree.panel",
     "results.legend",
     "sensor.plot",
     "shared.menus",

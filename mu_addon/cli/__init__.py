@@ -20,6 +20,7 @@ NAMES = (
     "place",
     "resume",
     "sweep",
+    "graph",
     "reproduce",
     "homogenize",
     "grip",

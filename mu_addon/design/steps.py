@@ -109,13 +109,15 @@ class Path:
 class Step:
     """One step: what it is made from, which parameters are its own, and what muting it does.
 
-    after: steps before it, whose values `make` is given in this order; own and reads: parameters of the unit
-    as `section.name`; chosen: fields of Given it depends on besides; muting: what muting does, in words, or
-    nothing where it cannot be; mute: its value then, from the same arguments as `make`.
+    gives: what its value is: profile, surface, lattice, points, path or solid; after: steps before it, whose
+    values `make` is given in this order; own and reads: parameters of the unit as `section.name`; chosen:
+    fields of StepInputs it depends on besides; muting: what muting does, in words, or nothing where it cannot
+    be; mute: its value then, from the same arguments as `make`.
     """
 
     name: str
     text: str
+    gives: str
     make: Callable[..., Any]
     after: tuple[str, ...] = ()
     own: tuple[str, ...] = ()
@@ -347,10 +349,11 @@ def _rest(section: type[Chambers | Envelope | Waveguide]) -> tuple[str, ...]:
 STEPS: dict[str, Step] = {
     step.name: step
     for step in (
-        Step("profile", "outer profile of bladders and necks", _profile, own=_PROFILE),
+        Step("profile", "outer profile of bladders and necks", "profile", _profile, own=_PROFILE),
         Step(
             "chambers",
             "cavity inside a constant wall",
+            "surface",
             _chambers,
             ("profile",),
             _CHAMBERS,
@@ -360,6 +363,7 @@ STEPS: dict[str, Step] = {
         Step(
             "membranes",
             "wall of the chambers, with the inlet",
+            "surface",
             _membranes,
             ("profile", "chambers"),
             _rest(Chambers),
@@ -368,6 +372,7 @@ STEPS: dict[str, Step] = {
         Step(
             "cells",
             "cells of the lattice envelope",
+            "lattice",
             _cells,
             ("profile",),
             _rest(Envelope),
@@ -378,6 +383,7 @@ STEPS: dict[str, Step] = {
         Step(
             "trim",
             "struts trimmed where they enter the actuator or leave a user-defined body",
+            "lattice",
             _trim,
             ("profile", "cells"),
             reads=_PROFILE,
@@ -388,6 +394,7 @@ STEPS: dict[str, Step] = {
         Step(
             "struts",
             "thickness of the struts, tapered to their ends",
+            "lattice",
             _struts,
             ("trim",),
             _STRUTS,
@@ -397,6 +404,7 @@ STEPS: dict[str, Step] = {
         Step(
             "anchors",
             "anchors P1 .. Pn for the sensor",
+            "points",
             _anchors,
             ("cells",),
             _ROW,
@@ -406,6 +414,7 @@ STEPS: dict[str, Step] = {
         Step(
             "path",
             f"a window of {SHORTEST} or more anchors that the waveguide follows",
+            "path",
             _path,
             ("anchors",),
             _rest(Waveguide),
@@ -416,6 +425,7 @@ STEPS: dict[str, Step] = {
         Step(
             "wells",
             "the waveguide's bar, with wells at a constant pitch",
+            "path",
             _wells,
             ("path",),
             _WELLS,
@@ -426,6 +436,7 @@ STEPS: dict[str, Step] = {
         Step(
             "solid",
             "the printable body, checked by its gates",
+            "solid",
             _solid,
             ("membranes", "struts", "wells"),
             chosen=("quality", "body"),

@@ -28,6 +28,7 @@ MODULES = {
     "calibrate.toml": ".sensor.calibrate",
     "sweep.toml": ".parameter_study.run",
     "reproduce.toml": ".reproduce.run",
+    "graph.toml": ".graph.run",
 }
 
 

@@ -14,6 +14,7 @@ PACKAGES = (
     "design",
     "evidence",
     "fem",
+    "graph",
     "homogenize",
     "materials",
     "measured",

@@ -25,6 +25,8 @@ from mu_addon.usecases.diagnose import job as diagnose
 from mu_addon.usecases.export import job as export
 from mu_addon.usecases.export import specimens
 from mu_addon.usecases.fit_material import job as fit
+from mu_addon.usecases.graph import job as graph
+from mu_addon.usecases.graph.templates import template
 from mu_addon.usecases.grip import job as grip
 from mu_addon.usecases.grip.grasp import Cube, Grip
 from mu_addon.usecases.homogenize import job as homogenize
@@ -93,6 +95,7 @@ def jobs(folder):
         held_cells=1 / 3,
         gripper=False,
     )
+    yield graph.Job(template("data-to-cause"), ("Diagnose",), node_reports=True)
 
 
 def test_every_job_is_read_back_from_its_folder(tmp_path):

@@ -1,0 +1,224 @@
+"""Groups: several nodes as one, edited in a tree of their own, used in as many places as wanted."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+from bpy.props import StringProperty
+
+from ...errors import InputError
+from ..shared.operators import reports_errors
+from . import conversion
+from .classes import GROUP, TREE, attribute
+
+
+def active_tree(context):
+    """The node tree of ours that the editor shows, or None."""
+    space = context.space_data
+    tree = getattr(space, "edit_tree", None)
+    return tree if tree is not None and tree.bl_idname == TREE else None
+
+
+class TreeOperator:
+    """An operator on the tree that a node editor shows."""
+
+    @classmethod
+    def poll(cls, context):
+        if active_tree(context) is None:
+            cls.poll_message_set("Open a node tree of the kind Monolithic Unit in a node editor")
+            return False
+        return True
+
+
+def make_group(tree, nodes):
+    """Put nodes of a tree into a new group; returns the node that stands for them. Raises InputError."""
+    nodes = [node for node in nodes if node.bl_idname != "NodeFrame"]
+    if not nodes:
+        raise InputError("no node is selected", tree.name, "select the nodes of the group")
+    inside = {node.name for node in nodes}
+    group = bpy.data.node_groups.new("Group", TREE)
+    copies = {node.name: _copied(node, group) for node in nodes}
+    middle = sum(n.location.x for n in nodes) / len(nodes), sum(n.location.y for n in nodes) / len(nodes)
+    ins, outs = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    ins.location = min(n.location.x for n in nodes) - 250.0, middle[1]
+    outs.location = max(n.location.x for n in nodes) + 300.0, middle[1]
+    entering, leaving = {}, {}
+    inner, outer_in, outer_out = [], [], []
+    for link in tree.links:
+        a, b = link.from_node.name in inside, link.to_node.name in inside
+        ends = (
+            (link.from_node.name, link.from_socket.identifier),
+            (link.to_node.name, link.to_socket.identifier),
+        )
+        if a and b:
+            inner.append(ends)
+        elif b:
+            # What enters from one socket is one input of the group, however many nodes take it.
+            if ends[0] not in entering:
+                entering[ends[0]] = _item(group, link.to_socket, link.from_socket, "INPUT")
+            outer_in.append((ends, entering[ends[0]]))
+        elif a:
+            if ends[0] not in leaving:
+                leaving[ends[0]] = _item(group, link.from_socket, link.from_socket, "OUTPUT")
+            outer_out.append((ends, leaving[ends[0]]))
+    for before, after in inner:
+        group.links.new(
+            _socket(copies[before[0]].outputs, before[1]), _socket(copies[after[0]].inputs, after[1])
+        )
+    for (_, after), item in outer_in:
+        group.links.new(_socket(ins.outputs, item), _socket(copies[after[0]].inputs, after[1]))
+    for before, item in dict.fromkeys((ends[0], item) for ends, item in outer_out):
+        group.links.new(_socket(copies[before[0]].outputs, before[1]), _socket(outs.inputs, item))
+    node = tree.nodes.new(GROUP)
+    node.node_tree, node.location = group, middle
+    conversion.sync_groups(tree)
+    for (before, _), item in outer_in:
+        tree.links.new(_socket(tree.nodes[before[0]].outputs, before[1]), _socket(node.inputs, item))
+    for (_, after), item in outer_out:
+        tree.links.new(_socket(node.outputs, item), _socket(tree.nodes[after[0]].inputs, after[1]))
+    for name in inside:
+        tree.nodes.remove(tree.nodes[name])
+    return node
+
+
+def take_apart(tree, node):
+    """Put a group's nodes in the place of the node that stands for them. Raises InputError."""
+    if node.node_tree is None:
+        raise InputError("the group is empty", node.name, "choose its tree first")
+    group = node.node_tree
+    own = [n for n in group.nodes if n.bl_idname not in ("NodeGroupInput", "NodeGroupOutput", "NodeFrame")]
+    copies = {n.name: _copied(n, tree) for n in own}
+    entering: dict[str, list] = {}
+    leaving: dict[str, list] = {}
+    for link in tree.links:
+        if link.to_node == node:
+            entering.setdefault(link.to_socket.identifier, []).append(
+                (link.from_node.name, link.from_socket.identifier)
+            )
+        if link.from_node == node:
+            leaving.setdefault(link.from_socket.identifier, []).append(
+                (link.to_node.name, link.to_socket.identifier)
+            )
+    links = []
+    for link in group.links:
+        a, b = link.from_node, link.to_node
+        if a.bl_idname == "NodeGroupInput":
+            befores = entering.get(link.from_socket.identifier, [])
+        else:
+            befores = [(copies[a.name].name, link.from_socket.identifier)]
+        if b.bl_idname == "NodeGroupOutput":
+            afters = leaving.get(link.to_socket.identifier, [])
+        else:
+            afters = [(copies[b.name].name, link.to_socket.identifier)]
+        links += [(before, after) for before in befores for after in afters]
+    tree.nodes.remove(node)
+    for before, after in links:
+        tree.links.new(
+            _socket(tree.nodes[before[0]].outputs, before[1]), _socket(tree.nodes[after[0]].inputs, after[1])
+        )
+    return list(copies.values())
+
+
+def _copied(node, tree):
+    """A copy of a node in another tree, with its fields."""
+    new = tree.nodes.new(node.bl_idname)
+    new.name, new.label, new.location, new.width = node.name, node.label, node.location, node.width
+    new.mute = node.mute
+    for s in getattr(node, "definition", None).settings if hasattr(node, "definition") else ():
+        setattr(new, attribute(s), getattr(node, attribute(s)))
+    for field in ("source", "follower", "node_tree"):
+        if hasattr(node, field):
+            setattr(new, field, getattr(node, field))
+    if node.bl_idname == GROUP:
+        conversion.sync_groups(tree)
+    return new
+
+
+def _item(group, like, named, in_out):
+    """Identifier of a new socket of a group's interface, of the type of a node's socket."""
+    kind = like.bl_idname if like.bl_idname.startswith("MU_NS_") else named.bl_idname
+    return group.interface.new_socket(name=like.name, in_out=in_out, socket_type=kind).identifier
+
+
+def _socket(found, identifier):
+    return next(s for s in found if s.identifier == identifier)
+
+
+class MU_OT_node_group_make(TreeOperator, bpy.types.Operator):
+    """Make a group of the selected nodes"""
+
+    bl_idname = "mu.node_group_make"
+    bl_label = "Make Group"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context):
+        tree = active_tree(context)
+        make_group(tree, [node for node in tree.nodes if node.select])
+        return {"FINISHED"}
+
+
+class MU_OT_node_group_ungroup(TreeOperator, bpy.types.Operator):
+    """Put the nodes of the selected groups back into the tree"""
+
+    bl_idname = "mu.node_group_ungroup"
+    bl_label = "Ungroup"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context):
+        tree = active_tree(context)
+        for node in [n for n in tree.nodes if n.select and n.bl_idname == GROUP]:
+            take_apart(tree, node)
+        return {"FINISHED"}
+
+
+class MU_OT_node_group_edit(TreeOperator, bpy.types.Operator):
+    """Open a group to edit it, or go back to the tree that it is used in"""
+
+    bl_idname = "mu.node_group_edit"
+    bl_label = "Edit Group"
+    bl_options = {"REGISTER"}
+
+    node: StringProperty(name="Node", description="Name of the group's node; empty: the active one")
+
+    def execute(self, context):
+        path, tree = context.space_data.path, active_tree(context)
+        node = tree.nodes.get(self.node) if self.node else tree.nodes.active
+        if node is not None and node.bl_idname == GROUP and node.node_tree is not None:
+            path.append(node.node_tree, node=node)
+        elif len(path) > 1:
+            path.pop()
+        return {"FINISHED"}
+
+
+CLASSES = (MU_OT_node_group_make, MU_OT_node_group_ungroup, MU_OT_node_group_edit)
+
+
+_KEYS = (
+    ("mu.node_group_make", "G", {"ctrl": True}),
+    ("mu.node_group_ungroup", "G", {"ctrl": True, "alt": True}),
+    ("mu.node_group_edit", "TAB", {}),
+)
+"""The keys that Blender's own groups have: those operators do not take trees of other kinds."""
+_keymaps: list = []
+
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
+
+
+def register() -> None:
+    """Operators, and their keys in node editors; in background there are none."""
+    _register_classes()
+    config = bpy.context.window_manager.keyconfigs.addon if bpy.context.window_manager else None
+    if config is not None:
+        keymap = config.keymaps.new(name="Node Editor", space_type="NODE_EDITOR")
+        _keymaps.extend(
+            (keymap, keymap.keymap_items.new(name, key, "PRESS", **held)) for name, key, held in _KEYS
+        )
+
+
+def unregister() -> None:
+    """Take them out again."""
+    for keymap, item in _keymaps:
+        keymap.keymap_items.remove(item)
+    _keymaps.clear()
+    _unregister_classes()

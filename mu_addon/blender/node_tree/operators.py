@@ -1,0 +1,239 @@
+"""Operators of node trees: evaluate, stop, open what a node left, templates, files, units of the scene."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+from pathlib import Path
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+
+from ...errors import InputError
+from ...files import write_text
+from ...graph.tree import with_absolute_paths
+from ...graph.tree_file import read_tree, tree_text
+from ...usecases.graph.definitions import definitions
+from ...usecases.graph.templates import template, template_names
+from ..jobs import start_child
+from ..jobs.operators import job_operators
+from ..shared.operators import NO_UNIT, open_file, reports_errors
+from ..shared.texts import sentence
+from ..unit import object as unit_object
+from . import conversion, state
+from .classes import TREE
+from .groups import TreeOperator, active_tree
+
+# What templates are for; others are shown by their names.
+_TEXTS = {
+    "unit": "A unit by the steps of its design, with a waveguide",
+    "three-walls": "Three walls of one unit, simulated and compared",
+    "gripper": "Two units on a plate, and their grasp of a cube",
+    "data-to-cause": "Measured data, the effects they name, and what these change",
+}
+
+
+def root_tree(context):
+    """The tree that is evaluated: the outermost of those that the editor has open."""
+    path = getattr(context.space_data, "path", None)
+    if path and path[0].node_tree is not None and path[0].node_tree.bl_idname == TREE:
+        return path[0].node_tree
+    return active_tree(context)
+
+
+def show(context, tree) -> None:
+    """Show a tree in the node editor, where the operator is called from one."""
+    space = context.space_data
+    if getattr(space, "type", "") == "NODE_EDITOR":
+        space.tree_type = TREE
+        space.node_tree = tree
+
+
+class _TreeOperator(TreeOperator):
+    find_root = staticmethod(root_tree)
+
+
+class MU_OT_tree_evaluate(_TreeOperator, bpy.types.Operator):
+    """Evaluate the tree in a process of its own; finished nodes are not repeated, and Blender stays usable"""
+
+    bl_idname = "mu.tree_evaluate"
+    bl_label = "Evaluate"
+    bl_options = {"REGISTER"}
+
+    node: StringProperty(name="Node", description="Evaluate this node and what it needs; empty: all")
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if state.RUN.is_running(root_tree(context)):
+            cls.poll_message_set("This tree is being evaluated")
+            return False
+        missing = start_child.missing()
+        if missing:
+            cls.poll_message_set(f"Not in this Blender: {', '.join(missing)}")
+            return False
+        return True
+
+    @reports_errors
+    def execute(self, context):
+        state.start(root_tree(context), (self.node,) if self.node else ())
+        return {"FINISHED"}
+
+
+class MU_OT_tree_new(bpy.types.Operator):
+    """Add a node tree made from a template"""
+
+    bl_idname = "mu.tree_new"
+    bl_label = "New from Template"
+    bl_options = {"REGISTER", "UNDO"}
+
+    template: EnumProperty(
+        name="Template",
+        description="What the tree holds at first",
+        items=lambda self, context: _items(),
+    )
+
+    @reports_errors
+    def execute(self, context):
+        tree = conversion.from_tree(template(self.template))
+        state.look(tree)
+        show(context, tree)
+        return {"FINISHED"}
+
+
+_template_items: list = []
+
+
+def _items():
+    # Blender keeps no reference to the texts of items.
+    if not _template_items:
+        names = sorted(template_names(), key=lambda name: [*_TEXTS, name].index(name))
+        _template_items.extend((n, sentence(n.replace("-", " ")), _TEXTS.get(n, n)) for n in names)
+    return _template_items
+
+
+class MU_OT_tree_load(bpy.types.Operator):
+    """Open a node tree's file, as `headless/run.py graph` reads it"""
+
+    bl_idname = "mu.tree_load"
+    bl_label = "Open Tree File"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: StringProperty(name="File", description="TOML file of a node tree", subtype="FILE_PATH")
+    filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
+
+    def invoke(self, context, event):
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    @reports_errors
+    def execute(self, context):
+        path = Path(bpy.path.abspath(self.filepath))
+        tree = conversion.from_tree(with_absolute_paths(read_tree(path), definitions(), path.parent))
+        state.look(tree)
+        show(context, tree)
+        return {"FINISHED"}
+
+
+class MU_OT_tree_save(_TreeOperator, bpy.types.Operator):
+    """Write the tree to a file for `headless/run.py graph`; groups are written as their nodes"""
+
+    bl_idname = "mu.tree_save"
+    bl_label = "Save Tree File"
+    bl_options = {"REGISTER"}
+
+    filepath: StringProperty(name="File", description="TOML file to write", subtype="FILE_PATH")
+    filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
+
+    def invoke(self, context, event):
+        self.filepath = self.filepath or f"{root_tree(context).name}.toml"
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    @reports_errors
+    def execute(self, context):
+        core = conversion.to_tree(root_tree(context))
+        if not core.nodes:
+            raise InputError("the tree has no nodes", core.name, "add some, or start from a template")
+        path = Path(bpy.path.abspath(self.filepath)).with_suffix(".toml")
+        write_text(path, tree_text(core))
+        self.report({"INFO"}, f"Wrote {path}")
+        return {"FINISHED"}
+
+
+class MU_OT_tree_of_unit(bpy.types.Operator):
+    """Add a tree with the active unit: its sidebar and the tree's node show the same fields"""
+
+    bl_idname = "mu.tree_of_unit"
+    bl_label = "Tree of the Active Unit"
+    bl_options = {"REGISTER", "UNDO"}
+
+    steps: BoolProperty(
+        name="Steps",
+        description="Lay out the steps of its design, and have the unit follow them",
+        default=False,
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if unit_object.active_root(context) is None:
+            cls.poll_message_set(NO_UNIT)
+            return False
+        return True
+
+    @reports_errors
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        tree = state.tree_of_unit(root, self.steps)
+        state.look(tree)
+        show(context, tree)
+        return {"FINISHED"}
+
+
+class MU_OT_node_open(_TreeOperator, bpy.types.Operator):
+    """Open what the active node's run left: its report, its folder or its table"""
+
+    bl_idname = "mu.node_open"
+    bl_label = "Open"
+    bl_options = {"REGISTER"}
+
+    what: EnumProperty(
+        name="What",
+        description="What to open",
+        items=[
+            ("folder", "Folder", "Folder of the node's run"),
+            ("report", "Report", "Report of the node's run, where it was written"),
+            ("table", "Table", "Table of a comparison, as a text in Blender"),
+        ],
+    )
+
+    @reports_errors
+    def execute(self, context):
+        tree, node = root_tree(context), active_tree(context).nodes.active
+        path = state.place_of(tree, node, self.what) if node is not None else None
+        if path is None or not path.exists():
+            raise InputError(
+                "there is nothing to open yet", str(path or ""), "evaluate the tree; reports are an option"
+            )
+        open_file(context, path)
+        return {"FINISHED"}
+
+
+CLASSES = (
+    MU_OT_tree_evaluate,
+    MU_OT_tree_new,
+    MU_OT_tree_load,
+    MU_OT_tree_save,
+    MU_OT_tree_of_unit,
+    MU_OT_node_open,
+    *job_operators(
+        state.RUN,
+        "tree_",
+        "evaluation",
+        kept="finished nodes are kept, and the next evaluation continues from there",
+        first="evaluate the tree first",
+        base=_TreeOperator,
+    ),
+)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

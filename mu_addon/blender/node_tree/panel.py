@@ -1,0 +1,184 @@
+"""What the node editor shows besides the nodes: Add menu, header, sidebar."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...graph.evaluation import MADE
+from ...run.child import RUNNING
+from ...usecases.graph.definitions import definitions
+from ..jobs.panel import job_state
+from ..shared.panels import large_button, wrapped
+from . import classes, state
+from .classes import GROUP, TREE
+from .operators import root_tree
+
+
+def _shows_tree(context) -> bool:
+    space = context.space_data
+    return getattr(space, "tree_type", "") == TREE
+
+
+class _Panel:
+    bl_space_type = "NODE_EDITOR"
+    bl_region_type = "UI"
+    bl_category = "MU"
+
+    @classmethod
+    def poll(cls, context):
+        return _shows_tree(context)
+
+
+class MU_PT_tree(_Panel, bpy.types.Panel):
+    """Evaluation of the tree, its folder and its file"""
+
+    bl_idname = "MU_PT_tree"
+    bl_label = "Node Tree"
+
+    def draw(self, context):
+        layout = self.layout
+        tree = root_tree(context)
+        if tree is None:
+            layout.operator_menu_enum("mu.tree_new", "template", icon="NODETREE")
+            layout.operator("mu.tree_load", icon="FILE_FOLDER")
+            return
+        child = state.RUN.child(tree)
+        if child is None or child.state != RUNNING:
+            large_button(layout, "mu.tree_evaluate", "PLAY")
+        job_state(layout, child, "see the nodes", "tree_")
+        row = layout.row(align=True)
+        for what in ("report", "folder"):
+            row.operator("mu.tree_open", text=what.capitalize()).what = what
+        column = layout.column()
+        column.use_property_split = True
+        column.prop(tree, "mu_folder")
+        column.prop(tree, "mu_reports")
+        row = layout.row(align=True)
+        row.operator("mu.tree_save", text="Save", icon="EXPORT")
+        row.operator("mu.tree_load", text="Open", icon="IMPORT")
+        layout.operator_menu_enum("mu.tree_new", "template", icon="NODETREE")
+        layout.operator("mu.tree_of_unit", icon="OUTLINER_OB_LATTICE")
+
+
+class MU_PT_node(_Panel, bpy.types.Panel):
+    """The active node: what it is, its state, what its run left"""
+
+    bl_idname = "MU_PT_node"
+    bl_label = "Active Node"
+
+    @classmethod
+    def poll(cls, context):
+        tree = getattr(context.space_data, "edit_tree", None)
+        return _shows_tree(context) and tree is not None and hasattr(tree.nodes.active, "definition")
+
+    def draw(self, context):
+        layout = self.layout
+        node = context.space_data.edit_tree.nodes.active
+        layout.label(text=node.definition.label)
+        found = classes.state_of(node)
+        if node.mute and node.definition.muting:
+            wrapped(layout, f"Muted: {node.definition.muting}", "HIDE_ON")
+        classes.draw_state(node, layout)
+        row = layout.row(align=True)
+        row.operator("mu.tree_evaluate", text="Evaluate to Here").node = node.name
+        if found is not None and found.state in MADE:
+            row = layout.row(align=True)
+            for what in state.places(node):
+                row.operator("mu.node_open", text=what.capitalize()).what = what
+        column = layout.column()
+        column.use_property_split = True
+        node.draw_buttons_ext(context, column)
+
+
+def _menu(category: str) -> type:
+    kinds = [d for d in definitions().values() if d.category == category]
+
+    def draw(self, context):
+        for d in kinds:
+            add = self.layout.operator("node.add_node", text=d.label)
+            add.type, add.use_transform = classes.node_class(d.kind), True
+
+    name = f"MU_MT_nodes_{category.lower()}"
+    members = {"__doc__": category, "bl_idname": name, "bl_label": category, "draw": draw}
+    return type(name, (bpy.types.Menu,), members)
+
+
+CATEGORIES = tuple(dict.fromkeys(d.category for d in definitions().values()))
+MENUS = tuple(map(_menu, CATEGORIES))
+
+
+class MU_MT_nodes_group(bpy.types.Menu):
+    """Groups of nodes"""
+
+    bl_idname = "MU_MT_nodes_group"
+    bl_label = "Group"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.operator("mu.node_group_make")
+        layout.operator("mu.node_group_ungroup")
+        layout.operator("mu.node_group_edit")
+        layout.separator()
+        for name, kind in (
+            ("Group", GROUP),
+            ("Group Input", "NodeGroupInput"),
+            ("Group Output", "NodeGroupOutput"),
+        ):
+            add = layout.operator("node.add_node", text=name)
+            add.type, add.use_transform = kind, True
+
+
+class MU_MT_nodes_layout(bpy.types.Menu):
+    """Frames and reroutes"""
+
+    bl_idname = "MU_MT_nodes_layout"
+    bl_label = "Layout"
+
+    def draw(self, context):
+        for name, kind in (("Frame", "NodeFrame"), ("Reroute", "NodeReroute")):
+            add = self.layout.operator("node.add_node", text=name)
+            add.type, add.use_transform = kind, True
+
+
+def _add(self, context):
+    if _shows_tree(context):
+        for menu in (*MENUS, MU_MT_nodes_group, MU_MT_nodes_layout):
+            self.layout.menu(menu.bl_idname)
+        self.layout.separator()
+        self.layout.operator_menu_enum("mu.tree_new", "template", text="Template")
+
+
+def _header(self, context):
+    if not _shows_tree(context):
+        return
+    tree = root_tree(context)
+    row = self.layout.row(align=True)
+    if tree is None:
+        row.operator_menu_enum("mu.tree_new", "template", text="Template", icon="NODETREE")
+        return
+    child = state.RUN.child(tree)
+    if child is not None and child.state == RUNNING:
+        row.label(text=str(child.progress.get("stage", "starting")))
+        row.operator("mu.tree_cancel", text="", icon="X")
+    else:
+        row.operator("mu.tree_evaluate", icon="PLAY")
+
+
+CLASSES = (MU_PT_tree, MU_PT_node, *MENUS, MU_MT_nodes_group, MU_MT_nodes_layout)
+
+
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
+
+
+def register() -> None:
+    """Panels and menus, the entries in the editor's Add menu and header."""
+    _register_classes()
+    bpy.types.NODE_MT_add.append(_add)
+    bpy.types.NODE_HT_header.append(_header)
+
+
+def unregister() -> None:
+    """Take them out again."""
+    bpy.types.NODE_HT_header.remove(_header)
+    bpy.types.NODE_MT_add.remove(_add)
+    _unregister_classes()

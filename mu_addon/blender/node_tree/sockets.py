@@ -1,0 +1,108 @@
+"""Sockets: one class for each type of the core, each with its colour; a number's shows the node's field."""
+
+from __future__ import annotations
+
+import colorsys
+import zlib
+from typing import Any
+
+import bpy
+
+from ...graph.definition import NUMBER
+from ...usecases.graph.definitions import definitions
+
+# A type that is not listed gets a colour of its own by its name.
+_COLOURS = {
+    "number": (0.63, 0.63, 0.63),
+    "profile": (0.85, 0.75, 0.35),
+    "surface": (0.35, 0.70, 0.55),
+    "lattice": (0.30, 0.55, 0.90),
+    "points": (0.80, 0.80, 0.95),
+    "path": (0.90, 0.55, 0.25),
+    "solid": (0.25, 0.80, 0.80),
+    "unit": (0.00, 0.84, 0.64),
+    "law": (0.55, 0.35, 0.75),
+    "study": (0.93, 0.62, 0.84),
+    "field": (0.90, 0.35, 0.35),
+    "model": (0.75, 0.25, 0.45),
+    "data": (0.65, 0.85, 0.25),
+    "table": (0.45, 0.62, 1.00),
+}
+ANY = "any"
+"""Sockets of inputs that take several types."""
+
+
+def colour(type_: str) -> tuple[float, float, float, float]:
+    """RGBA of a type's sockets."""
+    known = _COLOURS.get(type_) or colorsys.hsv_to_rgb(zlib.crc32(type_.encode()) % 360 / 360.0, 0.55, 0.85)
+    return (*known, 1.0)
+
+
+def identifier(type_: str) -> str:
+    """Blender's name of the socket class of a type: "print check" has MU_NS_print_check."""
+    return f"MU_NS_{type_.replace(' ', '_')}"
+
+
+def type_of(types: tuple[str, ...]) -> str:
+    """The type that an input's socket has."""
+    return types[0] if len(types) == 1 else ANY
+
+
+class _Socket:
+    """What all sockets of node trees draw."""
+
+    mu_type = ""
+
+    @classmethod
+    def draw_color_simple(cls):
+        return colour(cls.mu_type)
+
+    def draw_color(self, context, node):
+        return colour(self.mu_type)
+
+    def draw(self, context, layout, node, text):
+        field = node.field_of(self.identifier) if self.mu_type == NUMBER and hasattr(node, "field_of") else ""
+        if field and not self.is_output and not self.is_linked:
+            layout.prop(node, field, text=text)
+        else:
+            layout.label(text=text)
+
+
+class _InterfaceSocket:
+    """A socket of a group's interface."""
+
+    def draw(self, context, layout):
+        pass
+
+
+def _types() -> tuple[str, ...]:
+    found = [o.type for d in definitions().values() for o in d.outputs]
+    return tuple(dict.fromkeys([NUMBER, *found, ANY]))
+
+
+def _class(type_: str) -> Any:
+    name = identifier(type_)
+    members = {
+        "__doc__": f"Socket of a node tree: {type_}",
+        "bl_idname": name,
+        "bl_label": type_.capitalize(),
+        "mu_type": type_,
+    }
+    return type(name, (_Socket, bpy.types.NodeSocket), members)
+
+
+def _interface_class(type_: str) -> Any:
+    name = f"{identifier(type_)}_interface"
+    members = {
+        "__doc__": f"Socket of a group: {type_}",
+        "bl_idname": name,
+        "bl_socket_idname": identifier(type_),
+        "bl_label": type_.capitalize(),
+    }
+    return type(name, (_InterfaceSocket, bpy.types.NodeTreeInterfaceSocket), members)
+
+
+CLASSES = tuple(made(type_) for type_ in _types() for made in (_class, _interface_class))
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -1,0 +1,304 @@
+"""What trees of the file come to: a look after every change, and the run of a tree in a process of its own.
+
+A look makes what takes milliseconds, parameters and the steps' geometry, and knows of the rest what runs have
+left in the tree's folder.
+"""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ...errors import InputError, MuError
+from ...graph.check import faults
+from ...graph.evaluation import FAILED, Evaluation, Kept, Record, State
+from ...graph.records import NAME as RECORDS
+from ...graph.records import read_records
+from ...graph.runs import FOLDER
+from ...graph.tree import Source
+from ...run.folder import write_run
+from ...usecases.graph.definitions import definitions
+from ...usecases.graph.job import LAYOUT, Job, file_name
+from ...usecases.graph.templates import steps_of
+from ..jobs.start_child import INTERVAL_S, JOB_ENDED, JobKind
+from ..shared import handlers, updates
+from ..shared.file_cache import FileCache
+from ..simulate.study_folder import default_folder, relative
+from ..unit import object as unit_object
+from ..unit.properties import PARAMETERS_CHANGED, from_unit, to_unit
+from . import classes, conversion
+from .classes import CHANGED, TREE
+
+WAIT_S = 0.05
+SCENE_KEY = "mu_node_trees"
+"""Custom property of the scene that points to its trees: Blender evaluates drivers of what it reaches."""
+
+_kept = Kept()
+_records: FileCache[dict[str, Record]] = FileCache()
+_pending: set[int] = set()
+_looked: dict[int, float] = {}
+_seconds: dict[int, float] = {}
+_written: dict[int, int] = {}
+
+
+def trees() -> Iterator[Any]:
+    """Every node tree of ours in the file; those linked from another one are evaluated there."""
+    return (g for g in bpy.data.node_groups if g.bl_idname == TREE and g.library is None)
+
+
+def _is_group(tree: Any) -> bool:
+    """Whether a tree is a group's, made for use in others."""
+    return any(node.bl_idname in ("NodeGroupInput", "NodeGroupOutput") for node in tree.nodes)
+
+
+def uuid_of(tree: Any) -> str:
+    """Identifier of a tree; a copy has its own by its name."""
+    if not tree.mu_uuid:
+        tree.mu_uuid = uuid.uuid4().hex
+    return f"{tree.mu_uuid}:{tree.name}"
+
+
+def folder_of(tree: Any) -> Path:
+    """Folder of a tree's runs: the one it names, else beside the .blend file, else the user's own."""
+    if not tree.mu_uuid:
+        tree.mu_uuid = uuid.uuid4().hex
+    return default_folder(tree.mu_folder, tree.name, tree.mu_uuid)
+
+
+RUN = JobKind("graph", uuid_of, folder_of)
+"""The evaluation of a tree."""
+
+
+def look(tree: Any) -> dict[str, State]:
+    """Evaluate a tree as far as that takes milliseconds; mark its links, show states, update followers."""
+    start = time.perf_counter()
+    conversion.sync_groups(tree)
+    try:
+        core = conversion.to_tree(tree)
+    except InputError as error:
+        found = {node.name: State(FAILED, error=error) for node in tree.nodes if hasattr(node, "definition")}
+        classes.set_states(tree, found)
+        return found
+    folder = folder_of(tree)
+    records = _records.read([folder / FOLDER / RECORDS], lambda: read_records(folder)) or {}
+    evaluation = Evaluation(core, definitions(), kept=_kept, records=records)
+    found = evaluation.run()
+    refused: dict[tuple[str, str], set[Source]] = {}
+    for fault in faults(core, definitions()):
+        if fault.source is not None:
+            refused.setdefault((fault.node, fault.input), set()).add(fault.source)
+    conversion.mark_links(tree, {key: frozenset(sources) for key, sources in refused.items()})
+    classes.set_states(tree, {**found, **_of_groups(tree, found)})
+    _follow(tree, evaluation)
+    _keep_reachable(tree)
+    _seconds[tree.session_uid] = time.perf_counter() - start
+    return found
+
+
+def seconds_of(tree: Any) -> float:
+    """How long the latest look at a tree took, in s."""
+    return _seconds.get(tree.session_uid, 0.0)
+
+
+def _of_groups(tree: Any, found: dict[str, State]) -> dict[str, State]:
+    """For each group node the first error inside it, and for the nodes in the group their own states."""
+    shown = {}
+    for node in tree.nodes:
+        if node.bl_idname == classes.GROUP and node.node_tree is not None:
+            prefix = f"{node.name}/"
+            inside = {name.removeprefix(prefix): s for name, s in found.items() if name.startswith(prefix)}
+            classes.set_states(node.node_tree, inside)
+            failed = next((s for s in inside.values() if s.error is not None), None)
+            if failed is not None:
+                shown[node.name] = failed
+    return shown
+
+
+def _follow(tree: Any, evaluation: Evaluation) -> None:
+    """Give units in the scene the parameters of nodes that they follow."""
+    for node in tree.nodes:
+        root = getattr(node, "follower", None)
+        design = evaluation.outputs.get(node.name, {}).get("unit")
+        if root is None or design is None or not root.mu_unit.uuid:
+            continue
+        try:
+            same = to_unit(root.mu_unit) == design.unit and root.mu_unit.path == design.path
+        except MuError:
+            same = False
+        if not same:
+            with updates.paused():
+                from_unit(root.mu_unit, design.unit)
+                root.mu_unit.path = design.path
+            unit_object.rebuild(root)
+
+
+def _keep_reachable(tree: Any) -> None:
+    """Have the scene point to the tree, so that its drivers are evaluated and a file keeps it."""
+    scene = bpy.context.scene
+    if scene is None or _is_group(tree):
+        return
+    known = dict(scene[SCENE_KEY].items()) if SCENE_KEY in scene else {}
+    wanted = {found.name: found for found in trees() if not _is_group(found)}
+    if known != wanted:
+        scene[SCENE_KEY] = wanted
+
+
+def schedule(tree: Any) -> None:
+    """Have a tree looked at soon: after a change, and not before Blender has ended it."""
+    _pending.add(tree.session_uid)
+    if not bpy.app.timers.is_registered(_look_pending):
+        bpy.app.timers.register(_look_pending, first_interval=WAIT_S)
+
+
+def _look_pending() -> None:
+    pending = set(_pending)
+    _pending.clear()
+    groups = any(tree.session_uid in pending and _is_group(tree) for tree in trees())
+    for tree in list(trees()):
+        # A group's nodes are evaluated where it is used.
+        if not _is_group(tree) and (groups or tree.session_uid in pending):
+            look(tree)
+    redraw()
+
+
+def redraw() -> None:
+    """Have every node editor drawn again."""
+    manager = bpy.context.window_manager
+    for window in manager.windows if manager else ():
+        for area in window.screen.areas:
+            if area.type == "NODE_EDITOR":
+                area.tag_redraw()
+
+
+def job_of(tree: Any, wanted: tuple[str, ...] = ()) -> Job:
+    """The evaluation of a tree; raises InputError for a fault of a node."""
+    job = Job(conversion.to_tree(tree), wanted, tree.mu_reports)
+    job.require_sound()
+    return job
+
+
+def start(tree: Any, wanted: tuple[str, ...] = ()) -> Any:
+    """Evaluate a tree in a process of its own; raises MuError."""
+    job = job_of(tree, wanted)
+    folder = folder_of(tree)
+    if not tree.mu_folder:
+        tree.mu_folder = relative(folder)
+    child = RUN.start(tree, folder, lambda place: write_run(place, LAYOUT, job.texts()))
+    if not bpy.app.timers.is_registered(_redraw_running):
+        bpy.app.timers.register(_redraw_running, first_interval=INTERVAL_S, persistent=True)
+    return child
+
+
+def _redraw_running() -> float | None:
+    """Show which node is being computed, and those that are done meanwhile."""
+    running = [tree for tree in trees() if RUN.is_running(tree)]
+    for tree in running:
+        child = RUN.child(tree)
+        found = child.progress if child is not None else {}
+        node, _, stage = str(found.get("stage", "")).rpartition(": ")
+        classes.set_running(tree, node, stage, found.get("fraction"))
+        path = folder_of(tree) / FOLDER / RECORDS
+        written = path.stat().st_mtime_ns if path.is_file() else 0
+        if written != _written.get(tree.session_uid):
+            _written[tree.session_uid] = written
+            schedule(tree)
+    redraw()
+    return INTERVAL_S if running else None
+
+
+def tree_of_unit(root: Any, steps: bool = False) -> Any:
+    """A new tree with a unit of the scene: one node that shows its fields, or the steps that it follows."""
+    unit = to_unit(root.mu_unit)
+    if steps:
+        tree = conversion.from_tree(steps_of(unit, root.mu_unit.path))
+        for node in tree.nodes:
+            if hasattr(node, "follower"):
+                node.follower = root
+        return tree
+    tree = bpy.data.node_groups.new(unit.name, TREE)
+    tree.nodes.new(classes.node_class("unit")).source = root
+    return tree
+
+
+def places(node: Any) -> tuple[str, ...]:
+    """What can be opened of a node: its run's folder and report, its table."""
+    found = classes.state_of(node)
+    if found is not None and found.folder is not None:
+        return "folder", "report"
+    return ("table",) if any(o.type == "table" for o in node.definition.outputs) else ()
+
+
+def place_of(tree: Any, node: Any, what: str) -> Path | None:
+    """Where that lies, or None where the node has none."""
+    found = classes.state_of(node)
+    if what == "table":
+        return folder_of(tree) / f"compare-{file_name(node.name)}.csv"
+    if found is None or found.folder is None:
+        return None
+    return found.folder / "report.html" if what == "report" else found.folder
+
+
+def _of_object(root: Any) -> None:
+    """Look again at trees that show a unit of the scene."""
+    for tree in trees():
+        if any(getattr(node, "source", None) == root for node in tree.nodes):
+            schedule(tree)
+
+
+def _job_ended(key: str) -> None:
+    for tree in trees():
+        if RUN.key(tree) == key:
+            schedule(tree)
+
+
+@persistent
+def _all(*_: Any) -> None:
+    for tree in trees():
+        schedule(tree)
+
+
+@persistent
+def _driven(scene: Any, *_: Any) -> None:
+    """Look again at trees with drivers or animation whose values may be others now."""
+    now = time.monotonic()
+    for tree in trees():
+        data = tree.animation_data
+        if data is None or not (data.drivers or data.action):
+            continue
+        # A look may itself have Blender evaluate the scene again: not without end.
+        if now - _looked.get(tree.session_uid, 0.0) > 2 * WAIT_S:
+            _looked[tree.session_uid] = now
+            schedule(tree)
+
+
+_HANDLERS: dict[str, Callable[..., Any]] = dict.fromkeys(("undo_post", "redo_post", "load_post"), _all)
+_DRIVEN: dict[str, Callable[..., Any]] = dict.fromkeys(
+    ("frame_change_post", "depsgraph_update_post"), _driven
+)
+_CONNECTIONS = ((CHANGED, schedule), (PARAMETERS_CHANGED, _of_object), (JOB_ENDED, _job_ended))
+
+
+def register() -> None:
+    """Handlers and signals that start a look."""
+    handlers.add(_HANDLERS)
+    handlers.add(_DRIVEN)
+    for signal, function in _CONNECTIONS:
+        signal.connect(function)
+
+
+def unregister() -> None:
+    """Take them out, and a look that waits."""
+    for signal, function in _CONNECTIONS:
+        signal.disconnect(function)
+    handlers.remove(_DRIVEN)
+    handlers.remove(_HANDLERS)
+    for timer in (_look_pending, _redraw_running):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
+    _pending.clear()

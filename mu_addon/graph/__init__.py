@@ -1,0 +1,39 @@
+"""Node trees: what a node is, a tree and its file, what is wrong with one, and its evaluation.
+
+Nothing here knows a unit or a simulation: the definitions of nodes come from `usecases.graph`.
+"""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import public_face
+
+if TYPE_CHECKING:
+    from .check import Fault as Fault
+    from .check import faults as faults
+    from .definition import Call as Call
+    from .definition import Definition as Definition
+    from .definition import Input as Input
+    from .definition import Output as Output
+    from .definition import Setting as Setting
+    from .evaluation import Evaluation as Evaluation
+    from .evaluation import Kept as Kept
+    from .evaluation import Order as Order
+    from .evaluation import Record as Record
+    from .evaluation import State as State
+    from .tree import Node as Node
+    from .tree import NodeTree as NodeTree
+    from .tree import Source as Source
+    from .tree_file import parse_tree as parse_tree
+    from .tree_file import read_tree as read_tree
+    from .tree_file import tree_text as tree_text
+else:
+    __getattr__, __dir__, __all__ = public_face(
+        __name__,
+        {
+            "check": "Fault faults",
+            "definition": "Call Definition Input Output Setting",
+            "evaluation": "Evaluation Kept Order Record State",
+            "tree": "Node NodeTree Source",
+            "tree_file": "parse_tree read_tree tree_text",
+        },
+    )

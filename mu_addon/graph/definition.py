@@ -1,0 +1,174 @@
+"""What a kind of node is: its inputs and outputs, each of a type, its settings, and what it makes of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import attrs
+
+from ..design.quantity import Description
+from ..errors import InputError
+
+NUMBER = "number"
+"""Type of the outputs that may give a setting its value."""
+FILE, FOLDER = "file", "folder"
+
+
+@attrs.frozen
+class Setting:
+    """A value that is set on a node itself; one that is a number may come from another node instead.
+
+    path: `FILE` or `FOLDER` where the value names one; shown: False for what no editor shows.
+    """
+
+    description: Description
+    path: str = ""
+    shown: bool = True
+
+    @property
+    def name(self) -> str:
+        """Name of the setting, its unit at the end."""
+        return self.description.name
+
+    @property
+    def is_number(self) -> bool:
+        """Whether its value is a number, so that a link may give it."""
+        return self.description.type in (int, float)
+
+    def checked(self, value: Any) -> Any:
+        """The value as its type; raises InputError for another type, a value out of bounds, no choice."""
+        d = self.description
+        if d.type is float and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        if d.type is int and isinstance(value, float) and value.is_integer():
+            value = int(value)
+        if type(value) is not d.type:
+            words = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}[d.type]
+            raise InputError(f"{d.name} = {value!r} is not {words}", d.name, d.text)
+        if d.choices and value not in d.choices:
+            raise InputError(f"{d.name} = {value!r} is not known", d.name, f"choose {d.allowed}")
+        if isinstance(value, int | float) and self.is_number:
+            unit = f" {d.unit}" if d.unit else ""
+            if not (math.isfinite(value) and d.low <= value <= d.high):
+                raise InputError(
+                    f"{d.name} = {value:g}{unit} is out of bounds", d.name, f"choose {d.allowed}{unit}"
+                )
+        return value
+
+
+def setting(
+    name: str,
+    default: Any,
+    text: str,
+    *,
+    unit: str = "",
+    low: float = math.nan,
+    high: float = math.nan,
+    choices: tuple[str, ...] = (),
+    path: str = "",
+    shown: bool = True,
+) -> Setting:
+    """A setting that is no parameter of a unit; see `Setting` and `Description`."""
+    return Setting(
+        Description(name, type(default), default, unit, low, high, text, "", False, choices), path, shown
+    )
+
+
+@attrs.frozen
+class Input:
+    """What a node takes: outputs of these types, where `only` is given of these names alone.
+
+    needed: whether nothing is made without it; many: whether it takes several links.
+    """
+
+    name: str
+    types: tuple[str, ...]
+    text: str
+    only: tuple[str, ...] = ()
+    needed: bool = True
+    many: bool = False
+
+    def refusal(self, output: Output) -> str:
+        """Why an output cannot be linked here, in words; "" where it can."""
+        if output.type not in self.types:
+            return f"{self.name} takes a {' or '.join(self.types)}, not a {output.type}"
+        if self.only and output.name not in self.only:
+            return f"{self.name} takes {' or '.join(self.only)}, not {output.name}"
+        return ""
+
+
+@attrs.frozen
+class Output:
+    """What a node gives, by name, and its type."""
+
+    name: str
+    type: str
+    text: str = ""
+
+
+@attrs.frozen
+class Call:
+    """One evaluation of a node: its name, checked settings, values of its inputs, and whether it is muted.
+
+    inputs: by name; None without a link, a tuple of (name of the node, value) where it takes many.
+    """
+
+    node: str
+    settings: Mapping[str, Any]
+    inputs: Mapping[str, Any]
+    muted: bool = False
+
+
+Outputs = Mapping[str, Any]
+
+
+@attrs.frozen(eq=False)
+class Definition:
+    """One kind of node.
+
+    make: outputs by name, for a node that takes milliseconds; order: a run (`evaluation.Order`) for one that
+    takes longer, and read: its outputs, from the call and the finished run. muting: what muting does in
+    words, "" where it cannot be; mute: outputs of the muted node, without it nothing behind it is made.
+    remark: a few words on its outputs; named: whether outputs tell the node's name, as the cause of an error.
+    """
+
+    kind: str
+    label: str
+    category: str
+    text: str
+    inputs: tuple[Input, ...] = ()
+    outputs: tuple[Output, ...] = ()
+    settings: tuple[Setting, ...] = ()
+    make: Callable[[Call], Outputs] | None = None
+    order: Callable[[Call], Any] | None = None
+    read: Callable[..., Outputs] | None = None
+    muting: str = ""
+    mute: Callable[[Call], Outputs] | None = None
+    remark: Callable[[Outputs], str] = lambda outputs: ""
+    named: bool = False
+
+    @property
+    def runs(self) -> bool:
+        """Whether its work is a run of its own, in a folder."""
+        return self.order is not None
+
+    def setting(self, name: str) -> Setting | None:
+        """The setting of that name, or None."""
+        return next((s for s in self.settings if s.name == name), None)
+
+    def input(self, name: str) -> Input | None:
+        """What may be linked under that name: an input, or a setting that is a number; None without one."""
+        found = next((i for i in self.inputs if i.name == name), None)
+        own = self.setting(name)
+        if found is None and own is not None and own.is_number:
+            return Input(name, (NUMBER,), own.description.text, needed=False)
+        return found
+
+    def output(self, name: str) -> Output | None:
+        """The output of that name, or None."""
+        return next((o for o in self.outputs if o.name == name), None)
+
+
+Definitions = Mapping[str, Definition]

@@ -1,0 +1,354 @@
+"""Evaluation of a node tree: only what is asked for, and of that only what is not there yet.
+
+Every node has a key, a hash of its kind, its settings and the keys of what it is linked to; a run's key is
+the hash of its files of inputs. So equal work is done once, in whatever node it stands.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Protocol
+
+import attrs
+
+from ..errors import MuError
+from ..reading import file_bytes, is_number
+from ..run.cache import key as hashed
+from ..run.inputs import digest
+from ..run.usecase import UseCase
+from .check import Fault, faults
+from .definition import FILE, FOLDER, Call, Definition, Definitions, Outputs
+from .tree import Node, NodeTree, Source
+
+COMPUTED, CACHED, WAITING, FAILED, BLOCKED, MUTED = (
+    "computed", "cached", "waiting", "failed", "blocked", "muted",
+)  # fmt: skip
+MADE = (COMPUTED, CACHED)
+MOST_KEPT = 512
+# No file that a node names is longer, in bytes.
+LONGEST_FILE = 1 << 31
+
+
+class NodeError(MuError):
+    """An error of which another node than the one that found it is the cause: `node`."""
+
+    def __init__(self, error: MuError, node: str) -> None:
+        super().__init__(error.what, error.where, error.remedy)
+        self.status = error.status
+        self.node = node
+
+
+@attrs.frozen
+class Order:
+    """A run that a node wants: its use case and its job.
+
+    after: folder of a run that this one goes on from, whose cache it takes up; decides no result. answers:
+    whether a verdict in its summary is its answer, also where it ends with an error because of that.
+    """
+
+    use_case: UseCase[Any]
+    job: Any
+    after: Path | None = None
+    answers: bool = False
+
+    def is_done(self, summary: Mapping[str, Any]) -> bool:
+        """Whether the run that left this summary need not be repeated."""
+        return summary.get("status") == "complete" or (self.answers and "verdict" in summary)
+
+    @property
+    def key(self) -> str:
+        """Hash of its files of inputs."""
+        return hashed(
+            self.use_case.name, *(part for item in sorted(self.job.texts().items()) for part in item)
+        )
+
+
+@attrs.frozen
+class Finished:
+    """A run that is done: its folder and its summary."""
+
+    folder: Path
+    summary: Mapping[str, Any]
+
+    @property
+    def cost_s(self) -> float:
+        """Seconds that its stages took."""
+        found = self.summary.get("seconds")
+        return sum(s for s in found.values() if is_number(s)) if isinstance(found, Mapping) else 0.0
+
+
+class Runs(Protocol):
+    """Runs of an evaluation."""
+
+    def find(self, order: Order) -> Finished | None:
+        """The run where it is done already."""
+
+    def start(self, node: str, order: Order) -> Finished:
+        """The run, done now. Raises MuError."""
+
+
+@attrs.frozen
+class Record:
+    """What an evaluation left of a node: words on its outputs, those that are numbers, folder of its run.
+
+    cost_s: how long it took to compute.
+    """
+
+    remark: str = ""
+    cost_s: float = 0.0
+    numbers: Mapping[str, float] = attrs.field(factory=dict)
+    folder: Path | None = None
+
+
+@attrs.frozen
+class State:
+    """What became of a node: one of the states, the seconds it took, its key and a few words on its outputs.
+
+    cost_s: how long it took when it was computed, now or before; folder: of its run; error: why it failed;
+    because: the node that it waits for, or that failed.
+    """
+
+    state: str
+    seconds: float = 0.0
+    cost_s: float = 0.0
+    key: str = ""
+    remark: str = ""
+    folder: Path | None = None
+    error: MuError | None = None
+    because: str = ""
+
+
+@attrs.define
+class Kept:
+    """Outputs of nodes, and orders of runs, by key; the least recently used are dropped.
+
+    counts: how often each node was made, by its name.
+    """
+
+    counts: Counter[str] = attrs.field(factory=Counter)
+    _values: OrderedDict[str, Any] = attrs.field(factory=OrderedDict)
+
+    def get(self, key: str) -> Any:
+        """What is kept under a key, or None."""
+        if key in self._values:
+            self._values.move_to_end(key)
+        return self._values.get(key)
+
+    def put(self, key: str, value: Any) -> None:
+        """Keep a value."""
+        self._values[key] = value
+        while len(self._values) > MOST_KEPT:
+            self._values.popitem(last=False)
+
+
+Report = Callable[[str, State], None]
+
+
+@attrs.define
+class Evaluation:
+    """One tree, evaluated by `run`; afterwards `states` and `outputs` by node.
+
+    runs: where runs are found and started; None for a look, which makes only what takes milliseconds and
+    knows of the rest what earlier evaluations left: `records`, by key. report: called with each node's state.
+    """
+
+    tree: NodeTree
+    definitions: Definitions
+    runs: Runs | None = None
+    kept: Kept = attrs.field(factory=Kept)
+    records: Mapping[str, Record] = attrs.field(factory=dict)
+    report: Report = lambda name, state: None
+    states: dict[str, State] = attrs.field(factory=dict)
+    outputs: dict[str, Outputs] = attrs.field(factory=dict)
+
+    def run(self, wanted: Iterable[str] = ()) -> dict[str, State]:
+        """Make the wanted nodes, all of the tree where none is named, and what they need.
+
+        A node that fails does not keep others from being made. Raises what `runs` raises to end it all.
+        """
+        order, circle = self.tree.ordered()
+        needed = self.tree.upstream(tuple(wanted) or self.tree.nodes)
+        first: dict[str, Fault] = {}
+        for fault in faults(self.tree, self.definitions):
+            first.setdefault(fault.node, fault)
+        for name in (*order, *sorted(circle)):
+            if name not in needed:
+                continue
+            if name in first:
+                self._set(name, State(FAILED, error=first[name].error()))
+            elif name in circle:
+                self._set(name, State(BLOCKED, because=self._before(name)))
+            else:
+                self._make(name)
+        return self.states
+
+    def _set(self, name: str, state: State) -> None:
+        self.states[name] = state
+        self.report(name, state)
+
+    def _is_made(self, name: str) -> bool:
+        return name in self.states and self.states[name].state in MADE
+
+    def _before(self, name: str) -> str:
+        """The first source of a node that is not made."""
+        return next((s for s in self.tree.sources(name) if not self._is_made(s)), "")
+
+    def _make(self, name: str) -> None:
+        node = self.tree.nodes[name]
+        definition = self.definitions[node.kind]
+        lacking = self._lacking(node, definition)
+        if lacking is not None:
+            state = self.states[lacking].state
+            then = state if state in (WAITING, MUTED) else BLOCKED
+            self._set(name, State(then, because=self.states[lacking].because or lacking))
+            return
+        if node.muted and definition.mute is None:
+            self._set(name, State(MUTED, because=name))
+            return
+        start = time.perf_counter()
+        key = ""
+        try:
+            settings = self._settings(node, definition)
+            key = self._key(name, node, definition, settings)
+            behind = next(
+                (s for s in self.tree.sources(name) if self._is_made(s) and s not in self.outputs), ""
+            )
+            runs = definition.runs and not node.muted
+            if self.runs is None and (runs or behind):
+                self._look(name, key, behind)
+            elif runs:
+                self._of_run(name, definition, self._call(name, node, definition, settings), key, start)
+            else:
+                self._of_call(name, definition, self._call(name, node, definition, settings), key, start)
+        except MuError as error:
+            self._failed(name, error, key, time.perf_counter() - start)
+
+    def _look(self, name: str, key: str, behind: str) -> None:
+        """Take a node from the records, or let it wait for a run."""
+        found = self.records.get(key)
+        if found is None:
+            self._set(name, State(WAITING, key=key, because=self.states[behind].because if behind else name))
+        else:
+            state = State(CACHED, cost_s=found.cost_s, key=key, remark=found.remark, folder=found.folder)
+            self._set(name, state)
+
+    def _of_call(self, name: str, definition: Definition, call: Call, key: str, start: float) -> None:
+        found: tuple[Outputs, float] | None = self.kept.get(key)
+        state = CACHED
+        if found is None:
+            make = definition.mute if call.muted else definition.make
+            assert make is not None
+            found, state = (make(call), time.perf_counter() - start), COMPUTED
+            self.kept.put(key, found)
+            self.kept.counts[name] += 1
+        outputs, cost = found
+        self._done(name, definition, outputs, State(state, time.perf_counter() - start, cost, key))
+
+    def _of_run(self, name: str, definition: Definition, call: Call, key: str, start: float) -> None:
+        assert definition.order is not None
+        assert definition.read is not None
+        assert self.runs is not None
+        order = definition.order(call)
+        done, state = self.runs.find(order), CACHED
+        if done is None:
+            done, state = self.runs.start(name, order), COMPUTED
+            self.kept.counts[name] += 1
+        outputs = definition.read(call, done)
+        seconds = time.perf_counter() - start
+        cost = seconds if state == COMPUTED else done.cost_s
+        self._done(name, definition, outputs, State(state, seconds, cost, key, folder=done.folder))
+
+    def _done(self, name: str, definition: Definition, outputs: Outputs, state: State) -> None:
+        self.outputs[name] = outputs
+        self._set(name, attrs.evolve(state, remark=definition.remark(outputs)))
+
+    def _failed(self, name: str, error: MuError, key: str, seconds: float) -> None:
+        cause = error.node if isinstance(error, NodeError) else ""
+        self._set(name, State(FAILED, seconds, key=key, error=error, because=cause))
+        if cause in self.states and cause != name:
+            # What is to be mended stands there.
+            found = self.states[cause]
+            self._set(cause, attrs.evolve(found, state=FAILED, error=error, because=""))
+
+    def _lacking(self, node: Node, definition: Definition) -> str | None:
+        """The first source that is not made and that the node cannot do without, or None."""
+        for key, sources in node.links.items():
+            taken = definition.input(key)
+            optional = taken is not None and (taken.many or not taken.needed)
+            for source in sources:
+                muted = self.states[source.node].state == MUTED
+                if not self._is_made(source.node) and not (muted and optional):
+                    return source.node
+        for taken in definition.inputs:
+            sources = node.links.get(taken.name, ())
+            if taken.needed and not any(self._is_made(s.node) for s in sources):
+                return sources[0].node if sources else None
+        return None
+
+    def _settings(self, node: Node, definition: Definition) -> dict[str, Any]:
+        """Every setting of a node, its own or by a link. Raises InputError."""
+        found: dict[str, Any] = {}
+        for s in definition.settings:
+            source = next(iter(node.links.get(s.name, ())), None)
+            if source is not None and self._is_made(source.node):
+                value = self._number(source)
+                found[s.name] = value if value is None else s.checked(value)
+            else:
+                found[s.name] = s.checked(node.settings.get(s.name, s.description.default))
+        return found
+
+    def _number(self, source: Source) -> Any:
+        """A number that another node gives; None where a look does not know it."""
+        if source.node in self.outputs:
+            return self.outputs[source.node][source.output]
+        record = self.records.get(self.states[source.node].key)
+        return None if record is None else record.numbers.get(source.output)
+
+    def _call(self, name: str, node: Node, definition: Definition, settings: dict[str, Any]) -> Call:
+        inputs: dict[str, Any] = {}
+        for taken in definition.inputs:
+            sources = [s for s in node.links.get(taken.name, ()) if s.node in self.outputs]
+            values = tuple((s.node, self.outputs[s.node][s.output]) for s in sources)
+            inputs[taken.name] = values if taken.many else values[0][1] if values else None
+        return Call(name, settings, inputs, node.muted)
+
+    def _key(self, name: str, node: Node, definition: Definition, settings: Mapping[str, Any]) -> str:
+        links = [
+            (taken.name, s.output, self.states[s.node].key, s.node if taken.many else "")
+            for taken in definition.inputs
+            for s in node.links.get(taken.name, ())
+            if self._is_made(s.node)
+        ]
+        files = [_content(s.path, settings[s.name]) for s in definition.settings if s.path]
+        # Outputs that tell the node's name, as the cause of an error, are those of that node alone.
+        own = name if definition.named else ""
+        return hashed(node.kind, node.muted, sorted(settings.items()), links, files, own)
+
+
+def _content(path: str, value: str) -> Any:
+    """What tells whether a named file or folder has changed."""
+    if not value:
+        return ""
+    place = Path(value)
+    try:
+        if path == FILE:
+            found = place.stat()
+            return _digest(place, found.st_size, found.st_mtime_ns)
+        if path == FOLDER:
+            return sorted(
+                (p.name, p.stat().st_size, p.stat().st_mtime_ns) for p in place.iterdir() if p.is_file()
+            )
+    except OSError:
+        # Whoever reads it says so.
+        return "unreadable"
+    return ""
+
+
+@lru_cache(256)
+def _digest(place: Path, size: int, mtime_ns: int) -> str:
+    """SHA-256 of a file, read once as long as neither size nor time changes: a slider asks at every move."""
+    return digest(file_bytes(place, LONGEST_FILE))

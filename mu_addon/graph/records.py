@@ -1,0 +1,69 @@
+"""What evaluations have left in a folder, by the keys of nodes, for a look that makes nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..files import write_json
+from ..reading import file_bytes, is_number, parse_json
+from .definition import NUMBER, Definition, Outputs
+from .evaluation import Record, State
+from .runs import FOLDER
+
+NAME = "records.json"
+# No file of records is longer, in bytes; of more records the oldest are dropped.
+LONGEST, MOST_RECORDS = 1 << 24, 5000
+
+
+def record_of(definition: Definition, outputs: Outputs, state: State) -> Record:
+    """What is kept of a node that was made."""
+    numbers = {o.name: float(outputs[o.name]) for o in definition.outputs if o.type == NUMBER}
+    return Record(state.remark, state.cost_s, numbers, state.folder)
+
+
+def read_records(folder: Path) -> dict[str, Record]:
+    """Records by key of a tree's folder; those without their run, and what is no record, left out."""
+    try:
+        found = parse_json(file_bytes(folder / FOLDER / NAME, LONGEST), NAME)
+    except (OSError, InputError):
+        return {}
+    tables = found.get("records") if isinstance(found, dict) else None
+    if not isinstance(tables, dict):
+        return {}
+    records = {key: _record(table, folder) for key, table in tables.items()}
+    return {key: record for key, record in records.items() if record is not None}
+
+
+def write_records(folder: Path, records: Mapping[str, Record]) -> None:
+    """Write records by key into a tree's folder, the latest last. Raises OutputError."""
+    latest = list(records.items())[-MOST_RECORDS:]
+    tables = {
+        key: {
+            "remark": record.remark,
+            "cost_s": round(record.cost_s, 4),
+            "numbers": dict(record.numbers),
+            **({"run": record.folder.name} if record.folder is not None else {}),
+        }
+        for key, record in latest
+    }
+    write_json(folder / FOLDER / NAME, {"format": 1, "records": tables})
+
+
+def _record(table: Any, folder: Path) -> Record | None:
+    if not isinstance(table, dict):
+        return None
+    remark, numbers, run = table.get("remark", ""), table.get("numbers", {}), table.get("run")
+    cost = table.get("cost_s", 0.0)
+    if not (isinstance(remark, str) and isinstance(numbers, dict) and all(map(is_number, numbers.values()))):
+        return None
+    if not is_number(cost):
+        return None
+    if run is None:
+        return Record(remark, cost, numbers)
+    # A name alone: what leads out of the folder is no run of this tree.
+    if not isinstance(run, str) or Path(run).name != run or not (folder / FOLDER / run).is_dir():
+        return None
+    return Record(remark, cost, numbers, folder / FOLDER / run)

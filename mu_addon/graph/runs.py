@@ -1,0 +1,117 @@
+"""Runs of an evaluation, each in a folder that is named by the hash of its inputs."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from ..errors import InputError, MuError
+from ..files import make_folder
+from ..reading import file_bytes, parse_json
+from ..run.context import SUMMARY, run_to_end
+from ..run.folder import same_inputs
+from ..run.progress import Message, Progress, Sink
+from .evaluation import Finished, Order
+
+CACHE = "cache"
+FOLDER = "nodes"
+"""Folder of the runs within that of the tree."""
+# Far more than any summary holds.
+_LONGEST = 1 << 26
+# Exit statuses of a run that was asked to stop.
+_STOPPED = (130, 143)
+
+
+@attrs.define
+class FolderRuns:
+    """Runs in a folder, started where they are not done; what a killed one left is taken up.
+
+    progress: told of the stages of each, by node; reports: whether each writes its report.
+    """
+
+    folder: Path
+    progress: Progress = attrs.field(factory=Progress)
+    reports: bool = False
+
+    def place(self, order: Order) -> Path:
+        """Folder of a run."""
+        return self.folder / FOLDER / f"{order.use_case.name}-{order.key[:16]}"
+
+    def find(self, order: Order) -> Finished | None:
+        """The run where it lies there whole, of the same inputs."""
+        place = self.place(order)
+        summary = _summary(place)
+        if not order.is_done(summary) or not order.use_case.layout.is_of(place):
+            return None
+        return Finished(place, summary) if same_inputs(place, order.job.texts()) else None
+
+    def start(self, node: str, order: Order) -> Finished:
+        """The run, done; raises MuError as it does, and Stopped where the whole evaluation is to stop."""
+        errors: list[Message] = []
+        inner = Progress([_of_node(node, self.progress.sinks, errors)])
+        place = self.place(order)
+        if order.after is not None:
+            _take_up(order.after / CACHE, place / CACHE)
+        with run_to_end(inner) as context:
+            context.wants_report = self.reports
+            order.use_case.start(order.job, place, context)
+        summary = _summary(place)
+        stopped = context.status in _STOPPED
+        if context.status and (stopped or not order.is_done(summary)):
+            message = errors[-1] if errors else {}
+            found = MuError(
+                str(message.get("what", "the run failed")),
+                str(message.get("where", "")) or str(place),
+                str(message.get("what_to_do", "")),
+            )
+            found.status = context.status
+            if stopped:
+                raise Stopped(found)
+            raise found
+        return Finished(place, summary)
+
+
+class Stopped(Exception):
+    """The evaluation was asked to stop; `error` says how."""
+
+    def __init__(self, error: MuError) -> None:
+        super().__init__(str(error))
+        self.error = error
+
+
+def _take_up(before: Path, now: Path) -> None:
+    """Put the finished work of one run, files named by the hash of their inputs, into another's cache."""
+    with suppress(OSError):
+        for path in before.glob("*.npz"):
+            make_folder(now)
+            if not (now / path.name).exists():
+                shutil.copyfile(path, now / f".{path.name}.part")
+                (now / f".{path.name}.part").replace(now / path.name)
+
+
+def _of_node(node: str, sinks: Sequence[Sink], errors: list[Message]) -> Sink:
+    """A sink that passes a run's stages and warnings on under the node's name, and keeps its errors."""
+
+    def sink(message: Message) -> None:
+        if message["type"] == "error":
+            errors.append(message)
+        elif message["type"] in ("progress", "warning"):
+            key = "stage" if message["type"] == "progress" else "what"
+            for one in sinks:
+                one({**message, key: f"{node}: {message[key]}"})
+
+    return sink
+
+
+def _summary(folder: Path) -> dict[str, Any]:
+    """The summary of a run's folder, empty where there is none to read."""
+    try:
+        found = parse_json(file_bytes(folder / SUMMARY, _LONGEST), SUMMARY)
+    except (OSError, InputError):
+        return {}
+    return found if isinstance(found, dict) else {}

@@ -1,0 +1,20 @@
+"""Every kind of node by name, in the order in which menus list them."""
+
+from __future__ import annotations
+
+from functools import cache
+from types import MappingProxyType
+
+from ...graph.definition import Definition, Definitions
+from .design_nodes import design_nodes
+from .evidence_nodes import evidence_nodes
+from .study_nodes import study_nodes
+
+
+@cache
+def definitions() -> Definitions:
+    """Definitions of all kinds of nodes; made once."""
+    found: dict[str, Definition] = {}
+    for definition in (*design_nodes(), *study_nodes(), *evidence_nodes()):
+        found[definition.kind] = definition
+    return MappingProxyType(found)

@@ -1,0 +1,255 @@
+"""Runs that nodes ask for, and what is read of them. Loads the solver: imported when one is wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from ...design.anchors import window
+from ...design.gates import GateError
+from ...design.printing.printer import load_printer
+from ...errors import InputError
+from ...graph.definition import Call, Outputs
+from ...graph.evaluation import Finished, Order
+from ...homogenize.effective import Effective, read_effective
+from ...measured import Measured
+from ...meshing.settings import MeshSettings
+from ...placement.inclusion import PRINTED, RULES
+from ..check_print.job import Job as CheckJob
+from ..check_print.run import USE_CASE as CHECK
+from ..diagnose.job import Job as DiagnoseJob
+from ..diagnose.run import USE_CASE as DIAGNOSE
+from ..export.job import Job as ExportJob
+from ..export.job import resin_of as export_resin
+from ..export.run import USE_CASE as EXPORT
+from ..grip.grasp import OF_FIDELITY, Cube, Grip
+from ..grip.job import COARSE, REFINE
+from ..grip.job import Job as GripJob
+from ..grip.run import USE_CASE as GRIP
+from ..homogenize.job import FRICTIONS
+from ..homogenize.job import Job as HomogenizeJob
+from ..homogenize.job import resin_of as lattice_resin
+from ..homogenize.run import USE_CASE as HOMOGENIZE
+from ..simulate_and_place.extended_unit import read_extended, require_same_print
+from ..simulate_and_place.job import Job, grasp, protocol_of
+from ..simulate_and_place.run import USE_CASE as STUDY
+from ..simulate_and_place.static_effects import StaticEffects
+from .parts import Design, refuse_body, solid_of
+from .study_nodes import BOTH
+
+
+@attrs.frozen(eq=False)
+class Study:
+    """A study that is done: its job, its folder and its summary."""
+
+    job: Job
+    folder: Path
+    summary: Mapping[str, Any]
+
+
+def study_of(call: Call, done: Finished) -> Outputs:
+    """A study by its run."""
+    return {"study": Study(_simulated(call) if "unit" in call.inputs else _placed(call), *_kept(done))}
+
+
+def _kept(done: Finished) -> tuple[Path, Mapping[str, Any]]:
+    return done.folder, done.summary
+
+
+def _simulated(call: Call) -> Job:
+    """The study that a node Simulate asks for; raises InputError."""
+    s, design = call.settings, call.inputs["unit"]
+    unit, effects = design.unit, StaticEffects(orientation_deg=s["orientation_deg"], where=call.node)
+    lattice: Effective | None = call.inputs["law"]
+    model: Path | None = call.inputs["model"]
+    if model is not None:
+        found = read_extended(unit, model)
+        unit, effects = found.unit, attrs.evolve(found.effects, orientation_deg=s["orientation_deg"])
+        if lattice is not None and found.applied:
+            require_same_print(unit, lattice, model)
+    return Job(
+        unit=unit,
+        protocol=protocol_of(s["protocol"] or None),
+        mesh=MeshSettings(order=s["order"], refine=s["refine"], fidelity=s["fidelity"]),
+        times=s["times"],
+        self_contact=s["self_contact"],
+        lattice=lattice,
+        body=design.body,
+        effects=effects,
+        stages=("design", "simulate"),
+    )
+
+
+def _placed(call: Call) -> Job:
+    """The study that a node Rank Paths asks for: the simulated one, and its paths. Raises InputError."""
+    s, study = call.settings, call.inputs["study"]
+    rules = RULES if s["rule"] == BOTH else (s["rule"],)
+    return attrs.evolve(
+        study.job,
+        stages=("design", "simulate", "place"),
+        rules=(PRINTED,) if study.job.mesh.resolved else rules,
+        stations=s["stations"],
+        mesh_check=s["mesh_check"],
+        paths=s["paths"],
+        most_checks=s["checks"],
+        workers=s["workers"],
+    )
+
+
+def _study_of_place(call: Call, what: str) -> Study:
+    study: Study = call.inputs["study"]
+    if what not in study.summary:
+        raise InputError(
+            f"the study has no {what}: it is of a node that ranks no paths, or of a unit whose state depends "
+            "on its history",
+            "study",
+            "link a node Rank Paths",
+        )
+    return study
+
+
+def sensitivity_of(call: Call) -> Outputs:
+    """Where the sensitivity map of a study lies, and its largest value in mm."""
+    found = _study_of_place(call, "sensitivity").summary["sensitivity"]
+    return {"field": call.inputs["study"].folder / found["file"], "largest": float(found["largest_mm"])}
+
+
+def light_of(call: Call) -> Outputs:
+    """Where the signals of a study lie, and the largest per degree."""
+    found = _study_of_place(call, "light").summary["light"]["sensitivity_per_deg"]
+    best = max(found, key=lambda name: abs(found[name]))
+    return {"signals": call.inputs["study"].folder / "signals.csv", "largest": found[best], "path": best}
+
+
+def figure_of(call: Call) -> Outputs:
+    """One number of a study."""
+    summary, what = call.inputs["study"].summary, call.settings["figure"]
+    angles = {float(p): a for p, a in (summary.get("angle_deg") or {}).items()}
+    volume = ((summary.get("gates") or {}).get("unit.stl") or {}).get("volume_mm3")
+    least = [min(by_path.values()) for by_path in (summary.get("J_hat_mm") or {}).values()]
+    found = {
+        "angle at the highest pressure": angles[max(angles)] if angles else None,
+        "angle at the lowest pressure": angles[min(angles)] if angles else None,
+        "range of angles": max(angles.values()) - min(angles.values()) if angles else None,
+        "volume of resin": volume,
+        "least deviation": min(least) if least else None,
+    }[what]
+    if found is None:
+        raise InputError(f"the study has no {what}", "figure", "choose another figure, or link Rank Paths")
+    return {"number": float(found)}
+
+
+def homogenize_order(call: Call) -> Order:
+    """The lattice's law by homogenization."""
+    s, unit = call.settings, call.inputs["unit"].unit
+    frictions = {BOTH: FRICTIONS, "none": ()}.get(s["specimen"], (s["specimen"],))
+    job = HomogenizeJob(
+        unit=unit,
+        resin=lattice_resin(s["resin"] or None, unit),
+        cells=s["cells"],
+        frictions=frictions,
+        strain=s["strain"],
+        refine=s["refine"],
+    )
+    return Order(HOMOGENIZE, job)
+
+
+def _window(design: Design) -> Any:
+    return window(design.unit, design.path) if design.path else None
+
+
+def check_order(call: Call) -> Order:
+    """The print check of a unit."""
+    s, design = call.settings, call.inputs["unit"]
+    direction = (s["up_x"], s["up_y"], s["up_z"])
+    if not 1e-6 < sum(x * x for x in direction) < 1e12:
+        raise InputError(f"{direction} is not a direction", "up_x, up_y, up_z", "give one, such as 0, 0, 1")
+    refuse_body(design, "the print check")
+    job = CheckJob(
+        printer=load_printer(s["printer"] or "form-4-elastic-50a"),
+        unit=design.unit,
+        window=_window(design),
+        quality=s["quality"],
+        direction=direction,
+    )
+    return Order(CHECK, job, answers=True)
+
+
+def export_order(call: Call) -> Order:
+    """The files of a unit."""
+    s, design = call.settings, call.inputs["unit"]
+    refuse_body(design, "the export")
+    formats = tuple(s["formats"].split())
+    job = ExportJob(
+        unit=design.unit,
+        resin=export_resin(s["resin"] or None),
+        path=_window(design),
+        path_name=design.path,
+        formats=formats,
+        quality=s["quality"],
+    )
+    return Order(EXPORT, job)
+
+
+def grip_order(call: Call) -> Order:
+    """The grasp of a gripper."""
+    s = call.settings
+    mesh = MeshSettings(refine=COARSE if s["coarse"] else REFINE, fidelity=s["fidelity"])
+    rules = (PRINTED,) if mesh.resolved else ("volume_fraction",) if s["coarse"] else RULES
+    try:
+        sides = [float(word) for word in s["cubes_mm"].split()]
+    except ValueError:
+        raise InputError(
+            f"{s['cubes_mm']!r} are no side lengths", "cubes_mm", "give numbers in mm, such as 12.5 25"
+        ) from None
+    step_s = 1.0 if s["coarse"] else 0.5
+    job = GripJob(
+        gripper=call.inputs["gripper"],
+        cubes=tuple(Cube(side, s["density_g_per_ml"]) for side in sides),
+        grip=Grip(friction=s["friction"], step_s=step_s, **OF_FIDELITY[s["fidelity"]]),
+        mesh=mesh,
+        self_contact=s["self_contact"],
+        rules=rules if s["rank_paths"] else (),
+    )
+    return Order(GRIP, job)
+
+
+def simulate_order(call: Call) -> Order:
+    """The motion of a unit."""
+    return Order(STUDY, _simulated(call))
+
+
+def place_order(call: Call) -> Order:
+    """The ranking of paths of a study, which goes on from that."""
+    return Order(STUDY, _placed(call), after=call.inputs["study"].folder)
+
+
+def solid_order(call: Call) -> Order:
+    """The printable solid of linked parts."""
+    unit, given, path = solid_of(call)
+    job = Job(unit, grasp(), stages=("design",), quality=given.quality, body=given.body, path=path)
+    return Order(STUDY, job)
+
+
+def diagnose_order(call: Call) -> Order:
+    """The diagnosis of measured data."""
+    design, measured = call.inputs["unit"], call.inputs["data"]
+    assert isinstance(measured, Measured)
+    unit = None if design is None else design.unit
+    return Order(DIAGNOSE, DiagnoseJob(measured, unit, fidelity=call.settings["fidelity"]))
+
+
+def law_of(call: Call, done: Finished) -> Outputs:
+    """The lattice's law that a run of `homogenize` found."""
+    return {"law": read_effective(done.folder / "effective.toml"), "run": done}
+
+
+def check_of(call: Call, done: Finished) -> Outputs:
+    """The findings of a print check; GateError where the part must not be printed."""
+    if done.summary.get("verdict") == "error":
+        faults = done.summary.get("faults") or ["see its report"]
+        raise GateError(f"not printable: {faults[0]}", str(done.folder), "see report.html in that folder")
+    return {"check": done}

@@ -1,0 +1,247 @@
+"""Nodes of the work on a unit: simulation, ranking of paths, the lattice's law, print, gripper."""
+
+from __future__ import annotations
+
+from ...design.gripper import Fingers, Gripper, Plate
+from ...design.quantity import describe
+from ...design.solid import QUALITY
+from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
+from ...meshing.settings import FIDELITIES, HOMOGENISED
+from ...placement.inclusion import RULES
+from .loading import of_orders
+from .parts import refuse_body
+
+SIMULATE, PLACE, PRINT, GRASP = "Simulate", "Sensor", "Print", "Gripper"
+BOTH = "both"
+# As the use cases name them, which are not loaded for a look at their nodes; a test compares them.
+SPECIMENS = ("slide", "stick")
+FORMATS = ("stl", "3mf", "3mf-beams", "step", "txt")
+_FIDELITY = setting(
+    "fidelity",
+    HOMOGENISED,
+    "the printed body with its struts, or a continuum in place of the lattice",
+    choices=tuple(FIDELITIES),
+)
+_SELF_CONTACT = setting("self_contact", False, "keep walls and struts of a resolved unit apart")
+_QUALITY = setting("quality", "interactive", "how fine the facets are", choices=tuple(QUALITY))
+
+
+def _gripper(call: Call) -> Outputs:
+    s, design = call.settings, call.inputs["unit"]
+    refuse_body(design, "a gripper")
+    fingers = Fingers(**{d.name: s[d.name] for d in describe(Fingers)})
+    plate = Plate(**{d.name: s[d.name] for d in describe(Plate)})
+    return {"gripper": Gripper(design.unit, path=design.path or s["path"], fingers=fingers, plate=plate)}
+
+
+def _study_remark(outputs: Outputs) -> str:
+    summary = outputs["study"].summary
+    angles = {float(p): a for p, a in (summary.get("angle_deg") or {}).items()}
+    words = [f"{angles[p]:.1f}° at {p:g} kPa" for p in (max(angles),)] if angles else []
+    chosen = summary.get("chosen") or {}
+    return ", ".join([*dict.fromkeys(chosen.values()), *words])
+
+
+def _grasp_remark(outputs: Outputs) -> str:
+    held = [side for side, g in outputs["grasp"].summary.get("grasps", {}).items() if g["held"]]
+    return f"holds {', '.join(held)} mm" if held else ""
+
+
+FIGURES = (
+    "angle at the highest pressure",
+    "angle at the lowest pressure",
+    "range of angles",
+    "volume of resin",
+    "least deviation",
+)
+_TAKES_UNIT = Input("unit", ("unit",), "link a unit")
+_TAKES_STUDY = Input("study", ("study",), "link a node Simulate or Rank Paths")
+# A run that a muted node does not start; what follows it is left out with it.
+_LEFT_OUT = "neither this nor what needs it is computed"
+
+
+def study_nodes() -> tuple[Definition, ...]:
+    """Definitions of the nodes of simulation, sensor, print and gripper."""
+    return (
+        Definition(
+            "simulate",
+            "Simulate",
+            SIMULATE,
+            "the unit's motion under a pressure protocol",
+            (
+                _TAKES_UNIT,
+                Input("law", ("law",), "the lattice's law, by a node Homogenize", needed=False),
+                Input("model", ("model",), "an extended model, by a node Diagnose", needed=False),
+            ),
+            (Output("study", "study", "the motion"),),
+            (
+                setting("protocol", "", "CSV of time_s,pressure_kPa; empty: the shipped grasp", path=FILE),
+                setting("times", 13, "time samples of the protocol", low=2, high=1001),
+                setting("order", 2, "order of the elements: 1 for a look only", low=1, high=2),
+                setting("refine", 1.0, "what divides every element size", low=0.2, high=8.0),
+                _FIDELITY,
+                _SELF_CONTACT,
+                setting(
+                    "orientation_deg", 0.0, "direction of gravity about x", unit="deg", low=-360, high=360
+                ),
+            ),
+            order=of_orders("simulate_order"),
+            read=of_orders("study_of"),
+            muting=_LEFT_OUT,
+            remark=_study_remark,
+        ),
+        Definition(
+            "place",
+            "Rank Paths",
+            PLACE,
+            "sensor paths, ranked by how much each disturbs the motion",
+            (_TAKES_STUDY,),
+            (Output("study", "study", "motion and ranking"),),
+            (
+                setting(
+                    "rule", BOTH, "how the sensor stiffens the elements it meets", choices=(BOTH, *RULES)
+                ),
+                setting("stations", 51, "stations along the backbone", low=2, high=10_001),
+                setting("mesh_check", True, "solve a second mesh, for the mesh uncertainty of the ranking"),
+                setting(
+                    "paths",
+                    "windows",
+                    "windows of anchors, or any path of the lattice besides",
+                    choices=("windows", "graph"),
+                ),
+                setting("checks", 100, "most lattice paths solved by the full model", low=2, high=100_000),
+                setting("workers", 2, "processes at a time; decides no result", low=1, high=256),
+            ),
+            order=of_orders("place_order"),
+            read=of_orders("study_of"),
+            muting="the study passes on without a ranking",
+            mute=lambda call: {"study": call.inputs["study"]},
+            remark=_study_remark,
+        ),
+        Definition(
+            "sensitivity",
+            "Sensitivity",
+            PLACE,
+            "the map of how much stiffness anywhere disturbs the motion, and its largest value in mm",
+            (_TAKES_STUDY,),
+            (Output("field", "field", "sensitivity.vtu"), Output("largest", "number", "largest, in mm")),
+            make=of_orders("sensitivity_of"),
+            remark=lambda outputs: f"up to {outputs['largest']:.3g} mm",
+        ),
+        Definition(
+            "light",
+            "Light",
+            PLACE,
+            "the signal of a waveguide along every path, and the largest per degree of bending",
+            (_TAKES_STUDY,),
+            (Output("signals", "file", "signals.csv"), Output("largest", "number", "largest, per degree")),
+            make=of_orders("light_of"),
+            remark=lambda outputs: f"{outputs['path']}: {outputs['largest']:.3g} per degree",
+        ),
+        Definition(
+            "figure",
+            "Figure of a Study",
+            SIMULATE,
+            "one number of a study",
+            (_TAKES_STUDY,),
+            (Output("number", "number", "the number"),),
+            (setting("figure", FIGURES[0], "which number", choices=FIGURES),),
+            make=of_orders("figure_of"),
+            remark=lambda outputs: f"{outputs['number']:.6g}",
+        ),
+        Definition(
+            "homogenize",
+            "Homogenize",
+            SIMULATE,
+            "the lattice's law from its struts and its resin",
+            (_TAKES_UNIT,),
+            (Output("law", "law", "the lattice's law"),),
+            (
+                setting("resin", "", "material of the library or its TOML file; empty: that of the unit"),
+                setting("cells", 3, "cells along a side of the specimen", low=1, high=12),
+                setting(
+                    "specimen",
+                    BOTH,
+                    "contact of the specimen with its plates",
+                    choices=(BOTH, *SPECIMENS, "none"),
+                ),
+                setting("strain", 0.4, "largest compression", low=0.01, high=0.8),
+                setting("refine", 1.0, "what divides the cell's element size", low=0.3, high=4.0),
+            ),
+            order=of_orders("homogenize_order"),
+            read=of_orders("law_of"),
+            muting=_LEFT_OUT,
+            remark=lambda outputs: f"{outputs['run'].summary['moduli_kPa']['E100']:.4g} kPa",
+        ),
+        Definition(
+            "check",
+            "Check Print",
+            PRINT,
+            "whether the unit can be printed, and its best build direction",
+            (_TAKES_UNIT,),
+            (Output("check", "print check", "findings"),),
+            (
+                setting("printer", "", "shipped printer or its TOML file; empty: Form 4 with Elastic 50A"),
+                setting("up_x", 0.0, "build direction, away from the platform", low=-1e3, high=1e3),
+                setting("up_y", 0.0, "build direction, away from the platform", low=-1e3, high=1e3),
+                setting("up_z", 1.0, "build direction, away from the platform", low=-1e3, high=1e3),
+                _QUALITY,
+            ),
+            order=of_orders("check_order"),
+            read=of_orders("check_of"),
+            muting=_LEFT_OUT,
+            remark=lambda outputs: "verdict: {verdict}".format(**outputs["check"].summary),
+        ),
+        Definition(
+            "export",
+            "Export",
+            PRINT,
+            "files for printer and CAD",
+            (_TAKES_UNIT,),
+            (Output("files", "file", "the files"),),
+            (
+                setting("formats", " ".join(FORMATS), f"some of {', '.join(FORMATS)}"),
+                setting("quality", "export", "how fine the facets are", choices=tuple(QUALITY)),
+                setting("resin", "", "material of the library or its TOML file; empty: Elastic 50A"),
+            ),
+            order=of_orders("export_order"),
+            read=lambda call, done: {"files": done},
+            muting=_LEFT_OUT,
+            remark=lambda outputs: outputs["files"].folder.name,
+        ),
+        Definition(
+            "gripper",
+            "Gripper",
+            GRASP,
+            "two equal units on a plate",
+            (_TAKES_UNIT,),
+            (Output("gripper", "gripper", "the gripper"),),
+            (
+                setting("path", "alpha4", "path of the waveguides where the unit has none"),
+                *map(Setting, (*describe(Fingers), *describe(Plate))),
+            ),
+            make=_gripper,
+            remark=lambda outputs: "{:.4g} x {:.4g} mm".format(*outputs["gripper"].size_mm),
+        ),
+        Definition(
+            "grip",
+            "Grasp",
+            GRASP,
+            "the gripper's grasp of cubes",
+            (Input("gripper", ("gripper",), "link a gripper"),),
+            (Output("grasp", "grasp", "the grasp"),),
+            (
+                setting("cubes_mm", "12.5 25", "side lengths of the cubes in mm"),
+                setting("density_g_per_ml", 1.24, "density of the cubes", unit="g/ml", low=0.01, high=25),
+                setting("friction", 0.5, "coefficient of friction", low=0, high=5),
+                setting("coarse", False, "a coarser mesh, longer time steps, one inclusion rule"),
+                setting("rank_paths", True, "rank the paths of a finger's sensor"),
+                _FIDELITY,
+                _SELF_CONTACT,
+            ),
+            order=of_orders("grip_order"),
+            read=lambda call, done: {"grasp": done},
+            muting=_LEFT_OUT,
+            remark=_grasp_remark,
+        ),
+    )
