@@ -21,6 +21,7 @@ _MODULES = (
     "sensor.state",
     "sensor.properties",
     "gripper.object",
+    "scene.gestures",
     "results.thumbnails",
     # Operators.
     "unit.operators",

@@ -17,7 +17,7 @@ from ...run.folder import write_run
 from ..jobs.start_child import JobKind
 from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
-from ..unit.properties import exact
+from ..unit.fields import exact
 from . import object as gripper_object
 from .properties import to_gripper
 

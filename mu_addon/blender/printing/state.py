@@ -30,7 +30,8 @@ from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
 from ..steps import state as stack
 from ..unit import object as unit_object
-from ..unit.properties import exact, to_unit
+from ..unit.fields import exact
+from ..unit.properties import shape_hash, to_unit
 from .properties import FORMATS, OWN_PRINTER
 
 CHECK, EXPORT, SPECIMENS = "check", "export", "specimens"
@@ -200,7 +201,7 @@ def _own_stl(root: Any, unit: Unit, folder: Path) -> Path:
 
 
 def _shape(root: Any, unit: Unit) -> list[str]:
-    return [unit.hash(), path_of(root, unit), bodies.fingerprint(root)]
+    return [shape_hash(unit), path_of(root, unit), bodies.fingerprint(root)]
 
 
 def checked(root: Any) -> Checked | None:
@@ -221,7 +222,7 @@ def checked(root: Any) -> Checked | None:
             shape = parse_json(file_bytes(own), own.name)
             shape = shape["of"] if shape["stl_sha256"] == of["stl_sha256"] else []
         else:
-            shape = [read_unit(unit).hash(), of.get("path", ""), ""]
+            shape = [shape_hash(read_unit(unit)), of.get("path", ""), ""]
         digest = hashlib.sha256(content).hexdigest()
         return check, digest, shape, of["direction"], file_text(limits)
 

@@ -7,6 +7,7 @@ import textwrap
 from ...design.parameters import SECTIONS
 from ...design.quantity import describe
 from ...design.wall import Wall, offered
+from ..unit.fields import field
 from ..unit.object import active_root
 
 # Where a section's parameters are shown. A section that the core gains appears under Design by itself.
@@ -86,4 +87,4 @@ def parameters(layout, props, place: str) -> None:
             shown = offered(group.law, group.friction_share) if section is Wall else None
             for d in describe(section):
                 if shown is None or d.name in shown:
-                    column.prop(group, d.name)
+                    column.prop(group, field(group, d))

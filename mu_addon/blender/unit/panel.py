@@ -5,12 +5,10 @@ from __future__ import annotations
 import bpy
 
 from ..body import panel as body_panel
-from ..body import state as bodies
 from ..gripper import object as gripper_object
-from ..shared.operators import NO_UNIT
+from ..shared.operators import NO_UNIT, linked
 from ..shared.panels import TabPanel, UnitPanel, alert, parameters, wrapped
 from . import object as unit_object
-from .operators import in_millimetres
 
 
 class MU_PT_unit(TabPanel, bpy.types.Panel):
@@ -32,12 +30,15 @@ class MU_PT_unit(TabPanel, bpy.types.Panel):
             layout.operator("mu.add", text="Add Monolithic Unit", icon="ADD")
             layout.menu("MU_MT_more", icon="DOWNARROW_HLT")
             return
-        if not in_millimetres(context.scene):
-            box = layout.box()
-            wrapped(box, "The scene is not in millimetres: lengths are shown wrong", "ERROR")
-            box.operator("mu.millimetres")
+        if linked(root):
+            wrapped(layout, linked(root), "LINKED")
         row = layout.row(align=True)
-        row.menu("MU_MT_presets", text=root.mu_unit.title, icon="PRESET")
+        row.prop(root, "name", text="")
+        row.operator("mu.select", text="", icon="RESTRICT_SELECT_OFF")
+        row.operator("mu.rebuild", text="", icon="FILE_REFRESH")
+        row.operator("mu.delete", text="", icon="TRASH")
+        row = layout.row(align=True)
+        row.menu("MU_MT_presets", icon="PRESET")
         row.operator("mu.preset_save", text="", icon="ADD")
         row.menu("MU_MT_more", text="", icon="DOWNARROW_HLT")
         layout.row(align=True).prop(root.mu_unit, "show", expand=True)
@@ -57,7 +58,6 @@ class MU_PT_design(UnitPanel, bpy.types.Panel):
     bl_options = set()
 
     def show(self, layout, context, root):
-        layout.prop(root.mu_unit, "title")
         layout.prop(root.mu_unit, "scale")
         parameters(layout, root.mu_unit, "design")
 
@@ -69,7 +69,7 @@ class MU_PT_lattice(UnitPanel, bpy.types.Panel):
     bl_label = "Lattice"
 
     def show(self, layout, context, root):
-        envelope = unit_object.part(root, bodies.ENVELOPE)
+        envelope = root.mu_unit.envelope
         parameters(layout, root.mu_unit, "lattice")
         if envelope is not None:
             wrapped(layout, f"The lattice fills {envelope.name}; counts of cells are not used", "INFO")
