@@ -53,6 +53,7 @@ _MODULES = (
     "track.panel",
     "results.legend",
     "sensor.plot",
+    "jobs.header",
     "shared.menus",
 )
 """Modules with something to register, in the order they need each other."""

@@ -89,7 +89,7 @@ def folder_of(root: Any) -> Path:
     return studies.folder_of(root) / FOLDER
 
 
-DIAGNOSIS = JobKind(FOLDER, lambda root: root.mu_unit.uuid, folder_of)
+DIAGNOSIS = JobKind(FOLDER, lambda root: root.mu_unit.uuid, folder_of, "diagnosis", heavy=True)
 
 _data: FileCache[MeasuredFolder] = FileCache()
 _runs: FileCache[tuple[dict[str, Any], dict[str, Any], dict[str, Any], str]] = FileCache()

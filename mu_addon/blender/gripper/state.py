@@ -31,7 +31,7 @@ def folder_of(root: Any) -> Path:
     return studies.default_folder(props.folder, props.title, props.uuid)
 
 
-GRASP = JobKind("grip", lambda root: root.mu_gripper.uuid, folder_of)
+GRASP = JobKind("grip", lambda root: root.mu_gripper.uuid, folder_of, "grasp", heavy=True)
 
 
 def job_of(root: Any) -> Job:

@@ -207,7 +207,7 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
         header, body = layout.panel("MU_printing", default_closed=True)
         header.label(text="Print Offsets")
         if body:
-            parameters(body, root.mu_unit, "print")
+            parameters(body, root, "print")
 
 
 def _check_state(layout, found) -> None:

@@ -75,7 +75,7 @@ def latest_folder(root: Any) -> Path:
     return folder_of(root, CHECK) if child is None else child.folder.parent
 
 
-PRINTING = JobKind("print", lambda root: root.mu_unit.uuid, latest_folder)
+PRINTING = JobKind("print", lambda root: root.mu_unit.uuid, latest_folder, "print")
 
 _printers: FileCache[Printer] = FileCache()
 _checks: FileCache[Any] = FileCache()

@@ -16,7 +16,7 @@ from bpy.app.handlers import persistent
 from ...design.anchors import windows
 from ..gripper import object as gripper_object
 from ..shared import displays, handlers, scene_units, updates
-from ..unit import drawing, live_update
+from ..unit import broken, drawing, live_update
 from ..unit import object as unit_object
 from . import older_files
 
@@ -161,6 +161,7 @@ def _after_undo(*_: Any) -> None:
 def _after_load(*_: Any) -> None:
     for kept in (_holders, _given, _hidden):
         kept.clear()
+    broken.forget()
     older_files.renew()
     look()
 

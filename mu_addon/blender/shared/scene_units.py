@@ -26,3 +26,11 @@ def use_millimetres(scene: Any) -> None:
     """One Blender unit is a millimetre, shown as such."""
     units = scene.unit_settings
     units.system, units.scale_length, units.length_unit = "METRIC", 0.001, "MILLIMETERS"
+
+
+def length(scene: Any, value_mm: float, digits: int = 4) -> str:
+    """A length in mm, in inches in a scene of such, a plain number in one without units."""
+    system = scene.unit_settings.system
+    if system == "IMPERIAL":
+        return f"{value_mm / 25.4:.{digits}g} in"
+    return f"{value_mm:.{digits}g}" + (" mm" if system == "METRIC" else "")

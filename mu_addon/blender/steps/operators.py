@@ -6,6 +6,7 @@ import attrs
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
+from ...design.nearest import tied
 from ...design.parameters import SECTIONS
 from ...design.quantity import describe
 from ...design.steps import STEPS, Step, downstream
@@ -13,7 +14,7 @@ from ..shared import updates
 from ..shared.operators import UnitOperator, reports_errors
 from ..shared.texts import sentence
 from ..unit import object as unit_object
-from ..unit.fields import blender_property, exact, tied
+from ..unit.fields import blender_property, exact
 from ..unit.properties import from_unit, to_unit
 from . import state as stack
 

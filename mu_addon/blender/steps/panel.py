@@ -5,10 +5,9 @@ from __future__ import annotations
 import bpy
 
 from ...design.steps import STEPS
-from ..shared.panels import UnitPanel, wrapped
+from ..shared.panels import UnitPanel, parameter, wrapped
 from ..shared.texts import sentence
 from ..unit.drawing import DRAWN
-from ..unit.fields import field
 from . import state as stack
 
 
@@ -52,8 +51,7 @@ class MU_PT_stack(UnitPanel, bpy.types.Panel):
         column = layout.column(align=True)
         column.enabled = not entry.muted
         for section, name in stack.own_parameters(step):
-            group = getattr(props, section)
-            column.prop(group, field(group, stack.description(section, name)))
+            parameter(column, root, section, stack.description(section, name))
         row = layout.row(align=True)
         if step.name == "solid":
             row.operator("mu.solid")

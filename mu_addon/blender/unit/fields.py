@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
+from ...design.nearest import tied
 from ...design.quantity import Description, describe
 from ..shared import scene_units, updates
 from ..shared.texts import sentence
@@ -72,18 +73,28 @@ def true_length(name: str, title: str, text: str, scales: bool):
     the scene, and of numbers in Blender units; so this one is in those.
     """
 
-    def factor(group) -> float:
-        unit = group.id_data.mu_unit
-        return scene_units.mm(bpy.context.scene) * (exact(unit.scale) if scales else 1.0)
-
     def read(group) -> float:
-        return exact(getattr(group, name)) * factor(group)
+        return exact(getattr(group, name)) * _factor(group, scales)
 
     def write(group, value: float) -> None:
-        setattr(group, name, exact(value / factor(group)))
+        setattr(group, name, exact(value / _factor(group, scales)))
 
     shared = {"name": title, "description": text, "subtype": "DISTANCE", "precision": 6}
     return FloatProperty(get=read, set=write, options={"SKIP_SAVE"}, **shared)
+
+
+def _factor(group, scales: bool) -> float:
+    """Blender units of the scene in a millimetre of a parameter."""
+    scale = exact(group.id_data.mu_unit.scale) if scales else 1.0
+    return scene_units.mm(bpy.context.scene) * scale
+
+
+def shown_value(group, d: Description, value: float) -> str:
+    """A value of a parameter in words: a length as it is at the unit's scale."""
+    if d.unit != "mm":
+        return f"{value:.6g}"
+    scale = 1.0 if d.fixed else exact(group.id_data.mu_unit.scale)
+    return scene_units.length(bpy.context.scene, value * scale, digits=6)
 
 
 TRUE = "_true"
@@ -96,18 +107,6 @@ def field(group, d: Description) -> str:
         return d.name
     scaled = not d.fixed and group.id_data.mu_unit.scale != 1.0
     return d.name + TRUE if scaled or not scene_units.in_millimetres(bpy.context.scene) else d.name
-
-
-def tied(given: dict[str, Any]) -> dict[str, Any]:
-    """Parameters with the one that a rule ties to one of them: the bladder is two cells wide.
-
-    Nodes meet the bladder apices only so. Where both are given, the cell drives the bladder.
-    """
-    if "cell_mm" in given:
-        return {**given, "bladder_diameter_mm": 2.0 * given["cell_mm"]}
-    if "bladder_diameter_mm" in given:
-        return {**given, "cell_mm": 0.5 * given["bladder_diameter_mm"]}
-    return given
 
 
 def _tied_update(name: str, changed):

@@ -24,9 +24,8 @@ from ..path import ranking
 from ..preview import materials, nodes, skeletons
 from ..preview.nodes import unit as unit_group
 from ..shared import displays, scene_units, updates
-from ..shared.texts import error_text
 from ..steps import state as stack
-from . import drawing
+from . import broken, drawing
 from .properties import from_unit, shape_hash, to_unit
 
 SOLID = "solid"
@@ -130,9 +129,10 @@ def rebuild(root: Any) -> bool:
     try:
         unit = to_unit(props)
         _draw(root, unit)
+        broken.keep(root, unit)
         trouble = ""
     except MuError as error:
-        trouble = error_text(error)
+        trouble = broken.words(error)
     if props.trouble != trouble:
         props.trouble = trouble
     props.built = _fingerprint(root)

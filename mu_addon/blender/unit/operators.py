@@ -8,11 +8,13 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ...design.parameters import Unit
 from ...design.quantity import describe
+from ...errors import InputError
 from ..scene import landing
 from ..shared import scene_units
 from ..shared.operators import NO_UNIT, UnitOperator, reports_errors
 from . import object as unit_object
 from . import presets
+from .broken import broken
 from .fields import exact, tooltip
 
 _SCALE = next(d for d in describe(Unit) if d.name == "scale")
@@ -105,6 +107,40 @@ class MU_OT_rebuild(UnitOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class MU_OT_fit(UnitOperator, bpy.types.Operator):
+    """Set a parameter to the value nearest to its present one that keeps every design rule"""
+
+    bl_idname = "mu.fit"
+    bl_label = "Use the Value That Fits"
+    bl_options = {"REGISTER", "UNDO"}
+
+    section: StringProperty(name="Section", description="Section of the parameter: chambers, lattice ...")
+    name: StringProperty(name="Parameter", description="Name of the parameter")
+    why: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    @classmethod
+    def description(cls, context, properties):
+        """The rule in full, which the head of the panel may have no room for."""
+        return f"{properties.why}\n\nSet the nearest value that fits" if properties.why else cls.__doc__
+
+    @reports_errors
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        found = broken(root)
+        value = None if found is None else found.fits.get((self.section, self.name))
+        if value is None:
+            raise InputError(
+                f"{self.section}.{self.name} breaks no rule that another value of it would keep",
+                "design",
+                "change another field",
+            )
+        setattr(getattr(root.mu_unit, self.section), self.name, value)
+        if not unit_object.rebuild(root):
+            self.report({"ERROR"}, root.mu_unit.trouble)
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
 class MU_OT_delete(UnitOperator, bpy.types.Operator):
     """Delete the unit with all that shows its results; its study folder stays"""
 
@@ -148,7 +184,7 @@ class MU_OT_select(UnitOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (MU_OT_add, MU_OT_rebuild, MU_OT_delete, MU_OT_millimetres, MU_OT_select)
+CLASSES = (MU_OT_add, MU_OT_rebuild, MU_OT_fit, MU_OT_delete, MU_OT_millimetres, MU_OT_select)
 
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -7,7 +7,8 @@ import bpy
 from ..body import panel as body_panel
 from ..gripper import object as gripper_object
 from ..shared.operators import NO_UNIT, linked
-from ..shared.panels import TabPanel, UnitPanel, alert, parameters, wrapped
+from ..shared.panels import CHARACTERS, TabPanel, UnitPanel, parameters, wrapped
+from . import figures
 from . import object as unit_object
 
 
@@ -45,9 +46,19 @@ class MU_PT_unit(TabPanel, bpy.types.Panel):
         row = layout.row()
         row.enabled = root.mu_unit.show != unit_object.SOLID
         row.prop(root.mu_unit, "cut", icon="MOD_BOOLEAN", toggle=True)
-        if root.mu_unit.trouble:
-            alert(layout, root.mu_unit.trouble)
-            wrapped(layout, "The preview shows the last valid design", "INFO")
+        _head(layout, root)
+
+
+def _head(layout, root) -> None:
+    """What the unit comes to or, in red, the rule that it breaks: as many lines either way."""
+    lines, wrong = figures.lines(root, CHARACTERS + 4)
+    box = layout.box()
+    box.alert = wrong
+    column = box.column(align=True)
+    column.scale_y = 0.85
+    for number, line in enumerate(lines):
+        icon = ("ERROR" if wrong else "DRIVER_DISTANCE") if number == 0 else "BLANK1"
+        column.label(text=line, icon=icon)
 
 
 class MU_PT_design(UnitPanel, bpy.types.Panel):
@@ -59,7 +70,7 @@ class MU_PT_design(UnitPanel, bpy.types.Panel):
 
     def show(self, layout, context, root):
         layout.prop(root.mu_unit, "scale")
-        parameters(layout, root.mu_unit, "design")
+        parameters(layout, root, "design")
 
 
 class MU_PT_lattice(UnitPanel, bpy.types.Panel):
@@ -70,7 +81,7 @@ class MU_PT_lattice(UnitPanel, bpy.types.Panel):
 
     def show(self, layout, context, root):
         envelope = root.mu_unit.envelope
-        parameters(layout, root.mu_unit, "lattice")
+        parameters(layout, root, "lattice")
         if envelope is not None:
             wrapped(layout, f"The lattice fills {envelope.name}; counts of cells are not used", "INFO")
         body_panel.draw(layout, root)

@@ -5,7 +5,9 @@ import json
 import bpy
 import numpy as np
 
+from mu_addon.blender.unit import figures
 from mu_addon.blender.unit import object as unit_object
+from mu_addon.blender.unit.broken import broken
 from mu_addon.blender.unit.fields import field
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.anchors import window
@@ -48,7 +50,7 @@ def test_operators_without_a_unit_say_what_is_missing():
         name = cls.bl_idname.split(".")[1]
         operator = getattr(bpy.ops.mu, name)
         free = {"add", "millimetres", "preset_remove", "assets", "assets_remove"}
-        free |= {"sample", "sensor_ports", "gripper_add"}
+        free |= {"sample", "sensor_ports", "gripper_add", "job_cancel", "job_dismiss"}
         if name in free:
             assert operator.poll()
         elif name.startswith("track"):
@@ -75,7 +77,15 @@ def test_what_changes_the_file_is_one_undo_step():
     outside |= {"sensor_ports", "sensor_connect", "sensor_disconnect", "sensor_pause"}
     outside |= {"sensor_mark", "sensor_freeze", "sensor_sweep", "sensor_hold"}
     outside |= {"sensor_calibrate", "sensor_cancel", "sensor_dismiss", "sensor_zero"}
-    outside |= {"sensor_open", "grasp", "grasp_cancel", "grasp_dismiss", "grasp_open"}
+    outside |= {
+        "job_cancel",
+        "job_dismiss",
+        "sensor_open",
+        "grasp",
+        "grasp_cancel",
+        "grasp_dismiss",
+        "grasp_open",
+    }
     for cls in operators():
         assert ("UNDO" in cls.bl_options) == (cls.bl_idname.split(".")[1] not in outside), cls
         assert "REGISTER" in cls.bl_options
@@ -103,6 +113,55 @@ def test_fields_show_true_lengths_and_tied_ones_change_as_one():
         assert np.isclose(getattr(core.chambers, name), value, rtol=1e-7)
     assert bpy.ops.mu.profile(bladder_diameter_mm=26.0) == {"FINISHED"}
     assert to_unit(root.mu_unit).chambers.cell_mm == 13.0
+
+
+def test_a_broken_rule_stands_in_its_field_with_a_value_that_fits():
+    root = add()
+    chambers = root.mu_unit.chambers
+    assert broken(root) is None
+    for scale, shown in ((1.0, "a wall of 3 mm"), (2.0, "a wall of 6 mm")):
+        root.mu_unit.scale = scale
+        chambers.wall_mm = 3.0
+        found = broken(root)
+        assert shown in found.text
+        assert "_mm" not in found.text, "the panel's words, not the file's"
+        assert found.fits == {("chambers", "wall_mm"): 1.874}
+        lines, wrong = figures.lines(root, 38)
+        assert wrong
+        assert len(lines) == figures.LINES
+        assert shown in " ".join(lines)
+        assert bpy.ops.mu.fit(section="chambers", name="wall_mm") == {"FINISHED"}
+        assert root.mu_unit.trouble == ""
+        assert to_unit(root.mu_unit).chambers.wall_mm == 1.874
+        chambers.wall_mm = 0.9
+    # What was changed is to blame, too, where the rule names another field.
+    root.mu_unit.waveguide.well_pitch_mm = 0.5
+    assert set(broken(root).fits) == {("waveguide", "well_width_mm"), ("waveguide", "well_pitch_mm")}
+    assert bpy.ops.mu.fit(section="waveguide", name="well_pitch_mm") == {"FINISHED"}
+    assert to_unit(root.mu_unit).waveguide.well_pitch_mm == 1.001
+    assert "breaks no rule" in refused(bpy.ops.mu.fit, section="waveguide", name="well_pitch_mm")
+
+
+def test_the_head_says_what_a_unit_comes_to():
+    root = add()
+    lines, wrong = figures.lines(root, 38)
+    assert not wrong
+    assert lines[:3] == [
+        "Size 37.5 mm x 50 mm x 81 mm",
+        "Resin about 19.1 g, 19 ml",
+        "Prints upright in about 3 h 40 min",
+    ]
+    assert "assumed" in lines[3]
+    root.mu_unit.scale = 2.0
+    assert figures.lines(root, 38)[0][0] == "Size 75 mm x 100 mm x 162 mm"
+    bpy.context.scene.unit_settings.system = "IMPERIAL"
+    assert figures.lines(root, 38)[0][0] == "Size 2.953 in x 3.937 in x 6.378 in"
+    bpy.ops.mu.millimetres()
+    root.mu_unit.scale = 1.0
+    bpy.ops.mu.solid()
+    volume = json.loads(root.mu_unit.solid["mu_gates"])["volume_mm3"]
+    assert f"{volume / 1000:.3g} ml" in figures.lines(root, 38)[0][1]
+    assert "about" not in figures.lines(root, 38)[0][1]
 
 
 def test_path_select_and_stale_names():
