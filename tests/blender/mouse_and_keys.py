@@ -47,7 +47,7 @@ def session():
     # The slider, with the panel as it first opens; a few rows up and down where fonts differ.
     region = parts()[2]
     for rows in (0, -1, 1, -2, 2):
-        move(region.x + 175, region.y + region.height - 312 + 20 * rows)
+        move(region.x + 175, region.y + region.height - 400 + 20 * rows)
         yield 1.5
         event("LEFTMOUSE", "PRESS")
         yield 1.0

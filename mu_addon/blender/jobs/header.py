@@ -13,7 +13,7 @@ from ..shared.operators import reports_errors
 from . import start_child
 from .panel import whole
 
-WIDTH = 15
+WIDTH = 14
 """Width of the bar in the interface's units: what it says changes, its place does not."""
 
 
@@ -88,13 +88,13 @@ def _running(layout, keys: list[str]) -> None:
     # First in a row of fixed width: it stays under the mouse whatever the bar says.
     row.operator("mu.job_cancel", text="", icon="CANCEL").key = keys[0]
     more = row.row(align=True)
-    more.ui_units_x = 4.5
+    more.ui_units_x = 3
     waiting = sum(start_child.child_of(key).state == WAITING for key in keys)
     more.menu("MU_MT_jobs", text=f"+{waiting}" if waiting else "Jobs")
     fraction, text = whole(start_child.child_of(keys[0]))
     bar = row.row(align=True)
     bar.ui_units_x = WIDTH
-    bar.progress(factor=fraction, text=f"{fraction:.0%} {start_child.title_of(keys[0])}, {text}")
+    bar.progress(factor=fraction, text=f"{fraction:.0%}, {text}: {start_child.title_of(keys[0])}")
 
 
 def _notice(layout, key: str) -> None:

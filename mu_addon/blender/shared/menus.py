@@ -75,6 +75,7 @@ class MU_MT_more(bpy.types.Menu):
         layout.operator("mu.sample", icon="SCENE_DATA")
         layout.operator("mu.gripper_add", text="Gripper of This Unit", icon="MOD_MIRROR").of_unit = True
         layout.operator_menu_enum("mu.skin", "group", text="Skin with Nodes", icon="GEOMETRY_NODES")
+        layout.operator("mu.millimetres", icon="DRIVER_DISTANCE")
         layout.separator()
         layout.operator("mu.assets", icon="ASSET_MANAGER")
         layout.operator("mu.assets_remove")

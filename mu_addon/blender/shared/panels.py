@@ -96,7 +96,6 @@ def parameter(column, root, section: str, d: Description) -> None:
     if value is not None:
         right = row.row(align=True)
         right.alert = False
-        right.scale_x = 1.5
         fit = right.operator("mu.fit", text=shown_value(group, d, value))
         fit.section, fit.name, fit.why = section, d.name, found.text
 

@@ -51,7 +51,7 @@ class MU_PT_unit(TabPanel, bpy.types.Panel):
 
 def _head(layout, root) -> None:
     """What the unit comes to or, in red, the rule that it breaks: as many lines either way."""
-    lines, wrong = figures.lines(root, CHARACTERS + 4)
+    lines, wrong = figures.lines(root, CHARACTERS + 2)
     box = layout.box()
     box.alert = wrong
     column = box.column(align=True)

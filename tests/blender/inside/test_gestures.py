@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
+from mu_addon.blender.gripper import object as gripper_object
 from mu_addon.blender.jobs import start_child
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate.job import SIMULATION
@@ -397,3 +398,40 @@ def test_two_units_keep_apart_through_save_and_reopen(tmp_path):
     assert len(belonging(first)) == 11
     assert belonging(second) == [second]
     assert to_unit(first.mu_unit) == load_preset("mu-0.75x")
+
+
+def test_a_preset_keeps_a_name_of_the_users():
+    root = add()
+    bpy.ops.mu.preset_load(name="mu-0.75x")
+    assert root.name == "mu-0.75x"
+    root.name = "Thumb"
+    bpy.ops.mu.preset_load(name="mu-1.5x")
+    assert root.name == "Thumb"
+    assert root.mu_unit.scale == 1.5
+
+
+def test_a_gripper_is_one_thing_too(tmp_path):
+    bpy.ops.mu.millimetres()
+    bpy.ops.mu.gripper_add()
+    root = bpy.context.object
+    root.mu_gripper.folder = str(tmp_path)
+    assert root.type == "MESH"
+    assert [child.get("mu_grip") for child in root.children] == ["cube"]
+    select(root)
+    bpy.ops.object.duplicate(linked=True)
+    bpy.context.view_layer.update()
+    (copy,) = (other for other in gripper_object.roots() if other != root)
+    assert copy.mu_gripper.uuid != root.mu_gripper.uuid
+    assert copy.mu_gripper.folder == ""
+    assert [child.get("mu_grip") for child in copy.children] == ["cube"]
+    wide = size(root)[1]
+    copy.mu_gripper.fingers.gap_mm += 10.0
+    assert np.isclose(size(root)[1], wide)
+    assert size(copy)[1] > wide + 5.0
+    bpy.data.objects.remove(copy.children[0])
+    bpy.context.view_layer.update()
+    assert len(copy.children) == 1, "the cube comes back"
+    select(root)
+    bpy.ops.object.delete()
+    bpy.context.view_layer.update()
+    assert {o.name for o in bpy.data.objects} == {copy.name, copy.children[0].name}

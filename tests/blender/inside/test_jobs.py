@@ -43,7 +43,8 @@ def test_one_runs_the_others_wait_and_each_ends_with_a_notice(monkeypatch):
     watch(lambda: one.progress)
     assert (one.state, two.state) == ("running", "waiting")
     assert SIMULATION.is_running(second)
-    assert "mu-1.0x: simulation, Model A (3 of 8)" in said()
+    assert "Model A (3 of 8)" in said()
+    assert "left: mu-1.0x: simulation" in said()
     assert "+1" in said()
     assert bpy.ops.mu.job_cancel() == {"FINISHED"}
     assert "stopping" in said()
