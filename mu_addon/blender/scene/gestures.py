@@ -37,13 +37,16 @@ def look() -> None:
     _looking = True
     try:
         roots, shown = [], []
+        # In a scene of thousands of objects most are neither: what tells them is asked for first.
         for obj in bpy.data.objects:
-            if not displays.editable(obj):
+            if obj.get(displays.OWNER):
+                found = shown
+            elif obj.type == "MESH" and displays.uuid_of(obj):
+                found = roots
+            else:
                 continue
-            if displays.uuid_of(obj):
-                roots.append(obj)
-            elif obj.get(displays.OWNER):
-                shown.append(obj)
+            if displays.editable(obj):
+                found.append(obj)
         copies = _separate(roots)
         _follow(shown)
         for root in roots:
