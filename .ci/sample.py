@@ -22,6 +22,7 @@ def main(arguments: list[str]) -> int:
         return 2
     bpy.ops.wm.read_factory_settings(use_empty=True)
     mu_addon.register()
+    bpy.ops.mu.millimetres()
     bpy.ops.mu.sample()
     bpy.ops.wm.save_as_mainfile(filepath=str(Path(arguments[0]).resolve()), compress=True)
     mu_addon.unregister()

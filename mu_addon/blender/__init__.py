@@ -24,6 +24,7 @@ _MODULES = (
     "node_tree.classes",
     "node_tree.state",
     "gripper.object",
+    "scene.gestures",
     "results.thumbnails",
     # Operators.
     "unit.operators",
@@ -58,6 +59,7 @@ _MODULES = (
     "node_tree.panel",
     "results.legend",
     "sensor.plot",
+    "jobs.header",
     "shared.menus",
 )
 """Modules with something to register, in the order they need each other."""

@@ -5,9 +5,17 @@ from __future__ import annotations
 import math
 from typing import NoReturn
 
+import attrs
+
 from ..errors import InputError
 from .dimensions import Dimensions
 from .printed import as_printed
+
+
+class RuleError(InputError):
+    """A broken co-design rule; true_size: the same with lengths as they are at the unit's scale, or None."""
+
+    true_size: RuleError | None = None
 
 
 def check(d: Dimensions, allow_symmetric: bool = False) -> None:
@@ -16,6 +24,19 @@ def check(d: Dimensions, allow_symmetric: bool = False) -> None:
     The message names the rule and a value that fits; lengths that scale are given in mm at scale 1.
     allow_symmetric: accept as many cells on -y as on +y.
     """
+    try:
+        _check(d, allow_symmetric)
+    except RuleError as error:
+        if d.scale != 1.0:
+            try:
+                # The same rule, since rules are of shares: but its lengths are told as they are.
+                _check(attrs.evolve(d, scale=1.0), allow_symmetric)
+            except RuleError as true:
+                error.true_size = true
+        raise
+
+
+def _check(d: Dimensions, allow_symmetric: bool) -> None:
     _node_apex_alignment(d)
     _profile(d)
     _sagittal_symmetry(d)
@@ -84,7 +105,7 @@ def _printed_breach(d: Dimensions, offset_xy: float, offset_z: float) -> tuple[s
 
 
 def _refuse(rule: str, what: str, where: str, remedy: str) -> NoReturn:
-    raise InputError(f"{what} (rule: {rule})", where, remedy)
+    raise RuleError(f"{what} (rule: {rule})", where, remedy)
 
 
 def _node_apex_alignment(d: Dimensions) -> None:

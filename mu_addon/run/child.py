@@ -17,17 +17,19 @@ from typing import Any
 
 from ..errors import MuError
 from ..files import make_folder, output_error
+from .outlook import Outlook, Plan
 
 PATIENCE_S = 20.0
 """Seconds that a child which was asked to stop may take to write what it has, before it is killed."""
 MESSAGES, ERRORS = "messages.ndjson", "stderr.txt"
-RUNNING, DONE, FAILED, CANCELLED = "running", "done", "failed", "cancelled"
+WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "failed", "cancelled"
 
 
 class Child:
-    """One process and what it has said; `state` is running, done, failed or cancelled.
+    """One process and what it has said; `state` is waiting, running, done, failed or cancelled.
 
-    progress: its latest such message; warnings: texts; result, error: its last message, whichever.
+    progress: its latest such message; outlook: the whole of the run; warnings: texts; result, error: its last
+    message, whichever.
     """
 
     def __init__(
@@ -36,15 +38,18 @@ class Child:
         folder: Path,
         environment: Mapping[str, str],
         ends_with_parent: bool = False,
+        plan: Plan = (),
+        waits: bool = False,
     ) -> None:
         """Start `command`, its words kept in `folder`: messages.ndjson and stderr.txt. Raises MuError.
 
+        plan: its stages as they are expected; waits: `begin` starts it, and not this.
         ends_with_parent: hold the child's standard input open, by whose end `processes.end_with_input` knows
         that this process is gone.
         """
-        make_folder(folder)
         self.folder = folder
-        self.state = RUNNING
+        self.state = WAITING
+        self.outlook = Outlook(plan)
         self.progress: dict[str, Any] = {}
         self.warnings: list[str] = []
         self.result: dict[str, Any] | None = None
@@ -54,6 +59,16 @@ class Child:
         self.garbage = 0
         self._asked: float | None = None
         self._rest = b""
+        self._line = list(command), dict(environment), ends_with_parent
+        if not waits:
+            self.begin()
+
+    def begin(self) -> None:
+        """Start the process of a child that waits. Raises MuError."""
+        command, environment, ends_with_parent = self._line
+        folder = self.folder
+        make_folder(folder)
+        self.started = time.monotonic()
         try:
             out, err = (folder / MESSAGES).open("wb"), (folder / ERRORS).open("wb")
             self._stream = (folder / MESSAGES).open("rb")
@@ -62,11 +77,11 @@ class Child:
         with out, err:
             try:
                 self._process = subprocess.Popen(
-                    list(command),
+                    command,
                     stdin=subprocess.PIPE if ends_with_parent else subprocess.DEVNULL,
                     stdout=out,
                     stderr=err,
-                    env=dict(environment),
+                    env=environment,
                     start_new_session=True,
                 )
             except OSError as error:
@@ -76,6 +91,7 @@ class Child:
                     str(command[0]),
                     "reinstall mu_addon; in Blender, the extension built for this Blender and system",
                 ) from error
+        self.state = RUNNING
 
     @property
     def pid(self) -> int:
@@ -104,6 +120,8 @@ class Child:
 
     def cancel(self) -> None:
         """Ask it to stop; it keeps what it has finished. One that does not answer is killed later."""
+        if self.state == WAITING:
+            self.state = CANCELLED
         if self.state == RUNNING and self._asked is None:
             self._asked = time.monotonic()
             self._process.terminate()
@@ -118,6 +136,8 @@ class Child:
 
     def kill(self) -> None:
         """End it at once."""
+        if self.state == WAITING:
+            self.state = CANCELLED
         if self.state == RUNNING:
             self._process.kill()
             self._end(self._process.wait())
@@ -139,6 +159,7 @@ class Child:
         kind = message.get("type") if isinstance(message, dict) else None
         if kind == "progress":
             self.progress = message
+            self.outlook.tell(message)
         elif kind == "warning":
             self.warnings.append(str(message.get("what", "")))
         elif kind == "result":

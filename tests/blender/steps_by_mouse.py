@@ -9,6 +9,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from simulated import called, event, key, module, move, parts, place, run
 
 unit_object, stack = module("blender.unit.object"), module("blender.steps.state")
+drawing = module("blender.unit.drawing")
 
 
 def unit():
@@ -16,7 +17,8 @@ def unit():
 
 
 def shown():
-    return {child["mu_part"] for child in unit_object.roots()[0].children if child.get("mu_part")}
+    numbers = {item.value for item in unit_object.roots()[0].data.attributes["mu_part"].data}
+    return {drawing.PARTS[number] for number in numbers}
 
 
 def session():

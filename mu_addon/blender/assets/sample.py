@@ -6,8 +6,10 @@ import math
 from typing import Any
 
 import bpy
+from mathutils import Vector
 
 from ..preview import nodes
+from ..shared import scene_units
 from ..shared.compat import set_modifier_input
 from ..unit import object as unit_object
 
@@ -20,7 +22,7 @@ def build(context: Any) -> list[Any]:
     roots = []
     try:
         for number in range(3):
-            context.scene.cursor.location = cursor + _beside(number)
+            context.scene.cursor.location = cursor + _beside(context, number)
             bpy.ops.mu.add(preset="mu-1.0x", frame=False)
             roots.append(unit_object.active_root(context))
     finally:
@@ -40,15 +42,13 @@ def build(context: Any) -> list[Any]:
     context.view_layer.objects.active = bodied
     context.view_layer.update()
     bpy.ops.mu.body()
-    _curve(context, cursor + _beside(3))
+    _curve(context, cursor + _beside(context, 3))
     context.view_layer.objects.active = whole
     return roots
 
 
-def _beside(number: int) -> Any:
-    from mathutils import Vector
-
-    return Vector((0.0, APART_MM * number, 0.0))
+def _beside(context: Any, number: int) -> Any:
+    return Vector((0.0, APART_MM * number * scene_units.mm(context.scene), 0.0))
 
 
 def _barrel(context: Any, root: Any) -> Any:
@@ -70,7 +70,7 @@ def _barrel(context: Any, root: Any) -> Any:
     mesh = bpy.data.meshes.new("Barrel")
     mesh.from_pydata(vertices, [], faces)
     obj = bpy.data.objects.new("Barrel", mesh)
-    obj.location = root.location
+    obj.location, obj.scale = root.location, root.scale
     context.collection.objects.link(obj)
     return obj
 
@@ -87,7 +87,7 @@ def _curve(context: Any, at: Any) -> Any:
         point.co = place
         point.handle_left_type = point.handle_right_type = "AUTO"
     obj = bpy.data.objects.new("Waveguide on a Curve", curve)
-    obj.location = at
+    obj.location, obj.scale = at, (scene_units.mm(context.scene),) * 3
     context.collection.objects.link(obj)
     modifier = nodes.skin(obj, "MU Waveguide")
     for name, value in {"Section": 3.0, "Pitch": 6.0, "Well Width": 2.0, "Well Depth": 1.2}.items():

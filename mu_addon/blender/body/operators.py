@@ -85,7 +85,8 @@ class MU_OT_body_remove(UnitOperator, bpy.types.Operator):
 
     def execute(self, context):
         root = unit_object.active_root(context)
-        unit_object.remove_bodies(root)
+        unit_object.remove_envelope(root)
+        unit_object.mark(root, [])
         unit_object.rebuild(root)
         return {"FINISHED"}
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from ..unit import object as unit_object
-from . import state as bodies
+from ..unit import drawing
 
 
 def draw(layout, root) -> None:
@@ -14,5 +13,5 @@ def draw(layout, root) -> None:
         row = body.row(align=True)
         row.operator("mu.body_check", icon="VIEWZOOM")
         row.operator("mu.body", icon="MESH_MONKEY")
-        if any(unit_object.part(root, name) for name in bodies.PARTS):
+        if root.mu_unit.envelope is not None or drawing.beside(root, drawing.FLAWS) is not None:
             body.operator("mu.body_remove", icon="X")

@@ -13,11 +13,6 @@ from ...design.dimensions import Dimensions
 from ...design.parameters import Unit
 from ...errors import InputError
 
-ENVELOPE = "envelope"
-FLAWS = "flaws"
-PARTS = (ENVELOPE, FLAWS)
-"""Parts of a unit that are the user's, and that no rebuild removes."""
-
 _kept: dict[tuple[str, str], Body] = {}
 
 
@@ -44,29 +39,25 @@ def examined(body: Body, d: Dimensions) -> list[Flaw]:
 
 def envelope_in(root: Any, unit: Unit) -> Body | None:
     """The envelope that the user gave a unit, cut to its length, or None; raises InputError."""
-    obj = _part(root, ENVELOPE)
-    if obj is None:
+    mesh = root.mu_unit.envelope
+    if mesh is None:
         return None
-    vertices, triangles = _arrays(obj.data)
+    vertices, triangles = _arrays(mesh)
     digest = hashlib.sha256(vertices.tobytes() + triangles.tobytes()).hexdigest()
     key = digest, repr((unit.scale, unit.chambers))
     if key not in _kept:
         if len(_kept) > 16:
             _kept.clear()
-        _kept[key] = envelope(body_of(vertices, triangles, obj.name), unit.dimensions)
+        _kept[key] = envelope(body_of(vertices, triangles, mesh.name), unit.dimensions)
     return _kept[key]
 
 
 def fingerprint(root: Any) -> str:
     """Text that differs whenever the user's envelope does."""
-    obj = _part(root, ENVELOPE)
-    if obj is None:
+    mesh = root.mu_unit.envelope
+    if mesh is None:
         return ""
-    return hashlib.sha256(b"".join(array.tobytes() for array in _arrays(obj.data))).hexdigest()
-
-
-def _part(root: Any, name: str) -> Any:
-    return next((child for child in root.children if child.get("mu_part") == name), None)
+    return hashlib.sha256(b"".join(array.tobytes() for array in _arrays(mesh))).hexdigest()
 
 
 def _arrays(mesh: Any) -> tuple[Any, Any]:

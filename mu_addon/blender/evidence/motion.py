@@ -14,8 +14,9 @@ import bpy
 import numpy as np
 
 from ..preview import materials
+from ..shared import displays
 from ..shared.compat import set_curve
-from ..unit.object import EVIDENCE, remove_part
+from ..shared.displays import EVIDENCE
 from ..unit.properties import to_unit
 from .state import Course
 
@@ -44,10 +45,7 @@ def shown(root: Any) -> str:
 def hide(root: Any) -> None:
     """Take the measured motion out of the scene."""
     for part in parts(root):
-        action = part.animation_data.action if part.animation_data else None
-        remove_part(part)
-        if action is not None and not action.users:
-            bpy.data.actions.remove(action)
+        displays.remove(part)
 
 
 def show(root: Any, name: str, course: Course, scene: Any) -> None:
@@ -145,11 +143,7 @@ def _part(frame: Any, mark: str, title: str, vertices: Any, faces: Any, colour: 
 
 
 def _linked(parent: Any, mark: str, title: str, mesh: Any) -> Any:
-    part = bpy.data.objects.new(title, mesh)
-    part[EVIDENCE] = mark
-    for collection in parent.users_collection:
-        collection.objects.link(part)
-    part.parent = parent
+    part = displays.add(displays.root_above(parent), EVIDENCE, mark, mesh, title, parent)
     part.hide_select = True
     return part
 

@@ -25,7 +25,7 @@ from ..shared.registration import property_group_factory
 from ..shared.texts import error_text
 from ..simulate import effects
 from ..simulate import study_folder as studies
-from ..unit.properties import BESIDE_BLEND_FILE, to_unit
+from ..unit.properties import BESIDE_BLEND_FILE, shape_hash, to_unit
 
 FOLDER = "evidence"
 """Folder of the diagnosis in the unit's study folder."""
@@ -89,7 +89,7 @@ def folder_of(root: Any) -> Path:
     return studies.folder_of(root) / FOLDER
 
 
-DIAGNOSIS = JobKind(FOLDER, lambda root: root.mu_unit.uuid, folder_of)
+DIAGNOSIS = JobKind(FOLDER, lambda root: root.mu_unit.uuid, folder_of, "diagnosis", heavy=True)
 
 _data: FileCache[MeasuredFolder] = FileCache()
 _runs: FileCache[tuple[dict[str, Any], dict[str, Any], dict[str, Any], str]] = FileCache()
@@ -136,7 +136,7 @@ def _read_run(
     except (OSError, ValueError, MuError):
         named = {}
     try:
-        of = read_unit(unit).hash() if unit.is_file() else ""
+        of = shape_hash(read_unit(unit)) if unit.is_file() else ""
     except MuError:
         of = "unreadable"
     return _json(summary), _json(verdict), named, of
@@ -166,7 +166,7 @@ def _stale(root: Any, inputs: dict[str, Any], unit: str) -> str:
     if any(inputs.get(key) != value for key, value in found.digest.items()):
         return "it belongs to other measured data"
     try:
-        now = to_unit(root.mu_unit).hash()
+        now = shape_hash(to_unit(root.mu_unit))
     except MuError:
         now = ""
     # Without a unit's own file the verdict does not rest on the unit.
@@ -197,7 +197,7 @@ def applied(root: Any) -> str:
 def _having(root: Any) -> str:
     """Hash of the unit, and of the effects beside its parameters; raises InputError."""
     text = root.mu_unit.study.effects
-    return to_unit(root.mu_unit).hash() + (hashlib.sha256(text.encode()).hexdigest() if text else "")
+    return shape_hash(to_unit(root.mu_unit)) + (hashlib.sha256(text.encode()).hexdigest() if text else "")
 
 
 def _model(root: Any) -> str:

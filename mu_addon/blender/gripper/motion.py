@@ -4,26 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
-import bpy
 import numpy as np
 
 from ...errors import InputError
 from ...files import read_npz
 from ..preview import materials, skeletons
 from ..results import motion as motion_parts
+from ..shared import displays
 from ..shared.compat import set_curve
-from ..unit import object as unit_object
 from . import object as gripper_object
 from . import state as grasps
-
-MOVING = "moving:"
-"""What the names of the parts that play the grasp begin with."""
 
 
 def parts(root: Any) -> list[Any]:
     """Parts that play the grasp: left finger, right finger, cube."""
-    found = (gripper_object.part(root, MOVING + name) for name in (*gripper_object.SIDES, "cube"))
-    return [obj for obj in found if obj is not None]
+    names = (gripper_object.MOVING + name for name in (*gripper_object.SIDES, "cube"))
+    return [obj for obj in (gripper_object.part(root, name) for name in names) if obj is not None]
 
 
 def show(root: Any, scene: Any) -> None:
@@ -38,9 +34,7 @@ def show(root: Any, scene: Any) -> None:
     rate = scene.render.fps / scene.render.fps_base
     time = data["time_s"]
     for side, rest in zip(gripper_object.SIDES, data["rest_mm"], strict=True):
-        obj = gripper_object.new_part(
-            root, root, MOVING + side, bpy.data.meshes.new(f"{side.capitalize()} Finger")
-        )
+        obj = gripper_object.new_part(root, gripper_object.MOVING + side)
         slots = np.where(data["membrane"], 0, 1)
         skeleton = skeletons.Skeleton(rest.astype(float), faces=(data["triangles"],), slots=slots)
         skeletons.write(obj.data, skeleton)
@@ -48,7 +42,7 @@ def show(root: Any, scene: Any) -> None:
         file = found.folder / f"{side}.pc2"
         motion_parts.play(obj, file, motion_parts.step_of(file))
     half = np.full(3, float(data["cube_side_mm"]) / 2.0)
-    cube = gripper_object.put_box(root, MOVING + "cube", -half, half, "MU Obstacle")
+    cube = gripper_object.put_box(root, gripper_object.MOVING + "cube", -half, half, "MU Obstacle")
     frames = scene.frame_start + (time - time[0]) * rate
     for axis in range(3):
         set_curve(cube, "location", axis, frames, data["cube_mm"][:, axis])
@@ -59,11 +53,13 @@ def show(root: Any, scene: Any) -> None:
 def hide(root: Any) -> None:
     """Take the grasp out of the scene; its files stay."""
     for obj in parts(root):
-        unit_object.remove_part(obj)
+        displays.remove(obj)
     _hide_preview(root, False)
 
 
 def _hide_preview(root: Any, hidden: bool) -> None:
-    for child in root.children_recursive:
-        if child.get(gripper_object.PART, "").startswith(("finger:", "cube")):
-            child.hide_viewport = child.hide_render = hidden
+    """Draw the gripper without what the grasp shows in its place, or whole again."""
+    cube = gripper_object.part(root, "cube")
+    if cube is not None:
+        cube.hide_viewport = cube.hide_render = hidden
+    gripper_object.rebuild(root)

@@ -1,6 +1,6 @@
-"""A gripper in the scene: a root object with its parameters, two fingers, plate and cube.
+"""A gripper in the scene: one mesh object that holds its parameters, with both fingers and the plate.
 
-Its parts are children, known by the custom property `mu_grip`; frame and places are the core's.
+The cube is a child, known by the custom property `mu_grip`; frame and places are the core's.
 """
 
 from __future__ import annotations
@@ -10,21 +10,22 @@ from typing import Any
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 
 from ...design.gripper import Gripper
 from ...design.steps import StepInputs
 from ...errors import MuError
 from ..preview import materials, skeletons
-from ..shared import updates
+from ..shared import displays, updates
 from ..shared.texts import error_text
-from ..steps import state as stack
+from ..unit import drawing
 from ..unit import object as unit_object
-from ..unit.properties import exact
+from ..unit.fields import exact
 from .properties import PARAMETERS_CHANGED, from_gripper, to_gripper
 
-PART = "mu_grip"
-"""Marks the parts: `finger:SIDE`, `finger:SIDE:NAME`, `plate`, `cube`, `moving:SIDE`, `moving:cube`."""
+PART = displays.GRIPPER
+"""Marks the parts beside the gripper's own mesh: `cube`, and what plays the grasp."""
+MOVING = "moving:"
+"""What the names of the parts that play the grasp begin with: `moving:SIDE`, `moving:cube`."""
 SIDES = ("left", "right")
 SHOWN = ("membranes", "struts", "wells")
 """Steps of a finger's unit that are drawn."""
@@ -34,8 +35,8 @@ without the solver."""
 
 
 def roots() -> list[Any]:
-    """Root objects of all grippers in the file."""
-    return [o for o in bpy.data.objects if o.mu_gripper.uuid]
+    """All grippers of this file; those of linked libraries are none of them."""
+    return [o for o in bpy.data.objects if o.mu_gripper.uuid and displays.editable(o)]
 
 
 def active(context: Any) -> Any | None:
@@ -53,12 +54,12 @@ def active(context: Any) -> Any | None:
 
 def part(root: Any, name: str) -> Any | None:
     """The gripper's part of that name, or None."""
-    return next((child for child in root.children_recursive if child.get(PART) == name), None)
+    return next((child for child in root.children if child.get(PART) == name), None)
 
 
 def create(context: Any, gripper: Gripper) -> Any:
     """A new gripper at the 3D cursor of the scene, with its preview, selected and active."""
-    root = unit_object.new_root(context, "Monolithic Gripper", gripper.unit.dimensions.cell)
+    root = unit_object.new_root(context, gripper.name)
     with updates.paused():
         root.mu_gripper.uuid = uuid.uuid4().hex
         from_gripper(root.mu_gripper, gripper)
@@ -68,15 +69,21 @@ def create(context: Any, gripper: Gripper) -> Any:
 
 
 def delete(root: Any) -> None:
-    """Remove a gripper with all its parts."""
+    """Remove a gripper with all that shows it; children of the user's own stay."""
+    mesh = root.data
     for child in root.children_recursive:
-        unit_object.remove_part(child)
+        if child.get(displays.OWNER) == root.mu_gripper.uuid:
+            displays.remove(child)
     bpy.data.objects.remove(root)
+    if not mesh.users:
+        bpy.data.meshes.remove(mesh)
 
 
 def rebuild(root: Any) -> bool:
     """Draw the gripper from its parameters; where they break a rule the last good one stays."""
     props = root.mu_gripper
+    if root.mode == "EDIT":
+        return not props.trouble
     try:
         _draw(root, to_gripper(props))
         trouble = ""
@@ -89,23 +96,16 @@ def rebuild(root: Any) -> bool:
 
 def _draw(root: Any, gripper: Gripper) -> None:
     given = StepInputs(gripper.unit, gripper.path)
-    drawn = {}
-    for step in SHOWN:
-        name, draw = unit_object.DRAWN[step]
-        drawn[name] = draw(stack.STACK.value(step, given), given, root.mu_gripper.cut)
-    for side, (rotation, shift) in zip(SIDES, gripper.placements, strict=True):
-        finger = part(root, f"finger:{side}") or new_part(root, root, f"finger:{side}", None)
-        matrix = np.eye(4)
-        matrix[:3, :3], matrix[:3, 3] = rotation, shift
-        finger.matrix_local = Matrix(matrix.tolist())
-        for name, skeleton in drawn.items():
-            mark = f"finger:{side}:{name}"
-            if skeleton is None:
-                continue
-            obj = part(root, mark) or new_part(root, finger, mark, bpy.data.meshes.new(name.capitalize()))
-            unit_object.draw_part(obj, name, skeleton)
+    finger = drawing.shapes(given, list(SHOWN), root.mu_gripper.cut)
     x, y = (extent / 2.0 for extent in gripper.size_mm)
-    put_box(root, "plate", (-x, -y, -gripper.plate.thickness_mm), (x, y, 0.0), "MU Plate")
+    drawn = {drawing.PLATE: skeletons.box((-x, -y, -gripper.plate.thickness_mm), (x, y, 0.0))}
+    if part(root, MOVING + "cube") is None:  # else the grasp is played, whose fingers stand in their place
+        for side, (rotation, shift) in zip(SIDES, gripper.placements, strict=True):
+            drawn |= {f"{side}:{n}": skeletons.placed(s, rotation, shift) for n, s in finger.items()}
+    mesh = drawing.own_mesh(root, root.data, [o.data for o in roots() if o != root])
+    if mesh != root.data:
+        root.data = mesh
+    drawing.write(root, mesh, drawn)
     first = part(root, "cube") is None
     half = np.full(3, root.mu_gripper.cube_mm / 2.0)
     cube = put_box(root, "cube", -half, half, "MU Obstacle")
@@ -126,25 +126,16 @@ def beyond_mm(root: Any) -> float:
 
 def put_box(root: Any, name: str, low: Any, high: Any, material: str) -> Any:
     """The part of that name as a box between two corners (3,) in mm."""
-    obj = part(root, name) or new_part(root, root, name, bpy.data.meshes.new(name.capitalize()))
-    skeletons.write(obj.data, skeletons.box(low, high), smooth=False)
+    obj = part(root, name) or new_part(root, name)
+    skeletons.write(obj.data, skeletons.box(low, high))
     materials.assign(obj.data, material)
     return obj
 
 
-def new_part(root: Any, parent: Any, name: str, data: Any) -> Any:
-    """A new part of the gripper, a child of `parent`, locked in its place."""
-    words = name.replace(":", " ").capitalize()
-    obj = bpy.data.objects.new(words, data)
-    obj[PART] = name
-    for collection in root.users_collection:
-        collection.objects.link(obj)
-    obj.parent = parent
-    # Parts follow their root; moved by hand they would no longer show the gripper.
-    obj.lock_location = obj.lock_rotation = obj.lock_scale = (True, True, True)
-    if data is None:
-        obj.empty_display_size = 1.0
-    return obj
+def new_part(root: Any, name: str) -> Any:
+    """A new part of the gripper, locked in its place."""
+    title = name.replace(":", " ").capitalize()
+    return displays.lock(displays.add(root, PART, name, bpy.data.meshes.new(title)))
 
 
 def _parameters_changed(root: Any) -> None:

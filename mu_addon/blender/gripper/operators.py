@@ -9,11 +9,11 @@ from bpy.props import BoolProperty, EnumProperty
 from ...design.gripper import gripper_names, load_gripper
 from ..jobs import start_child
 from ..jobs.operators import job_operators
+from ..scene import landing
 from ..shared import viewports
 from ..shared.operators import UnitOperator, reports_errors
 from ..simulate import study_folder as studies
 from ..unit.object import active_root
-from ..unit.operators import use_millimetres
 from ..unit.properties import to_unit
 from . import motion
 from . import object as gripper_object
@@ -57,10 +57,9 @@ class MU_OT_gripper_add(bpy.types.Operator):
                 path=unit.mu_unit.path or found.path,
                 name=unit.mu_unit.title,
             )
-        use_millimetres(context.scene)
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
-        gripper_object.create(context, found)
+        landing.land(context, gripper_object.create(context, found))
         return {"FINISHED"}
 
 

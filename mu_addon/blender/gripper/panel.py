@@ -8,6 +8,8 @@ from ...design.gripper import SECTIONS
 from ...design.quantity import describe
 from ..jobs.panel import job_state, start_button
 from ..shared.panels import RootPanel, alert, wrapped
+from ..shared.scene_units import in_millimetres
+from ..unit.fields import field
 from . import motion
 from . import object as gripper_object
 from . import state as grasps
@@ -31,13 +33,14 @@ class MU_PT_gripper(GripperPanel, bpy.types.Panel):
 
     def show(self, layout, context, root):
         props = root.mu_gripper
-        layout.prop(props, "title")
+        layout.prop(root, "name")
         layout.prop(props, "path")
         for section in SECTIONS:
             column = layout.column(align=True)
             column.label(text=section.section.capitalize())
             for d in describe(section):
-                column.prop(getattr(props, section.section), d.name)
+                group = getattr(props, section.section)
+                column.prop(group, field(group, d))
         row = layout.row()
         row.use_property_split = False
         row.prop(props, "cut", icon="MOD_BOOLEAN", toggle=True)
@@ -57,7 +60,7 @@ class MU_PT_grasp(GripperPanel, bpy.types.Panel):
         layout.prop(props, "detail")
         if props.detail != "part":
             column = layout.column(align=True)
-            column.prop(props, "cube_mm")
+            column.prop(props, "cube_mm" if in_millimetres(context.scene) else "cube_mm_true")
             cube = gripper_object.part(root, "cube")
             if cube is not None:
                 column.prop(cube, "location", index=2, text="Its Height")

@@ -11,7 +11,8 @@ from ...design.quantity import describe
 from ...design.rigid_body import FRICTION
 from ..shared.registration import property_group_factory
 from ..shared.updates import Signal
-from ..unit.properties import BESIDE_BLEND_FILE, blender_property, exact
+from ..unit.fields import exact, generated_fields, true_length
+from ..unit.properties import BESIDE_BLEND_FILE, title_property
 
 PARAMETERS_CHANGED = Signal()
 """Sent with the root of the gripper whose parameters changed."""
@@ -22,7 +23,7 @@ def _changed(group, context):
 
 
 def _generated(section: type):
-    annotations = {d.name: blender_property(d, _changed) for d in describe(section)}
+    annotations = generated_fields(section, _changed)
     return type(
         f"MU_PG_gripper_{section.section}",
         (bpy.types.PropertyGroup,),
@@ -40,13 +41,7 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
         "uuid": StringProperty(options={"HIDDEN"}),
         # The unit of both fingers, as TOML: a gripper does not change when a preset does.
         "finger": StringProperty(options={"HIDDEN"}),
-        "title": StringProperty(
-            name="Name",
-            description="Name of the gripper, one line of 1 to 80 printable characters",
-            default="gripper",
-            maxlen=80,
-            update=_changed,
-        ),
+        "title": title_property("gripper"),
         "path": StringProperty(
             name="Sensor Path",
             description="Window of anchors that the waveguide of either finger follows, such as alpha4",
@@ -71,6 +66,7 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
             max=199.0,
             update=_changed,
         ),
+        "cube_mm_true": true_length("cube_mm", "Cube", "Side of the cube that is grasped", scales=False),
         "density_g_per_ml": FloatProperty(
             name="Density (g/ml)",
             description="Of the cube, which decides its weight. The default is solid PLA, assumed",

@@ -17,7 +17,7 @@ from ...run.folder import write_run
 from ..jobs.start_child import JobKind
 from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
-from ..unit.properties import exact
+from ..unit.fields import exact
 from . import object as gripper_object
 from .properties import to_gripper
 
@@ -31,7 +31,7 @@ def folder_of(root: Any) -> Path:
     return studies.default_folder(props.folder, props.title, props.uuid)
 
 
-GRASP = JobKind("grip", lambda root: root.mu_gripper.uuid, folder_of)
+GRASP = JobKind("grip", lambda root: root.mu_gripper.uuid, folder_of, "grasp", heavy=True)
 
 
 def job_of(root: Any) -> Job:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from ...run.child import CANCELLED, DONE, FAILED, RUNNING
+from ...run.child import CANCELLED, DONE, FAILED, RUNNING, WAITING
 from ...run.progress import spell
 from ..shared.panels import alert, large_button, wrapped
 
 
 def start_button(layout, child, operator: str, icon: str) -> None:
-    """The button that starts a job, unless its child runs."""
-    if child is None or child.state != RUNNING:
+    """The button that starts a job, unless its child runs or waits."""
+    if child is None or child.state not in (RUNNING, WAITING):
         large_button(layout, operator, icon)
 
 
@@ -18,28 +18,41 @@ def job_state(layout, child, where: str, prefix: str = "") -> None:
 
     where: where its results are shown; prefix: what the names of its operators begin with.
     """
-    if child is not None:
-        _running(layout, child, prefix) if child.state == RUNNING else _ended(layout, child, where, prefix)
+    if child is None:
+        return
+    if child.state in (RUNNING, WAITING):
+        _running(layout, child, prefix)
+    else:
+        _ended(layout, child, where, prefix)
+
+
+def whole(child) -> tuple[float, str]:
+    """How much of a job's whole is done, 0..1, and its stage, number of stages and time left in words."""
+    if child.state == WAITING:
+        return 0.0, "waiting for the job before it"
+    outlook = child.outlook
+    if child.stopping:
+        return outlook.fraction, "stopping ..."
+    stage = str(child.progress.get("stage", "starting"))
+    if outlook.count:
+        stage += f" ({outlook.number} of {outlook.count})"
+    left = outlook.seconds_left
+    # Without a plan the bar is the stage's own, and so is the time.
+    fraction = outlook.fraction if outlook.count else child.progress.get("fraction") or 0.0
+    return fraction, stage if left is None else f"{stage}, {spell(left)} left"
 
 
 def _running(layout, child, prefix: str) -> None:
-    """Stage, time left and Cancel of a child."""
-    fraction = child.progress.get("fraction")
-    text = "stopping ..." if child.stopping else _stage(child)
-    layout.progress(factor=fraction or 0.0, text=text)
-    if child.progress.get("detail"):
-        layout.label(text=str(child.progress["detail"]))
+    """Cancel, stage and time left of a child: Cancel first, since what is below comes and goes."""
     row = layout.row()
-    row.label(text=f"running for {spell(child.seconds)}")
+    row.label(text=f"running for {spell(child.seconds)}" if child.state == RUNNING else "not started yet")
     row.operator(f"mu.{prefix}cancel", icon="CANCEL")
+    fraction, text = whole(child)
+    layout.progress(factor=fraction, text=text)
+    details = [str(child.progress.get("detail", "")), child.outlook.why and f"Longer: {child.outlook.why}"]
+    layout.label(text=next((text for text in reversed(details) if text), ""))
     for warning in child.warnings[-2:]:
         wrapped(layout, warning, "ERROR")
-
-
-def _stage(child) -> str:
-    stage = str(child.progress.get("stage", "starting"))
-    left = child.progress.get("seconds_left")
-    return stage if left is None else f"{stage}, {spell(float(left))} left"
 
 
 def _ended(layout, child, where: str, prefix: str) -> None:

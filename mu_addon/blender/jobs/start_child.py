@@ -15,9 +15,10 @@ from typing import Any
 import attrs
 import bpy
 
-from ...errors import InputError
-from ...run.child import RUNNING, Child
+from ...errors import InputError, MuError
+from ...run.child import FAILED, RUNNING, WAITING, Child
 from ...run.interpreter import environment, worker_command
+from ...run.outlook import Plan
 from ..shared import viewports
 from ..shared.updates import Signal
 
@@ -32,6 +33,9 @@ JOB_ENDED = Signal()
 """Sent with the key of a job that has ended."""
 
 _children: dict[str, Child] = {}
+_titles: dict[str, str] = {}
+_heavy: set[str] = set()
+"""Keys of jobs of which one runs at a time."""
 
 
 def missing(modules: Sequence[str] = SOLVER) -> list[str]:
@@ -39,10 +43,16 @@ def missing(modules: Sequence[str] = SOLVER) -> list[str]:
     return [name for name in modules if importlib.util.find_spec(name) is None]
 
 
-def start(arguments: Sequence[str], folder: Path, ends_with_parent: bool = False) -> Child:
+def start(
+    arguments: Sequence[str],
+    folder: Path,
+    ends_with_parent: bool = False,
+    plan: Plan = (),
+    waits: bool = False,
+) -> Child:
     """Start one command line of the core for a run in `folder`; raises MuError. See `Child`."""
     command = worker_command(CHILD_MAIN, arguments, bpy.app.binary_path)
-    return Child(command, folder / OWN_FOLDER, environment(), ends_with_parent)
+    return Child(command, folder / OWN_FOLDER, environment(), ends_with_parent, plan, waits)
 
 
 @attrs.frozen(eq=False)
@@ -50,11 +60,16 @@ class JobKind:
     """A kind of job that objects of the scene have done for them, one at a time for each object.
 
     name: what tells the kinds apart; uuid_of, folder_of: identifier of a root object and folder of its run.
+    title: the job in words; heavy: whether it takes the machine for minutes, so that of such jobs one runs at
+    a time and the others wait for it; plan_of: its stages for an object, as they are expected.
     """
 
     name: str
     uuid_of: Callable[[Any], str]
     folder_of: Callable[[Any], Path]
+    title: str = "job"
+    heavy: bool = False
+    plan_of: Callable[[Any], Plan] = lambda root: ()
 
     def key(self, root: Any) -> str:
         """Identifier of the job of that object."""
@@ -65,7 +80,7 @@ class JobKind:
         return child_of(self.key(root))
 
     def is_running(self, root: Any) -> bool:
-        """Whether the job runs."""
+        """Whether the job runs, or waits for another one."""
         return self.key(root) in running()
 
     def start(
@@ -78,13 +93,18 @@ class JobKind:
         if self.is_running(root):
             raise InputError("this job is running already", str(folder), "wait for it or cancel it")
         write_inputs(folder)
-        return watch(self.key(root), start(["resume", str(folder), "--json", *options], folder))
+        key, plan = self.key(root), self.plan_of(root)
+        waits = self.heavy and any(key in _heavy for key in running())
+        child = start(["resume", str(folder), "--json", *options], folder, plan=plan, waits=waits)
+        if self.heavy:
+            _heavy.add(key)
+        return watch(key, child, f"{root.name}: {self.title}")
 
     def dismiss(self, root: Any) -> None:
         """Forget an ended job, so that no panel shows it."""
         child = self.child(root)
-        if child is not None and child.state != RUNNING:
-            del _children[self.key(root)]
+        if child is not None and child.state not in (RUNNING, WAITING):
+            forget(self.key(root))
 
 
 def child_of(key: str) -> Child | None:
@@ -93,13 +113,33 @@ def child_of(key: str) -> Child | None:
 
 
 def running() -> list[str]:
-    """Keys of the jobs that are running."""
-    return [key for key, child in _children.items() if child.state == RUNNING]
+    """Keys of the jobs that run or wait for one, in the order in which they were started."""
+    return [key for key, child in _children.items() if child.state in (RUNNING, WAITING)]
 
 
-def watch(key: str, child: Child) -> Child:
-    """Have the timer read what a child says, as the job of that key."""
+def title_of(key: str) -> str:
+    """What a job is, and of what object, in words; nothing for one that has no place in the header."""
+    return _titles.get(key, "")
+
+
+def ended() -> list[str]:
+    """Keys of the jobs with a title that have ended and were not dismissed, the latest last."""
+    return [key for key, child in _children.items() if key in _titles and key not in running()]
+
+
+def forget(key: str) -> None:
+    """Forget a job that has ended."""
+    _children.pop(key, None)
+    _titles.pop(key, None)
+
+
+def watch(key: str, child: Child, title: str = "") -> Child:
+    """Have the timer read what a child says, as the job of that key; title: what the header calls it."""
+    # Anew at the end: jobs are listed in the order in which they were started.
+    forget(key)
     _children[key] = child
+    if title:
+        _titles[key] = title
     if not bpy.app.timers.is_registered(_poll):
         # Persistent: loading another file does not end a job.
         bpy.app.timers.register(_poll, first_interval=INTERVAL_S, persistent=True)
@@ -109,13 +149,29 @@ def watch(key: str, child: Child) -> Child:
 def poll() -> bool:
     """Read what every child has written; returns whether there was anything new."""
     news = [child.poll() for child in _children.values()]
-    return any(news)
+    return _begin_next() or any(news)
+
+
+def _begin_next() -> bool:
+    """Start the first job that waits, where none of its kind runs; returns whether there was one."""
+    heavy = [child for key, child in _children.items() if key in _heavy]
+    waiting = [child for child in heavy if child.state == WAITING]
+    if not waiting or any(child.state == RUNNING for child in heavy):
+        return False
+    try:
+        waiting[0].begin()
+    except MuError as error:
+        what = {"what": error.what, "where": error.where, "what_to_do": error.remedy}
+        waiting[0].state, waiting[0].error = FAILED, what
+    return True
 
 
 def _poll() -> float | None:
     before = running()
-    if poll():
-        viewports.redraw()
+    news = poll()
+    if news or before:
+        # Headers each time: the time left counts down between messages.
+        viewports.redraw() if news else viewports.redraw_headers()
     for key in set(before) - set(running()):
         JOB_ENDED.send(key)
     return INTERVAL_S if running() else None
@@ -135,6 +191,7 @@ def unregister() -> None:
     """End every child and its timer."""
     atexit.unregister(_end_all)
     _end_all()
-    _children.clear()
+    for kept in (_children, _titles, _heavy):
+        kept.clear()
     if bpy.app.timers.is_registered(_poll):
         bpy.app.timers.unregister(_poll)

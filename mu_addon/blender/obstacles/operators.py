@@ -14,7 +14,8 @@ from ..body.operators import report_flaws, selected_meshes
 from ..preview import materials, skeletons
 from ..shared.operators import UnitOperator, ValidUnitOperator, reports_errors
 from ..unit import object as unit_object
-from ..unit.properties import exact, to_unit
+from ..unit.fields import exact
+from ..unit.properties import to_unit
 from . import state as obstacles
 
 NO_OBSTACLE = "No obstacle yet: select a closed mesh and use it as one"
@@ -82,15 +83,14 @@ class MU_OT_obstacle_box(ValidUnitOperator, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     size: FloatVectorProperty(
-        name="Size",
-        description="Edges of the box",
-        subtype="XYZ_LENGTH",
-        unit="LENGTH",
+        name="Size (mm)",
+        description="Edges of the box in mm",
+        subtype="XYZ",
         default=(25.0, 25.0, 25.0),
         min=0.1,
     )
     gap: FloatProperty(
-        name="Gap", description="Distance between unit and box", subtype="DISTANCE", default=5.0, min=0.0
+        name="Gap (mm)", description="Distance between unit and box in mm", default=5.0, min=0.0
     )
     friction: FloatProperty(
         name="Friction", description="Coefficient of Coulomb friction", default=FRICTION, min=0.0, max=5.0
@@ -102,7 +102,7 @@ class MU_OT_obstacle_box(ValidUnitOperator, bpy.types.Operator):
         d = to_unit(root.mu_unit).dimensions
         size = np.array([exact(edge) for edge in self.size])
         mesh = bpy.data.meshes.new("Obstacle")
-        skeletons.write(mesh, skeletons.box(-size / 2.0, size / 2.0), smooth=False)
+        skeletons.write(mesh, skeletons.box(-size / 2.0, size / 2.0))
         materials.assign(mesh, "MU Obstacle")
         obj = bpy.data.objects.new("Obstacle", mesh)
         context.collection.objects.link(obj)

@@ -19,7 +19,7 @@ from ...design.parameters import Unit
 from ...design.rigid_body import FRICTION, RigidBody
 from ..body import state as bodies
 from ..shared.registration import property_group_factory
-from ..unit.properties import exact
+from ..unit.fields import exact
 
 ODD_SIZE_MM = (0.1, 2000.0)
 """An obstacle smaller or larger than that is more likely in another unit of length."""

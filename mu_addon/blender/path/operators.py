@@ -7,8 +7,10 @@ from bpy.props import StringProperty
 
 from ...design.anchors import window
 from ..shared import updates
+from ..shared.displays import PART
 from ..shared.operators import UnitOperator, reports_errors
 from ..unit import object as unit_object
+from ..unit.drawing import CANDIDATE
 from ..unit.properties import to_unit
 
 
@@ -35,8 +37,8 @@ class MU_OT_path(UnitOperator, bpy.types.Operator):
 
 def selected_candidate(context) -> str:
     """Name of the candidate path that is the active object, or nothing."""
-    part = context.object.get(unit_object.PART, "") if context.object else ""
-    return part.removeprefix(unit_object.CANDIDATE) if part.startswith(unit_object.CANDIDATE) else ""
+    part = context.object.get(PART, "") if context.object else ""
+    return part.removeprefix(CANDIDATE) if part.startswith(CANDIDATE) else ""
 
 
 CLASSES = (MU_OT_path,)

@@ -40,7 +40,7 @@ class MU_PT_path(UnitPanel, bpy.types.Panel):
             ).name = name
         if not ranked:
             wrapped(layout, "Simulate to rank them: Place the Sensor", "INFO")
-        parameters(layout, props, "path")
+        parameters(layout, root, "path")
 
 
 CLASSES = (MU_PT_path,)

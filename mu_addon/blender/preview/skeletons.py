@@ -5,6 +5,7 @@ Everything here is for the eye and takes milliseconds; what is printed or simula
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import attrs
@@ -37,15 +38,17 @@ _CUBE_EDGES = np.array([[a, b] for a in range(8) for b in range(a) if np.abs(_CU
 class Skeleton:
     """A mesh to draw: vertices (n, 3) in mm, edges (e, 2), faces, a list of (m, k) arrays, and attributes.
 
-    attributes: values (n,) at the vertices by name; slots: number of the material of each face, or None;
-    inputs: further inputs, by name, of the node group that skins it.
+    attributes: values (n,) at the vertices by name, integers or not; slots: number of the material of each
+    face, or None; smooth: whether faces are shaded smooth, all or each; inputs: further inputs, by name, of
+    the node group that skins it.
     """
 
     vertices: Floats
     edges: Integers = attrs.field(factory=lambda: np.empty((0, 2), np.int64))
     faces: tuple[Integers, ...] = ()
-    attributes: dict[str, Floats] = attrs.field(factory=dict)
+    attributes: dict[str, Any] = attrs.field(factory=dict)
     slots: Integers | None = None
+    smooth: Any = True
     inputs: dict[str, Any] = attrs.field(factory=dict)
 
 
@@ -127,7 +130,7 @@ def bar(found: Bar | None) -> Skeleton | None:
     corners = np.array([*solid, *hollow])
     faces = np.concatenate([FACES + 8 * number for number in range(len(corners))])
     slots = np.repeat(np.arange(len(corners)) >= len(solid), 6).astype(np.int64)
-    return Skeleton(corners.reshape(-1, 3), faces=(faces,), slots=slots)
+    return Skeleton(corners.reshape(-1, 3), faces=(faces,), slots=slots, smooth=False)
 
 
 def candidates(unit: Unit) -> dict[str, Skeleton]:
@@ -153,7 +156,43 @@ def candidates(unit: Unit) -> dict[str, Skeleton]:
 def box(low: ArrayLike, high: ArrayLike) -> Skeleton:
     """A box between two corners (3,) in mm, its faces outward."""
     corners = np.asarray(low, float) + (np.asarray(high, float) - np.asarray(low, float)) * _CUBE
-    return Skeleton(corners, faces=(_CUBE_FACES,))
+    return Skeleton(corners, faces=(_CUBE_FACES,), smooth=False)
+
+
+def joined(parts: Sequence[Skeleton]) -> Skeleton:
+    """Several skeletons as one; an attribute that one of them lacks is 0 there."""
+    counts = [len(part.vertices) for part in parts]
+    starts = np.concatenate([[0], np.cumsum(counts)])[:-1].astype(int)
+    names = dict.fromkeys(name for part in parts for name in part.attributes)
+    attributes = {
+        name: np.concatenate(
+            [part.attributes.get(name, np.zeros(n)) for part, n in zip(parts, counts, strict=True)]
+        )
+        for name in names
+    }
+    for name, values in attributes.items():
+        if all(np.issubdtype(p.attributes[name].dtype, np.integer) for p in parts if name in p.attributes):
+            attributes[name] = values.astype(np.int32)
+    sizes = [sum(map(len, part.faces)) for part in parts]
+    slots = [
+        np.zeros(n, np.int64) if part.slots is None else part.slots
+        for part, n in zip(parts, sizes, strict=True)
+    ]
+    smooth = [np.full(n, part.smooth) for part, n in zip(parts, sizes, strict=True)]
+    empty = Skeleton(np.empty((0, 3)))
+    return Skeleton(
+        np.concatenate([empty.vertices, *(part.vertices for part in parts)]),
+        np.concatenate([empty.edges, *(p.edges + start for p, start in zip(parts, starts, strict=True))]),
+        tuple(f + start for p, start in zip(parts, starts, strict=True) for f in p.faces),
+        attributes,
+        np.concatenate([np.empty(0, np.int64), *slots]),
+        np.concatenate([np.empty(0, bool), *smooth]),
+    )
+
+
+def placed(part: Skeleton, rotation: ArrayLike, shift: ArrayLike) -> Skeleton:
+    """A skeleton turned by a matrix (3, 3), then moved by (3,) in mm."""
+    return attrs.evolve(part, vertices=part.vertices @ np.asarray(rotation).T + np.asarray(shift))
 
 
 def free_path(points: Floats, name: str, cell: float) -> Skeleton:
@@ -231,7 +270,7 @@ def _facing_x(vertices: Floats, triangles: Integers) -> Integers:
     return np.where(away[:, None], triangles[:, ::-1], triangles)
 
 
-def write(mesh: Any, skeleton: Skeleton, smooth: bool = True) -> None:
+def write(mesh: Any, skeleton: Skeleton) -> None:
     """Replace the geometry of a Blender mesh by a skeleton, materials kept."""
     mesh.clear_geometry()
     mesh.vertices.add(len(skeleton.vertices))
@@ -251,9 +290,11 @@ def write(mesh: Any, skeleton: Skeleton, smooth: bool = True) -> None:
             mesh.polygons.foreach_set("material_index", skeleton.slots.astype(np.int32))
     mesh.update(calc_edges=bool(skeleton.faces))
     if skeleton.faces:
-        mesh.polygons.foreach_set("use_smooth", np.full(len(mesh.polygons), smooth))
-        if smooth:
+        smooth = np.broadcast_to(np.asarray(skeleton.smooth, bool), len(mesh.polygons))
+        mesh.polygons.foreach_set("use_smooth", np.ascontiguousarray(smooth))
+        if smooth.any():
             mesh.set_sharp_from_angle(angle=np.radians(40.0))
     for name, values in skeleton.attributes.items():
-        attribute = mesh.attributes.new(name, "FLOAT", "POINT")
-        attribute.data.foreach_set("value", values.astype(np.float32))
+        whole = np.issubdtype(np.asarray(values).dtype, np.integer)
+        attribute = mesh.attributes.new(name, "INT" if whole else "FLOAT", "POINT")
+        attribute.data.foreach_set("value", values.astype(np.int32 if whole else np.float32))

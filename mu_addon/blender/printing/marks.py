@@ -9,13 +9,12 @@ import numpy as np
 from mathutils import Vector
 
 from ..preview import materials, nodes, skeletons
-from ..shared import viewports
+from ..shared import displays, viewports
 from ..shared.compat import set_modifier_input
-from ..unit import object as unit_object
 from ..unit.properties import to_unit
 
 FAULTS = ("error", "warning")
-MARK = unit_object.CHECK
+MARK = displays.CHECK
 """Its value on a mark is the finding's number, and `UP` on the arrow along the build direction."""
 UP = "up"
 LARGER = 1.8
@@ -38,7 +37,7 @@ def marked(root: Any) -> str:
 def clear(root: Any) -> None:
     """Remove the marks."""
     for obj in mark_objects(root):
-        unit_object.remove_part(obj)
+        displays.remove(obj)
     root.mu_print.finding = -1
 
 
@@ -66,12 +65,7 @@ def mark(root: Any, found: Any) -> None:
 
 
 def _mark_object(root: Any, name: str, data: Any, value: str) -> Any:
-    obj = bpy.data.objects.new(name, data)
-    obj[MARK] = value
-    for collection in root.users_collection:
-        collection.objects.link(obj)
-    obj.parent = root
-    obj.lock_location = obj.lock_rotation = obj.lock_scale = (True, True, True)
+    obj = displays.lock(displays.add(root, MARK, value, data, name))
     obj.show_in_front = True
     return obj
 
@@ -95,6 +89,6 @@ def frame(root: Any, place: Any, reach: float) -> None:
     for area in viewports.areas():
         view = area.spaces.active.region_3d
         view.view_location = centre
-        view.view_distance = 4.0 * reach
+        view.view_distance = 4.0 * reach * root.matrix_world.median_scale
         if view.view_perspective == "CAMERA":
             view.view_perspective = "PERSP"

@@ -31,7 +31,7 @@ class MU_PT_print(UnitPanel, bpy.types.Panel):
 
     def show(self, layout, context, root):
         large_button(layout, "mu.solid", "MESH_DATA")
-        solid = unit_object.part(root, unit_object.SOLID)
+        solid = root.mu_unit.solid
         if solid is None:
             wrapped(layout, "No solid built yet", "INFO")
         else:
@@ -49,7 +49,7 @@ class MU_PT_print(UnitPanel, bpy.types.Panel):
 
 def _gates(layout, root, solid) -> None:
     box = layout.box()
-    if not unit_object.solid_is_current(root, solid):
+    if not unit_object.solid_is_current(root):
         wrapped(box, "Built from earlier parameters: build it again", "ERROR")
     g = json.loads(solid["mu_gates"])
     for text in (
@@ -208,7 +208,7 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
         header, body = layout.panel("MU_printing", default_closed=True)
         header.label(text="Print Offsets")
         if body:
-            parameters(body, root.mu_unit, "print")
+            parameters(body, root, "print")
 
 
 def _check_state(layout, found) -> None:

@@ -90,9 +90,8 @@ class MU_PG_print(bpy.types.PropertyGroup):
         options=BESIDE_BLEND_FILE,
     )
     marker: FloatProperty(
-        name="Marks",
-        description="Radius of the balls at the places that were found",
-        subtype="DISTANCE",
+        name="Marks (mm)",
+        description="Radius in mm of the balls at the places that were found",
         default=0.8,
         min=0.05,
         max=10.0,

@@ -31,7 +31,8 @@ from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
 from ..steps import state as stack
 from ..unit import object as unit_object
-from ..unit.properties import exact, to_unit
+from ..unit.fields import exact
+from ..unit.properties import shape_hash, to_unit
 from .properties import FORMATS, OWN_PRINTER
 
 CHECK, EXPORT, SPECIMENS = "check", "export", "specimens"
@@ -75,7 +76,7 @@ def latest_folder(root: Any) -> Path:
     return folder_of(root, CHECK) if child is None else child.folder.parent
 
 
-PRINTING = JobKind("print", lambda root: root.mu_unit.uuid, latest_folder)
+PRINTING = JobKind("print", lambda root: root.mu_unit.uuid, latest_folder, "print")
 
 _printers: FileCache[Printer] = FileCache()
 _measured: FileCache[tuple[str, Printer]] = FileCache()
@@ -215,7 +216,7 @@ def _own_stl(root: Any, unit: Unit, folder: Path) -> Path:
 
 
 def _shape(root: Any, unit: Unit) -> list[str]:
-    return [unit.hash(), path_of(root, unit), bodies.fingerprint(root)]
+    return [shape_hash(unit), path_of(root, unit), bodies.fingerprint(root)]
 
 
 def checked(root: Any) -> Checked | None:
@@ -236,7 +237,7 @@ def checked(root: Any) -> Checked | None:
             shape = parse_json(file_bytes(own), own.name)
             shape = shape["of"] if shape["stl_sha256"] == of["stl_sha256"] else []
         else:
-            shape = [read_unit(unit).hash(), of.get("path", ""), ""]
+            shape = [shape_hash(read_unit(unit)), of.get("path", ""), ""]
         digest = hashlib.sha256(content).hexdigest()
         return check, digest, shape, of["direction"], file_text(limits)
 

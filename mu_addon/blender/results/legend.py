@@ -17,6 +17,7 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
 from ...usecases.simulate_and_place.motion import MODEL_A
+from ..shared.displays import LEGEND
 from ..shared.overlay import Overlay
 from ..shared.texts import path_symbol
 from ..simulate import study_folder as studies
@@ -67,7 +68,7 @@ def _draw() -> None:
         return
     scale = context.preferences.system.ui_scale
     size = round(12 * scale)
-    in_scene = any(child.get(unit_object.LEGEND) and child.visible_get() for child in root.children)
+    in_scene = any(child.get(LEGEND) and child.visible_get() for child in root.children)
     if not in_scene:
         left = _beside_tools(context.area) + LEFT * scale
         if any(root.mu_motion.field in part.data.attributes for part in shown):

@@ -15,9 +15,9 @@ from mathutils import Matrix
 
 from ...errors import InputError
 from ..preview import materials, skeletons
-from ..shared import handlers
+from ..shared import displays, handlers
+from ..shared.displays import LEGEND
 from ..unit import object as unit_object
-from ..unit.object import LEGEND, remove_part
 from . import field_colours, legend
 from . import motion as motion_parts
 
@@ -42,7 +42,7 @@ def show(root: Any) -> Any:
     bar = bar_of(root)
     if bar is None:
         low, high = motion.mesh.nodes.min(axis=0), motion.mesh.nodes.max(axis=0)
-        bar = _add(root, root, BAR, bpy.data.meshes.new("Legend"))
+        bar = displays.add(root, LEGEND, BAR, bpy.data.meshes.new("Legend"))
         bar.matrix_local = (
             Matrix.Translation((0.0, float(high[1] + 0.4 * (high[1] - low[1])), float(low[2])))
             @ _FACING_X
@@ -57,7 +57,7 @@ def hide(root: Any) -> None:
     bar = bar_of(root)
     if bar is not None:
         for obj in (*bar.children, bar):
-            remove_part(obj)
+            displays.remove(obj)
 
 
 def update(root: Any) -> None:
@@ -73,15 +73,18 @@ def update(root: Any) -> None:
     first = 2 * np.arange(legend.PIECES)[:, None]
     values = np.repeat(low + (high - low) * heights, 2)
     shape = skeletons.Skeleton(
-        corners, faces=(first + np.array([0, 1, 3, 2]),), attributes={"share": corners[:, 1]}
+        corners,
+        faces=(first + np.array([0, 1, 3, 2]),),
+        attributes={"share": corners[:, 1]},
+        smooth=False,
     )
-    skeletons.write(bar.data, shape, smooth=False)
+    skeletons.write(bar.data, shape)
     field_colours.write_colours(root, bar.data, values)
     wanted = field_colours.legend_material_of(root)
     if not bar.data.materials:
         bar.data.materials.append(wanted)
     for text in [child for child in bar.children if child.get(LEGEND) == TICK]:
-        remove_part(text)
+        displays.remove(text)
     for value in legend.ticks(low, high):
         _put_text(bar, TICK, f"{value:.4g}", (WIDTH + 0.02, (value - low) / (high - low)))
     update_text(root, bpy.context.scene)
@@ -98,7 +101,7 @@ def _put_text(bar: Any, what: str, text: str, place: tuple[float, float]) -> Non
     """Write a text of the legend; each but the ticks exists once."""
     obj = next((child for child in bar.children if child.get(LEGEND) == what and what != TICK), None)
     if obj is None:
-        obj = _add(bar.parent, bar, what, bpy.data.curves.new("Legend Text", "FONT"))
+        obj = displays.add(bar.parent, LEGEND, what, bpy.data.curves.new("Legend Text", "FONT"), parent=bar)
         # Not by its location: Blender would draw a line from there to the bar.
         obj.data.offset_x, obj.data.offset_y = place
         obj.data.size = TEXT
@@ -106,15 +109,6 @@ def _put_text(bar: Any, what: str, text: str, place: tuple[float, float]) -> Non
         obj.data.materials.append(materials.unlit("MU Legend Text"))
     if obj.data.body != text:
         obj.data.body = text
-
-
-def _add(root: Any, parent: Any, what: str, data: Any) -> Any:
-    made = bpy.data.objects.new(data.name, data)
-    made[LEGEND] = what
-    for collection in root.users_collection:
-        collection.objects.link(made)
-    made.parent = parent
-    return made
 
 
 @persistent

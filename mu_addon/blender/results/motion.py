@@ -28,12 +28,12 @@ from ...usecases.simulate_and_place.motion import (
     read_motion,
 )
 from ..preview import skeletons
-from ..shared import handlers
+from ..shared import displays, handlers
+from ..shared.displays import MOTION
 from ..shared.file_cache import FileCache
 from ..shared.updates import Signal
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
-from ..unit.object import MOTION
 from ..unit.properties import to_unit
 from . import field_colours
 
@@ -110,7 +110,7 @@ def hide(root: Any, name: str, what: str) -> None:
     """Take a motion out of the scene; its files stay."""
     for part in parts(root):
         if _what(part)[0] == name and (_what(part)[1] == PRINT) == (what == PRINT):
-            unit_object.remove_part(part)
+            displays.remove(part)
     arrange(root)
 
 
@@ -152,19 +152,19 @@ def _show_print(root: Any, motion: Motion, name: str) -> None:
             "the motion belongs to other parameters than the unit has now",
             remedy="simulate again, or go back to those parameters",
         )
-    solid = unit_object.part(root, unit_object.SOLID)
-    if solid is None or not unit_object.solid_is_current(root, solid):
+    if not unit_object.solid_is_current(root):
         core = to_unit(root.mu_unit)
-        solid = unit_object.put_solid(root, unit_object.solid_of(root, core), core)
+        unit_object.put_solid(root, unit_object.solid_of(root, core), core)
         root.mu_unit.show = "preview"
-    rest = vertices_of(solid.data)
+    solid = root.mu_unit.solid
+    rest = vertices_of(solid)
     carried = motion.embedding(rest)
     moved, still = (motion.carried(whose, carried) for whose in (name, MODEL_A))
     file = motion.folder / PLAYED / f"{name}-{PRINT}.pc2"
     _write_cache(file, motion, rest, moved)
     part = _part(root, name, PRINT)
     old = part.data
-    part.data = solid.data.copy()
+    part.data = solid.copy()
     part.data.name = old.name
     part.data.materials.clear()
     bpy.data.meshes.remove(old)
@@ -192,13 +192,8 @@ def _part(root: Any, name: str, body: str) -> Any:
         if part[MOTION] == f"{name}|{body}":
             return part
     title = f"{'Model A' if name == MODEL_A else name} {body}"
-    part = bpy.data.objects.new(title, bpy.data.meshes.new(title))
-    part[MOTION] = f"{name}|{body}"
-    for collection in root.users_collection:
-        collection.objects.link(part)
-    part.parent = root
-    part.lock_rotation = part.lock_scale = (True, True, True)
-    return part
+    part = displays.add(root, MOTION, f"{name}|{body}", bpy.data.meshes.new(title))
+    return displays.lock(part, location=False)
 
 
 def _write_cache(file: Path, motion: Motion, rest: Any, displacement: Any) -> None:

@@ -157,7 +157,7 @@ def latest_calibration(root: Any) -> Path:
     return max(folder.glob("*/"), default=folder)
 
 
-CALIBRATION = JobKind("calibrate", lambda root: root.mu_unit.uuid, latest_calibration)
+CALIBRATION = JobKind("calibrate", lambda root: root.mu_unit.uuid, latest_calibration, "calibration")
 
 
 def calibrate(root: Any, data: Path) -> None:

@@ -19,10 +19,10 @@ from ...usecases.simulate_and_place.motion import REGIONS, Motion
 from ...usecases.simulate_and_place.poses import Poses, poses
 from ..preview import materials, skeletons
 from ..results import motion as motion_parts
-from ..shared import handlers
+from ..shared import displays, handlers
+from ..shared.displays import TWIN
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
-from ..unit.object import TWIN
 
 LIVE, OUTSIDE, WAITING = "live", "outside", "waiting"
 _LOOKS = {LIVE: {"membrane": "MU Twin", "lattice": "MU Lattice"}}
@@ -80,16 +80,11 @@ def show(root: Any) -> None:
     rest = int(np.argmin(np.abs(shape.motion.state_kPa)))
     for region in REGIONS:
         title = f"Twin {region}"
-        part = bpy.data.objects.new(title, bpy.data.meshes.new(title))
-        part[TWIN] = region
+        part = displays.lock(displays.add(root, TWIN, region, bpy.data.meshes.new(title)))
         skeletons.write(
             part.data, skeletons.Skeleton(shape.vertices[region][rest], faces=(shape.triangles[region],))
         )
-        for collection in root.users_collection:
-            collection.objects.link(part)
-        part.parent = root
         part.location = (0.0, 1.5 * wide, 0.0)
-        part.lock_location = part.lock_rotation = part.lock_scale = (True, True, True)
     _status.pop(root.mu_unit.uuid, None)
     _colour(root, WAITING)
 
@@ -97,7 +92,7 @@ def show(root: Any) -> None:
 def hide(root: Any) -> None:
     """Take the twin out of the scene."""
     for part in parts(root):
-        unit_object.remove_part(part)
+        displays.remove(part)
 
 
 def set_pose(root: Any, reading: Any, fresh: bool) -> bool:

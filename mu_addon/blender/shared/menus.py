@@ -1,4 +1,4 @@
-"""Entries in Blender's menus, and the menu of presets."""
+"""Entries in Blender's menus, the menus of presets and of what is done with a unit."""
 
 from __future__ import annotations
 
@@ -44,6 +44,26 @@ def _add(self, context):
     self.layout.operator("mu.gripper_add", icon="MOD_MIRROR")
 
 
+class MU_MT_object(bpy.types.Menu):
+    """What is done with a unit or gripper as a whole"""
+
+    bl_idname = "MU_MT_object"
+    bl_label = "Monolithic Unit"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.operator("mu.select", icon="RESTRICT_SELECT_OFF")
+        layout.operator("mu.rebuild", icon="FILE_REFRESH")
+        layout.operator("mu.delete", icon="TRASH")
+        layout.separator()
+        layout.operator("mu.gripper_delete", icon="TRASH")
+
+
+def _object(self, context):
+    # The menu search of Blender finds what is in menus.
+    self.layout.menu("MU_MT_object", icon="OUTLINER_OB_LATTICE")
+
+
 class MU_MT_more(bpy.types.Menu):
     """Sample scene, node groups for curves of your own, and the asset browser"""
 
@@ -55,24 +75,27 @@ class MU_MT_more(bpy.types.Menu):
         layout.operator("mu.sample", icon="SCENE_DATA")
         layout.operator("mu.gripper_add", text="Gripper of This Unit", icon="MOD_MIRROR").of_unit = True
         layout.operator_menu_enum("mu.skin", "group", text="Skin with Nodes", icon="GEOMETRY_NODES")
+        layout.operator("mu.millimetres", icon="DRIVER_DISTANCE")
         layout.separator()
         layout.operator("mu.assets", icon="ASSET_MANAGER")
         layout.operator("mu.assets_remove")
 
 
-CLASSES = (MU_MT_presets, MU_MT_presets_remove, MU_MT_more)
+CLASSES = (MU_MT_presets, MU_MT_presets_remove, MU_MT_object, MU_MT_more)
 
 
 _register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
 
 
 def register() -> None:
-    """Menus, and the entry in Add > Mesh."""
+    """Menus, and the entries in Add > Mesh and Object."""
     _register_classes()
     bpy.types.VIEW3D_MT_mesh_add.append(_add)
+    bpy.types.VIEW3D_MT_object.append(_object)
 
 
 def unregister() -> None:
     """Take them out again."""
+    bpy.types.VIEW3D_MT_object.remove(_object)
     bpy.types.VIEW3D_MT_mesh_add.remove(_add)
     _unregister_classes()

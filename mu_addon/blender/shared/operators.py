@@ -9,22 +9,33 @@ import bpy
 
 from ...errors import MuError
 from ..unit.object import active_root
+from .displays import editable
 
 NO_UNIT = "Select a Monolithic Unit, or add one: Add > Mesh > Monolithic Unit"
 
 
+def linked(root) -> str:
+    """Why a unit cannot be changed in this file: where it is linked from, and what to do. Else nothing."""
+    if editable(root):
+        return ""
+    source = root if root.library is not None else root.override_library.reference
+    name = Path(source.library.filepath).name
+    return f"{root.name} is linked from {name}: change it there, or use Object > Relations > Make Local"
+
+
 class UnitOperator:
-    """An operator on the active unit; greyed out, with the reason, where there is none."""
+    """An operator on the active unit; greyed out, with the reason, where there is none or it is linked."""
 
     find_root = staticmethod(active_root)
     no_root = NO_UNIT
 
     @classmethod
     def poll(cls, context):
-        if cls.find_root(context) is None:
-            cls.poll_message_set(cls.no_root)
-            return False
-        return True
+        root = cls.find_root(context)
+        trouble = cls.no_root if root is None else linked(root)
+        if trouble:
+            cls.poll_message_set(trouble)
+        return not trouble
 
 
 class ValidUnitOperator(UnitOperator):

@@ -5,8 +5,10 @@ from __future__ import annotations
 import textwrap
 
 from ...design.parameters import SECTIONS
-from ...design.quantity import describe
+from ...design.quantity import Description, describe
 from ...design.wall import Wall, offered
+from ..unit.broken import broken
+from ..unit.fields import field, shown_value
 from ..unit.object import active_root
 
 # Where a section's parameters are shown. A section that the core gains appears under Design by itself.
@@ -77,8 +79,30 @@ def large_button(layout, operator: str, icon: str, **settings) -> None:
     row.operator(operator, icon=icon, **settings)
 
 
-def parameters(layout, props, place: str) -> None:
+def parameter(column, root, section: str, d: Description) -> None:
+    """The field of one parameter; where it breaks a rule red, with the nearest value that fits as a button.
+
+    The button stands beside the field: nothing below it moves.
+    """
+    group = getattr(root.mu_unit, section)
+    found = broken(root)
+    if found is None or (section, d.name) not in found.fits:
+        column.prop(group, field(group, d))
+        return
+    row = column.row(align=True)
+    row.alert = True
+    row.prop(group, field(group, d))
+    value = found.fits[section, d.name]
+    if value is not None:
+        right = row.row(align=True)
+        right.alert = False
+        fit = right.operator("mu.fit", text=shown_value(group, d, value))
+        fit.section, fit.name, fit.why = section, d.name, found.text
+
+
+def parameters(layout, root, place: str) -> None:
     """Fields of every section that belongs to a place."""
+    props = root.mu_unit
     for section in SECTIONS:
         if PLACES.get(section.section, "design") == place:
             group = getattr(props, section.section)
@@ -86,4 +110,4 @@ def parameters(layout, props, place: str) -> None:
             shown = offered(group.law, group.friction_share) if section is Wall else None
             for d in describe(section):
                 if shown is None or d.name in shown:
-                    column.prop(group, d.name)
+                    parameter(column, root, section.section, d)

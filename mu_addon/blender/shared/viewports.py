@@ -28,3 +28,11 @@ def redraw_views(panels: bool) -> None:
         for region in area.regions:
             if region.type == "WINDOW" or (panels and region.type == "UI"):
                 region.tag_redraw()
+
+
+def redraw_headers() -> None:
+    """Have the header of every 3D view drawn again."""
+    for area in areas():
+        for region in area.regions:
+            if region.type == "HEADER":
+                region.tag_redraw()

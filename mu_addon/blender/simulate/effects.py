@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ...errors import InputError
 from ...reading import parse_toml
 from ..shared.texts import readable
-from ..unit.properties import exact
+from ..unit.fields import exact
 
 if TYPE_CHECKING:
     from ...usecases.simulate_and_place.static_effects import StaticEffects

@@ -45,7 +45,7 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
         header, body = layout.panel("MU_material", default_closed=True)
         header.label(text="Material")
         if body:
-            parameters(body, root.mu_unit, "simulate")
+            parameters(body, root, "simulate")
             body.prop(study, "solver")
             body.prop(study, "device")
             body.prop(study, "folder")

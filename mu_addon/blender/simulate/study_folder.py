@@ -22,7 +22,7 @@ from ..body import state as bodies
 from ..obstacles import state as obstacles
 from ..shared.compat import user_folder
 from ..shared.file_cache import FileCache
-from ..unit.properties import to_unit
+from ..unit.properties import shape_hash, to_unit
 from . import effects
 
 CONTACT = "contact.csv"
@@ -111,7 +111,7 @@ def findings(root: Any) -> Findings | None:
         unit = to_unit(root.mu_unit)
         body = bodies.envelope_in(root, unit)
         own = "" if body is None else body.hash
-        stale = (unit.hash(), own, obstacles.inputs(root), effects.inputs(root)) != inputs
+        stale = (shape_hash(unit), own, obstacles.inputs(root), effects.inputs(root)) != inputs
     except MuError:
         stale = True
     return Findings(folder, str(summary.get("status", "")), stale, summary)
@@ -119,7 +119,7 @@ def findings(root: Any) -> Findings | None:
 
 def _read_findings(folder: Path) -> tuple[dict[str, Any], Any]:
     summary = parse_json(file_bytes(folder / "summary.json"), "summary.json")
-    unit = read_unit(folder / "unit.toml").hash()
+    unit = shape_hash(read_unit(folder / "unit.toml"))
     inputs = unit, _body_hash(folder), _obstacles(folder), _effects(folder)
     return summary if isinstance(summary, dict) else {}, inputs
 

@@ -6,6 +6,7 @@ import attrs
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
+from ...design.nearest import tied
 from ...design.parameters import SECTIONS
 from ...design.quantity import describe
 from ...design.steps import STEPS, Step, downstream
@@ -13,7 +14,8 @@ from ..shared import updates
 from ..shared.operators import UnitOperator, reports_errors
 from ..shared.texts import sentence
 from ..unit import object as unit_object
-from ..unit.properties import blender_property, exact, from_unit, to_unit
+from ..unit.fields import blender_property, exact
+from ..unit.properties import from_unit, to_unit
 from . import state as stack
 
 _OF_THEIR_OWN = ("path", "solid")
@@ -53,11 +55,15 @@ class _OfStep(UnitOperator):
         root = unit_object.active_root(context)
         props = root.mu_unit
         unit = to_unit(props)
+        given: dict[str, dict] = {}
         for section, name in stack.own_parameters(self.step):
             if self.properties.is_property_set(name):
                 value = getattr(self, name)
                 value = exact(value) if isinstance(value, float) else value
-                unit = attrs.evolve(unit, **{section: attrs.evolve(getattr(unit, section), **{name: value})})
+                if value != getattr(getattr(unit, section), name):
+                    given.setdefault(section, {})[name] = value
+        changed = {s: attrs.evolve(getattr(unit, s), **tied(values)) for s, values in given.items()}
+        unit = attrs.evolve(unit, **changed)
         before = stack.STACK.counts.copy()
         with updates.paused():
             stack.fill(props)

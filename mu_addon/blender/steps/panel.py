@@ -5,9 +5,9 @@ from __future__ import annotations
 import bpy
 
 from ...design.steps import STEPS
-from ..shared.panels import UnitPanel, wrapped
+from ..shared.panels import UnitPanel, parameter, wrapped
 from ..shared.texts import sentence
-from ..unit import object as unit_object
+from ..unit.drawing import DRAWN
 from . import state as stack
 
 
@@ -19,7 +19,7 @@ class MU_UL_steps(bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index):
         row = layout.row(align=True)
         drawable = row.row()
-        drawable.enabled = item.name in unit_object.DRAWN
+        drawable.enabled = item.name in DRAWN
         drawable.prop(item, "shown", text="", emboss=False, icon="HIDE_OFF" if item.shown else "HIDE_ON")
         name = row.row()
         name.active = not item.muted
@@ -51,7 +51,7 @@ class MU_PT_stack(UnitPanel, bpy.types.Panel):
         column = layout.column(align=True)
         column.enabled = not entry.muted
         for section, name in stack.own_parameters(step):
-            column.prop(getattr(props, section), name)
+            parameter(column, root, section, stack.description(section, name))
         row = layout.row(align=True)
         if step.name == "solid":
             row.operator("mu.solid")

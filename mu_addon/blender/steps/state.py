@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from ...design.anchors import windows
-from ...design.parameters import Unit
+from ...design.parameters import SECTIONS, Unit
+from ...design.quantity import Description, describe
 from ...design.steps import STEPS, Stack, Step, StepInputs
 from ..body import state as bodies
 
@@ -50,3 +51,9 @@ def given(root: Any, unit: Unit, quality: str = "interactive") -> StepInputs:
 def own_parameters(step: Step) -> list[tuple[str, str]]:
     """(section, name) of a step's own parameters."""
     return [(section, name) for section, name in (path.split(".") for path in step.own)]
+
+
+def description(section: str, name: str) -> Description:
+    """What the core says of a parameter."""
+    (core,) = (s for s in SECTIONS if s.section == section)
+    return next(d for d in describe(core) if d.name == name)

@@ -19,7 +19,8 @@ from ...measured.kinds import ROLES
 from ...measured.video import View
 from ...usecases.track_video.run import Bench, MarkerSettings
 from ..shared.registration import property_group_factory
-from ..unit.properties import BESIDE_BLEND_FILE, exact
+from ..unit.fields import exact
+from ..unit.properties import BESIDE_BLEND_FILE
 
 
 def _track(name: str, description: str):

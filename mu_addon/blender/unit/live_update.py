@@ -53,7 +53,7 @@ def _rebuild_pending():
 def _show(root) -> None:
     """Show the parts that belong to what the user wants to see, preview or solid."""
     if not updates.are_paused() and root.mu_unit.uuid:
-        unit_object.show_parts(root)
+        unit_object.show(root)
 
 
 @persistent

@@ -1,19 +1,18 @@
-"""A unit in the scene: a root object that holds its parameters, and parts that are rebuilt from them.
+"""A unit in the scene: one mesh object that holds its parameters, and a mesh that is rebuilt from them.
 
-The root is found by its UUID, since undo deletes and restores objects; parts are the root's children, known
-by the custom property `mu_part`.
+Its mesh is the preview or, where the user wants to see that, the printable solid; both are kept by pointers
+of its properties, with the user's own envelope. The object is found by its UUID, since undo deletes and
+restores objects.
 """
 
 from __future__ import annotations
 
 import json
 import uuid
-from collections.abc import Callable
 from typing import Any
 
 import attrs
 import bpy
-import numpy as np
 
 from ...design.anchors import Window, windows
 from ...design.body import Body
@@ -23,36 +22,22 @@ from ...errors import InputError, MuError
 from ..body import state as bodies
 from ..path import ranking
 from ..preview import materials, nodes, skeletons
-from ..shared import updates
-from ..shared.compat import set_modifier_input
-from ..shared.texts import error_text
+from ..preview.nodes import unit as unit_group
+from ..shared import displays, scene_units, updates
 from ..steps import state as stack
-from .properties import from_unit, to_unit
+from . import broken, drawing
+from .properties import from_unit, shape_hash, to_unit
 
-PART = "mu_part"
-MOTION = "mu_motion"
-"""Marks the parts that show a study's motion, see `results.motion`."""
-EVIDENCE = "mu_evidence_part"
-"""Marks the parts that show measured motion, see `evidence.motion`."""
-CHECK = "mu_check"
-"""Marks the objects that show what a print check found, see `printing.marks`."""
-LEGEND = "mu_legend"
-"""Marks the objects of a legend in the scene, see `results.legend_object`."""
-TWIN = "mu_twin"
-"""Marks the parts that move as the real unit does, see `sensor.twin`."""
-CANDIDATE = "candidate:"
-FREE = "free"
-"""The best path of the whole lattice, where a study has looked for it."""
 SOLID = "solid"
 
 
 def roots() -> list[Any]:
-    """Root objects of all units in the file."""
-    return [o for o in bpy.data.objects if o.mu_unit.uuid]
+    """All units of this file; those of linked libraries are none of them."""
+    return [o for o in bpy.data.objects if o.mu_unit.uuid and displays.editable(o)]
 
 
 def root_of(obj: Any) -> Any | None:
-    """The root that an object is or belongs to, or None."""
+    """The unit that an object is or belongs to, or None."""
     while obj is not None:
         if obj.mu_unit.uuid:
             return obj
@@ -70,18 +55,18 @@ def active_root(context: Any) -> Any | None:
 
 
 def by_uuid(name: str) -> Any | None:
-    """The root of that UUID, or None where it was deleted."""
+    """The unit of that UUID, or None where it was deleted."""
     return next((o for o in roots() if o.mu_unit.uuid == name), None)
 
 
-def part(root: Any, name: str) -> Any | None:
-    """The root's part of that name, or None."""
-    return next((child for child in root.children if child.get(PART) == name), None)
+def candidate(root: Any, name: str) -> Any | None:
+    """The object that shows the candidate path of that name, or None."""
+    return drawing.beside(root, drawing.CANDIDATE + name)
 
 
 def create(context: Any, unit: Unit) -> Any:
     """A new unit at the 3D cursor of the scene, with its preview, selected and active."""
-    root = new_root(context, "Monolithic Unit", unit.dimensions.cell)
+    root = new_root(context, unit.name)
     with updates.paused():
         root.mu_unit.uuid = uuid.uuid4().hex
         stack.fill(root.mu_unit)
@@ -91,13 +76,14 @@ def create(context: Any, unit: Unit) -> Any:
     return root
 
 
-def new_root(context: Any, title: str, size: float) -> Any:
-    """A root object, to hold parameters and parts, at the scene's 3D cursor; size in mm of its axes."""
-    root = bpy.data.objects.new(title, None)
-    root.empty_display_type = "ARROWS"
-    root.empty_display_size = size
+def new_root(context: Any, title: str) -> Any:
+    """A root object, to hold parameters and a mesh in mm, in its true size at the scene's 3D cursor."""
+    root = bpy.data.objects.new(title, bpy.data.meshes.new(title))
     context.collection.objects.link(root)
     root.location = context.scene.cursor.location
+    root.scale = (scene_units.mm(context.scene),) * 3
+    # Its size is the design's: scaled by hand it would show another unit than the one that is simulated.
+    root.lock_scale = (True, True, True)
     return root
 
 
@@ -110,19 +96,15 @@ def make_active(context: Any, obj: Any) -> None:
 
 
 def delete(root: Any) -> None:
-    """Remove a unit with all its parts."""
+    """Remove a unit with all that shows it; children of the user's own stay."""
+    meshes = [root.data, root.mu_unit.preview, root.mu_unit.solid, root.mu_unit.envelope]
     for child in root.children_recursive:
-        if any(child.get(mark) for mark in (PART, MOTION, EVIDENCE, CHECK, TWIN, LEGEND)):
-            remove_part(child)
+        if child.get(displays.OWNER) == root.mu_unit.uuid:
+            displays.remove(child)
     bpy.data.objects.remove(root)
-
-
-def remove_part(obj: Any) -> None:
-    """Remove a part and, where nothing else uses it, its mesh or text."""
-    data = obj.data
-    bpy.data.objects.remove(obj)
-    if data is not None and not data.users:
-        (bpy.data.curves if isinstance(data, bpy.types.Curve) else bpy.data.meshes).remove(data)
+    for mesh in dict.fromkeys(mesh for mesh in meshes if mesh is not None):
+        if not mesh.users:
+            bpy.data.meshes.remove(mesh)
 
 
 def chosen_window(root: Any, unit: Unit) -> Window | None:
@@ -133,34 +115,28 @@ def chosen_window(root: Any, unit: Unit) -> Window | None:
 
 
 def behind(root: Any) -> bool:
-    """Whether the preview was built from other parameters than the root now has."""
+    """Whether the preview was built from other parameters than the unit now has."""
     return bool(root.mu_unit.built != _fingerprint(root))
 
 
 def rebuild(root: Any) -> bool:
     """Build the preview from the parameters; where they break a rule the last good one stays."""
     props = root.mu_unit
-    _own_uuid(root)
+    if root.mode == "EDIT":
+        return not props.trouble
     with updates.paused():
         stack.fill(props)
     try:
         unit = to_unit(props)
         _draw(root, unit)
+        broken.keep(root, unit)
         trouble = ""
     except MuError as error:
-        trouble = error_text(error)
+        trouble = broken.words(error)
     if props.trouble != trouble:
         props.trouble = trouble
     props.built = _fingerprint(root)
     return not trouble
-
-
-def _own_uuid(root: Any) -> None:
-    """A duplicate carries its original's UUID: the later of the two, by name, becomes a unit of its own."""
-    same = sorted(o.name for o in roots() if o.mu_unit.uuid == root.mu_unit.uuid)
-    if len(same) > 1 and same[0] != root.name:
-        root.mu_unit.uuid = uuid.uuid4().hex
-        root.mu_unit.study.folder = ""
 
 
 def _fingerprint(root: Any) -> str:
@@ -172,145 +148,81 @@ def _fingerprint(root: Any) -> str:
         return error.what
     steps = "".join(f"{entry.name}{entry.muted:d}{entry.shown:d}" for entry in props.stack)
     known = (ranking.ranked(root), ranking.free(root)) if props.candidates else ()
-    shown = unit.hash(), props.path, props.cut, props.candidates, steps, bodies.fingerprint(root), known
+    shown = shape_hash(unit), props.path, props.cut, props.candidates, steps, bodies.fingerprint(root), known
     return "|".join(map(str, shown))
 
 
 def _draw(root: Any, unit: Unit) -> None:
     props = root.mu_unit
     given = stack.given(root, unit)
-    shown = [entry.name for entry in props.stack if entry.shown]
-    shapes = {}
-    try:
-        for step in shown:
-            if step in DRAWN:
-                name, draw = DRAWN[step]
-                skeleton = draw(stack.STACK.value(step, given), given, props.cut)
-                if skeleton is not None:
-                    shapes[name] = skeleton
-        if props.candidates:
-            paths = skeletons.candidates(unit)
-            shapes |= {CANDIDATE + name: skeleton for name, skeleton in paths.items()}
-            free = ranking.free(root)
-            if free is not None:
-                name, _, points = free
-                shapes[FREE] = skeletons.free_path(points, name, unit.dimensions.cell)
-    finally:
-        for name, skeleton in shapes.items():
-            _put(root, name, skeleton)
-        tubes = {n.removeprefix(CANDIDATE): part(root, n) for n in shapes if n.startswith(CANDIDATE)}
-        ranking.colour_and_label(root, tubes)
-        for child in list(root.children):
-            name = child.get(PART)
-            if name not in (None, SOLID, *bodies.PARTS, *shapes):
-                remove_part(child)
-    show_parts(root)
+    drawn = drawing.shapes(given, [entry.name for entry in props.stack if entry.shown], props.cut)
+    separate(root)
+    drawing.write(root, props.preview, drawn)
+    drawing.put_candidates(root, unit, props.candidates)
+    show(root)
 
 
-DRAWN: dict[str, tuple[str, Callable[[Any, Any, bool], skeletons.Skeleton | None]]] = {
-    "profile": ("profile", lambda value, given, cut: skeletons.outline(value)),
-    "chambers": ("chambers", lambda value, given, cut: skeletons.cavity(value, cut)),
-    "membranes": ("actuator", lambda value, given, cut: skeletons.actuator(value, cut)),
-    "cells": ("cells", lambda value, given, cut: skeletons.boxes(value)),
-    "trim": ("trim", lambda value, given, cut: skeletons.lines(value, cut)),
-    "struts": ("lattice", lambda value, given, cut: skeletons.lattice(value, cut)),
-    "anchors": (
-        "anchors",
-        lambda value, given, cut: skeletons.anchor_skeleton(value, stack.STACK.value("struts", given)),
-    ),
-    "path": ("path", lambda value, given, cut: skeletons.line_through(value)),
-    "wells": ("waveguide", lambda value, given, cut: skeletons.bar(value)),
-}
-"""The part that a step's value becomes, and how it is drawn: from the value, what was given, the cut."""
-
-_LOOKS = {
-    "actuator": ("Actuator", ("MU Membrane", "MU Section"), ""),
-    "lattice": ("Lattice", ("MU Lattice",), "MU Tubes"),
-    "anchors": ("Anchors", ("MU Anchors",), "MU Balls"),
-    "waveguide": ("Waveguide", ("MU Waveguide", "MU Wells"), ""),
-    "profile": ("Profile", ("MU Membrane",), ""),
-    "chambers": ("Chambers", ("MU Section",), ""),
-    "cells": ("Cells", ("MU Lattice",), ""),
-    "trim": ("Strut Axes", ("MU Lattice",), ""),
-    "path": ("Path", ("MU Waveguide",), ""),
-    FREE: ("Free Path", ("MU Waveguide",), "MU Labelled Tube"),
-    bodies.ENVELOPE: ("Envelope", ("MU Lattice",), ""),
-    bodies.FLAWS: ("Flaws", ("MU Flaws",), "MU Balls"),
-    SOLID: ("Solid", ("MU Solid",), ""),
-}
+def separate(root: Any) -> None:
+    """Give a unit a preview of its own, which no duplicate shares."""
+    props = root.mu_unit
+    if props.preview is None and props.solid != root.data:
+        props.preview = root.data
+    others = [m for o in roots() if o != root for m in (o.data, o.mu_unit.preview)]
+    mesh = drawing.own_mesh(root, props.preview, others)
+    if mesh != props.preview:
+        props.preview = mesh
+        show(root)
 
 
-def _put(root: Any, name: str, skeleton: skeletons.Skeleton) -> None:
-    title, colours, group = _LOOKS.get(
-        name, (name.removeprefix(CANDIDATE), ("MU Candidate",), "MU Labelled Tube")
-    )
-    obj = part(root, name) or _new_part(root, name, title)
-    if obj.mode == "EDIT":
+def show(root: Any) -> None:
+    """Show preview or solid, as the unit's properties say; without a solid, the preview."""
+    props = root.mu_unit
+    if root.mode == "EDIT" or props.preview is None:
         return
-    if obj.data.users > 1:  # a linked duplicate's
-        obj.data = bpy.data.meshes.new(title)
-    skeletons.write(obj.data, skeleton, smooth=name != "waveguide")
-    materials.assign(obj.data, *colours)
-    if name.startswith(CANDIDATE):
-        chosen = name == CANDIDATE + root.mu_unit.path
-        obj.data.materials[0] = materials.material("MU Waveguide" if chosen else "MU Candidate")
-    _skin(obj, group, skeleton)
-
-
-def draw_part(obj: Any, name: str, skeleton: skeletons.Skeleton) -> None:
-    """Draw a skeleton as the part of that name looks, on any object with a mesh of its own."""
-    _, colours, group = _LOOKS[name]
-    skeletons.write(obj.data, skeleton, smooth=name != "waveguide")
-    materials.assign(obj.data, *colours)
-    _skin(obj, group, skeleton)
-
-
-def _skin(obj: Any, group: str, skeleton: skeletons.Skeleton) -> None:
-    if not skeleton.attributes:
-        obj.modifiers.clear()  # struts without thickness stay lines
-    elif group:
-        modifier = nodes.skin(obj, group)
-        for socket, value in {"Material": obj.data.materials[0], **skeleton.inputs}.items():
-            set_modifier_input(modifier, socket, value)
-
-
-def _new_part(root: Any, name: str, title: str) -> Any:
-    obj = bpy.data.objects.new(title, bpy.data.meshes.new(title))
-    obj[PART] = name
-    for collection in root.users_collection:
-        collection.objects.link(obj)
-    obj.parent = root
-    # Parts follow their root; moved by hand they would no longer show the unit.
-    obj.lock_location = obj.lock_rotation = obj.lock_scale = (True, True, True)
-    return obj
+    mesh, old = props.preview, root.data
+    if props.show == SOLID and props.solid is not None:
+        mesh = props.solid
+    if old != mesh:
+        root.data = mesh
+        if old is not None and not old.users and old.library is None:
+            bpy.data.meshes.remove(old)
+    modifier = nodes.skin(root, unit_group.NAME)
+    skinned = mesh == props.preview
+    if modifier.show_viewport != skinned:
+        modifier.show_viewport = modifier.show_render = skinned
 
 
 def put_solid(root: Any, solid: Any, unit: Unit) -> Any:
-    """Make the core's printable solid the root's part `solid`, with its gates and what it was built from."""
-    obj = part(root, SOLID) or _new_part(root, SOLID, "Solid")
-    skeleton = skeletons.Skeleton(solid.vertices, faces=(solid.triangles,))
-    skeletons.write(obj.data, skeleton)
-    materials.assign(obj.data, "MU Solid")
-    obj["mu_unit_hash"] = unit.hash()
-    obj["mu_path"] = solid.window.name if solid.window else ""
-    obj["mu_body"] = bodies.fingerprint(root)
-    obj["mu_quality"] = solid.quality
-    obj["mu_gates"] = json.dumps(attrs.asdict(solid.gates))
+    """Keep the core's printable solid as a mesh of the unit, with its gates and what it was built from."""
+    old = root.mu_unit.solid
+    mesh = bpy.data.meshes.new(f"{root.name} solid")
+    skeletons.write(mesh, skeletons.Skeleton(solid.vertices, faces=(solid.triangles,)))
+    materials.assign(mesh, "MU Solid")
+    mesh["mu_unit_hash"] = shape_hash(unit)
+    mesh["mu_path"] = solid.window.name if solid.window else ""
+    mesh["mu_body"] = bodies.fingerprint(root)
+    mesh["mu_quality"] = solid.quality
+    mesh["mu_gates"] = json.dumps(attrs.asdict(solid.gates))
     with updates.paused():
-        root.mu_unit.show = SOLID
-    show_parts(root)
-    return obj
+        root.mu_unit.solid, root.mu_unit.show = mesh, SOLID
+    show(root)
+    if old is not None and not old.users:
+        bpy.data.meshes.remove(old)
+    return mesh
 
 
-def solid_is_current(root: Any, obj: Any) -> bool:
-    """Whether the solid was built from the parameters, the path and the body that the root has now."""
+def solid_is_current(root: Any) -> bool:
+    """Whether there is a solid, built from the parameters, the path and the body that the unit has now."""
+    mesh = root.mu_unit.solid
+    if mesh is None:
+        return False
     try:
         unit = to_unit(root.mu_unit)
     except InputError:
         return False
     window = chosen_window(root, unit)
-    now = unit.hash(), window.name if window else "", bodies.fingerprint(root)
-    return now == (obj["mu_unit_hash"], obj["mu_path"], obj.get("mu_body", ""))
+    now = shape_hash(unit), window.name if window else "", bodies.fingerprint(root)
+    return now == (mesh["mu_unit_hash"], mesh["mu_path"], mesh.get("mu_body", ""))
 
 
 def solid_of(root: Any, unit: Unit, quality: str = "interactive") -> Solid:
@@ -320,41 +232,21 @@ def solid_of(root: Any, unit: Unit, quality: str = "interactive") -> Solid:
 
 
 def put_envelope(root: Any, body: Body) -> Any:
-    """Keep a body of the user's as the unit's envelope: a wire, hidden, since the lattice shows it."""
-    obj = part(root, bodies.ENVELOPE) or _new_part(root, bodies.ENVELOPE, body.name)
-    skeletons.write(obj.data, skeletons.Skeleton(body.vertices, faces=(body.triangles,)), smooth=False)
-    obj.display_type = "WIRE"
-    obj.hide_render = True
-    obj.hide_set(True)
-    return obj
+    """Keep a body of the user's as the unit's envelope; it is not drawn, since the lattice shows it."""
+    mesh = bpy.data.meshes.new(body.name)
+    skeletons.write(mesh, skeletons.Skeleton(body.vertices, faces=(body.triangles,), smooth=False))
+    remove_envelope(root)
+    root.mu_unit.envelope = mesh
+    return mesh
 
 
-def remove_bodies(root: Any) -> None:
-    """Take the user's envelope out of the unit, and the marks of flaws."""
-    for child in list(root.children):
-        if child.get(PART, "") in bodies.PARTS:
-            remove_part(child)
+def remove_envelope(root: Any) -> None:
+    """Take the user's envelope out of the unit."""
+    old, root.mu_unit.envelope = root.mu_unit.envelope, None
+    if old is not None and not old.users:
+        bpy.data.meshes.remove(old)
 
 
 def mark(root: Any, places: list[Any]) -> None:
     """Put a red ball at every place (3,) in mm of the unit's frame, in place of those that were there."""
-    old = part(root, bodies.FLAWS)
-    if old is not None:
-        remove_part(old)
-    if len(places):
-        radius = np.full(len(places), 0.08 * to_unit(root.mu_unit).dimensions.cell)
-        _put(root, bodies.FLAWS, skeletons.Skeleton(np.array(places), attributes={"radius": radius}))
-        part(root, bodies.FLAWS).show_in_front = True
-
-
-def show_parts(root: Any) -> None:
-    """Show preview or solid, as the root says; without a solid, the preview."""
-    solid = part(root, SOLID)
-    whole = root.mu_unit.show == SOLID and solid is not None
-    for child in root.children:
-        name = child.get(PART)
-        if name is None or name.startswith(CANDIDATE):
-            continue
-        hidden = whole != (name == SOLID)
-        if child.hide_viewport != hidden:
-            child.hide_viewport = child.hide_render = hidden
+    drawing.put_flaws(root, places, 0.08 * to_unit(root.mu_unit).dimensions.cell)

@@ -8,24 +8,16 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ...design.parameters import Unit
 from ...design.quantity import describe
-from ..shared.operators import UnitOperator, reports_errors
+from ...errors import InputError
+from ..scene import landing
+from ..shared import scene_units
+from ..shared.operators import NO_UNIT, UnitOperator, reports_errors
 from . import object as unit_object
 from . import presets
-from .properties import exact, tooltip
+from .broken import broken
+from .fields import exact, tooltip
 
 _SCALE = next(d for d in describe(Unit) if d.name == "scale")
-
-
-def in_millimetres(scene) -> bool:
-    """Whether one Blender unit of the scene is a millimetre."""
-    units = scene.unit_settings
-    return units.system == "METRIC" and abs(units.scale_length - 0.001) < 1e-9
-
-
-def use_millimetres(scene) -> None:
-    """One Blender unit is a millimetre, shown as such."""
-    units = scene.unit_settings
-    units.system, units.scale_length, units.length_unit = "METRIC", 0.001, "MILLIMETERS"
 
 
 _items: list[tuple[str, str, str]] = []
@@ -60,8 +52,8 @@ class MU_OT_add(bpy.types.Operator):
     )
     millimetres: BoolProperty(
         name="Scene in Millimetres",
-        description="Set the scene's unit, one Blender unit a millimetre",
-        default=True,
+        description="Also set the scene's unit of length, one Blender unit a millimetre",
+        default=False,
     )
     # The preset that the scale belongs to: another one, chosen in the redo panel, brings its own scale.
     scaled: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
@@ -78,41 +70,71 @@ class MU_OT_add(bpy.types.Operator):
         if exact(self.scale) != core.scale:
             core = attrs.evolve(core, scale=max(exact(self.scale), _SCALE.low))
         if self.millimetres:
-            use_millimetres(context.scene)
+            scene_units.use_millimetres(context.scene)
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         root = unit_object.create(context, core)
+        landing.land(context, root)
         if self.frame and not bpy.app.background:
             _frame(context, root)
         return {"FINISHED"}
 
 
 def _frame(context, root):
-    """Bring a unit into the 3D view: it is 75 mm tall, and Blender's view begins 15 units wide."""
+    """Bring a unit into the 3D view: a scene may be metres wide, and a unit is 75 mm tall."""
     area = context.area if context.area and context.area.type == "VIEW_3D" else None
     area = area or next((a for a in context.screen.areas if a.type == "VIEW_3D"), None)
-    if area is None:
-        return
-    region = next(r for r in area.regions if r.type == "WINDOW")
-    parts = [c for c in root.children if not c.get(unit_object.PART, "").startswith(unit_object.CANDIDATE)]
-    for child in parts:
-        child.select_set(True)
-    context.view_layer.update()
-    with context.temp_override(area=area, region=region):
-        bpy.ops.view3d.view_selected()
-    for child in parts:
-        child.select_set(False)
+    if area is not None:
+        region = next(r for r in area.regions if r.type == "WINDOW")
+        with context.temp_override(area=area, region=region):
+            bpy.ops.view3d.view_selected()
 
 
 class MU_OT_rebuild(UnitOperator, bpy.types.Operator):
-    """Build the preview again from the parameters, with every part that was deleted"""
+    """Build the unit's mesh again from its parameters, with everything that was edited or deleted by hand"""
 
     bl_idname = "mu.rebuild"
-    bl_label = "Rebuild Preview"
+    bl_label = "Rebuild Unit"
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
         root = unit_object.active_root(context)
+        if root.mode == "EDIT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        if not unit_object.rebuild(root):
+            self.report({"ERROR"}, root.mu_unit.trouble)
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class MU_OT_fit(UnitOperator, bpy.types.Operator):
+    """Set a parameter to the value nearest to its present one that keeps every design rule"""
+
+    bl_idname = "mu.fit"
+    bl_label = "Use the Value That Fits"
+    bl_options = {"REGISTER", "UNDO"}
+
+    section: StringProperty(name="Section", description="Section of the parameter: chambers, lattice ...")
+    name: StringProperty(name="Parameter", description="Name of the parameter")
+    why: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    @classmethod
+    def description(cls, context, properties):
+        """The rule in full, which the head of the panel may have no room for."""
+        return f"{properties.why}\n\nSet the nearest value that fits" if properties.why else cls.__doc__
+
+    @reports_errors
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        found = broken(root)
+        value = None if found is None else found.fits.get((self.section, self.name))
+        if value is None:
+            raise InputError(
+                f"{self.section}.{self.name} breaks no rule that another value of it would keep",
+                "design",
+                "change another field",
+            )
+        setattr(getattr(root.mu_unit, self.section), self.name, value)
         if not unit_object.rebuild(root):
             self.report({"ERROR"}, root.mu_unit.trouble)
             return {"CANCELLED"}
@@ -120,7 +142,7 @@ class MU_OT_rebuild(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_delete(UnitOperator, bpy.types.Operator):
-    """Delete the unit with all its parts; its study folder stays"""
+    """Delete the unit with all that shows its results; its study folder stays"""
 
     bl_idname = "mu.delete"
     bl_label = "Delete Unit"
@@ -139,23 +161,30 @@ class MU_OT_millimetres(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
-        use_millimetres(context.scene)
+        scene_units.use_millimetres(context.scene)
         return {"FINISHED"}
 
 
 class MU_OT_select(UnitOperator, bpy.types.Operator):
-    """Make the unit's root the active object, which holds its parameters and moves all its parts"""
+    """Select the unit itself, alone, where something that shows its results is the active object"""
 
     bl_idname = "mu.select"
     bl_label = "Select Unit"
     bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if unit_object.active_root(context) is None:
+            cls.poll_message_set(NO_UNIT)
+            return False
+        return True
 
     def execute(self, context):
         unit_object.make_active(context, unit_object.active_root(context))
         return {"FINISHED"}
 
 
-CLASSES = (MU_OT_add, MU_OT_rebuild, MU_OT_delete, MU_OT_millimetres, MU_OT_select)
+CLASSES = (MU_OT_add, MU_OT_rebuild, MU_OT_fit, MU_OT_delete, MU_OT_millimetres, MU_OT_select)
 
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

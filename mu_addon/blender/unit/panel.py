@@ -5,12 +5,11 @@ from __future__ import annotations
 import bpy
 
 from ..body import panel as body_panel
-from ..body import state as bodies
 from ..gripper import object as gripper_object
-from ..shared.operators import NO_UNIT
-from ..shared.panels import TabPanel, UnitPanel, alert, parameters, wrapped
+from ..shared.operators import NO_UNIT, linked
+from ..shared.panels import CHARACTERS, TabPanel, UnitPanel, parameters, wrapped
+from . import figures
 from . import object as unit_object
-from .operators import in_millimetres
 
 
 class MU_PT_unit(TabPanel, bpy.types.Panel):
@@ -32,21 +31,34 @@ class MU_PT_unit(TabPanel, bpy.types.Panel):
             layout.operator("mu.add", text="Add Monolithic Unit", icon="ADD")
             layout.menu("MU_MT_more", icon="DOWNARROW_HLT")
             return
-        if not in_millimetres(context.scene):
-            box = layout.box()
-            wrapped(box, "The scene is not in millimetres: lengths are shown wrong", "ERROR")
-            box.operator("mu.millimetres")
+        if linked(root):
+            wrapped(layout, linked(root), "LINKED")
         row = layout.row(align=True)
-        row.menu("MU_MT_presets", text=root.mu_unit.title, icon="PRESET")
+        row.prop(root, "name", text="")
+        row.operator("mu.select", text="", icon="RESTRICT_SELECT_OFF")
+        row.operator("mu.rebuild", text="", icon="FILE_REFRESH")
+        row.operator("mu.delete", text="", icon="TRASH")
+        row = layout.row(align=True)
+        row.menu("MU_MT_presets", icon="PRESET")
         row.operator("mu.preset_save", text="", icon="ADD")
         row.menu("MU_MT_more", text="", icon="DOWNARROW_HLT")
         layout.row(align=True).prop(root.mu_unit, "show", expand=True)
         row = layout.row()
         row.enabled = root.mu_unit.show != unit_object.SOLID
         row.prop(root.mu_unit, "cut", icon="MOD_BOOLEAN", toggle=True)
-        if root.mu_unit.trouble:
-            alert(layout, root.mu_unit.trouble)
-            wrapped(layout, "The preview shows the last valid design", "INFO")
+        _head(layout, root)
+
+
+def _head(layout, root) -> None:
+    """What the unit comes to or, in red, the rule that it breaks: as many lines either way."""
+    lines, wrong = figures.lines(root, CHARACTERS + 2)
+    box = layout.box()
+    box.alert = wrong
+    column = box.column(align=True)
+    column.scale_y = 0.85
+    for number, line in enumerate(lines):
+        icon = ("ERROR" if wrong else "DRIVER_DISTANCE") if number == 0 else "BLANK1"
+        column.label(text=line, icon=icon)
 
 
 class MU_PT_design(UnitPanel, bpy.types.Panel):
@@ -57,9 +69,8 @@ class MU_PT_design(UnitPanel, bpy.types.Panel):
     bl_options = set()
 
     def show(self, layout, context, root):
-        layout.prop(root.mu_unit, "title")
         layout.prop(root.mu_unit, "scale")
-        parameters(layout, root.mu_unit, "design")
+        parameters(layout, root, "design")
 
 
 class MU_PT_lattice(UnitPanel, bpy.types.Panel):
@@ -69,8 +80,8 @@ class MU_PT_lattice(UnitPanel, bpy.types.Panel):
     bl_label = "Lattice"
 
     def show(self, layout, context, root):
-        envelope = unit_object.part(root, bodies.ENVELOPE)
-        parameters(layout, root.mu_unit, "lattice")
+        envelope = root.mu_unit.envelope
+        parameters(layout, root, "lattice")
         if envelope is not None:
             wrapped(layout, f"The lattice fills {envelope.name}; counts of cells are not used", "INFO")
         body_panel.draw(layout, root)

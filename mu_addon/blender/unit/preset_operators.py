@@ -2,6 +2,7 @@
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
+import attrs
 import bpy
 from bpy.props import StringProperty
 
@@ -25,6 +26,8 @@ class MU_OT_preset_load(UnitOperator, bpy.types.Operator):
     def execute(self, context):
         root = unit_object.active_root(context)
         core = presets.load(self.name)
+        if not presets.is_named_after_one(root.name):
+            core = attrs.evolve(core, name=root.mu_unit.title)  # the user's own name stays
         with updates.paused():
             from_unit(root.mu_unit, core)
         unit_object.rebuild(root)

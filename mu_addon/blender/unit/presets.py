@@ -17,6 +17,11 @@ def names() -> list[str]:
     return [*preset_names(), *(USER + path.stem for path in sorted(_folder().glob("*.toml")))]
 
 
+def is_named_after_one(name: str) -> bool:
+    """Whether an object has a preset's name, with the number that Blender gives to the second of a name."""
+    return re.sub(r"\.\d{3,}$", "", name) in {known.removeprefix(USER) for known in names()}
+
+
 def load(name: str) -> Unit:
     """The unit of that preset; raises InputError."""
     return read_unit(_file(name)) if name.startswith(USER) else load_preset(name)

@@ -7,6 +7,7 @@ A parameter that the core gains appears here, with its bounds, meaning and sourc
 
 import textwrap
 
+import attrs
 import bpy
 import numpy as np
 from bpy.props import (
@@ -22,62 +23,12 @@ from bpy.props import (
 from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
 from ..shared.registration import property_group_factory
-from ..shared.texts import sentence
 from ..shared.updates import Signal
+from .fields import blender_property, exact, generated_fields, tied
 
 PARAMETERS_CHANGED, VIEW_CHANGED = Signal(), Signal()
 """Sent with the root whose parameters changed, and with one of which other parts are to be seen."""
-UNITS = ("mm", "kPa", "s")
 BESIDE_BLEND_FILE = {"PATH_SUPPORTS_BLEND_RELATIVE"}
-
-
-def exact(value: float) -> float:
-    """The shortest decimal number that Blender's single precision stands for: 0.9 for 0.8999999762."""
-    return float(str(np.float32(value)))
-
-
-def label(d: Description) -> str:
-    """Name of a parameter for a panel: `bladder_diameter_mm` becomes "Bladder Diameter"."""
-    words = d.name.split("_")
-    unit = words.pop() if words[-1] in UNITS else ""
-    text = " ".join(word if word.isupper() else word.capitalize() for word in words)
-    return f"{text} ({unit})" if unit and unit != "mm" else text
-
-
-def tooltip(d: Description) -> str:
-    """What a parameter is, its bounds and where its value comes from; Blender adds the last full stop."""
-    allowed = f". {d.allowed} {d.unit}".rstrip() if d.allowed else ""
-    fixed = ". The same at every scale" if d.fixed else ""
-    return f"{sentence(d.text)}{allowed}{fixed}.\nSource: {d.source}"
-
-
-def blender_property(d: Description, update=None, options=frozenset()):
-    """The Blender property of one parameter."""
-    shared = {
-        "name": label(d),
-        "description": tooltip(d),
-        "update": update,
-        "options": {"ANIMATABLE", *options},
-    }
-    if d.choices:
-        items = [
-            (name, name.replace("-", " ").capitalize(), textwrap.shorten(d.text, 60)) for name in d.choices
-        ]
-        return EnumProperty(items=items, default=d.default, **shared)
-    if d.type is bool:
-        return BoolProperty(default=d.default, **shared)
-    if d.type is int:
-        return IntProperty(default=d.default, min=int(d.low), max=int(d.high), **shared)
-    length = {"subtype": "DISTANCE"} if d.unit == "mm" else {}
-    return FloatProperty(
-        default=d.default,
-        min=d.low,
-        max=d.high,
-        precision=3 if d.high < 1000 else 1,
-        step=10 if d.high > 20 else 1,
-        **length,
-        **shared,
-    )
 
 
 def _changed(group, context):
@@ -85,7 +36,7 @@ def _changed(group, context):
 
 
 def _generated(section: type):
-    annotations = {d.name: blender_property(d, _changed) for d in describe(section)}
+    annotations = generated_fields(section, _changed)
     name = f"MU_PG_{section.section}"
     return type(
         name, (bpy.types.PropertyGroup,), {"__annotations__": annotations, "__doc__": section.__doc__}
@@ -201,18 +152,26 @@ class MU_PG_step(bpy.types.PropertyGroup):
     shown: BoolProperty(name="Show", description="Show what this step gives in the preview", update=_changed)
 
 
+def title_property(noun: str):
+    """The name of an object that is a unit or gripper, as the core may have it: one line, 80 characters."""
+
+    def read(group) -> str:
+        name = "".join(c if c.isprintable() else " " for c in group.id_data.name)
+        return name.strip()[:80] or noun
+
+    def write(group, value: str) -> None:
+        group.id_data.name = value
+
+    text = f"Name of the {noun}, which is that of its object"
+    return StringProperty(name="Name", description=text, get=read, set=write)
+
+
 class MU_PG_unit(bpy.types.PropertyGroup):
     """One Monolithic Unit, kept on its root object."""
 
     __annotations__ = {
         "uuid": StringProperty(options={"HIDDEN"}),
-        "title": StringProperty(
-            name="Name",
-            description="Name of the unit, one line of 1 to 80 printable characters",
-            default="custom",
-            maxlen=80,
-            update=_changed,
-        ),
+        "title": title_property("unit"),
         "scale": blender_property(_HEAD["scale"], _changed),
         **{
             name: PointerProperty(type=group, description=textwrap.shorten(group.__doc__ or name, 200))
@@ -244,6 +203,11 @@ class MU_PG_unit(bpy.types.PropertyGroup):
             default="preview",
             update=_view_changed,
         ),
+        # What the object's mesh is, one or the other, and the envelope of the user's own.
+        **{
+            name: PointerProperty(type=bpy.types.Mesh, options={"HIDDEN"})
+            for name in ("preview", "solid", "envelope")
+        },
         # What the preview was last built from, and why it could not follow the parameters.
         "built": StringProperty(options={"HIDDEN"}),
         "trouble": StringProperty(options={"HIDDEN"}),
@@ -257,13 +221,24 @@ def section_of(props, section: str) -> dict:
     """Values of one section of a unit's properties, as the core's parameters."""
     group = getattr(props, section)
     (core,) = (s for s in SECTIONS if s.section == section)
-    return {d.name: _value(d, getattr(group, d.name)) for d in describe(core)}
+    values = {d.name: _value(d, getattr(group, d.name)) for d in describe(core)}
+    if section == "chambers":
+        bladder = tied({"cell_mm": values["cell_mm"]})["bladder_diameter_mm"]
+        # One value in two properties: single precision may round them apart.
+        if np.isclose(values["bladder_diameter_mm"], bladder, rtol=1e-6):
+            values["bladder_diameter_mm"] = bladder
+    return values
 
 
 def to_unit(props) -> Unit:
     """The core's unit that Blender's properties stand for; raises InputError where a rule is broken."""
     sections = {s.section: s(**section_of(props, s.section)) for s in SECTIONS}
     return Unit(name=props.title, scale=exact(props.scale), **sections)
+
+
+def shape_hash(unit: Unit) -> str:
+    """Hash of a unit but for its name: a new name makes no result old."""
+    return attrs.evolve(unit, name="unit").hash()
 
 
 def from_unit(props, unit: Unit) -> None:

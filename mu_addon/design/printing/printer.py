@@ -21,6 +21,7 @@ MEANING = {
     "build_z_mm": "height of the build volume above the platform",
     "support_mm": "height that supports and raft lift the part above the platform",
     "layer_mm": "height of a layer",
+    "layer_s": "time that a layer takes in s",
     "solid_mm": "thinnest solid",
     "wall_mm": "thinnest wall between a chamber and the outside",
     "strut_mm": "thinnest strut",
@@ -55,8 +56,11 @@ class Limit:
         return "measured" if self.measured else "assumed" if self.assumed else "published"
 
 
-# For files that do not give it, as those of older versions.
-SUPPORTS = Limit(7.0, "a raft of 2 mm and supports of 5 mm above it; set your slicer's figures", True)
+SUPPLIED = {
+    "support_mm": Limit(7.0, "a raft of 2 mm and supports of 5 mm above it; set your slicer's figures", True),
+    "layer_s": Limit(15.0, "exposure, peel and settling of a soft resin; your slicer's time by layers", True),
+}
+"""For files that do not give them, as those of older versions."""
 
 
 @attrs.frozen
@@ -103,7 +107,7 @@ def read_printer(path: str | Path) -> Printer:
     document = parse(text, keys, str(path))
     if document.get("format") != 1 or document["format"] is True:
         raise InputError("the printer's file has no format = 1", place(str(path), None), "write format = 1")
-    missing = [name for name in MEANING if name not in document and name != "support_mm"]
+    missing = [name for name in MEANING if name not in document and name not in SUPPLIED]
     if missing:
         raise InputError(
             f"a limit is missing: {missing[0]}, {MEANING[missing[0]]}",
@@ -111,7 +115,8 @@ def read_printer(path: str | Path) -> Printer:
             f"add [{missing[0]}] with value and source, or start from a shipped file",
         )
     limits = {
-        name: _limit(name, document[name], str(path)) if name in document else SUPPORTS for name in MEANING
+        name: _limit(name, document[name], str(path)) if name in document else SUPPLIED[name]
+        for name in MEANING
     }
     if limits["support_mm"].value >= limits["build_z_mm"].value:
         raise InputError(

@@ -14,6 +14,7 @@ def drawn(panels):
     layout.label.side_effect = lambda text="", **_: texts.append(text)
     layout.progress.side_effect = lambda factor, text: texts.append(f"{factor:.2f} {text}")
     layout.operator.side_effect = lambda name, text="", **_: texts.append(text or name) or MagicMock()
+    layout.prop.side_effect = lambda data, name, **_: name == "name" and texts.append(data.name)
     layout.template_icon.side_effect = lambda icon, scale: texts.append("a picture")
     for panel in panels:
         if getattr(panel, "poll", lambda _: True)(bpy.context):

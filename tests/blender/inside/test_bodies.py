@@ -7,14 +7,16 @@ import numpy as np
 
 from mu_addon.blender.body import state as bodies
 from mu_addon.blender.jobs import start_child
+from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.simulate import study_folder as studies
+from mu_addon.blender.unit import drawing
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.surface import volume
 from mu_addon.usecases.simulate_and_place.job import read_job
 
-from .acting import add, refused
+from .acting import add, points_of, refused
 
 
 def barrel(width=18.75, tall=25.0, low=-2.0, high=80.0, around=32, hole=False):
@@ -55,27 +57,27 @@ def test_a_body_becomes_the_envelope_wherever_it_and_the_unit_stand():
     obj.matrix_world = root.matrix_world @ obj.matrix_world
     choose(obj, root)
     assert bpy.ops.mu.body_check() == {"FINISHED"}
-    assert unit_object.part(root, bodies.FLAWS) is None
-    before = len(unit_object.part(root, "lattice").data.vertices)
+    assert drawing.beside(root, drawing.FLAWS) is None
+    before = len(points_of(root, "lattice"))
     assert bpy.ops.mu.body() == {"FINISHED"}
     assert root.mu_unit.trouble == "", root.mu_unit.trouble
-    kept = unit_object.part(root, bodies.ENVELOPE)
-    assert np.allclose(points(kept).min(0), [-18.75, -18.75, -2.0], atol=1e-4)
-    struts = points(unit_object.part(root, "lattice"))
+    kept = root.mu_unit.envelope
+    assert np.allclose(motion_parts.vertices_of(kept).min(0), [-18.75, -18.75, -2.0], atol=1e-4)
+    struts = points_of(root, "lattice")
     assert ((struts[:, 0] / 18.75) ** 2 + ((struts[:, 1] - 6.25) / 25) ** 2).max() < 1.001
     assert len(struts) < before
     assert obj.hide_get()
     # Shape the unit on: the body stays, and where it no longer fits, that is said.
     root.mu_unit.chambers.wall_mm = 1.0
     assert root.mu_unit.trouble == ""
-    assert unit_object.part(root, bodies.ENVELOPE) == kept
+    assert root.mu_unit.envelope == kept
     root.mu_unit.chambers.count = 7
     assert "from z = -2 to 80 mm, the unit from 0 to 87.5" in root.mu_unit.trouble
     root.mu_unit.chambers.count = 6
     assert root.mu_unit.trouble == ""
     assert bpy.ops.mu.body_remove() == {"FINISHED"}
-    assert unit_object.part(root, bodies.ENVELOPE) is None
-    assert len(unit_object.part(root, "lattice").data.vertices) == before
+    assert root.mu_unit.envelope is None
+    assert len(points_of(root, "lattice")) == before
 
 
 def test_the_solid_is_cut_to_the_body_and_grows_old_with_it():
@@ -84,32 +86,31 @@ def test_the_solid_is_cut_to_the_body_and_grows_old_with_it():
     choose(barrel(high=40.0), root)
     bpy.ops.mu.body()
     assert bpy.ops.mu.solid() == {"FINISHED"}
-    solid = unit_object.part(root, "solid")
-    at = points(solid)
+    at = motion_parts.vertices_of(root.mu_unit.solid)
     reach = (at[:, 0] / 18.75) ** 2 + ((at[:, 1] - 6.25) / 25) ** 2
     assert reach[at[:, 2] > 0.01].max() < 1.001
     assert at[:, 2].max() == 37.5
-    assert unit_object.solid_is_current(root, solid)
+    assert unit_object.solid_is_current(root)
     bpy.ops.mu.body_remove()
-    assert not unit_object.solid_is_current(root, solid)
+    assert not unit_object.solid_is_current(root)
 
 
 def test_flaws_are_marked_in_their_places():
     root = add()
     choose(barrel(hole=True), root)
     assert bpy.ops.mu.body_check() == {"FINISHED"}
-    marks = unit_object.part(root, bodies.FLAWS)
+    marks = drawing.beside(root, drawing.FLAWS)
     at = points(marks)
     assert len(at) == 32
     assert np.allclose(at[:, 2], 80.0)
     assert "32 edges are open" in refused(bpy.ops.mu.body)
-    assert unit_object.part(root, bodies.ENVELOPE) is None
+    assert root.mu_unit.envelope is None
     root.mu_unit.chambers.wall_mm = 1.0
-    assert unit_object.part(root, bodies.FLAWS) == marks
+    assert drawing.beside(root, drawing.FLAWS) == marks
 
     choose(barrel(width=12.0), root)
     bpy.ops.mu.body_check()
-    at = points(unit_object.part(root, bodies.FLAWS))
+    at = points(drawing.beside(root, drawing.FLAWS))
     # Six bladders come out of it on either side.
     assert len(at) == 12, at
     assert (np.hypot(at[:, 0] / 12, (at[:, 1] - 6.25) / 25) > 0.99).all(), at
@@ -117,7 +118,7 @@ def test_flaws_are_marked_in_their_places():
     assert (at[:, 0] > 0).sum() == 6
     choose(barrel(), root)
     bpy.ops.mu.body_check()
-    assert unit_object.part(root, bodies.FLAWS) is None
+    assert drawing.beside(root, drawing.FLAWS) is None
 
     choose(barrel(width=0.01875, tall=0.025, low=0.0, high=0.08), root)
     assert "seems to be in metres" in refused(bpy.ops.mu.body)

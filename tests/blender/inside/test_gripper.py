@@ -13,6 +13,7 @@ from mu_addon.blender.gripper import state as grasps
 from mu_addon.blender.gripper.properties import to_gripper
 from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.unit import object as unit_object
+from mu_addon.blender.unit.drawing import PARTS
 from mu_addon.design.gripper import load_gripper
 from mu_addon.design.gripper import to_toml as gripper_toml
 from mu_addon.design.parameters import to_toml
@@ -29,6 +30,7 @@ PANELS = gripper_panel.CLASSES
 
 
 def held(**settings):
+    bpy.ops.mu.millimetres()
     assert bpy.ops.mu.gripper_add(**settings) == {"FINISHED"}
     bpy.context.view_layer.update()
     return gripper_object.active(bpy.context)
@@ -48,16 +50,22 @@ def test_two_fingers_face_each_other_over_the_plate():
     root = held()
     assert root.mu_gripper.trouble == ""
     assert not unit_object.roots()
-    assert abs(bpy.context.scene.unit_settings.scale_length - 0.001) < 1e-9
+    assert [o.name for o in bpy.data.objects] == ["Cube", root.name], "one object, and the cube"
+
+    def both(part):
+        of = np.array([item.value for item in root.data.attributes["mu_part"].data]) == PARTS.index(part)
+        at = world(root)[of]
+        return at[: len(at) // 2], at[len(at) // 2 :]
+
     for gap in (30.0, 40.0):
         root.mu_gripper.fingers.gap_mm = gap
         bpy.context.view_layer.update()
-        bars = [world(gripper_object.part(root, f"finger:{s}:waveguide")) for s in ("left", "right")]
+        bars = both("waveguide")
         assert np.allclose(bars[0] * [-1, -1, 1], bars[1], atol=1e-4), "each half a turn from the other"
-        inner = [world(gripper_object.part(root, f"finger:{s}:lattice"))[:, 1] for s in ("left", "right")]
+        inner = [at[:, 1] for at in both("lattice")]
         # Struts end at the envelope's faces: the gap is between those.
         assert abs(inner[1].min() - inner[0].max() - gap) < 1e-3
-    plate, cube = (world(gripper_object.part(root, name)) for name in ("plate", "cube"))
+    plate, cube = np.concatenate(both("plate")), world(gripper_object.part(root, "cube"))
     assert plate[:, 2].max() == 0.0
     assert abs(plate[:, 2].min() + 5.0) < 1e-6
     assert np.allclose(cube.min(axis=0), [-12.5, -12.5, 75 + 3 - 12.5], atol=1e-4)

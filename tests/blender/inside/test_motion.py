@@ -9,6 +9,7 @@ from mu_addon.blender.results import legend_object
 from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.results import panel as results_panel
 from mu_addon.blender.shared.compat import modifier_input
+from mu_addon.blender.unit import drawing
 from mu_addon.blender.unit import live_update as live
 from mu_addon.blender.unit import object as unit_object
 
@@ -167,7 +168,7 @@ def test_a_path_of_the_whole_lattice_moves_and_is_shown_where_it_lies(study):
     assert name in motion_parts.motion_of(root).paths
     assert 0 < j < 1
     root.mu_unit.candidates = True
-    tube = unit_object.part(root, "free")
+    tube = drawing.beside(root, "free")
     assert np.allclose(motion_parts.vertices_of(tube.data), points, atol=1e-4)
     show(name=name)
     show(name=name, what="print")
@@ -177,16 +178,16 @@ def test_a_path_of_the_whole_lattice_moves_and_is_shown_where_it_lies(study):
         assert values(part.data, "deviation_mm").max() > 1e-3
     root.mu_unit.chambers.wall_mm = 1.0
     assert ranking.free(root) is None
-    assert unit_object.part(root, "free") is None
+    assert drawing.beside(root, "free") is None
 
 
 def test_the_print_is_carried_by_the_mesh(study):
     root = started(study)
     show(name="model_a", what="print")
     (part,) = motion_parts.parts(root)
-    solid = unit_object.part(root, "solid")
-    assert len(part.data.vertices) == len(solid.data.vertices)
-    assert part.data != solid.data
+    solid = root.mu_unit.solid
+    assert len(part.data.vertices) == len(solid.vertices)
+    assert part.data != solid
     assert root.mu_unit.show == "preview"
     assert "outside the mesh" in part["mu_outside"]
     bpy.context.scene.frame_set(193)
@@ -250,13 +251,13 @@ def test_what_is_missing_is_said(study):
 def test_candidates_say_their_rank(study):
     root = add(preset="mu-0.75x")
     root.mu_unit.candidates = True
-    assert modifier_input(unit_object.part(root, "candidate:alpha1").modifiers[0], "Label") == "α1"
+    assert modifier_input(unit_object.candidate(root, "alpha1").modifiers[0], "Label") == "α1"
     root.mu_unit.study.folder = str(study)
     live.catch_up()  # as when a simulation has ended
     known = ranking.ranked(root)
     assert sorted(rank for _, rank in known.values()) == list(range(1, 11))
     bpy.ops.mu.path(name="alpha4")
-    tubes = {name: unit_object.part(root, f"candidate:{name}") for name in known}
+    tubes = {name: unit_object.candidate(root, name) for name in known}
     for name, tube in tubes.items():
         label = modifier_input(tube.modifiers[0], "Label")
         assert label.startswith("α"), label
@@ -267,7 +268,7 @@ def test_candidates_say_their_rank(study):
     assert not unit_object.behind(root)
     root.mu_unit.chambers.wall_mm = 1.0  # stale: they say nothing any more
     assert ranking.ranked(root) == {}
-    assert modifier_input(unit_object.part(root, "candidate:alpha1").modifiers[0], "Label") == "α1"
+    assert modifier_input(unit_object.candidate(root, "alpha1").modifiers[0], "Label") == "α1"
 
 
 def test_panels_show_the_motion(study):

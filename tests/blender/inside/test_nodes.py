@@ -5,10 +5,8 @@ import bpy
 import numpy as np
 
 from mu_addon.blender.assets import library
-from mu_addon.blender.body import state as bodies
 from mu_addon.blender.preview import nodes
 from mu_addon.blender.shared.compat import modifier_input, set_modifier_input
-from mu_addon.blender.unit import object as unit_object
 
 from .acting import add
 
@@ -213,5 +211,5 @@ def test_the_sample_scene():
     assert {r.mu_unit.trouble for r in (whole, opened, bodied)} == {""}
     assert opened.mu_unit.cut
     assert opened.mu_unit.path == "alpha4"
-    assert unit_object.part(bodied, bodies.ENVELOPE) is not None
+    assert bodied.mu_unit.envelope is not None
     assert closed_volume(bpy.data.objects["Waveguide on a Curve"]) > 0

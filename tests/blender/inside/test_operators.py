@@ -5,18 +5,21 @@ import json
 import bpy
 import numpy as np
 
+from mu_addon.blender.unit import figures
 from mu_addon.blender.unit import object as unit_object
+from mu_addon.blender.unit.broken import broken
+from mu_addon.blender.unit.fields import field
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.anchors import window
-from mu_addon.design.parameters import load_preset
+from mu_addon.design.parameters import Chambers, Waveguide, load_preset
+from mu_addon.design.quantity import describe
 from mu_addon.design.solid import build_solid
 from mu_addon.design.surface import bad_edges, stl_surface
 
-from .acting import add, operators, refused
+from .acting import add, operators, points_of, refused, shown_parts
 
 
-def test_add_makes_a_unit_in_millimetres():
-
+def test_add_makes_a_unit():
     bpy.context.scene.cursor.location = (1.0, 2.0, 3.0)
     root = add()
     assert to_unit(root.mu_unit) == load_preset("mu-1.0x")
@@ -27,8 +30,8 @@ def test_add_makes_a_unit_in_millimetres():
     assert abs(units.scale_length - 0.001) < 1e-9
     assert units.length_unit == "MILLIMETERS"
     bpy.context.view_layer.update()
-    assert abs(unit_object.part(root, "actuator").dimensions.z - 81.0) < 1e-3  # 75 and the inlet's 6
-    small = add(preset="mu-0.75x")
+    assert abs(np.ptp(points_of(root, "actuator")[:, 2]) - 81.0) < 1e-3  # 75 and the inlet's 6
+    small = add(preset="mu-0.75x", millimetres=False)
     assert small.mu_unit.scale == 0.75
     assert small.mu_unit.uuid != root.mu_unit.uuid
     other = add(preset="mu-1.0x", scale=1.2)
@@ -47,7 +50,7 @@ def test_operators_without_a_unit_say_what_is_missing():
         name = cls.bl_idname.split(".")[1]
         operator = getattr(bpy.ops.mu, name)
         free = {"add", "millimetres", "preset_remove", "assets", "assets_remove"}
-        free |= {"sample", "sensor_ports", "gripper_add"}
+        free |= {"sample", "sensor_ports", "gripper_add", "job_cancel", "job_dismiss"}
         if name in free:
             assert operator.poll()
         elif name.startswith("track"):
@@ -74,24 +77,105 @@ def test_what_changes_the_file_is_one_undo_step():
     outside |= {"sensor_ports", "sensor_connect", "sensor_disconnect", "sensor_pause"}
     outside |= {"sensor_mark", "sensor_freeze", "sensor_sweep", "sensor_hold"}
     outside |= {"sensor_calibrate", "sensor_cancel", "sensor_dismiss", "sensor_zero"}
-    outside |= {"sensor_open", "grasp", "grasp_cancel", "grasp_dismiss", "grasp_open"}
+    outside |= {
+        "job_cancel",
+        "job_dismiss",
+        "sensor_open",
+        "grasp",
+        "grasp_cancel",
+        "grasp_dismiss",
+        "grasp_open",
+    }
     for cls in operators():
         assert ("UNDO" in cls.bl_options) == (cls.bl_idname.split(".")[1] not in outside), cls
         assert "REGISTER" in cls.bl_options
 
 
+def test_fields_show_true_lengths_and_tied_ones_change_as_one():
+    root = add()
+    chambers = root.mu_unit.chambers
+    known = {d.name: d for d in describe(Chambers)}
+    assert field(chambers, known["wall_mm"]) == "wall_mm"
+    root.mu_unit.scale = 2.0
+    assert field(chambers, known["bladder_diameter_mm"]) == "bladder_diameter_mm_true"
+    assert chambers.bladder_diameter_mm_true == 50.0
+    chambers.wall_mm_true = 2.0
+    assert to_unit(root.mu_unit).chambers.wall_mm == 1.0
+    # What is the same at every scale reads the same at every scale.
+    waveguide = root.mu_unit.waveguide
+    (pitch,) = (d for d in describe(Waveguide) if d.name == "well_pitch_mm")
+    assert field(waveguide, pitch) == "well_pitch_mm"
+    for name, value in (("cell_mm", 13.7), ("bladder_diameter_mm", 25.123457), ("cell_mm", 12.345678)):
+        setattr(chambers, name, value)
+        core = to_unit(root.mu_unit)
+        assert root.mu_unit.trouble == ""
+        assert core.chambers.bladder_diameter_mm == 2.0 * core.chambers.cell_mm
+        assert np.isclose(getattr(core.chambers, name), value, rtol=1e-7)
+    assert bpy.ops.mu.profile(bladder_diameter_mm=26.0) == {"FINISHED"}
+    assert to_unit(root.mu_unit).chambers.cell_mm == 13.0
+
+
+def test_a_broken_rule_stands_in_its_field_with_a_value_that_fits():
+    root = add()
+    chambers = root.mu_unit.chambers
+    assert broken(root) is None
+    for scale, shown in ((1.0, "a wall of 3 mm"), (2.0, "a wall of 6 mm")):
+        root.mu_unit.scale = scale
+        chambers.wall_mm = 3.0
+        found = broken(root)
+        assert shown in found.text
+        assert "_mm" not in found.text, "the panel's words, not the file's"
+        assert found.fits == {("chambers", "wall_mm"): 1.874}
+        lines, wrong = figures.lines(root, 38)
+        assert wrong
+        assert len(lines) == figures.LINES
+        assert shown in " ".join(lines)
+        assert bpy.ops.mu.fit(section="chambers", name="wall_mm") == {"FINISHED"}
+        assert root.mu_unit.trouble == ""
+        assert to_unit(root.mu_unit).chambers.wall_mm == 1.874
+        chambers.wall_mm = 0.9
+    # What was changed is to blame, too, where the rule names another field.
+    root.mu_unit.waveguide.well_pitch_mm = 0.5
+    assert set(broken(root).fits) == {("waveguide", "well_width_mm"), ("waveguide", "well_pitch_mm")}
+    assert bpy.ops.mu.fit(section="waveguide", name="well_pitch_mm") == {"FINISHED"}
+    assert to_unit(root.mu_unit).waveguide.well_pitch_mm == 1.001
+    assert "breaks no rule" in refused(bpy.ops.mu.fit, section="waveguide", name="well_pitch_mm")
+
+
+def test_the_head_says_what_a_unit_comes_to():
+    root = add()
+    lines, wrong = figures.lines(root, 38)
+    assert not wrong
+    assert lines[:3] == [
+        "Size 37.5 mm x 50 mm x 81 mm",
+        "Resin about 19.1 g, 19 ml",
+        "Prints upright in about 3 h 40 min",
+    ]
+    assert "assumed" in lines[3]
+    root.mu_unit.scale = 2.0
+    assert figures.lines(root, 38)[0][0] == "Size 75 mm x 100 mm x 162 mm"
+    bpy.context.scene.unit_settings.system = "IMPERIAL"
+    assert figures.lines(root, 38)[0][0] == "Size 2.953 in x 3.937 in x 6.378 in"
+    bpy.ops.mu.millimetres()
+    root.mu_unit.scale = 1.0
+    bpy.ops.mu.solid()
+    volume = json.loads(root.mu_unit.solid["mu_gates"])["volume_mm3"]
+    assert f"{volume / 1000:.3g} ml" in figures.lines(root, 38)[0][1]
+    assert "about" not in figures.lines(root, 38)[0][1]
+
+
 def test_path_select_and_stale_names():
     root = add()
     assert bpy.ops.mu.path(name="alpha4") == {"FINISHED"}
-    bar = unit_object.part(root, "waveguide")
-    assert bar is not None
-    assert [m.name for m in bar.data.materials] == ["MU Waveguide", "MU Wells"]
-    assert abs(bar.dimensions.z) >= 0
-    assert len(bar.data.polygons) % 6 == 0
+    bar = points_of(root, "waveguide")
+    assert len(bar) % 8 == 0
+    slots = [root.data.materials[face.material_index].name for face in root.data.polygons]
+    assert slots.count("MU Waveguide") + slots.count("MU Wells") == len(bar) // 8 * 6
+    assert slots.count("MU Wells") > 6
     assert "alpha11" in refused(bpy.ops.mu.path, name="alpha11")
     assert root.mu_unit.path == "alpha4"
     root.mu_unit.candidates = True
-    tube = unit_object.part(root, "candidate:alpha7")
+    tube = unit_object.candidate(root, "alpha7")
     bpy.context.view_layer.objects.active = tube
     assert unit_object.active_root(bpy.context) == root
     assert bpy.ops.mu.path() == {"FINISHED"}
@@ -102,7 +186,7 @@ def test_path_select_and_stale_names():
     # A unit of fewer chambers has fewer paths: the chosen one is not drawn, and nothing breaks.
     root.mu_unit.chambers.count = 3
     assert root.mu_unit.trouble == ""
-    assert unit_object.part(root, "waveguide") is None
+    assert "waveguide" not in shown_parts(root)
     assert bpy.ops.mu.path(name="none") == {"FINISHED"}
     assert root.mu_unit.path == ""
 
@@ -112,27 +196,26 @@ def test_solid_is_the_cores_and_knows_when_it_is_old():
     root = add()
     bpy.ops.mu.path(name="alpha4")
     assert bpy.ops.mu.solid() == {"FINISHED"}
-    solid = unit_object.part(root, "solid")
+    solid = root.mu_unit.solid
     core = load_preset("mu-1.0x")
     made = build_solid(core, window(core, "alpha4"))
-    found = np.empty(3 * len(solid.data.vertices), np.float32)
-    solid.data.vertices.foreach_get("co", found)
+    found = np.empty(3 * len(solid.vertices), np.float32)
+    solid.vertices.foreach_get("co", found)
     assert np.array_equal(found.reshape(-1, 3), made.vertices.astype(np.float32))
-    assert len(solid.data.polygons) == len(made.triangles)
+    assert len(solid.polygons) == len(made.triangles)
     assert json.loads(solid["mu_gates"])["genus"] == made.gates.genus
-    assert unit_object.solid_is_current(root, solid)
+    assert unit_object.solid_is_current(root)
     assert root.mu_unit.show == "solid"
-    assert not solid.hide_viewport
-    assert unit_object.part(root, "lattice").hide_viewport
+    assert root.data == solid
     root.mu_unit.show = "preview"
-    assert solid.hide_viewport
-    assert not unit_object.part(root, "lattice").hide_viewport
+    assert root.data == root.mu_unit.preview != solid
+    assert shown_parts(root) == {"actuator", "lattice", "anchors", "waveguide"}
     root.mu_unit.chambers.wall_mm = 1.0
-    assert not unit_object.solid_is_current(root, solid)
+    assert not unit_object.solid_is_current(root)
     root.mu_unit.chambers.wall_mm = 0.9
-    assert unit_object.solid_is_current(root, solid)
+    assert unit_object.solid_is_current(root)
     bpy.ops.mu.path(name="alpha5")
-    assert not unit_object.solid_is_current(root, solid)
+    assert not unit_object.solid_is_current(root)
 
 
 def test_stl_comes_out_in_millimetres(tmp_path):
@@ -164,9 +247,9 @@ def test_save_and_reload(tmp_path):
     assert root.mu_unit.uuid == uuid
     assert root.mu_unit.path == "alpha6"
     assert not unit_object.behind(root)
-    parts = {c["mu_part"]: c for c in root.children}
-    assert set(parts) == {"actuator", "lattice", "anchors", "waveguide"}
+    assert shown_parts(root) == {"actuator", "lattice", "anchors", "waveguide"}
+    mesh = root.data
     root.mu_unit.chambers.count = 5
-    assert unit_object.part(root, "actuator") == parts["actuator"]
-    assert abs(max(v.co.z for v in parts["actuator"].data.vertices) - 62.5) < 1e-4
-    assert len(bpy.data.node_groups) == 2  # none was made twice
+    assert root.data == mesh
+    assert abs(points_of(root, "actuator")[:, 2].max() - 62.5) < 1e-4
+    assert len(bpy.data.node_groups) == 3  # none was made twice

@@ -128,7 +128,8 @@ def test_a_new_section_of_the_core_appears_by_itself():
 
 def test_values_survive_single_precision():
     from mu_addon.blender.shared import updates
-    from mu_addon.blender.unit.properties import exact, from_unit, to_unit
+    from mu_addon.blender.unit.fields import exact
+    from mu_addon.blender.unit.properties import from_unit, to_unit
     from mu_addon.design.parameters import load_preset, preset_names
 
     from .acting import add

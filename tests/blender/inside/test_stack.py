@@ -6,12 +6,14 @@ from collections import Counter
 import bpy
 import numpy as np
 
+from mu_addon.blender.preview import nodes
 from mu_addon.blender.steps import state as stack
 from mu_addon.blender.unit import object as unit_object
+from mu_addon.blender.unit.drawing import DRAWN, PARTS
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.steps import STEPS
 
-from .acting import add, refused
+from .acting import add, attribute, points_of, refused, shown_parts
 
 
 def made(action):
@@ -21,7 +23,7 @@ def made(action):
 
 
 def shape(root, name):
-    return len(unit_object.part(root, name).data.vertices)
+    return len(points_of(root, name))
 
 
 def test_a_slider_makes_only_what_depends_on_it():
@@ -79,7 +81,7 @@ def test_muted_steps_are_left_out_and_not_printed(tmp_path):
     assert "without wells is not the unit" in refused(bpy.ops.mu.solid)
     never = {"filepath": str(tmp_path / "never.stl"), "quality": "interactive"}
     assert "unmute wells" in refused(bpy.ops.mu.export_stl, **never)
-    assert unit_object.part(root, "solid") is None
+    assert props.solid is None
     bpy.ops.mu.mute(step="wells", muted=False)
     assert shape(root, "waveguide") == with_wells
 
@@ -88,29 +90,32 @@ def test_muted_steps_are_left_out_and_not_printed(tmp_path):
     bpy.ops.mu.chambers(muted=False)
     assert shape(root, "actuator") == whole
 
-    tubes = unit_object.part(root, "lattice")
-    assert len(tubes.modifiers) == 1
+    def skins():
+        struts = attribute(root, "mu_part") == PARTS.index("lattice")
+        return set(attribute(root, "mu_skin")[struts])
 
-    def length(obj):
-        ends = np.array([[obj.data.vertices[v].co[:] for v in e.vertices] for e in obj.data.edges])
+    def length():
+        of = attribute(root, "mu_part") == PARTS.index("lattice")
+        points = [v.co[:] for v in root.data.vertices]
+        ends = np.array([[points[v] for v in e.vertices] for e in root.data.edges if of[e.vertices[0]]])
         return np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum()
 
-    trimmed = length(tubes)
+    assert skins() == {nodes.unit.TUBE}
+    trimmed = length()
     bpy.ops.mu.mute(step="trim")
-    assert length(tubes) > 1.1 * trimmed
+    assert length() > 1.1 * trimmed
     bpy.ops.mu.mute(step="struts")
-    assert len(tubes.modifiers) == 0
-    assert "radius" not in tubes.data.attributes
+    assert skins() == {nodes.unit.PLAIN}, "struts without thickness stay lines"
     bpy.ops.mu.mute(step="struts", muted=False)
-    assert len(tubes.modifiers) == 1
+    assert skins() == {nodes.unit.TUBE}
     bpy.ops.mu.mute(step="trim", muted=False)
     bpy.ops.mu.mute(step="cells")
-    assert unit_object.part(root, "lattice") is None
-    assert unit_object.part(root, "waveguide") is not None
+    assert "lattice" not in shown_parts(root)
+    assert "waveguide" in shown_parts(root)
     bpy.ops.mu.mute(step="cells", muted=False)
 
     bpy.ops.mu.mute(step="path")
-    assert unit_object.part(root, "waveguide") is None
+    assert "waveguide" not in shown_parts(root)
     assert props.path == "alpha4"
 
 
@@ -121,18 +126,16 @@ def test_every_step_can_be_shown():
     assert {e.name for e in props.stack if e.shown} == {"membranes", "struts", "anchors", "wells"}
     for entry in props.stack:
         entry.shown = True
-    parts = {c["mu_part"] for c in root.children}
-    assert parts == {name for name, _ in unit_object.DRAWN.values()}
+    assert shown_parts(root) == {name for name, _ in DRAWN.values()}
     d = load_preset("mu-1.0x").dimensions
-    cells = unit_object.part(root, "cells").data
+    of = attribute(root, "mu_part") == PARTS.index("cells")
+    edges = [e for e in root.data.edges if of[e.vertices[0]]]
     nx, ny, nz = d.cells_x, d.cells_y_minus + d.cells_y_plus + 1, d.count
-    assert len(cells.vertices) == (nx + 1) * (ny + 1) * (nz + 1)
-    assert len(cells.edges) == sum(
-        a * (b + 1) * (c + 1) for a, b, c in ((nx, ny, nz), (ny, nx, nz), (nz, nx, ny))
-    )
+    assert of.sum() == (nx + 1) * (ny + 1) * (nz + 1)
+    assert len(edges) == sum(a * (b + 1) * (c + 1) for a, b, c in ((nx, ny, nz), (ny, nx, nz), (nz, nx, ny)))
     for entry in props.stack:
         entry.shown = False
-    assert [c for c in root.children if c.get("mu_part")] == []
+    assert len(root.data.vertices) == 0
 
 
 def test_the_stack_is_saved_and_an_older_file_gets_one():
@@ -148,4 +151,4 @@ def test_the_stack_is_saved_and_an_older_file_gets_one():
     root.mu_unit.stack.clear()  # as a file of an earlier version has it
     assert bpy.ops.mu.rebuild() == {"FINISHED"}
     assert [e.name for e in root.mu_unit.stack] == list(STEPS)
-    assert unit_object.part(root, "lattice") is not None
+    assert "lattice" in shown_parts(root)

@@ -7,22 +7,25 @@ from types import ModuleType
 import bpy
 
 from ...shared.compat import input_defaults, modifier_inputs, set_modifier_input
-from . import balls, field, labelled, tubes, waveguide
+from . import balls, field, labelled, tubes, unit, waveguide
 
 GROUPS: dict[str, ModuleType] = {module.NAME: module for module in (tubes, balls, labelled, waveguide, field)}
+"""Groups for any geometry, which are assets."""
+_ALL = {**GROUPS, unit.NAME: unit}
 
 CATALOGUE = "6f0f3a5e-5f0b-4a37-9a39-0c2f7c1b9d21"
 """Identifier of the catalogue that the groups are listed under in the asset browser."""
 
 
 def group(name: str):
-    """The node group of that name, built or brought up to date; it is an asset of the file it is in."""
-    module = GROUPS[name]
+    """The node group of that name, built or brought up to date; those of `GROUPS` are assets of the file."""
+    module = _ALL[name]
     found = bpy.data.node_groups.get(name)
     if found is None:
         found = bpy.data.node_groups.new(name, "GeometryNodeTree")
         found.is_modifier = True
-        found.asset_mark()
+        if name in GROUPS:
+            found.asset_mark()
     if found.get("mu_version") != module.VERSION:
         _build(found, module)
     return found

@@ -1,0 +1,204 @@
+"""What Blender's own gestures leave behind, put right: duplicates, deletions, hiding, collections, units.
+
+A gesture knows nothing of units. After each one this module looks at all of them, once, and mends what is not
+as it should be. It writes nothing where nothing is wrong, so that its own changes end in one further look.
+Undo and redo bring back states from before the mending; the same look follows them.
+"""
+
+from __future__ import annotations
+
+import uuid
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ...design.anchors import windows
+from ..gripper import object as gripper_object
+from ..shared import displays, handlers, scene_units, updates
+from ..unit import broken, drawing, live_update
+from ..unit import object as unit_object
+from . import older_files
+
+_holders: dict[str, int] = {}
+"""By UUID: the object, by the number that it keeps through undo, which had it before any duplicate did."""
+_given: dict[tuple[str, int], str] = {}
+"""UUIDs that duplicates were given, by the original's and their own number: a redo gives them again."""
+_hidden: dict[str, bool] = {}
+"""By UUID: whether the unit was hidden at the last look."""
+_looking = False
+
+
+def look() -> None:
+    """Put right what the last gesture left behind."""
+    global _looking
+    if _looking:
+        return
+    _looking = True
+    try:
+        roots, shown = [], []
+        # In a scene of thousands of objects most are neither: what tells them is asked for first.
+        for obj in bpy.data.objects:
+            if obj.get(displays.OWNER):
+                found = shown
+            elif obj.type == "MESH" and displays.uuid_of(obj):
+                found = roots
+            else:
+                continue
+            if displays.editable(obj):
+                found.append(obj)
+        copies = _separate(roots)
+        _follow(shown)
+        for root in roots:
+            _true_size(root)
+            if root in copies or _damaged(root):
+                _rebuild(root)
+    finally:
+        _looking = False
+
+
+def own(root: Any) -> None:
+    """Make a root another one than that which it is a copy of: a UUID of its own, a folder of its own."""
+    key = displays.uuid_of(root), root.session_uid
+    fresh = _given.setdefault(key, uuid.uuid4().hex)
+    with updates.paused():
+        if root.mu_unit.uuid:
+            root.mu_unit.uuid, root.mu_unit.study.folder = fresh, ""
+        else:
+            root.mu_gripper.uuid, root.mu_gripper.folder = fresh, ""
+
+
+def _separate(roots: list[Any]) -> list[Any]:
+    """Give every duplicate an identity and a mesh of its own; returns them."""
+    copies = []
+    by_uuid: dict[str, list[Any]] = {}
+    for root in roots:
+        by_uuid.setdefault(displays.uuid_of(root), []).append(root)
+    for name, same in by_uuid.items():
+        first = min(same, key=lambda root: (root.session_uid != _holders.get(name), root.name))
+        _holders[name] = first.session_uid
+        for root in same:
+            if root != first:
+                own(root)
+                _holders[displays.uuid_of(root)] = root.session_uid
+                if root.mu_unit.uuid:
+                    unit_object.separate(root)
+                copies.append(root)
+    return copies
+
+
+def _follow(shown: list[Any]) -> None:
+    """Displays follow their root; those without one, and copies under another one, go."""
+    layer = bpy.context.view_layer
+    roots: dict[str, Any] = {}
+    stray, own_displays = [], []
+    for obj in shown:
+        root = displays.root_above(obj.parent)
+        if root is None or displays.uuid_of(root) != obj[displays.OWNER]:
+            stray.append(obj)
+            continue
+        roots[displays.uuid_of(root)] = root
+        own_displays.append((obj, root))
+    for obj in stray:
+        displays.remove(obj)
+    changed = {}
+    for name, root in roots.items():
+        hidden = root.hide_viewport or (layer.objects.get(root.name) == root and root.hide_get())
+        if _hidden.get(name, False) != hidden:
+            changed[name] = _hidden[name] = hidden
+    for obj, root in own_displays:
+        if set(obj.users_collection) != set(root.users_collection):
+            for collection in obj.users_collection:
+                collection.objects.unlink(obj)
+            for collection in root.users_collection:
+                collection.objects.link(obj)
+        hidden = changed.get(displays.uuid_of(root))
+        if hidden is not None and layer.objects.get(obj.name) == obj:
+            obj.hide_set(hidden)
+
+
+def _true_size(root: Any) -> None:
+    """Keep a root's true size when the scene's unit of length changes; an unlocked one is the user's."""
+    wanted = scene_units.mm(bpy.context.scene)
+    if all(root.lock_scale) and any(abs(s - wanted) > 1e-6 * wanted for s in root.scale):
+        root.scale = (wanted,) * 3
+
+
+def _damaged(root: Any) -> bool:
+    """Whether something of a unit or gripper was deleted by force, and can be built again."""
+    if root.mode == "EDIT" or root.data is None:
+        return False
+    if root.mu_gripper.uuid:
+        return gripper_object.part(root, "cube") is None and not root.mu_gripper.trouble
+    props = root.mu_unit
+    if props.trouble or not props.built or props.preview is None:
+        return False
+    if props.preview.get("mu_points") != len(props.preview.vertices):
+        return True
+    if not props.candidates:
+        return False
+    there = [child.get(displays.PART) for child in root.children]
+    wanted = [drawing.CANDIDATE + window.name for window in windows(props.chambers.count)]
+    return sorted(name for name in there if name in wanted) != sorted(wanted)
+
+
+def _rebuild(root: Any) -> None:
+    if root.mu_unit.uuid:
+        live_update.schedule(root)
+    else:
+        gripper_object.rebuild(root)
+
+
+@persistent
+def _after_update(scene: Any, depsgraph: Any) -> None:
+    if any(depsgraph.id_type_updated(kind) for kind in ("OBJECT", "SCENE", "COLLECTION", "MESH")):
+        look()
+
+
+@persistent
+def _after_undo(*_: Any) -> None:
+    look()
+
+
+@persistent
+def _after_load(*_: Any) -> None:
+    for kept in (_holders, _given, _hidden):
+        kept.clear()
+    broken.forget()
+    older_files.renew()
+    look()
+
+
+@persistent
+def _after_import(imported: Any) -> None:
+    """What is appended is another unit than the one in the file that it comes from."""
+    objects = [item.id for item in imported.import_items if isinstance(item.id, bpy.types.Object)]
+    if not any(displays.editable(obj) and displays.uuid_of(obj) for obj in objects):
+        return
+    for obj in objects:
+        if displays.editable(obj) and displays.uuid_of(obj):
+            own(obj)
+    older_files.renew()
+    look()
+    live_update.catch_up()
+
+
+_HANDLERS = {
+    "depsgraph_update_post": _after_update,
+    "undo_post": _after_undo,
+    "redo_post": _after_undo,
+    "load_post": _after_load,
+    "blend_import_post": _after_import,
+}
+
+
+def register() -> None:
+    """Handlers that look after every gesture."""
+    handlers.add(_HANDLERS)
+
+
+def unregister() -> None:
+    """Take them out."""
+    handlers.remove(_HANDLERS)
+    for kept in (_holders, _given, _hidden):
+        kept.clear()

@@ -1,0 +1,51 @@
+"""Where a new unit or gripper lands: at the 3D cursor or, where something stands there, beside it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from mathutils import Vector
+
+from ..shared import scene_units
+
+GAP_MM = 10.0
+"""Distance that is left to what is there."""
+Box = tuple[Any, Any]
+
+
+def land(context: Any, root: Any) -> None:
+    """Move a new root along x until nothing that is seen stands in its place."""
+    context.view_layer.update()
+    low, high = _box(root)
+    gap = GAP_MM * scene_units.mm(context.scene)
+    boxes = [_box(o) for o in context.visible_objects if o != root and o.parent != root and _has_body(o)]
+    shift = clear(low, high, boxes, gap)
+    if shift:
+        root.location.x += shift
+        context.view_layer.update()
+
+
+def clear(low: Any, high: Any, boxes: list[Box], gap: float) -> float:
+    """How far along +x a box (3,), (3,) is moved until it is `gap` away from every other."""
+    start = float(low[0])
+    width = float(high[0] - low[0])
+    x = start
+    for other_low, other_high in sorted(boxes, key=lambda box: float(box[0][0])):
+        aside = any(
+            other_low[axis] > high[axis] + gap or low[axis] > other_high[axis] + gap for axis in (1, 2)
+        )
+        # By start along x: whoever begins beyond the present place leaves room for it.
+        if not aside and other_low[0] <= x + width + gap and other_high[0] >= x - gap:
+            x = max(x, float(other_high[0]) + 1.001 * gap)
+    return x - start
+
+
+def _has_body(obj: Any) -> bool:
+    return obj.type in ("MESH", "CURVE", "SURFACE", "META", "FONT", "VOLUME", "POINTCLOUD", "CURVES")
+
+
+def _box(obj: Any) -> Box:
+    """Corners of an object's box along the axes of the world."""
+    points = np.array([obj.matrix_world @ Vector(corner) for corner in obj.bound_box])
+    return points.min(axis=0), points.max(axis=0)

@@ -1,0 +1,105 @@
+"""A broken rule in the words of the panel: what is wrong, in which fields, and what fits there."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import attrs
+
+from ...design.nearest import nearest_fit
+from ...design.parameters import SECTIONS, Unit
+from ...design.quantity import Description, describe
+from ...errors import InputError, MuError
+from .fields import exact, label
+from .properties import section_of, to_unit
+
+Place = tuple[str, str]
+_KNOWN: dict[str, list[tuple[str, Description]]] = {}
+for _section in SECTIONS:
+    for _d in describe(_section):
+        _KNOWN.setdefault(_d.name, []).append((_section.section, _d))
+
+
+@attrs.frozen
+class Broken:
+    """What rule is broken, in a sentence; fits: what fits in each field, by section and name, or None."""
+
+    text: str
+    fits: dict[Place, float | int | None]
+
+
+_good: dict[str, Unit] = {}
+"""By UUID: the last design that kept every rule in this session."""
+_found: dict[str, tuple[Any, Broken]] = {}
+"""By UUID: what was found last, with the parameters that it is of."""
+
+
+def keep(root: Any, unit: Unit) -> None:
+    """Remember a design that keeps every rule: what differs from it is to blame for a broken one."""
+    _good[root.mu_unit.uuid] = unit
+
+
+def words(error: MuError) -> str:
+    """What an error says, with parameters by the names of their fields, and true lengths."""
+    true = getattr(error, "true_size", None) or error
+    lines = [true.what] if isinstance(error, InputError) and _places(error.where) else [true.what, true.where]
+    return "\n".join(_in_panel(text) for text in (*lines, true.remedy) if text)
+
+
+def _in_panel(text: str) -> str:
+    text = re.sub(r"\[\w+\] ", "", text)
+    return re.sub(r"\b[a-z]+(?:_[a-zA-Z]+)+\b", lambda m: _label(m[0]), text)
+
+
+def _label(name: str) -> str:
+    return label(_KNOWN[name][0][1]) if name in _KNOWN else name
+
+
+def _places(where: str) -> list[Place]:
+    """The parameters that the `where` of a rule names: "[chambers] wall_mm"."""
+    section = re.match(r"\[(\w+)\] (.+)", where)
+    if section is None:
+        return []
+    names = [name.strip() for name in section[2].split(",")]
+    return [(section[1], name) for name in names if any(s == section[1] for s, _ in _KNOWN.get(name, ()))]
+
+
+def broken(root: Any) -> Broken | None:
+    """The rule that a unit's parameters break, or None; looked for anew only where they changed."""
+    props = root.mu_unit
+    if not props.trouble:
+        return None
+    values = {s.section: section_of(props, s.section) for s in SECTIONS}
+    key = exact(props.scale), repr(values), props.trouble
+    kept = _found.get(props.uuid)
+    if kept is None or kept[0] != key:
+        kept = _found[props.uuid] = key, _look(props, values)
+    return kept[1]
+
+
+def _look(props: Any, values: dict[str, dict[str, Any]]) -> Broken:
+    try:
+        to_unit(props)
+    except InputError as error:
+        places = dict.fromkeys(_places(error.where))
+        good = _good.get(props.uuid)
+        if good is not None:
+            for section, own in values.items():
+                for name, value in own.items():
+                    if value != getattr(getattr(good, section), name):
+                        places[section, name] = None
+        try:
+            sections = {s.section: s(**values[s.section]) for s in SECTIONS}
+        except InputError:
+            return Broken(words(error), places)
+        scale = exact(props.scale)
+        fits = {place: nearest_fit(sections, scale, *place) for place in places}
+        return Broken(words(error), fits)
+    return Broken(props.trouble, {})
+
+
+def forget() -> None:
+    """Forget every design: another file is open."""
+    _good.clear()
+    _found.clear()

@@ -1,0 +1,134 @@
+"""Blender properties of the core's parameters, and what a panel shows of a length: its true one."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import textwrap
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+
+from ...design.nearest import tied
+from ...design.quantity import Description, describe
+from ..shared import scene_units, updates
+from ..shared.texts import sentence
+
+UNITS = ("mm", "kPa", "s")
+
+
+def exact(value: float) -> float:
+    """The shortest decimal number that Blender's single precision stands for: 0.9 for 0.8999999762."""
+    return float(str(np.float32(value)))
+
+
+def label(d: Description) -> str:
+    """Name of a parameter for a panel: `bladder_diameter_mm` becomes "Bladder Diameter"."""
+    words = d.name.split("_")
+    unit = words.pop() if words[-1] in UNITS else ""
+    text = " ".join(word if word.isupper() else word.capitalize() for word in words)
+    return f"{text} ({unit})" if unit and unit != "mm" else text
+
+
+def tooltip(d: Description) -> str:
+    """What a parameter is, its bounds and where its value comes from; Blender adds the last full stop."""
+    allowed = f". {d.allowed} {d.unit}".rstrip() if d.allowed else ""
+    fixed = ". The same at every scale" if d.fixed else ""
+    return f"{sentence(d.text)}{allowed}{fixed}.\nSource: {d.source}"
+
+
+def blender_property(d: Description, update=None, options=frozenset()):
+    """The Blender property of one parameter."""
+    shared = {
+        "name": label(d),
+        "description": tooltip(d),
+        "update": update,
+        "options": {"ANIMATABLE", *options},
+    }
+    if d.choices:
+        items = [
+            (name, name.replace("-", " ").capitalize(), textwrap.shorten(d.text, 60)) for name in d.choices
+        ]
+        return EnumProperty(items=items, default=d.default, **shared)
+    if d.type is bool:
+        return BoolProperty(default=d.default, **shared)
+    if d.type is int:
+        return IntProperty(default=d.default, min=int(d.low), max=int(d.high), **shared)
+    length = {"subtype": "DISTANCE"} if d.unit == "mm" else {}
+    return FloatProperty(
+        default=d.default,
+        min=d.low,
+        max=d.high,
+        precision=3 if d.high < 1000 else 1,
+        step=10 if d.high > 20 else 1,
+        **length,
+        **shared,
+    )
+
+
+def true_length(name: str, title: str, text: str, scales: bool):
+    """A field for the length `name`, in mm at scale 1 where it `scales`, as it is: true, in the scene's unit.
+
+    Typed or dragged, it sets that length, within its bounds. Blender shows fields of lengths in the unit of
+    the scene, and of numbers in Blender units; so this one is in those.
+    """
+
+    def read(group) -> float:
+        return exact(getattr(group, name)) * _factor(group, scales)
+
+    def write(group, value: float) -> None:
+        setattr(group, name, exact(value / _factor(group, scales)))
+
+    shared = {"name": title, "description": text, "subtype": "DISTANCE", "precision": 6}
+    return FloatProperty(get=read, set=write, options={"SKIP_SAVE"}, **shared)
+
+
+def _factor(group, scales: bool) -> float:
+    """Blender units of the scene in a millimetre of a parameter."""
+    scale = exact(group.id_data.mu_unit.scale) if scales else 1.0
+    return scene_units.mm(bpy.context.scene) * scale
+
+
+def shown_value(group, d: Description, value: float) -> str:
+    """A value of a parameter in words: a length as it is at the unit's scale."""
+    if d.unit != "mm":
+        return f"{value:.6g}"
+    scale = 1.0 if d.fixed else exact(group.id_data.mu_unit.scale)
+    return scene_units.length(bpy.context.scene, value * scale, digits=6)
+
+
+TRUE = "_true"
+"""What the name of a parameter's field `true_length` ends with."""
+
+
+def field(group, d: Description) -> str:
+    """Name of the property that a panel shows of a parameter: itself, or its true length where it differs."""
+    if d.unit != "mm":
+        return d.name
+    scaled = not d.fixed and group.id_data.mu_unit.scale != 1.0
+    return d.name + TRUE if scaled or not scene_units.in_millimetres(bpy.context.scene) else d.name
+
+
+def _tied_update(name: str, changed):
+    """The update of a parameter that is tied to another one: both change as one."""
+
+    def update(group, context):
+        if not updates.are_paused():
+            with updates.paused():
+                for other, value in tied({name: exact(getattr(group, name))}).items():
+                    if other != name:
+                        setattr(group, other, value)
+        changed(group, context)
+
+    return update
+
+
+def generated_fields(section: type, changed) -> dict[str, Any]:
+    """Blender properties of every parameter of a section, and of every length as it is."""
+    annotations = {}
+    for d in describe(section):
+        update = _tied_update(d.name, changed) if len(tied({d.name: 0.0})) > 1 else changed
+        annotations[d.name] = blender_property(d, update)
+        if d.unit == "mm":
+            annotations[d.name + TRUE] = true_length(d.name, label(d), tooltip(d), not d.fixed)
+    return annotations

@@ -1,0 +1,74 @@
+"""What a unit comes to, for the head of its panel: true size, resin, time to print; so many lines."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Any
+
+import bpy
+
+from ...design import figures as core
+from ...design.printing.printer import Printer
+from ...errors import MuError
+from ...reading import parse_json
+from ...run.progress import spell
+from ..printing import state as printing
+from ..shared import scene_units
+from ..shared.file_cache import UNREADABLE
+from ..steps import state as stack
+from . import object as unit_object
+from .broken import broken
+from .properties import to_unit
+
+LINES = 4
+"""Lines of the box at the head of the panel, whatever it says: what is below does not move."""
+
+_kept: dict[str, tuple[Any, list[str]]] = {}
+
+
+def lines(root: Any, width: int) -> tuple[list[str], bool]:
+    """What the box says, LINES lines of at most `width` letters, and whether it is a broken rule."""
+    found = broken(root)
+    if found is not None:
+        text = textwrap.wrap(found.text.split("\n")[0], width)
+        if len(text) > LINES:
+            text = [*text[: LINES - 1], text[LINES - 1][: width - 2] + " ..."]
+        return text + [""] * (LINES - len(text)), True
+    return _figures(root), False
+
+
+def _figures(root: Any) -> list[str]:
+    props, units = root.mu_unit, bpy.context.scene.unit_settings
+    current = unit_object.solid_is_current(root)
+    key = props.built, current, root.mu_print.printer, units.system, units.scale_length, units.length_unit
+    kept = _kept.get(props.uuid)
+    if kept is None or kept[0] != key:
+        try:
+            kept = key, _made(root, current)
+        except (MuError, *UNREADABLE) as error:
+            kept = key, [str(error).split("\n")[0], "", "", ""]
+        _kept[props.uuid] = kept
+    return kept[1]
+
+
+def _made(root: Any, current: bool) -> list[str]:
+    unit = to_unit(root.mu_unit)
+    printer = printing.printer_of(root)
+    struts = stack.STACK.value("struts", stack.given(root, unit))
+    found = core.figures(unit, printer, struts, _volume(root) if current else None)
+    about = "about " if found.approximate else ""
+    return [
+        "Size " + " x ".join(scene_units.length(bpy.context.scene, mm) for mm in found.size_mm),
+        f"Resin {about}{found.mass_g:.3g} g, {found.volume_mm3 / 1000.0:.3g} ml",
+        f"Prints upright in about {spell(found.print_s)}",
+        _assumed(printer),
+    ]
+
+
+def _volume(root: Any) -> float:
+    return float(parse_json(root.mu_unit.solid["mu_gates"], "mu_gates")["volume_mm3"])
+
+
+def _assumed(printer: Printer) -> str:
+    limit = printer.limits["layer_s"]
+    return f"at {limit.value:g} s a layer{', assumed' if limit.assumed else ''}"

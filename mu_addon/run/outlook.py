@@ -1,0 +1,111 @@
+"""How far a run is as a whole, and how long it still takes: from a plan of its stages and what it says."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+Plan = Sequence[tuple[str, float]]
+"""Stages of a run in order, with the seconds that each is expected to take."""
+LONGER = 1.2
+"""By what factor an estimate has to grow before it is told, with the reason; else the old one counts on."""
+SLACK_S = 5.0
+UNPLANNED_S = 20.0
+"""Seconds that a stage which no plan has is taken for."""
+
+
+class Outlook:
+    """The whole of a run as it goes on; `tell` it each progress message.
+
+    fraction: done of the whole, 0..1, which never shrinks; number and count: of the present stage and of all;
+    why: why the time left grew last, or nothing. Without a plan there are only the stages so far, and no
+    time left but the present stage's.
+    """
+
+    def __init__(self, plan: Plan = (), clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._expected = dict(plan)
+        self._planned = bool(plan)
+        self._taken: dict[str, float] = {}
+        self._stage = ""
+        self._share = 0.0
+        self._spent = 0.0
+        self._own_left: float | None = None
+        self._left: float | None = None
+        self._at = clock()
+        self.fraction = 0.0
+        self.why = ""
+
+    @property
+    def number(self) -> int:
+        """Number of the present stage, from 1; 0 before the first."""
+        return list(self._expected).index(self._stage) + 1 if self._stage else 0
+
+    @property
+    def count(self) -> int:
+        """Number of stages, 0 where nobody planned them."""
+        return len(self._expected) if self._planned else 0
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Seconds until the end, counted down since the last message; None where that is not known."""
+        return None if self._left is None else max(self._left - (self._clock() - self._at), 0.0)
+
+    def tell(self, message: Mapping[str, Any]) -> None:
+        """Take in a progress message, see `progress`."""
+        stage, share = str(message.get("stage", "")), message.get("fraction")
+        added = ""
+        if stage not in self._expected:
+            added = stage
+            self._add(stage)
+        if stage != self._stage:
+            # What was passed over was in the cache, or not asked for.
+            self._stage = stage
+        self._share = float(share) if isinstance(share, int | float) else 0.0
+        seconds, left = message.get("seconds"), message.get("seconds_left")
+        self._spent = float(seconds) if isinstance(seconds, int | float) else 0.0
+        self._own_left = float(left) if isinstance(left, int | float) else None
+        if message.get("state") == "end":
+            self._taken[stage] = self._spent
+            self._share, self._own_left = 1.0, 0.0
+        self._estimate(added)
+
+    def _add(self, stage: str) -> None:
+        """Put a stage that was not planned after the present one."""
+        items = list(self._expected.items())
+        items.insert(self.number, (stage, UNPLANNED_S))
+        self._expected = dict(items)
+
+    def _estimate(self, added: str) -> None:
+        names = list(self._expected)
+        here = names.index(self._stage)
+        before = sum(self._expected[name] for name in names[:here])
+        whole = sum(self._expected.values())
+        done = before + self._share * self._expected[self._stage]
+        # One that has not ended is not done, however short the rest is expected to be.
+        self.fraction = max(self.fraction, min(done / whole if whole else 0.0, 0.999))
+        own = self._own_left
+        if own is None:
+            own = max((1.0 - self._share) * self._expected[self._stage], 0.0)
+        rest = sum(self._expected[name] for name in names[here + 1 :]) * self._pace()
+        if self._planned:
+            self._set_left(own + rest, added)
+        elif self._own_left is not None:
+            self._set_left(own, "")
+
+    def _pace(self) -> float:
+        """By what factor finished stages took longer than expected, within what one can believe."""
+        expected = sum(self._expected[name] for name in self._taken)
+        return min(max(sum(self._taken.values()) / expected, 0.2), 5.0) if expected > 1.0 else 1.0
+
+    def _set_left(self, left: float, added: str) -> None:
+        """The time left: it shrinks, or grows by so much that the reason is told."""
+        shown = self.seconds_left
+        if shown is not None and left > shown:
+            if left <= LONGER * shown + SLACK_S:
+                return
+            self.why = f"{added} was added" if added else f"{self._stage} takes longer than expected"
+        elif shown is not None:
+            self.why = ""
+        self._left, self._at = left, self._clock()

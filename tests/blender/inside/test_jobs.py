@@ -1,0 +1,88 @@
+"""Jobs in the header: one runs, the others wait; Cancel, and a notice at the end."""
+
+import sys
+from unittest.mock import MagicMock
+
+import bpy
+
+from mu_addon.blender.jobs import header, start_child
+from mu_addon.blender.simulate.job import SIMULATION, plan_of
+from mu_addon.run.child import Child
+
+from .acting import add, refused
+from .jobs import FAKE, ended, watch
+
+
+def started(root, how, monkeypatch):
+    """A fake simulation, started as its operator does."""
+
+    def fake(arguments, folder, **settings):
+        folder = folder / start_child.OWN_FOLDER
+        return Child([sys.executable, FAKE, how], folder, start_child.environment(), **settings)
+
+    monkeypatch.setattr(start_child, "start", fake)
+    return SIMULATION.start(root, SIMULATION.folder_of(root), lambda folder: None)
+
+
+def said():
+    """Words of the header, and the factor of its bar."""
+    texts, layout = [], MagicMock()
+    layout.row.return_value = layout
+    layout.label.side_effect = lambda text="", **_: texts.append(text)
+    layout.progress.side_effect = lambda factor, text: texts.append(text)
+    layout.menu.side_effect = lambda name, text="", **_: texts.append(text)
+    header.draw(MagicMock(layout=layout), bpy.context)
+    return " ".join(texts)
+
+
+def test_one_runs_the_others_wait_and_each_ends_with_a_notice(monkeypatch):
+    first, second = add(), add()
+    assert said() == ""
+    one = started(first, "hang", monkeypatch)
+    two = started(second, "good", monkeypatch)
+    watch(lambda: one.progress)
+    assert (one.state, two.state) == ("running", "waiting")
+    assert SIMULATION.is_running(second)
+    assert "Model A (3 of 8)" in said()
+    assert "left: mu-1.0x: simulation" in said()
+    assert "+1" in said()
+    assert bpy.ops.mu.job_cancel() == {"FINISHED"}
+    assert "stopping" in said()
+    ended(one)
+    watch(lambda: two.state != "waiting")
+    ended(two)
+    assert (one.state, two.state) == ("cancelled", "done")
+    assert "mu-1.0x.001: simulation: done in" in said()
+    assert bpy.ops.mu.job_dismiss() == {"FINISHED"}
+    assert said() == ""
+    assert "no such job" in refused(bpy.ops.mu.job_cancel)
+
+
+def test_what_waits_can_be_taken_out_of_the_queue(monkeypatch):
+    first, second = add(), add()
+    one = started(first, "hang", monkeypatch)
+    two = started(second, "good", monkeypatch)
+    assert bpy.ops.mu.job_cancel(key=SIMULATION.key(second)) == {"FINISHED"}
+    assert two.state == "cancelled"
+    one.cancel()
+    ended(one)
+    start_child.poll()
+    assert two.state == "cancelled"
+    assert not start_child.running()
+
+
+def test_a_failed_one_says_what_in_the_header(monkeypatch):
+    child = started(add(), "reported_error", monkeypatch)
+    ended(child)
+    assert "no equilibrium" in said()
+
+
+def test_a_plan_has_the_stages_of_the_job_and_the_seconds_of_the_last_run(study):
+    root = add(preset="mu-0.75x")
+    root.mu_unit.study.command = "simulate"
+    assert [name for name, _ in plan_of(root)] == ["solid", "mesh", "Model A", "report"]
+    root.mu_unit.study.folder = str(study)
+    from mu_addon.blender.simulate import study_folder as studies
+
+    seconds = studies.findings(root).summary["seconds"]
+    assert dict(plan_of(root))["Model A"] == seconds["Model A"]

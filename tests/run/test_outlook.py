@@ -1,0 +1,108 @@
+"""The whole of a run: a fraction that grows, a time left that shrinks or says why not."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mu_addon.run.outlook import Outlook
+
+PLAN = (("mesh", 10.0), ("Model A", 60.0), ("report", 10.0))
+
+
+class Clock:
+    def __init__(self):
+        self.now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
+def outlook(plan=PLAN):
+    clock = Clock()
+    return Outlook(plan, clock), clock
+
+
+def message(stage, fraction, seconds, left=None, state="run"):
+    return {"stage": stage, "fraction": fraction, "seconds": seconds, "seconds_left": left, "state": state}
+
+
+def test_a_run_as_planned_counts_down():
+    run, clock = outlook()
+    run.tell(message("mesh", None, 0.0, state="start"))
+    assert (run.number, run.count) == (1, 3)
+    assert run.seconds_left == 80.0
+    clock.now = 10.0
+    run.tell(message("mesh", 1.0, 10.0, state="end"))
+    assert run.fraction == 0.125
+    clock.now = 40.0
+    run.tell(message("Model A", 0.5, 30.0, 30.0))
+    assert run.number == 2
+    assert run.fraction == 0.5
+    assert run.seconds_left == 40.0
+    clock.now = 45.0
+    assert run.seconds_left == 35.0, "it counts between messages, too"
+    assert run.why == ""
+
+
+def test_a_longer_time_says_why_and_a_little_longer_one_is_not_told():
+    run, clock = outlook()
+    run.tell(message("Model A", 0.1, 6.0, 54.0))
+    assert run.seconds_left == 64.0
+    clock.now = 1.0
+    run.tell(message("Model A", 0.1, 7.0, 60.0))
+    assert run.seconds_left == 63.0
+    assert run.why == ""
+    run.tell(message("Model A", 0.11, 30.0, 240.0))
+    assert run.seconds_left == 250.0
+    assert run.why == "Model A takes longer than expected"
+    run.tell(message("Model A", 0.5, 60.0, 60.0))
+    assert run.seconds_left == 70.0
+    assert run.why == ""
+    run.tell(message("mesh check", None, 0.0))
+    assert run.count == 4
+    clock.now = 71.0
+    run.tell(message("map", 0.0, 0.0, 100.0))
+    assert run.why == "map was added"
+
+
+def test_what_the_cache_had_is_passed_over():
+    run, _ = outlook()
+    run.tell(message("report", 0.0, 0.0, 10.0))
+    assert run.fraction == 70.0 / 80.0
+    assert run.seconds_left == 10.0
+
+
+def test_a_pace_of_finished_stages_tells_of_the_later_ones():
+    run, clock = outlook()
+    run.tell(message("mesh", 0.5, 10.0, 10.0))
+    clock.now = 20.0
+    run.tell(message("mesh", 1.0, 20.0, state="end"))
+    assert run.seconds_left == 140.0, "twice as slow as expected"
+
+
+def test_without_a_plan_there_is_the_stage_alone():
+    run, _ = outlook(())
+    assert run.seconds_left is None
+    run.tell(message("Model A", 0.5, 1.0, 3.0))
+    assert run.count == 0
+    assert run.seconds_left == 3.0
+    run.tell({"stage": "x", "fraction": "half", "seconds": None})
+    assert 0.0 <= run.fraction < 1.0
+
+
+STAGES = st.sampled_from(["mesh", "Model A", "report", "light"])
+NUMBER = st.one_of(st.none(), st.floats(0.0, 1e4))
+MESSAGE = st.tuples(STAGES, st.one_of(st.none(), st.floats(0.0, 1.0)), NUMBER, NUMBER, st.floats(0.0, 60.0))
+
+
+@given(st.lists(MESSAGE, max_size=30))
+def test_whatever_is_told_the_fraction_grows_and_the_time_shrinks_or_has_a_reason(messages):
+    run, clock = outlook()
+    before, left = 0.0, None
+    for stage, fraction, seconds, own, pause in messages:
+        clock.now += pause
+        run.tell(message(stage, fraction, seconds, own))
+        assert before <= run.fraction < 1.0
+        now = run.seconds_left
+        if left is not None and now > left:
+            assert run.why
+        before, left = run.fraction, now
