@@ -15,7 +15,8 @@ from ...usecases.graph.definitions import definitions
 from ..shared.panels import wrapped
 from ..shared.texts import sentence
 from ..shared.updates import Signal
-from ..unit.properties import BESIDE_BLEND_FILE, blender_property, label, tooltip
+from ..unit.fields import blender_property, field, label, tooltip
+from ..unit.properties import BESIDE_BLEND_FILE
 from . import sockets
 
 TREE = "MuNodeTree"
@@ -178,7 +179,7 @@ class _CoreNode(_Node):
 
 def draw_source(node, layout) -> None:
     """The parameters of the unit in the scene that a node shows: the very fields of the unit's sidebar."""
-    from ...design.parameters import SECTIONS
+    from ...design.parameters import SECTIONS, describe
 
     props = node.source.mu_unit
     layout.prop(props, "title")
@@ -187,8 +188,8 @@ def draw_source(node, layout) -> None:
         layout.label(text=section.section.capitalize())
         column = layout.column(align=True)
         group = getattr(props, section.section)
-        for name in group.__annotations__:
-            column.prop(group, name)
+        for d in describe(section):
+            column.prop(group, field(group, d))
 
 
 def draw_state(node, layout) -> None:

@@ -13,7 +13,8 @@ from ...errors import InputError
 from ...graph.definition import Setting
 from ...graph.tree import Node, NodeTree, Source
 from ...usecases.graph.definitions import definitions
-from ..unit.properties import exact, to_unit
+from ..unit.fields import exact
+from ..unit.properties import to_unit
 from .classes import GROUP, TREE, attribute, node_class
 
 DEEPEST = 16
