@@ -43,13 +43,12 @@ class MU_OT_evidence_diagnose(ValidUnitOperator, bpy.types.Operator):
             return False
         root = unit_object.active_root(context)
         found = evidence.measured_data(root)
-        trouble = ""
         if found is None or found.measured is None:
             trouble = found.trouble.partition("\n")[0] if found else NO_DATA
         elif evidence.DIAGNOSIS.is_running(root):
             trouble = "A diagnosis is running"
-        elif start_child.missing():
-            trouble = f"Not in this Blender: {', '.join(start_child.missing())}"
+        else:
+            trouble = start_child.lacking()
         if trouble:
             cls.poll_message_set(trouble)
         return not trouble
@@ -81,8 +80,7 @@ class MU_OT_evidence_apply(ValidUnitOperator, bpy.types.Operator):
             trouble = "No effect was named that could be applied"
         if not trouble and evidence.applied(unit_object.active_root(context)):
             trouble = "This model is already applied: undo removes it"
-        if not trouble and start_child.missing():
-            trouble = f"Not in this Blender: {', '.join(start_child.missing())}"
+        trouble = trouble or start_child.lacking()
         if trouble:
             cls.poll_message_set(trouble)
         return not trouble

@@ -93,12 +93,12 @@ class MU_OT_grasp(GripperOperator, bpy.types.Operator):
     def poll(cls, context):
         if not super().poll(context):
             return False
-        root, missing = gripper_object.active(context), start_child.missing()
+        root = gripper_object.active(context)
         trouble = root.mu_gripper.trouble.partition("\n")[0]
         if grasps.GRASP.is_running(root):
             trouble = "A job of this gripper is running"
-        elif missing:
-            trouble = f"Not in this Blender: {', '.join(missing)}"
+        else:
+            trouble = trouble or start_child.lacking()
         if trouble:
             cls.poll_message_set(trouble)
         return not trouble

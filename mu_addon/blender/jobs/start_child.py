@@ -43,6 +43,12 @@ def missing(modules: Sequence[str] = SOLVER) -> list[str]:
     return [name for name in modules if importlib.util.find_spec(name) is None]
 
 
+def lacking(modules: Sequence[str] = SOLVER) -> str:
+    """Which of those modules this Blender does not find, in words; empty where it finds all."""
+    names = missing(modules)
+    return f"Not in this Blender: {', '.join(names)}" if names else ""
+
+
 def start(
     arguments: Sequence[str],
     folder: Path,

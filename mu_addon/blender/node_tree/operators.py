@@ -67,11 +67,9 @@ class MU_OT_tree_evaluate(_TreeOperator, bpy.types.Operator):
         if state.RUN.is_running(root_tree(context)):
             cls.poll_message_set("This tree is being evaluated")
             return False
-        missing = start_child.missing()
-        if missing:
-            cls.poll_message_set(f"Not in this Blender: {', '.join(missing)}")
-            return False
-        return True
+        if trouble := start_child.lacking():
+            cls.poll_message_set(trouble)
+        return not trouble
 
     @reports_errors
     def execute(self, context):

@@ -26,7 +26,7 @@ from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.folder import FolderLayout, write_run
 from ...usecases.export.limit_sheet import with_measured
 from ..body import state as bodies
-from ..jobs.start_child import OWN_FOLDER, JobKind, missing
+from ..jobs.start_child import OWN_FOLDER, JobKind, lacking
 from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
 from ..steps import state as stack
@@ -125,9 +125,8 @@ def path_of(root: Any, unit: Unit) -> str:
 
 def trouble(root: Any, command: str) -> str:
     """Why a job for the printer cannot be started now, or nothing."""
-    lacking = missing(NEEDED)
-    if lacking:
-        return f"Not in this Blender: {', '.join(lacking)}"
+    if absent := lacking(NEEDED):
+        return absent
     settings = root.mu_print
     if command in (CHECK, EXPORT):
         try:

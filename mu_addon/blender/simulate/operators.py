@@ -28,11 +28,9 @@ class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
         if SIMULATION.is_running(root):
             cls.poll_message_set("This unit is being simulated")
             return False
-        missing = start_child.missing()
-        if missing:
-            cls.poll_message_set(f"Not in this Blender: {', '.join(missing)}")
-            return False
-        return True
+        if trouble := start_child.lacking():
+            cls.poll_message_set(trouble)
+        return not trouble
 
     @reports_errors
     def execute(self, context):
