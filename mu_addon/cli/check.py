@@ -50,6 +50,15 @@ def add(commands: Commands[Any]) -> None:
         metavar=("X", "Y", "Z"),
         help="Build direction, pointing away from the platform (default: 0 0 1, inlet toward the platform).",
     )
+    command.add_argument(
+        "--layers",
+        nargs="*",
+        type=float,
+        default=(),
+        metavar="MM",
+        help="Heights of the layers to draw, in mm above the part's lowest point (default: 12, evenly "
+        "spaced).",
+    )
     add_solid(command)
 
 
@@ -81,5 +90,6 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
         stl=None if stl is None else read_stl(stl),
         stl_file=stl,
         direction=tuple(options.up),
+        layers=tuple(options.layers),
     )
     USE_CASE.start(job, Path(options.out), context)

@@ -1,6 +1,8 @@
 """`check` from the command line: its files, its report and its exit status."""
 
+import base64
 import json
+import re
 
 import numpy as np
 import pytest
@@ -61,6 +63,18 @@ def test_a_limit_that_was_measured_decides(tmp_path):
     assert not found["drain"]["assumed"]
     assert "measured" in (out / "report.html").read_text()
     assert read_printer(out / "printer.toml").limits["drain_diameter_mm"].measured
+
+
+def test_the_report_draws_the_layers_that_are_asked_for(tmp_path):
+    status, out = run(tmp_path, bottle(4.0), "--layers", "1", "7")
+    assert status == 0
+    charts = re.findall(r"data:image/svg\+xml;base64,([^\"]+)", (out / "report.html").read_text())
+    words = b" ".join(base64.b64decode(chart) for chart in charts).decode()
+    assert "1.0 mm, 13 mm²" in words
+    assert "7.0 mm, 100 mm²" in words
+    assert main(["resume", str(out)]) == 0
+    status, _ = run(tmp_path / "out", bottle(4.0), "--layers", "-1")
+    assert status == 2
 
 
 def test_a_part_that_must_not_be_printed_ends_with_status_6(tmp_path):

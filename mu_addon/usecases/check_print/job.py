@@ -17,6 +17,8 @@ from ...toml_writer import toml_text
 
 # No STL is longer, in bytes: some 40 million triangles.
 _LONGEST = 1 << 31
+# Of layers to draw: how many at most, and no part is so tall, in mm.
+MOST_LAYERS, _FARTHEST = 60, 1e5
 
 UNIT, PRINTER = "unit.toml", "printer.toml"
 LAYOUT = FolderLayout(
@@ -31,7 +33,8 @@ LAYOUT = FolderLayout(
 class Job:
     """Inputs of a check: a unit, or the bytes of an STL file, or a file checked against its unit.
 
-    direction points away from the platform, in the part's frame.
+    direction points away from the platform, in the part's frame. layers: heights in mm, above the part's
+    lowest point, of the layers to draw; some evenly spaced where there are none.
     """
 
     printer: Printer
@@ -41,6 +44,15 @@ class Job:
     stl: bytes | None = None
     stl_file: Path | None = None
     direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    layers: tuple[float, ...] = attrs.field(default=(), converter=tuple)
+
+    def __attrs_post_init__(self) -> None:
+        if len(self.layers) > MOST_LAYERS or not all(0.0 <= z < _FARTHEST for z in self.layers):
+            raise InputError(
+                f"layers at {', '.join(f'{z:g}' for z in self.layers[:5])} mm",
+                "layers",
+                f"give up to {MOST_LAYERS} heights above the part's lowest point, in mm, from 0 on",
+            )
 
     @property
     def stl_name(self) -> str:
@@ -66,6 +78,7 @@ class Job:
             "path": None if self.window is None else self.window.name,
             "stl_sha256": None if self.stl is None else digest(self.stl),
             "direction": self.direction,
+            "layers": list(self.layers) or None,
             "run": {"stl": str(self.stl_file.resolve())} if self.stl_file is not None else None,
         }
         texts = {LAYOUT.inputs: toml_text(values, LAYOUT.header), PRINTER: printer_text(self.printer)}
@@ -91,7 +104,7 @@ def read_job(folder: Path) -> Job:
     if stl is not None and content is not None:
         require_digest(stl, content, values["stl_sha256"], "STL file")
     unit = read_unit(folder / UNIT) if "unit" in values else None
-    taken = {key: values[key] for key in ("quality", "direction") if key in values}
+    taken = {key: values[key] for key in ("quality", "direction", "layers") if key in values}
     return structured(
         Job,
         taken,

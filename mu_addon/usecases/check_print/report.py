@@ -13,6 +13,7 @@ from ...design.printing.check import PrintCheck
 from ...design.printing.finding import Finding, counted
 from ...design.printing.orientation import Build, directions
 from ...design.printing.printer import MEANING
+from ...design.printing.slices import Slice, even_heights, slices
 from ...design.surface import Triangles, Vertices
 from ...files import write_bytes, write_text
 from ...report import charts as plots
@@ -36,6 +37,8 @@ FILES = {
 COLORS = {"error": (0.75, 0.05, 0.10), "warning": (0.95, 0.55, 0.0)}
 GREY = (0.66, 0.70, 0.76)
 MOST_ROWS = 12
+# Layers that are drawn where none was asked for.
+LAYERS = 12
 
 
 def write_report(
@@ -45,14 +48,15 @@ def write_report(
     with progress.stage("report", expected_s=8.0):
         picture = places_picture(vertices, triangles, found, job.direction)
         write_bytes(folder / "places.png", picture.png)
-        write_text(folder / "report.html", report(job, found, picture))
+        write_text(folder / "report.html", report(job, vertices, triangles, found, picture))
 
 
-def report(job: Job, found: PrintCheck, picture: Picture) -> str:
+def report(job: Job, vertices: Vertices, triangles: Triangles, found: PrintCheck, picture: Picture) -> str:
     """The whole report as HTML text."""
     files = {name: text for name, text in FILES.items() if name != "unit.toml" or job.unit is not None}
     sections = [
         ("findings", "What was checked", _findings(found)),
+        ("layers", "Layers", _layers(job, vertices, triangles)),
         ("orientation", "Build direction", _orientation(found.builds)),
         ("limits", "The printer's limits", _limits(job)),
         ("files", "Files of this check", facts_table("file", "content", files)),
@@ -173,6 +177,55 @@ def _limits(job: Job) -> str:
         for name, limit in job.printer.limits.items()
     ]
     return table("mm, degrees, ml and g/ml", head, rows)
+
+
+def _layers(job: Job, vertices: Vertices, triangles: Triangles) -> str:
+    """Pictures of layers: those that were asked for, or some evenly spaced."""
+    heights = job.layers or even_heights(vertices, job.direction, LAYERS)
+    found = slices(vertices, triangles, job.direction, heights)
+    if not found:
+        return "<p>The surface encloses no volume: it has no layers.</p>"
+    caption = (
+        "Layers by their height above the part's lowest point: material in grey, what a layer encloses in "
+        "blue, such as a chamber, with its area."
+    )
+    return figure(layer_pictures(found), caption, "Sections of the part at several heights")
+
+
+def layer_pictures(found: Sequence[Slice]) -> str:
+    """Sections of a part side by side, to one scale, as SVG text."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path as Outline
+
+    across = 4
+    rows = -(-len(found) // across)
+    points = np.concatenate([ring for s in found for ring in s.outlines])
+    low, high = points.min(axis=0), points.max(axis=0)
+    wide = plots.WIDTH * 1.6
+    tall = (0.4 + wide / across * float((high - low)[1] / (high - low)[0])) * rows
+    with plots.canvas(wide, tall) as (chart, svg):
+        for k, section in enumerate(found):
+            axes = chart.add_subplot(rows, across, k + 1)
+            # Holes last, filled: what stands in them is material again.
+            for ring in sorted(section.outlines, key=_extent, reverse=True):
+                edge = Outline(np.vstack([ring, ring[:1]]), closed=True)
+                color = GREY if _extent(ring, signed=True) > 0 else plots.BY_LENGTH[3]
+                axes.add_patch(PathPatch(edge, facecolor=color, edgecolor=plots.INK, linewidth=0.3))
+            title = f"{section.height_mm:.1f} mm"
+            if section.enclosed_mm2 >= 1.0:
+                title += f", {section.enclosed_mm2:.0f} mm²"
+            axes.set_title(title, fontsize=8)
+            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+            axes.axis("off")
+        chart.tight_layout(pad=0.3)
+    return svg()
+
+
+def _extent(ring: Floats, signed: bool = False) -> float:
+    """Area of an outline (n, 2), with `signed` negative for that of a hole."""
+    x, y = ring.T
+    area = 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    return area if signed else abs(area)
 
 
 def direction_name(direction: Sequence[float]) -> str:
