@@ -118,8 +118,9 @@ def test_a_folder_of_an_older_version_says_the_same(tmp_path, name):
     job = found.read(folder)
     texts = job.texts_in(folder)[0] if hasattr(job, "texts_in") else job.texts()
     if name == "check":
-        # A limit that came since is written with its default: what was found without it is set aside.
-        texts["printer.toml"] = without_table(texts["printer.toml"], "support_mm")
+        # Limits that came since are written with their defaults: what was found without them is set aside.
+        for limit in ("support_mm", "layer_s"):
+            texts["printer.toml"] = without_table(texts["printer.toml"], limit)
     assert same_inputs(folder, {k: v for k, v in texts.items() if k != "resin.toml"})
 
 

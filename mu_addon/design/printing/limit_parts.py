@@ -57,7 +57,8 @@ def limit_parts(printer: Printer, strut_mm: float) -> list[LimitPart]:
     """A part for every limit of a printer that a print can show.
 
     strut_mm: length of the unit's struts, half a cell's diagonal. Without a part are the build volume, the
-    layer and the supports, which are settings and not limits, and the density, which any weighed part tells.
+    layer, its time and the supports, which are settings and not limits, and the density, which any weighed
+    part tells.
     """
     rows: dict[str, tuple[Callable[[float], Any], str, str]] = {
         "solid_mm": (_held_wall, "the wall between its posts is whole and straight", "smallest"),

@@ -146,7 +146,7 @@ def test_a_simulation_is_given_the_body(monkeypatch):
     root = add()
     choose(barrel(), root)
     bpy.ops.mu.body()
-    monkeypatch.setattr(start_child, "start", lambda *arguments: None)
+    monkeypatch.setattr(start_child, "start", lambda *arguments, **more: None)
     monkeypatch.setattr(start_child, "watch", lambda *arguments: None)
     assert bpy.ops.mu.simulate() == {"FINISHED"}
     job = read_job(studies.folder_of(root))

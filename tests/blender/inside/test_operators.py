@@ -51,12 +51,15 @@ def test_operators_without_a_unit_say_what_is_missing():
         operator = getattr(bpy.ops.mu, name)
         free = {"add", "millimetres", "preset_remove", "assets", "assets_remove"}
         free |= {"sample", "sensor_ports", "gripper_add", "job_cancel", "job_dismiss"}
+        free |= {"tree_new", "tree_load"}
         if name in free:
             assert operator.poll()
         elif name.startswith("track"):
             assert "Open a clip of the bench in the Movie Clip Editor" in refused(operator)
         elif name.startswith(("grasp", "gripper")):
             assert "Add > Mesh > Monolithic Gripper" in refused(operator), name
+        elif name.startswith(("node_", "tree_")) and name != "tree_of_unit":
+            assert "Open a node tree of the kind Monolithic Unit" in refused(operator), name
         elif name == "skin":
             assert "Select a curve or a mesh" in refused(operator)
         else:
@@ -72,6 +75,8 @@ def test_what_changes_the_file_is_one_undo_step():
     outside = {"simulate", "cancel", "dismiss", "open", "export_stl", "preset_save", "preset_remove"}
     outside |= {"assets", "assets_remove", "picture"}
     outside |= {"evidence_diagnose", "evidence_cancel", "evidence_dismiss", "evidence_open"}
+    outside |= {"tree_evaluate", "tree_save", "tree_cancel", "tree_dismiss", "tree_open"}
+    outside |= {"node_open", "node_group_edit"}
     outside |= {"print_check", "print_export", "print_specimens"}
     outside |= {"print_cancel", "print_dismiss", "print_open"}
     outside |= {"sensor_ports", "sensor_connect", "sensor_disconnect", "sensor_pause"}

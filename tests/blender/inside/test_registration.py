@@ -122,8 +122,9 @@ def test_a_new_section_of_the_core_appears_by_itself():
         def prop(self, group, name):
             self.shown.append(name)
 
-    draw(Layout(), root.mu_unit, "design")
-    assert Layout.shown[-2:] == ["depth_mm", "way"]
+    draw(Layout(), root, "design")
+    # A new scene's unit is the metre: a length is shown as it is there.
+    assert Layout.shown[-2:] == ["depth_mm_true", "way"]
 
 
 def test_values_survive_single_precision():

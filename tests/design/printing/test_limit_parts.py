@@ -26,8 +26,8 @@ def mesh(limit):
 
 
 def test_every_limit_has_a_part_but_settings_and_the_density():
-    settings = {"build_x_mm", "build_y_mm", "build_z_mm", "support_mm", "layer_mm", "density_g_per_ml"}
-    assert set(PARTS) == set(MEANING) - settings
+    settings = {"build_x_mm", "build_y_mm", "build_z_mm", "support_mm", "layer_mm", "layer_s"}
+    assert set(PARTS) == set(MEANING) - settings - {"density_g_per_ml"}
     for name, part in PARTS.items():
         assert np.all(np.diff(part.sizes) > 0)
         assert part.sizes[RATIOS.index(1.0)] == pytest.approx(PRINTER[name], rel=0.05)
