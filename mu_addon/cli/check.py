@@ -69,7 +69,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
     from ..errors import InputError
     from ..usecases.check_print.job import Job, read_stl
     from ..usecases.check_print.run import USE_CASE
-    from ..usecases.export.limit_sheet import with_measured
+    from ..usecases.export.limit_sheet import measured_limits
 
     unit = unit_if_named(options)
     if unit is None and options.stl is None:
@@ -80,7 +80,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
         raise InputError(f"{options.up} is not a direction", "--up", "give three numbers, such as 0 0 1")
     printer = load_printer(options.printer)
     if options.limits is not None:
-        printer = with_measured(printer, Path(options.limits))
+        printer = printer.with_limits(measured_limits(Path(options.limits)))
     stl = None if options.stl is None else Path(options.stl)
     job = Job(
         printer=printer,

@@ -150,7 +150,7 @@ Report = Callable[[str, State], None]
 
 @attrs.define
 class Evaluation:
-    """One tree, evaluated by `run`; afterwards `states` and `outputs` by node.
+    """One tree, evaluated by `run`; afterwards `states` and `outputs` by node, and the tree's `faults`.
 
     runs: where runs are found and started; None for a look, which makes only what takes milliseconds and
     knows of the rest what earlier evaluations left: `records`, by key. report: called with each node's state.
@@ -164,6 +164,7 @@ class Evaluation:
     report: Report = lambda name, state: None
     states: dict[str, State] = attrs.field(factory=dict)
     outputs: dict[str, Outputs] = attrs.field(factory=dict)
+    faults: tuple[Fault, ...] = ()
 
     def run(self, wanted: Iterable[str] = ()) -> dict[str, State]:
         """Make the wanted nodes, all of the tree where none is named, and what they need.
@@ -173,7 +174,8 @@ class Evaluation:
         order, circle = self.tree.ordered()
         needed = self.tree.upstream(tuple(wanted) or self.tree.nodes)
         first: dict[str, Fault] = {}
-        for fault in faults(self.tree, self.definitions):
+        self.faults = faults(self.tree, self.definitions)
+        for fault in self.faults:
             first.setdefault(fault.node, fault)
         for name in (*order, *sorted(circle)):
             if name not in needed:

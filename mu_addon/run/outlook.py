@@ -59,9 +59,8 @@ class Outlook:
         if stage not in self._expected:
             added = stage
             self._add(stage)
-        if stage != self._stage:
-            # What was passed over was in the cache, or not asked for.
-            self._stage = stage
+        # What was passed over was in the cache, or not asked for.
+        self._stage = stage
         self._share = float(share) if isinstance(share, int | float) else 0.0
         seconds, left = message.get("seconds"), message.get("seconds_left")
         self._spent = float(seconds) if isinstance(seconds, int | float) else 0.0

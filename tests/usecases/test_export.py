@@ -27,7 +27,7 @@ from mu_addon.run.progress import Progress
 from mu_addon.usecases.export import run as exporting
 from mu_addon.usecases.export import specimens
 from mu_addon.usecases.export.job import Job, path_of
-from mu_addon.usecases.export.limit_sheet import with_measured
+from mu_addon.usecases.export.limit_sheet import measured_limits
 from mu_addon.usecases.export.print_offsets import compensation_offsets, gauge_sheet, read_sheet
 from mu_addon.usecases.export.run import USE_CASE as EXPORT
 from mu_addon.usecases.export.specimens import USE_CASE as SPECIMENS
@@ -301,7 +301,7 @@ def filled(folder, path, **measured):
 def test_limits_that_were_measured_take_the_place_of_those_that_were_not(printed, tmp_path):
     printer = load_printer()
     sheet = filled(printed[0], tmp_path / "limits.csv", wall_mm="0.42", bridge_mm="15")
-    found = with_measured(printer, sheet)
+    found = printer.with_limits(measured_limits(sheet))
     changed = {name for name in printer.limits if found.limits[name] != printer.limits[name]}
     assert changed == {"wall_mm", "bridge_mm"}
     assert found["wall_mm"] == 0.42
@@ -324,7 +324,7 @@ def test_limits_that_were_measured_take_the_place_of_those_that_were_not(printed
 )
 def test_a_sheet_of_limits_that_says_nothing_sensible_is_refused(printed, tmp_path, measured, message):
     with pytest.raises(InputError, match=message):
-        with_measured(load_printer(), filled(printed[0], tmp_path / "limits.csv", **measured))
+        measured_limits(filled(printed[0], tmp_path / "limits.csv", **measured))
 
 
 @pytest.mark.parametrize(
@@ -339,7 +339,7 @@ def test_a_sheet_of_limits_that_says_nothing_sensible_is_refused(printed, tmp_pa
 def test_a_sheet_of_limits_that_was_edited_too_much_is_refused(tmp_path, text, message):
     (tmp_path / "limits.csv").write_text(text)
     with pytest.raises(InputError, match=message):
-        with_measured(load_printer(), tmp_path / "limits.csv")
+        measured_limits(tmp_path / "limits.csv")
 
 
 def test_the_template_is_a_folder_of_measured_data_but_for_its_rows(printed):

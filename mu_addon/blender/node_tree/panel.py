@@ -5,10 +5,9 @@ from __future__ import annotations
 import bpy
 
 from ...graph.evaluation import MADE
-from ...run.child import RUNNING
 from ...usecases.graph.definitions import definitions
-from ..jobs.panel import job_state
-from ..shared.panels import large_button, wrapped
+from ..jobs.panel import job_state, start_button, whole
+from ..shared.panels import wrapped
 from . import classes, state
 from .classes import GROUP, TREE
 from .operators import root_tree
@@ -43,8 +42,7 @@ class MU_PT_tree(_Panel, bpy.types.Panel):
             layout.operator("mu.tree_load", icon="FILE_FOLDER")
             return
         child = state.RUN.child(tree)
-        if child is None or child.state != RUNNING:
-            large_button(layout, "mu.tree_evaluate", "PLAY")
+        start_button(layout, child, "mu.tree_evaluate", "PLAY")
         job_state(layout, child, "see the nodes", "tree_")
         row = layout.row(align=True)
         for what in ("report", "folder"):
@@ -90,13 +88,18 @@ class MU_PT_node(_Panel, bpy.types.Panel):
         node.draw_buttons_ext(context, column)
 
 
+def _entry(layout, text: str, kind: str) -> None:
+    """An entry of the Add menu: a node of that kind, which then follows the mouse."""
+    add = layout.operator("node.add_node", text=text)
+    add.type, add.use_transform = kind, True
+
+
 def _menu(category: str) -> type:
     kinds = [d for d in definitions().values() if d.category == category]
 
     def draw(self, context):
         for d in kinds:
-            add = self.layout.operator("node.add_node", text=d.label)
-            add.type, add.use_transform = classes.node_class(d.kind), True
+            _entry(self.layout, d.label, classes.node_class(d.kind))
 
     name = f"MU_MT_nodes_{category.lower()}"
     members = {"__doc__": category, "bl_idname": name, "bl_label": category, "draw": draw}
@@ -124,8 +127,7 @@ class MU_MT_nodes_group(bpy.types.Menu):
             ("Group Input", "NodeGroupInput"),
             ("Group Output", "NodeGroupOutput"),
         ):
-            add = layout.operator("node.add_node", text=name)
-            add.type, add.use_transform = kind, True
+            _entry(layout, name, kind)
 
 
 class MU_MT_nodes_layout(bpy.types.Menu):
@@ -136,8 +138,7 @@ class MU_MT_nodes_layout(bpy.types.Menu):
 
     def draw(self, context):
         for name, kind in (("Frame", "NodeFrame"), ("Reroute", "NodeReroute")):
-            add = self.layout.operator("node.add_node", text=name)
-            add.type, add.use_transform = kind, True
+            _entry(self.layout, name, kind)
 
 
 def _add(self, context):
@@ -157,8 +158,8 @@ def _header(self, context):
         row.operator_menu_enum("mu.tree_new", "template", text="Template", icon="NODETREE")
         return
     child = state.RUN.child(tree)
-    if child is not None and child.state == RUNNING:
-        row.label(text=str(child.progress.get("stage", "starting")))
+    if child is not None and state.RUN.is_running(tree):
+        row.label(text=whole(child)[1])
         row.operator("mu.tree_cancel", text="", icon="X")
     else:
         row.operator("mu.tree_evaluate", icon="PLAY")

@@ -16,7 +16,6 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...errors import InputError, MuError
-from ...graph.check import faults
 from ...graph.evaluation import FAILED, Evaluation, Kept, Record, State
 from ...graph.records import NAME as RECORDS
 from ...graph.records import read_records
@@ -59,16 +58,19 @@ def _is_group(tree: Any) -> bool:
 
 def uuid_of(tree: Any) -> str:
     """Identifier of a tree; a copy has its own by its name."""
-    if not tree.mu_uuid:
-        tree.mu_uuid = uuid.uuid4().hex
-    return f"{tree.mu_uuid}:{tree.name}"
+    return f"{_number(tree)}:{tree.name}"
 
 
 def folder_of(tree: Any) -> Path:
     """Folder of a tree's runs: the one it names, else beside the .blend file, else the user's own."""
+    return default_folder(tree.mu_folder, tree.name, _number(tree))
+
+
+def _number(tree: Any) -> str:
+    """The UUID of a tree, given to it when it is first asked for."""
     if not tree.mu_uuid:
         tree.mu_uuid = uuid.uuid4().hex
-    return default_folder(tree.mu_folder, tree.name, tree.mu_uuid)
+    return str(tree.mu_uuid)
 
 
 RUN = JobKind("graph", uuid_of, folder_of)
@@ -90,7 +92,7 @@ def look(tree: Any) -> dict[str, State]:
     evaluation = Evaluation(core, definitions(), kept=_kept, records=records)
     found = evaluation.run()
     refused: dict[tuple[str, str], set[Source]] = {}
-    for fault in faults(core, definitions()):
+    for fault in evaluation.faults:
         if fault.source is not None:
             refused.setdefault((fault.node, fault.input), set()).add(fault.source)
     conversion.mark_links(tree, {key: frozenset(sources) for key, sources in refused.items()})

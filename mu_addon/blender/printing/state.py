@@ -17,14 +17,14 @@ from mathutils import Vector
 
 from ...design.anchors import window
 from ...design.parameters import Unit, read_unit
-from ...design.printing.printer import Printer, load_printer, printer_text
+from ...design.printing.printer import Limit, Printer, load_printer, printer_text
 from ...design.steps import require_whole
 from ...design.surface import stl_bytes
 from ...errors import InputError, MuError
 from ...files import write_bytes, write_json
 from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.folder import FolderLayout, write_run
-from ...usecases.export.limit_sheet import with_measured
+from ...usecases.export.limit_sheet import measured_limits
 from ..body import state as bodies
 from ..jobs.start_child import OWN_FOLDER, JobKind, lacking
 from ..shared.file_cache import FileCache
@@ -79,23 +79,18 @@ def latest_folder(root: Any) -> Path:
 PRINTING = JobKind("print", lambda root: root.mu_unit.uuid, latest_folder, "print")
 
 _printers: FileCache[Printer] = FileCache()
-_measured: FileCache[tuple[str, Printer]] = FileCache()
+_measured: FileCache[dict[str, Limit]] = FileCache()
 _checks: FileCache[Any] = FileCache()
 _exports: FileCache[dict[str, Any]] = FileCache()
 
 
 def printer_of(root: Any) -> Printer:
     """The printer that is chosen, with the limits that were measured; raises InputError for bad files."""
-    if not root.mu_print.limits_file:
-        return _printer(root)
-    sheet = Path(bpy.path.abspath(root.mu_print.limits_file))
-    own = [Path(bpy.path.abspath(root.mu_print.printer_file))] if root.mu_print.printer == OWN_PRINTER else []
-
-    def read() -> tuple[str, Printer]:
-        return root.mu_print.printer, with_measured(_printer(root), sheet)
-
-    kept = _measured.read([sheet, *own], read)
-    return kept[1] if kept and kept[0] == root.mu_print.printer else read()[1]
+    printer, measured = _printer(root), root.mu_print.limits_file
+    if not measured:
+        return printer
+    path = Path(bpy.path.abspath(measured))
+    return printer.with_limits(_measured.read([path], lambda: measured_limits(path)) or measured_limits(path))
 
 
 def _printer(root: Any) -> Printer:

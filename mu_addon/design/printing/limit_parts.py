@@ -64,9 +64,21 @@ def limit_parts(printer: Printer, strut_mm: float) -> list[LimitPart]:
         "solid_mm": (_held_wall, "the wall between its posts is whole and straight", "smallest"),
         "wall_mm": (_free_wall, "the wall stands straight, without a hole", "smallest"),
         "strut_mm": (lambda size: _strut(size, strut_mm), "both struts are whole and straight", "smallest"),
-        "gap_mm": (_slot, "a sheet of paper passes through the slot, all of it", "smallest"),
-        "well_width_mm": (_groove, "the groove is seen, all along and as deep as it is wide", "smallest"),
-        "well_depth_mm": (_shallow, "the groove can be felt with a needle", "smallest"),
+        "gap_mm": (
+            lambda size: _slotted(size, _HIGH - _SOLID),
+            "a sheet of paper passes through the slot, all of it",
+            "smallest",
+        ),
+        "well_width_mm": (
+            lambda size: _slotted(size, size),
+            "the groove is seen, all along and as deep as it is wide",
+            "smallest",
+        ),
+        "well_depth_mm": (
+            lambda size: _slotted(2.0, size),
+            "the groove can be felt with a needle",
+            "smallest",
+        ),
         "drain_diameter_mm": (_drained, "no resin is left in the pocket after washing", "smallest"),
         "leak_diameter_mm": (_hole, "light passes through the hole", "smallest"),
         "overhang_deg": (_slope, "the underside of the slope is smooth and straight", "smallest"),
@@ -143,19 +155,10 @@ def _strut(diameter: float, length: float) -> Any:
     return solid.trim_by_plane([0.0, 0.0, 1.0], -_FOOT / 2)
 
 
-def _slot(width: float) -> Any:
+def _slotted(width: float, depth: float) -> Any:
+    """A block with a slot of that width and depth along its top."""
     block = shapes.box([0.0, 0.0, 0.0], [width + 2 * _SOLID, _DEEP, _HIGH])
-    return block - shapes.box([_SOLID, -1.0, _SOLID], [_SOLID + width, _DEEP + 1.0, _HIGH + 1.0])
-
-
-def _groove(width: float) -> Any:
-    block = shapes.box([0.0, 0.0, 0.0], [width + 2 * _SOLID, _DEEP, _HIGH])
-    return block - shapes.box([_SOLID, -1.0, _HIGH - width], [_SOLID + width, _DEEP + 1.0, _HIGH + 1.0])
-
-
-def _shallow(depth: float) -> Any:
-    block = shapes.box([0.0, 0.0, 0.0], [2.0 + 2 * _SOLID, _DEEP, _HIGH])
-    return block - shapes.box([_SOLID, -1.0, _HIGH - depth], [_SOLID + 2.0, _DEEP + 1.0, _HIGH + 1.0])
+    return block - shapes.box([_SOLID, -1.0, _HIGH - depth], [_SOLID + width, _DEEP + 1.0, _HIGH + 1.0])
 
 
 def _drained(diameter: float) -> Any:

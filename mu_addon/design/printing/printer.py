@@ -77,6 +77,10 @@ class Printer:
     def __getitem__(self, name: str) -> float:
         return self.limits[name].value
 
+    def with_limits(self, limits: dict[str, Limit]) -> Printer:
+        """The printer with other limits in place of its own, by name."""
+        return attrs.evolve(self, limits={**self.limits, **limits})
+
     @property
     def room(self) -> tuple[float, float, float]:
         """Sizes in mm of the room for the part itself: the build volume less the height of its supports."""

@@ -55,13 +55,13 @@ def slices(
     found = []
     for height in heights_mm:
         section = solid.slice(float(low + height))
-        holes = -sum(min(_area(np.asarray(ring)), 0.0) for ring in section.to_polygons())
+        holes = -sum(min(signed_area(np.asarray(ring)), 0.0) for ring in section.to_polygons())
         drawn = [np.asarray(ring) for ring in section.simplify(_SIMPLE_mm).to_polygons()]
         found.append(Slice(float(height), drawn, float(section.area()), holes))
     return found
 
 
-def _area(ring: Array) -> float:
+def signed_area(ring: Array) -> float:
     """Area in mm2 of a polygon (n, 2), positive where it runs counter-clockwise."""
     x, y = (ring - ring[0]).T
     return float(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))

@@ -13,7 +13,7 @@ from ...design.printing.check import PrintCheck
 from ...design.printing.finding import Finding, counted
 from ...design.printing.orientation import Build, directions
 from ...design.printing.printer import MEANING
-from ...design.printing.slices import Slice, even_heights, slices
+from ...design.printing.slices import Slice, even_heights, signed_area, slices
 from ...design.surface import Triangles, Vertices
 from ...files import write_bytes, write_text
 from ...report import charts as plots
@@ -207,9 +207,9 @@ def layer_pictures(found: Sequence[Slice]) -> str:
         for k, section in enumerate(found):
             axes = chart.add_subplot(rows, across, k + 1)
             # Holes last, filled: what stands in them is material again.
-            for ring in sorted(section.outlines, key=_extent, reverse=True):
+            for ring in sorted(section.outlines, key=lambda ring: abs(signed_area(ring)), reverse=True):
                 edge = Outline(np.vstack([ring, ring[:1]]), closed=True)
-                color = GREY if _extent(ring, signed=True) > 0 else plots.BY_LENGTH[3]
+                color = GREY if signed_area(ring) > 0 else plots.BY_LENGTH[3]
                 axes.add_patch(PathPatch(edge, facecolor=color, edgecolor=plots.INK, linewidth=0.3))
             title = f"{section.height_mm:.1f} mm"
             if section.enclosed_mm2 >= 1.0:
@@ -219,13 +219,6 @@ def layer_pictures(found: Sequence[Slice]) -> str:
             axes.axis("off")
         chart.tight_layout(pad=0.3)
     return svg()
-
-
-def _extent(ring: Floats, signed: bool = False) -> float:
-    """Area of an outline (n, 2), with `signed` negative for that of a hole."""
-    x, y = ring.T
-    area = 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-    return area if signed else abs(area)
 
 
 def direction_name(direction: Sequence[float]) -> str:

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
 
-import attrs
-
 from ...design.printing.limit_parts import LimitPart
-from ...design.printing.printer import MEANING, Limit, Printer
+from ...design.printing.printer import MEANING, Limit
 from ...errors import InputError
-from ...reading import file_text, unreadable
+from .sheet import sheet_rows, sheet_text
 
-# Bytes of a filled sheet: a hundred times as many as the empty one has.
-_LONGEST = 1 << 17
 COLUMNS = ("limit", "meaning", "best", "sizes", "measured")
 # Between the sizes of a row.
 _BETWEEN = " "
@@ -24,29 +18,19 @@ _BETWEEN = " "
 
 def limit_sheet(parts: Sequence[LimitPart]) -> str:
     """The sheet of some parts as CSV text, its last column to be filled in."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for part in parts:
-        sizes = _BETWEEN.join(f"{size:g}" for size in part.sizes)
-        writer.writerow([part.limit, MEANING[part.limit], part.best, sizes, ""])
-    return text.getvalue()
+    return sheet_text(
+        COLUMNS,
+        [(p.limit, MEANING[p.limit], p.best, _BETWEEN.join(f"{size:g}" for size in p.sizes)) for p in parts],
+    )
 
 
-def with_measured(printer: Printer, path: Path) -> Printer:
-    """The printer with the limits that a filled sheet gives, in their units; empty rows leave theirs.
+def measured_limits(path: Path) -> dict[str, Limit]:
+    """The limits that a filled sheet gives, by name and in their units; empty rows give none.
 
-    Raises InputError.
+    Raises InputError, also where no row is filled in.
     """
-    try:
-        rows = list(csv.DictReader(io.StringIO(file_text(path, _LONGEST))))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"cannot read the sheet: {unreadable(error)}", str(path), "give limits.csv of `specimens`"
-        ) from error
-    found = {}
-    for number, row in enumerate(rows, 2):
-        where = f"{path}, line {number}"
+    found: dict[str, Limit] = {}
+    for where, row in sheet_rows(path, "give limits.csv of `specimens`"):
         name, written = row.get("limit") or "", (row.get("measured") or "").strip()
         if name not in MEANING:
             raise InputError(
@@ -58,7 +42,7 @@ def with_measured(printer: Printer, path: Path) -> Printer:
             found[name] = Limit(_measured(row, name, written, where), f"measured, {path.name}", False, True)
     if not found:
         raise InputError("no limit was measured", str(path), "fill in the last column, or leave --limits out")
-    return attrs.evolve(printer, limits={**printer.limits, **found})
+    return found
 
 
 def _measured(row: dict[str, str], name: str, written: str, where: str) -> float:

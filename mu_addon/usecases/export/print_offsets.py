@@ -2,46 +2,32 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from pathlib import Path
 
 from ...design.coupons import FEATURES, offsets
 from ...design.parameters import Unit
 from ...errors import InputError
-from ...reading import file_text, unreadable
+from .sheet import sheet_rows, sheet_text
 
-# Bytes of a filled sheet: a hundred times as many as the empty one has.
-_LONGEST = 1 << 17
 COLUMNS = ("feature", "kind", "axis", "nominal_mm", "measured_mm")
 
 
 def gauge_sheet() -> str:
     """The gauge's sheet as CSV text, its last column to be filled in."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows([(f.name, f.kind, f.axis, f"{f.nominal_mm:g}", "") for f in FEATURES])
-    return text.getvalue()
+    return sheet_text(COLUMNS, [(f.name, f.kind, f.axis, f"{f.nominal_mm:g}") for f in FEATURES])
 
 
 def read_sheet(path: Path) -> dict[str, tuple[float, float, float]]:
     """Offset, its standard error and scale, for "xy" and "z", of a filled sheet; raises InputError."""
-    try:
-        rows = list(csv.DictReader(io.StringIO(file_text(path, _LONGEST))))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"cannot read the sheet: {unreadable(error)}", str(path), "give the gauge's CSV file"
-        ) from error
     known = {feature.name: feature for feature in FEATURES}
     chosen, sizes = [], []
-    for number, row in enumerate(rows, 2):
+    for where, row in sheet_rows(path, "give the gauge's CSV file"):
         name, value = row.get("feature") or "", (row.get("measured_mm") or "").strip()
         if name not in known:
             raise InputError(
                 f"the gauge has no feature {name!r}",
-                f"{path}, line {number}",
+                where,
                 "the features are those of `specimens`",
             )
         if not value:
@@ -53,7 +39,7 @@ def read_sheet(path: Path) -> dict[str, tuple[float, float, float]]:
         if not 0.0 < size < 3.0 * known[name].nominal_mm:
             raise InputError(
                 f"{name} measured as {value!r}, nominal {known[name].nominal_mm:g} mm",
-                f"{path}, line {number}",
+                where,
                 "give millimetres, or leave it empty",
             )
         chosen.append(known[name])

@@ -1,0 +1,32 @@
+"""A sheet to be filled in at the bench: CSV whose last column is left empty."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from ...errors import InputError
+from ...reading import file_text, unreadable
+
+# Bytes of a filled sheet: a hundred times as many as the empty ones have.
+_LONGEST = 1 << 17
+
+
+def sheet_text(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """An empty sheet as CSV text: its rows without the last column's cell, which is to be filled in."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([*row, ""] for row in rows)
+    return text.getvalue()
+
+
+def sheet_rows(path: Path, remedy: str) -> list[tuple[str, dict[str, str]]]:
+    """Rows of a filled sheet, each with its place in words; raises InputError with the remedy."""
+    try:
+        rows = list(csv.DictReader(io.StringIO(file_text(path, _LONGEST))))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read the sheet: {unreadable(error)}", str(path), remedy) from error
+    return [(f"{path}, line {number}", row) for number, row in enumerate(rows, 2)]
