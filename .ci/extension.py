@@ -1,17 +1,17 @@
 """Build the Blender extension, with Blender's own tool as it ships in the bpy wheel.
 
     python .ci/extension.py FOLDER            check it and write its .zip, without wheels
-    python .ci/extension.py FOLDER --bundle   one .zip a platform with the wheels of every Blender's Python
-                                              inside, and index.json: FOLDER can then be hosted as it is
+    python .ci/extension.py FOLDER --bundle   one .zip a platform and Python with its wheels inside, and
+                                              index.json: FOLDER can then be hosted as it is
     python .ci/extension.py FOLDER --install  install bpy into this Python first, where it is missing
 
 The tool needs bpy, which a plain `pip install -e .` leaves out: without it this says so before any work.
 Beside them it puts sample.blend, the sample scene.
 
 Blender wants the manifest beside the package's `__init__.py`; the checkout keeps them apart so that the core
-is an ordinary package. What ships is copied together first. Wheels come from pip, unmodified, each with the
-SHA-256 that wheels.csv pins, and are kept in FOLDER/wheels; numpy is never among them, since Blender has its
-own and a second one would replace it. sbom.cdx.json in the archive lists what it holds.
+is an ordinary package. What ships is copied together first. Wheels come from pip, each with the SHA-256 that
+wheels.csv pins, and are kept in FOLDER/wheels; five are slimmed (slim.py). numpy is never among them, since
+Blender has its own and a second one would replace it. sbom.cdx.json in the archive lists what it holds.
 """
 
 from __future__ import annotations
@@ -23,10 +23,12 @@ import subprocess
 import sys
 import tempfile
 import tomllib
+from itertools import product
 from pathlib import Path
 
 from bill import write_bill
-from wheels import PLATFORMS, PYTHONS, download, not_as_pinned, pinned
+from slim import slim
+from wheels import BLENDERS, PLATFORMS, PYTHONS, download, not_as_pinned, pinned
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -89,39 +91,49 @@ def stage(folder: Path) -> None:
         shutil.copytree(ROOT / "assets", folder / "assets")
 
 
-def bundle(source: Path, wheels: list[Path], platform: str) -> None:
-    """Put wheels into a staged extension, each once, and name them in its manifest."""
-    names = sorted({wheel.name for wheel in wheels})
+def bundle(source: Path, wheels: list[Path], platform: str, python: str) -> None:
+    """Put wheels into a staged extension, and name them, platform and Blender's versions in its manifest."""
     (source / "wheels").mkdir()
-    for wheel in {wheel.name: wheel for wheel in wheels}.values():
+    for wheel in wheels:
         shutil.copy(wheel, source / "wheels")
-    listed = "".join(f'  "./wheels/{name}",\n' for name in names)
+    listed = "".join(f'  "./wheels/{name}",\n' for name in sorted(wheel.name for wheel in wheels))
+    first, end = BLENDERS[python]
     manifest = source / "blender_manifest.toml"
     head, permissions, rest = manifest.read_text(encoding="utf-8").partition("[permissions]")
-    text = f'{head}platforms = ["{platform}"]\nwheels = [\n{listed}]\n\n{permissions}{rest}'
-    manifest.write_text(text, encoding="utf-8")
+    lines = [
+        f'blender_version_min = "{first}"' if line.startswith("blender_version_min") else line
+        for line in head.splitlines()
+    ]
+    lines += [f'blender_version_max = "{end}"'] if end else []
+    head = "\n".join([*lines, f'platforms = ["{platform}"]', f"wheels = [\n{listed}]"])
+    manifest.write_text(f"{head}\n\n{permissions}{rest}", encoding="utf-8")
 
 
-def build(tool: Path, out: Path, platform: str | None, pythons: list[str]) -> int:
+def build(tool: Path, out: Path, platform: str | None = None, python: str = "") -> int:
     """Stage, validate and build one .zip into `out`; the exit status of the first step that fails."""
+    slimmed = []
     with tempfile.TemporaryDirectory() as scratch:
         source = Path(scratch) / "mu_addon"
         stage(source)
         target = ["--output-dir", str(out)]
         if platform is not None:
-            wheels = [wheel for python in pythons for wheel in download(out / "wheels", platform, python)]
-            bundle(source, wheels, platform)
+            wheels = []
+            for pinned_wheel in download(out / "wheels", platform, python):
+                wheel, change = slim(pinned_wheel, out / "wheels" / platform / python / "slim")
+                wheels.append(wheel)
+                slimmed += [change] if change else []
+            bundle(source, wheels, platform, python)
             version = tomllib.loads((source / "blender_manifest.toml").read_text(encoding="utf-8"))["version"]
-            archive = out / f"mu_addon-{version}-{platform}.zip"
+            archive = out / f"mu_addon-{version}-{platform}-py{python.replace('.', '')}.zip"
             target = ["--output-filepath", str(archive)]
-        write_bill(source)
+        write_bill(source, slimmed)
         for arguments in (["validate", str(source)], ["build", "--source-dir", str(source), *target]):
             status = subprocess.run([sys.executable, str(tool), *arguments], check=False).returncode
             if status:
                 return status
     if platform is not None:
-        wanted = [w for w in pinned() if w.platform == platform and w.python in pythons]
-        wrong = not_as_pinned(archive, wanted)
+        wanted = [w for w in pinned() if (w.platform, w.python) == (platform, python)]
+        wrong = not_as_pinned(archive, wanted, out / "wheels")
         if wrong:
             archive.unlink()
             sys.stderr.write("\n".join(wrong) + "\n")
@@ -134,7 +146,7 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(description="Build the Blender extension.")
     parser.add_argument("folder", nargs="?", type=Path, default=Path("out"))
     parser.add_argument(
-        "--bundle", action="store_true", help="one .zip a platform, wheels inside, and index.json"
+        "--bundle", action="store_true", help="one .zip a platform and Python, wheels inside, and index.json"
     )
     parser.add_argument("--platform", nargs="+", choices=PLATFORMS, default=list(PLATFORMS))
     parser.add_argument("--python", nargs="+", choices=PYTHONS, default=list(PYTHONS))
@@ -153,10 +165,10 @@ def main(arguments: list[str]) -> int:
         sys.stderr.write("the sample scene could not be built\n")
         return 1
     if not options.bundle:
-        return build(tool, out, None, [])
-    for platform in options.platform:
+        return build(tool, out)
+    for platform, python in product(options.platform, options.python):
         try:
-            status = build(tool, out, platform, options.python)
+            status = build(tool, out, platform, python)
         except subprocess.CalledProcessError as error:
             sys.stderr.write(f"pip did not find the wheels of {platform} as pinned: {error}\n")
             status = 1

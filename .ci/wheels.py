@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import io
 import json
 import subprocess
 import sys
@@ -20,17 +21,23 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
+from slim import differences, slimmed_name
+
 ROOT = Path(__file__).resolve().parents[1]
 TABLE = Path(__file__).with_name("wheels.csv")
-PYTHONS = ("3.11", "3.13", "3.14")
-"""Of Blender 4.5 and 5.0; of 5.1 and 5.2; of Linux distributions that build Blender with their own."""
+BLENDERS = {"3.11": ("4.5.0", "5.1.0"), "3.13": ("5.1.0", ""), "3.14": ("5.1.0", "")}
+"""The first Blender that has a Python, and the first that has it no more: 3.11 is in Blender 4.5 and 5.0,
+3.13 in 5.1 and 5.2, 3.14 in those that Linux distributions build with their own."""
+PYTHONS = tuple(BLENDERS)
 PLATFORMS = {
     "linux-x64": [f"manylinux_2_{minor}_x86_64" for minor in (28, 27, 24, 17)] + ["manylinux2014_x86_64"],
     "windows-x64": ["win_amd64"],
     "macos-arm64": [f"macosx_{major}_0_arm64" for major in (15, 14, 13, 12, 11)],
 }
-LEFT_OUT = ("numpy",)
-"""numpy is Blender's own."""
+LEFT_OUT = ("numpy", "Pygments", "markdown-it-py", "mdurl", "tzdata")
+"""numpy is Blender's own; the others are asked for by packages that import them for what is never done here:
+coloured listings and Markdown in a terminal (rich, for meshio), names of time zones (dateutil, for
+matplotlib)."""
 UNAVAILABLE = {"windows-x64": ("pymetis",)}
 """No wheel for a platform; without METIS systems are ordered by minimum degree."""
 
@@ -82,21 +89,29 @@ def _pip(command: str, platform: str, python: str) -> list[str]:
     return [sys.executable, "-m", "pip", command, "--quiet", *kind]
 
 
-def not_as_pinned(archive: Path, wheels: Iterable[Wheel]) -> list[str]:
-    """What is wrong with the wheels of a built archive: other content, one too many, one that is missing."""
-    expected = {f"wheels/{w.file}": w.sha256 for w in wheels}
+def not_as_pinned(archive: Path, wheels: Iterable[Wheel], folder: Path) -> list[str]:
+    """What is wrong with the wheels of a built archive: other content, one too many, one that is missing.
+
+    folder: of the downloads; a slimmed wheel is compared file by file with the pinned one that lies there.
+    """
+    expected = {f"wheels/{slimmed_name(w.file)}": w for w in wheels}
     with zipfile.ZipFile(archive) as package:
-        found = {
-            name: hashlib.sha256(package.read(name)).hexdigest()
-            for name in package.namelist()
-            if name.startswith("wheels/") and not name.endswith("/")
-        }
-    wrong = [f"{name} is not pinned in {TABLE.name}" for name in sorted(found.keys() - expected.keys())]
-    wrong += [f"{name} is missing" for name in sorted(expected.keys() - found.keys())]
-    both = sorted(found.keys() & expected.keys())
-    return wrong + [
-        f"{name} has another SHA-256 than pinned" for name in both if found[name] != expected[name]
-    ]
+        found = {n for n in package.namelist() if n.startswith("wheels/") and not n.endswith("/")}
+        wrong = [f"{name} is not pinned in {TABLE.name}" for name in sorted(found - expected.keys())]
+        wrong += [f"{name} is missing" for name in sorted(expected.keys() - found)]
+        for name in sorted(found & expected.keys()):
+            pin, content = expected[name], package.read(name)
+            if name != f"wheels/{pin.file}":
+                original = (folder / pin.platform / pin.python / pin.file).read_bytes()
+                with (
+                    zipfile.ZipFile(io.BytesIO(content)) as made,
+                    zipfile.ZipFile(folder / pin.platform / pin.python / pin.file) as source,
+                ):
+                    wrong += [f"{name}: {what}" for what in differences(made, source)]
+                content = original
+            if hashlib.sha256(content).hexdigest() != pin.sha256:
+                wrong.append(f"{name} has another SHA-256 than pinned")
+    return wrong
 
 
 def _chosen(platform: str, python: str) -> list[Wheel]:

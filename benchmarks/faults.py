@@ -21,11 +21,11 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from functools import cache
 from pathlib import Path
 
 import attrs
 import numpy as np
+import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
@@ -33,16 +33,17 @@ sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 from circumstances import circumstances  # noqa: E402
 
 from mu_addon.design.parameters import load_preset  # noqa: E402
+from mu_addon.errors import MuError, OutputError  # noqa: E402
 from mu_addon.meshing.settings import MeshSettings  # noqa: E402
-from mu_addon.run.cache import Cache  # noqa: E402
 from mu_addon.run.context import run_to_end  # noqa: E402
 from mu_addon.run.folder import keep_inputs  # noqa: E402
 from mu_addon.run.progress import Progress  # noqa: E402
-from mu_addon.usecases.simulate_and_place import study as study_module  # noqa: E402
 from mu_addon.usecases.simulate_and_place.job import Job, grasp  # noqa: E402
 from mu_addon.usecases.simulate_and_place.run import run_stages  # noqa: E402
 from mu_addon.usecases.simulate_and_place.study import Study  # noqa: E402
 from tests.run.failing_files import failing  # noqa: E402
+from tests.run.failing_memory import short_of_memory  # noqa: E402
+from tests.usecases.fault_injection import PARTIAL, inject_each, placement  # noqa: E402
 
 JOB = Job(
     load_preset("mu-1.0x"),
@@ -282,60 +283,41 @@ def two_at_once(work, reference):
 
 
 def calls(work, reference, every):
-    """Each call that changes a file of a whole `place` fails, by turns once and for good.
+    """Each call that changes a file of a `place` of three chambers fails, by turns once and for good."""
+    yield place_with(work / "calls", "calls that change a file", failing, OutputError.status, every)
 
-    Its computed states come from memory, and are written as if they had just been computed.
-    """
-    kept = {}
-    get, put = Cache.get, Cache.put
 
-    def keep(self, kind, name, arrays):
-        kept[kind, name] = {part: np.array(values) for part, values in arrays.items()}
-        put(self, kind, name, arrays)
+def blocks(work, reference, every):
+    """Each block of 64 kB and more that numpy asks for in that `place` is refused, likewise."""
+    yield place_with(
+        work / "blocks",
+        "blocks of memory of 64 kB and more",
+        lambda _, at, for_good: short_of_memory(at, for_good),
+        MuError.status,
+        every,
+    )
 
-    def remember(self, kind, name):
-        found = get(self, kind, name)
-        if found is None and (kind, name) in kept:
-            put(self, kind, name, kept[kind, name])
-            return dict(kept[kind, name])
-        return found
 
-    def run(folder):
-        messages = []
-        with run_to_end(Progress([messages.append])) as context:
-            run_stages(Study.open(attrs.evolve(JOB, workers=1), folder, context))
-        return context.status, messages[-1]
+def place_with(work, what, layer, expected, every):
+    """A whole `place` with a fault at each place of it; what has been computed comes from memory."""
+    work.mkdir()
+    met = []
 
-    study_module.build_solid = cache(study_module.build_solid)
-    Cache.get, Cache.put = remember, keep
-    try:
-        assert run(work / "calls-once")[0] == 0
-        with failing(work / "calls-0") as files:
-            assert run(work / "calls-0")[0] == 0
-        statuses, wrong, total = Counter(), [], len(files.calls)
-        for at in range(1, total + 1, every):
-            folder = work / f"calls-{at}"
-            with failing(folder, at, for_good=at % 2 == 0) as files:
-                status, message = run(folder)
-            where = f"{at}, {files.calls[at - 1]}"
-            statuses[status] += 1
-            half = [p.name for p in folder.rglob("*.part*")]
-            if status not in (0, 5) or half or not (status == 0 or message["what_to_do"]):
-                wrong.append(f"{where}: exit {status}, {message.get('what')}, {half}")
-            if run(folder)[0] != 0 or digits(folder) != reference:
-                wrong.append(f"{where}: not the same digits")
-            shutil.rmtree(folder)
-    finally:
-        Cache.get, Cache.put = get, put
-    ended = ", ".join(f"{count} times exit {status}" for status, count in sorted(statuses.items()))
-    yield (
-        f"{sum(statuses.values())} of the {total} calls that change a file fail, each in a run of its own",
-        f"{ended}; then same digits" if not wrong else "FAILED: " + "; ".join(wrong),
+    def counted(*where):
+        met.append(where)
+        return layer(*where)
+
+    with pytest.MonkeyPatch.context() as patch:
+        wrong = inject_each(placement(patch), work, counted, expected, PARTIAL, every)
+    return (
+        f"{len(met) - 1} times one of the {what} of a whole `place` fails",
+        "; ".join(wrong) or f"exit 0 or {expected} with what to do, no half file; then same digits",
     )
 
 
 FAULTS = {
     "calls": calls,
+    "blocks": blocks,
     "kills": kills,
     "disk": disk,
     "small_files": small_files,
@@ -350,7 +332,7 @@ def main():
     parser.add_argument("faults", nargs="*", choices=[*FAULTS, []], help=", ".join(FAULTS))
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument(
-        "--every", type=int, default=1, help="of the calls that can fail only each N-th fails"
+        "--every", type=int, default=1, help="of the calls and blocks that can fail only each N-th fails"
     )
     parser.add_argument("--reference", type=Path, help="a folder of this study, finished, to compare with")
     given = parser.parse_args()
@@ -367,7 +349,7 @@ def main():
         reference = digits(work / "reference")
         print("| fault | what came of it |\n| --- | --- |")
         for fault in given.faults or FAULTS:
-            more = {"kills": (given.kills,), "calls": (given.every,)}.get(fault, ())
+            more = {"kills": (given.kills,), "calls": (given.every,), "blocks": (given.every,)}.get(fault, ())
             for what, outcome in FAULTS[fault](work, reference, *more):
                 print(f"| {what} | {outcome} |", flush=True)
 

@@ -24,11 +24,9 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import TipSection
 from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import FIDELITIES, MeshSettings
-from mu_addon.run.context import RunContext
-from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place.job import Job
-from mu_addon.usecases.simulate_and_place.run import simulate_and_place
-from mu_addon.usecases.simulate_and_place.study import begin_study
+
+from .running import angles_deg, print_heading, print_row, run_study
 
 PRESSURES_KPA = (0.0, -5.0, 10.0)
 # Small beside what bends the unit: its stiffness at rest.
@@ -60,8 +58,7 @@ def main() -> None:
     chambers = attrs.evolve(preset.chambers, count=options.chambers)
     protocol = Protocol(np.arange(float(len(PRESSURES_KPA))), np.array(PRESSURES_KPA))
     angles = [f"{p:g} kPa, deg" for p in PRESSURES_KPA if p]
-    columns = ["cells x, y", "model", "unknowns", *angles, "tip N/mm", "J_hat mm", "best first", "s"]
-    print("| " + " | ".join(columns) + " |\n" + "| --- " * len(columns) + "|", flush=True)
+    print_heading(["cells x, y", "model", "unknowns", *angles, "tip N/mm", "J_hat mm", "best first", "s"])
     for plus in options.plus:
         across = 2 + plus
         wide = 2 * ((across - 1) // 2) + 1 if options.wide else preset.lattice.cells_x
@@ -73,22 +70,19 @@ def main() -> None:
             mesh = MeshSettings(fidelity=name, refine=options.refine)
             job = Job(unit, protocol, mesh, times=len(PRESSURES_KPA), mesh_check=False, workers=1)
             with tempfile.TemporaryDirectory() as folder:
-                context = RunContext(Progress())
-                begin_study(job, Path(folder), context)
                 try:
-                    study = simulate_and_place(job, Path(folder), context)
+                    study, summary = run_study(job, Path(folder))
                 except MuError as why:
-                    print(f"| {wide}, {across} | {name} | {why}", flush=True)
+                    print_row([f"{wide}, {across}", name, why])
                     continue
-                summary = context.summary
-                angle = {float(p): a for p, a in summary["angle_deg"].items()}
+                angle = angles_deg(summary)
                 J = summary["J_hat_mm"][job.headline_rule]
                 ranked = sorted(J, key=J.get)
                 row = [f"{wide}, {across}", name, study.solver["unknowns"]]
                 row += [f"{angle[p]:.2f}" for p in PRESSURES_KPA if p]
                 row += [f"{lateral_stiffness(study):.4g}", ", ".join(f"{J[n]:.4f}" for n in sorted(J))]
                 row += [" ".join(ranked), f"{time.perf_counter() - began:.0f}"]
-            print("| " + " | ".join(map(str, row)) + " |", flush=True)
+            print_row(row)
 
 
 if __name__ == "__main__":

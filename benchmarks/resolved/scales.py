@@ -15,17 +15,13 @@ import time
 from pathlib import Path
 
 import attrs
-import numpy as np
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MuError
-from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import RESOLVED, MeshSettings
-from mu_addon.run.context import RunContext
-from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place.job import Job
-from mu_addon.usecases.simulate_and_place.run import simulate_and_place
-from mu_addon.usecases.simulate_and_place.study import begin_study
+
+from .running import angles_deg, outward, print_heading, print_row, run_study
 
 
 def main() -> None:
@@ -37,12 +33,10 @@ def main() -> None:
     parser.add_argument("--pressure", type=float, nargs="*", default=[-20.0, -10.0, 20.0, 40.0])
     parser.add_argument("--without-contact", action="store_true")
     options = parser.parse_args()
-    # From rest outward on either side.
-    pressures = [0.0, *sorted((p for p in options.pressure if p < 0), reverse=True), 0.0]
-    pressures += sorted(p for p in options.pressure if p > 0)
-    protocol = Protocol(np.arange(float(len(pressures))), np.array(pressures))
-    columns = ["preset", "refine", "unknowns", *(f"{p:g} kPa, deg" for p in pressures if p), "J_hat mm", "s"]
-    print("| " + " | ".join(columns) + " |\n" + "| --- " * len(columns) + "|", flush=True)
+    protocol = outward(options.pressure)
+    pressures = [float(p) for p in protocol.pressure_kPa]
+    angles = [f"{p:g} kPa, deg" for p in pressures if p]
+    print_heading(["preset", "refine", "unknowns", *angles, "J_hat mm", "s"])
     for name in options.presets:
         preset = load_preset(name)
         unit = attrs.evolve(preset, chambers=attrs.evolve(preset.chambers, count=options.chambers))
@@ -54,20 +48,18 @@ def main() -> None:
                 unit, protocol, mesh, times=len(pressures), mesh_check=False, workers=1, self_contact=touch
             )
             folder = options.folder / f"{name}-{options.chambers}-{refine:g}{'' if touch else '-passing'}"
-            context = RunContext(Progress())
             try:
-                begin_study(job, folder, context)
-                study = simulate_and_place(job, folder, context)
+                study, summary = run_study(job, folder)
             except MuError as why:
-                print(f"| {name} | {refine:g} | {why}", flush=True)
+                print_row([name, f"{refine:g}", why])
                 continue
-            angle = {float(p): a for p, a in context.summary["angle_deg"].items()}
-            J = context.summary["J_hat_mm"][job.headline_rule]
+            angle = angles_deg(summary)
+            J = summary["J_hat_mm"][job.headline_rule]
             row = [name, f"{refine:g}", study.solver["unknowns"]]
             row += [f"{angle[p]:.3f}" for p in pressures if p]
             row += [", ".join(f"{n} {J[n]:.4f}" for n in sorted(J, key=J.get))]
             row += [f"{time.process_time() - began:.0f}"]
-            print("| " + " | ".join(map(str, row)) + " |", flush=True)
+            print_row(row)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,8 @@ from __future__ import annotations
 from importlib import import_module
 from types import ModuleType
 
-# In the order in which --help lists them; a module's name is its command's, with _ for -.
+# In the order in which --help lists them; a module's name is its command's, with _ for -, and one more at
+# the end of a word that is Python's.
 NAMES = (
     "presets",
     "design",
@@ -25,6 +26,7 @@ NAMES = (
     "homogenize",
     "grip",
     "fit_material",
+    "import_",
     "track",
     "diagnose",
     "design_experiments",
@@ -38,4 +40,4 @@ NAMES = (
 
 def all_commands() -> dict[str, ModuleType]:
     """Every subcommand's module by the subcommand's name."""
-    return {name.replace("_", "-"): import_module(f".{name}", __name__) for name in NAMES}
+    return {name.rstrip("_").replace("_", "-"): import_module(f".{name}", __name__) for name in NAMES}

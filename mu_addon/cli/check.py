@@ -29,6 +29,13 @@ def add(commands: Commands[Any]) -> None:
         help="STL file to check; if a unit is given too, the file is compared with the unit's nominal "
         "geometry.",
     )
+    command.add_argument(
+        "--repair",
+        action="store_true",
+        help="Repair the STL file before it is checked, where there is only one way to: flipped and doubled "
+        "faces, tiny gaps. part.stl of the output folder is then the repaired part; what has more than one "
+        "remedy is refused.",
+    )
     command.add_argument("--path", metavar="NAME", help="Path of the unit's waveguide: alpha1, alpha2, ...")
     command.add_argument(
         "--printer",
@@ -91,5 +98,6 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
         stl_file=stl,
         direction=tuple(options.up),
         layers=tuple(options.layers),
+        repair=options.repair,
     )
     USE_CASE.start(job, Path(options.out), context)

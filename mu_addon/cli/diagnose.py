@@ -24,15 +24,23 @@ def add(commands: Commands[Any]) -> None:
     add_measured_folder(command)
     add_unit(command, required=False)
     add_fidelity(command)
+    command.add_argument(
+        "--model",
+        metavar="FILE",
+        help="What an earlier diagnosis found, its model.toml: these effects are in the model from the start "
+        "and stay; new causes are added to them.",
+    )
     add_report(command)
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
     """Diagnose the folder."""
+    from ..evidence.extended import load_model
     from ..measured import read_folder
     from ..usecases.diagnose.job import Job
     from ..usecases.diagnose.run import USE_CASE
 
     unit = unit_if_named(options)
-    job = Job(read_folder(Path(options.folder)), unit, fidelity=options.fidelity)
+    known = load_model(Path(options.model)) if options.model else None
+    job = Job(read_folder(Path(options.folder)), unit, fidelity=options.fidelity, known=known)
     USE_CASE.start(job, Path(options.out), context)

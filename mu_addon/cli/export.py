@@ -58,6 +58,14 @@ def add(commands: Commands[Any]) -> None:
         "calibration coupon of `specimens`.",
     )
     command.add_argument(
+        "--vent-along",
+        nargs=3,
+        type=float,
+        metavar=("X", "Y", "Z"),
+        help="Vent what traps resin if the unit is built along this direction, away from the platform: STL "
+        "and 3MF get a hole through the wall for each cup of the print check, and plug-1.stl .. close them.",
+    )
+    command.add_argument(
         "--resin",
         metavar="NAME|FILE",
         help="Resin: a material of the library or a TOML file (default: elastic-50a-v1).",
@@ -82,5 +90,6 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
         quality=options.quality,
         take_off=offsets,
         offset_source=source,
+        vent_along=None if options.vent_along is None else tuple(options.vent_along),
     )
     USE_CASE.start(job, Path(options.out), context)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from ..fem.solver import SolverChoice
     from ..run.context import RunContext
     from ..usecases.simulate_and_place.extended_unit import Extended
-    from ..usecases.simulate_and_place.static_effects import StaticEffects
+    from ..usecases.simulate_and_place.named_effects import NamedEffects
 
 EXAMPLE = "example: run.py place --preset mu-1.0x --out out/mu-1.0x"
 Commands = argparse._SubParsersAction  # what add_subparsers returns; argparse gives it no public name
@@ -265,18 +265,18 @@ def unit_if_named(options: argparse.Namespace) -> Unit | None:
     return None if options.preset is None and options.unit is None else unit_of(options)
 
 
-def modelled(options: argparse.Namespace, context: RunContext) -> tuple[Unit, StaticEffects]:
+def modelled(options: argparse.Namespace, context: RunContext) -> tuple[Unit, NamedEffects]:
     """The unit with what the extended model of --model adds to it, and effects beyond a unit's parameters.
 
     What no simulation of a unit can take is warned of.
     """
     import attrs
 
-    from ..usecases.simulate_and_place.static_effects import StaticEffects
+    from ..usecases.simulate_and_place.named_effects import NamedEffects
 
     unit = unit_of(options)
     turn = options.orientation
-    effects = StaticEffects(orientation_deg=turn, where="--orientation")
+    effects = NamedEffects(orientation_deg=turn, where="--orientation")
     if options.model is not None:
         from ..usecases.simulate_and_place.extended_unit import read_extended
 

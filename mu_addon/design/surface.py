@@ -118,7 +118,8 @@ def _unique_rows(rows: NDArray[_Number]) -> tuple[NDArray[_Number], NDArray[np.i
     """Distinct rows in lexicographic order and each row's place among them: np.unique(axis=0), but fast."""
     order = np.lexsort(rows.T[::-1])
     ordered = rows[order]
-    new = np.concatenate([[True], (ordered[1:] != ordered[:-1]).any(axis=1)])
+    new = np.ones(len(rows), bool)
+    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
     place = np.empty(len(rows), np.int64)
     place[order] = np.cumsum(new) - 1
     return ordered[new], place

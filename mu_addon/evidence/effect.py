@@ -94,6 +94,35 @@ LIBRARY = {
     "mesh_error": ("the mesh of the model is too coarse", "the same simulation on a finer mesh"),
 }
 
+# Where an experiment of a kind shows an effect otherwise than `LIBRARY` has it.
+SHOWN_BY = {
+    ("viscoelasticity", "coupon"): "one coupon at two rates a decade apart, or held at a stretch",
+    ("viscoelasticity", "lattice_compression"): "one block at two rates a decade apart, or held",
+    ("viscoelasticity", "pressure_hold"): "a longer hold, and the same in a rigid chamber of that volume",
+    ("rate_independent_hysteresis", "coupon"): "loading and unloading at two rates a decade apart",
+    (
+        "rate_independent_hysteresis",
+        "lattice_compression",
+    ): "loading and unloading at two rates a decade apart",
+    ("strain_stiffening", "coupon"): "a test to a larger stretch",
+    ("strain_stiffening", "beam_deadweight"): "larger weights",
+    ("mullins_softening", "coupon"): "cycles of growing stretch on a coupon that was never loaded",
+    ("mullins_softening", "lattice_compression"): "cycles of growing strain on a block that was never loaded",
+    ("tension_compression_asymmetry", "coupon"): "one coupon pulled, another compressed",
+    ("leak", "pressure_hold"): "the same hold with a plug of metal in the unit's place",
+    ("leak", "unit_pressure"): "the valve shut at pressure: what falls is the leak",
+    ("line_lag", "unit_pressure"): "steps of pressure, with the camera at 30 frames a second or more",
+    ("gravity", "unit_pressure"): "one protocol in three orientations",
+    ("gravity", "beam_deadweight"): "the beam upside down",
+    ("pressure_gain", "unit_pressure"): "a second gauge beside the first",
+    ("pressure_gain", "pressure_hold"): "a second gauge beside the first",
+    ("pressure_offset", "pressure_hold"): "the gauge open to the air before and after",
+    ("temperature_drift", "pressure_hold"): "the same hold with the chamber's temperature recorded",
+    ("overcure", "unit_pressure"): "the wall of a unit cut open",
+    ("wall_thickness", "unit_pressure"): "the wall of a unit cut open",
+    ("skin_cure", "unit_pressure"): "coupons of several thicknesses, of the same print",
+}
+
 
 @attrs.frozen
 class Parameter:
@@ -156,8 +185,8 @@ class Effect:
     """Physics that the base model lacks; `kinds` are the experiments it can be seen in.
 
     parameters: the first is its size, whose null switches the effect off exactly; the others give its shape.
-    mechanism, reveals: in words, of `LIBRARY` where not given. whose: the one specimen or experiment that has
-    it, "specimen B"; empty where all have. Raises InputError for a name not in `LIBRARY`.
+    mechanism, reveals: in words, of `LIBRARY` and `SHOWN_BY` where not given. whose: the one specimen or
+    experiment that has it, "specimen B"; empty where all have. Raises InputError for a name not in `LIBRARY`.
     """
 
     name: str
@@ -173,7 +202,8 @@ class Effect:
 
     @reveals.default
     def _shown_by(self) -> str:
-        return LIBRARY.get(self.name, ("", ""))[1]
+        usual = LIBRARY.get(self.name, ("", ""))[1]
+        return "; or ".join(dict.fromkeys(SHOWN_BY.get((self.name, kind), usual) for kind in self.kinds))
 
     def __attrs_post_init__(self) -> None:
         if self.name not in LIBRARY or not self.parameters:

@@ -49,8 +49,12 @@ class ExtendedModel:
     @property
     def values(self) -> dict[str, float]:
         """Values for a simulator's `predict`: by "effect.parameter" or nuisance, each in its own unit."""
-        named = {f"{e}.{p}": f.value for e, ps in self.effects.items() for p, f in ps.items()}
-        return {**{n: f.value for n, f in self.nuisances.items()}, **named}
+        return {**{n: f.value for n, f in self.nuisances.items()}, **self.of_effects}
+
+    @property
+    def of_effects(self) -> dict[str, float]:
+        """Values of the effects alone, by "effect.parameter"."""
+        return {f"{e}.{p}": f.value for e, ps in self.effects.items() for p, f in ps.items()}
 
     def save(self, path: Path) -> None:
         """Write `text` to the file `path`; raises OutputError where that fails."""
@@ -72,6 +76,19 @@ class ExtendedModel:
             "lattice": Commented(lattice, (words,)) if lattice else None,
         }
         return toml_text(values, "Effects that measured data named, with what each parameter is known to.")
+
+
+def stacked(before: ExtendedModel, found: ExtendedModel) -> ExtendedModel:
+    """A model with what was found before, and what a later diagnosis that started from it found.
+
+    Later values of nuisances, and a later response of the lattice, take the place of earlier ones.
+    """
+    return ExtendedModel(
+        found.verdict,
+        {**before.effects, **found.effects},
+        {**before.nuisances, **found.nuisances},
+        found.lattice or before.lattice,
+    )
 
 
 _RESPONSE = tuple(a.name for a in attrs.fields(OffsetResponse))

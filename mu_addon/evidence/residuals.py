@@ -16,8 +16,9 @@ from ..measured import Experiment
 from ..measured.rest import at_rest
 from .fit import Fit, Fitter
 from .noise import cycle_s, harmonics
+from .prediction.effective_pressure import play_operator
 from .prediction.unit import KIND as UNIT
-from .prediction.unit import cycles, play_operator
+from .prediction.unit import cycles
 from .record import KNOWN, Record, Series
 from .ringing import modes, ringing
 

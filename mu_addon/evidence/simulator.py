@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import attrs
@@ -53,13 +54,21 @@ class Composite:
     """Simulators of several kinds of experiment as one; they share parameters by name, and cache predictions.
 
     simulators: by kind. An effect whose parameters differ from kind to kind counts as several effects of one
-    name. remembered: most predictions kept, the oldest are dropped; calls: predictions that were computed.
-    Raises InputError where two simulators give a parameter another unit, null or disjoint bounds.
+    name. known: values, by "effect.parameter", of effects that an earlier diagnosis named: they are in every
+    prediction, and none of these effects is offered again; unseen: those of them that no kind here has.
+    remembered: most predictions kept, the oldest are dropped; calls: predictions that were computed. Raises
+    InputError where two simulators give a parameter another unit, null or disjoint bounds.
     """
 
-    def __init__(self, simulators: Mapping[str, Simulator], remembered: int = 1024) -> None:
+    def __init__(
+        self,
+        simulators: Mapping[str, Simulator],
+        remembered: int = 1024,
+        known: Mapping[str, float] = MappingProxyType({}),
+    ) -> None:
         self._simulators = dict(simulators)
         self._remembered = remembered
+        self._known = dict(known)
         self._kept: OrderedDict[Any, tuple[Experiment, Array]] = OrderedDict()
         self.calls = 0
         nuisances: dict[str, Parameter] = {}
@@ -68,19 +77,29 @@ class Composite:
             for p in simulator.nuisances:
                 nuisances[p.name] = _shared(nuisances.get(p.name, p), p)
             for e in simulator.effects:
-                known = effects.get(e.keys)
-                if known is None:
+                same = effects.get(e.keys)
+                if same is None:
                     effects[e.keys] = attrs.evolve(e, kinds=(kind,))
                     continue
-                both = [_shared(a, b) for a, b in zip(known.parameters, e.parameters, strict=True)]
-                effects[e.keys] = attrs.evolve(known, parameters=tuple(both), kinds=(*known.kinds, kind))
+                both = [_shared(a, b) for a, b in zip(same.parameters, e.parameters, strict=True)]
+                shown = "; or ".join(dict.fromkeys([*same.reveals.split("; or "), *e.reveals.split("; or ")]))
+                effects[e.keys] = attrs.evolve(
+                    same, parameters=tuple(both), kinds=(*same.kinds, kind), reveals=shown
+                )
         self.nuisances = tuple(nuisances.values())
-        self.effects = tuple(effects.values())
         self._only = {p.name: p.experiment for p in self.nuisances if p.experiment}
         self._knows = {
             kind: {p.name for p in s.nuisances} | {key for e in s.effects for key in e.keys}
             for kind, s in self._simulators.items()
         }
+        # Another law of a mechanism that is in the model already would have it twice.
+        there = {(k.partition(".")[0], kind) for kind, names in self._knows.items() for k in names & {*known}}
+        self.effects = tuple(e for e in effects.values() if not {(e.name, kind) for kind in e.kinds} & there)
+        # An effect's values are passed on whole, with what was stated of it besides its parameters.
+        for kind, names in self._knows.items():
+            names |= {k for k in known if (k.partition(".")[0], kind) in there}
+        seen = {name for name, _ in there}
+        self.unseen = tuple(dict.fromkeys(n for k in known if (n := k.partition(".")[0]) not in seen))
 
     def knows(self, experiment: Experiment) -> bool:
         """Whether there is a simulator for that experiment's kind."""
@@ -98,7 +117,7 @@ class Composite:
         kind without a simulator.
         """
         simulator = self._of(experiment)
-        own = self._own(experiment, values)
+        own = self._own(experiment, {**self._known, **values})
         key = (experiment.name, id(experiment), tuple(sorted(own.items())))
         if key in self._kept:
             self._kept.move_to_end(key)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -13,24 +13,19 @@ import numpy as np
 from ..design.parameters import Unit
 from ..design.strut_cell import relative_density, strut_cell
 from ..errors import InputError
-from ..fem.clogged import CloggedModel
-from ..fem.lattice_law import LatticeLaw
-from ..fem.laws import Foam, Layered, NeoHooke, Yeoh
-from ..fem.loads import gravity
-from ..fem.materials import Layer, Materials
-from ..fem.model import Model
-from ..fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
-from ..fem.obstacle import CONTACT_NEWTON, Obstacle
-from ..fem.rigid import Plane
-from ..fem.unit import materials_of
-from ..fem.wall_law import LAYER_NORMAL, layer_stiffness
-from ..meshing.mesh import LATTICE, MEMBRANE, Mesh
-from ..meshing.morph import morphed
+from ..fem.newton_settings import CONTACT_NEWTON, RESOLVED_NEWTON, NewtonSettings
+from ..meshing.mesh import LATTICE, MEMBRANE
 from ..meshing.settings import CELL_MM, MeshSettings
-from ..resolved.unit import mesh_of
 from .effect import Effect, Parameter
 from .prediction import beam, coupon, lattice
 from .prediction.flat_obstacle import NAME as CONTACT
+
+if TYPE_CHECKING:
+    # Where an effect is only named, sized or drawn, nothing of the solver is loaded.
+    from ..fem.lattice_law import LatticeLaw
+    from ..fem.materials import Layer, Materials
+    from ..fem.model import Model
+    from ..meshing.mesh import Mesh
 
 Array = np.ndarray[Any, Any]
 
@@ -70,6 +65,9 @@ class Body:
 
     def meshed(self, cache: Path | None = None) -> Mesh:
         """The unit's mesh; raises InputError and MeshingError. cache: see `mesh_of`."""
+        from ..meshing.morph import morphed
+        from ..resolved.unit import mesh_of
+
         if self.mesh.resolved:
             # Made anew: no mesher moves its nodes, and struts cannot be moved through the wall.
             return mesh_of(self.unit, self.mesh, cache=cache)
@@ -83,6 +81,8 @@ class Body:
 
     def materials(self, mesh: Mesh) -> Materials:
         """The base model's materials on a mesh; raises InputError if the unit's wall has a law of its own."""
+        from ..fem.unit import materials_of
+
         if self.unit.wall.names:
             raise InputError(
                 "evidence takes a neo-Hookean wall: what a wall does beyond that is what it looks for",
@@ -93,6 +93,8 @@ class Body:
 
     def model(self, mesh: Mesh) -> Model:
         """The base model of a mesh, loaded by pressure alone."""
+        from ..fem.model import Model
+
         return Model(mesh, device=self.device, threads=1)
 
 
@@ -145,12 +147,16 @@ def down(orientation_deg: float) -> Array:
 
 
 def _weight(body: Body, mesh: Mesh, density_kg_m3: float) -> Array:
+    from ..fem.loads import gravity
+
     hollow = (mesh.region == LATTICE) & (not mesh.resolved)
     solid = np.where(hollow, relative_density(strut_cell(body.unit)), 1.0)
     return gravity(mesh, density_kg_m3 * TONNE_PER_MM3 * solid, down(body.orientation_deg))
 
 
 def _clogged(body: Body, mesh: Mesh, share_lost: float) -> Model:
+    from ..fem.clogged import CloggedModel
+
     d = body.unit.printed
     if not 0 < body.distal < d.count:
         raise InputError(
@@ -164,6 +170,9 @@ def with_flat_obstacle(body: Body, mesh: Mesh, gap_mm: float) -> Model:
 
     |gap_mm|: distance in mm of the wall from the outline at rest.
     """
+    from ..fem.obstacle import Obstacle
+    from ..fem.rigid import Plane
+
     model = body.model(mesh)
     away = math.copysign(1.0, gap_mm)
     farthest = float((away * mesh.nodes[:, 1]).max())
@@ -230,6 +239,9 @@ def _elastic(materials: Materials, inside: Array) -> tuple[Array, Array, Array]:
 
 
 def _stiffening(materials: Materials, mesh: Mesh, c2_over_c1: float) -> Materials:
+    from ..fem.laws import NeoHooke, Yeoh
+    from ..fem.materials import Layer, Materials
+
     wall, rest = parted(materials, _in_region(mesh, MEMBRANE))
     stiffer = []
     for layer in wall:
@@ -251,6 +263,9 @@ def _asymmetric(materials: Materials, mesh: Mesh, excess: float) -> Materials:
     In parallel with the lattice's law a foam that resists one side only; for less stiff struts it resists
     tension, and takes the place of as much of the law. Two such foams are the lattice at small strain.
     """
+    from ..fem.laws import Foam
+    from ..fem.materials import Layer, Materials
+
     inside = _in_region(mesh, LATTICE)
     lattice_, rest = parted(materials, inside)
     elements, E, nu = _elastic(materials, inside)
@@ -267,6 +282,10 @@ def _layered(materials: Materials, mesh: Mesh, in_plane: float) -> Materials:
     All struts of a body-centred cell make one angle with the layers: to a homogenised lattice it is another
     modulus. Struts of a resolved mesh are printed in layers, too.
     """
+    from ..fem.laws import Layered
+    from ..fem.materials import Layer, Materials
+    from ..fem.wall_law import LAYER_NORMAL, layer_stiffness
+
     wall, rest = parted(materials, _in_region(mesh, MEMBRANE))
     layered: list[Layer] = []
     for layer in wall:

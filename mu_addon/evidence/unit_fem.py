@@ -38,8 +38,8 @@ Array = np.ndarray[Any, Any]
 Progress = Callable[[str, float], None]
 
 # Part of every key: raise it when a change of the code changes what is computed.
-REVISION = 2
-ANGLE = "angle_deg"
+REVISION = 3
+ANGLE, VOLUME = "angle_deg", "volume_mm3"
 # Fewer pressures make no cubic spline.
 FEWEST = 4
 # Along the meridian as fine as the default: there a coarser mesh misses most.
@@ -128,8 +128,8 @@ class Run:
 
     @property
     def rows(self) -> int:
-        """Number of values at each pressure: angle, three coordinates a point, two moves of the outline."""
-        return 1 + 3 * len(self.points) + 2 * self.outline
+        """Values at each pressure: angle, volume, three coordinates a point, two moves of the outline."""
+        return 2 + 3 * len(self.points) + 2 * self.outline
 
     @property
     def changed(self) -> tuple[Body, UnitEffect | None]:
@@ -165,7 +165,7 @@ class Run:
 
 @attrs.frozen(eq=False)
 class Result:
-    """What a run found: values (rows, k) at k pressures, in degrees and mm; nan where not reached.
+    """What a run found: values (rows, k) at k pressures, in degrees, mm3 and mm; nan where not reached.
 
     why: the reason where values are nan, else empty.
     """
@@ -175,7 +175,7 @@ class Result:
 
 
 def run(case: Run, cache: Path | None = None) -> Result:
-    """Angle in degrees and places of points in mm at every pressure, from rest outward.
+    """Angle in degrees, growth of the chambers in mm3 and places of points in mm at every pressure.
 
     cache: folder where a mesher that is not repeatable keeps its meshes. A pressure that is not reached, with
     those beyond it, is nan; so is all where the body cannot be drawn or meshed.
@@ -196,9 +196,11 @@ def run(case: Run, cache: Path | None = None) -> Result:
         equilibrium = Equilibrium(model, materials, body.newton(effect), explains=not case.effect)
         # Out of reach, it only lends the points at which the unit would touch.
         outline = with_flat_obstacle(body, mesh, 1e6).obstacles[0] if case.outline else None
-        places = slice(1, 1 + 3 * len(case.points))
+        places = slice(2, 2 + 3 * len(case.points))
+        whole, rest = 2 ** len(mesh.symmetry), model.cavity_volume(np.zeros_like(mesh.nodes))
         for at, state in _states(equilibrium, np.array(case.pressures_kPa)):
             values[0, at] = tip.angle_deg(state.u)
+            values[1, at] = whole * (model.cavity_volume(state.u) - rest)
             values[places, at] = points.at(state.u).ravel()
             if outline:
                 y, still = (outline.places(u)[..., 1] for u in (state.u, np.zeros_like(state.u)))
@@ -352,7 +354,7 @@ class _Plan:
         body = Body(reduced, settings.mesh, settings.finer, settings.distal, settings.lattice)
         markers = attached(mesh, here, settings.farthest_mm * scale)
         measured = {c for e in here for c, values in e.columns.items() if np.isfinite(values).any()}
-        known = [ANGLE, *(f"marker{m.number}_{a}_mm" for m in markers for a in AXES)]
+        known = [ANGLE, VOLUME, *(f"marker{m.number}_{a}_mm" for m in markers for a in AXES)]
         return cls(
             body,
             scale,
@@ -381,9 +383,9 @@ class _Plan:
                         yield self.case(name, size, orientation)
 
     def base(self, found: dict[str, Result]) -> Result:
-        """The free unit's angle and places."""
+        """The free unit's angle, volume and places."""
         result = found[self.case().key()]
-        return Result(result.values[: 1 + 3 * len(self.markers)], result.why)
+        return Result(result.values[: 2 + 3 * len(self.markers)], result.why)
 
     def free(self, found: dict[str, Result]) -> dict[int, tuple[Array, Array]]:
         """By side, 1 for +y: the free unit's pressures from 0 on, and its outline's moves in mm."""
@@ -439,8 +441,9 @@ class _Plan:
 
     @property
     def larger(self) -> Array:
-        """What each row of a result is multiplied by: lengths grow with the unit, an angle has none."""
-        return np.array([1.0, *[self.enlarged] * (3 * len(self.markers))])[:, None]
+        """What each row of a result is multiplied by: lengths grow with the unit, an angle does not."""
+        lengths = [self.enlarged] * (3 * len(self.markers))
+        return np.array([1.0, self.enlarged**3, *lengths])[:, None]
 
     def responses(self, settings: UnitSettings, found: dict[str, Result]) -> Iterator[UnitResponse]:
         """The response in each orientation."""
@@ -494,7 +497,7 @@ class _Plan:
         return Variant(effect.parameter.narrowed(low, high), np.array(sizes), np.array(values))
 
     def _rows(self) -> list[int]:
-        order = [ANGLE, *(f"marker{m.number}_{a}_mm" for m in self.markers for a in AXES)]
+        order = [ANGLE, VOLUME, *(f"marker{m.number}_{a}_mm" for m in self.markers for a in AXES)]
         return [order.index(c) for c in self.channels]
 
 

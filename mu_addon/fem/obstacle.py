@@ -14,17 +14,11 @@ from ..meshing.quality import shapes
 from . import friction
 from .elements import triangle_quadrature
 from .friction import Lag, Memory
-from .newton_settings import NewtonSettings
 from .outer_faces import OuterFaces, outer_faces
 from .rigid import Pose, Rigid
 
 Array = np.ndarray[Any, Any]
 
-# Points that begin to touch change the tangent, so an old factor is soon of no use; and a body that is
-# stopped ends far from where it was predicted.
-CONTACT_NEWTON = NewtonSettings(keep_factor=0.2, max_factorisations=40, predictor_tolerance=3.0)
-RESOLVED_OBSTACLE_NEWTON: NewtonSettings = attrs.evolve(CONTACT_NEWTON, max_step_MPa=0.005, follow_snaps=True)
-"""For a body strut by strut beside an obstacle: struts snap one by one long before the body does."""
 # A point slides where its friction is at least this share of its bound, which lags by less than the rest.
 _AT_BOUND = 0.999
 

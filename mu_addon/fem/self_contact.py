@@ -12,16 +12,11 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from ..design.quantity import in_kPa
 from ..errors import InputError
 from ..meshing.mesh import AXES, LATTICE, Mesh
-from .newton_settings import NewtonSettings
 from .outer_faces import free_boundary
 from .self_intersection import facets_of
 
 Array = np.ndarray[Any, Any]
 
-# A body that closes ends far from its prediction, and steps that touch cut short are many.
-SELF_CONTACT_NEWTON = NewtonSettings(
-    keep_factor=0.8, max_factorisations=80, max_iterations=200, max_backtracks=12, predictor_tolerance=3.0
-)
 # Distances in gaps: around a strut's foot where it does not touch the wall; and of pairs that the tangent's
 # pattern makes room for, so that it grows seldom.
 _FOOT = 2.0

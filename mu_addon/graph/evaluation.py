@@ -152,7 +152,7 @@ Report = Callable[[str, State], None]
 class Evaluation:
     """One tree, evaluated by `run`; afterwards `states` and `outputs` by node, and the tree's `faults`.
 
-    runs: where runs are found and started; None for a look, which makes only what takes milliseconds and
+    runs: where runs are found and started; None for a refresh, which makes only what takes milliseconds and
     knows of the rest what earlier evaluations left: `records`, by key. report: called with each node's state.
     """
 
@@ -221,7 +221,7 @@ class Evaluation:
             )
             runs = definition.runs and not node.muted
             if self.runs is None and (runs or behind):
-                self._look(name, key, behind)
+                self._recall(name, key, behind)
             elif runs:
                 self._of_run(name, definition, self._call(name, node, definition, settings), key, start)
             else:
@@ -229,7 +229,7 @@ class Evaluation:
         except MuError as error:
             self._failed(name, error, key, time.perf_counter() - start)
 
-    def _look(self, name: str, key: str, behind: str) -> None:
+    def _recall(self, name: str, key: str, behind: str) -> None:
         """Take a node from the records, or let it wait for a run."""
         found = self.records.get(key)
         if found is None:
@@ -304,7 +304,7 @@ class Evaluation:
         return found
 
     def _number(self, source: Source) -> Any:
-        """A number that another node gives; None where a look does not know it."""
+        """A number that another node gives; None where a refresh does not know it."""
         if source.node in self.outputs:
             return self.outputs[source.node][source.output]
         record = self.records.get(self.states[source.node].key)

@@ -1,4 +1,4 @@
-"""What evaluations have left in a folder, by the keys of nodes, for a look that makes nothing."""
+"""What evaluations have left in a folder, by the keys of nodes, for a refresh, which starts no run."""
 
 from __future__ import annotations
 

@@ -10,7 +10,6 @@ from typing import Any
 
 import attrs
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ..errors import InputError
 
@@ -52,14 +51,14 @@ class OffsetResponse:
         range.
         """
         at = self._at(scale, offset_mm)
-        return resin_MPa * np.exp(CubicSpline(self.offsets_mm, np.log(self.modulus))(at))
+        return resin_MPa * np.exp(_through(self.offsets_mm, np.log(self.modulus), at))
 
     def relative_density(self, scale: Any, offset_mm: Any) -> Array:
         """Share (...) of the volume that is solid at scales (...) with print offsets (...) in mm.
 
         Raises InputError where offset over scale is outside the range.
         """
-        return np.asarray(CubicSpline(self.offsets_mm, self.density)(self._at(scale, offset_mm)))
+        return _through(self.offsets_mm, self.density, self._at(scale, offset_mm))
 
     def _at(self, scale: Any, offset_mm: Any) -> Array:
         at = np.asarray(offset_mm, float) / np.asarray(scale, float)
@@ -71,3 +70,11 @@ class OffsetResponse:
                 f"stay between {low:g} and {high:g} mm",
             )
         return at
+
+
+def _through(x: Array, y: Array, at: Array) -> Array:
+    """Values at `at` of the cubic spline through y (k,) at x (k,)."""
+    # Only now: what merely names an effect must not load it.
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(x, y)(at))

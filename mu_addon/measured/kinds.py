@@ -30,6 +30,7 @@ UNITS = {
     "added_mass": "g",
     "tip_deflection": "mm",
     "voltage": "V",
+    "volume": "mm3",
 }
 # What a column may be in instead: how much of the unit it is read in one of it is.
 CONVERTED = {
@@ -40,10 +41,11 @@ CONVERTED = {
     "N": {"mN": 1e-3, "kN": 1e3},
     "g": {"mg": 1e-3, "kg": 1e3},
     "V": {"mV": 1e-3},
+    "mm3": {"ul": 1.0, "ml": 1e3, "cm3": 1e3},
     "": {"percent": 1e-2},
 }
 # What a camera or a voltmeter can miss for a moment; a gap in anything else leaves rows without meaning.
-MAY_BE_MISSING = ("angle_deg", "voltage_V", "marker")
+MAY_BE_MISSING = ("angle_deg", "voltage_V", "marker", "volume_mm3")
 
 _MARKER = re.compile(r"marker([1-9]\d*)_([xyz])_mm")
 
@@ -102,7 +104,11 @@ KINDS = {
     for kind in (
         Kind(
             "unit_pressure",
-            (("pressure_kPa", "angle_deg"), ("pressure_kPa", "marker1_y_mm", "marker1_z_mm")),
+            (
+                ("pressure_kPa", "angle_deg"),
+                ("pressure_kPa", "marker1_y_mm", "marker1_z_mm"),
+                ("pressure_kPa", "volume_mm3"),
+            ),
             ("angle_sd_deg",),
             may_have_keys=("added_mass_g", "chamber_volume_mm3", "valve", "pressure"),
             marked=True,
@@ -174,5 +180,5 @@ def markers(columns: Sequence[str]) -> dict[int, set[str]]:
 
 
 def may_be_missing(column: str) -> bool:
-    """Whether single values of this column may be missing: angle, voltage or a marker."""
+    """Whether single values of this column may be missing: angle, voltage, volume or a marker."""
     return column.startswith(MAY_BE_MISSING)

@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 
 from ..errors import MeshingError
+from .gmsh_libraries import SYSTEM_LIBRARIES, install_libraries, missing_libraries
 from .mesh import Array, boundary_faces
 
 # Elements grow by half their distance from the anchors' line and from the necks.
@@ -44,8 +45,7 @@ def load_gmsh() -> Any:
     except OSError as error:
         raise GmshUnavailable(
             f"gmsh cannot load a system library: {error}",
-            remedy="on Debian and Ubuntu: apt install libglu1-mesa (libGLU.so.1); then also "
-            "libxft2, libxcursor1, libxinerama1 if it names those",
+            remedy=install_libraries(missing_libraries() or SYSTEM_LIBRARIES),
         ) from error
     # Where its wheel was unpacked without the library, gmsh imports all the same and only warns.
     if not hasattr(gmsh.lib, "gmshInitialize"):

@@ -12,8 +12,7 @@ from ..fem.kinematics import Probe
 from ..fem.laws import NeoHooke
 from ..fem.materials import Materials
 from ..fem.model import Model
-from ..fem.newton_settings import NewtonSettings
-from ..fem.obstacle import CONTACT_NEWTON
+from ..fem.newton_settings import CONTACT_NEWTON, NewtonSettings
 from ..fem.state import State
 from ..fem.time_stepping import simulate_in_time
 

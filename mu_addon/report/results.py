@@ -279,6 +279,7 @@ class ReportData:
     angle_deg: Floats = attrs.field(factory=lambda: np.zeros(0))
     protocol_s: Floats = attrs.field(factory=lambda: np.zeros(0))
     protocol_kPa: Floats = attrs.field(factory=lambda: np.zeros(0))
+    in_time: bool = False
     parameters: Sequence[Parameter] = ()
     mesh: Mapping[str, Any] = attrs.field(factory=dict)  # label with unit -> figure
     solver: Mapping[str, Any] = attrs.field(factory=dict)

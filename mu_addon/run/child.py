@@ -17,7 +17,7 @@ from typing import Any
 
 from ..errors import MuError
 from ..files import make_folder, output_error
-from .outlook import Outlook, Plan
+from .progress_estimate import Plan, ProgressEstimate
 
 PATIENCE_S = 20.0
 """Seconds that a child which was asked to stop may take to write what it has, before it is killed."""
@@ -28,8 +28,8 @@ WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "faile
 class Child:
     """One process and what it has said; `state` is waiting, running, done, failed or cancelled.
 
-    progress: its latest such message; outlook: the whole of the run; warnings: texts; result, error: its last
-    message, whichever.
+    progress: its latest such message; estimate: the whole of the run; warnings: texts; result, error: its
+    last message, whichever.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class Child:
         """
         self.folder = folder
         self.state = WAITING
-        self.outlook = Outlook(plan)
+        self.estimate = ProgressEstimate(plan)
         self.progress: dict[str, Any] = {}
         self.warnings: list[str] = []
         self.result: dict[str, Any] | None = None
@@ -159,7 +159,7 @@ class Child:
         kind = message.get("type") if isinstance(message, dict) else None
         if kind == "progress":
             self.progress = message
-            self.outlook.tell(message)
+            self.estimate.tell(message)
         elif kind == "warning":
             self.warnings.append(str(message.get("what", "")))
         elif kind == "result":

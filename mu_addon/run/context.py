@@ -23,6 +23,8 @@ from .progress import Progress, log_file
 
 DONE, UNEXPECTED, INTERRUPTED, TERMINATED = 0, 70, 130, 143
 SUMMARY = "summary.json"
+# What libraries say that were refused memory, in other errors than MemoryError: Warp, the loader, C++.
+_REFUSED = ("Failed to allocate", "failed to map segment", "Cannot allocate memory", "bad_alloc")
 # Bytes that the summary of a run that goes on takes up: room for its last one where the disk is full by then.
 RESERVED = 1 << 14
 
@@ -140,19 +142,25 @@ def run_to_end(progress: Progress) -> Iterator[RunContext]:
             what = f"the package {error.name} is not installed"
             _stop(context, MuError(what, sys.executable, "install the packages that README.md names"))
         except MemoryError:
-            remedy = "use a coarser mesh, fewer workers or a machine with more memory"
-            _stop(context, MuError("out of memory", _where_results_are(context), remedy))
+            _stop(context, _out_of_memory(context))
         except Exception as error:  # noqa: BLE001 - the last resort: told, logged and turned into exit status 70
-            _log_traceback(context, error)
-            fault = _Unexpected(
-                f"internal error: {type(error).__name__}: {error}",
-                remedy="report it with log.ndjson, which holds the details"
-                if context.folder
-                else "report it",
-            )
-            _stop(context, fault)
+            if any(words in str(error) for words in _REFUSED):
+                _stop(context, _out_of_memory(context))
+            else:
+                _log_traceback(context, error)
+                _stop(context, _unexpected(context, error))
         finally:
             context.unlock()
+
+
+def _out_of_memory(context: RunContext) -> MuError:
+    remedy = "use a coarser mesh, fewer workers or a machine with more memory"
+    return MuError("out of memory", _where_results_are(context), remedy)
+
+
+def _unexpected(context: RunContext, error: Exception) -> MuError:
+    remedy = "report it with log.ndjson, which holds the details" if context.folder else "report it"
+    return _Unexpected(f"internal error: {type(error).__name__}: {error}", remedy=remedy)
 
 
 def _where_results_are(context: RunContext) -> str:

@@ -10,6 +10,10 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from ..errors import MuError
+
+# With less memory, of their own or of addresses, libraries end a process by a signal or wait for ever.
+_LEAST_MB = {"RLIMIT_DATA": 500, "RLIMIT_AS": 2000}
 # Simulating a unit takes half a gigabyte a process; more processes than this wait for memory, not for cores.
 MOST_WORKERS = 16
 
@@ -85,3 +89,23 @@ def limit_memory(megabytes: int) -> None:
         import resource
 
         resource.setrlimit(resource.RLIMIT_DATA, (megabytes * 1_000_000, megabytes * 1_000_000))
+
+
+def require_memory() -> None:
+    """Raise MuError where this process is limited to less memory than its libraries can fail in cleanly.
+
+    Refused memory, OpenBLAS asks again for ever and Manifold crashes; neither can be told from here.
+    """
+    if sys.platform == "win32":
+        return
+    import resource
+
+    for name, least in _LEAST_MB.items():
+        limit, _ = resource.getrlimit(getattr(resource, name))
+        if limit != resource.RLIM_INFINITY and limit < least * 1_000_000:
+            option = {"RLIMIT_DATA": "-d", "RLIMIT_AS": "-v"}[name]
+            raise MuError(
+                f"out of memory: this process may take up {limit / 1e6:.0f} MB",
+                f"the system's limit {name}",
+                f"allow {least} MB or more: `ulimit {option} {least * 1000}`, or memory_MB of a sweep",
+            )

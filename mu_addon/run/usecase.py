@@ -10,6 +10,7 @@ import attrs
 
 from .context import RunContext
 from .folder import FolderLayout, begin
+from .processes import require_memory
 
 Job = TypeVar("Job")
 
@@ -34,9 +35,10 @@ class UseCase(Generic[Job]):
     def start(self, job: Job, folder: Path, context: RunContext) -> Any:
         """Run a job in a folder and leave its report, also where it stops early; returns what was found.
 
-        Raises InputError, also for a folder of another kind of run or one in use, OutputError, and what the
-        job itself raises.
+        Raises InputError, also for a folder of another kind of run or one in use, OutputError, MuError where
+        the process may take up too little memory, and what the job itself raises.
         """
+        require_memory()
         if self.begin is not None:
             self.begin(job, folder, context)
         else:

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from .calibration import read_calibration as read_calibration
     from .calibration import write_calibration as write_calibration
     from .decoder import Decoder as Decoder
-    from .decoder import Layout as Layout
-    from .decoder import Samples as Samples
     from .embedded_waveguide import EmbeddedWaveguide as EmbeddedWaveguide
     from .embedded_waveguide import Joints as Joints
     from .embedded_waveguide import WaveguideShape as WaveguideShape
@@ -37,6 +35,8 @@ if TYPE_CHECKING:
     from .recording import Recorder as Recorder
     from .recording import Recording as Recording
     from .recording import read_recording as read_recording
+    from .samples import Layout as Layout
+    from .samples import Samples as Samples
     from .session import Control as Control
     from .session import run_session as run_session
     from .signal import Response as Response
@@ -54,13 +54,14 @@ else:
         __name__,
         {
             "calibration": "Calibration CalibrationSweep calibrate read_calibration write_calibration",
-            "decoder": "Decoder Layout Samples",
+            "decoder": "Decoder",
             "embedded_waveguide": "EmbeddedWaveguide Joints WaveguideShape embed_waveguide",
             "framing": "cobs_decoded cobs_encoded crc16",
             "guide": "Centreline Guide",
             "law": "Law fit_law",
             "optics": "Optics",
             "recording": "Recorder Recording read_recording",
+            "samples": "Layout Samples",
             "session": "Control run_session",
             "signal": "Response Signal signal_of_nodes signal_of_states",
             "sources": "Replay SerialLine Simulated ports",

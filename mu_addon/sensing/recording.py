@@ -26,7 +26,8 @@ import numpy as np
 from ..errors import InputError
 from ..files import append_lines, make_folder, output_error, plain
 from ..reading import file_bytes
-from .decoder import Reject, Samples
+from .accounts import Reject
+from .samples import Samples
 
 Array = np.ndarray[Any, Any]
 

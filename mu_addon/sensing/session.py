@@ -20,9 +20,10 @@ import numpy as np
 
 from ..errors import OutputError
 from ..files import plain
-from .decoder import Decoder, Samples
+from .decoder import Decoder
 from .recording import Recorder, columns_of
 from .ring import Ring
+from .samples import Samples
 from .sources import ConnectionLost, EndOfStream, Source
 
 Array = np.ndarray[Any, Any]

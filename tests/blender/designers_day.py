@@ -80,7 +80,7 @@ assert child.state == child_module.DONE, child.error
 assert not any("gmsh" in warning for warning in child.warnings), child.warnings
 found = studies.findings(root)
 assert (found.status, found.stale, found.quick) == ("complete", False, True)
-assert len(found.ranking(found.rule)) == 10
+assert len(found.ranking) == 10
 for whose, what in (("model_a", "mesh"), ("alpha4", "mesh"), ("model_a", "print")):
     assert bpy.ops.mu.motion(name=whose, what=what) == {"FINISHED"}
 bpy.context.scene.frame_set(193)
@@ -88,7 +88,7 @@ assert len(module("blender.results.motion").parts(root)) == 5
 bpy.ops.wm.save_mainfile()
 bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
 (root,) = unit_object.roots()
-assert len(studies.findings(root).ranking("volume_fraction")) == 10
+assert len(studies.findings(root).ranking) == 10
 
 # Something in the way, and the gripper to print; the active object says which is worked on.
 assert bpy.ops.mu.add(preset="mu-0.75x") == {"FINISHED"}

@@ -47,8 +47,9 @@ def session():
     # The slider, with the panel as it first opens; a few rows up and down where fonts differ.
     region = parts()[2]
     for rows in (0, -1, 1, -2, 2):
-        move(region.x + 175, region.y + region.height - 400 + 20 * rows)
+        move(region.x + 175, region.y + region.height - 380 + 20 * rows)
         yield 1.5
+        built = unit_object.roots()[0].mu_unit.built
         event("LEFTMOUSE", "PRESS")
         yield 1.0
         for _ in range(6):
@@ -58,8 +59,9 @@ def session():
         yield 3.0
         if abs(wall() - 0.9) > 1e-4:
             break
-        key("Z", ctrl=True)  # another parameter
-        yield 3.0
+        if unit_object.roots()[0].mu_unit.built != built:
+            key("Z", ctrl=True)  # another parameter
+            yield 3.0
     dragged = wall()
     assert abs(dragged - 0.9) > 1e-4, "no slider was found"
     yield from settled()
@@ -85,7 +87,7 @@ def session():
     (root,) = unit_object.roots()
     assert not unit_object.behind(root)
     assert list(root.children) == []
-    assert len(root.data.vertices) > 10_000
+    assert len(root.data.vertices) > 5_000
 
 
 run(session)

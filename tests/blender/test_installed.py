@@ -125,10 +125,10 @@ def test_an_upgrade_keeps_the_users_presets(installed, home, archive):
 
 
 @pytest.mark.skipif(not WINDOW, reason="NOT TESTED with mouse and keys: set MU_BLENDER_UI")
-@pytest.mark.parametrize("script", ["mouse_and_keys.py", "steps_by_mouse.py"])
+@pytest.mark.parametrize("script", ["mouse_and_keys.py", "steps_by_mouse.py", "gestures_in_window.py"])
 def test_mouse_and_keys(script, installed, home, tmp_path):
     os.environ["MU_TEST_FOLDER"] = str(tmp_path)
-    call(home, HERE / script, tmp_path / "screen.png", 300, command=WINDOW)
+    call(home, HERE / script, tmp_path / "screen.png", 900, command=WINDOW)
     assert (tmp_path / "outcome.txt").read_text() == "all went well", (tmp_path / "outcome.txt").read_text()
 
 

@@ -23,7 +23,7 @@ TABLE = Path(__file__).parents[1] / "data" / "blind" / "unit.npz"
 POINTS = ((18.75, 10.0, 30.0), (18.75, 10.0, 55.0), (0.0, 5.0, 75.0))
 CHANNELS = ("angle_deg", *(f"marker{m}_{a}_mm" for m in (1, 2, 3) for a in "yz"))
 # Rows of a run that are seen: the angle, y and z of each point.
-ROWS = [0, 2, 3, 5, 6, 8, 9]
+ROWS = [0, 3, 4, 6, 7, 9, 10]
 TURNS = (0.0, 90.0)
 JUDGED_kPa = (-18.0, -13.5, -9.0, -4.5, 0.0, *(38.0 * np.arange(1, 8) / 7).tolist())
 HIDDEN_kPa = (-18.5, -15.0, -11.0, -7.0, -3.0, 0.0, 3.0, 7.0, 11.5, 16.5, 22.0, 28.0, 34.0, 39.0)

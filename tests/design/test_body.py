@@ -284,6 +284,12 @@ def test_a_file_whose_faces_are_no_numbers_of_points_is_refused(tmp_path):
         read_body(path)
 
 
+def test_a_body_of_slivers_alone_is_refused():
+    """Found by the fuzzer: nothing is left of it once vertices that agree are merged."""
+    with pytest.raises(InputError, match="no surface"):
+        body_of([[0, 0, 0], [0, 0, 1e-9], [0, 1e-9, 0]], [[0, 1, 2]])
+
+
 def test_coordinates_that_no_grid_holds_are_refused_and_not_changed(tmp_path):
     path = tmp_path / "body.ply"
     path.write_text(PLY.format(corner="int", far="1e30"))

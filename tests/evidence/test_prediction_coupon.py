@@ -5,8 +5,8 @@ import pytest
 
 from mu_addon.errors import InputError
 from mu_addon.evidence.prediction.coupon import CouponStress, yeoh
+from mu_addon.evidence.prediction.effective_pressure import first_order_lag
 from mu_addon.evidence.prediction.specimen import recorded
-from mu_addon.evidence.prediction.unit import first_order_lag
 from mu_addon.fem.laws import Yeoh
 from mu_addon.materials import incompressible
 

@@ -7,11 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mu_addon.evidence.effect import LIBRARY, SHOWN_BY, Effect, Parameter
 from mu_addon.evidence.prediction.beam import BeamSag
 from mu_addon.evidence.prediction.coupon import CouponStress
 from mu_addon.evidence.prediction.hold import ChamberPressure
 from mu_addon.evidence.prediction.lattice import LatticeStress
 from mu_addon.evidence.prediction.waveguide import WaveguideVoltage
+from mu_addon.measured.kinds import KINDS
 
 from .bench import experiment, parameters
 
@@ -118,3 +120,22 @@ def test_predictions_are_finite_within_all_bounds(data):
     }
     found = simulator.predict(e, values)
     assert np.isfinite(found).all(), {k: v for k, v in values.items() if math.isfinite(v)}
+
+
+def test_no_advice_asks_for_what_a_kind_cannot_do():
+    """A hold's valve is shut already, and a unit takes no added mass."""
+    for (name, kind), words in SHOWN_BY.items():
+        assert name in LIBRARY
+        assert kind in KINDS
+        assert words
+
+    def shown(name, *kinds):
+        return Effect(name, (Parameter("size", "", 0.0, 1.0, 0.0),), kinds).reveals
+
+    assert "valve" not in shown("leak", "pressure_hold")
+    assert "mass" not in shown("gravity", "unit_pressure")
+    assert shown("gravity", "unit_pressure", "beam_deadweight").count("; or ") == 1
+    # Both laws of one mechanism ask for the same experiment.
+    block = LatticeStress([experiment("lattice_compression", {"time_s": TIME, "strain": STRAIN}, **BLOCK)])
+    relaxing = {e.reveals for e in block.effects if e.name == "viscoelasticity"}
+    assert relaxing == {SHOWN_BY["viscoelasticity", "lattice_compression"]}

@@ -9,11 +9,12 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.evidence.prediction.flat_obstacle import contact_effect
 from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.unit_effects import Body, layer_stiffness, with_flat_obstacle
+from mu_addon.evidence.unit_effects import Body, with_flat_obstacle
 from mu_addon.evidence.unit_fem import Run, UnitSettings, run, unit_responses
 from mu_addon.evidence.verdict import diagnose
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.obstacle import CONTACT_NEWTON
+from mu_addon.fem.newton_settings import CONTACT_NEWTON
+from mu_addon.fem.wall_law import layer_stiffness
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from tests.evidence import analytic

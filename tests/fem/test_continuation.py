@@ -18,8 +18,8 @@ from mu_addon.fem.factor import LDL, IndefiniteError
 from mu_addon.fem.inertia import Inertia
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.fem.newton_settings import NewtonSettings
-from mu_addon.fem.obstacle import RESOLVED_OBSTACLE_NEWTON, Obstacle
+from mu_addon.fem.newton_settings import RESOLVED_OBSTACLE_NEWTON, NewtonSettings
+from mu_addon.fem.obstacle import Obstacle
 from mu_addon.fem.rigid import Plane, Pose
 from mu_addon.fem.state import rest
 from mu_addon.fem.time_stepping import simulate_in_time

@@ -9,7 +9,8 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.loads import gravity
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.fem.obstacle import CONTACT_NEWTON, Obstacle
+from mu_addon.fem.newton_settings import CONTACT_NEWTON
+from mu_addon.fem.obstacle import Obstacle
 from mu_addon.fem.rigid import Box, Plane, Pose, Sphere
 from mu_addon.fem.state import rest
 from mu_addon.fem.time_stepping import simulate_in_time

@@ -7,7 +7,8 @@ import pytest
 from mu_addon.fem.embedding import embed
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
-from mu_addon.fem.obstacle import CONTACT_NEWTON, Obstacle
+from mu_addon.fem.newton_settings import CONTACT_NEWTON
+from mu_addon.fem.obstacle import Obstacle
 from mu_addon.fem.outer_faces import outer_faces
 from mu_addon.fem.rigid import Plane, Pose
 from mu_addon.fem.state import rest

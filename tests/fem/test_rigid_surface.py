@@ -8,7 +8,8 @@ from mu_addon.errors import InputError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.fem.obstacle import CONTACT_NEWTON, Obstacle
+from mu_addon.fem.newton_settings import CONTACT_NEWTON
+from mu_addon.fem.obstacle import Obstacle
 from mu_addon.fem.rigid import Box, Pose, Sphere
 from mu_addon.fem.rigid_surface import Surface, _closest
 from mu_addon.fem.state import rest

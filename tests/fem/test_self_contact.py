@@ -13,10 +13,11 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.loads import traction
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
+from mu_addon.fem.newton_settings import SELF_CONTACT_NEWTON
 from mu_addon.fem.obstacle import Obstacle
 from mu_addon.fem.outer_faces import outer_faces
 from mu_addon.fem.rigid import Plane, Pose
-from mu_addon.fem.self_contact import SELF_CONTACT_NEWTON, SelfContact
+from mu_addon.fem.self_contact import SelfContact
 from mu_addon.fem.self_intersection import crossings
 from mu_addon.fem.state import rest
 

@@ -135,14 +135,14 @@ def test_circles_fail_and_what_is_behind_them_waits():
     ]  # fmt: skip
 
 
-def test_a_look_starts_no_run_and_knows_what_records_know():
+def test_a_refresh_starts_no_run_and_knows_what_records_know():
     wanted = attrs.evolve(DEFINITIONS["twice"], kind="run", make=None, order=lambda call: 1 / 0)
     definitions = {**DEFINITIONS, "run": wanted}
     found = tree(a=node("sum", more=2.0), r=node("run", {"sum": "a.sum"}), t=node("twice", {"sum": "r.sum"}))
-    look = Evaluation(found, definitions)
-    look.run()
-    assert [look.states[n].state for n in "art"] == ["computed", "waiting", "waiting"]
-    records = {look.states["r"].key: Record("four")}
+    refresh = Evaluation(found, definitions)
+    refresh.run()
+    assert [refresh.states[n].state for n in "art"] == ["computed", "waiting", "waiting"]
+    records = {refresh.states["r"].key: Record("four")}
     again = Evaluation(found, definitions, records=records)
     again.run()
     assert [again.states[n].state for n in "art"] == ["computed", "cached", "waiting"]

@@ -6,6 +6,7 @@ import subprocess
 import time
 
 import pytest
+import trimesh
 
 from mu_addon.graph import Node, NodeTree, Source, tree_text
 from mu_addon.usecases.graph.definitions import definitions
@@ -145,7 +146,7 @@ def test_the_shipped_unit_is_evaluated_from_its_file(tmp_path):
     assert out["nodes"]["Trim"]["remark"].endswith("struts")
 
 
-def every_kind():
+def every_kind(wall):
     """A tree with every kind of node, as coarse as each goes."""
     nodes = dict(template("unit").nodes)
 
@@ -177,13 +178,16 @@ def every_kind():
     add("Cause", "diagnose", {"data": "Data.data"})
     add("As Measured", "simulate", {"unit": "U.unit", "model": "Cause.model"}, **COARSE)
     add("Compare", "compare", {"items": ["Move.study", "By Law.study", "As Measured.study"]})
+    add("Wall", "obstacle", file=str(wall), friction=0.3)
     add("Gripper", "gripper", {"unit": "U.unit"})
     add("Grasp", "grip", {"gripper": "Gripper.gripper"}, coarse=True, cubes_mm="20", rank_paths=False)
     return NodeTree("every kind", nodes)
 
 
 def test_every_kind_of_node_is_computed_and_found_again(tmp_path):
-    tree = every_kind()
+    wall = tmp_path / "wall.stl"
+    trimesh.creation.box((10.0, 10.0, 10.0)).export(wall)
+    tree = every_kind(wall)
     assert {node.kind for node in tree.nodes.values()} == set(definitions())
     (tmp_path / "every.toml").write_text(tree_text(tree), encoding="utf-8")
     first = evaluated(tmp_path / "every.toml", tmp_path / "out")

@@ -1,11 +1,13 @@
 """The Blender extension: Blender's tool accepts it, it holds what ships, and it registers twice."""
 
+import base64
 import hashlib
 import importlib.util
 import json
 import re
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -100,20 +102,117 @@ def test_an_archive_with_other_wheels_than_pinned_is_refused(tmp_path, ci):
         for name, data in content.items()
     ]
 
-    def archive_of(held):
-        path = tmp_path / "built.zip"
-        with zipfile.ZipFile(path, "w") as stream:
-            for name, data in held.items():
-                stream.writestr(f"wheels/{name}", data)
-        return path
-
-    assert wheels.not_as_pinned(archive_of(content), pins) == []
+    assert wheels.not_as_pinned(archive_of(tmp_path, content), pins, tmp_path) == []
     other = {"a.whl": content["a.whl"], "b.whl": b"another", "d.whl": b"one more"}
-    assert wheels.not_as_pinned(archive_of(other), pins) == [
+    assert wheels.not_as_pinned(archive_of(tmp_path, other), pins, tmp_path) == [
         "wheels/d.whl is not pinned in wheels.csv",
         "wheels/c.whl is missing",
         "wheels/b.whl has another SHA-256 than pinned",
     ]
+
+
+def archive_of(folder, held):
+    """An extension's archive with these wheels, by name."""
+    path = folder / "built.zip"
+    with zipfile.ZipFile(path, "w") as stream:
+        for name, data in held.items():
+            stream.writestr(f"wheels/{name}", data)
+    return path
+
+
+SCIPY = {
+    "scipy/linalg/__init__.py": "x = 1\n",
+    "scipy/linalg/tests/test_lapack.py": "assert True\n",
+    "scipy/linalg/tests/data/LICENSE.txt": "free\n",
+    "scipy-9.dist-info/METADATA": "Name: scipy\nVersion: 9\nLicense-Expression: BSD-3-Clause\n",
+    "scipy-9.dist-info/WHEEL": "Wheel-Version: 1.0\nTag: py3-none-any\n",
+}
+NAME = "scipy-9-py3-none-any.whl"
+
+
+def digest(content):
+    return base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
+
+
+@pytest.fixture
+def published(tmp_path):
+    """A wheel of a package that ships its tests, where a download lies."""
+    path = tmp_path / "linux-x64" / "3.11" / NAME
+    path.parent.mkdir(parents=True)
+    record = [f"{name},sha256={digest(text.encode())},{len(text)}\n" for name, text in SCIPY.items()]
+    with zipfile.ZipFile(path, "w") as stream:
+        for name, text in SCIPY.items():
+            stream.writestr(name, text)
+        stream.writestr("scipy-9.dist-info/RECORD", "".join(record) + "scipy-9.dist-info/RECORD,,\n")
+    return path
+
+
+def test_a_slimmed_wheel_lacks_its_tests_and_nothing_else(tmp_path, ci, published):
+    made, change = ci("slim").slim(published, tmp_path / "slim")
+    again, _ = ci("slim").slim(published, tmp_path / "again")
+    assert made.read_bytes() == again.read_bytes()
+    assert made.name == "scipy-9-0slim-py3-none-any.whl"
+    assert (change.original, change.files) == (NAME, 1)
+    assert change.sha256 == hashlib.sha256(published.read_bytes()).hexdigest()
+    with zipfile.ZipFile(made) as package:
+        held = {name: package.read(name) for name in package.namelist()}
+    rows = [line.split(",") for line in held.pop("scipy-9.dist-info/RECORD").decode().splitlines()]
+    assert rows.pop() == ["scipy-9.dist-info/RECORD", "", ""]
+    assert {name for name, *_ in rows} == held.keys() == SCIPY.keys() - {"scipy/linalg/tests/test_lapack.py"}
+    for name, code, size in rows:
+        assert (code, int(size)) == (f"sha256={digest(held[name])}", len(held[name]))
+        assert name.endswith("/WHEEL") or held[name].decode() == SCIPY[name]
+    assert held["scipy-9.dist-info/WHEEL"].decode() == SCIPY["scipy-9.dist-info/WHEEL"] + "Build: 0slim\n"
+
+
+def test_another_change_of_a_slimmed_wheel_is_refused(tmp_path, ci, published):
+    wheels = ci("wheels")
+    pin = wheels.Wheel(
+        "linux-x64", "3.11", "scipy", "9", NAME, hashlib.sha256(published.read_bytes()).hexdigest()
+    )
+    made, _ = ci("slim").slim(published, tmp_path / "slim")
+    assert wheels.not_as_pinned(archive_of(tmp_path, {made.name: made.read_bytes()}), [pin], tmp_path) == []
+    with zipfile.ZipFile(made) as package:
+        held = {name: package.read(name) for name in package.namelist()}
+    held["scipy/linalg/__init__.py"] = b"x = 2\n"
+    held["scipy/more.py"] = held.pop("scipy-9.dist-info/METADATA")
+    with zipfile.ZipFile(made, "w") as package:
+        for name, content in held.items():
+            package.writestr(name, content)
+    assert wheels.not_as_pinned(archive_of(tmp_path, {made.name: made.read_bytes()}), [pin], tmp_path) == [
+        f"wheels/{made.name}: scipy/more.py was added",
+        f"wheels/{made.name}: scipy-9.dist-info/METADATA was lost",
+        f"wheels/{made.name}: scipy/linalg/__init__.py was changed",
+    ]
+    # What the wheel was made from has to be the pinned one, too.
+    published.write_bytes(published.read_bytes() + b"x")
+    found = wheels.not_as_pinned(archive_of(tmp_path, {made.name: made.read_bytes()}), [pin], tmp_path)
+    assert f"wheels/{made.name} has another SHA-256 than pinned" in found
+
+
+def test_the_bill_says_what_a_slimmed_wheel_was_made_from(tmp_path, ci, published):
+    (tmp_path / "blender_manifest.toml").write_text((ROOT / "blender_manifest.toml").read_text())
+    made, change = ci("slim").slim(published, tmp_path / "wheels")
+    ci("bill").write_bill(tmp_path, [change])
+    (component,) = json.loads((tmp_path / "sbom.cdx.json").read_text())["components"]
+    assert "purl" not in component
+    assert component["hashes"][0]["content"] == hashlib.sha256(made.read_bytes()).hexdigest()
+    (ancestor,) = component["pedigree"]["ancestors"]
+    assert ancestor["purl"] == f"pkg:pypi/scipy@9?file_name={NAME}"
+    assert ancestor["hashes"][0]["content"] == change.sha256
+    assert "1 files, 12 bytes, left out: */tests/*" in component["pedigree"]["notes"]
+
+
+@pytest.mark.parametrize(
+    ("python", "first", "end"), [("3.11", "4.5.0", "5.1.0"), ("3.13", "5.1.0", None), ("3.14", "5.1.0", None)]
+)
+def test_an_archive_is_for_the_blenders_of_its_python(python, first, end, tmp_path, ci, published):
+    (tmp_path / "blender_manifest.toml").write_text((ROOT / "blender_manifest.toml").read_text())
+    ci("extension").bundle(tmp_path, [published], "linux-x64", python)
+    manifest = tomllib.loads((tmp_path / "blender_manifest.toml").read_text())
+    assert (manifest["blender_version_min"], manifest.get("blender_version_max")) == (first, end)
+    assert (manifest["platforms"], manifest["wheels"]) == (["linux-x64"], [f"./wheels/{NAME}"])
+    assert manifest["permissions"]
 
 
 def test_pins_are_those_of_the_project(ci):

@@ -26,10 +26,10 @@ def printed(code, folder):
 
 
 def require_alike(found, shown):
-    """Equal words, and numbers within what a mesher without a seed scatters."""
+    """Equal words, and numbers within what a mesher without a seed scatters: E[100] by 3.4 % in ten runs."""
     assert NUMBER.sub("#", found).split() == NUMBER.sub("#", shown).split()
     figures = [[float(number) for number in NUMBER.findall(text)] for text in (found, shown)]
-    assert figures[0] == pytest.approx(figures[1], rel=0.03)
+    assert figures[0] == pytest.approx(figures[1], rel=0.05)
 
 
 def test_ten_lines_lead_from_a_preset_to_an_angle(tmp_path):

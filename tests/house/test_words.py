@@ -73,6 +73,26 @@ def _texts(path):
             yield node.lineno, " ".join(node.value.split())
 
 
+def _messages(path):
+    """Every string of a module as a user reads it: "..." stands for each field of an f-string."""
+    for node in _nodes(path):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.value
+        elif isinstance(node, ast.JoinedStr):
+            yield "".join(p.value if isinstance(p, ast.Constant) else "..." for p in node.values)
+
+
+@cache
+def _all_messages():
+    return [message for path in SOURCES for message in _messages(path)]
+
+
+def _is_a_message(quoted):
+    """Whether some string of the package has these words, with anything in place of each "..."."""
+    pattern = re.compile(".*".join(re.escape(part) for part in quoted.split("...")), re.DOTALL)
+    return any(pattern.search(message) for message in _all_messages())
+
+
 def _identifiers(path):
     for node in _nodes(path):
         if isinstance(node, ast.Name):
@@ -129,6 +149,29 @@ def test_no_retired_identifier():
 )
 def test_the_search_for_identifiers_can_find_one(name, retired):
     assert bool(_retired_identifiers(name)) == retired
+
+
+def test_the_messages_that_the_page_explains_are_those_of_the_code():
+    text = (ROOT / "docs" / "blender.md").read_text(encoding="utf-8")
+    section = text.split("## When something is wrong")[1]
+    starts = re.findall(r"^- ((?:\*[^*\n]+\*(?:, )?)+)", section, re.MULTILINE)
+    assert len(starts) == len(re.findall(r"^- ", section, re.MULTILINE))
+    quoted = [words for start in starts for words in re.findall(r"\*([^*]+)\*", start)]
+    assert len(quoted) > 10
+    assert [words for words in quoted if not _is_a_message(words)] == []
+
+
+@pytest.mark.parametrize(
+    ("quoted", "expected"),
+    [
+        ("This unit is being simulated", True),
+        ("no equilibrium at ... kPa: ...", True),
+        ("This unit is being evaluated", False),
+        ("no equilibrium at ... bar", False),
+    ],
+)
+def test_the_search_for_messages_can_find_one(quoted, expected):
+    assert _is_a_message(quoted) == expected
 
 
 def _anchors(page):

@@ -8,7 +8,8 @@ from mu_addon.design import load_preset
 from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.wall import Wall
 from mu_addon.fem.model import Model
-from mu_addon.fem.obstacle import RESOLVED_OBSTACLE_NEWTON, Obstacle
+from mu_addon.fem.newton_settings import RESOLVED_OBSTACLE_NEWTON
+from mu_addon.fem.obstacle import Obstacle
 from mu_addon.fem.rigid import Plane
 from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.settings import MeshSettings

@@ -39,6 +39,16 @@ class FailingFiles:
         self.full: set[int] = set()
         self._lock = threading.Lock()
 
+    @property
+    def places(self) -> int:
+        """How many calls there were."""
+        return len(self.calls)
+
+    @property
+    def where(self) -> str:
+        """The first call that failed, in words."""
+        return self.calls[self.at - 1]
+
     def concerns(self, path: Any) -> bool:
         """Whether a path, or the file of a number, lies in the folder."""
         if isinstance(path, int):

@@ -109,6 +109,27 @@ def test_a_fault_of_ours(tmp_path):
     assert 'raise RuntimeError("a bug")' in traces[0] or "RuntimeError: a bug" in traces[0]
 
 
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError("Unable to allocate 3 GiB"),
+        RuntimeError("Failed to allocate 3000000 bytes on device 'cpu'"),
+        ImportError("manifold3d.so: failed to map segment from shared object"),
+        RuntimeError("std::bad_alloc"),
+    ],
+)
+def test_libraries_that_are_refused_memory(tmp_path, error):
+    messages = []
+    with run_to_end(Progress([messages.append])) as context:
+        context.open_folder(tmp_path)
+        raise error
+    assert context.status == 1
+    assert json.loads((tmp_path / "summary.json").read_text())["status"] == "partial"
+    assert messages[-1]["what"] == "out of memory"
+    assert "coarser mesh" in messages[-1]["what_to_do"]
+    assert "traceback" not in (tmp_path / "log.ndjson").read_text()
+
+
 def test_a_fault_before_there_is_a_folder(tmp_path):
     status, output, summary, log = finish(start("early", tmp_path), tmp_path)
     assert (status, summary, log) == (70, None, [])

@@ -1,7 +1,8 @@
 """Files of every kind that is read, damaged at random: each is read or refused, and nothing else happens.
 
-The corpus is one sound file of each kind. `MUTANTS=2000 python -m pytest tests/run/test_mutated_files.py`
-draws so many of each; the same numbers give the same files.
+The corpus is one sound file of each kind, and in fuzz.zip what a fuzzer found to reach other code
+(`python benchmarks/fuzz.py`). `MUTANTS=2000 python -m pytest tests/run/test_mutated_files.py` draws so many
+of each; the same numbers give the same files, and `MUTANTS_SEED=2` others.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ import random
 import re
 import shutil
 import struct
-from collections.abc import Callable
+import zipfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,7 @@ from mu_addon.design.body import read_body
 from mu_addon.design.surface import stl_bytes, stl_surface
 from mu_addon.errors import InputError
 from mu_addon.files import read_npz, write_npz
+from mu_addon.graph.tree_file import read_tree
 from mu_addon.homogenize.effective import read_effective
 from mu_addon.measured.folder import read_folder
 from mu_addon.sensing.recording import read_recording
@@ -33,7 +36,9 @@ from ..homogenize.lattice_laws import body_centred
 from .test_reading import READERS
 
 COUNT = int(os.environ.get("MUTANTS", "15"))
+SEED = os.environ.get("MUTANTS_SEED", "")
 DATA = Path(__file__).parents[1] / "data"
+FUZZED = DATA / "fuzz.zip"
 VERTICES = np.array([[x, y, z] for x in (0.0, 20.0) for y in (0.0, 20.0) for z in (0.0, 75.0)])
 FACES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6)]
 FACES += [(0, 6, 4), (1, 5, 7), (1, 7, 3)]
@@ -81,6 +86,20 @@ def mutated(random_: random.Random, content: bytes) -> bytes:
     return bytes(changed)
 
 
+def fuzzed(name: str) -> list[bytes]:
+    """What the fuzzer found for a reader."""
+    with zipfile.ZipFile(FUZZED) as archive:
+        names = sorted(member for member in archive.namelist() if member.startswith(f"{name}/"))
+        return [archive.read(member) for member in names]
+
+
+def mutants(name: str, contents: list[bytes]) -> Iterator[bytes]:
+    """COUNT mutants, each of one of the contents."""
+    for number in range(COUNT):
+        random_ = random.Random(f"{name} {SEED} {number}")
+        yield mutated(random_, random_.choice(contents))
+
+
 def ascii_stl() -> bytes:
     corners = "".join(
         "facet normal 0 0 0\nouter loop\n"
@@ -123,6 +142,33 @@ RECORDING = b"time_s,device_s,sequence,light_V\n" + b"".join(b"%f,%f,%d,1.5\n" %
 INDEX = b'{"type": "recording", "version": 1}\n{"type": "file", "file": "recording-000.csv"}\n'
 PIXELS = b"time_s,base right_px,base down_px\n" + b"".join(b"%d,100.5,%d\n" % (k, 50 + k) for k in range(9))
 
+TREE = b"""format = 1
+name = "two walls"
+[nodes.Unit]
+kind = "unit"
+[nodes.Thin]
+kind = "set_parameter"
+at = [300, 0]
+[nodes.Thin.settings]
+value = 0.7
+[nodes.Thin.links]
+unit = ["Unit.unit"]
+"""
+
+
+def recording_with(name: str) -> Callable[[Path], Any]:
+    """A reader of a recording, one of whose files is the given one."""
+
+    def read(path: Path) -> Any:
+        folder = path.parent / "recording"
+        folder.mkdir(exist_ok=True)
+        for file, content in (("index.ndjson", INDEX), ("recording-000.csv", RECORDING)):
+            (folder / file).write_bytes(path.read_bytes() if file == name else content)
+        return read_recording(folder)
+
+    return read
+
+
 # Name of the file, its content, and who reads it.
 CORPUS: dict[str, tuple[str, Callable[[Path], bytes], Callable[[Path], Any]]] = {
     name: (f"{name.replace(' ', '-')}.toml", lambda _, text=text: text.encode(), reader)
@@ -144,6 +190,9 @@ CORPUS |= {
     "PLY": ("body.ply", lambda _: ply(binary=False), read_body),
     "PLY of bytes": ("body.ply", lambda _: ply(binary=True), read_body),
     "NPZ": ("b.npz", npz, read_npz),
+    "node tree": ("tree.toml", lambda _: TREE, read_tree),
+    "recording": ("recording-000.csv", lambda _: RECORDING, recording_with("recording-000.csv")),
+    "index of a recording": ("index.ndjson", lambda _: INDEX, recording_with("index.ndjson")),
 }  # fmt: skip
 
 
@@ -164,13 +213,14 @@ def test_a_damaged_file_is_read_or_refused(name: str, tmp_path: Path) -> None:
     content = made(tmp_path)
     assert (tmp_path / file).write_bytes(content)
     assert read_all(reader, tmp_path / file) == 1, "the corpus is sound"
-    for seed in range(COUNT):
+    found = fuzzed(name)
+    for number, made_up in enumerate([*found, *mutants(name, [content, *found])]):
         path = tmp_path / file
-        path.write_bytes(mutated(random.Random(f"{name} {seed}"), content))
+        path.write_bytes(made_up)
         try:
             read_all(reader, path)
         except Exception as error:
-            raise AssertionError(f"{name}, seed {seed}: {error!r}") from error
+            raise AssertionError(f"{name}, number {number}: {error!r}") from error
 
 
 FOLDERS: dict[str, tuple[Callable[[Path], Any], Path]] = {
@@ -190,22 +240,9 @@ def test_a_folder_with_a_damaged_file_is_read_or_refused(name: str, tmp_path: Pa
     for path in files:
         content = path.read_bytes()
         for seed in range(COUNT):
-            path.write_bytes(mutated(random.Random(f"{name} {path.name} {seed}"), content))
+            path.write_bytes(mutated(random.Random(f"{name} {path.name} {SEED} {seed}"), content))
             try:
                 read_all(reader, folder)
             except Exception as error:
                 raise AssertionError(f"{name}, {path.name}, seed {seed}: {error!r}") from error
         path.write_bytes(content)
-
-
-def test_a_damaged_recording_is_read_or_refused(tmp_path: Path) -> None:
-    for seed in range(4 * COUNT):
-        random_ = random.Random(f"recording {seed}")
-        files = {"index.ndjson": INDEX, "recording-000.csv": RECORDING}
-        name = random_.choice(sorted(files))
-        for file, content in files.items():
-            (tmp_path / file).write_bytes(mutated(random_, content) if file == name else content)
-        try:
-            read_all(read_recording, tmp_path)
-        except Exception as error:
-            raise AssertionError(f"seed {seed}: {error!r}") from error

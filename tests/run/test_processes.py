@@ -57,3 +57,23 @@ def test_a_thread_that_may_not_set_signals_goes_on_without():
     thread.start()
     thread.join()
     assert done == [True]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are counted in another way")
+@pytest.mark.parametrize(("limit", "option"), [("RLIMIT_DATA", "-d"), ("RLIMIT_AS", "-v")])
+def test_a_limit_in_which_libraries_crash_is_refused_before_they_do(limit, option):
+    """Within 90 MB OpenBLAS asks for memory for ever, within 150 Manifold ends the process by a signal."""
+    code = f"""
+import resource
+from mu_addon.errors import MuError
+from mu_addon.run.processes import require_memory
+require_memory()
+resource.setrlimit(resource.{limit}, (90_000_000, resource.RLIM_INFINITY))
+try:
+    require_memory()
+except MuError as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "this process may take up 90 MB" in done.stdout, done.stderr
+    assert f"ulimit {option} " in done.stdout

@@ -15,8 +15,10 @@ from collections.abc import Callable
 import attrs
 import numpy as np
 
-from mu_addon.sensing.decoder import Decoder, Samples
+from mu_addon.sensing.accounts import Counters
+from mu_addon.sensing.decoder import Decoder
 from mu_addon.sensing.framing import END, info_frame, sample_frame
+from mu_addon.sensing.samples import Samples
 
 INFO = info_frame({"channels": ["light", "dark"], "unit_per_count": 1.0})
 
@@ -135,6 +137,11 @@ class Outcome:
     unaccounted: int
 
 
+def accounted(counted: Counters) -> int:
+    """How many bytes were counted by what became of them."""
+    return counted.read_bytes + counted.rejected_bytes + counted.cut_bytes + counted.overlong
+
+
 def decoded(name: str, seed: int, samples: int = 200, share: float = 0.1) -> Outcome:
     """Mutate a stream of that format, feed it in pieces of random sizes, and compare."""
     random_ = random.Random(f"{name} {seed}")
@@ -148,7 +155,6 @@ def decoded(name: str, seed: int, samples: int = 200, share: float = 0.1) -> Out
         place, at = place + size, at + 0.002
     groups += decoder.finish(at)
     counted = decoder.counters
-    accounted = counted.read_bytes + counted.rejected_bytes + counted.cut_bytes + counted.overlong
     of = {piece: k for k, piece in enumerate(pieces)}
     came = data.split(end)[1:-1]
     whole = {of[piece + end] for piece in came if piece + end in of}
@@ -162,7 +168,7 @@ def decoded(name: str, seed: int, samples: int = 200, share: float = 0.1) -> Out
                 pair = group.values[:, [names.index("light"), names.index("dark")]]
                 kept.update(map(tuple, pair.tolist()))
     missing = sorted(k for k in whole if not kept[float(light(k)), float(dark(k))])
-    return Outcome(groups, decoder, len(whole), missing, counted.bytes - accounted)
+    return Outcome(groups, decoder, len(whole), missing, counted.bytes - accounted(counted))
 
 
 def sound(outcome: Outcome) -> bool:

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mu_addon.sensing.decoder import Decoder, Samples
+from mu_addon.sensing.decoder import Decoder
 from mu_addon.sensing.framing import info_frame, sample_frame
+from mu_addon.sensing.samples import Samples
 
 INFO = info_frame({"channels": ["light", "dark"], "unit": "V", "unit_per_count": 0.001})
 

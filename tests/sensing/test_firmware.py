@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mu_addon.sensing.decoder import Decoder, Samples
+from mu_addon.sensing.decoder import Decoder
+from mu_addon.sensing.samples import Samples
 
 ROOT = Path(__file__).parents[2]
 COMPILER = next((found for name in ("c++", "g++", "clang++") if (found := shutil.which(name))), None)

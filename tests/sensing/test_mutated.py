@@ -18,9 +18,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mu_addon.sensing.decoder import Decoder, Samples
+from mu_addon.sensing.decoder import Decoder
 from mu_addon.sensing.framing import framed, info_frame, sample_frame
 from mu_addon.sensing.recording import REJECTS, read_recording
+from mu_addon.sensing.samples import Samples
 from mu_addon.sensing.session import run_session
 from mu_addon.usecases.sensor.stream import Display, console_summary, status_line
 

@@ -1,5 +1,9 @@
 """A unit's motion of known angles: each cross-section turned by its share, without any solver."""
 
+import json
+import os
+
+import attrs
 import numpy as np
 
 from mu_addon.design.parameters import load_preset
@@ -8,6 +12,8 @@ from mu_addon.fem.trajectory import Trajectory
 from mu_addon.fem.unit import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
+from mu_addon.usecases.simulate_and_place import history
+from mu_addon.usecases.simulate_and_place.job import Job, grasp, write_study
 from mu_addon.usecases.simulate_and_place.motion import write_model_a
 
 UNIT = load_preset("mu-0.75x")
@@ -26,13 +32,38 @@ def bent(mesh, angle_deg):
     return u
 
 
-def write_bent_motion(folder, angles=ANGLES, pressures=PRESSURES):
+def write_bent_motion(folder, angles=ANGLES, pressures=PRESSURES, refine=0.5, unit=UNIT):
     """Write `folder`/motion of these angles at these pressures, and return the mesh."""
-    mesh = mesh_unit(UNIT, MeshSettings(refine=0.5, order=1))
+    mesh = mesh_unit(unit, MeshSettings(refine=refine, order=1))
     states = tuple(
         State(pressure_MPa=p / 1e3, u=bent(mesh, a)) for p, a in zip(pressures, angles, strict=True)
     )
     index = np.arange(len(pressures))
     trajectory = Trajectory(index.astype(float), np.asarray(pressures), states, index)
-    write_model_a(folder, mesh, materials_of(UNIT, mesh), trajectory)
+    write_model_a(folder, mesh, materials_of(unit, mesh), trajectory)
     return mesh
+
+
+def write_bent_run(home, at_s, wall_mm=0.9, more=1.0, full=False, ranked=True):
+    """A finished run in a unit's home folder, as if ended at a time: bent `more` times as far.
+
+    full: of quadratic elements, as its inputs say; ranked: whether it ranked paths, too. Returns the run.
+    """
+    chambers = attrs.evolve(UNIT.chambers, wall_mm=wall_mm)
+    job = Job(attrs.evolve(UNIT, chambers=chambers), grasp())
+    if not full:
+        job = attrs.evolve(job, mesh=MeshSettings(order=1, refine=0.5), rules=("volume_fraction",))
+    if not ranked:
+        job = attrs.evolve(job, stages=("design", "simulate"))
+    folder, job = history.place_of(home, job)
+    write_study(job, folder)
+    write_bent_motion(folder, more * ANGLES)
+    angles = {f"{p:g}": more * a for p, a in zip(PRESSURES, ANGLES, strict=True)}
+    summary = {"status": "complete", "angle_deg": angles, "seconds": {"Model A": 480.0 if full else 20.0}}
+    if ranked:
+        found = {"alpha4": 0.05 * more, "alpha1": 0.1, "alpha10": 0.4}
+        summary |= {"chosen": {"volume_fraction": "alpha4"}, "J_hat_mm": {"volume_fraction": found}}
+    path = folder / "summary.json"
+    path.write_text(json.dumps(summary))
+    os.utime(path, (at_s, at_s))
+    return history.read_run(folder)

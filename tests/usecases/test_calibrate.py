@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from mu_addon.cli.main import main
-from mu_addon.sensing.decoder import Layout, Samples
 from mu_addon.sensing.recording import Recorder, read_recording
+from mu_addon.sensing.samples import Layout, Samples
 
 
 def volts_of(angle: np.ndarray) -> np.ndarray:

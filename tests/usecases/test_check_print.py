@@ -12,7 +12,7 @@ from mu_addon.design import shapes
 from mu_addon.design.parameters import Chambers, Unit
 from mu_addon.design.printing.printer import MEANING, load_printer, printer_text, read_printer
 from mu_addon.design.solid import build_solid, printable
-from mu_addon.design.surface import genus, stl_bytes
+from mu_addon.design.surface import bad_edges, genus, stl_bytes, stl_surface, volume
 from mu_addon.errors import InputError
 from mu_addon.usecases.check_print.job import Job
 from mu_addon.usecases.check_print.report import direction_name
@@ -173,3 +173,25 @@ def test_a_file_is_compared_with_its_unit(tmp_path):
     assert genus(*nominal_of(job)) == genus(solid.vertices, solid.triangles)
     assert nominal_of(Job(load_printer(), unit)) is None
     assert nominal_of(Job(load_printer(), stl=job.stl)) is None
+
+
+def test_a_file_is_repaired_where_there_is_one_way_to_and_the_report_says_how(tmp_path, capsys):
+    vertices, triangles = bottle(4.0)
+    broken = np.concatenate([triangles[:9, ::-1], triangles[9:], triangles[20:22]])
+    status, out = run(tmp_path, (vertices, broken), "--repair")
+    assert status == 0
+    found = json.loads((out / "check.json").read_text())
+    done = " ".join(change["what"] for change in found["repair"]["changes"])
+    assert "flipped" in done
+    assert "doubled" in done
+    assert found["repair"]["volume_after_mm3"] == pytest.approx(volume(vertices, triangles), rel=1e-6)
+    assert {f["severity"] for f in found["findings"] if "faces" in f["check"]} == {"pass"}
+    assert bad_edges(stl_surface((out / "part.stl").read_bytes())[1]) == 0
+    assert "doubled triangles were removed" in (out / "report.html").read_text()
+    assert "repaired: " in capsys.readouterr().out
+    # A hole may be closed in several ways: nothing is written, and what remains is said.
+    status, out = run(tmp_path / "out", (vertices, triangles[30:]), "--repair")
+    assert status == 6
+    assert "open edges" in json.loads((out / "summary.json").read_text())["reason"]["what"]
+    assert not (out / "part.stl").exists()
+    assert main(["check", "--preset", "mu-1.0x", "--repair", "--out", str(tmp_path / "unit")]) == 2

@@ -6,19 +6,24 @@ import re
 import shutil
 from pathlib import Path
 
+import attrs
 import numpy as np
 import pytest
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.evidence import unit_fem
-from mu_addon.evidence.extended import load_model
+from mu_addon.evidence.effect import LIBRARY
+from mu_addon.evidence.extended import ExtendedModel, Fitted, load_model
 from mu_addon.evidence.prediction.lattice import LatticeStress
+from mu_addon.evidence.prediction.unit import UnitPressure
+from mu_addon.evidence.simulator import Composite
 from mu_addon.measured import read_folder
 from mu_addon.run.context import RunContext, run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.diagnose import run as diagnosing
 from mu_addon.usecases.diagnose.job import Job
+from mu_addon.usecases.diagnose.remedies import TO_DO, what_to_do
 from mu_addon.usecases.diagnose.run import USE_CASE, console_summary
 from mu_addon.usecases.simulate_and_place.extended_unit import read_extended
 from tests.evidence import analytic
@@ -227,3 +232,74 @@ def test_what_cannot_be_judged_is_named_before_anything_is_written(tmp_path, spo
     assert what in caught.value.what
     assert where in f"{caught.value.where} {caught.value.remedy}"
     assert not (tmp_path / "out").exists()
+
+
+RELAXES = {"viscoelasticity.share": 0.25, "viscoelasticity.time_s": 4.0}
+
+
+@pytest.fixture
+def analytic_unit(monkeypatch):
+    """The response of the unit is that of the data's, in closed form."""
+    monkeypatch.setattr(unit_fem, "unit_responses", lambda *_, **__: [analytic.response()])
+
+
+def test_what_was_found_before_stays_and_a_new_cause_is_added(tmp_path, analytic_unit):
+    first, _ = run(bent_unit(tmp_path / "first", RELAXES), tmp_path / "one", load_preset("mu-1.0x"))
+    assert [c["effect"] for c in first.summary["causes"]] == ["viscoelasticity"]
+    before = load_model(tmp_path / "one/model.toml")
+    both = bent_unit(tmp_path / "both", RELAXES | {"pressure_offset.offset_kPa": 2.0}, seed=4)
+    second, _ = run(both, tmp_path / "two", load_preset("mu-1.0x"), known=before)
+    (cause,) = second.summary["causes"]
+    assert cause["effect"] == "pressure_offset"
+    assert cause["parameters"]["offset_kPa"]["value"] == pytest.approx(2.0, abs=0.2)
+    after = load_model(tmp_path / "two/model.toml")
+    assert list(after.effects) == ["viscoelasticity", "pressure_offset"]
+    assert after.effects["viscoelasticity"] == before.effects["viscoelasticity"]
+    assert any("known before" in words for words in second.summary["remarks"])
+    # Data of the first kind hold nothing new.
+    again = bent_unit(tmp_path / "again", RELAXES, seed=5)
+    third, _ = run(again, tmp_path / "three", load_preset("mu-1.0x"), known=before)
+    assert third.summary["verdict"] == "none"
+    assert list(load_model(tmp_path / "three/model.toml").effects) == ["viscoelasticity"]
+
+
+def test_a_diagnosis_goes_on_with_what_it_knew(tmp_path, analytic_unit):
+    from mu_addon.usecases.diagnose.job import read_job
+
+    folder = bent_unit(tmp_path / "first", RELAXES)
+    run(folder, tmp_path / "one", load_preset("mu-1.0x"))
+    known = load_model(tmp_path / "one/model.toml")
+    run(folder, tmp_path / "two", load_preset("mu-1.0x"), known=known)
+    assert read_job(tmp_path / "two").known == known
+
+
+def test_a_softening_is_stated_with_the_pressure_it_is_relative_to():
+    """A simulation through other pressures has the same softening, and so has a later diagnosis."""
+    size = {"softening": Fitted(0.3, 0.01, 0.28, 0.32), "energy_share": Fitted(0.3, 0.01, 0.28, 0.32)}
+    model = ExtendedModel("named", {"mullins_softening": size}, {})
+    name, time, pressure, how = analytic.protocols(0.4, 1)[0]
+    e = analytic.experiment(name, time, pressure, dict.fromkeys(analytic.CHANNELS, 0.0 * time), **how)
+    simulators = {"unit_pressure": UnitPressure([analytic.response()], [e])}
+    stated = diagnosing.with_reference(model, simulators)
+    reference = stated.effects["mullins_softening"]["reference_kPa"].value
+    assert reference == np.abs(analytic.response().pressures_kPa).max()
+    elsewhere = attrs.evolve(analytic.response(), pressures_kPa=2.0 * analytic.response().pressures_kPa)
+    stiffer = {"unit_pressure": UnitPressure([elsewhere], [e])}
+    found = Composite(stiffer, known=stated.of_effects)
+    assert "mullins_softening" not in [effect.name for effect in found.effects]
+    values = {"mullins_softening.reference_kPa": reference, **model.values}
+    np.testing.assert_allclose(found.predict(e, {}), stiffer["unit_pressure"].predict(e, values))
+    assert not np.allclose(found.predict(e, {}), stiffer["unit_pressure"].predict(e, model.values), rtol=1e-3)
+
+
+def test_there_is_something_to_do_about_every_cause():
+    assert set(TO_DO) == set(LIBRARY)
+    assert what_to_do(("leak", "leak")).count(".") == 1
+    assert all(not words.endswith(".") for words in TO_DO.values())
+
+
+def test_the_page_says_first_what_to_do(overcured):
+    _, out, summary, _ = overcured
+    assert "export --compensate" in summary["to_do"]
+    html = (out / "report.html").read_text(encoding="utf-8")
+    assert html.index("What to do.") < html.index("Next measurement")

@@ -10,12 +10,14 @@ import attrs
 import lib3mf
 import numpy as np
 import pytest
+import trimesh
 
 from mu_addon.design.anchors import window
 from mu_addon.design.beams import lattice_beams
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import Chambers, Unit
 from mu_addon.design.printing.printer import load_printer, printer_text, read_printer
+from mu_addon.design.solid import build_solid
 from mu_addon.design.threemf import Beams, Part, read_3mf, write_3mf
 from mu_addon.design.waveguide import waveguide
 from mu_addon.errors import InputError
@@ -27,6 +29,7 @@ from mu_addon.run.progress import Progress
 from mu_addon.usecases.export import run as exporting
 from mu_addon.usecases.export import specimens
 from mu_addon.usecases.export.job import Job, path_of
+from mu_addon.usecases.export.job import read_job as read_export
 from mu_addon.usecases.export.limit_sheet import measured_limits
 from mu_addon.usecases.export.print_offsets import compensation_offsets, gauge_sheet, read_sheet
 from mu_addon.usecases.export.run import USE_CASE as EXPORT
@@ -358,3 +361,42 @@ def test_the_template_is_a_folder_of_measured_data_but_for_its_rows(printed):
     found = read_folder(folder)
     assert len(found.experiments) == len(entries) == 3 * 3 + 3 + 3 + 2
     assert (printed[0] / "sheet.html").read_text().count("<tr") > 20
+
+
+def test_vents_for_a_build_direction_are_cut_and_their_plugs_written(tmp_path):
+    job = Job(SMALL, RESIN, formats=("stl", "step"), quality="interactive", vent_along=(0.0, 0.0, -1.0))
+    context, messages = run(EXPORT, job, tmp_path)
+    assert context.status == 0
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert "plug-1.stl" in [f["file"] for f in manifest["files"]]
+    vents = manifest["vents"]
+    assert vents["trapped_before_ml"] > 5.0
+    assert vents["trapped_after_ml"] < 0.1
+    assert len(vents["vents"]) == 1
+    part = trimesh.load(tmp_path / "unit.stl")
+    plug = trimesh.load(tmp_path / "plug-1.stl")
+    for read in (part, plug):
+        assert read.is_watertight
+        assert read.body_count == 1
+    # One tunnel more than without the vent, and the file is the one that the manifest measured.
+    plain = build_solid(SMALL)
+    assert (plain.gates.genus + 1, manifest["solid"]["gates"]["genus"]) == (
+        manifest["solid"]["gates"]["genus"],
+        1 - part.euler_number // 2,
+    )
+    assert any("step has no vents" in m.get("what", "") for m in messages)
+    assert read_export(tmp_path).vent_along == (0.0, 0.0, -1.0)
+
+
+def test_no_vent_where_nothing_is_trapped_and_a_reason_where_none_can_be(tmp_path):
+    job = Job(SMALL, RESIN, formats=("stl",), quality="interactive", vent_along=(0.0, 0.0, 1.0))
+    context, messages = run(EXPORT, job, tmp_path / "up")
+    assert context.status == 0
+    assert any("no vent is needed" in m.get("what", "") for m in messages)
+    assert not list((tmp_path / "up").glob("plug*"))
+    context, messages = run(EXPORT, attrs.evolve(job, vent_along=(1.0, 0.0, 0.0)), tmp_path / "side")
+    assert context.status == 6
+    assert "can have no vent" in messages[-1]["what"]
+    assert not (tmp_path / "side" / "unit.stl").exists()
+    with pytest.raises(InputError, match="not a direction"):
+        Job(SMALL, RESIN, vent_along=(0.0, 0.0, 0.0))

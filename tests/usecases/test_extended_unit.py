@@ -84,12 +84,34 @@ def test_walls_and_moduli_are_multiplied():
 
 def test_what_a_unit_has_no_parameter_for_is_said():
     known = model(
-        leak__conductance_ratio=0.1, viscoelasticity__share=0.2, viscoelasticity__time_s=5, angle_zero_deg=0.4
+        pressure_gain__gain=0.1,
+        viscoelasticity__creep_per_MPa=0.2,
+        viscoelasticity__onset_s=5,
+        viscoelasticity__growth_per_MPa=0.0,
+        viscoelasticity__begins_s=30.0,
+        angle_zero_deg=0.4,
     )
     found = extend(Unit(), known)
     assert found.unit == Unit()
-    assert [words.split(" (")[0] for words in found.left_out] == ["leak", "viscoelasticity", "angle zero deg"]
-    assert "time_s 5" in found.left_out[1]
+    names = [words.split(" (")[0] for words in found.left_out]
+    assert names == ["pressure gain", "viscoelasticity", "angle zero deg"]
+    # Creep of a chamber, not of a unit that bends.
+    assert "onset_s 5" in found.left_out[1]
+    assert "another kind of experiment" in found.left_out[1]
+
+
+def test_what_acts_in_time_is_for_the_simulation():
+    known = model(
+        leak__conductance_ratio=0.1,
+        viscoelasticity__share=0.2,
+        viscoelasticity__time_s=5,
+        line_lag__time_s=0.3,
+    )
+    found = extend(Unit(), known)
+    assert found.left_out == ()
+    assert found.effects.in_time
+    assert list(found.effects.values) == ["line_lag", "leak", "viscoelasticity"]
+    assert "all moduli relax by 20.0%, with a time constant of 5 s" in found.applied
 
 
 @pytest.mark.parametrize("verdict", ["ambiguous", "unexplained"])

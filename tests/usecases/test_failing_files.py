@@ -1,35 +1,20 @@
 """Every call of a run that can fail on a disk fails once: a clear error, no half file, then the same digits.
 
-`simulate`, `export`, `sweep` and `record` as they are, but for what touches no file: solid and mesh are built
-once for all runs, points of a sweep have a known answer, and a sensor's bytes come from memory.
+`simulate`, `place`, `export`, `sweep` and `record` as they are, but for what touches no file: solid, mesh and
+states are computed once for all runs, points of a sweep have a known answer, and a sensor's bytes come from
+memory.
 """
 
 from __future__ import annotations
 
 import functools
-import hashlib
-import json
-import sys
-import threading
-from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
-import attrs
-import numpy as np
 import pytest
 
-from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MuError
-from mu_addon.fem.protocol import Protocol
 from mu_addon.materials.library import load_material
-from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
-from mu_addon.run.context import RunContext, run_to_end
-from mu_addon.run.progress import Progress
-from mu_addon.sensing.framing import info_frame, sample_frame
-from mu_addon.sensing.recording import read_recording
-from mu_addon.sensing.sources import EndOfStream
+from mu_addon.run.context import RunContext
 from mu_addon.usecases.export import run as exporting
 from mu_addon.usecases.export.job import Job as ExportJob
 from mu_addon.usecases.parameter_study import run as sweeping
@@ -38,140 +23,24 @@ from mu_addon.usecases.parameter_study.point import Task, run_point, version
 from mu_addon.usecases.sensor.stream import stream
 from mu_addon.usecases.simulate_and_place import run as placing
 from mu_addon.usecases.simulate_and_place import study
-from mu_addon.usecases.simulate_and_place.job import Job
 
 from ..run.failing_files import failing
-
-Run = Callable[[Path, RunContext], Any]
-Messages = list[dict[str, Any]]
-# What a run says of itself, with its time, and what only its lock and those who look on read.
-_OWN = (
-    "summary.json",
-    "log.ndjson",
-    "run.lock",
-    "status.json",
-    "report.html",
-    "index.ndjson",
-    "rejects.ndjson",
+from .fault_injection import (
+    PARTIAL,
+    PLAN,
+    STUDY,
+    OneProcess,
+    Prepared,
+    answered,
+    computed_once,
+    faults,
+    inject_each,
+    lines_of,
+    placement,
+    ran,
+    rows_of,
+    unraisable,  # noqa: F401 - a fixture of every test here
 )
-
-
-def ran(run: Run, folder: Path) -> tuple[int, Messages]:
-    """A run to its end: its exit status and what it told."""
-    messages: Messages = []
-    with run_to_end(Progress([messages.append])) as context:
-        context.wants_report = False
-        run(folder, context)
-    return context.status, messages
-
-
-def results(folder: Path) -> dict[str, bytes]:
-    """What every file of a folder holds, by its place, but those that tell of the run itself."""
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.name not in _OWN and path.suffix != ".npz"
-    } | {
-        # The same arrays: an archive's bytes are those of one version of its library.
-        f"cache/{path.name}": path.read_bytes()
-        for path in sorted(folder.rglob("*.npz"))
-    }
-
-
-def lines_of(path: Path) -> list[Any]:
-    """The messages of a file of lines; raises ValueError for one that is not whole."""
-    text = path.read_text(encoding="utf-8")
-    if text and not text.endswith("\n"):
-        raise ValueError(f"{path.name} ends within a line: {text[-60:]!r}")
-    return [json.loads(line) for line in text.splitlines()]
-
-
-def _begun(data: bytes, whole: bytes) -> bool:
-    """Whether a table begins as the whole one does and has whole lines, no more of them."""
-    lines, all_lines = data.splitlines(keepends=True), whole.splitlines(keepends=True)
-    begins = lines[0].split(b",")[0] == all_lines[0].split(b",")[0]
-    return begins and lines[-1].endswith(b"\n") and len(lines) <= len(all_lines)
-
-
-def faults(
-    folder: Path,
-    status: int,
-    messages: Messages,
-    reference: dict[str, bytes] | None,
-    partial: Sequence[str] = (),
-) -> Iterator[str]:
-    """What is wrong with the end of a run one of whose calls failed, and with what it leaves.
-
-    reference: what the run finds undisturbed; None where that is never the same. partial: tables that hold
-    what has been found so far.
-    """
-    last = messages[-1] if messages else {}
-    if status not in (0, 5):
-        yield f"exit status {status}: {last}"
-    if status and not (last.get("type") == "error" and last["what"] and last["where"] and last["what_to_do"]):
-        yield f"no clear error: {last}"
-    found = results(folder)
-    yield from (f"left behind: {name}" for name in found if ".part" in name)
-    if reference is not None:
-        for name, data in found.items():
-            if name not in reference:
-                yield f"left behind: {name}"
-            elif data != reference[name] and not (name in partial and _begun(data, reference[name])):
-                yield f"not whole: {name}"
-        if status == 0 and found != reference:
-            yield f"success without {sorted(reference.keys() - found.keys())}"
-    try:
-        if (folder / "summary.json").exists():
-            state = json.loads((folder / "summary.json").read_text())["status"]
-            if state != ("partial" if status else "complete"):
-                yield f"exit status {status} and a summary that says {state}"
-        elif not status:
-            yield "success without a summary"
-        for path in (folder / "log.ndjson", folder / "rejects.ndjson"):
-            if path.exists() and any(message.get("type") == "traceback" for message in lines_of(path)):
-                yield f"a traceback in {path.name}"
-    except (ValueError, KeyError) as error:
-        yield f"damaged: {error}"
-
-
-def fail_each_call(run: Run, work: Path, partial: Sequence[str] = ()) -> list[str]:
-    """Fail one call after the other of a run until none is left; returns what was wrong afterwards.
-
-    After every second one all later calls fail, too. partial: see `faults`. Once all works again, the same
-    run must come to the same results.
-    """
-    status, messages = ran(run, work / "reference")
-    assert status == 0, messages[-1]
-    reference = results(work / "reference")
-    wrong: list[str] = []
-    seen: set[str] = set()
-    for at in range(1, 2000):
-        folder = work / f"at-{at}"
-        with failing(folder, at, for_good=at % 2 == 0) as files:
-            status, messages = ran(run, folder)
-        if at > len(files.calls):
-            assert at > 20, "too few calls: the layer does not see them"
-            return wrong
-        where = f"{at}, {files.calls[at - 1]}"
-        wrong += [f"{where}: {fault}" for fault in faults(folder, status, messages, reference, partial)]
-        # Most faults leave what another one left: only the first of each is run once more.
-        left = hashlib.sha256(repr(sorted(results(folder).items())).encode()).hexdigest()
-        if left not in seen:
-            seen.add(left)
-            status, messages = ran(run, folder)
-            if status or results(folder) != reference:
-                wrong.append(f"{where}, again: exit status {status}, {messages[-1]}")
-    raise AssertionError("the run never came to its end")
-
-
-@pytest.fixture(autouse=True)
-def unraisable(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
-    """What fails where no one can be told, as in `__del__` and in threads; none of it may happen."""
-    caught: list[str] = []
-    monkeypatch.setattr(sys, "unraisablehook", lambda found: caught.append(repr(found.exc_value)))
-    monkeypatch.setattr(threading, "excepthook", lambda found: caught.append(repr(found.exc_value)))
-    yield caught
-    assert caught == []
 
 
 @pytest.fixture(params=[False, True], ids=["once", "for good"])
@@ -180,27 +49,20 @@ def for_good(request: pytest.FixtureRequest) -> bool:
     return bool(request.param)
 
 
-UNIT = load_preset("mu-1.0x")
-STUDY = Job(
-    unit=attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=3)),
-    protocol=Protocol(np.arange(3.0), np.array([0.0, -2.0, 2.0])),
-    mesh=MeshSettings(refine=0.3, order=1),
-    times=3,
-    mesh_check=False,
-    workers=1,
-    stages=("design", "simulate"),
-)
-
-
 def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "build_solid", functools.cache(study.build_solid))
-    mesh = functools.cache(lambda: mesh_unit(STUDY.unit, STUDY.mesh_settings(STUDY.mesh)))
-    monkeypatch.setattr(study, "mesh_of", lambda *_: mesh())
+    monkeypatch.setattr(study, "mesh_of", computed_once(study.mesh_of))
 
     def run(folder: Path, context: RunContext) -> None:
         placing.USE_CASE.start(STUDY, folder, context)
 
-    assert fail_each_call(run, tmp_path, partial=["angle.csv", "stretch.csv", "model_a.pvd"]) == []
+    assert inject_each(run, tmp_path, failing, 5, PARTIAL) == []
+
+
+@pytest.mark.slow
+def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each ninth call, to be quick; `python benchmarks/faults.py calls` has every one fail."""
+    assert inject_each(placement(monkeypatch), tmp_path, failing, 5, PARTIAL, step=9) == []
 
 
 def test_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -212,39 +74,7 @@ def test_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def run(folder: Path, context: RunContext) -> None:
         exporting.USE_CASE.start(job, folder, context)
 
-    assert fail_each_call(run, tmp_path) == []
-
-
-PLAN = """
-format = 1
-preset = "mu-1.0x"
-stages = "simulate"
-method = "grid"
-[vary]
-"chambers.wall_mm" = { values = [0.9, 1.0] }
-"""
-
-
-def answered(task: Task) -> dict[str, Any]:
-    """A point whose answer is known."""
-    summary = {
-        "gates": {"unit.stl": {"volume_mm3": 1000.0}},
-        "angle_deg": {"20": len(task.files["unit.toml"])},
-    }
-    return {"status": "done", "seconds": 0.1, "memory_MB": 1, "summary": summary}
-
-
-class OneProcess:
-    """Stands for the cluster, which writes nothing into the folder and takes a second to start."""
-
-    def __init__(self, scheduler: str | None, workers: int) -> None:
-        pass
-
-    def results(self, tasks: list[Task], work: Any, warn: Any) -> Iterator[tuple[int, dict[str, Any]]]:
-        yield from enumerate(map(work, tasks))
-
-    def close(self) -> None:
-        pass
+    assert inject_each(run, tmp_path, failing, 5) == []
 
 
 def test_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -254,7 +84,7 @@ def test_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def run(folder: Path, context: RunContext) -> None:
         sweeping.USE_CASE.start(job, folder, context)
 
-    assert fail_each_call(run, tmp_path, partial=["points.csv"]) == []
+    assert inject_each(run, tmp_path, failing, 5, partial=["points.csv"]) == []
 
 
 FAKE = str(Path(__file__).resolve().parents[1] / "run" / "fake_worker.py")
@@ -280,38 +110,6 @@ def test_a_point_of_a_sweep(tmp_path: Path, for_good: bool, monkeypatch: pytest.
             return
 
 
-class Prepared:
-    """A line on which all has come: two layouts of channels, and bytes that are no frame."""
-
-    def __init__(self) -> None:
-        self.pieces = [
-            info_frame({"channels": ["light"], "unit": "V", "gain": 1e-3}),
-            b"".join(sample_frame(k, 10_000 * k, (100 + k,)) for k in range(30)),
-            b"\x00garbage\x00more of it\x00",
-            info_frame({"channels": ["light", "dark"], "unit": "V", "gain": 1e-3}),
-            b"".join(sample_frame(k, 10_000 * k, (100 + k, 3)) for k in range(30, 60)),
-        ]
-
-    def open(self) -> str:
-        return "prepared"
-
-    def read(self) -> bytes:
-        if not self.pieces:
-            raise EndOfStream
-        return self.pieces.pop(0)
-
-    def close(self) -> None:
-        pass
-
-
-def rows_of(folder: Path) -> list[list[list[float]]]:
-    """The rows of every file of a recording, without host times."""
-    return [
-        np.column_stack([values for name, values in part.columns.items() if name != "time_s"]).tolist()
-        for part in read_recording(folder)
-    ]
-
-
 def test_record(tmp_path: Path, for_good: bool) -> None:
     def run(folder: Path, context: RunContext) -> None:
         stream(Prepared(), folder, seconds=None, about={}, context=context)
@@ -327,7 +125,7 @@ def test_record(tmp_path: Path, for_good: bool) -> None:
             assert at > 50
             return
         where = f"{at}, {files.calls[at - 1]}"
-        wrong = list(faults(folder, status, messages, None))
+        wrong = list(faults(folder, (status, messages), None, 5))
         if (folder / "index.ndjson").exists():
             lines_of(folder / "index.ndjson")
             found = rows_of(folder)

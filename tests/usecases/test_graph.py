@@ -231,3 +231,48 @@ def test_a_run_leaves_states_a_table_and_a_report_and_one_failure_does_not_keep_
     report = (tmp_path / "report.html").read_text()
     assert "too thick" in report
     assert "FAILED" in report
+
+
+def test_obstacles_are_what_a_simulation_may_touch(tmp_path):
+    """Two boxes beside a unit are those of the study; one that stands in the unit is told of."""
+    unit = load_preset("mu-0.75x")
+    vertices = np.array([(x, y, z) for x in (-9.0, 9.0) for y in (0.0, 12.0) for z in (40.0, 50.0)])
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+
+    def box(name, y):
+        lines = [f"v {a} {b + y} {c}" for a, b, c in vertices]
+        lines += ["f " + " ".join(str(k + 1) for k in face) for face in faces]
+        (tmp_path / name).write_text("\n".join(lines) + "\n")
+        return Node("obstacle", settings={"file": str(tmp_path / name), "friction": 0.3})
+
+    aside = unit.dimensions.height
+    nodes = {
+        "Unit": Node("unit", settings={"preset": "mu-0.75x"}),
+        "Near": box("near.obj", aside),
+        "Far": box("far.obj", -2.0 * aside),
+        "Motion": Node(
+            "simulate",
+            links={
+                "unit": (Source("Unit", "unit"),),
+                "obstacles": (Source("Near", "obstacle"), Source("Far", "obstacle")),
+            },
+        ),
+    }
+    tree = NodeTree("touch", nodes)
+    assert faults(tree, definitions()) == ()
+
+    class Orders:
+        def find(self, order):
+            found.append(order.job)
+            raise InputError("this far", "", "")
+
+    found = []
+    Evaluation(tree, definitions(), Orders()).run()
+    (job,) = found
+    assert [(o.name, o.friction) for o in job.obstacles] == [("near.obj", 0.3), ("far.obj", 0.3)]
+    inside = attrs.evolve(tree, nodes={**nodes, "Far": box("inside.obj", 0.0)})
+    failed = Evaluation(inside, definitions(), Orders()).run()["Motion"]
+    assert "inside" in str(failed.error)
+    assert len(found) == 1
+    empty = attrs.evolve(tree, nodes={**nodes, "Far": Node("obstacle")})
+    assert "no body is named" in Evaluation(empty, definitions()).run()["Far"].error.what

@@ -1,6 +1,8 @@
 """study.toml: what it says comes back, older formats are understood, and hostile ones change nothing."""
 
 import shutil
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -185,3 +187,17 @@ def test_the_solver_is_no_part_of_a_studys_inputs():
     assert attrs.evolve(motion, solver=SolverChoice("iterative")).text() == motion.text()
     with pytest.raises(InputError, match="quadratic elements"):
         attrs.evolve(motion, mesh=MeshSettings(order=1), solver=SolverChoice("iterative"))
+
+
+def test_the_inputs_of_a_study_are_made_without_the_solver():
+    """Blender's window waits for them: neither Warp nor SciPy is loaded."""
+    code = (
+        "import sys, numpy\n"
+        "from mu_addon.design.parameters import load_preset\n"
+        "from mu_addon.fem.protocol import Protocol\n"
+        "from mu_addon.usecases.simulate_and_place.job import Job\n"
+        "Job(load_preset('mu-1.0x'), Protocol(numpy.array([0.0, 1.0]), numpy.array([0.0, 20.0]))).texts()\n"
+        "print([name for name in ('warp', 'scipy', 'gmsh', 'matplotlib') if name in sys.modules])\n"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert found.stdout == "[]\n", found.stderr

@@ -199,7 +199,7 @@ def test_jobs_that_know_no_such_wall_refuse_it(mesh):
     from mu_addon.fem.model import Model
     from mu_addon.fem.trajectory import simulate
     from mu_addon.usecases.grip.run import Job as GripJob
-    from mu_addon.usecases.simulate_and_place.static_effects import StaticEffects
+    from mu_addon.usecases.simulate_and_place.named_effects import NamedEffects
 
     unit = unit_with_wall(law="prony", prony_g1=0.3)
     with pytest.raises(InputError, match="neo-Hookean wall"):
@@ -212,7 +212,7 @@ def test_jobs_that_know_no_such_wall_refuse_it(mesh):
         simulate(Equilibrium(Model(mesh), materials_of(unit, mesh)), np.arange(2.0), np.array([0.0, 5.0]))
     with pytest.raises(InputError, match="remembers nothing"):
         attrs.evolve(job_of(unit, [0, 1], [0, 5]), stages=("design", "simulate", "place"), paths="graph")
-    stiffening = StaticEffects({"strain_stiffening": {"c2_over_c1": 0.2}})
+    stiffening = NamedEffects({"strain_stiffening": {"c2_over_c1": 0.2}})
     with pytest.raises(InputError, match="has a law of its own"):
         job_of(unit, [0, 1], [0, 5], effects=stiffening)
 

@@ -1,6 +1,8 @@
-"""The node groups as an asset library of the user's, written by the Blender that will read it.
+"""Presets and node groups as an asset library of the user's, written by the Blender that will read it.
 
 One that came in the archive would be of one Blender's format and nodes; this one fits the Blender at hand.
+A preset is an object: dropped into a scene it is a unit of its own. Resins and printers are numbers that
+belong to no data of Blender's, so that no asset can hold them: they are chosen in the panels.
 """
 
 from __future__ import annotations
@@ -10,35 +12,72 @@ from typing import Any
 
 import bpy
 
-from ...errors import OutputError
+from ...errors import MuError, OutputError
 from ...files import write_text
 from ..preview import nodes
 from ..shared.compat import user_folder
+from ..unit import object as unit_object
+from ..unit import presets
 
 NAME = "Monolithic Units"
-FILE = "mu-nodes.blend"
+FILE, UNITS_FILE = "mu-nodes.blend", "mu-units.blend"
+UNITS_CATALOGUE = "2d1c1c0e-8d0f-4b5e-9a55-6f6c2f0f4a10"
 CATALOGUES = "blender_assets.cats.txt"
 
 
 def write() -> Path:
-    """Write every node group and the catalogue into the user's folder; returns the folder. OutputError."""
+    """Write presets, node groups and catalogues into the user's folder; returns it. Raises OutputError."""
     folder = user_folder("assets")
     before = set(bpy.data.node_groups)
     groups = {nodes.group(name) for name in nodes.GROUPS}
-    beside, target = folder / f".{FILE}", folder / FILE
     try:
-        bpy.data.libraries.write(str(beside), groups, fake_user=True, compress=True)
-        beside.replace(target)
-    except (OSError, RuntimeError) as error:
-        raise OutputError(
-            f"cannot write the node groups: {error}", str(target), "check the folder"
-        ) from error
+        _write(folder / FILE, groups)
+        write_units(folder / UNITS_FILE)
     finally:
         # What this file does not use is not left in it.
-        for tree in groups - before:
+        for tree in set(bpy.data.node_groups) - before:
             bpy.data.node_groups.remove(tree)
-    write_text(folder / CATALOGUES, f"VERSION 1\n\n{nodes.CATALOGUE}:{NAME}:{NAME.replace(' ', '-')}\n")
+    named = {nodes.CATALOGUE: NAME, UNITS_CATALOGUE: f"{NAME}/Presets"}
+    lines = [f"{uuid}:{path}:{path.replace(' ', '-').replace('/', '-')}" for uuid, path in named.items()]
+    write_text(folder / CATALOGUES, "\n".join(["VERSION 1", "", *lines, ""]))
     return folder
+
+
+def write_units(target: Path) -> None:
+    """Write every preset as an object that is an asset. Raises OutputError."""
+    context = bpy.context
+    active, selected = context.view_layer.objects.active, list(context.selected_objects)
+    roots = []
+    try:
+        for name in presets.names():
+            try:
+                unit = presets.load(name)
+            except MuError:
+                continue  # a file of the user's that is no preset any more; loading it says why
+            root = unit_object.create(context, unit)
+            roots.append(root)
+            root.name = name.removeprefix(presets.USER)
+            root.asset_mark()
+            root.asset_data.catalog_id = UNITS_CATALOGUE
+            root.asset_data.description = (
+                f"Monolithic Unit, {unit.chambers.count} chambers, scale {unit.scale:g}"
+            )
+        _write(target, set(roots))
+    finally:
+        for root in roots:
+            unit_object.delete(root)
+        for obj in selected:
+            obj.select_set(True)
+        context.view_layer.objects.active = active
+
+
+def _write(target: Path, data: set[Any]) -> None:
+    beside = target.with_name(f".{target.name}")
+    try:
+        bpy.data.libraries.write(str(beside), data, fake_user=True, compress=True)
+        beside.replace(target)
+    except (OSError, RuntimeError) as error:
+        raise OutputError(f"cannot write the assets: {error}", str(target), "check the folder") from error
 
 
 def listed() -> Any | None:
@@ -49,7 +88,7 @@ def listed() -> Any | None:
 
 
 def add() -> Path:
-    """Write the groups and list their folder among the user's asset libraries. Raises OutputError."""
+    """Write the assets and list their folder among the user's asset libraries. Raises OutputError."""
     folder = write()
     if listed() is None:
         bpy.context.preferences.filepaths.asset_libraries.new(name=NAME, directory=str(folder))
@@ -61,5 +100,5 @@ def remove() -> None:
     entry = listed()
     if entry is not None:
         bpy.context.preferences.filepaths.asset_libraries.remove(entry)
-    for name in (FILE, CATALOGUES):
+    for name in (FILE, UNITS_FILE, CATALOGUES):
         (user_folder("assets") / name).unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Node groups in the user's asset browser, node groups on the user's own curves, and the sample scene."""
+"""Presets and node groups in the user's asset browser, node groups on curves, and the sample scene."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -11,7 +11,7 @@ from . import library, sample
 
 
 class MU_OT_assets(bpy.types.Operator):
-    """Put the node groups into the asset browser of every file: an asset library in your own folder"""
+    """Put presets and node groups into the asset browser of every file: a library in your own folder"""
 
     bl_idname = "mu.assets"
     bl_label = "Add to Asset Browser"
@@ -20,12 +20,12 @@ class MU_OT_assets(bpy.types.Operator):
     @reports_errors
     def execute(self, context):
         folder = library.add()
-        self.report({"INFO"}, f"{len(nodes.GROUPS)} node groups are in the library {library.NAME}: {folder}")
+        self.report({"INFO"}, f"Presets and node groups are in the library {library.NAME}: {folder}")
         return {"FINISHED"}
 
 
 class MU_OT_assets_remove(bpy.types.Operator):
-    """Take the node groups out of the asset browser again; files that use them keep theirs"""
+    """Take presets and node groups out of the asset browser again; files that use them keep theirs"""
 
     bl_idname = "mu.assets_remove"
     bl_label = "Remove from Asset Browser"

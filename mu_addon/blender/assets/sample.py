@@ -9,7 +9,7 @@ import bpy
 from mathutils import Vector
 
 from ..preview import nodes
-from ..shared import scene_units
+from ..shared import scene_units, viewports
 from ..shared.compat import set_modifier_input
 from ..unit import object as unit_object
 
@@ -42,8 +42,10 @@ def build(context: Any) -> list[Any]:
     context.view_layer.objects.active = bodied
     context.view_layer.update()
     bpy.ops.mu.body()
-    _curve(context, cursor + _beside(context, 3))
+    # Beside the units, which land beside what stands at the cursor.
+    curve = _curve(context, whole.location + _beside(context, 3))
     context.view_layer.objects.active = whole
+    viewports.frame([*roots, curve])
     return roots
 
 

@@ -5,6 +5,7 @@
 import bpy
 
 from ...design.body import require_sound
+from ...design.printing.repair import repaired
 from ...errors import InputError
 from ..shared.operators import UnitOperator, reports_errors
 from ..shared.texts import sentence
@@ -56,6 +57,30 @@ class MU_OT_body_check(UnitOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class MU_OT_body_repair(UnitOperator, bpy.types.Operator):
+    """Repair a copy of the selected mesh where there is only one way: flipped or doubled faces, tiny gaps"""
+
+    bl_idname = "mu.body_repair"
+    bl_label = "Repair Copy"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        obj = selected_mesh(context)
+        mended = repaired(*bodies.arrays_of(obj, root))
+        if not mended.is_whole:
+            remains = "; ".join(mended.remains)
+            raise InputError(f"only by hand: {remains}", obj.name, "Check Body marks the places")
+        if not mended.changes:
+            self.report({"INFO"}, f"{obj.name} needs no repair")
+            return {"CANCELLED"}
+        bodies.put_repaired(obj, root, mended)
+        for line in mended.lines():
+            self.report({"WARNING"}, sentence(line))
+        return {"FINISHED"}
+
+
 class MU_OT_body(UnitOperator, bpy.types.Operator):
     """Make a copy of the selected mesh the unit's envelope, which the lattice then fills"""
 
@@ -91,7 +116,7 @@ class MU_OT_body_remove(UnitOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (MU_OT_body_check, MU_OT_body, MU_OT_body_remove)
+CLASSES = (MU_OT_body_check, MU_OT_body_repair, MU_OT_body, MU_OT_body_remove)
 
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

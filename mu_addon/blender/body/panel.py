@@ -12,6 +12,7 @@ def draw(layout, root) -> None:
     if body:
         row = body.row(align=True)
         row.operator("mu.body_check", icon="VIEWZOOM")
-        row.operator("mu.body", icon="MESH_MONKEY")
+        row.operator("mu.body_repair", icon="TOOL_SETTINGS")
+        body.operator("mu.body", icon="MESH_MONKEY")
         if root.mu_unit.envelope is not None or drawing.beside(root, drawing.FLAWS) is not None:
             body.operator("mu.body_remove", icon="X")

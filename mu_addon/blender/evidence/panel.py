@@ -6,6 +6,7 @@ from pathlib import Path
 
 import bpy
 
+from ..import_data.drawing import draw_import
 from ..jobs.panel import job_state, start_button
 from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.texts import readable
@@ -27,6 +28,7 @@ class MU_PT_evidence(UnitPanel, bpy.types.Panel):
 
     def show(self, layout, context, root):
         layout.prop(root.mu_evidence, "folder")
+        draw_import(layout, root)
         found = evidence.measured_data(root)
         if found is None:
             wrapped(layout, "Choose a folder with experiments.toml and its CSV files", "INFO")
@@ -91,6 +93,8 @@ def _verdict(layout, root, judged):
     wrapped(
         column, f"{title}: {headline}" if judged.name in ("named", "ambiguous") else title, ICONS[judged.name]
     )
+    if judged.summary.get("to_do"):
+        wrapped(column, str(judged.summary["to_do"]), "TOOL_SETTINGS")
     # Mechanism and parameters with their intervals, or why nothing is named.
     wrapped(column, str(judged.summary.get("sentence", "")))
     for cause in judged.verdict.get("causes") or ():

@@ -22,7 +22,7 @@ from ...run.folder import write_run
 from ..jobs.start_child import JobKind
 from ..shared.file_cache import FileCache
 from ..shared.registration import property_group_factory
-from ..shared.texts import error_text
+from ..shared.wording import error_text
 from ..simulate import effects
 from ..simulate import study_folder as studies
 from ..unit.properties import BESIDE_BLEND_FILE, shape_hash, to_unit

@@ -16,7 +16,7 @@ from ...design.steps import StepInputs
 from ...errors import MuError
 from ..preview import materials, skeletons
 from ..shared import displays, updates
-from ..shared.texts import error_text
+from ..shared.wording import error_text
 from ..unit import drawing
 from ..unit import object as unit_object
 from ..unit.fields import exact
@@ -40,7 +40,7 @@ def roots() -> list[Any]:
 
 
 def active(context: Any) -> Any | None:
-    """The gripper to work on: that of the active object, or the only one there is if no unit is active."""
+    """The gripper to work on: that of the active object, or the only one there is if no unit is worked on."""
     obj = context.object
     while obj is not None:
         if obj.mu_gripper.uuid:
@@ -49,7 +49,7 @@ def active(context: Any) -> Any | None:
             return None
         obj = obj.parent
     found = [o for o in context.scene.objects if o.mu_gripper.uuid]
-    return found[0] if len(found) == 1 else None
+    return found[0] if len(found) == 1 and unit_object.active_root(context) is None else None
 
 
 def part(root: Any, name: str) -> Any | None:

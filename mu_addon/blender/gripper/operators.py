@@ -60,6 +60,7 @@ class MU_OT_gripper_add(bpy.types.Operator):
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         landing.land(context, gripper_object.create(context, found))
+        viewports.frame_selected(context)
         return {"FINISHED"}
 
 

@@ -61,9 +61,8 @@ class MU_PT_grasp(GripperPanel, bpy.types.Panel):
         if props.detail != "part":
             column = layout.column(align=True)
             column.prop(props, "cube_mm" if in_millimetres(context.scene) else "cube_mm_true")
-            cube = gripper_object.part(root, "cube")
-            if cube is not None:
-                column.prop(cube, "location", index=2, text="Its Height")
+            if gripper_object.part(root, "cube") is not None:
+                column.prop(props, "cube_height")
             column.prop(props, "density_g_per_ml")
             column.prop(props, "friction")
             layout.prop(props, "printed_struts")

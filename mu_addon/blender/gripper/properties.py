@@ -9,6 +9,7 @@ from ...design import parameters
 from ...design.gripper import SECTIONS, Gripper
 from ...design.quantity import describe
 from ...design.rigid_body import FRICTION
+from ..shared import displays, scene_units
 from ..shared.registration import property_group_factory
 from ..shared.updates import Signal
 from ..unit.fields import exact, generated_fields, true_length
@@ -32,6 +33,22 @@ def _generated(section: type):
 
 
 GROUPS = {section.section: _generated(section) for section in SECTIONS}
+
+
+def _cube_of(root):
+    return next((child for child in root.children if child.get(displays.GRIPPER) == "cube"), None)
+
+
+def _cube_height(props):
+    # The cube's own place is in mm; a field of lengths is in Blender units.
+    cube = _cube_of(props.id_data)
+    return 0.0 if cube is None else cube.location.z * scene_units.mm(bpy.context.scene)
+
+
+def _put_cube(props, value):
+    cube = _cube_of(props.id_data)
+    if cube is not None:
+        cube.location.z = value / scene_units.mm(bpy.context.scene)
 
 
 class MU_PG_gripper(bpy.types.PropertyGroup):
@@ -67,6 +84,14 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
             update=_changed,
         ),
         "cube_mm_true": true_length("cube_mm", "Cube", "Side of the cube that is grasped", scales=False),
+        "cube_height": FloatProperty(
+            name="Its Height",
+            description="Of the middle of the cube above the plate",
+            subtype="DISTANCE",
+            get=_cube_height,
+            set=_put_cube,
+            options={"SKIP_SAVE"},
+        ),
         "density_g_per_ml": FloatProperty(
             name="Density (g/ml)",
             description="Of the cube, which decides its weight. The default is solid PLA, assumed",

@@ -66,7 +66,7 @@ def _trouble(solves):
             else f"the solver cannot load: {error}",
             "where": f"Python {sys.version.split()[0]}, {sys.executable}",
             "what_to_do": "install the extension built for this Blender and system (blender --command "
-            "extension install-file -r user_default -e mu_addon-VERSION-SYSTEM.zip)"
+            "extension install-file -r user_default -e mu_addon-VERSION-SYSTEM-PYTHON.zip)"
             + ("; design and export work without the solver" if solves else ""),
             "status": 1,
         }

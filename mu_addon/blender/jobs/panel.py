@@ -5,6 +5,7 @@ from __future__ import annotations
 from ...run.child import CANCELLED, DONE, FAILED, RUNNING, WAITING
 from ...run.progress import spell
 from ..shared.panels import alert, large_button, wrapped
+from ..shared.wording import in_panel
 
 
 def start_button(layout, child, operator: str, icon: str) -> None:
@@ -30,15 +31,15 @@ def whole(child) -> tuple[float, str]:
     """How much of a job's whole is done, 0..1, and its stage, number of stages and time left in words."""
     if child.state == WAITING:
         return 0.0, "waiting for the job before it"
-    outlook = child.outlook
+    estimate = child.estimate
     if child.stopping:
-        return outlook.fraction, "stopping ..."
+        return estimate.fraction, "stopping ..."
     stage = str(child.progress.get("stage", "starting"))
-    if outlook.count:
-        stage += f" ({outlook.number} of {outlook.count})"
-    left = outlook.seconds_left
+    if estimate.count:
+        stage += f" ({estimate.number} of {estimate.count})"
+    left = estimate.seconds_left
     # Without a plan the bar is the stage's own, and so is the time.
-    fraction = outlook.fraction if outlook.count else child.progress.get("fraction") or 0.0
+    fraction = estimate.fraction if estimate.count else child.progress.get("fraction") or 0.0
     return fraction, stage if left is None else f"{stage}, {spell(left)} left"
 
 
@@ -49,20 +50,20 @@ def _running(layout, child, prefix: str) -> None:
     row.operator(f"mu.{prefix}cancel", icon="CANCEL")
     fraction, text = whole(child)
     layout.progress(factor=fraction, text=text)
-    details = [str(child.progress.get("detail", "")), child.outlook.why and f"Longer: {child.outlook.why}"]
+    details = [str(child.progress.get("detail", "")), child.estimate.why and f"Longer: {child.estimate.why}"]
     layout.label(text=next((text for text in reversed(details) if text), ""))
     for warning in child.warnings[-2:]:
-        wrapped(layout, warning, "ERROR")
+        wrapped(layout, in_panel(warning), "ERROR")
 
 
 def _ended(layout, child, where: str, prefix: str) -> None:
     """How a child ended, and where its results are shown."""
     if child.state == FAILED:
         error = child.error or {}
-        box = alert(layout, str(error.get("what", "")))
+        box = alert(layout, in_panel(str(error.get("what", ""))))
         for key in ("where", "what_to_do"):
             if error.get(key):
-                wrapped(box, str(error[key]))
+                wrapped(box, in_panel(str(error[key])))
     else:
         box = layout.box()
         if child.state == DONE:

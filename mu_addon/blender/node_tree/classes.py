@@ -52,7 +52,7 @@ def set_states(tree, found) -> None:
 
 
 def state_of(node):
-    """The state of a node as of the latest look, or None."""
+    """The state of a node as of the latest refresh, or None."""
     return _STATES.get(node.id_data.session_uid, {}).get(node.name)
 
 

@@ -93,7 +93,7 @@ class MU_OT_tree_new(bpy.types.Operator):
     @reports_errors
     def execute(self, context):
         tree = conversion.from_tree(template(self.template))
-        state.look(tree)
+        state.refresh(tree)
         show(context, tree)
         return {"FINISHED"}
 
@@ -127,7 +127,7 @@ class MU_OT_tree_load(bpy.types.Operator):
     def execute(self, context):
         path = Path(bpy.path.abspath(self.filepath))
         tree = conversion.from_tree(with_absolute_paths(read_tree(path), definitions(), path.parent))
-        state.look(tree)
+        state.refresh(tree)
         show(context, tree)
         return {"FINISHED"}
 
@@ -182,7 +182,7 @@ class MU_OT_tree_of_unit(bpy.types.Operator):
     def execute(self, context):
         root = unit_object.active_root(context)
         tree = state.tree_of_unit(root, self.steps)
-        state.look(tree)
+        state.refresh(tree)
         show(context, tree)
         return {"FINISHED"}
 

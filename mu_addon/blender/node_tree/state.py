@@ -1,7 +1,7 @@
-"""What trees of the file come to: a look after every change, and the run of a tree in a process of its own.
+"""What trees of the file come to: a refresh after every change, and the run of a tree in its own process.
 
-A look makes what takes milliseconds, parameters and the steps' geometry, and knows of the rest what runs have
-left in the tree's folder.
+A refresh makes what takes milliseconds, parameters and the steps' geometry, and takes the rest from the
+records that runs have left in the tree's folder.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import attrs
 import bpy
 from bpy.app.handlers import persistent
 
@@ -33,6 +34,7 @@ from ..unit import object as unit_object
 from ..unit.properties import PARAMETERS_CHANGED, from_unit, to_unit
 from . import classes, conversion
 from .classes import CHANGED, TREE
+from .plan import plan_of
 
 WAIT_S = 0.05
 SCENE_KEY = "mu_node_trees"
@@ -41,9 +43,10 @@ SCENE_KEY = "mu_node_trees"
 _kept = Kept()
 _records: FileCache[dict[str, Record]] = FileCache()
 _pending: set[int] = set()
-_looked: dict[int, float] = {}
+_refreshed: dict[int, float] = {}
 _seconds: dict[int, float] = {}
 _written: dict[int, int] = {}
+_states: dict[int, dict[str, State]] = {}
 
 
 def trees() -> Iterator[Any]:
@@ -77,7 +80,7 @@ RUN = JobKind("graph", uuid_of, folder_of)
 """The evaluation of a tree."""
 
 
-def look(tree: Any) -> dict[str, State]:
+def refresh(tree: Any) -> dict[str, State]:
     """Evaluate a tree as far as that takes milliseconds; mark its links, show states, update followers."""
     start = time.perf_counter()
     conversion.sync_groups(tree)
@@ -97,6 +100,7 @@ def look(tree: Any) -> dict[str, State]:
             refused.setdefault((fault.node, fault.input), set()).add(fault.source)
     conversion.mark_links(tree, {key: frozenset(sources) for key, sources in refused.items()})
     classes.set_states(tree, {**found, **_of_groups(tree, found)})
+    _states[tree.session_uid] = found
     _follow(tree, evaluation)
     _keep_reachable(tree)
     _seconds[tree.session_uid] = time.perf_counter() - start
@@ -104,7 +108,7 @@ def look(tree: Any) -> dict[str, State]:
 
 
 def seconds_of(tree: Any) -> float:
-    """How long the latest look at a tree took, in s."""
+    """How long the latest refresh of a tree took, in s."""
     return _seconds.get(tree.session_uid, 0.0)
 
 
@@ -152,20 +156,20 @@ def _keep_reachable(tree: Any) -> None:
 
 
 def schedule(tree: Any) -> None:
-    """Have a tree looked at soon: after a change, and not before Blender has ended it."""
+    """Have a tree refreshed soon: after a change, and not before Blender has ended it."""
     _pending.add(tree.session_uid)
-    if not bpy.app.timers.is_registered(_look_pending):
-        bpy.app.timers.register(_look_pending, first_interval=WAIT_S)
+    if not bpy.app.timers.is_registered(_refresh_pending):
+        bpy.app.timers.register(_refresh_pending, first_interval=WAIT_S)
 
 
-def _look_pending() -> None:
+def _refresh_pending() -> None:
     pending = set(_pending)
     _pending.clear()
     groups = any(tree.session_uid in pending and _is_group(tree) for tree in trees())
     for tree in list(trees()):
         # A group's nodes are evaluated where it is used.
         if not _is_group(tree) and (groups or tree.session_uid in pending):
-            look(tree)
+            refresh(tree)
     redraw()
 
 
@@ -191,7 +195,9 @@ def start(tree: Any, wanted: tuple[str, ...] = ()) -> Any:
     folder = folder_of(tree)
     if not tree.mu_folder:
         tree.mu_folder = relative(folder)
-    child = RUN.start(tree, folder, lambda place: write_run(place, LAYOUT, job.texts()))
+    expected = plan_of(job.tree, _states.get(tree.session_uid, {}), wanted, folder)
+    kind = attrs.evolve(RUN, plan_of=lambda _: expected)
+    child = kind.start(tree, folder, lambda place: write_run(place, LAYOUT, job.texts()))
     if not bpy.app.timers.is_registered(_redraw_running):
         bpy.app.timers.register(_redraw_running, first_interval=INTERVAL_S, persistent=True)
     return child
@@ -247,7 +253,7 @@ def place_of(tree: Any, node: Any, what: str) -> Path | None:
 
 
 def _of_object(root: Any) -> None:
-    """Look again at trees that show a unit of the scene."""
+    """Refresh the trees that show a unit of the scene."""
     for tree in trees():
         if any(getattr(node, "source", None) == root for node in tree.nodes):
             schedule(tree)
@@ -267,15 +273,15 @@ def _all(*_: Any) -> None:
 
 @persistent
 def _driven(scene: Any, *_: Any) -> None:
-    """Look again at trees with drivers or animation whose values may be others now."""
+    """Refresh the trees with drivers or animation whose values may be others now."""
     now = time.monotonic()
     for tree in trees():
         data = tree.animation_data
         if data is None or not (data.drivers or data.action):
             continue
-        # A look may itself have Blender evaluate the scene again: not without end.
-        if now - _looked.get(tree.session_uid, 0.0) > 2 * WAIT_S:
-            _looked[tree.session_uid] = now
+        # A refresh may itself have Blender evaluate the scene again: not without end.
+        if now - _refreshed.get(tree.session_uid, 0.0) > 2 * WAIT_S:
+            _refreshed[tree.session_uid] = now
             schedule(tree)
 
 
@@ -287,7 +293,7 @@ _CONNECTIONS = ((CHANGED, schedule), (PARAMETERS_CHANGED, _of_object), (JOB_ENDE
 
 
 def register() -> None:
-    """Handlers and signals that start a look."""
+    """Handlers and signals that start a refresh."""
     handlers.add(_HANDLERS)
     handlers.add(_DRIVEN)
     for signal, function in _CONNECTIONS:
@@ -295,12 +301,12 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take them out, and a look that waits."""
+    """Take them out, and a refresh that waits."""
     for signal, function in _CONNECTIONS:
         signal.disconnect(function)
     handlers.remove(_DRIVEN)
     handlers.remove(_HANDLERS)
-    for timer in (_look_pending, _redraw_running):
+    for timer in (_refresh_pending, _redraw_running):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
     _pending.clear()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import attrs
 import bpy
 import numpy as np
 
@@ -13,12 +14,36 @@ from ..shared.texts import path_symbol
 from ..simulate import study_folder as studies
 
 
+@attrs.frozen
+class Known:
+    """What the shown run knows of the candidate paths: J_hat in mm by name, the best first.
+
+    stale: whether it is of a unit with other parameters.
+    """
+
+    j: dict[str, float]
+    stale: bool = False
+
+    def share(self, name: str) -> float:
+        """Place of a path's J between the smallest, 0, and the largest, 1, as its colour shows it."""
+        return self.share_of(self.j[name])
+
+    def share_of(self, j: float) -> float:
+        """As `share`, of a J in mm. By the root: the best paths are told apart best."""
+        low, high = min(self.j.values()), max(self.j.values())
+        return float(np.sqrt((j - low) / (high - low))) if high > low else 0.0
+
+
+def known(root: Any) -> Known:
+    """J of every path by the shown run, also where that is stale; empty without a ranking."""
+    found = studies.findings(root)
+    return Known({}) if found is None else Known(dict(found.ranking), found.stale)
+
+
 def ranked(root: Any) -> dict[str, tuple[float, int]]:
     """J_hat in mm and rank, from 1, of every path by name; empty without results or where they are stale."""
-    found = studies.findings(root)
-    if found is None or found.stale:
-        return {}
-    return {name: (j, rank) for rank, (name, j) in enumerate(found.ranking(found.rule), 1)}
+    found = known(root)
+    return {} if found.stale else {name: (j, rank) for rank, (name, j) in enumerate(found.j.items(), 1)}
 
 
 def free(root: Any) -> tuple[str, float, Any] | None:
@@ -29,25 +54,36 @@ def free(root: Any) -> tuple[str, float, Any] | None:
 
 
 def colour_and_label(root: Any, candidates: dict[str, Any]) -> None:
-    """Colour and label candidate tubes, objects by path; the chosen one keeps its colour."""
-    known = ranked(root)
-    if not known:
-        return
-    values = [j for j, _ in known.values()]
-    low, high = min(values), max(values)
-    for name, tube in candidates.items():
-        if name not in known:
+    """Colour and label candidate tubes, objects by path; the chosen one keeps its colour.
+
+    What is stale is grey, its rank with a question mark.
+    """
+    found = known(root)
+    for rank, name in enumerate(found.j, 1):
+        if name not in candidates:
             continue
-        j, rank = known[name]
+        tube = candidates[name]
         modifier = tube.modifiers[0]
+        doubt = "?" if found.stale else ""
         # Below the name: side by side the tubes have no room for more.
-        label = f"{path_symbol(name)}\n#{rank}"
-        set_modifier_input(modifier, "Label", label)
-        if name != root.mu_unit.path:
-            share = ((j - low) / (high - low)) ** 0.5 if high > low else 0.0
-            colour = _material(f"MU J {root.mu_unit.uuid[:8]} {name}", field_colours.of_map(share))
+        set_modifier_input(modifier, "Label", f"{path_symbol(name)}\n#{rank}{doubt}")
+        if name != root.mu_unit.path and not found.stale:
+            j_colour = field_colours.of_map(found.share(name))
+            colour = _material(f"MU J {root.mu_unit.uuid[:8]} {name}", j_colour)
             tube.data.materials[0] = colour
             set_modifier_input(modifier, "Material", colour)
+        write_colour(tube)
+
+
+def write_colour(tube: Any) -> None:
+    """Have a tube's points carry the colour of its material, which solid shading shows by attribute."""
+    mesh = tube.data
+    colour = np.float32(mesh.materials[0].diffuse_color)
+    attribute = mesh.color_attributes.get(field_colours.COLOUR) or mesh.color_attributes.new(
+        field_colours.COLOUR, "FLOAT_COLOR", "POINT"
+    )
+    attribute.data.foreach_set("color", np.broadcast_to(colour, (len(mesh.vertices), 4)).ravel())
+    mesh.color_attributes.active_color = mesh.color_attributes[field_colours.COLOUR]
 
 
 def _material(name: str, colour: tuple[float, ...]) -> Any:

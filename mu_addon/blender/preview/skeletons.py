@@ -27,8 +27,10 @@ AROUND = 48
 """Flat pieces around the axis."""
 ALONG_STRUT = 4
 """Straight pieces of a strut, enough to see its taper."""
-LADDER_STEP = 0.45
-"""Distance, in cells, between candidate paths drawn side by side outside the lattice."""
+WIDEST_LANE = 0.4
+"""Distance, in cells, between candidate paths drawn side by side, where the lattice is as wide."""
+CANDIDATE_RADIUS = 0.07
+"""Radius, in cells, of a candidate path's tube."""
 _CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 _CUBE_FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
 _CUBE_EDGES = np.array([[a, b] for a in range(8) for b in range(a) if np.abs(_CUBE[a] - _CUBE[b]).sum() == 1])
@@ -133,23 +135,34 @@ def bar(found: Bar | None) -> Skeleton | None:
     return Skeleton(corners.reshape(-1, 3), faces=(faces,), slots=slots, smooth=False)
 
 
-def candidates(unit: Unit) -> dict[str, Skeleton]:
-    """Every candidate path by name, side by side outside the lattice: in place they cover each other."""
+def candidates(unit: Unit, order: Sequence[str], cut: bool) -> dict[str, Skeleton]:
+    """Every candidate path by name on the lattice's face toward +x or, with `cut`, on its section.
+
+    All of them run along one column of anchors, where they would cover each other: seen from +x each has its
+    true length and height, and a lane of its own, side by side. order: names, the first beside the anchors.
+    """
     d = unit.dimensions
     at, side = anchor_points(unit), float(np.sign(d.row)) or 1.0
-    edge = d.bounds[1][1] if side > 0 else d.bounds[1][0]
+    low, high = d.bounds[1]
+    edge = high if side > 0 else low
+    radius = CANDIDATE_RADIUS * d.cell
+    known = {window.name: window for window in windows(len(at))}
+    lane = min(WIDEST_LANE * d.cell, (high - low) / len(known))
+    front = (0.0 if cut else d.bounds[0][1]) + 1.5 * radius
     found = {}
-    for number, window in enumerate(windows(len(at)), 1):
-        points = at[list(window.indices)].copy()
-        points[:, 1] = edge + side * LADDER_STEP * d.cell * (number + 0.5)
-        radius = np.full(len(points), 0.06 * d.cell)
-        name = {
-            "Label": path_symbol(window.name),
-            "At": (0.1 * d.cell, float(points[0, 1]) - 0.1 * d.cell, float(points[0, 2]) - 0.4 * d.cell),
-            "Size": 0.3 * d.cell,
+    for number, name in enumerate(sorted(known, key=lambda n: order.index(n) if n in order else len(order))):
+        points = at[list(known[name].indices)].copy()
+        points[:, 0] = front
+        points[:, 1] = edge - side * lane * (number + 0.5)
+        size = 0.5 * lane
+        label = {
+            "Label": path_symbol(name),
+            "At": (front, float(points[0, 1]) - 0.5 * size, float(points[0, 2]) - 1.4 * size),
+            "Size": size,
+            "In Viewport": False,
         }
-        edges = _polylines(1, len(points))
-        found[window.name] = Skeleton(points, edges, attributes={"radius": radius}, inputs=name)
+        widths = {"radius": np.full(len(points), radius)}
+        found[name] = Skeleton(points, _polylines(1, len(points)), attributes=widths, inputs=label)
     return found
 
 

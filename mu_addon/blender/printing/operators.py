@@ -11,7 +11,7 @@ from ..shared.operators import UnitOperator, ValidUnitOperator, reports_errors
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from ..unit.properties import to_unit
-from . import marks
+from . import layer, marks
 from . import state as printing
 
 NOT_CHECKED = "Check the print first"
@@ -215,6 +215,49 @@ class MU_OT_print_up(UnitOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class MU_OT_print_layer(ValidUnitOperator, bpy.types.Operator):
+    """Show a layer of the solid along the build direction Up: material in yellow, what it encloses in blue"""
+
+    bl_idname = "mu.print_layer"
+    bl_label = "Show Layer"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if not unit_object.solid_is_current(unit_object.active_root(context)):
+            cls.poll_message_set("Build the solid first")
+            return False
+        return True
+
+    @reports_errors
+    def execute(self, context):
+        layer.put(unit_object.active_root(context))
+        return {"FINISHED"}
+
+
+class MU_OT_print_layer_clear(UnitOperator, bpy.types.Operator):
+    """Take the layer off the scene, and show the whole solid again"""
+
+    bl_idname = "mu.print_layer_clear"
+    bl_label = "Clear Layer"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if layer.layer_object(unit_object.active_root(context)) is None:
+            cls.poll_message_set("No layer is shown")
+            return False
+        return True
+
+    def execute(self, context):
+        layer.clear(unit_object.active_root(context))
+        return {"FINISHED"}
+
+
 CLASSES = (
     MU_OT_print_check,
     MU_OT_print_export,
@@ -237,6 +280,8 @@ CLASSES = (
     MU_OT_print_clear,
     MU_OT_print_show,
     MU_OT_print_up,
+    MU_OT_print_layer,
+    MU_OT_print_layer_clear,
 )
 
 

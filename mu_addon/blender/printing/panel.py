@@ -11,7 +11,7 @@ from ...run.child import FAILED
 from ..jobs.panel import job_state
 from ..shared.panels import UnitPanel, alert, large_button, parameters, wrapped
 from ..unit import object as unit_object
-from . import marks
+from . import layer, marks
 from . import state as printing
 from .properties import OWN_PRINTER
 
@@ -53,7 +53,7 @@ def _gates(layout, root, solid) -> None:
         wrapped(box, "Built from earlier parameters: build it again", "ERROR")
     g = json.loads(solid["mu_gates"])
     for text in (
-        f"Lattice genus {g['lattice_genus']}, as E - V + 1",
+        f"Lattice whole: its {g['lattice_genus']} loops are there",
         f"{g['components']} body, {g['bad_edges_after_stl']} open edges in its STL",
         f"{g['inner_shells']} cavity of {g['inner_volume_mm3'] / 1000:.2f} cm3",
         f"{g['volume_mm3'] / 1000:.2f} cm3 of resin, {g['triangles']} triangles",
@@ -174,6 +174,33 @@ def _directions(layout, settings, found) -> None:
         box.label(text=f"{build['support_mm2']:.0f} mm2 to support, {build['inner_mm2']:.0f} in chambers")
 
 
+class MU_PT_print_layers(_OfPrint, bpy.types.Panel):
+    """Layers of the solid as they are built, one at a time in the 3D view"""
+
+    bl_idname = "MU_PT_print_layers"
+    bl_label = "Layers"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def show(self, layout, context, root):
+        settings = root.mu_print
+        shown = layer.layer_object(root)
+        if shown is None:
+            layout.operator("mu.print_layer", icon="ALIGN_MIDDLE")
+            wrapped(layout, "Layers are those of the solid, built along Up", "INFO")
+            return
+        row = layout.row(align=True)
+        row.prop(settings, "layer", slider=True)
+        row.operator("mu.print_layer_clear", text="", icon="X")
+        if not unit_object.solid_is_current(root):
+            alert(layout, "Of an earlier solid: build it again")
+            return
+        found = layer.facts(shown)
+        column = layout.column(align=True)
+        column.label(text=f"{found['height_mm']:.1f} of {found['whole_mm']:.1f} mm")
+        column.label(text=f"Material (yellow): {found['area_mm2']:.0f} mm2")
+        column.label(text=f"Enclosed (blue): {found['enclosed_mm2']:.0f} mm2")
+
+
 class MU_PT_print_files(_OfPrint, bpy.types.Panel):
     """Files for printer and CAD, each read back and compared, and specimens to measure"""
 
@@ -243,7 +270,7 @@ def _written(layout, found) -> None:
         wrapped(column, f"Not written: {entry['format']}: {entry['why']}", "ERROR")
 
 
-CLASSES = (MU_PT_print, MU_PT_print_check, MU_PT_print_files)
+CLASSES = (MU_PT_print, MU_PT_print_check, MU_PT_print_layers, MU_PT_print_files)
 
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -9,7 +9,7 @@ from ...design.assets import asset_names
 from ...design.printing.printer import DEFAULT
 from ..shared.registration import property_group_factory
 from ..unit.properties import BESIDE_BLEND_FILE
-from . import marks
+from . import layer, marks
 
 OWN_PRINTER = "own"
 FORMATS = (
@@ -58,6 +58,7 @@ class MU_PG_print(bpy.types.PropertyGroup):
         description="Build direction in the unit's frame, away from the platform. 0 0 1: inlet down",
         subtype="XYZ",
         default=(0.0, 0.0, 1.0),
+        update=lambda settings, context: layer.follow(settings.id_data),
     )
     formats: EnumProperty(
         name="Files",
@@ -96,6 +97,15 @@ class MU_PG_print(bpy.types.PropertyGroup):
         min=0.05,
         max=10.0,
         update=lambda settings, context: marks.resize(settings.id_data),
+    )
+    layer: FloatProperty(
+        name="Height",
+        description="Which layer is shown, as a share of the height from the platform's side",
+        default=0.5,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=lambda settings, context: layer.follow(settings.id_data),
     )
     # Which finding is looked at, and which of its places; -1: none.
     finding: IntProperty(default=-1, options={"HIDDEN"})

@@ -13,6 +13,7 @@ from ...design.solid import QUALITY
 from ..shared.operators import ValidUnitOperator, reports_errors
 from ..unit import object as unit_object
 from ..unit.properties import to_unit
+from . import layer
 from . import state as printing
 
 _QUALITY = [
@@ -37,6 +38,7 @@ class MU_OT_solid(ValidUnitOperator, bpy.types.Operator):
         core = to_unit(root.mu_unit)
         solid = unit_object.solid_of(root, core, self.quality)
         unit_object.put_solid(root, solid, core)
+        layer.follow(root)
         gates = solid.gates
         self.report({"INFO"}, f"Watertight, {gates.triangles} triangles, {gates.volume_mm3 / 1000:.2f} cm3")
         return {"FINISHED"}

@@ -58,6 +58,12 @@ FIELDS = (
         "Between walls and struts that touch each other; of Model A, simulated with self-contact",
     ),
     Field(
+        "run_difference_mm",
+        "Difference of Runs",
+        "mm",
+        "Distance between where this run and the one that it is compared with have moved a point",
+    ),
+    Field(
         "dJ_by_modulus_mm_per_MPa",
         "Sensitivity dJ/dE",
         "mm/MPa",
@@ -163,11 +169,13 @@ def paint(root: Any, parts: list[tuple[Any, bool]]) -> None:
 
 
 def write_colours(root: Any, mesh: Any, values: Any | None) -> None:
-    """Write a field's values (v,) as the colours that solid shading shows, plain where it has none."""
+    """Write a field's values (v,) as the colours that solid shading shows; plain without one, and at NaN."""
     attribute = mesh.color_attributes.get(COLOUR) or mesh.color_attributes.new(COLOUR, "FLOAT_COLOR", "POINT")
+    plain = np.float32(materials.COLOURS[_PLAIN])
     if values is None:
-        found = np.broadcast_to(np.float32(materials.COLOURS[_PLAIN]), (len(mesh.vertices), 4))
+        found = np.broadcast_to(plain, (len(mesh.vertices), 4))
     else:
-        found = colours(root, values)
+        found = colours(root, np.nan_to_num(values))
+        found[np.isnan(values)] = plain
     attribute.data.foreach_set("color", np.ascontiguousarray(found).ravel())
     mesh.color_attributes.active_color = mesh.color_attributes[COLOUR]

@@ -45,6 +45,9 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
     time = motion_parts.time_of(motion, scene)
     pressure = float(np.interp(time, motion.time_s, motion.pressure_kPa))
     found = [f"{field.label} [{field.unit}]" if field.unit else field.label]
+    other = studies.run_by_key(root, root.mu_unit.study.against)
+    if field.name == motion_parts.DIFFERENCE and other is not None:
+        found.append(f"to the run {other.title}")
     found.append(f"{np.clip(time, motion.time_s[0], motion.time_s[-1]):.2f} s, {pressure + 0.0:.1f} kPa")
     for contact in studies.contact_forces(root):
         force = float(np.interp(time, contact.time_s, contact.force_N))
@@ -62,7 +65,7 @@ def _draw() -> None:
     root = unit_object.active_root(context)
     if root is None or not root.mu_motion.legend:
         return
-    shown = [part for part in motion_parts.parts(root) if part.visible_get()]
+    shown = [part for part in motion_parts.parts(root) if motion_parts.is_seen(root, part)]
     motion = motion_parts.motion_of(root) if shown else None
     if motion is None:
         return
@@ -70,38 +73,40 @@ def _draw() -> None:
     size = round(12 * scale)
     in_scene = any(child.get(LEGEND) and child.visible_get() for child in root.children)
     if not in_scene:
-        left = _beside_tools(context.area) + LEFT * scale
+        left = beside_tools(context.area) + LEFT * scale
         if any(root.mu_motion.field in part.data.attributes for part in shown):
-            _ramp(root, scale, left)
+            _field_ramp(root, scale, left)
         for line, text in enumerate(reversed(lines(root, motion, context.scene))):
             write(text, left, (BOTTOM + HEIGHT + 14) * scale + 1.5 * size * line, size)
     _names(context, root, motion, size)
 
 
-def _beside_tools(area: Any) -> float:
+def beside_tools(area: Any) -> float:
     """Width in pixels of the toolbar that lies over the viewport's left, 0 where there is none."""
     tools = next((region for region in area.regions if region.type == "TOOLS"), None)
     return 0.0 if tools is None or tools.width <= 1 else float(tools.width)
 
 
-def _ramp(root: Any, scale: float, left: float) -> None:
-    settings = root.mu_motion
+def _field_ramp(root: Any, scale: float, left: float) -> None:
+    low, high = root.mu_motion.low, root.mu_motion.high
+    if high > low:
+        marks = [((value - low) / (high - low), f"{value:.4g}") for value in ticks(low, high)]
+        ramp(field_colours.colours(root, np.linspace(low, high, PIECES + 1)), marks, scale, left)
+
+
+def ramp(colours: Any, marks: list[tuple[float, str]], scale: float, left: float) -> None:
+    """Draw colours (PIECES + 1, 4), linear, from below to above; marks: share of the height, and text."""
     x0, x1 = left, left + WIDTH * scale
     heights = (BOTTOM + HEIGHT * np.linspace(0.0, 1.0, PIECES + 1)) * scale
     corners = [(x, y) for y in heights for x in (x0, x1)]
-    low, high = settings.low, settings.high
-    if not high > low:
-        return
-    colours = _display(field_colours.colours(root, np.repeat(np.linspace(low, high, PIECES + 1), 2)))
     corner = np.array([[0, 1, 3], [0, 3, 2]], np.int32)
     triangles = np.concatenate([corner + 2 * piece for piece in range(PIECES)])
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
-    data = {"pos": corners, "color": colours.tolist()}
+    data = {"pos": corners, "color": _display(np.repeat(colours, 2, axis=0)).tolist()}
     batch_for_shader(shader, "TRIS", data, indices=triangles).draw(shader)
     size = round(11 * scale)
-    for value in ticks(low, high):
-        y = (BOTTOM + HEIGHT * (value - low) / (high - low)) * scale
-        write(f"{value:.4g}", x1 + 6 * scale, y - 0.35 * size, size)
+    for share, text in marks:
+        write(text, x1 + 6 * scale, (BOTTOM + HEIGHT * share) * scale - 0.35 * size, size)
 
 
 def _display(linear: Any) -> Any:
@@ -127,12 +132,26 @@ def _names(context: Any, root: Any, motion: Any, size: int) -> None:
             write(text, place.x - blf.dimensions(0, text)[0] / 2, place.y, size)
 
 
+def cross(x: float, y: float, side: float, colour: tuple[float, ...]) -> None:
+    """Draw a ring of `side` pixels around x, y and the cross in it."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 25)
+    ring = np.stack([x + side * np.cos(angle), y + side * np.sin(angle)], axis=1)
+    pairs = [*np.repeat(ring, 2, axis=0)[1:-1].tolist()]
+    pairs += [(x - 2 * side, y), (x - side, y), (x + side, y), (x + 2 * side, y)]
+    pairs += [(x, y - 2 * side), (x, y - side), (x, y + side), (x, y + 2 * side)]
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    gpu.state.line_width_set(2.0)
+    shader.uniform_float("color", colour)
+    batch_for_shader(shader, "LINES", {"pos": pairs}).draw(shader)
+    gpu.state.line_width_set(1.0)
+
+
 def write(text: str, x: float, y: float, size: int, colour: tuple[float, ...] = TEXT) -> None:
     """Draw a text with a shadow, its lower left at x, y in pixels."""
     blf.size(0, size)
     blf.color(0, *colour)
     blf.enable(0, blf.SHADOW)
-    blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.8)
+    blf.shadow(0, 5, 0.0, 0.0, 0.0, 1.0)
     blf.position(0, x, y, 0)
     blf.draw(0, text)
     blf.disable(0, blf.SHADOW)

@@ -1,8 +1,9 @@
-"""A study's motion in the scene: objects beside the unit that deform on the timeline and carry its fields.
+"""A study's motion in the scene: objects that deform on the timeline and carry its fields.
 
-Positions come from point caches in the study folder, which Blender plays by itself; the fields of the frame
-are written before it is drawn. An object is a child of the unit's root and knows what it shows by the custom
-property `mu_motion`: "NAME|BODY", NAME a path or model_a, BODY one of `BODIES`.
+The first one is seen in the unit's own place, in place of its design, the others beside it. Positions come
+from point caches in the study folder, which Blender plays by itself; the fields of the frame are written
+before it is drawn. An object is a child of the unit's root and knows what it shows by the custom property
+`mu_motion`: "NAME|BODY", NAME a path or model_a, BODY one of `BODIES`; and by `mu_run`, of which run.
 """
 
 from __future__ import annotations
@@ -15,33 +16,34 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...errors import InputError
+from ...errors import InputError, MuError
 from ...report.pc2 import read_pc2, write_pc2
 from ...usecases.simulate_and_place.motion import (
-    FOLDER,
     MODEL_A,
     PLAYED,
     REGIONS,
     SENSITIVITY,
     Motion,
     Skin,
-    read_motion,
 )
+from ..jobs.start_child import JOB_ENDED
 from ..preview import skeletons
-from ..shared import displays, handlers
+from ..shared import displays, handlers, updates
 from ..shared.displays import MOTION
-from ..shared.file_cache import FileCache
 from ..shared.updates import Signal
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
-from ..unit.properties import to_unit
-from . import field_colours
+from ..unit.properties import VIEW_CHANGED, to_unit
+from . import field_colours, run_motions
+from .run_motions import motion_of
 
 PRINT = "print"
 BODIES = (*REGIONS, PRINT)
 MESH = "mesh"
 """The analysis mesh: both its regions."""
 DISPLACEMENT, DEVIATION = "displacement_mm", "deviation_mm"
+DIFFERENCE = "run_difference_mm"
+RUN = "mu_run"
 
 _RARE = 0.2
 """Percent of the values, at either end, that do not stretch the range: at edges stress has no bound."""
@@ -58,7 +60,6 @@ class Played:
 COLOURED = Signal()
 """Sent with the root whose motion was coloured anew."""
 
-_motions: FileCache[Motion] = FileCache()
 _played: dict[tuple[Path, str, bool], Played] = {}
 """By folder, what is shown and whether it is cut; not of the printed body, which has its own."""
 
@@ -70,7 +71,7 @@ def parts(root: Any) -> list[Any]:
 
 def shown(root: Any) -> list[tuple[str, str]]:
     """Pairs (name, `mesh` or `print`) that are shown, Model A first, each beside the one before."""
-    found = {(name, PRINT if body == PRINT else MESH) for name, body in (_what(p) for p in parts(root))}
+    found = {_pair(part) for part in parts(root)}
     return sorted(found, key=lambda pair: (pair[0] != MODEL_A, len(pair[0]), pair[0], pair[1]))
 
 
@@ -79,15 +80,14 @@ def _what(part: Any) -> tuple[str, str]:
     return name, body
 
 
+def _pair(part: Any) -> tuple[str, str]:
+    name, body = _what(part)
+    return name, PRINT if body == PRINT else MESH
+
+
 def one(root: Any, name: str, what: str) -> Any:
     """The object that shows a motion, or the first of its two."""
-    return next(p for p in parts(root) if _what(p)[0] == name and (_what(p)[1] == PRINT) == (what == PRINT))
-
-
-def motion_of(root: Any) -> Motion | None:
-    """The motion in the unit's study folder, or None where there is none; read again when it changes."""
-    folder = studies.folder_of(root)
-    return _motions.read([folder / FOLDER / f"{MODEL_A}.npz"], lambda: read_motion(folder))
+    return next(part for part in parts(root) if _pair(part) == (name, what))
 
 
 def show(root: Any, name: str, what: str) -> None:
@@ -95,7 +95,9 @@ def show(root: Any, name: str, what: str) -> None:
     motion = motion_of(root)
     if motion is None:
         raise InputError(
-            "there is no motion to show", str(studies.folder_of(root)), "simulate first, or simulate again"
+            "there is no motion to show",
+            str(studies.results_folder(root)),
+            "simulate first, or simulate again",
         )
     if what == PRINT:
         _show_print(root, motion, name)
@@ -109,28 +111,71 @@ def show(root: Any, name: str, what: str) -> None:
 def hide(root: Any, name: str, what: str) -> None:
     """Take a motion out of the scene; its files stay."""
     for part in parts(root):
-        if _what(part)[0] == name and (_what(part)[1] == PRINT) == (what == PRINT):
+        if _pair(part) == (name, what):
             displays.remove(part)
     arrange(root)
 
 
 def rebuild(root: Any) -> None:
-    """Build again what is shown, from the files as they are now. Raises MuError."""
+    """Build again what is shown, from the files of the shown run as they are now. Raises MuError."""
     for name, what in shown(root):
         show(root, name, what)
 
 
+def follow(root: Any) -> None:
+    """Have what is shown be of the run that is shown: parameters, a new run or a choice have changed it.
+
+    A motion that this run has not is taken away, and the panel says so.
+    """
+    studies.remember(root)
+    key, wrong = root.mu_unit.study.run, ""
+    if all(part.get(RUN, key) == key for part in parts(root)):
+        return
+    for name, what in shown(root):
+        try:
+            show(root, name, what)
+        except MuError as error:
+            hide(root, name, what)
+            wrong = error.what
+    root.mu_motion.trouble = wrong
+
+
 def arrange(root: Any) -> None:
-    """Stand what is shown side by side, beside the unit, on the side that it bends away from."""
+    """Stand the first motion in the unit's place, the others beside it, on the side that it bends away from.
+
+    With `on_unit` off, all of them stand beside the design.
+    """
     motion = motion_of(root)
     if motion is None:
         return
+    settings = root.mu_motion
     low, high = motion.mesh.nodes.min(axis=0), motion.mesh.nodes.max(axis=0)
-    step = root.mu_motion.apart * float(high[1] - low[1])
-    places = {pair: number for number, pair in enumerate(shown(root), 1)}
+    step = settings.apart * float(high[1] - low[1])
+    pairs = shown(root)
+    places = {pair: number for number, pair in enumerate(pairs, 0 if settings.on_unit else 1)}
     for part in parts(root):
-        name, body = _what(part)
-        part.location = (0.0, -step * places[name, PRINT if body == PRINT else MESH], 0.0)
+        place = places[_pair(part)]
+        part.location = (0.0, -step * place, 0.0)
+        part[displays.ON_UNIT] = place == 0
+        part.hide_viewport = part.hide_render = place == 0
+    _see(root)
+
+
+def _see(root: Any) -> None:
+    """Have a unit show its result where there is one in its place, else its design."""
+    there = bool(displays.on_unit(root))
+    if there and root.mu_unit.show != unit_object.RESULT:
+        root.mu_unit.show = unit_object.RESULT
+    elif not there and root.mu_unit.show == unit_object.RESULT:
+        root.mu_unit.show = "preview"
+    unit_object.show(root)
+
+
+def is_seen(root: Any, part: Any) -> bool:
+    """Whether a part is seen, by itself or in the unit's place."""
+    if part.get(displays.ON_UNIT):
+        return bool(unit_object.shows_result(root) and root.visible_get())
+    return bool(part.visible_get())
 
 
 def _show_region(root: Any, motion: Motion, name: str, region: str) -> None:
@@ -139,7 +184,7 @@ def _show_region(root: Any, motion: Motion, name: str, region: str) -> None:
     rest = skin.of_nodes(motion.mesh.nodes)
     file = motion.folder / PLAYED / f"{name}-{region}{'-cut' if cut else ''}.pc2"
     _write_cache(file, motion, rest, skin.of_nodes(*motion.sides(name)))
-    part = _part(root, name, region)
+    part = _part(root, motion, name, region)
     skeletons.write(part.data, skeletons.Skeleton(rest, faces=(skin.triangles,)))
     _play(part, motion, file)
 
@@ -162,7 +207,7 @@ def _show_print(root: Any, motion: Motion, name: str) -> None:
     moved, still = (motion.carried(whose, carried) for whose in (name, MODEL_A))
     file = motion.folder / PLAYED / f"{name}-{PRINT}.pc2"
     _write_cache(file, motion, rest, moved)
-    part = _part(root, name, PRINT)
+    part = _part(root, motion, name, PRINT)
     old = part.data
     part.data = solid.copy()
     part.data.name = old.name
@@ -187,13 +232,15 @@ def vertices_of(mesh: Any) -> Any:
     return found.reshape(-1, 3).astype(float)
 
 
-def _part(root: Any, name: str, body: str) -> Any:
-    for part in parts(root):
-        if part[MOTION] == f"{name}|{body}":
-            return part
-    title = f"{'Model A' if name == MODEL_A else name} {body}"
-    part = displays.add(root, MOTION, f"{name}|{body}", bpy.data.meshes.new(title))
-    return displays.lock(part, location=False)
+def _part(root: Any, motion: Motion, name: str, body: str) -> Any:
+    part = next((part for part in parts(root) if part[MOTION] == f"{name}|{body}"), None)
+    if part is None:
+        title = f"{'Model A' if name == MODEL_A else name} {body}"
+        part = displays.add(root, MOTION, f"{name}|{body}", bpy.data.meshes.new(title))
+        displays.lock(part, location=False)
+    run = studies.shown_run(root)
+    part[RUN] = "" if run is None else run.key
+    return part
 
 
 def _write_cache(file: Path, motion: Motion, rest: Any, displacement: Any) -> None:
@@ -243,10 +290,15 @@ def time_of(motion: Motion, scene: Any) -> float:
     return float(motion.time_s[0] + (scene.frame_current_final - scene.frame_start) / rate)
 
 
+def frame_of(motion: Motion, time_s: float, scene: Any) -> int:
+    """The scene's first frame at or after a time of the protocol."""
+    rate = scene.render.fps / scene.render.fps_base
+    return int(np.ceil(scene.frame_start + (time_s - float(motion.time_s[0])) * rate - 1e-6))
+
+
 def last_frame(motion: Motion, scene: Any) -> int:
     """The scene's frame at which the protocol ends."""
-    rate = scene.render.fps / scene.render.fps_base
-    return int(np.ceil(scene.frame_start + float(motion.time_s[-1] - motion.time_s[0]) * rate))
+    return frame_of(motion, float(motion.time_s[-1]), scene)
 
 
 def _distances(moved: Any, still: Any) -> dict[str, Any]:
@@ -284,7 +336,10 @@ def played(root: Any, part: Any) -> Played | None:
             kept = _played[key] = Played(motion, _fields_of(motion, name, body, motion.skin(body, cut)))
         except InputError:
             return None
-    return kept
+    if root.mu_motion.field != DIFFERENCE:
+        return kept
+    apart = run_motions.apart(root, motion, name, body, cut)
+    return kept if apart is None else attrs.evolve(kept, fields={**kept.fields, DIFFERENCE: apart})
 
 
 def _replayed(root: Any, part: Any, motion: Motion) -> Played | None:
@@ -327,12 +382,30 @@ def extent(root: Any, field: str) -> tuple[float, float]:
     found = [p.fields[field] for p in (played(root, part) for part in parts(root)) if p and field in p.fields]
     if not found:
         return 0.0, 1.0
-    ends = np.array([np.percentile(values, (_RARE, 100.0 - _RARE)) for values in found])
-    low, high = float(ends[:, 0].min()), float(ends[:, 1].max())
+    ends = np.array([np.nanpercentile(values, (_RARE, 100.0 - _RARE)) for values in found])
+    low, high = float(np.nanmin(ends[:, 0])), float(np.nanmax(ends[:, 1]))
     if root.mu_motion.symmetric:
         high = max(abs(low), abs(high))
         low = -high
     return low, high if high > low else low + 1.0
+
+
+def peak_frame(root: Any, scene: Any) -> int | None:
+    """The frame at which the chosen field is largest in what is shown, without its rarest values.
+
+    None where it is not known, or the same at every time.
+    """
+    field, best = root.mu_motion.field, None
+    for part in parts(root):
+        found = played(root, part)
+        values = found.fields.get(field) if found else None
+        if found is None or values is None or values.ndim == 1 or np.isnan(values).all():
+            continue
+        largest = np.nanpercentile(values, 100.0 - _RARE, axis=1)[found.motion.state]
+        sample = int(largest.argmax())
+        if best is None or largest[sample] > best[0]:
+            best = largest[sample], frame_of(found.motion, float(found.motion.time_s[sample]), scene)
+    return None if best is None else best[1]
 
 
 def _write(root: Any, scene: Any) -> None:
@@ -364,26 +437,50 @@ def _before_frame(scene, *_):
             _write(root, scene)
 
 
+def _forget() -> None:
+    for kept in (_played, _prints, run_motions):
+        kept.clear()
+
+
 @persistent
 def _loaded(*_):
-    _played.clear()
-    _prints.clear()
-    _motions.clear()
+    _forget()
     for root in unit_object.roots():
         if parts(root):
             _write(root, bpy.context.scene)
 
 
+def _job_ended(_key: str) -> None:
+    for root in unit_object.roots():
+        follow(root)
+
+
+def _chosen(root: Any) -> None:
+    """The result is to be seen: where none is in the unit's place yet, that of Model A."""
+    if updates.are_paused() or root.mu_unit.show != unit_object.RESULT or displays.on_unit(root):
+        return
+    if motion_of(root) is None:
+        root.mu_motion.trouble = "No motion to show: simulate this unit first"
+        return
+    root.mu_motion.on_unit = True
+    if not parts(root):
+        show(root, MODEL_A, MESH)
+
+
 _HANDLERS = {"frame_change_pre": _before_frame, "load_post": _loaded}
+_CONNECTIONS = ((unit_object.REBUILT, follow), (JOB_ENDED, _job_ended), (VIEW_CHANGED, _chosen))
 
 
 def register() -> None:
-    """Handlers that keep the fields at the scene's frame."""
+    """Handlers that keep the fields at the scene's frame, and what is shown with its run."""
     handlers.add(_HANDLERS)
+    for signal, function in _CONNECTIONS:
+        signal.connect(function)
 
 
 def unregister() -> None:
     """Take them out."""
+    for signal, function in _CONNECTIONS:
+        signal.disconnect(function)
     handlers.remove(_HANDLERS)
-    for kept in (_played, _prints, _motions):
-        kept.clear()
+    _forget()

@@ -16,6 +16,13 @@ from . import motion as motion_parts
 NO_MOTION = "No motion yet: simulate this unit first"
 
 
+def show_colours(context) -> None:
+    """Have 3D views in solid shading show colour attributes, which hold the field's colours."""
+    for area in context.screen.areas if context.screen else ():
+        if area.type == "VIEW_3D" and area.spaces.active.shading.type == "SOLID":
+            area.spaces.active.shading.color_type = "VERTEX"
+
+
 class MotionOperator(UnitOperator):
     """An operator on the active unit whose study holds a motion."""
 
@@ -30,7 +37,7 @@ class MotionOperator(UnitOperator):
 
 
 class MU_OT_motion(MotionOperator, bpy.types.Operator):
-    """Show or hide the motion of Model A or of a sensor path beside the unit, as mesh or as print"""
+    """Show or hide the motion of Model A or of a sensor path, as mesh or as print"""
 
     bl_idname = "mu.motion"
     bl_label = "Show Motion"
@@ -73,10 +80,8 @@ class MU_OT_motion(MotionOperator, bpy.types.Operator):
         motion_parts.show(root, self.name, self.what)
         if self.timeline:
             context.scene.frame_end = motion_parts.last_frame(motion, context.scene)
-        if self.shade and context.screen:
-            for area in context.screen.areas:
-                if area.type == "VIEW_3D" and area.spaces.active.shading.type == "SOLID":
-                    area.spaces.active.shading.color_type = "VERTEX"
+        if self.shade:
+            show_colours(context)
         return {"FINISHED"}
 
 
@@ -152,7 +157,7 @@ class MU_OT_picture(UnitOperator, bpy.types.Operator):
     @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
-        path = studies.folder_of(root) / FOLDER / self.name
+        path = studies.results_folder(root) / FOLDER / self.name
         if not self.name or not path.is_file():
             raise InputError("there is no such picture", str(path), "simulate first")
         image = bpy.data.images.load(str(path), check_existing=True)

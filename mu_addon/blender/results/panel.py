@@ -12,10 +12,17 @@ from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.texts import path_symbol
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
-from . import field_colours, legend_object, thumbnails
+from . import field_colours, legend_object, run_motions, thumbnails
 from . import motion as motion_parts
 from .operators import NO_MOTION
 
+BUTTONS = (
+    ("deviation_mm", "Deviation"),
+    ("von_mises_kPa", "Stress"),
+    ("displacement_mm", "Displacement"),
+    ("contact_pressure_kPa", "Self-Contact"),
+)
+"""Fields that a click paints on the unit, and what the button says."""
 PICTURE = 13.0
 """Side of a picture, in heights of a button."""
 
@@ -50,10 +57,10 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
                 else "no contact"
             )
             column.label(text=f"{contact.name}: {words}", icon="CUBE")
-        ranking = found.ranking(found.rule)
+        ranking = found.ranking
         if ranking:
             best, j = ranking[0]
-            tied = (found.summary.get("tied_with_chosen") or {}).get(found.rule) or []
+            tied = (found.summary.get("tied_with_chosen") or {}).get(found.run.rule) or []
             column.label(text=f"Best path {best}, J {j:.4f} mm")
             if tied:
                 column.label(text=f"tied with {', '.join(tied)}")
@@ -68,12 +75,27 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
             column.label(
                 text=f"{best['length_mm']:.0f} mm long, {search['checked']} of {search['paths']} solved"
             )
+        if motion_parts.motion_of(root) is not None:
+            _look_buttons(layout, root)
         row = layout.row(align=True)
         row.operator("mu.open", text="Report", icon="URL").what = "report"
         row.operator("mu.open", text="Folder", icon="FILE_FOLDER").what = "folder"
 
 
+def _look_buttons(layout, root) -> None:
+    """What is looked at most, one click each."""
+    grid = layout.grid_flow(columns=2, align=True, even_columns=True, row_major=True)
+    settings = root.mu_motion
+    for name, text in BUTTONS:
+        on = unit_object.shows_result(root) and settings.field == name
+        grid.operator("mu.field_show", text=text, depress=on).field = name
+    row = layout.row()
+    row.use_property_split = False
+    row.prop(root.mu_unit, "candidates", text="Ranking on the Lattice", toggle=True, icon="CURVE_PATH")
+
+
 class _OfResults(UnitPanel):
+    # Below the runs, see `run_panel`, which are registered later.
     bl_parent_id = "MU_PT_results"
     bl_options: ClassVar[set[str]] = set()
 
@@ -83,6 +105,7 @@ class MU_PT_motion(_OfResults, bpy.types.Panel):
 
     bl_idname = "MU_PT_motion"
     bl_label = "On the Model"
+    bl_order = 1
 
     def show(self, layout, context, root):
         motion = motion_parts.motion_of(root)
@@ -116,6 +139,7 @@ class MU_PT_motion(_OfResults, bpy.types.Panel):
         row = column.row()
         row.enabled = motion.halved
         row.prop(settings, "cut")
+        column.prop(settings, "on_unit")
         column.prop(settings, "apart")
         column.prop(settings, "live")
 
@@ -125,6 +149,7 @@ class MU_PT_field(_OfResults, bpy.types.Panel):
 
     bl_idname = "MU_PT_field"
     bl_label = "Colours"
+    bl_order = 2
 
     @classmethod
     def poll(cls, context):
@@ -139,6 +164,8 @@ class MU_PT_field(_OfResults, bpy.types.Panel):
         ]
         if missing:
             wrapped(layout, f"Grey, without this field: {', '.join(missing)}", "INFO")
+        if settings.field == motion_parts.DIFFERENCE and run_motions.difference_words(root):
+            wrapped(layout, run_motions.difference_words(root), "INFO")
         unit = field_colours.BY_NAME[settings.field].unit
         column = layout.column(align=True)
         column.prop(settings, "low", text=f"From ({unit})" if unit else "From")
@@ -148,6 +175,10 @@ class MU_PT_field(_OfResults, bpy.types.Panel):
         row.prop(settings, "lock", toggle=True, icon="LOCKED" if settings.lock else "UNLOCKED", text="Lock")
         row.prop(settings, "symmetric", toggle=True)
         row.operator("mu.motion_range", text="Fit")
+        row = layout.row(align=True)
+        row.use_property_split = False
+        row.prop(settings, "marker", toggle=True)
+        row.operator("mu.probe", icon="EYEDROPPER")
         row = layout.row(align=True)
         row.use_property_split = False
         row.prop(settings, "legend", toggle=True)
@@ -160,9 +191,10 @@ class MU_PT_pictures(_OfResults, bpy.types.Panel):
 
     bl_idname = "MU_PT_pictures"
     bl_label = "Pictures"
+    bl_order = 3
 
     def show(self, layout, context, root):
-        folder = studies.folder_of(root) / FOLDER
+        folder = studies.results_folder(root) / FOLDER
         names = [ANGLE] + ([delta_name(root.mu_unit.path)] if root.mu_unit.path else [])
         found = [(name, thumbnails.icon_of(folder / name)) for name in names]
         for name, icon in found:

@@ -33,6 +33,10 @@ def _surface(settings, context):
         settings.trouble = ""
 
 
+def _redraw(settings, context):
+    viewports.redraw()
+
+
 def _apart(settings, context):
     motion_parts.arrange(settings.id_data)
 
@@ -75,6 +79,18 @@ class MU_PG_motion(bpy.types.PropertyGroup):
         "mesh is a half",
         default=True,
         update=_surface,
+    )
+    on_unit: BoolProperty(
+        name="On the Unit",
+        description="Show the first motion in the unit's own place instead of beside the design",
+        default=True,
+        update=_apart,
+    )
+    marker: BoolProperty(
+        name="Largest Value",
+        description="Mark in the viewport where the field is largest at this frame",
+        default=True,
+        update=_redraw,
     )
     apart: FloatProperty(
         name="Apart",

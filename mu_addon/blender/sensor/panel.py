@@ -1,4 +1,4 @@
-"""The panel Sensor of the sidebar tab MU: the real sensor, its calibration, and the twin."""
+"""The panel Sensor on the Bench of the sidebar tab MU: the real sensor, its calibration, and the twin."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from ...run.child import FAILED
 from ...sensing.session import LOSSES
 from ..jobs.panel import job_state
 from ..shared.panels import UnitPanel, large_button, wrapped
+from ..shared.wording import in_panel
 from ..simulate import study_folder as studies
 from . import state as sensor
 from . import twin
@@ -30,7 +31,7 @@ class MU_PT_sensor(UnitPanel, bpy.types.Panel):
     """The real sensor: connect, record, calibrate, and bend the twin by it"""
 
     bl_idname = "MU_PT_sensor"
-    bl_label = "Sensor"
+    bl_label = "Sensor on the Bench"
 
     def show(self, layout, context, root):
         missing = sensor.missing()
@@ -83,8 +84,9 @@ def _session(layout, settings, session):
     words, icon = STATES.get(session.state, (session.state, "INFO"))
     if session.child.state == FAILED:
         box.alert = True
-        wrapped(box, str((session.child.error or {}).get("what", "")), "ERROR")
-        wrapped(box, str((session.child.error or {}).get("where", "")))
+        error = session.child.error or {}
+        wrapped(box, in_panel(str(error.get("what", ""))), "ERROR")
+        wrapped(box, in_panel(str(error.get("what_to_do") or error.get("where", ""))))
         wrapped(box, "The recording is kept. Connect again")
     elif session.running and session.watched.silent_s > sensor.SILENT_S and status:
         box.alert = True
@@ -106,7 +108,7 @@ def _session(layout, settings, session):
     losses = [f"{status[key]} {word}" for key, word in LOSSES.items() if status.get(key)]
     wrapped(column, ", ".join(losses) or "nothing lost", "ERROR" if losses else "CHECKMARK")
     for words in status.get("complaint", ()):
-        wrapped(column, words, "INFO")
+        wrapped(column, in_panel(words), "INFO")
     for name, value in zip(session.channels, list(status.get("latest", ()))[3:], strict=False):
         row = column.row()
         row.label(text=name)
@@ -130,13 +132,16 @@ def _plot(layout, settings, session):
     header.label(text="Plot")
     if not body:
         return
+    running = session is not None and session.running
     row = body.row(align=True)
     row.use_property_split = False
     row.prop(settings, "plot", toggle=True)
-    frozen = session is not None and session.frozen is not None
+    row = row.row(align=True)
+    row.enabled = running
+    frozen = running and session.frozen is not None
     row.operator("mu.sensor_freeze", text="Go On" if frozen else "Freeze", icon="PLAY" if frozen else "PAUSE")
     body.prop(settings, "seconds")
-    if session is not None:
+    if running:
         hidden = settings.hidden.split(",")
         grid = body.grid_flow(columns=2, align=True)
         for name in session.channels:

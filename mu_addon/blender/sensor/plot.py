@@ -51,7 +51,8 @@ def _draw() -> None:
     if twin.parts(root):
         _over_twin(context, root, scale)
     session = sensor.of(root)
-    if session is None or not root.mu_sensor.plot:
+    # It ends with its connection or the file that is replayed: what stands there is always of this moment.
+    if session is None or not session.running or not root.mu_sensor.plot:
         return
     traces = session.frozen or session.traces
     if traces is not None:

@@ -58,7 +58,9 @@ def _shape(root: Any) -> _Shape:
     motion = motion_parts.motion_of(root)
     if motion is None:
         raise InputError(
-            "there is no simulated motion to bend the twin by", str(studies.folder_of(root)), "simulate first"
+            "there is no simulated motion to bend the twin by",
+            str(studies.results_folder(root)),
+            "simulate first",
         )
     cut = bool(root.mu_motion.cut and motion.halved)
     kept = _shapes.get((motion.folder, cut))

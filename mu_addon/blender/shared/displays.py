@@ -19,15 +19,26 @@ EVIDENCE = "mu_evidence_part"
 """Marks the objects that show measured motion, see `evidence.motion`."""
 CHECK = "mu_check"
 """Marks the objects that show what a print check found, see `printing.marks`."""
+LAYER = "mu_layer"
+"""Marks the object that shows a layer of the print, see `printing.layer`."""
 LEGEND = "mu_legend"
 """Marks the objects of a legend in the scene, see `results.legend_object`."""
 TWIN = "mu_twin"
 """Marks the objects that move as the real unit does, see `sensor.twin`."""
 GRIPPER = "mu_grip"
 """Marks the cube of a gripper and what plays its grasp, see `gripper.object`."""
-MARKS = (PART, MOTION, EVIDENCE, CHECK, LEGEND, TWIN, GRIPPER)
+MARKS = (PART, MOTION, EVIDENCE, CHECK, LAYER, LEGEND, TWIN, GRIPPER)
 OWNER = "mu_of"
 """On each: UUID of the unit or gripper that it belongs to."""
+
+ON_UNIT = "mu_on_unit"
+"""On a motion's object that is not seen itself: the unit shows it in its own place."""
+
+
+def on_unit(root: Any) -> list[Any]:
+    """The objects whose motion a unit shows in its own place, by name."""
+    found = (child for child in root.children if child.get(MOTION) and child.get(ON_UNIT))
+    return sorted(found, key=lambda child: str(child.name))
 
 
 def uuid_of(root: Any) -> str:

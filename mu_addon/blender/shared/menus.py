@@ -65,7 +65,7 @@ def _object(self, context):
 
 
 class MU_MT_more(bpy.types.Menu):
-    """Sample scene, node groups for curves of your own, and the asset browser"""
+    """Sample scene, gripper, node groups for curves of your own, and the asset browser"""
 
     bl_idname = "MU_MT_more"
     bl_label = "More"

@@ -10,6 +10,7 @@ import bpy
 from ...errors import MuError
 from ..unit.object import active_root
 from .displays import editable
+from .wording import in_panel
 
 NO_UNIT = "Select a Monolithic Unit, or add one: Add > Mesh > Monolithic Unit"
 
@@ -60,7 +61,7 @@ def reports_errors(execute):
         try:
             return execute(self, context)
         except MuError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, in_panel(str(error)))
             return {"CANCELLED"}
 
     return reported

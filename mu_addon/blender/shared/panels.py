@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 
 from ...design.parameters import SECTIONS
 from ...design.quantity import Description, describe
@@ -20,6 +21,19 @@ PLACES = {
     "wall": "simulate",
     "print": "print",
 }
+FIRST = {
+    "chambers": ("count", "cell_mm", "bladder_diameter_mm", "neck_diameter_mm", "wall_mm"),
+    "lattice": (
+        "kind",
+        "cells_x",
+        "cells_y_minus",
+        "cells_y_plus",
+        "junction_diameter_mm",
+        "midspan_diameter_mm",
+    ),
+    "waveguide": ("row", "well_pitch_mm"),
+}
+"""Parameters of a section that are always seen; its others are folded. One that is not named has none."""
 CHARACTERS = 34
 """Letters in one line of a panel of usual width: labels do not wrap."""
 
@@ -101,13 +115,31 @@ def parameter(column, root, section: str, d: Description) -> None:
 
 
 def parameters(layout, root, place: str) -> None:
-    """Fields of every section that belongs to a place."""
+    """Fields of every section that belongs to a place; those that are seldom changed folded below it."""
     props = root.mu_unit
+    folded = []
     for section in SECTIONS:
         if PLACES.get(section.section, "design") == place:
             group = getattr(props, section.section)
             column = layout.column(align=True)
             shown = offered(group.law, group.friction_share) if section is Wall else None
+            first = FIRST.get(section.section)
             for d in describe(section):
-                if shown is None or d.name in shown:
+                if first is not None and d.name not in first:
+                    folded.append((section.section, d))
+                elif shown is None or d.name in shown:
                     parameter(column, root, section.section, d)
+    if folded:
+        _folded(layout, root, place, folded)
+
+
+def _folded(layout, root, place: str, fields: Sequence[tuple[str, Description]]) -> None:
+    """A fold with fields; its head is red while one of them breaks a rule."""
+    header, body = layout.panel(f"MU_more_{place}", default_closed=True)
+    found = broken(root)
+    header.alert = found is not None and any((section, d.name) in found.fits for section, d in fields)
+    header.label(text="More", icon="ERROR" if header.alert else "NONE")
+    if body:
+        column = body.column(align=True)
+        for section, d in fields:
+            parameter(column, root, section, d)

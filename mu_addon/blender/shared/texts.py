@@ -1,8 +1,6 @@
-"""How names and errors of the core are written in panels."""
+"""How names of the core are written in panels."""
 
 from __future__ import annotations
-
-from ...errors import MuError
 
 
 def readable(name: str) -> str:
@@ -18,8 +16,3 @@ def sentence(text: str) -> str:
 def path_symbol(name: str) -> str:
     """The name of a sensor path with its Greek letter: "alpha4" becomes "α4"."""
     return name.replace("alpha", "α")
-
-
-def error_text(error: MuError) -> str:
-    """What happened, where, and what to do, a line each."""
-    return "\n".join(text for text in (error.what, error.where, error.remedy) if text)

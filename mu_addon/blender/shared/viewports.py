@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import bpy
+import numpy as np
+from mathutils import Vector
+
+LOWER, SENSOR_MM = 0.6, 72.0
+"""Height of a 3D view by its width, as it mostly is, and the width in mm of its camera's sensor."""
 
 
 def areas() -> Iterator[Any]:
@@ -14,6 +19,35 @@ def areas() -> Iterator[Any]:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 yield area
+
+
+def frame(objects: Iterable[Any]) -> None:
+    """Bring objects into every 3D view, each from its own side; in background too: so a file opens framed."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    evaluated = [obj.evaluated_get(depsgraph) for obj in objects]
+    corners = np.array([obj.matrix_world @ Vector(c) for obj in evaluated for c in obj.bound_box])
+    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
+    radius = float(np.linalg.norm(corners - middle, axis=1).max())
+    for area in areas():
+        space = area.spaces.active
+        view = space.region_3d
+        view.view_location = middle
+        # Half the angle of the view is that of its width; it is lower than wide.
+        view.view_distance = radius / (LOWER * SENSOR_MM / (2.0 * space.lens))
+        space.clip_start = min(space.clip_start, view.view_distance / 100.0)
+        space.clip_end = max(space.clip_end, 10.0 * view.view_distance)
+
+
+def frame_selected(context: Any) -> None:
+    """Bring what is selected into the 3D view: a scene may be metres wide, and a unit is 75 mm tall."""
+    if bpy.app.background:
+        return
+    area = context.area if context.area and context.area.type == "VIEW_3D" else None
+    area = area or next((a for a in context.screen.areas if a.type == "VIEW_3D"), None)
+    if area is not None:
+        region = next(r for r in area.regions if r.type == "WINDOW")
+        with context.temp_override(area=area, region=region):
+            bpy.ops.view3d.view_selected()
 
 
 def redraw() -> None:

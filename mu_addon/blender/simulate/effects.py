@@ -15,7 +15,7 @@ from ..shared.texts import readable
 from ..unit.fields import exact
 
 if TYPE_CHECKING:
-    from ...usecases.simulate_and_place.static_effects import StaticEffects
+    from ...usecases.simulate_and_place.named_effects import NamedEffects
 
 WEIGHT = "gravity"
 """The effect that depends on the direction of gravity."""
@@ -71,9 +71,9 @@ def _direction(root: Any) -> float:
     return exact(root.mu_unit.study.orientation_deg) % 360.0
 
 
-def static_effects(root: Any) -> StaticEffects:
+def named_effects(root: Any) -> NamedEffects:
     """The effects as the simulation takes them; raises InputError."""
-    from ...usecases.simulate_and_place.static_effects import StaticEffects
+    from ...usecases.simulate_and_place.named_effects import NamedEffects
 
     found = inputs(root)
-    return StaticEffects(found.get("effects", {}), found.get("orientation_deg", 0.0), "effects of the unit")
+    return NamedEffects(found.get("effects", {}), found.get("orientation_deg", 0.0), "effects of the unit")

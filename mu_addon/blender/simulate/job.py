@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import bpy
@@ -40,9 +39,8 @@ def plan_of(root: Any) -> list[tuple[str, float]]:
         if settings.paths == "graph":
             names += [name for name in FULL_S if "path" in name]
     names.append("report")
-    found = studies.findings(root)
-    known = found.summary.get("seconds") if found is not None else None
-    taken = known if isinstance(known, dict) and set(names) <= set(known) else {}
+    alike = (run.summary.get("seconds") for run in studies.runs_of(root) if run.detail == settings.detail)
+    taken = next((s for s in alike if isinstance(s, dict) and set(names) <= set(s)), {})
 
     def seconds(name: str) -> float:
         value = taken.get(name)
@@ -54,7 +52,12 @@ def plan_of(root: Any) -> list[tuple[str, float]]:
 
 
 SIMULATION = JobKind(
-    "simulate", lambda root: root.mu_unit.uuid, studies.folder_of, "simulation", heavy=True, plan_of=plan_of
+    "simulate",
+    lambda root: root.mu_unit.uuid,
+    studies.results_folder,
+    "simulation",
+    heavy=True,
+    plan_of=plan_of,
 )
 
 
@@ -90,16 +93,8 @@ def job_of(root: Any) -> Job:
         protocol=protocol_of(bpy.path.abspath(settings.protocol) if settings.protocol else None),
         body=body,
         obstacles=obstacles.rigid_bodies(root, unit),
-        effects=effects.static_effects(root),
+        effects=effects.named_effects(root),
         stages=stages,
         solver=SolverChoice(settings.solver, settings.device),
         **extra,
     )
-
-
-def write_inputs(root: Any, folder: Path) -> None:
-    """Write what the unit's simulation is asked to do into its folder; raises InputError and OutputError."""
-    job = job_of(root)
-    from ...usecases.simulate_and_place.job import write_study
-
-    write_study(job, folder)

@@ -4,13 +4,22 @@
 
 import bpy
 
+from ...usecases.simulate_and_place import history
 from ..jobs import start_child
-from ..jobs.operators import job_operators
+from ..jobs.operators import FILES, job_operators
 from ..shared import viewports
 from ..shared.operators import ValidUnitOperator, reports_errors
 from ..unit import object as unit_object
 from . import study_folder as studies
-from .job import SIMULATION, write_inputs
+from .job import SIMULATION, job_of
+
+
+def _file_of(root, what):
+    """A file of the run that is shown; of one that is computed or has just been, what its process said."""
+    child = SIMULATION.child(root)
+    if what in ("log", "errors") and child is not None:
+        return child.folder.parent / FILES[what]
+    return studies.results_folder(root) / FILES[what]
 
 
 class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
@@ -36,12 +45,13 @@ class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
     def execute(self, context):
         root = unit_object.active_root(context)
         study = root.mu_unit.study
-        SIMULATION.start(
-            root,
-            studies.assign_folder(root),
-            lambda folder: write_inputs(root, folder),
-            ["--solver", study.solver, "--device", study.device],
-        )
+        job = job_of(root)
+        # Now: it comes with the solver's packages.
+        from ...usecases.simulate_and_place.job import write_study
+
+        folder, job = history.place_of(studies.assign_folder(root), job)
+        options = ["--solver", study.solver, "--device", study.device]
+        SIMULATION.start(root, folder, lambda folder: write_study(job, folder), options)
         viewports.redraw()
         return {"FINISHED"}
 
@@ -54,6 +64,7 @@ CLASSES = (
         "simulation",
         kept="finished stages are kept, and the next run continues from there",
         first="simulate first",
+        path_of=_file_of,
     ),
 )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ...meshing.gmsh_libraries import install_libraries, missing_libraries
 from ..jobs import start_child
 from ..jobs.panel import job_state, start_button
 from ..shared.panels import UnitPanel, parameters, wrapped
@@ -27,6 +28,11 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
                 "work without. Install the extension built for this Blender and system.",
                 "ERROR",
             )
+        elif lacking := missing_libraries():
+            text = (
+                f"Without {', '.join(lacking)} of this system a unit is meshed more slowly and less exactly."
+            )
+            wrapped(layout.box(), f"{text} To have it, {install_libraries(lacking)}", "ERROR")
         study = root.mu_unit.study
         layout.prop(study, "command")
         if study.command == "place":
@@ -46,6 +52,9 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
         header.label(text="Material")
         if body:
             parameters(body, root, "simulate")
+        header, body = layout.panel("MU_computing", default_closed=True)
+        header.label(text="Solver and Folder")
+        if body:
             body.prop(study, "solver")
             body.prop(study, "device")
             body.prop(study, "folder")

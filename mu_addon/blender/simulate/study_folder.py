@@ -1,9 +1,8 @@
-"""Where a unit's results lie, and whether they belong to the unit as it is now."""
+"""Where a unit's runs lie, which one is shown, and whether it is of the unit as it is now."""
 
 from __future__ import annotations
 
 import csv
-import hashlib
 import re
 from pathlib import Path
 from typing import Any
@@ -12,17 +11,14 @@ import attrs
 import bpy
 import numpy as np
 
-from ...design.body import MOST_BYTES
-from ...design.parameters import read_unit
-from ...design.rigid_body import read_rigid_bodies
 from ...errors import MuError
-from ...reading import file_bytes, parse_json
-from ...usecases.simulate_and_place import study_file
+from ...usecases.simulate_and_place import history
+from ...usecases.simulate_and_place.history import Run
 from ..body import state as bodies
 from ..obstacles import state as obstacles
 from ..shared.compat import user_folder
 from ..shared.file_cache import FileCache
-from ..unit.properties import shape_hash, to_unit
+from ..unit.properties import to_unit
 from . import effects
 
 CONTACT = "contact.csv"
@@ -30,35 +26,35 @@ CONTACT = "contact.csv"
 
 @attrs.frozen
 class Findings:
-    """What a study's summary.json says; `stale` where the unit was changed since it was computed."""
+    """What the shown run has found; `stale` where the unit was changed since it was computed."""
 
-    folder: Path
-    status: str
+    run: Run
     stale: bool
-    summary: dict[str, Any]
 
     @property
-    def angles(self) -> list[tuple[float, float]]:
-        """Pairs (pressure in kPa, bending angle in degrees) by pressure."""
-        found = self.summary.get("angle_deg") or {}
-        return sorted((float(p), float(a)) for p, a in found.items())
+    def summary(self) -> dict[str, Any]:
+        """Its summary.json."""
+        return self.run.summary
+
+    @property
+    def status(self) -> str:
+        """How far it came: `complete`, `running`, or why it stopped."""
+        return str(self.run.summary.get("status", ""))
 
     @property
     def quick(self) -> bool:
         """Whether it was computed with linear elements, which lock in thin walls."""
-        mesh = (self.summary.get("study") or {}).get("mesh") or {}
-        return mesh.get("order") == 1
-
-    def ranking(self, rule: str) -> list[tuple[str, float]]:
-        """Pairs (path, J_hat in mm) of one rule, the best first."""
-        found = (self.summary.get("J_hat_mm") or {}).get(rule) or {}
-        return sorted(((name, float(j)) for name, j in found.items()), key=lambda pair: pair[1])
+        return self.run.detail == "quick"
 
     @property
-    def rule(self) -> str:
-        """The rule whose best path is the answer, or nothing where no paths were ranked."""
-        rules = list(self.summary.get("chosen") or {})
-        return "volume_fraction" if "volume_fraction" in rules else (rules or [""])[0]
+    def angles(self) -> list[tuple[float, float]]:
+        """Pairs (pressure in kPa, bending angle in degrees) by pressure."""
+        return self.run.angles
+
+    @property
+    def ranking(self) -> list[tuple[str, float]]:
+        """Pairs (path, J_hat in mm), the best first."""
+        return self.run.ranking
 
 
 @attrs.frozen(eq=False)
@@ -71,7 +67,10 @@ class ContactForce:
 
 
 def folder_of(root: Any) -> Path:
-    """Folder of the unit's study: the one it names, else beside the .blend file, else the user's own."""
+    """The unit's own folder, where its runs and what else is made of it lie.
+
+    The one that it names, else one beside the .blend file, else one in the user's own folder.
+    """
     props = root.mu_unit
     return default_folder(props.study.folder, props.title, props.uuid)
 
@@ -82,59 +81,101 @@ def default_folder(named: str, title: str, uuid: str) -> Path:
         return Path(bpy.path.abspath(named))
     name = f"{re.sub(r'[^A-Za-z0-9._-]+', '-', title).strip('-.') or 'unit'}-{uuid[:8]}"
     if bpy.data.filepath:
-        blend = Path(bpy.data.filepath)
-        return blend.with_name(f"{blend.stem}.mu") / name
+        return beside(Path(bpy.data.filepath), name)
     return user_folder("studies") / name
 
 
+def beside(blend: Path, name: str) -> Path:
+    """The folder of a unit, by its own name, beside a .blend file."""
+    return blend.with_name(f"{blend.stem}.mu") / name
+
+
 def assign_folder(root: Any) -> Path:
-    """The unit's study folder, stored with the unit from now on, relative to the .blend file if possible."""
+    """The unit's folder, stored with the unit from now on, relative to the .blend file if possible."""
     folder = folder_of(root)
     if not root.mu_unit.study.folder:
         root.mu_unit.study.folder = relative(folder)
     return folder
 
 
-_findings: FileCache[tuple[dict[str, Any], Any]] = FileCache()
+_runs: FileCache[Run] = FileCache()
 _forces: FileCache[list[ContactForce]] = FileCache()
 
 
-def findings(root: Any) -> Findings | None:
-    """What the unit's study has found, or None where there is none; read again only when files change."""
-    folder = folder_of(root)
-    names = ("summary.json", "unit.toml", study_file.NAME, "body.obj", study_file.FILES["obstacles"])
-    known = _findings.read([folder / name for name in names], lambda: _read_findings(folder))
-    if known is None:
-        return None
-    summary, inputs = known
+def runs_of(root: Any) -> list[Run]:
+    """Every run of the unit, the latest first; each is read again only when its files change."""
+    found = (
+        _runs.read(history.files_of(folder), lambda folder=folder: history.read_run(folder))
+        for folder in history.folders(folder_of(root))
+    )
+    return history.ordered(run for run in found if run is not None)
+
+
+def run_by_key(root: Any, key: str) -> Run | None:
+    """The unit's run of that key, or None where there is none any more."""
+    return next((run for run in runs_of(root) if run.key == key), None)
+
+
+def design_of(root: Any) -> str:
+    """Hash of what a simulation of the unit would be of, see `history.design_key`; nothing if of nothing."""
     try:
         unit = to_unit(root.mu_unit)
         body = bodies.envelope_in(root, unit)
         own = "" if body is None else body.hash
-        stale = (shape_hash(unit), own, obstacles.inputs(root), effects.inputs(root)) != inputs
+        return history.design_key(unit, own, obstacles.inputs(root), effects.inputs(root))
     except MuError:
-        stale = True
-    return Findings(folder, str(summary.get("status", "")), stale, summary)
-
-
-def _read_findings(folder: Path) -> tuple[dict[str, Any], Any]:
-    summary = parse_json(file_bytes(folder / "summary.json"), "summary.json")
-    unit = shape_hash(read_unit(folder / "unit.toml"))
-    inputs = unit, _body_hash(folder), _obstacles(folder), _effects(folder)
-    return summary if isinstance(summary, dict) else {}, inputs
-
-
-def _body_hash(folder: Path) -> str:
-    """Hash of the body that a study was made with, as `Body.hash` has it; nothing where there was none."""
-    try:
-        return hashlib.sha256(file_bytes(folder / "body.obj", MOST_BYTES)).hexdigest()
-    except OSError:
         return ""
+
+
+def shown_run(root: Any) -> Run | None:
+    """The run whose results are shown: the one that was chosen, else the best one of the unit as it is now.
+
+    A choice holds until the unit changes. Where no run is of the unit as it is now, it is the run that was
+    shown last, which is then stale.
+    """
+    return _shown(root, runs_of(root), design_of(root))
+
+
+def _shown(root: Any, found: list[Run], design: str) -> Run | None:
+    study = root.mu_unit.study
+    last = next((run for run in found if run.key == study.run), None)
+    if last is not None and study.run_design == design:
+        return last
+    ready = any(run.design == design and run.has_results for run in found)
+    if last is not None and last.has_results and not ready:
+        return last
+    return history.best_of(found, design)
+
+
+def choose(root: Any, run: Run) -> None:
+    """Show the results of a run, until the unit changes."""
+    study = root.mu_unit.study
+    study.run, study.run_design = run.key, design_of(root)
+
+
+def remember(root: Any) -> None:
+    """Keep which run is shown, so that it stays where the unit has none of its own."""
+    run, study = shown_run(root), root.mu_unit.study
+    if run is not None and study.run != run.key:
+        study.run, study.run_design = run.key, ""
+
+
+def results_folder(root: Any) -> Path:
+    """Folder of the run that is shown; where there is none, the folder that runs will lie in."""
+    run = shown_run(root)
+    return folder_of(root) if run is None else run.folder
+
+
+def findings(root: Any) -> Findings | None:
+    """What the shown run has found, or None where nothing was simulated yet."""
+    design = design_of(root)
+    run = _shown(root, runs_of(root), design)
+    return Findings(run, run.design != design) if run is not None and run.summary else None
 
 
 def contact_forces(root: Any) -> list[ContactForce]:
     """Force of the study's unit on every obstacle; empty where there is none."""
-    path = folder_of(root) / CONTACT
+    path = results_folder(root) / CONTACT
     return _forces.read([path], lambda: _read_forces(path)) or []
 
 
@@ -146,21 +187,6 @@ def _read_forces(path: Path) -> list[ContactForce]:
         force = np.linalg.norm([float(row[f"force_{axis}_N"]) for axis in "xyz"])
         found.setdefault(Path(row["obstacle"]).stem, []).append((float(row["time_s"]), float(force)))
     return [ContactForce(name, *np.array(values).T) for name, values in found.items()]
-
-
-def _effects(folder: Path) -> dict[str, Any]:
-    """Effects that a study was made with, as `effects.inputs` has them; raises InputError."""
-    asked = (study_file.read(folder) or {}).get("simulate", {})
-    return {name: asked[name] for name in effects.INPUTS if name in asked}
-
-
-def _obstacles(folder: Path) -> list[tuple[str, float]]:
-    """Obstacles that a study was made with, as `obstacles.inputs` has them; raises InputError."""
-    asked = (study_file.read(folder) or {}).get("simulate", {})
-    if "obstacles" not in asked:
-        return []
-    met = read_rigid_bodies(folder / study_file.FILES["obstacles"], asked.get("friction"))
-    return sorted((rigid.body.hash, rigid.friction) for rigid in met)
 
 
 def relative(path: Path) -> str:

@@ -11,7 +11,8 @@ from ...design.nearest import nearest_fit
 from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
 from ...errors import InputError, MuError
-from .fields import exact, label
+from ..shared.wording import in_panel
+from .fields import exact
 from .properties import section_of, to_unit
 
 Place = tuple[str, str]
@@ -44,16 +45,7 @@ def words(error: MuError) -> str:
     """What an error says, with parameters by the names of their fields, and true lengths."""
     true = getattr(error, "true_size", None) or error
     lines = [true.what] if isinstance(error, InputError) and _places(error.where) else [true.what, true.where]
-    return "\n".join(_in_panel(text) for text in (*lines, true.remedy) if text)
-
-
-def _in_panel(text: str) -> str:
-    text = re.sub(r"\[\w+\] ", "", text)
-    return re.sub(r"\b[a-z]+(?:_[a-zA-Z]+)+\b", lambda m: _label(m[0]), text)
-
-
-def _label(name: str) -> str:
-    return label(_KNOWN[name][0][1]) if name in _KNOWN else name
+    return "\n".join(in_panel(text) for text in (*lines, true.remedy) if text)
 
 
 def _places(where: str) -> list[Place]:

@@ -22,8 +22,20 @@ def exact(value: float) -> float:
     return float(str(np.float32(value)))
 
 
+_NAMES = {
+    "count": "Chambers",
+    "row": "Anchor Row",
+    "cells_y_minus": "Cells -Y",
+    "cells_y_plus": "Cells +Y",
+    "allow_symmetric": "Allow Symmetry",
+}
+"""Parameters whose own names say too little beside a field."""
+
+
 def label(d: Description) -> str:
     """Name of a parameter for a panel: `bladder_diameter_mm` becomes "Bladder Diameter"."""
+    if d.name in _NAMES:
+        return _NAMES[d.name]
     words = d.name.split("_")
     unit = words.pop() if words[-1] in UNITS else ""
     text = " ".join(word if word.isupper() else word.capitalize() for word in words)

@@ -24,11 +24,14 @@ from ..path import ranking
 from ..preview import materials, nodes, skeletons
 from ..preview.nodes import unit as unit_group
 from ..shared import displays, scene_units, updates
+from ..shared.compat import set_modifier_input
 from ..steps import state as stack
 from . import broken, drawing
 from .properties import from_unit, shape_hash, to_unit
 
-SOLID = "solid"
+SOLID, RESULT = "solid", "result"
+REBUILT = updates.Signal()
+"""Sent with a unit whose preview was rebuilt: its parameters may have changed."""
 
 
 def roots() -> list[Any]:
@@ -46,12 +49,19 @@ def root_of(obj: Any) -> Any | None:
 
 
 def active_root(context: Any) -> Any | None:
-    """The unit to work on: that of the active object, or the only one there is."""
+    """The unit to work on: that of the active object, or the only one there is if no gripper is active."""
     found = root_of(context.object)
-    if found is None:
+    if found is None and not _of_gripper(context.object):
         every = [o for o in context.scene.objects if o.mu_unit.uuid]
         found = every[0] if len(every) == 1 else None
     return found
+
+
+def _of_gripper(obj: Any | None) -> bool:
+    """Whether an object is a gripper or a part of one."""
+    while obj is not None and not obj.mu_gripper.uuid:
+        obj = obj.parent
+    return obj is not None
 
 
 def by_uuid(name: str) -> Any | None:
@@ -136,6 +146,7 @@ def rebuild(root: Any) -> bool:
     if props.trouble != trouble:
         props.trouble = trouble
     props.built = _fingerprint(root)
+    REBUILT.send(root)
     return not trouble
 
 
@@ -147,7 +158,7 @@ def _fingerprint(root: Any) -> str:
     except InputError as error:
         return error.what
     steps = "".join(f"{entry.name}{entry.muted:d}{entry.shown:d}" for entry in props.stack)
-    known = (ranking.ranked(root), ranking.free(root)) if props.candidates else ()
+    known = (ranking.known(root), ranking.free(root)) if props.candidates else ()
     shown = shape_hash(unit), props.path, props.cut, props.candidates, steps, bodies.fingerprint(root), known
     return "|".join(map(str, shown))
 
@@ -175,7 +186,7 @@ def separate(root: Any) -> None:
 
 
 def show(root: Any) -> None:
-    """Show preview or solid, as the unit's properties say; without a solid, the preview."""
+    """Show preview, solid or result, as the unit's properties say; where that is not there, the preview."""
     props = root.mu_unit
     if root.mode == "EDIT" or props.preview is None:
         return
@@ -190,6 +201,15 @@ def show(root: Any) -> None:
     skinned = mesh == props.preview
     if modifier.show_viewport != skinned:
         modifier.show_viewport = modifier.show_render = skinned
+    played = displays.on_unit(root) if props.show == RESULT else []
+    set_modifier_input(modifier, unit_group.SHOW_RESULT, bool(played))
+    for name, part in zip(unit_group.RESULTS, [*played, None, None], strict=False):
+        set_modifier_input(modifier, name, part)
+
+
+def shows_result(root: Any) -> bool:
+    """Whether the motion of a study is seen in the unit's own place."""
+    return root.mu_unit.show == RESULT and bool(displays.on_unit(root))
 
 
 def put_solid(root: Any, solid: Any, unit: Unit) -> Any:
@@ -203,11 +223,13 @@ def put_solid(root: Any, solid: Any, unit: Unit) -> Any:
     mesh["mu_body"] = bodies.fingerprint(root)
     mesh["mu_quality"] = solid.quality
     mesh["mu_gates"] = json.dumps(attrs.asdict(solid.gates))
+    # One that is shown is removed by `show`, and then no more to be asked for its users.
+    beside = old if old != root.data else None
     with updates.paused():
         root.mu_unit.solid, root.mu_unit.show = mesh, SOLID
     show(root)
-    if old is not None and not old.users:
-        bpy.data.meshes.remove(old)
+    if beside is not None and not beside.users:
+        bpy.data.meshes.remove(beside)
     return mesh
 
 

@@ -10,7 +10,7 @@ from ...design.parameters import Unit
 from ...design.quantity import describe
 from ...errors import InputError
 from ..scene import landing
-from ..shared import scene_units
+from ..shared import scene_units, viewports
 from ..shared.operators import NO_UNIT, UnitOperator, reports_errors
 from . import object as unit_object
 from . import presets
@@ -75,19 +75,9 @@ class MU_OT_add(bpy.types.Operator):
             bpy.ops.object.mode_set(mode="OBJECT")
         root = unit_object.create(context, core)
         landing.land(context, root)
-        if self.frame and not bpy.app.background:
-            _frame(context, root)
+        if self.frame:
+            viewports.frame_selected(context)
         return {"FINISHED"}
-
-
-def _frame(context, root):
-    """Bring a unit into the 3D view: a scene may be metres wide, and a unit is 75 mm tall."""
-    area = context.area if context.area and context.area.type == "VIEW_3D" else None
-    area = area or next((a for a in context.screen.areas if a.type == "VIEW_3D"), None)
-    if area is not None:
-        region = next(r for r in area.regions if r.type == "WINDOW")
-        with context.temp_override(area=area, region=region):
-            bpy.ops.view3d.view_selected()
 
 
 class MU_OT_rebuild(UnitOperator, bpy.types.Operator):

@@ -131,9 +131,14 @@ class MU_PG_study(bpy.types.PropertyGroup):
     )
     # model.toml of the effects that a diagnosis named beside the unit's parameters, see `effects`.
     effects: StringProperty(options={"HIDDEN"})
+    # The run whose results were shown last, and the design at which it was chosen, see `study_folder`.
+    run: StringProperty(options={"HIDDEN"})
+    run_design: StringProperty(options={"HIDDEN"})
+    # The run that the shown one is compared with.
+    against: StringProperty(options={"HIDDEN"})
     folder: StringProperty(
         name="Study Folder",
-        description="Folder of this unit's results. Empty: beside the .blend file, or the user's folder",
+        description="Folder of this unit's runs. Empty: beside the .blend file, or the user's folder",
         subtype="DIR_PATH",
         options=BESIDE_BLEND_FILE,
     )
@@ -190,15 +195,16 @@ class MU_PG_unit(bpy.types.PropertyGroup):
         ),
         "candidates": BoolProperty(
             name="Show Candidates",
-            description="Draw every candidate path beside the lattice, to compare and to pick one by a click",
+            description="Draw every candidate path on the lattice, to compare and to choose one by a click",
             update=_changed,
         ),
         "show": EnumProperty(
             name="Show",
-            description="Whether the unit is seen as it is being designed or as it will be printed",
+            description="The unit as it is being designed, as it will be printed, or as it moves",
             items=[
                 ("preview", "Preview", "Skeleton of the design, follows every slider"),
                 ("solid", "Solid", "The printable solid that was built last"),
+                ("result", "Result", "The motion of the shown run, coloured, in the unit's own place"),
             ],
             default="preview",
             update=_view_changed,

@@ -9,15 +9,15 @@ from . import layers
 from .drain import Chambers
 from .finding import MOST_PLACES, Finding, Points, Severity, clustered, counted
 from .printer import Printer
-from .voxels import VoxelColumns
+from .voxels import VoxelRows
 
 
 def build_findings(
-    built: VoxelColumns, chambers: Chambers, printer: Printer
+    built: VoxelRows, chambers: Chambers, printer: Printer
 ) -> tuple[list[Finding], dict[str, float]]:
     """Findings on islands, cups, overhangs and bridges of a build, and the volumes of its cups in ml by name.
 
-    built: the part's columns along the build direction, cells one layer high; chambers: to tell islands
+    built: the part's cells along the build direction, one layer high; chambers: to tell islands
     within them from those outside. The limits are the printer's.
     """
     begun = layers.islands(built, layers.regions(built, free=False))
@@ -78,7 +78,12 @@ def _cups(closed: layers.Cups, printer: Printer) -> Finding:
         int(large.sum()),
         limit.source,
         limit.assumed,
-        "print with the opening toward the platform: see the build directions" if large.any() else "",
+        (
+            "print with the opening toward the platform: see the build directions; or vent it: "
+            "export --vent-along"
+        )
+        if large.any()
+        else "",
     )
 
 

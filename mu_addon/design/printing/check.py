@@ -24,7 +24,7 @@ from .nominal import against_nominal
 from .orientation import Build, fits, orientations
 from .printer import Printer
 from .thickness import cast_rays, samples
-from .voxels import frame_along, voxel_columns
+from .voxels import frame_along, voxel_rows
 from .walls import chamber_walls, narrowest, thinnest
 
 Array = NDArray[np.float64]
@@ -68,6 +68,8 @@ def check(
     stages: Collection[str] = STAGES,
     stage: Stage = nullcontext,
     nominal: tuple[Vertices, Triangles] | None = None,
+    verdict: Callable[[PrintCheck], None] | None = None,
+    share: Callable[[float], None] | None = None,
 ) -> PrintCheck:
     """Printability check of a surface of vertices (n, 3) in mm and triangles (m, 3), as its STL is read back.
 
@@ -75,7 +77,9 @@ def check(
     from the platform. A surface that is not closed, inside out or of the wrong size is examined no further.
     `stages` may leave some out: layers need chambers, directions need chambers and thickness. stage: context
     that is entered, with its name, for each stage. nominal: surface of the unit's own solid, which a surface
-    from elsewhere is compared with. Raises InputError for a window that does not fit the unit.
+    from elsewhere is compared with. verdict: called with the result before build directions are compared,
+    which adds no finding; share: called with the share of them that is done. Raises InputError for a window
+    that does not fit the unit.
     """
     vertices, triangles = stl_surface(stl_bytes(vertices, triangles))
     up = np.asarray(direction, float) / np.linalg.norm(direction)
@@ -88,14 +92,21 @@ def check(
         figures[f"{axis}_mm"] = extent
     if unit is not None:
         found += _drawing(unit, window, printer)
+
+    def unexamined(sound: bool) -> PrintCheck:
+        short = PrintCheck([*found, _unexamined(sound)], figures, [])
+        if verdict is not None:
+            verdict(short)
+        return short
+
     if not sound or any(f.severity == "error" for f in sized):
-        return PrintCheck([*found, _unexamined(sound)], figures, [])
+        return unexamined(sound)
 
     from manifold3d import Error, Manifold, Mesh64
 
     solid = Manifold(Mesh64(vertices, triangles.astype(np.uint64)))
     if solid.status() != Error.NoError:
-        return PrintCheck([*found, _unexamined(False)], figures, [])
+        return unexamined(False)
     if nominal is not None:
         found += against_nominal(vertices, triangles, nominal)
     figures["volume_ml"] = solid.volume() / 1e3
@@ -113,7 +124,7 @@ def check(
     if "chambers" in stages:
         with stage("chambers and drains"):
             step = _step(STEP, vertices)
-            pockets = chambers(distance_field(voxel_columns(*seen, step)))
+            pockets = chambers(distance_field(voxel_rows(*seen, step)))
             found += drainage_findings(solid, pockets, unit, printer)
             figures["chamber_ml"] = sum(p.volume for p in pockets.found) / 1e3
             if "thickness" in stages:
@@ -122,15 +133,19 @@ def check(
                 found += chamber_walls(surface, inward, lit & ~other, printer)
     if "layers" in stages:
         with stage("layers"):
-            built = voxel_columns(*seen, _step(STEP, vertices), printer["layer_mm"], frame_along(up))
+            built = voxel_rows(*seen, _step(STEP, vertices), printer["layer_mm"], frame_along(up))
             more, ml = build_findings(built, pockets, printer)
             found += more
             figures |= ml
+    if verdict is not None:
+        verdict(PrintCheck(found, figures, []))
     builds: list[Build] = []
     if "directions" in stages:
         with stage("build directions"):
             coarse = _step(max(min(COARSE, 0.9 * float(inward.distance.min())), STEP), vertices)
-            builds = orientations(*seen, surface, lit, coarse, printer["overhang_deg"], printer.room, up)
+            builds = orientations(
+                *seen, surface, lit, coarse, printer["overhang_deg"], printer.room, up, share
+            )
     return PrintCheck(found, figures, builds)
 
 

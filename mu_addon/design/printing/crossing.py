@@ -24,12 +24,22 @@ def crossings(vertices: Vertices, triangles: Triangles) -> Points:
     overlap within one plane is not found, nor penetration by less than DEPTH mm.
     """
     pairs = near_pairs(vertices[triangles])
-    shared = (triangles[pairs[:, 0]][:, :, None] == triangles[pairs[:, 1]][:, None, :]).sum(axis=(1, 2))
-    pairs = pairs[shared < 2]
+    normals, depth = _planes(vertices[triangles])
+    level = np.einsum("mj,mj->m", normals, vertices[triangles[:, 0]])
     found = []
     for part in np.array_split(pairs, len(pairs) // _PAIRS_AT_ONCE + 1):
-        one, other = part.T
-        found += [_through(vertices, triangles, one, other), _through(vertices, triangles, other, one)]
+        for one, other in (part.T, part[:, ::-1].T):
+            # Most pairs touch and go no farther: the one lies on one side of the other's plane.
+            high = np.full(len(one), -np.inf)
+            low = np.full(len(one), np.inf)
+            for corner in triangles[one].T:
+                height = np.einsum("pj,pj->p", normals[other], vertices[corner]) - level[other]
+                np.maximum(high, height, out=high)
+                np.minimum(low, height, out=low)
+            across = (high > 0.5 * depth[other]) & (low < -0.5 * depth[other])
+            one, other = one[across], other[across]
+            shared = (triangles[one][:, :, None] == triangles[other][:, None, :]).sum(axis=(1, 2))
+            found.append(_through(vertices, triangles, one[shared < 2], other[shared < 2]))
     return np.concatenate(found)
 
 
@@ -65,27 +75,36 @@ def near_pairs(corners: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.concatenate(pairs)
 
 
+def _planes(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Unit normals (m, 3) of triangles, corners (m, 3, 3), and how deep (m,) in mm one passes through them.
+
+    The normal of a triangle without area is 0, and nothing passes through it.
+    """
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(u, v)
+    length = np.linalg.norm(normal, axis=1)
+    normal[length < 1e-12] = 0.0
+    normal /= np.maximum(length, 1e-12)[:, None]
+    longest = np.maximum.reduce([np.linalg.norm(w, axis=1) for w in (u, v, v - u)])
+    return normal, np.minimum(DEPTH, 1e-2 * longest)
+
+
 def _through(
     vertices: Vertices, triangles: Triangles, one: NDArray[np.int64], other: NDArray[np.int64]
 ) -> Points:
     """Points where edges of triangles `one` (p,) go through triangles `other` (p,)."""
     origin, second, third = np.moveaxis(vertices[triangles[other]], 1, 0)
     u, v = second - origin, third - origin
-    normal = np.cross(u, v)
-    length = np.linalg.norm(normal, axis=1)
-    flat = length < 1e-12
-    normal /= np.where(flat, 1.0, length)[:, None]
+    normal, depth = _planes(vertices[triangles[other]])
     corners = vertices[triangles[one]] - origin[:, None, :]
     height = np.einsum("pij,pj->pi", corners, normal)
-    longest = np.maximum.reduce([np.linalg.norm(w, axis=1) for w in (u, v, v - u)])
-    depth = np.minimum(DEPTH, 1e-2 * longest)
     found = []
     for k in range(3):
         n = (k + 1) % 3
         ends = triangles[one][:, [k, n]]
         common = (ends[:, :, None] == triangles[other][:, None, :]).any(axis=(1, 2))
         a, b = height[:, k], height[:, n]
-        across = (a * b < 0.0) & (np.minimum(np.abs(a), np.abs(b)) > depth) & ~common & ~flat
+        across = (a * b < 0.0) & (np.minimum(np.abs(a), np.abs(b)) > depth) & ~common
         i = np.flatnonzero(across)
         t = (a[i] / (a[i] - b[i]))[:, None]
         point = corners[i, k] + t * (corners[i, n] - corners[i, k])

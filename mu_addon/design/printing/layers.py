@@ -1,6 +1,6 @@
 """A part built layer by layer: islands, cups, overhangs and spans.
 
-Layers are built from the platform in the direction of the frame's third axis. In a printer whose part hangs
+Layers are built from the platform in the direction of the grid's first axis. In a printer whose part hangs
 from the platform the film below the tank closes every layer; what the part encloses against it is a cup.
 """
 
@@ -10,14 +10,10 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from .voxels import VoxelColumns
+from .runs import Runs, joined, meeting
+from .voxels import VoxelRows
 
 Array = NDArray[np.float64]
-
-_ACROSS = np.zeros((3, 3, 3), bool)
-_ACROSS[1, :, 1] = _ACROSS[:, 1, 1] = True
-_ROUND = np.zeros((3, 3, 3), bool)
-_ROUND[:, :, 1] = True
 
 
 @attrs.frozen(eq=False)
@@ -25,7 +21,7 @@ class Regions:
     """Connected regions of every layer, of solid or free cells, and which overlap from layer to layer.
 
     layer (r,): number of each region's layer; cells (r,): count of its cells; middle (r, 3): its mean, in
-    cells, see VoxelColumns.points; outside (r,): whether it reaches the edge of the grid. links (l, 2):
+    cells, see VoxelRows.points; outside (r,): whether it reaches the edge of the grid. links (l, 2):
     numbers of a region and of one in the next layer above it.
     """
 
@@ -48,12 +44,15 @@ class Islands:
 class Cups:
     """Cups, the largest first: largest sealed volumes (n,) in mm3, and places (n, 3) in mm of their middles.
 
-    sealed (n,): whether a cup never opens.
+    sealed (n,): whether a cup never opens. first, last (n, 3): middles in mm of the regions with which it
+    begins, on the platform's side, and ends.
     """
 
     volume: Array
     places: Array
     sealed: NDArray[np.bool_]
+    first: Array
+    last: Array
 
 
 @attrs.frozen(eq=False)
@@ -69,74 +68,80 @@ class Overhang:
     bridge: NDArray[np.bool_]
 
 
-def regions(columns: VoxelColumns, free: bool, at_once: int = 8_000_000) -> Regions:
+def regions(grid: VoxelRows, free: bool, at_once: int = 8_000_000) -> Regions:
     """Connected regions of every layer: free cells that touch by side, or solid ones, by side or corner.
 
-    free: which of both; at_once: largest number of cells that are held in memory at a time.
+    free: which of both; at_once: cells of the layers that are looked at together, to limit memory.
     """
-    from scipy.ndimage import label
-
-    nx, ny, levels = columns.shape
-    thick = max(1, at_once // (nx * ny))
-    layer, cells, middle, outside, links = [], [], [], [], []
-    before, begin, begin_before = None, 0, 0
-    for first in range(0, levels, thick):
-        last = min(first + thick, levels)
-        body = columns.slab(first, last) > 0
-        named, count = label(~body if free else body, _ACROSS if free else _ROUND)
-        index = np.flatnonzero(named)
-        flat = named.ravel()[index]
-        size = np.bincount(flat, minlength=count + 1)[1:]
-        at = np.unravel_index(index, named.shape)
-        sums = [np.bincount(flat, axis, count + 1)[1:] / np.maximum(size, 1) for axis in at]
-        edge = np.zeros(count + 1, bool)
-        for side in (named[0], named[-1], named[:, 0], named[:, -1]):
-            edge[np.unique(side)] = True
-        layer.append(np.rint(sums[2]).astype(np.int64) + first)
-        cells.append(size)
-        middle.append(np.stack([sums[0], sums[1], sums[2] + first], axis=1))
-        outside.append(edge[1:])
+    layers, rows, cells = grid.shape
+    thick = max(1, at_once // (rows * cells))
+    layer, size, middle, outside, links = [], [], [], [], []
+    before: tuple[Runs, NDArray[np.int64]] | None = None
+    begin = 0
+    for first in range(0, layers, thick):
+        last = min(first + thick, layers)
+        runs = grid.lines(first, last)
+        if free:
+            runs = runs.complement(first * rows, last * rows)
+        one, other = meeting(runs, runs, 1, 0 if free else 1)
+        beside = runs.line[one] % rows != rows - 1
+        count, part = joined(len(runs.line), [(one[beside], other[beside])])
+        length = runs.end - runs.start
+        at_layer, at_row = runs.line // rows, runs.line % rows
+        number = np.bincount(part, length, count)
+        centre = [at_layer, at_row, 0.5 * (runs.start + runs.end - 1)]
+        middle.append(
+            np.stack([np.bincount(part, length * x, count) / np.maximum(number, 1) for x in centre], axis=1)
+        )
+        edge = np.zeros(count, bool)
+        edge[part[(at_row == 0) | (at_row == rows - 1) | (runs.start == 0) | (runs.end == cells)]] = True
+        layer.append(np.rint(middle[-1][:, 0]).astype(np.int64))
+        size.append(np.rint(number).astype(np.int64))
+        outside.append(edge)
+        named = part + begin
         if before is not None:
-            links.append(_touching(before, named[:, :, 0], begin_before, begin))
-        for k in range(last - first - 1):
-            links.append(_touching(named[:, :, k], named[:, :, k + 1], begin, begin))
-        before, begin_before = named[:, :, -1].copy(), begin
+            links.append(_linked(*before, runs.part(first * rows, (first + 1) * rows), named, rows))
+        links.append(_linked(runs, named, runs, named, rows))
+        tail = int(np.searchsorted(runs.line, (last - 1) * rows))
+        before = runs.part((last - 1) * rows, last * rows), named[tail:]
         begin += count
     return Regions(
         np.concatenate(layer),
-        np.concatenate(cells),
+        np.concatenate(size),
         np.concatenate(middle),
         np.concatenate(outside),
-        np.concatenate(links) if links else np.empty((0, 2), np.int64),
+        np.concatenate(links),
     )
 
 
-def islands(columns: VoxelColumns, solid: Regions) -> Islands:
+def islands(grid: VoxelRows, solid: Regions) -> Islands:
     """Islands: solid regions above the first layer without any solid below them.
 
-    solid: the regions of the solid in the same columns.
+    solid: the regions of the solid in the same grid.
     """
     held = np.zeros(len(solid.layer), bool)
     held[solid.links[:, 1]] = True
     found = np.flatnonzero(~held)
     found = found[solid.layer[found] > solid.layer.min()]
     found = found[np.argsort(-solid.cells[found], kind="stable")]
-    area = solid.cells[found] * columns.step[0] * columns.step[1]
-    return Islands(columns.points(solid.middle[found]), area)
+    area = solid.cells[found] * grid.step[1] * grid.step[2]
+    return Islands(grid.points(solid.middle[found]), area)
 
 
-def cups(columns: VoxelColumns, free: Regions) -> Cups:
+def cups(grid: VoxelRows, free: Regions) -> Cups:
     """Cups: groups of free regions that are closed in from the sides and from the platform's side.
 
-    free: the free regions in the same columns. Regions are joined in the order of building; while a group has
+    free: the free regions in the same grid. Regions are joined in the order of building; while a group has
     not met the outside, the film seals it. A cup's volume is that just before its group meets the outside, or
     that of the whole group if it never does.
     """
     parent = list(range(len(free.layer)))
     # Of each group of regions: cells, and the sums of their middles; whether it met the outside; its start.
     weight = np.concatenate([free.cells[:, None], free.cells[:, None] * free.middle], axis=1).tolist()
-    is_open, start = free.outside.tolist(), free.layer.tolist()
-    found: list[tuple[list[float], bool]] = []
+    is_open, start, top = free.outside.tolist(), free.layer.tolist(), free.layer.tolist()
+    # The regions of a group that lie lowest and highest.
+    lowest, highest = list(range(len(parent))), list(range(len(parent)))
+    found: list[tuple[list[float], bool, int, int]] = []
 
     def root(k: int) -> int:
         while parent[k] != k:
@@ -153,21 +158,34 @@ def cups(columns: VoxelColumns, free: Regions) -> Cups:
         for closed, other in ((one, two), (two, one)):
             # A region of this layer alone, closed to the side but open to below, is no cup.
             if is_open[other] and not is_open[closed] and start[closed] < level:
-                found.append((weight[closed], False))
+                found.append((weight[closed], False, lowest[closed], highest[closed]))
         parent[two] = one
         weight[one] = [x + y for x, y in zip(weight[one], weight[two], strict=True)]
         is_open[one] = is_open[one] or is_open[two]
-        start[one] = min(start[one], start[two])
-    found += [(weight[k], True) for k in range(len(parent)) if parent[k] == k and not is_open[k]]
+        if start[two] < start[one]:
+            start[one], lowest[one] = start[two], lowest[two]
+        if top[two] > top[one]:
+            top[one], highest[one] = top[two], highest[two]
+    found += [
+        (weight[k], True, lowest[k], highest[k])
+        for k in range(len(parent))
+        if parent[k] == k and not is_open[k]
+    ]
     found.sort(key=lambda cup: -cup[0][0])
     sums = np.array([cup[0] for cup in found]).reshape(-1, 4)
     middle = sums[:, 1:] / np.maximum(sums[:, :1], 1.0)
+    first = free.middle[np.array([cup[2] for cup in found], np.int64)]
+    last = free.middle[np.array([cup[3] for cup in found], np.int64)]
     return Cups(
-        sums[:, 0] * columns.cell_volume, columns.points(middle), np.array([c[1] for c in found], bool)
+        sums[:, 0] * grid.cell_volume,
+        grid.points(middle),
+        np.array([cup[1] for cup in found], bool),
+        grid.points(first),
+        grid.points(last),
     )
 
 
-def overhangs(columns: VoxelColumns, slope_deg: float, at_once: int = 8_000_000) -> Overhang:
+def overhangs(grid: VoxelRows, slope_deg: float, at_once: int = 8_000_000) -> Overhang:
     """What layers extend beyond the layer below, which supports slopes of `slope_deg` degrees from level.
 
     Islands are left out. A region supported from opposite sides is a bridge, whose span is twice its reach.
@@ -175,27 +193,25 @@ def overhangs(columns: VoxelColumns, slope_deg: float, at_once: int = 8_000_000)
     """
     from scipy.ndimage import label
 
-    nx, ny, levels = columns.shape
-    thick = max(1, at_once // (nx * ny))
-    near = _disk(columns.step[2] / np.tan(np.radians(slope_deg)) / columns.step[0])
+    layers, rows, cells = grid.shape
+    thick = max(1, at_once // (rows * cells))
+    near = _disk(grid.step[0] / np.tan(np.radians(slope_deg)) / grid.step[1])
     found: list[tuple[float, float, float, float, bool]] = []
-    before = np.zeros((nx, ny), bool)
+    before = np.zeros((rows, cells), bool)
     begun = False
-    for first in range(0, levels, thick):
-        last = min(first + thick, levels)
-        body = columns.slab(first, last) > 0
-        filled = body.any(axis=(0, 1))
-        for k in np.flatnonzero(filled).tolist():
-            layer = body[:, :, k]
+    for first in range(0, layers, thick):
+        body = grid.slab(first, min(first + thick, layers))
+        for k in np.flatnonzero(body.any(axis=(1, 2))).tolist():
+            layer = body[k]
             if begun and (layer & ~before).any():
                 held = _widened(before, near)
                 beyond, count = label(layer & ~held, np.ones((3, 3)))
                 if count:
-                    found += _reaches(beyond, layer & held, float(columns.step[0]), first + k)
+                    found += _reaches(beyond, layer & held, float(grid.step[1]), first + k)
             before, begun = layer, True
-    rows = np.array([f[:4] for f in found]).reshape(-1, 4)
-    places = columns.points(rows[:, [1, 2, 3]]) if len(rows) else rows[:, 1:]
-    return Overhang(places, rows[:, 0], np.array([f[4] for f in found], bool))
+    worst = np.array([f[:4] for f in found]).reshape(-1, 4)
+    places = grid.points(worst[:, 1:]) if len(worst) else worst[:, 1:]
+    return Overhang(places, worst[:, 0], np.array([f[4] for f in found], bool))
 
 
 def _reaches(
@@ -218,7 +234,7 @@ def _reaches(
         ways = np.stack([to_i[tuple(around.T)], to_j[tuple(around.T)]], axis=1) - around
         ways = ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-9)
         bridge = bool((ways @ ways.T).min() < -0.5)
-        found.append((distance[i, j] * step, crop[0].start + i, crop[1].start + j, level, bridge))
+        found.append((distance[i, j] * step, level, crop[0].start + i, crop[1].start + j, bridge))
     return found
 
 
@@ -235,12 +251,12 @@ def _widened(layer: NDArray[np.bool_], by: NDArray[np.bool_]) -> NDArray[np.bool
     return np.asarray(binary_dilation(layer, by))
 
 
-def _touching(
-    below: NDArray[np.int32], above: NDArray[np.int32], begin_below: int, begin_above: int
+def _linked(
+    below: Runs, named_below: NDArray[np.int64], above: Runs, named_above: NDArray[np.int64], rows: int
 ) -> NDArray[np.int64]:
-    """Pairs (l, 2) of numbers of regions with a cell over a cell; labels count from 1, numbers from 0."""
-    both = (below > 0) & (above > 0)
-    a, b = below[both].astype(np.int64), above[both].astype(np.int64)
+    """Pairs (l, 2) of numbers of regions with a cell over a cell."""
+    one, other = meeting(below, above, rows)
+    a, b = named_below[one].astype(np.int64), named_above[other].astype(np.int64)
     span = int(b.max(initial=0)) + 1
     code = np.unique(a * span + b)
-    return np.stack([code // span - 1 + begin_below, code % span - 1 + begin_above], axis=1)
+    return np.stack([code // span, code % span], axis=1)

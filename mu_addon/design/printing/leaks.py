@@ -23,7 +23,7 @@ def drainage_findings(solid: Any, chambers: Chambers, unit: Unit | None, printer
     exactly. Without one a chamber's widest way out is taken for its inlet, and others are warnings.
     """
     limit = printer.limits["drain_diameter_mm"]
-    step = float(chambers.columns.step[0])
+    step = float(chambers.grid.step[0])
     leaks: list[Points] = []
     widths: list[float] = []
     inlets: list[tuple[float, Points]] = []
@@ -135,7 +135,7 @@ def _holes(stopped: Any, chambers: Chambers, d: Dimensions) -> Points:
     p, q, r = vertices[triangles.T]
     normal = np.cross(q - p, r - p)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    before = (p + q + r) / 3.0 + float(chambers.columns.step[0]) * normal
+    before = (p + q + r) / 3.0 + float(chambers.grid.step[0]) * normal
     curves = necks(vertices, triangles, chambers.hold(before), chambers.beside(before))
     middles = np.array([curve.mean(axis=0) for curve in curves]).reshape(-1, 3)
     return middles[[not _in_inlet(place, d) for place in middles]]

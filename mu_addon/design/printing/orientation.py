@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 
 import attrs
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from ..surface import Triangles, Vertices
 from .layers import cups, islands, regions
 from .thickness import Samples
-from .voxels import frame_along, voxel_columns
+from .voxels import frame_along, voxel_rows
 
 Array = NDArray[np.float64]
 
@@ -82,13 +83,14 @@ def build(
     slope_deg: flattest slope from level, in degrees, that needs no support; room: sizes of the build volume
     in mm.
     """
-    grid = voxel_columns(vertices, triangles, step, frame=frame_along(direction))
+    frame = frame_along(direction)
+    grid = voxel_rows(vertices, triangles, step, frame=frame)
     closed = cups(grid, regions(grid, free=True))
     loose = islands(grid, regions(grid, free=False))
     height = surface.points @ direction
     flat = surface.normals @ direction < -np.cos(np.radians(slope_deg))
     flat &= height > height.min() + step
-    extent = np.ptp(vertices @ grid.frame.T, axis=0)
+    extent = np.ptp(vertices @ frame.T, axis=0)
     return Build(
         direction=tuple(direction.tolist()),
         cup_ml=float(closed.volume[:1].sum()) / 1e3,
@@ -126,18 +128,25 @@ def orientations(
     slope_deg: float,
     room: tuple[float, float, float],
     own: Array,
+    share: Callable[[float], None] | None = None,
 ) -> list[Build]:
     """Ranked builds along 26 directions, the part's `own` (3,), and eight at 20 degrees to the best of these.
 
-    vertices (n, 3) in mm and triangles (m, 3); in_chamber (s,) and the other arguments are as in `build`.
+    vertices (n, 3) in mm and triangles (m, 3); in_chamber (s,) and the other arguments are as in `build`;
+    share: called with the share of the directions that is done.
     """
-
-    def built(direction: Array) -> Build:
-        return build(vertices, triangles, surface, in_chamber, direction, step, slope_deg, room)
 
     first = directions()
     if np.abs(first - own).sum(axis=1).min() > 1e-6:
         first = np.concatenate([own[None], first])
-    found = [built(direction) for direction in first]
-    best = np.array(ranked(found)[0].direction)
-    return ranked(found + [built(direction) for direction in tilted(best, 20.0)])
+    found: list[Build] = []
+
+    def add(ways: Array) -> None:
+        for direction in ways:
+            found.append(build(vertices, triangles, surface, in_chamber, direction, step, slope_deg, room))
+            if share is not None:
+                share(len(found) / (len(first) + 8))
+
+    add(first)
+    add(tilted(np.array(ranked(found)[0].direction), 20.0))
+    return ranked(found)

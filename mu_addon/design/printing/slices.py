@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...errors import InputError
 from ..surface import Triangles, Vertices
 from .voxels import frame_along
 
@@ -28,6 +30,20 @@ class Slice:
 
     height_mm: float
     outlines: list[Array]
+    area_mm2: float
+    enclosed_mm2: float
+
+
+@attrs.frozen(eq=False)
+class Filled:
+    """One section as triangles: vertices (n, 3) in mm, of its material (m, 3) and of what it encloses (k, 3).
+
+    area_mm2, enclosed_mm2: their areas.
+    """
+
+    vertices: Array
+    material: Triangles
+    enclosed: Triangles
     area_mm2: float
     enclosed_mm2: float
 
@@ -59,6 +75,52 @@ def slices(
         drawn = [np.asarray(ring) for ring in section.simplify(_SIMPLE_mm).to_polygons()]
         found.append(Slice(float(height), drawn, float(section.area()), holes))
     return found
+
+
+class Layers:
+    """A closed surface, vertices (n, 3) in mm and triangles (m, 3), whose sections are asked for one by one.
+
+    direction (3,): of the build, away from the platform. height_mm: of the whole part along it. Raises
+    InputError for a surface that encloses no volume.
+    """
+
+    def __init__(self, vertices: Vertices, triangles: Triangles, direction: ArrayLike) -> None:
+        from manifold3d import Error, Manifold, Mesh64
+
+        self.frame = frame_along(np.asarray(direction, float))
+        built = vertices @ self.frame.T
+        self._low, high = (float(z) for z in (built[:, 2].min(), built[:, 2].max()))
+        self.height_mm = high - self._low
+        self._solid = Manifold(Mesh64(built, triangles.astype(np.uint64)))
+        if self._solid.status() != Error.NoError or self._solid.is_empty():
+            raise InputError("the surface encloses no volume", "layers", "build the solid again")
+
+    def filled(self, height_mm: float) -> Filled:
+        """The section at a height above the lowest point, as triangles in the part's own frame."""
+        from manifold3d import CrossSection, FillRule
+
+        section = self._solid.slice(self._low + height_mm)
+        rings = [np.asarray(ring) for ring in section.to_polygons()]
+        outer = CrossSection([ring for ring in rings if signed_area(ring) > 0.0], FillRule.NonZero)
+        enclosed = outer - section
+        points, faces = [np.empty((0, 3))], []
+        for region in (section, enclosed):
+            flat, triangles = _triangulated(region)
+            faces.append(triangles + sum(map(len, points)))
+            level = np.full((len(flat), 1), self._low + height_mm)
+            points.append(np.concatenate([flat, level], axis=1) @ self.frame)
+        areas = float(section.area()), float(enclosed.area())
+        return Filled(np.concatenate(points), faces[0], faces[1], *areas)
+
+
+def _triangulated(region: Any) -> tuple[Array, Triangles]:
+    """Points (n, 2) and triangles (m, 3) of a CrossSection."""
+    from manifold3d import triangulate
+
+    rings = [np.asarray(ring) for ring in region.to_polygons()]
+    if not rings:
+        return np.empty((0, 2)), np.empty((0, 3), np.int64)
+    return np.concatenate(rings), np.asarray(triangulate(rings)).astype(np.int64)
 
 
 def signed_area(ring: Array) -> float:

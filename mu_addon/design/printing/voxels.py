@@ -1,4 +1,4 @@
-"""A surface seen as columns: where each line along the build direction enters and leaves the solid.
+"""A surface seen as a grid of cells: which runs of them, along the rows of each layer, are solid.
 
 What is inside is counted (winding number), so that solids which overlap count as one.
 """
@@ -10,39 +10,42 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..surface import Triangles, Vertices
+from .runs import Runs
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 _AT_ONCE = 2_000_000
 
 
 @attrs.frozen(eq=False)
-class VoxelColumns:
-    """A grid of `shape` cells of step (3,) mm from its corner low (3,), and the surface's crossings along z.
+class VoxelRows:
+    """A grid of `shape` cells of step (3,) mm from its corner low (3,): layers, rows, cells of a row.
 
-    frame (3, 3): rows are the grid's axes. column, level and sign (c,) of each crossing: the column's number
-    i * shape[1] + j, the first cell whose centre lies above it, and +1 where the solid begins, -1 where it
-    ends; sorted by level.
+    frame (3, 3): rows are the grid's axes, the first of them along the build. solid: the runs of solid cells;
+    the line of row j of layer k is number k * shape[1] + j.
     """
 
     frame: Array
     low: Array
     step: Array
     shape: tuple[int, int, int]
-    column: NDArray[np.int64]
-    level: NDArray[np.int64]
-    sign: NDArray[np.int8]
+    solid: Runs
 
-    def slab(self, first: int, last: int) -> NDArray[np.int8]:
-        """Winding numbers (nx, ny, last - first) at the centres of cells in levels first .. last - 1."""
-        nx, ny, _ = self.shape
-        a, b = np.searchsorted(self.level, [first, last])
-        turns = np.zeros((nx * ny, last - first), np.int8)
-        if a:
-            turns[:, 0] = np.bincount(self.column[:a], self.sign[:a], nx * ny)
-        np.add.at(turns, (self.column[a:b], self.level[a:b] - first), self.sign[a:b])
+    def lines(self, first: int, last: int) -> Runs:
+        """Runs of solid cells in layers first .. last - 1."""
+        return self.solid.part(first * self.shape[1], last * self.shape[1])
+
+    def slab(self, first: int, last: int) -> NDArray[np.bool_]:
+        """Which cells (last - first, rows, cells) of layers first .. last - 1 are solid."""
+        _, rows, cells = self.shape
+        here = self.lines(first, last)
+        turns = np.zeros(((last - first) * rows, cells + 1), np.int8)
+        line = here.line - first * rows
+        turns[line, here.start] = 1
+        turns[line, here.end] -= 1
         np.cumsum(turns, axis=1, out=turns)
-        return turns.reshape(nx, ny, last - first)
+        return turns[:, :-1].astype(bool).reshape(last - first, rows, cells)
 
     def points(self, index: ArrayLike) -> Array:
         """Places (n, 3) in mm, in the surface's frame, of cells (n, 3); whole numbers are cell centres."""
@@ -63,85 +66,103 @@ def frame_along(direction: Array) -> Array:
     return np.stack([x, np.cross(up, x), up])
 
 
-def voxel_columns(
+def voxel_rows(
     vertices: Vertices,
     triangles: Triangles,
     step: float,
     layer: float | None = None,
     frame: Array | None = None,
-    margin: float = 0.0,
-) -> VoxelColumns:
-    """Columns through a closed surface, vertices (n, 3) in mm and triangles (m, 3), `step` mm apart.
+) -> VoxelRows:
+    """Cells of a closed surface, vertices (n, 3) in mm and triangles (m, 3), `step` mm wide.
 
-    layer: height of cells in mm, `step` if None; frame (3, 3): the grid's axes as rows, by default x, y, z.
-    The grid leaves `margin` mm, and at least two cells, free on every side; the lowest layer of the part
-    begins where the part does.
+    layer: height of cells in mm, `step` if None; frame (3, 3): axes as rows, the third along the build, by
+    default x, y, z. The grid leaves two cells free on every side; the lowest layer of the part begins where
+    the part does.
     """
-    frame = np.eye(3) if frame is None else frame
-    seen = vertices @ frame.T
-    size = np.array([step, step, step if layer is None else layer])
-    pad = 2 + np.ceil(margin / size).astype(int)
+    axes = (np.eye(3) if frame is None else frame)[[2, 0, 1]]
+    seen = vertices @ axes.T
+    size = np.array([step if layer is None else layer, step, step])
     extent = np.ptp(seen, axis=0)
-    # Centres off the round numbers that designs are made of: no column then runs along a face.
-    nudge = np.array([0.2718, 0.3141, 0.0]) * step
-    low = seen.min(axis=0) - pad * size - nudge
-    shape = tuple((np.ceil((extent + nudge) / size).astype(int) + 2 * pad).tolist())
-    local = (seen - low) / size - 0.5
-    column, level, sign = _crossings(local, triangles, shape)
-    order = np.argsort(level, kind="stable")
-    return VoxelColumns(frame, low, size, shape, column[order], level[order], sign[order])
+    # Centres off the round numbers that designs are made of: no row then runs along a face.
+    nudge = np.array([0.0, 0.2718, 0.3141]) * step
+    low = seen.min(axis=0) - 2 * size - nudge
+    shape = tuple((np.ceil((extent + nudge) / size).astype(int) + 4).tolist())
+    line, cell, sign = _crossings((seen - low) / size - 0.5, triangles, shape)
+    return VoxelRows(axes, low, size, shape, _filled(line, cell, sign, shape[2]))
+
+
+def _filled(line: Index, cell: Index, sign: NDArray[np.int8], cells: int) -> Runs:
+    """Runs of cells around which a surface winds, from its crossings along the lines."""
+    width = cells + 1
+    # Crossings at one cell count together, whatever their order.
+    place, index = np.unique(line * width + cell, return_inverse=True)
+    turns = np.bincount(np.ravel(index), sign, len(place)).astype(np.int64)
+    inside = np.cumsum(turns) > 0
+    before = np.concatenate([[False], inside[:-1]])
+    begin, end = place[inside & ~before], place[before & ~inside]
+    return Runs(begin // width, begin % width, end % width, cells)
 
 
 def _crossings(
     points: Array, triangles: Triangles, shape: tuple[int, int, int]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int8]]:
-    """Crossings of the lines at whole numbers x, y with triangles, in units of cells."""
-    corners = points[triangles]
-    low = np.ceil(corners[:, :, :2].min(axis=1)).astype(np.int64)
-    high = np.floor(corners[:, :, :2].max(axis=1)).astype(np.int64)
-    span = np.maximum(high - low + 1, 0)
-    p, q, r = corners[:, 0], corners[:, 1], corners[:, 2]
-    double: Array = (q[:, 0] - p[:, 0]) * (r[:, 1] - p[:, 1]) - (r[:, 0] - p[:, 0]) * (q[:, 1] - p[:, 1])
-    count = np.where(double != 0.0, span.prod(axis=1), 0)
+) -> tuple[Index, Index, NDArray[np.int8]]:
+    """Where rows at whole numbers of the first two coordinates meet triangles, in units of cells.
+
+    Of each: number of its line, first cell whose centre lies beyond, and +1 where the solid begins, -1 where
+    it ends.
+    """
+    # Row by row of cells or layer by layer, in whichever there are fewer.
+    spans = []
+    for k in (0, 1):
+        a, b, c = np.ceil(points[:, k]).astype(np.int64)[triangles.T]
+        spans.append(np.maximum(np.maximum(a, b), c) - np.minimum(np.minimum(a, b), c))
+    across = 0 if spans[0].sum() <= spans[1].sum() else 1
+    count = spans[across]
     kept = np.flatnonzero(count)
-    count = count[kept]
-    cuts = np.flatnonzero(np.diff(np.cumsum(count) // _AT_ONCE)) + 1
-    parts = [_crossed(points, triangles, double, low, span, part, shape) for part in np.split(kept, cuts)]
-    column, level, sign = (np.concatenate(each) for each in zip(*parts, strict=True))
-    return column, level, sign
+    cuts = np.flatnonzero(np.diff(np.cumsum(count[kept]) // _AT_ONCE)) + 1
+    parts = [_crossed(points, triangles, part, count[part], across, shape) for part in np.split(kept, cuts)]
+    line, cell, sign = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return line, cell, sign
 
 
 def _crossed(
     points: Array,
     triangles: Triangles,
-    double: Array,
-    low: NDArray[np.int64],
-    span: NDArray[np.int64],
-    part: NDArray[np.int64],
+    part: Index,
+    count: Index,
+    across: int,
     shape: tuple[int, int, int],
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int8]]:
-    count = span[part].prod(axis=1)
+) -> tuple[Index, Index, NDArray[np.int8]]:
+    """Crossings of the triangles `part`, which meet `count` planes of a whole coordinate `across`."""
+    along = 1 - across
     owner = np.repeat(part, count)
-    k = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    wide = span[owner, 0]
-    x, y = low[owner, 0] + k % wide, low[owner, 1] + k // wide
-    inside = np.ones(len(owner), bool)
-    weights = []
+    first = np.ceil(points[:, across]).astype(np.int64)[triangles[part]].min(axis=1)
+    plane = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(first, count)
+    low = np.full(len(owner), np.inf)
+    high = np.full(len(owner), -np.inf)
+    depth_low, depth_high = np.zeros(len(owner)), np.zeros(len(owner))
+    falling = np.zeros(len(owner), bool)
     for corner in range(3):
-        a, b = triangles[owner, (corner + 1) % 3], triangles[owner, (corner + 2) % 3]
-        # Neighbours see their common edge from the same end, so that a line on it is counted in one of them.
-        swapped = a > b
-        first, second = points[np.where(swapped, b, a)], points[np.where(swapped, a, b)]
-        area = (second[:, 0] - first[:, 0]) * (y - first[:, 1])
-        area -= (second[:, 1] - first[:, 1]) * (x - first[:, 0])
-        area *= np.where(swapped, -1.0, 1.0) * np.sign(double[owner])
-        inside &= (area > 0.0) | ((area == 0.0) & (swapped == (double[owner] > 0.0)))
-        weights.append(area)
-    owner, x, y = owner[inside], x[inside], y[inside]
-    share = np.stack([w[inside] for w in weights], axis=1)
-    share /= share.sum(axis=1, keepdims=True)
-    height = np.einsum("ij,ij->i", share, points[triangles[owner], 2])
-    level = np.clip(np.ceil(height), 0, shape[2]).astype(np.int64)
-    kept = level < shape[2]
-    sign = np.where(double[owner] < 0.0, 1, -1).astype(np.int8)
-    return (x * shape[1] + y)[kept], level[kept], sign[kept]
+        a, b = triangles[owner, corner], triangles[owner, (corner + 1) % 3]
+        # Neighbours see their common edge from the same end, so that it lies at the same place in both.
+        p, q = points[np.minimum(a, b)], points[np.maximum(a, b)]
+        below = p[:, across] <= plane
+        i = np.flatnonzero(below != (q[:, across] <= plane))
+        share = (plane[i] - p[i, across]) / (q[i, across] - p[i, across])
+        at = p[i, along] + share * (q[i, along] - p[i, along])
+        depth = p[i, 2] + share * (q[i, 2] - p[i, 2])
+        left = at < low[i]
+        right = at > high[i]
+        low[i[left]], depth_low[i[left]] = at[left], depth[left]
+        falling[i[left]] = below[i[left]] != (a[i[left]] < b[i[left]])
+        high[i[right]], depth_high[i[right]] = at[right], depth[right]
+    begin = np.ceil(low).astype(np.int64)
+    number = np.maximum(np.ceil(high).astype(np.int64) - begin, 0)
+    k = np.repeat(np.arange(len(owner)), number)
+    at = np.arange(len(k)) - np.repeat(np.cumsum(number) - number, number) + begin[k]
+    depth = depth_low[k] + (at - low[k]) / (high[k] - low[k]) * (depth_high[k] - depth_low[k])
+    cell = np.clip(np.ceil(depth), 0, shape[2]).astype(np.int64)
+    layer, row = (plane[k], at) if across == 0 else (at, plane[k])
+    # Seen with the rows toward the eye: the side on which a triangle's lower edge falls is its outside.
+    outward = falling[k] == (across == 1)
+    return layer * shape[1] + row, cell, np.where(outward, -1, 1).astype(np.int8)

@@ -14,7 +14,8 @@ from ...measured import Experiment
 from ...measured.folder import ATMOSPHERE_kPa
 from ..effect import Effect, Parameter
 from .drift import drift, drifts, largest_reading
-from .unit import GAUGE_SHARE, TIMED, first_order_lag
+from .effective_pressure import first_order_lag
+from .unit import GAUGE_SHARE, TIMED
 
 Array = np.ndarray[Any, Any]
 

@@ -13,7 +13,8 @@ from ...errors import ConvergenceError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
 from .drift import drift, drifts, largest_reading
-from .unit import REFERENCE_C, RELAXING, TIMED, decades_lag, first_order_lag
+from .effective_pressure import decades_lag, first_order_lag
+from .unit import REFERENCE_C, RELAXING, TIMED
 from .yielding import elastic_strain, yielding
 
 Array = np.ndarray[Any, Any]
@@ -45,7 +46,7 @@ def machine(kind: str) -> tuple[Effect, ...]:
     in_time = ("viscoelasticity", "mullins_softening", "fatigue_drift", "temperature_drift")
     return (
         *(Effect(name, _TIMED[name], (kind,)) for name in in_time),
-        attrs.evolve(RELAXING, kinds=(kind,)),
+        Effect(RELAXING.name, RELAXING.parameters, (kind,), RELAXING.mechanism),
         yielding(kind),
         Effect(
             "anisotropy",

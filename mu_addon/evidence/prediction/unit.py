@@ -15,6 +15,7 @@ from ...measured import Experiment
 from ..effect import Effect, Parameter
 from .camera import camera_effects, read_by_camera
 from .drift import drift, drifts, largest_reading
+from .effective_pressure import in_the_chambers, play_operator, remembered
 from .flat_obstacle import NAME as CONTACT
 from .flat_obstacle import ObstacleResponse, contact_effect
 
@@ -171,8 +172,9 @@ def pressure_histories(experiments: Sequence[Experiment]) -> dict[str, PressureH
 def nuisances(channels: Sequence[str]) -> tuple[Parameter, ...]:
     """Parameters that every fit of a unit frees: modulus factor, and each channel's zero in its unit."""
     zeros = [
-        Parameter(_zero(c), c.rpartition("_")[2], -1e3, 1e3, 0.0, source="set by the camera", linear=True)
+        Parameter(_zero(c), c.rpartition("_")[2], -most, most, 0.0, source=f"set by the {by}", linear=True)
         for c in channels
+        for most, by in [(1e6, "syringe") if c.startswith("volume") else (1e3, "camera")]
     ]
     modulus = Parameter("modulus_factor", "", 0.2, 5.0, 1.0, (1.0,), "batches of resin differ")
     return (modulus, *zeros)
@@ -276,7 +278,6 @@ RELAXING = Effect(
     (KIND,),
     "all moduli relax with time, by as much in each decade of it",
 )
-DECADES = 4
 
 
 class UnitPressure:
@@ -316,7 +317,7 @@ class UnitPressure:
         camera = camera_effects(self.channels_known, KIND, experiments)
         self.effects = (*TIMED, RELAXING, *static.values(), *gauge, *camera)
         self._sizes = {e.name: e.keys[0] for e in static.values()}
-        self._reference_kPa = max(float(np.abs(r.pressures_kPa).max()) for r in self._responses)
+        self.reference_kPa = max(float(np.abs(r.pressures_kPa).max()) for r in self._responses)
 
     def _bounded(
         self, free: tuple[Parameter, ...], experiments: Sequence[Experiment]
@@ -370,8 +371,8 @@ class UnitPressure:
         second, third = (values.get(name, 0.0) for name in DISCREPANCIES)
         if not (second or third):
             return pressure
-        x = pressure / self._reference_kPa
-        return np.asarray(pressure + self._reference_kPa * (second * x**2 + third * x**3))
+        x = pressure / self.reference_kPa
+        return np.asarray(pressure + self.reference_kPa * (second * x**2 + third * x**3))
 
     def effective_kPa(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
         """Pressure (n,) in kPa at which the base unit would stand where the unit of these values stands.
@@ -387,14 +388,9 @@ class UnitPressure:
             p = np.interp(t - delay, t, p)
         p = p - drift("pressure_drift", t, values)
         p = (p - get("pressure_offset.offset_kPa", 0.0)) / (1.0 + get("pressure_gain.gain", 0.0))
-        leak, lag = get("leak.conductance_ratio", 0.0), get("line_lag.time_s", 0.0)
-        if experiment.valve == "shut":
-            # Nothing flows between gauge and chambers: what leaks is seen by both.
-            leak = lag = 0.0
-        if leak:
-            # The line feeds the leak: tau dp_c/dt = p - p_c - leak p_c.
-            p, lag = p / (1.0 + leak), lag / (1.0 + leak)
-        p = first_order_lag(t, p, lag)
+        # With a valve shut nothing flows between gauge and chambers: what leaks is seen by both.
+        if experiment.valve != "shut":
+            p = in_the_chambers(t, p, values)
         modulus: Any = get("modulus_factor", 1.0)
         if per_K := get("temperature_drift.per_K", 0.0):
             kelvin = experiment.temperature_C - REFERENCE_C
@@ -403,20 +399,8 @@ class UnitPressure:
             done = past.cycles + cycles(experiment["pressure_kPa"])
             modulus = modulus * (1.0 - per_decade * np.log10(1.0 + done))
         p = p / modulus
-        if share := get("viscoelasticity.share", 0.0):
-            time = get("viscoelasticity.time_s", 1.0) / (1.0 - share)
-            p = (1.0 - share) * p + share * first_order_lag(t, p, time)
-        if share := get("viscoelasticity.per_decade", 0.0):
-            p = (1.0 - DECADES * share) * p + share * decades_lag(t, p, get("viscoelasticity.onset_s", 1.0))
-        if share := get("rate_independent_hysteresis.share", 0.0):
-            p = (1.0 - share) * p + share * play_operator(
-                p, get("rate_independent_hysteresis.threshold_kPa", 2.0)
-            )
-        if softening := get("mullins_softening.softening", 0.0):
-            width = get("mullins_softening.energy_share", 0.3) * self._reference_kPa**2
-            before = max(past.peak_kPa, -past.trough_kPa) / get("modulus_factor", 1.0)
-            p = p / mullins_softening(p, before, softening, width)
-        return p
+        before = max(past.peak_kPa, -past.trough_kPa) / get("modulus_factor", 1.0)
+        return remembered(t, p, values, self.reference_kPa, before)
 
     def _response(self, experiment: Experiment) -> UnitResponse:
         how = experiment.scale, experiment.orientation_deg
@@ -442,68 +426,6 @@ class UnitPressure:
 
 def _turn(degrees: float) -> float:
     return (degrees + 180.0) % 360.0 - 180.0
-
-
-def first_order_lag(t: Array, p: Array, time_s: float) -> Array:
-    """Solution (n,) of time_s dx/dt + x = p from equilibrium, in the unit of p.
-
-    t (n,): times in s. Exact for p (n,) linear between its samples; p itself where time_s is not positive.
-    """
-    from scipy.signal import lfilter
-
-    if time_s <= 0.0:
-        return p
-    h = np.diff(t)
-    if np.ptp(h) <= 1e-9 * h.mean():
-        a, b0, b1 = _weights(h.mean(), time_s)
-        found, _ = lfilter([b1, b0], [1.0, -a], p, zi=[(1.0 - b1) * p[0]])
-        return np.asarray(found)
-    a, b0, b1 = _weights(h, time_s)
-    driven = b0 * p[:-1] + b1 * p[1:]
-    x = [float(p[0])]
-    for ai, di in zip(a.tolist(), driven.tolist(), strict=True):
-        x.append(ai * x[-1] + di)
-    return np.array(x)
-
-
-def decades_lag(t: Array, p: Array, onset_s: float) -> Array:
-    """Sum (n,) of `first_order_lag` of p (n,) by times onset_s, ten times that, ..., over `DECADES`."""
-    return np.asarray(sum(first_order_lag(t, p, onset_s * 10.0**k) for k in range(DECADES)))
-
-
-def _weights(h: Any, time_s: float) -> tuple[Any, Any, Any]:
-    a = np.exp(-h / time_s)
-    mean = -np.expm1(-h / time_s) * time_s / h
-    return a, mean - a, 1.0 - mean
-
-
-def play_operator(p: Array, threshold: float) -> Array:
-    """Play operator (n,) of p (n,) with half-width `threshold`, in the unit of p; it begins in the middle."""
-    moves = np.diff(p)
-    at = np.flatnonzero(moves)
-    turned = np.flatnonzero(np.diff(np.sign(moves[at])))
-    turns = at[turned + 1]
-    # Between two turns what happened before is one number.
-    x = float(p[0])
-    before = [x]
-    for v in p[turns].tolist():
-        x = min(max(x, v - threshold), v + threshold)
-        before.append(x)
-    held = np.repeat(before, np.diff(turns, prepend=-1, append=len(p) - 1))
-    return np.minimum(np.maximum(held, p - threshold), p + threshold)
-
-
-def mullins_softening(p: Array, before_kPa: float, softening: float, width: float) -> Array:
-    """Share (n,) of the virgin modulus left, 1 - softening erf((W_max - W)/width), Ogden and Roxburgh 1999.
-
-    p (n,): pressure in kPa. W and width, in kPa^2: W is the square of the pressure, as the energy of the
-    virgin unit nearly is; before_kPa: the largest absolute pressure of earlier experiments.
-    """
-    from scipy.special import erf
-
-    energy = p**2
-    most = np.maximum(np.maximum.accumulate(energy), before_kPa**2)
-    return np.asarray(1.0 - softening * erf((most - energy) / width))
 
 
 def cycles(p: Array) -> Array:

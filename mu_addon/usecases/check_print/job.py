@@ -34,7 +34,8 @@ class Job:
     """Inputs of a check: a unit, or the bytes of an STL file, or a file checked against its unit.
 
     direction points away from the platform, in the part's frame. layers: heights in mm, above the part's
-    lowest point, of the layers to draw; some evenly spaced where there are none.
+    lowest point, of the layers to draw; some evenly spaced where there are none. repair: whether the file's
+    surface is repaired first, where there is only one way to.
     """
 
     printer: Printer
@@ -45,8 +46,13 @@ class Job:
     stl_file: Path | None = None
     direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
     layers: tuple[float, ...] = attrs.field(default=(), converter=tuple)
+    repair: bool = False
 
     def __attrs_post_init__(self) -> None:
+        if self.repair and self.stl is None:
+            raise InputError(
+                "there is no file to repair", "--repair", "give --stl; a unit's own solid needs no repair"
+            )
         if len(self.layers) > MOST_LAYERS or not all(0.0 <= z < _FARTHEST for z in self.layers):
             raise InputError(
                 f"layers at {', '.join(f'{z:g}' for z in self.layers[:5])} mm",
@@ -79,6 +85,7 @@ class Job:
             "stl_sha256": None if self.stl is None else digest(self.stl),
             "direction": self.direction,
             "layers": list(self.layers) or None,
+            "repair": self.repair or None,
             "run": {"stl": str(self.stl_file.resolve())} if self.stl_file is not None else None,
         }
         texts = {LAYOUT.inputs: toml_text(values, LAYOUT.header), PRINTER: printer_text(self.printer)}
@@ -104,7 +111,7 @@ def read_job(folder: Path) -> Job:
     if stl is not None and content is not None:
         require_digest(stl, content, values["stl_sha256"], "STL file")
     unit = read_unit(folder / UNIT) if "unit" in values else None
-    taken = {key: values[key] for key in ("quality", "direction", "layers") if key in values}
+    taken = {key: values[key] for key in ("quality", "direction", "layers", "repair") if key in values}
     return structured(
         Job,
         taken,

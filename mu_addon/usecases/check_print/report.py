@@ -13,6 +13,7 @@ from ...design.printing.check import PrintCheck
 from ...design.printing.finding import Finding, counted
 from ...design.printing.orientation import Build, directions
 from ...design.printing.printer import MEANING
+from ...design.printing.repair import Repair
 from ...design.printing.slices import Slice, even_heights, signed_area, slices
 from ...design.surface import Triangles, Vertices
 from ...files import write_bytes, write_text
@@ -42,16 +43,29 @@ LAYERS = 12
 
 
 def write_report(
-    job: Job, vertices: Vertices, triangles: Triangles, found: PrintCheck, folder: Path, progress: Progress
+    job: Job,
+    vertices: Vertices,
+    triangles: Triangles,
+    found: PrintCheck,
+    folder: Path,
+    progress: Progress,
+    mended: Repair | None = None,
 ) -> None:
     """Write places.png and report.html."""
     with progress.stage("report", expected_s=8.0):
         picture = places_picture(vertices, triangles, found, job.direction)
         write_bytes(folder / "places.png", picture.png)
-        write_text(folder / "report.html", report(job, vertices, triangles, found, picture))
+        write_text(folder / "report.html", report(job, vertices, triangles, found, picture, mended))
 
 
-def report(job: Job, vertices: Vertices, triangles: Triangles, found: PrintCheck, picture: Picture) -> str:
+def report(
+    job: Job,
+    vertices: Vertices,
+    triangles: Triangles,
+    found: PrintCheck,
+    picture: Picture,
+    mended: Repair | None = None,
+) -> str:
     """The whole report as HTML text."""
     files = {name: text for name, text in FILES.items() if name != "unit.toml" or job.unit is not None}
     sections = [
@@ -62,6 +76,8 @@ def report(job: Job, vertices: Vertices, triangles: Triangles, found: PrintCheck
         ("files", "Files of this check", facts_table("file", "content", files)),
         ("versions", "Versions", facts_table("program", "version", package_versions())),
     ]
+    if mended is not None:
+        sections.insert(0, ("repair", "Repair", _repair(mended)))
     assumed = sum(f.assumed for f in found.findings if f.limit is not None)
     notes = [
         (
@@ -112,6 +128,18 @@ def _findings(found: PrintCheck) -> str:
         remedy = f". {f.remedy[:1].upper()}{f.remedy[1:]}." if f.remedy else ""
         rows.append(([f.check, words[f.severity], f.what + remedy, limit, _where(f)], False))
     return table("* assumed, see the printer's limits", head, rows) + _places(found)
+
+
+def _repair(mended: Repair) -> str:
+    """What was changed before the check, and by how much."""
+    rows = [([change.what, str(change.count)], False) for change in mended.changes]
+    rows += [
+        (["largest move of a vertex, mm", f"{mended.largest_move_mm:.2g}"], False),
+        (["volume of the file's surface, mm³", f"{mended.volume_before_mm3:.6g}"], False),
+        (["volume once repaired, mm³", f"{mended.volume_after_mm3:.6g}"], False),
+    ]
+    words = "<p>The file was repaired where there is only one way to; part.stl is the repaired part.</p>"
+    return words + table("", [("change", "text"), ("", "n")], rows)
 
 
 def _where(f: Finding) -> str:

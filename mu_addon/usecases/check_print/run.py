@@ -10,6 +10,7 @@ import numpy as np
 
 from ...design.gates import GateError
 from ...design.printing.check import PrintCheck, check
+from ...design.printing.repair import Repair, repaired
 from ...design.solid import build_solid
 from ...design.surface import Triangles, Vertices, stl_bytes, stl_surface
 from ...errors import InputError
@@ -25,7 +26,25 @@ def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
     progress = context.progress
     with progress.stage("part"):
         vertices, triangles = surface_of(job)
+        mended = repaired(vertices, triangles) if job.repair else None
+        if mended is not None:
+            vertices, triangles = mended.vertices, mended.triangles
+            require_whole(mended, job.stl_name)
         nominal = nominal_of(job)
+
+    if mended is not None:
+        progress.warning(f"repaired: {'; '.join(mended.lines())}", job.stl_name, "look at part.stl")
+
+    def verdict(found: PrintCheck) -> None:
+        """Tell what is known before build directions are compared, which adds no finding."""
+        for finding in found.findings:
+            if finding.is_fault:
+                first = "not printable: " if finding.severity == "error" else ""
+                where = _where(finding.places)
+                progress.warning(f"{first}{finding.check}: {finding.what}", where, finding.remedy)
+        context.summary |= summary(found)
+        write_json(folder / "check.json", as_plain(job, found, mended))
+
     found = check(
         vertices,
         triangles,
@@ -35,17 +54,16 @@ def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
         job.direction,
         stage=progress.stage,
         nominal=nominal,
+        verdict=verdict,
+        share=progress.update,
     )
     context.summary |= summary(found)
     write_bytes(folder / "part.stl", stl_bytes(vertices, triangles))
-    write_json(folder / "check.json", as_plain(job, found))
-    context.report = lambda _: write_report(job, vertices, triangles, found, folder, progress)
+    write_json(folder / "check.json", as_plain(job, found, mended))
+    context.report = lambda _: write_report(job, vertices, triangles, found, folder, progress, mended)
     # Before the error of a part that must not be printed: that is the answer, and no reason to leave early.
     context.write_report()
     context.report = None
-    for finding in found.findings:
-        if finding.severity == "warning":
-            progress.warning(f"{finding.check}: {finding.what}", _where(finding.places), finding.remedy)
     errors = [f for f in found.findings if f.severity == "error"]
     if errors:
         first = errors[0]
@@ -105,7 +123,18 @@ def _text_stl(content: bytes, name: str) -> tuple[Vertices, Triangles]:
         ) from error
 
 
-def as_plain(job: Job, found: PrintCheck) -> dict[str, Any]:
+def require_whole(mended: Repair, name: str) -> None:
+    """Raise GateError, with what was done and what remains, unless a repair left nothing."""
+    if not mended.is_whole:
+        done = "; ".join(f"{change.count} {change.what}" for change in mended.changes) or "nothing"
+        raise GateError(
+            f"the repair is not unambiguous: {'; '.join(mended.remains)} (done before that: {done})",
+            name,
+            "correct what remains where the part was made, or check it without --repair to see the places",
+        )
+
+
+def as_plain(job: Job, found: PrintCheck, mended: Repair | None = None) -> dict[str, Any]:
     """What check.json holds."""
     return {
         "format": 1,
@@ -116,6 +145,7 @@ def as_plain(job: Job, found: PrintCheck) -> dict[str, Any]:
         "findings": [finding.plain() for finding in found.findings],
         "figures": found.figures,
         "orientation": [attrs.asdict(build) for build in found.builds],
+        **({} if mended is None else {"repair": mended.plain()}),
     }
 
 

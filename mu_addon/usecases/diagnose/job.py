@@ -12,6 +12,7 @@ import attrs
 
 from ...design.parameters import Unit, load_preset, read_unit, to_toml
 from ...errors import InputError
+from ...evidence.extended import ExtendedModel, load_model
 from ...evidence.prediction import unit as unit_pressure
 from ...measured import Experiment, Measured, read_folder
 from ...measured.folder import FILE
@@ -25,11 +26,12 @@ if TYPE_CHECKING:
     from ...evidence.unit_fem import UnitSettings
 
 UNIT = "unit.toml"
+KNOWN = "known.toml"
 LAYOUT = FolderLayout(
     "diagnose.toml",
     "# The inputs of this diagnosis; the measured data are named by the SHA-256 of their files.",
     results=("verdict.json", "model.toml", "residuals.csv", "report.html"),
-    optional=(UNIT,),
+    optional=(UNIT, KNOWN),
 )
 PRESET = "mu-1.0x"
 
@@ -40,13 +42,15 @@ class Job:
 
     unit: what unit_pressure experiments and blocks of counted cells are of, whatever its scale; the preset
     `PRESET` without one. fidelity: whether it is simulated homogenised or resolved. settings: how it is
-    simulated, where not as its fidelity has it.
+    simulated, where not as its fidelity has it. known: what an earlier diagnosis found, None without one: its
+    effects are in the model from the start and stay; moduli and zeros are fitted anew.
     """
 
     measured: Measured
     unit: Unit | None = None
     settings: UnitSettings | None = None
     fidelity: str = attrs.field(default=HOMOGENISED, validator=attrs.validators.in_(FIDELITIES))
+    known: ExtendedModel | None = None
 
     def __attrs_post_init__(self) -> None:
         if not any(e.role == "fit" for e in self.measured.experiments):
@@ -80,6 +84,8 @@ class Job:
             "run": {"data": str(self.measured.folder.resolve())},
         }
         texts = {LAYOUT.inputs: toml_text(values, LAYOUT.header)}
+        if self.known is not None:
+            texts[KNOWN] = self.known.text()
         return texts if self.subject is None else texts | {UNIT: to_toml(self.subject)}
 
 
@@ -91,8 +97,13 @@ def read_job(folder: Path) -> Job:
         raise InputError("it was made with settings given in Python", str(path), "make it there again")
     measured = read_folder(named_path(path, run, "data", "folder of measured data"))
     require_same_data(measured, values.get("data"), described(measured))
-    unit = folder / UNIT
-    return Job(measured, read_unit(unit) if unit.is_file() else None, fidelity=fidelity_in(values, path))
+    unit, known = folder / UNIT, folder / KNOWN
+    return Job(
+        measured,
+        read_unit(unit) if unit.is_file() else None,
+        fidelity=fidelity_in(values, path),
+        known=load_model(known) if known.is_file() else None,
+    )
 
 
 def fidelity_in(values: Mapping[str, Any], path: Path) -> str:

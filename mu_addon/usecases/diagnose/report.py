@@ -23,7 +23,7 @@ from ...run.context import RunContext
 from ...run.versions import package_versions
 from . import charts as pictures
 from .diagnosis import Curve, Diagnosis, curves
-from .words import advice, bare, between, listed, readable, sentence
+from .words import advice, bare, between, listed, readable, sentence, to_do
 
 FILES = {
     "diagnose.toml": "inputs of this run",
@@ -88,7 +88,9 @@ def _headline(found: Diagnosis) -> str:
     verdict = found.verdict
     headline, words = sentence(verdict)
     html = (
-        f'<p class="answer">Verdict: <strong>{escape(headline)}</strong>.</p><p>{escape(signed(words))}</p>'
+        f'<p class="answer">Verdict: <strong>{escape(headline)}</strong>.</p>'
+        + (f"<p><strong>What to do.</strong> {escape(do)}</p>" if (do := to_do(verdict)) else "")
+        + f"<p>{escape(signed(words))}</p>"
     )
     if next_ := advice(verdict):
         html += f"<p><strong>Next measurement.</strong> {escape(next_)}</p>"

@@ -14,10 +14,12 @@ import numpy as np
 from ...design.parameters import Unit
 from ...errors import InputError
 from ...evidence.drive import reading_noise
-from ...evidence.extended import ExtendedModel, extended_model
+from ...evidence.extended import ExtendedModel, Fitted, extended_model, stacked
 from ...evidence.prediction import lattice
+from ...evidence.prediction import unit as unit_pressure
+from ...evidence.prediction.effective_pressure import REFERENCE
 from ...evidence.resolution import STAYS, dwell, quantum
-from ...evidence.simulator import Composite
+from ...evidence.simulator import Composite, Simulator
 from ...evidence.verdict import Verdict, diagnose
 from ...files import write_csv, write_json
 from ...measured import Measured
@@ -30,7 +32,7 @@ from .diagnosis import Diagnosis, curves
 from .job import LAYOUT, Job, read_job
 from .report import write_report
 from .simulators import simulators_of
-from .words import advice, readable, sentence
+from .words import advice, readable, sentence, to_do
 
 
 def begin_diagnosis(job: Job, folder: Path, context: RunContext) -> None:
@@ -72,13 +74,18 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | No
     simulators, notes = simulators_of(
         measured.experiments, unit, folder / "cache", progress, job.unit_settings
     )
-    simulator = Composite(simulators)
+    known = job.known.of_effects if job.known else {}
+    simulator = Composite(simulators, known=known)
+    notes += _known_before(job, simulator)
     with _stages(progress, simulator) as on_model:
         verdict = diagnose(measured.experiments, simulator, on_model)
     model, block = _extended_model(verdict, simulator), simulators.get(lattice.KIND)
     if isinstance(block, lattice.LatticeStress) and block.computed:
         model = attrs.evolve(model, lattice=block.computed)
         notes += _resin(model, unit)
+    model = with_reference(model, simulators)
+    if job.known is not None:
+        model = stacked(job.known, model)
     notes += _bounds_met(verdict, simulator)
     notes += _noisy_gauges(measured, verdict)
     notes += verdict.set_aside
@@ -100,6 +107,29 @@ def _extended_model(verdict: Verdict, simulator: Composite) -> ExtendedModel:
     fit = verdict.selection.chosen if verdict.names else verdict.selection.base
     seen = {k for k, column in zip(fit.keys, fit.jacobian.T, strict=True) if column.any()}
     return attrs.evolve(model, nuisances={k: f for k, f in model.nuisances.items() if k in seen})
+
+
+def with_reference(model: ExtendedModel, simulators: Mapping[str, Simulator]) -> ExtendedModel:
+    """The model with the pressure that the energy of a unit's Mullins softening is relative to."""
+    effect, _, name = REFERENCE.partition(".")
+    unit = simulators.get(unit_pressure.KIND)
+    if effect not in model.effects or not isinstance(unit, unit_pressure.UnitPressure):
+        return model
+    stated = Fitted(unit.reference_kPa, 0.0, math.nan, math.nan, "kPa")
+    return attrs.evolve(model, effects={**model.effects, effect: {**model.effects[effect], name: stated}})
+
+
+def _known_before(job: Job, simulator: Composite) -> list[str]:
+    """What was in the model from the start, in words, and what of it these experiments do not show."""
+    if job.known is None:
+        return []
+    effects = {
+        readable(name): ", ".join(f"{readable(p)} {f.value:.3g} {f.unit}".rstrip() for p, f in values.items())
+        for name, values in job.known.effects.items()
+    }
+    words = [f"known before and in the model from the start: {n} ({v})" for n, v in effects.items()]
+    unseen = (f"of {readable(n)}, known before, these experiments show nothing" for n in simulator.unseen)
+    return [*words, *unseen]
 
 
 def _resin(model: ExtendedModel, unit: Unit | None) -> list[str]:
@@ -197,6 +227,7 @@ def summary(found: Diagnosis) -> dict[str, Any]:
         "verdict": verdict.kind,
         "headline": headline,
         "sentence": words,
+        "to_do": to_do(verdict),
         "next": advice(verdict),
         "causes": verdict.as_json()["causes"],
         "gain": verdict.gain.as_json(),
@@ -209,7 +240,9 @@ def summary(found: Diagnosis) -> dict[str, Any]:
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
     """What a diagnosis found, in a few lines of text, of its `summary`."""
-    lines = [f"verdict: {summary['verdict']}: {summary['headline']}", summary["sentence"]]
+    lines = [f"verdict: {summary['verdict']}: {summary['headline']}"]
+    lines += [f"what to do: {summary['to_do']}"] if summary.get("to_do") else []
+    lines.append(summary["sentence"])
     for name, words in (("fit", "fitted data"), ("held_out", "held-out data")):
         errors = summary["gain"][name]
         if errors and summary["causes"]:

@@ -9,6 +9,7 @@ from ...evidence.effect import Parameter
 from ...evidence.selection import Cause
 from ...evidence.sensitivity import best_seen
 from ...evidence.verdict import Verdict
+from .remedies import what_to_do
 
 # Of the table of dependences: the size of what is left against the data's own spread.
 SPREAD = "spread"
@@ -127,6 +128,15 @@ def advice(verdict: Verdict) -> str:
         f"These data cannot identify {listed([readable(s.effect.name) for s in hidden])}. To identify "
         f"more: {'; or '.join(some)}."
     )
+
+
+def to_do(verdict: Verdict) -> str:
+    """What to do about what was found, in words; empty where nothing was named."""
+    if verdict.kind == "none":
+        return "Trust the simulation for experiments like these."
+    if verdict.kind == "ambiguous":
+        return "Make the next measurement below before anything is changed."
+    return what_to_do(verdict.names)
 
 
 def _of_one_only(cause: Cause) -> str:

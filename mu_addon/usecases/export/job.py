@@ -31,13 +31,16 @@ _LONGEST_PATH = 1 << 18
 LAYOUT = FolderLayout(
     "export.toml",
     "# The inputs of this export; unit.toml beside it belongs to them.",
-    results=("unit.stl", "unit.3mf", "unit-beams.3mf", "*.step", "nodes.txt", MANIFEST),
+    results=("unit.stl", "unit.3mf", "unit-beams.3mf", "*.step", "nodes.txt", "plug-*.stl", MANIFEST),
 )
 
 
 @attrs.frozen(eq=False)
 class Job:
-    """Inputs of an export. path: of the waveguide, or None; take_off: the printer's offsets in mm."""
+    """Inputs of an export. path: of the waveguide, or None; take_off: the printer's offsets in mm.
+
+    vent_along: build direction, away from the platform, for which trapped resin gets vents; None for none.
+    """
 
     unit: Unit
     resin: Material
@@ -47,6 +50,7 @@ class Job:
     quality: str = "export"
     take_off: tuple[float, float] = (0.0, 0.0)
     offset_source: str = ""
+    vent_along: tuple[float, float, float] | None = None
 
     def __attrs_post_init__(self) -> None:
         for name in self.formats:
@@ -54,6 +58,10 @@ class Job:
                 raise InputError(
                     f"there is no format {name!r}", "--formats", f"choose from {', '.join(FORMATS)}"
                 )
+        if self.vent_along is not None and not 1e-6 < sum(x * x for x in self.vent_along) < 1e12:
+            raise InputError(
+                f"{self.vent_along} is not a direction", "--vent-along", "give three numbers, such as 0 0 -1"
+            )
         if self.quality not in QUALITY:
             raise InputError(
                 f"there is no quality {self.quality!r}", "--quality", f"one of {', '.join(QUALITY)}"
@@ -70,6 +78,7 @@ class Job:
             "take_off_mm": self.take_off,
             "offset_source": self.offset_source or None,
             "resin": self.resin.name,
+            "vent_along": self.vent_along,
             "points_mm": None if self.path is None or isinstance(self.path, Window) else self.path,
         }
         return {
@@ -90,6 +99,7 @@ class _Settings:
     take_off_mm: tuple[float, float] = (0.0, 0.0)
     offset_source: str = ""
     points_mm: tuple[tuple[float, float, float], ...] = ()
+    vent_along: tuple[float, float, float] | None = None
 
 
 def read_job(folder: Path) -> Job:
@@ -108,6 +118,7 @@ def read_job(folder: Path) -> Job:
         quality=asked.quality,
         take_off=asked.take_off_mm,
         offset_source=asked.offset_source,
+        vent_along=asked.vent_along,
     )
 
 

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from ...design.beams import beam_parts
 from ...design.export import write_nodes
 from ...design.lattice import lattice_of
+from ...design.printing.printer import load_printer
+from ...design.printing.vents import Vented, vented
 from ...design.solid import QUALITY, Solid, build_solid
-from ...design.surface import bad_edges, stl_bytes, stl_surface, volume
+from ...design.surface import area, bad_edges, genus, stl_bytes, stl_surface, volume
 from ...design.threemf import Part, read_3mf, write_3mf
 from ...errors import MeshingError, OutputError
 from ...files import write_bytes, write_json
@@ -49,6 +51,7 @@ class Export:
     context: RunContext
     files: list[dict[str, Any]] = attrs.field(factory=list)
     refused: list[dict[str, str]] = attrs.field(factory=list)
+    vented: Vented | None = None
 
     @property
     def progress(self) -> Progress:
@@ -60,6 +63,9 @@ class Export:
         job = self.job
         with self.progress.stage("solid", 12.0 if job.quality == "export" else 3.0):
             solid = build_solid(job.unit, job.path, job.quality, take_off=job.take_off)
+        if job.vent_along is not None:
+            with self.progress.stage("vents", 10.0):
+                solid = self._vent(solid, job.vent_along)
         for name in job.formats:
             with self.progress.stage(name, 8.0):
                 {
@@ -72,6 +78,49 @@ class Export:
         manifest = self._manifest(solid)
         write_json(self.folder / MANIFEST, manifest)
         self.context.summary |= manifest
+
+    def _vent(self, solid: Solid, direction: tuple[float, float, float]) -> Solid:
+        """The solid with vents for what it traps along a build direction; writes their plugs."""
+        found = self.vented = vented(solid.vertices, solid.triangles, direction, load_printer())
+        for name in self.job.formats:
+            if name in ("3mf-beams", "step"):
+                self.progress.warning(f"{name} has no vents: it stays of nominal shape", "--vent-along")
+        if not found.vents:
+            self.progress.warning(
+                f"no vent is needed: {found.before_ml:.3g} ml are trapped at most", "--vent-along"
+            )
+            return solid
+        for number, vent in enumerate(found.vents, 1):
+            name = f"plug-{number}.stl"
+            points, faces = vent.plug_surface()
+            write_bytes(self.folder / name, stl_bytes(points, faces))
+            back = stl_surface((self.folder / name).read_bytes())
+            if bad_edges(back[1]) or abs(volume(*back) / vent.plug.volume() - 1.0) > 1e-3:
+                raise _mismatch(name, "is another body than the plug")
+            x, y, z = vent.outer
+            what = f"plug of the vent at ({x:.2f}, {y:.2f}, {z:.2f}) mm, glued in once the unit is washed"
+            self._add(name, what, {"volume_mm3": volume(*back), "open_edges": 0})
+        gates = attrs.evolve(
+            solid.gates,
+            bad_edges=bad_edges(found.triangles),
+            genus=genus(found.vertices, found.triangles),
+            volume_mm3=volume(found.vertices, found.triangles),
+            area_mm2=area(found.vertices, found.triangles),
+            vertices=len(found.vertices),
+            triangles=len(found.triangles),
+        )
+        return attrs.evolve(solid, vertices=found.vertices, triangles=found.triangles, gates=gates)
+
+    def _vents(self) -> dict[str, Any] | None:
+        """What the manifest says of vents, None where none were asked for."""
+        if self.vented is None:
+            return None
+        return {
+            "along": self.job.vent_along,
+            "trapped_before_ml": self.vented.before_ml,
+            "trapped_after_ml": self.vented.after_ml,
+            "vents": [vent.plain() for vent in self.vented.vents],
+        }
 
     def _stl(self, solid: Solid) -> None:
         write_bytes(self.folder / "unit.stl", stl_bytes(solid.vertices, solid.triangles))
@@ -215,6 +264,7 @@ class Export:
                 "z": job.take_off[1],
                 "source": job.offset_source or "nothing: nominal geometry",
             },
+            "vents": self._vents(),
             "resin": {
                 "name": job.resin.name,
                 "density_g_per_ml": density,

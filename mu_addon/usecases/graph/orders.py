@@ -11,6 +11,7 @@ import attrs
 from ...design.anchors import window
 from ...design.gates import GateError
 from ...design.printing.printer import load_printer
+from ...design.rigid_body import require_beside
 from ...errors import InputError
 from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
@@ -35,8 +36,8 @@ from ..homogenize.job import resin_of as lattice_resin
 from ..homogenize.run import USE_CASE as HOMOGENIZE
 from ..simulate_and_place.extended_unit import read_extended, require_same_print
 from ..simulate_and_place.job import Job, grasp, protocol_of
+from ..simulate_and_place.named_effects import NamedEffects
 from ..simulate_and_place.run import USE_CASE as STUDY
-from ..simulate_and_place.static_effects import StaticEffects
 from .parts import Design, refuse_body, solid_of
 from .study_nodes import BOTH
 
@@ -62,7 +63,7 @@ def _kept(done: Finished) -> tuple[Path, Mapping[str, Any]]:
 def _simulated(call: Call) -> Job:
     """The study that a node Simulate asks for; raises InputError."""
     s, design = call.settings, call.inputs["unit"]
-    unit, effects = design.unit, StaticEffects(orientation_deg=s["orientation_deg"], where=call.node)
+    unit, effects = design.unit, NamedEffects(orientation_deg=s["orientation_deg"], where=call.node)
     lattice: Effective | None = call.inputs["law"]
     model: Path | None = call.inputs["model"]
     if model is not None:
@@ -70,6 +71,8 @@ def _simulated(call: Call) -> Job:
         unit, effects = found.unit, attrs.evolve(found.effects, orientation_deg=s["orientation_deg"])
         if lattice is not None and found.applied:
             require_same_print(unit, lattice, model)
+    obstacles = tuple(body for _, body in call.inputs["obstacles"])
+    require_beside(obstacles, unit.dimensions, design.body)
     return Job(
         unit=unit,
         protocol=protocol_of(s["protocol"] or None),
@@ -78,6 +81,7 @@ def _simulated(call: Call) -> Job:
         self_contact=s["self_contact"],
         lattice=lattice,
         body=design.body,
+        obstacles=obstacles,
         effects=effects,
         stages=("design", "simulate"),
     )

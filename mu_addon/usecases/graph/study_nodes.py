@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from ...design.body import read_body
 from ...design.gripper import Fingers, Gripper, Plate
 from ...design.quantity import describe
+from ...design.rigid_body import FRICTION, RigidBody
 from ...design.solid import QUALITY
+from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
 from ...meshing.settings import FIDELITIES, HOMOGENISED
 from ...placement.inclusion import RULES
@@ -32,6 +35,13 @@ def _gripper(call: Call) -> Outputs:
     fingers = Fingers(**{d.name: s[d.name] for d in describe(Fingers)})
     plate = Plate(**{d.name: s[d.name] for d in describe(Plate)})
     return {"gripper": Gripper(design.unit, path=design.path or s["path"], fingers=fingers, plate=plate)}
+
+
+def _obstacle(call: Call) -> Outputs:
+    s = call.settings
+    if not s["file"]:
+        raise InputError("no body is named", "file", "give a file of a closed surface: STL, OBJ or PLY")
+    return {"obstacle": RigidBody(read_body(s["file"]), s["friction"])}
 
 
 def _study_remark(outputs: Outputs) -> str:
@@ -72,6 +82,7 @@ def study_nodes() -> tuple[Definition, ...]:
                 _TAKES_UNIT,
                 Input("law", ("law",), "the lattice's law, by a node Homogenize", needed=False),
                 Input("model", ("model",), "an extended model, by a node Diagnose", needed=False),
+                Input("obstacles", ("obstacle",), "link nodes Obstacle", needed=False, many=True),
             ),
             (Output("study", "study", "the motion"),),
             (
@@ -89,6 +100,19 @@ def study_nodes() -> tuple[Definition, ...]:
             read=of_orders("study_of"),
             muting=_LEFT_OUT,
             remark=_study_remark,
+        ),
+        Definition(
+            "obstacle",
+            "Obstacle",
+            SIMULATE,
+            "a rigid body that the unit may touch, fixed in the unit's frame",
+            outputs=(Output("obstacle", "obstacle", "the body"),),
+            settings=(
+                setting("file", "", "closed surface in mm: STL, OBJ or PLY", path=FILE),
+                setting("friction", FRICTION, "coefficient of friction with the unit", low=0, high=5),
+            ),
+            make=_obstacle,
+            remark=lambda outputs: outputs["obstacle"].name,
         ),
         Definition(
             "place",

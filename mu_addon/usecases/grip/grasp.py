@@ -21,8 +21,8 @@ from ...fem.kinematics import TipSection, probe
 from ...fem.loads import STANDARD_GRAVITY
 from ...fem.materials import Materials
 from ...fem.model import Model
-from ...fem.newton_settings import NewtonSettings
-from ...fem.obstacle import CONTACT_NEWTON, Obstacle
+from ...fem.newton_settings import CONTACT_NEWTON, NewtonSettings
+from ...fem.obstacle import Obstacle
 from ...fem.outer_faces import OuterFaces, outer_faces
 from ...fem.rigid import Box, Pose
 from ...fem.self_contact import SelfContact

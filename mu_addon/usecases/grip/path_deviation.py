@@ -22,7 +22,7 @@ from ...fem.equilibrium import Equilibrium
 from ...fem.kinematics import Probe, probe
 from ...fem.materials import Materials
 from ...fem.model import Model
-from ...fem.obstacle import CONTACT_NEWTON
+from ...fem.newton_settings import CONTACT_NEWTON
 from ...fem.time_stepping import simulate_in_time
 from ...fem.trajectory import Trajectory, simulate
 from ...fem.unit import materials_of

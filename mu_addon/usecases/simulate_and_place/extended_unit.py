@@ -17,7 +17,7 @@ from ...evidence.prediction.lattice import SLENDER, ComputedCell
 from ...evidence.unit_effects import EFFECTS, Body
 from ...homogenize.effective import Effective
 from ..diagnose.words import readable
-from .static_effects import NAMES, StaticEffects
+from .named_effects import NAMES, NamedEffects, parameters_of
 
 Values = Mapping[str, Fitted]
 # A unit with a value in it, and what changed in words.
@@ -35,8 +35,10 @@ _ELSEWHERE = {
     "mesh_error": "a finer mesh is given with --refine",
 }
 _NOWHERE = (
-    "it concerns time, gauge or test bench, which a quasi-static simulation of the unit does not contain"
+    "it concerns a gauge, a clock, a camera or the bench, which a simulation of the unit does not contain"
 )
+
+_OTHER_KIND = "its parameters are of another kind of experiment than a whole unit under pressure"
 
 
 @attrs.frozen
@@ -50,7 +52,7 @@ class Extended:
     unit: Unit
     applied: tuple[str, ...]
     left_out: tuple[str, ...]
-    effects: StaticEffects
+    effects: NamedEffects
     kept: ExtendedModel
 
     def of_parameters(self) -> Extended:
@@ -58,7 +60,7 @@ class Extended:
         beyond = self.effects.words()
         whole = tuple(f"{words}: only `simulate` and `place` simulate the whole unit" for words in beyond)
         applied = tuple(words for words in self.applied if words not in beyond)
-        return attrs.evolve(self, applied=applied, left_out=(*self.left_out, *whole), effects=StaticEffects())
+        return attrs.evolve(self, applied=applied, left_out=(*self.left_out, *whole), effects=NamedEffects())
 
 
 def read_extended(unit: Unit, path: str | Path) -> Extended:
@@ -71,20 +73,21 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
 
     overcure moves the print's surfaces, skin_cure gives it a skin, wall_thickness changes its wall, and
     moduli that were fitted take the place of the unit's. A fitted modulus of the lattice is of the lattice as
-    drawn at 1.0x, so the unit gets that of its own scale. Effects that no parameter of a unit stands for, and
-    that are as static as a simulation of it, are for that, see `StaticEffects`.
+    drawn at 1.0x, so the unit gets that of its own scale. Effects that no parameter of a unit stands for are
+    for its simulation, see `NamedEffects`, but those of a kind of experiment that is no whole unit.
     """
     applied: list[str] = []
     left_out: list[str] = []
-    static = {name: values for name, values in model.effects.items() if name in NAMES}
+    beside = {n: v for n, v in model.effects.items() if n in NAMES and parameters_of(n, v) is not None}
     for name, values in model.effects.items():
-        if name in static:
+        if name in beside:
             continue
         effect = EFFECTS.get(name)
         known = effect is not None and tuple(values) == (effect.parameter.name,)
         put = _of_effect(name) if known and name in _DESCRIPTIONS else None
         if put is None:
-            left_out.append(f"{readable(name)} ({_listed_values(values)}): {_ELSEWHERE.get(name, _NOWHERE)}")
+            why = _ELSEWHERE.get(name, _OTHER_KIND if name in NAMES else _NOWHERE)
+            left_out.append(f"{readable(name)} ({_listed_values(values)}): {why}")
             continue
         for p, fitted in values.items():
             unit, words = _put(unit, origin, f"{name}.{p}", fitted, put)
@@ -100,8 +103,8 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
             left_out.append(
                 f"{readable(name)} ({fitted.value:.4g}) belongs to the test bench, not to the unit"
             )
-    named = {name: {p: fitted.value for p, fitted in values.items()} for name, values in static.items()}
-    effects = StaticEffects(named, where=f"{origin}, [effect]")
+    named = {name: {p: fitted.value for p, fitted in values.items()} for name, values in beside.items()}
+    effects = NamedEffects(named, where=f"{origin}, [effect]")
     applied += effects.words()
     if model.verdict == "ambiguous" and applied:
         left_out.insert(
@@ -111,7 +114,7 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
         left_out.insert(
             0, "the verdict is unexplained: the model is wrong, and it contains no effect that corrects it"
         )
-    kept = ExtendedModel(model.verdict, {n: v for n, v in static.items() if n in effects.values}, {})
+    kept = ExtendedModel(model.verdict, {n: v for n, v in beside.items() if n in effects.values}, {})
     return Extended(unit, tuple(applied), tuple(left_out), effects, kept)
 
 

@@ -19,13 +19,15 @@ from ...design.quantity import in_MPa
 from ...design.rigid_body import FRICTION, RigidBody, mirrored, read_rigid_bodies, require_beside, to_obj
 from ...design.solid import QUALITY
 from ...errors import InputError
-from ...fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
-from ...fem.obstacle import CONTACT_NEWTON, RESOLVED_OBSTACLE_NEWTON
+from ...fem.newton_settings import (
+    CONTACT_NEWTON,
+    RESOLVED_NEWTON,
+    RESOLVED_OBSTACLE_NEWTON,
+    SELF_CONTACT_NEWTON,
+    NewtonSettings,
+)
 from ...fem.protocol import Protocol, read_protocol
-from ...fem.self_contact import SELF_CONTACT_NEWTON, SelfContact
 from ...fem.solver import SolverChoice
-from ...fem.unit import materials_of
-from ...homogenize.effective import Effective, read_effective
 from ...meshing.settings import MeshSettings
 from ...placement.graph import Limits
 from ...placement.inclusion import PRINTED, RULES
@@ -33,14 +35,16 @@ from ...run.folder import claim, keep_inputs
 from ...run.inputs import digest
 from ...run.lock import FolderLock
 from ...sensing.optics import Optics
-from .contact_history import obstacles_of
-from .static_effects import StaticEffects
+from .named_effects import NamedEffects
 from .study_file import FILES, LAYOUT, NAME, STAGES, Tables, compose, holds, read_run
 from .study_file import read as read_tables
 
 if TYPE_CHECKING:
+    # The inputs of a study are made without the solver: Blender's window waits for them.
     from ...fem.materials import Materials
     from ...fem.model import Model
+    from ...fem.self_contact import SelfContact
+    from ...homogenize.effective import Effective
     from ...meshing.mesh import Mesh
 
 GRASP = "protocols/grasp.csv"
@@ -99,7 +103,7 @@ class Job:
     # Rigid bodies that the unit may touch, fixed in its frame.
     obstacles: tuple[RigidBody, ...] = attrs.field(default=(), converter=tuple)
     # What measured data named beside what the unit has parameters for, and the direction of gravity.
-    effects: StaticEffects = attrs.field(factory=StaticEffects)
+    effects: NamedEffects = attrs.field(factory=NamedEffects)
     # Whether walls and struts of a resolved unit keep apart, at a cost of several times the time.
     self_contact: bool = attrs.field(default=False, validator=attrs.validators.instance_of(bool))
     # How linear systems are solved: within their tolerance it decides nothing.
@@ -176,8 +180,25 @@ class Job:
 
     @cached_property
     def samples(self) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
-        """Time in s and pressure in kPa, (k,) each, at which the protocol is solved."""
-        return self.protocol.sample(self.times)
+        """Time in s and pressure in kPa, (k,) each, at which the protocol is solved.
+
+        With effects in time that is the pressure at which the unit without them would stand.
+        """
+        time, pressure = self.protocol.sample(self.times)
+        if not self.effects.in_time:
+            return time, pressure
+        # Between the protocol's corners the pressure is linear, as the effects have it.
+        every = np.union1d(self.protocol.time_s, time)
+        effective = self.effects.effective_kPa(
+            every, np.interp(every, self.protocol.time_s, self.protocol.pressure_kPa)
+        )
+        # Rounded, so that the same pressure met twice is recognised as one equilibrium.
+        return time, np.round(effective[np.searchsorted(every, time)], 9)
+
+    @property
+    def supplied_kPa(self) -> np.ndarray[Any, Any]:
+        """The protocol's pressure (k,) in kPa at the times of `samples`."""
+        return self.protocol.sample(self.times)[1]
 
     def tables(self) -> Tables:
         """Everything that decides the results, a table a stage, as study.toml has it.
@@ -226,6 +247,8 @@ class Job:
 
     def materials(self, mesh: Mesh) -> Materials:
         """Materials of the unit's mesh, effects and all."""
+        from ...fem.unit import materials_of
+
         drawn = materials_of(self.unit, mesh, None if self.lattice is None else self.lattice.law)
         return self.effects.materials(drawn, mesh)
 
@@ -235,6 +258,8 @@ class Job:
         model = self.effects.model(self.unit, mesh, threads, device)
         model.solver = solver
         if self.obstacles:
+            from .contact_history import obstacles_of
+
             model.obstacles = obstacles_of(self.obstacles, self.unit, mesh)
         if self.self_contact:
             model.self_contact = self_contact_of(self.unit, mesh)
@@ -319,6 +344,8 @@ class Job:
 
 def self_contact_of(unit: Unit, mesh: Mesh) -> SelfContact:
     """What keeps walls and struts of a unit's resolved mesh apart. Raises InputError."""
+    from ...fem.self_contact import SelfContact
+
     resin_MPa = in_MPa(unit.material.membrane_modulus_kPa)
     return SelfContact(mesh, GAP_SHARE * unit.printed.wall, BARRIER_SHARE * resin_MPa)
 
@@ -392,6 +419,8 @@ def job_of(tables: Mapping[str, Mapping[str, Any]], folder: Path) -> Job:
     if "simulate" in tables:
         job["protocol"] = read_protocol(folder / FILES["protocol"])
         if "lattice" in tables["simulate"]:
+            from ...homogenize.effective import read_effective
+
             job["lattice"] = read_effective(folder / FILES["lattice"])
         if "obstacles" in tables["simulate"]:
             friction = tables["simulate"].get("friction")
@@ -408,7 +437,7 @@ def job_with(tables: Mapping[str, Mapping[str, Any]], where: str, **given: Any) 
         values = {k: v for k, v in table.items() if k not in own and not k.endswith("_sha256")}
         if stage == "simulate" and ("effects" in values or "orientation_deg" in values):
             named, turn = values.pop("effects", {}), values.pop("orientation_deg", 0.0)
-            job["effects"] = StaticEffects(named, turn, f"{where}, [{stage}.effects]")
+            job["effects"] = NamedEffects(named, turn, f"{where}, [{stage}.effects]")
         for key, kind in (("mesh", MeshSettings), ("search", Limits), ("optics", Optics)):
             if key in values:
                 inner = _inner(values.pop(key), f"{where}, [{stage}.{key}]")

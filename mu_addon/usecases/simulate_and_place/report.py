@@ -299,10 +299,11 @@ def _motion(r: ReportData) -> str:
     html = ""
     if len(r.angle_deg):
         low, high = float(r.pressure_kPa.min()), float(r.pressure_kPa.max())
+        why = "friction causes hysteresis" if r.contact else "it depends on what was before"
         html += figure(
             plots.angle_against_pressure(r.pressure_kPa, r.angle_deg),
             "Bending angle of the tip relative to the base, without a sensor; each dot is a converged state"
-            + (", in order of time: friction causes hysteresis." if r.contact else "."),
+            + (f", in order of time: {why}." if r.in_time else "."),
             f"Bending angle against pressure from {low:g} to {high:g} kPa.",
         )
     if len(r.protocol_s):

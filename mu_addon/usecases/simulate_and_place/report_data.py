@@ -9,7 +9,6 @@ import numpy as np
 
 from ...design.parameters import assumed, stated
 from ...errors import InputError
-from ...evidence.unit_effects import EFFECTS
 from ...files import write_bytes
 from ...report.results import (
     Gate,
@@ -24,10 +23,11 @@ from ...report.results import (
 from ...run.versions import package_versions
 from .job import LATTICE_LAW
 from .motion import CONTACT_PRESSURE, REGIONS, read_motion
+from .named_effects import parameters_of
 
 if TYPE_CHECKING:
     from ...homogenize.effective import Effective
-    from .static_effects import StaticEffects
+    from .named_effects import NamedEffects
     from .study import Study
 
 # What the lattice's law stands in for.
@@ -82,9 +82,7 @@ def _panel_pictures(study: Study) -> None:
 
     if study.trajectory is None or study.mesh is None:
         return
-    states = study.trajectory.states
-    angles = np.array([study.bending_angle_deg(s.u) for s in states])
-    write_angle(study.folder, np.array([s.pressure_kPa for s in states]), angles)
+    write_angle(study.folder, *study.motion_in_order())
     rule = study.job.headline_rule
     found = [e for e in study.evaluations.values() if e.rule == rule]
     top = max((float(e.deviation.delta.max()) for e in found), default=0.0)
@@ -104,11 +102,7 @@ def report_data(
     job, d = study.job, study.job.unit.dimensions
     windows = study.windows
     complete = all((w.name, rule) in study.evaluations for w in windows for rule in job.rules)
-    time, pressure = job.samples
-    states = study.trajectory.states if study.trajectory else tuple(study.states)
-    if not job.in_time:
-        # One state a pressure; where something remembers one an instant, in the order of time.
-        states = tuple(sorted(states, key=lambda s: s.pressure_MPa))
+    moved_kPa, angle_deg = study.motion_in_order()
     rules = {rule: _rule_result(study, rule) for rule in job.rules} if complete else {}
     return ReportData(
         title=f"Sensor path for {job.unit.name}" if rules else f"Monolithic Unit {job.unit.name}",
@@ -130,10 +124,11 @@ def report_data(
         self_contact=tuple(study.self_contact),
         touched=_painted(study, CONTACT_PRESSURE, 0.0, 1.0, "contact pressure"),
         effects=tuple(_effect_words(job.effects)),
-        pressure_kPa=np.array([s.pressure_kPa for s in states]),
-        angle_deg=np.array([study.bending_angle_deg(s.u) for s in states if study.mesh]),
-        protocol_s=time if states else np.zeros(0),
-        protocol_kPa=pressure if states else np.zeros(0),
+        pressure_kPa=moved_kPa,
+        angle_deg=angle_deg,
+        in_time=job.in_time or job.effects.in_time,
+        protocol_s=job.samples[0] if len(moved_kPa) else np.zeros(0),
+        protocol_kPa=job.supplied_kPa if len(moved_kPa) else np.zeros(0),
         parameters=_parameters(study),
         mesh=_mesh_figures(study),
         solver={name.replace("_", " "): value for name, value in study.solver.items()},
@@ -188,7 +183,7 @@ def _parameters(study: Study) -> list[Parameter]:
     return rows
 
 
-def _effect_words(effects: StaticEffects) -> list[str]:
+def _effect_words(effects: NamedEffects) -> list[str]:
     """What acts on the unit besides, in words."""
     turned = (
         [f"gravity turned {effects.orientation_deg:g}° about x, 0 being the tip down"]
@@ -198,12 +193,12 @@ def _effect_words(effects: StaticEffects) -> list[str]:
     return [*effects.words(), *turned]
 
 
-def _effects(effects: StaticEffects) -> list[Parameter]:
+def _effects(effects: NamedEffects) -> list[Parameter]:
     """Size of every effect beside the unit's parameters, and the direction of gravity where it matters."""
     rows = [
-        Parameter(f"effects.{name}.{p}", value, EFFECTS[name].parameter.unit, f"the model given: {words}")
+        Parameter(f"effects.{name}.{p.name}", given[p.name], p.unit, f"the model given: {words}")
         for (name, given), words in zip(effects.values.items(), effects.words(), strict=True)
-        for p, value in given.items()
+        for p in parameters_of(name, given) or ()
     ]
     if effects.has_gravity:
         turned = Parameter(

@@ -258,7 +258,8 @@ class Study:
             materials = self.job.materials(self.mesh)
             touching = self._write_self_contact(model, self.trajectory.states)
             remembered = self._remembered(model)
-            write_model_a(self.folder, self.mesh, materials, self.trajectory, remembered, touching)
+            supplied = attrs.evolve(self.trajectory, pressure_kPa=self.job.supplied_kPa)
+            write_model_a(self.folder, self.mesh, materials, supplied, remembered, touching)
             self._look_for_self_intersection(self.trajectory.states)
             self._tell_of_snaps(self.trajectory.states)
             self._look_beyond_the_fit(self.trajectory.states)
@@ -390,7 +391,7 @@ class Study:
 
     def _write_motion(self, states: Any) -> None:
         assert self.mesh is not None
-        if self.job.in_time:
+        if self.job.in_time or self.job.effects.in_time:
             self._write_in_time(states)
             return
         ordered = sorted(states, key=lambda s: s.pressure_MPa)
@@ -408,20 +409,47 @@ class Study:
         write_trajectory(self.folder / "model_a.pvd", self.mesh, reached)
 
     def _write_in_time(self, states: Any) -> None:
-        """As `_write_motion`, of states an instant: with contact or memory the way back differs."""
+        """As `_write_motion`, an instant a row: with contact or memory the way back differs."""
         assert self.mesh is not None
-        time, _ = self.job.samples
-        reached = list(zip(time.tolist(), states, strict=False))
-        angles = [self.bending_angle_deg(s.u) for _, s in reached]
+        reached = self._instants(states)
         rows = [
-            (f"{t:.9g}", f"{s.pressure_kPa:.6g}", f"{a:.6g}")
-            for (t, s), a in zip(reached, angles, strict=True)
+            (f"{t:.9g}", f"{p:.6g}", f"{self.bending_angle_deg(s.u):.6g}", f"{s.pressure_kPa:.6g}")
+            for t, p, s in reached
         ]
-        write_csv(self.folder / "angle.csv", ["time_s", "pressure_kPa", "angle_deg"], rows)
+        head = ["time_s", "pressure_kPa", "angle_deg"]
+        if self.job.effects.in_time:
+            # The pressure at which the unit without the effects in time stands so.
+            head.append("effective_kPa")
+        write_csv(self.folder / "angle.csv", head, [row[: len(head)] for row in rows])
         # Of a pressure met twice, what it was the first time.
-        first = {p: float(a) for _, p, a in reversed(rows)}
+        first = {p: float(a) for _, p, a, _ in reversed(rows)}
         self.context.summary["angle_deg"] = dict(sorted(first.items(), key=lambda item: float(item[0])))
-        write_trajectory(self.folder / "model_a.pvd", self.mesh, reached)
+        write_trajectory(self.folder / "model_a.pvd", self.mesh, [(t, s) for t, _, s in reached])
+
+    def _instants(self, states: Any) -> list[tuple[float, float, State]]:
+        """Time in s, supplied pressure in kPa and state of every instant of the protocol that was reached."""
+        time, effective = self.job.samples
+        if self.job.in_time:
+            at = list(states)
+        else:
+            by_pressure = {round(s.pressure_kPa, 9): s for s in states}
+            at = [by_pressure.get(p) for p in effective.tolist()]
+        supplied = self.job.supplied_kPa.tolist()
+        found = zip(time.tolist(), supplied, at, strict=False)
+        return [(t, p, state) for t, p, state in found if state is not None]
+
+    def motion_in_order(self) -> tuple[Array, Array]:
+        """Pressure (s,) in kPa and bending angle (s,) in degrees of the motion as far as it was computed.
+
+        One state a pressure, ascending; one an instant where contact, the wall or an effect remembers.
+        """
+        states = self.trajectory.states if self.trajectory else tuple(self.states)
+        if self.job.in_time or self.job.effects.in_time:
+            shown = [(p, s) for _, p, s in self._instants(states)]
+        else:
+            shown = [(s.pressure_kPa, s) for s in sorted(states, key=lambda s: s.pressure_MPa)]
+        angles = [self.bending_angle_deg(s.u) for _, s in shown] if self.mesh is not None else []
+        return np.array([p for p, _ in shown]), np.array(angles)
 
     def _write_contact(self) -> None:
         """What the unit touched, where it may touch something."""
@@ -653,11 +681,10 @@ class Study:
             summary["J_cont_mm"][rule] = {e.name: e.deviation.J_cont for e in found}
         columns = ["path", "start", "length", "rule", "J_hat_mm", "J_cont_mm", "rank"]
         write_csv(self.folder / "deviation.csv", columns, rows)
-        time, pressure = self.job.samples
         arrays |= {
             "path": np.array([c.name for c in every]),
-            "time_s": time,
-            "pressure_kPa": pressure,
+            "time_s": self.job.samples[0],
+            "pressure_kPa": self.job.supplied_kPa,
             "station": np.linspace(0, 1, self.job.stations),
         }
         write_npz(self.folder / "delta.npz", arrays)
@@ -690,7 +717,7 @@ class Study:
     def _warn_of_missed_corners(self) -> None:
         """Say where uniform samples miss the protocol's extremes."""
         corners = self.job.protocol.pressure_kPa
-        _, samples = self.job.samples
+        samples = self.job.supplied_kPa
         for extreme, met in ((corners.min(), samples.min()), (corners.max(), samples.max())):
             if abs(extreme - met) > 1e-6:
                 self.warn(

@@ -8,8 +8,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import re
-import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -20,12 +18,11 @@ import numpy as np
 from ...design.toml_text import line_of, parse, place
 from ...errors import InputError
 from ...files import write_text
-from ...measured import read_folder
-from ...measured.folder import FILE
 from ...measured.kinds import COMMON, KINDS
 from ...measured.rest import AT_REST, SAMPLES
 from ...measured.table import Remark, read_table
 from ...measured.video import Motion, Pair, Tracks, View, motion, resting
+from ...measured.writing import add_experiment, csv_text, file_stem
 from ...reading import file_text, require_rows, unreadable
 from ...run.context import RunContext
 from ...toml_writer import toml_text
@@ -289,27 +286,11 @@ def write_experiment(found: Filmed, bench: Bench, name: str, folder: Path) -> tu
     An experiment of that name that was made from a video before is made anew. Raises InputError where
     another holds the name, or the data could not be read again; OutputError.
     """
-    stem = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or "video"
-    table = folder / f"{stem}.csv"
-    block = _block(name, table.name, bench)
-    text = _table(found, bench)
-    remarks = _tried(block, table.name, text)
-    listed = folder / FILE
-    before = ""
-    if listed.exists():
-        same = [e for e in read_folder(folder).experiments if e.name == name or e.file.name == table.name]
-        before = file_text(listed)
-        if same and block not in before:
-            raise InputError(
-                f"an experiment named {same[0].name!r}, in {same[0].file.name}, already exists",
-                str(listed),
-                "rename this experiment, or remove the other one",
-            )
-    write_text(folder / f"{stem}.pixels.csv", _pixels(found))
-    write_text(table, text)
-    if block not in before:
-        write_text(listed, f"{before.rstrip()}\n\n{block}".lstrip())
-    return table, remarks
+    table = f"{file_stem(name)}.csv"
+    block = _block(name, table, bench)
+    remarks = add_experiment(folder, name, block, table, _table(found, bench))
+    write_text(folder / f"{file_stem(name)}.pixels.csv", _pixels(found))
+    return folder / table, remarks
 
 
 def _block(name: str, file: str, bench: Bench) -> str:
@@ -338,35 +319,17 @@ def _table(found: Filmed, bench: Bench) -> str:
     return stream.getvalue() + _csv(columns)
 
 
+def _csv(columns: Mapping[str, Array]) -> str:
+    """CSV text of columns (n,); nobody measures less than a micrometre."""
+    return csv_text(columns, lambda v: f"{v:.10g}" if v == int(v) else f"{v:.6f}")
+
+
 def _pixels(found: Filmed) -> str:
     """Places in the picture, a row a frame, as `read_pixels` reads them."""
     columns: dict[str, Array] = {"frame": np.arange(len(found.tracks))}
     for name, at in zip(found.tracks.names, found.tracks.pixels, strict=True):
         columns |= {f"{name} right_px": at[:, 0], f"{name} down_px": at[:, 1]}
     return _csv(columns)
-
-
-def _csv(columns: Mapping[str, Array]) -> str:
-    """CSV text of columns (n,), empty where there is nothing; nobody measures less than a micrometre."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(columns)
-    for row in zip(*columns.values(), strict=True):
-        writer.writerow(["" if np.isnan(v) else f"{v:.10g}" if v == int(v) else f"{v:.6f}" for v in row])
-    return stream.getvalue()
-
-
-def _tried(block: str, file: str, text: str) -> tuple[Remark, ...]:
-    """What the reader of measured data says of an experiment before it is put anywhere."""
-    with tempfile.TemporaryDirectory() as scratch:
-        write_text(Path(scratch) / FILE, block)
-        write_text(Path(scratch) / file, text)
-        try:
-            measured = read_folder(Path(scratch))
-        except InputError as error:
-            where = error.where.replace(scratch, "").lstrip("/\\")
-            raise InputError(error.what, where, error.remedy) from error
-    return tuple(Remark(r.what, Path(r.where.replace(scratch, "")).name, r.remedy) for r in measured.remarks)
 
 
 def read_pixels(path: Path) -> Tracks:

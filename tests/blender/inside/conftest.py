@@ -17,6 +17,7 @@ from mu_addon.evidence import unit_fem
 
 from ...evidence import analytic
 from ...headless.processes import run
+from ...usecases.bent_motion import write_bent_run
 from ...usecases.diagnosis_data import bent_unit, weighed_blocks
 from ...usecases.test_diagnose import run as diagnosed
 from ..filming import ANGLES, film, pressures
@@ -98,6 +99,22 @@ def study(placed, tmp_path):
     return shutil.copytree(
         placed, tmp_path / "study", ignore=shutil.ignore_patterns("cache", "played"), dirs_exist_ok=True
     )
+
+
+@pytest.fixture(scope="session")
+def finished_runs(tmp_path_factory):
+    """Home folder of a unit with three runs: full, a quick look at it, and the motion of a thicker wall."""
+    home = tmp_path_factory.mktemp("finished") / "home"
+    write_bent_run(home, 1000, full=True)
+    write_bent_run(home, 2000)
+    write_bent_run(home, 3000, wall_mm=1.1, more=0.8, ranked=False)
+    return home
+
+
+@pytest.fixture
+def home(finished_runs, tmp_path):
+    """A copy of `finished_runs`."""
+    return shutil.copytree(finished_runs, tmp_path / "home")
 
 
 @pytest.fixture

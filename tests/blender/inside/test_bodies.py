@@ -149,6 +149,26 @@ def test_a_simulation_is_given_the_body(monkeypatch):
     monkeypatch.setattr(start_child, "start", lambda *arguments, **more: None)
     monkeypatch.setattr(start_child, "watch", lambda *arguments: None)
     assert bpy.ops.mu.simulate() == {"FINISHED"}
-    job = read_job(studies.folder_of(root))
+    job = read_job(studies.results_folder(root))
     assert job.unit == to_unit(root.mu_unit)
     assert job.body.hash == bodies.envelope_in(root, job.unit).hash
+
+
+def test_a_copy_of_a_body_is_repaired_where_there_is_one_way_to():
+    root = add()
+    root.location = (30.0, 0.0, 5.0)
+    bpy.context.view_layer.update()
+    obj = barrel()
+    obj.matrix_world = root.matrix_world @ obj.matrix_world
+    obj.data.polygons[3].flip()
+    obj.data.update()
+    choose(obj, root)
+    assert "inconsistently oriented" in refused(bpy.ops.mu.body)
+    assert bpy.ops.mu.body_repair() == {"FINISHED"}
+    assert obj.hide_get()
+    (copy,) = [o for o in bpy.context.selected_objects if o.type == "MESH" and o != obj and o.parent is None]
+    assert copy.name.startswith("Barrel repaired")
+    assert bpy.ops.mu.body() == {"FINISHED"}
+    assert root.mu_unit.trouble == "", root.mu_unit.trouble
+    choose(barrel(hole=True), root)
+    assert "open edges" in refused(bpy.ops.mu.body_repair)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+import pytest
 
 from mu_addon.blender.evidence import motion as evidence_motion
 from mu_addon.blender.evidence import panel as evidence_panel
@@ -23,6 +24,7 @@ from mu_addon.evidence.extended import ExtendedModel, Fitted
 from mu_addon.fem.protocol import read_protocol
 from mu_addon.measured import read_folder
 
+from ...lab_files import exports
 from .acting import add, refused
 from .drawing import drawn as drawn_by
 from .jobs import ended, fake, watch
@@ -153,7 +155,7 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
     study = root.mu_unit.study
     study.command, study.detail = "simulate", "quick"
     unit = to_unit(root.mu_unit)
-    assert not effects.static_effects(root)
+    assert not effects.named_effects(root)
     assert "With named effects" not in drawn(panels.MU_PT_simulate)
     assert "no effects beside" in refused(bpy.ops.mu.evidence_remove)
     bpy.ops.ed.undo_push(message="diagnosed")
@@ -173,7 +175,7 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
     assert not bpy.ops.mu.evidence_apply.poll()
     # Pressure alone knows no direction.
     assert not effects.has_gravity(root)
-    assert "orientation_deg" not in effects.static_effects(root).tables
+    assert "orientation_deg" not in effects.named_effects(root).tables
 
     bpy.ops.ed.undo()
     root = unit_object.active_root(bpy.context)
@@ -214,7 +216,7 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
     assert bpy.ops.mu.evidence_remove() == {"FINISHED"}
     assert studies.findings(root).stale
     assert "With named effects" not in drawn(panels.MU_PT_simulate)
-    assert not effects.static_effects(root)
+    assert not effects.named_effects(root)
 
 
 def opened(clogged):
@@ -385,3 +387,40 @@ def test_a_diagnosis_that_was_broken_off_shows_no_verdict(tmp_path, clogged):
     assert list(evidence.course(root, first.name).series) == ["measured"]
     path.write_text("{")
     assert "The diagnosis is not finished" in drawn()
+
+
+def test_files_of_a_machine_are_imported_and_asked_about_in_the_panel(tmp_path):
+    (tmp_path / "pull.txt").write_text(exports.PLAIN)
+    root = add()
+    refused(bpy.ops.mu.import_files, files=[], directory=str(tmp_path))
+    assert bpy.ops.mu.import_files(directory=str(tmp_path), files=[{"name": "pull.txt"}]) == {"FINISHED"}
+    texts = drawn()
+    assert "the unit of 'Kraft' is not given" in texts
+    assert "was it a coupon" in texts
+    answers = {one.key: one for one in root.mu_import.answers}
+    assert answers["unit.Kraft"].value == "N"
+    refused(bpy.ops.mu.import_answers)
+    answers["kind"].value = "coupon"
+    assert bpy.ops.mu.import_answers() == {"FINISHED"}
+    # What a coupon needs is asked next.
+    left = {one.key: one for one in root.mu_import.answers if not one.answered}
+    assert set(left) == {"mode", "section_mm", "length_mm"}
+    left["section_mm"].value, left["length_mm"].value = "12.5", "40"
+    refused(bpy.ops.mu.import_answers)
+    left = {one.key: one for one in root.mu_import.answers if not one.answered}
+    left["section_mm"].value = "12.5x3"
+    assert bpy.ops.mu.import_answers() == {"FINISHED"}
+    assert not root.mu_import.files
+    assert "pull: 24 rows" in drawn()
+    (found,) = read_folder(Path(bpy.path.abspath(root.mu_evidence.folder))).experiments
+    assert np.polyfit(found["strain"], found["stress_kPa"], 1)[0] == pytest.approx(2500.0, rel=1e-4)
+
+
+def test_an_import_can_be_left(tmp_path):
+    (tmp_path / "pull.txt").write_text(exports.PLAIN)
+    root = add()
+    bpy.ops.mu.import_files(directory=str(tmp_path), files=[{"name": "pull.txt"}])
+    assert bpy.ops.mu.import_cancel() == {"FINISHED"}
+    assert not root.mu_import.files
+    assert not root.mu_evidence.folder
+    assert "Import Files" in drawn() or "mu.import_files" in drawn()

@@ -46,6 +46,22 @@ def drawn():
     return drawn_by(PANELS)
 
 
+def test_the_active_object_says_which_panels_are_seen():
+    """With one unit and one gripper in a scene, whichever is active has the sidebar to itself."""
+    gripper = held()
+    unit = add()
+    assert gripper_object.active(bpy.context) is None
+    bpy.context.view_layer.objects.active = gripper
+    assert gripper_object.active(bpy.context) == gripper
+    assert unit_object.active_root(bpy.context) is None
+    bpy.context.view_layer.objects.active = gripper_object.part(gripper, "cube")
+    assert gripper_object.active(bpy.context) == gripper
+    assert unit_object.active_root(bpy.context) is None
+    bpy.context.view_layer.objects.active = None
+    assert unit_object.active_root(bpy.context) == unit, "the only unit there is"
+    assert gripper_object.active(bpy.context) is None
+
+
 def test_two_fingers_face_each_other_over_the_plate():
     root = held()
     assert root.mu_gripper.trouble == ""
@@ -75,6 +91,10 @@ def test_two_fingers_face_each_other_over_the_plate():
     moved = gripper_object.part(root, "cube")
     assert tuple(moved.lock_location) == (True, True, False)
     moved.location.z = 80.3
+    assert np.isclose(root.mu_gripper.cube_height, 80.3 * root.scale.x), (
+        "as long as it is, in the scene's unit"
+    )
+    root.mu_gripper.cube_height = 80.3 * root.scale.x
     root.mu_gripper.cube_mm = 20.0
     bpy.context.view_layer.update()
     assert np.allclose(world(moved).mean(axis=0), [0, 0, 80.3], atol=1e-4)

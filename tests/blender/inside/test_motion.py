@@ -3,15 +3,18 @@
 import bpy
 import numpy as np
 
-from mu_addon.blender.path import ranking
+from mu_addon.blender.path import legend as path_legend
+from mu_addon.blender.path import picking, ranking
 from mu_addon.blender.results import field_colours as fields
-from mu_addon.blender.results import legend_object
+from mu_addon.blender.results import legend_object, run_motions
 from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.results import panel as results_panel
 from mu_addon.blender.shared.compat import modifier_input
 from mu_addon.blender.unit import drawing
 from mu_addon.blender.unit import live_update as live
 from mu_addon.blender.unit import object as unit_object
+from mu_addon.blender.unit.properties import to_unit
+from mu_addon.design.anchors import anchor_points
 
 from .acting import add, refused
 from .drawing import drawn
@@ -73,13 +76,31 @@ def test_motion_plays_in_its_own_time_and_carries_its_fields(study):
     assert not np.allclose(*stress, rtol=0.02)
     assert values(other.data, "deviation_mm").max() > 1e-3
     assert not values(part.data, "deviation_mm").any()
+    # The first is seen in the unit's own place, of which it is the mesh; the other one beside it.
+    assert other.location.y < part.location.y == 0.0
+    assert part.hide_viewport
+    assert not other.hide_viewport
+    scene.frame_set(193)
+    own = [motion_parts.vertices_of(evaluated(p)) for p in motion_parts.parts(root) if p.hide_viewport]
+    assert np.allclose(
+        sorted(motion_parts.vertices_of(evaluated(root)).tolist()), sorted(np.concatenate(own).tolist())
+    )
+    root.mu_unit.show = "preview"
+    assert len(evaluated(root).vertices) != sum(map(len, own))
+    root.mu_unit.show = "result"
+    root.mu_motion.on_unit = False
+    assert root.mu_unit.show == "preview"
     assert other.location.y < part.location.y < 0.0
+    assert not part.hide_viewport
+    root.mu_motion.on_unit = True
+    assert root.mu_unit.show == "result"
     root.mu_motion.apart = 0.0
     assert other.location.y == part.location.y == 0.0
     assert bpy.ops.mu.motion(name="model_a", on=False) == {"FINISHED"}
     assert motion_parts.shown(root) == [("alpha4", "mesh")]
     assert bpy.ops.mu.motion_clear() == {"FINISHED"}
     assert motion_parts.parts(root) == []
+    assert root.mu_unit.show == "preview"
 
 
 def test_colours_follow_the_range_and_grey_is_what_is_not_known(study):
@@ -89,11 +110,14 @@ def test_colours_follow_the_range_and_grey_is_what_is_not_known(study):
     bpy.context.scene.frame_set(193)
     settings = root.mu_motion
     known, unknown = (motion_parts.one(root, name, "mesh") for name in ("model_a", "alpha4"))
-    # What no part knows is grey on all of them: this study is without self-contact.
-    settings.field = "contact_pressure_kPa"
-    assert all(settings.field not in part.data.attributes for part in (known, unknown))
+    # What no part knows is grey on all of them: without self-contact, without a run to compare with.
+    nowhere = ("contact_pressure_kPa", "run_difference_mm")
+    for field in nowhere:
+        settings.field = field
+        assert all(field not in part.data.attributes for part in (known, unknown))
+    assert "Compare with another run" in run_motions.difference_words(root)
     for field in fields.FIELDS:
-        if field.name == "contact_pressure_kPa":
+        if field.name in nowhere:
             continue
         settings.field = field.name
         material = fields.material_of(root)
@@ -188,7 +212,7 @@ def test_the_print_is_carried_by_the_mesh(study):
     solid = root.mu_unit.solid
     assert len(part.data.vertices) == len(solid.vertices)
     assert part.data != solid
-    assert root.mu_unit.show == "preview"
+    assert root.mu_unit.show == "result"
     assert "outside the mesh" in part["mu_outside"]
     bpy.context.scene.frame_set(193)
     rest, now = motion_parts.vertices_of(part.data), motion_parts.vertices_of(evaluated(part))
@@ -266,9 +290,29 @@ def test_candidates_say_their_rank(study):
     colours = {tuple(t.data.materials[0].diffuse_color) for n, t in tubes.items() if n != "alpha4"}
     assert len(colours) == 9
     assert not unit_object.behind(root)
-    root.mu_unit.chambers.wall_mm = 1.0  # stale: they say nothing any more
+    # They lie on the lattice, the best beside the anchors; each at its own height.
+    order = [name for name, _ in sorted(known.items(), key=lambda item: item[1][1])]
+    ends = {name: motion_parts.vertices_of(tube.data) for name, tube in tubes.items()}
+    places = [ends[name][0, 1] for name in order]
+    assert places == sorted(places, reverse=True)
+    low, high = to_unit(root.mu_unit).dimensions.bounds[1]
+    assert low < places[-1] < places[0] < high
+    anchors = anchor_points(to_unit(root.mu_unit))
+    assert np.allclose(ends["alpha4"][:, 2], anchors[3:, 2], atol=1e-4)
+    share = ranking.known(root).share
+    assert (share(order[0]), share(order[-1])) == (0.0, 1.0)
+    marks = dict(path_legend.marks(ranking.known(root)))
+    assert {0.0, 1.0} < set(marks)
+    root.mu_unit.chambers.wall_mm = 1.0  # stale: they say so, in grey
     assert ranking.ranked(root) == {}
-    assert modifier_input(unit_object.candidate(root, "alpha1").modifiers[0], "Label") == "α1"
+    label = modifier_input(unit_object.candidate(root, "alpha1").modifiers[0], "Label")
+    assert label == f"α1\n#{known['alpha1'][1]}?"
+    assert unit_object.candidate(root, "alpha1").data.materials[0].name == "MU Candidate"
+    assert "stale" in path_legend.lines(ranking.known(root))[-1]
+    # A click makes one the active object, which chooses it.
+    bpy.context.view_layer.objects.active = unit_object.candidate(root, "alpha7")
+    picking.choose_active()
+    assert root.mu_unit.path == "alpha7"
 
 
 def test_panels_show_the_motion(study):

@@ -6,11 +6,12 @@ import attrs
 import bpy
 import pytest
 
-from mu_addon.blender.node_tree import classes, conversion, groups, operators, panel, sockets, state
+from mu_addon.blender.node_tree import classes, conversion, groups, operators, panel, plan, sockets, state
 from mu_addon.design.steps import STEPS
 from mu_addon.graph import read_tree
 from mu_addon.run.child import DONE
 from mu_addon.usecases.graph.definitions import definitions
+from mu_addon.usecases.graph.job import STATES
 from mu_addon.usecases.graph.templates import template, template_names
 
 from .acting import add, refused
@@ -26,7 +27,7 @@ def new(name):
 
 
 def states(tree):
-    return {name: found.state for name, found in state.look(tree).items()}
+    return {name: found.state for name, found in state.refresh(tree).items()}
 
 
 def link(tree, before, output, after, taken):
@@ -79,7 +80,7 @@ def test_links_of_every_type_are_valid_where_the_core_takes_them_and_red_with_a_
                     b = tree.nodes.new(classes.node_class(into.kind))
                     a.name, b.name = "a", "b"
                     made = link(tree, "a", output.name, "b", taken.name)
-                    found = state.look(tree)
+                    found = state.refresh(tree)
                     refusal = taken.refusal(output)
                     assert made.is_valid == (refusal == ""), (before.kind, output.name, into.kind)
                     if refusal:
@@ -99,20 +100,20 @@ def test_a_wrong_link_mended_is_valid_again_and_a_circle_is_named():
     walls = new("three-walls")
     link(walls, "Wall 0.8 mm", "unit", "Wall 0.9 mm", "unit")
     link(walls, "Wall 0.9 mm", "unit", "Wall 0.8 mm", "unit")
-    found = state.look(walls)
+    found = state.refresh(walls)
     assert "circle" in found["Wall 0.8 mm"].error.what
     assert found["Wall 1.0 mm"].error is None
 
 
 def test_a_slider_makes_only_what_depends_on_it_and_its_error_stands_on_its_node():
     tree = new("unit")
-    state.look(tree)
+    state.refresh(tree)
     tree.nodes["Chambers"].wall_mm = 0.83
     assert {n for n, s in states(tree).items() if s == "computed"} == {
         "Chambers", "Membranes", "Wells", "Assemble Unit",
     }  # fmt: skip
     tree.nodes["Chambers"].wall_mm = 3.0
-    found = state.look(tree)
+    found = state.refresh(tree)
     assert "too thick" in found["Chambers"].error.what
     assert found["Assemble Unit"].because == "Chambers"
     assert classes.state_of(tree.nodes["Chambers"]).error is found["Chambers"].error
@@ -123,44 +124,44 @@ def test_values_come_by_sockets_and_by_drivers():
     number = tree.nodes.new(classes.node_class("number"))
     number.value = 1.05
     link(tree, number.name, "number", "Chambers", "wall_mm")
-    assert "wall 1.05 mm" in state.look(tree)["Assemble Unit"].remark
+    assert "wall 1.05 mm" in state.refresh(tree)["Assemble Unit"].remark
     (into,) = (x for x in tree.links if x.to_socket.identifier == "wall_mm")
     tree.links.remove(into)
     driver = tree.driver_add('nodes["Chambers"].wall_mm').driver
     driver.expression = "0.8 + 0.01 * frame"
-    state.look(tree)
+    state.refresh(tree)
     scene = bpy.context.scene
     for frame, wall in ((10, 0.9), (20, 1.0)):
         scene.frame_set(frame)
-        assert f"wall {wall:g} mm" in state.look(tree)["Assemble Unit"].remark
+        assert f"wall {wall:g} mm" in state.refresh(tree)["Assemble Unit"].remark
 
 
 def test_keyframes_move_a_parameter():
     tree = new("unit")
-    state.look(tree)
+    state.refresh(tree)
     node = tree.nodes["Profile"]
     for frame, scale in ((1, 1.0), (11, 2.0)):
         node.scale = scale
         node.keyframe_insert("scale", frame=frame)
     bpy.context.scene.frame_set(11)
-    assert "150 mm long" in state.look(tree)["Assemble Unit"].remark
+    assert "150 mm long" in state.refresh(tree)["Assemble Unit"].remark
     bpy.context.scene.frame_set(1)
-    assert "75 mm long" in state.look(tree)["Assemble Unit"].remark
+    assert "75 mm long" in state.refresh(tree)["Assemble Unit"].remark
 
 
 def test_muting_a_node_or_a_link_is_the_cores_muting():
     tree = new("three-walls")
     tree.nodes["Wall 0.8 mm"].mute = True
-    found = state.look(tree)
+    found = state.refresh(tree)
     assert found["Wall 0.8 mm"].remark == found["Unit"].remark, "the unit passes unchanged"
     tree.nodes["Motion, wall 0.8"].mute = True
     assert states(tree)["Motion, wall 0.8"] == "muted"
     tree.nodes["Unit"].mute = True
-    assert "cannot be muted" in state.look(tree)["Unit"].error.what
+    assert "cannot be muted" in state.refresh(tree)["Unit"].error.what
     tree.nodes["Unit"].mute = False
     (into,) = (x for x in tree.links if x.to_node.name == "Wall 1.0 mm")
     into.is_muted = True
-    assert "not linked" in state.look(tree)["Wall 1.0 mm"].error.what
+    assert "not linked" in state.refresh(tree)["Wall 1.0 mm"].error.what
 
 
 def test_frames_and_reroutes_change_nothing():
@@ -177,24 +178,24 @@ def test_frames_and_reroutes_change_nothing():
 def test_a_group_is_its_nodes_used_twice_it_is_two_and_taken_apart_it_is_as_before():
     tree = new("unit")
     before = conversion.to_tree(tree)
-    state.look(tree)
+    state.refresh(tree)
     node = groups.make_group(tree, [tree.nodes[name] for name in ("Cells", "Trim", "Struts")])
     assert [s.name for s in node.inputs] == ["Profile"]
     assert sorted(s.name for s in node.outputs) == ["Cells", "Struts"]
-    found = state.look(tree)
+    found = state.refresh(tree)
     assert {"Group/Cells", "Group/Trim", "Group/Struts"} <= set(found)
     assert {s.state for s in found.values()} <= {"cached", "computed"}
     # An error inside shows on the group, too.
     inner = node.node_tree.nodes["Struts"]
     inner.midspan_diameter_mm = 0.6
     inner.junction_diameter_mm = 5.0
-    failed = {name for name, s in state.look(tree).items() if s.error is not None}
+    failed = {name for name, s in state.refresh(tree).items() if s.error is not None}
     assert "Group/Struts" in failed
     assert classes.state_of(node).error is not None
     inner.junction_diameter_mm, inner.midspan_diameter_mm = 0.8, 1.0
     other = tree.nodes.new(classes.GROUP)
     other.node_tree = node.node_tree
-    state.look(tree)
+    state.refresh(tree)
     assert f"{other.name}/Cells" in conversion.to_tree(tree).nodes
     tree.nodes.remove(other)
     own = {n: node.node_tree.nodes[n] for n in ("Cells", "Trim", "Struts")}
@@ -238,7 +239,7 @@ def test_a_group_in_itself_is_told():
     again.node_tree = node.node_tree
     if again.node_tree is None:
         return
-    found = state.look(tree)
+    found = state.refresh(tree)
     assert any(s.error is not None and "deep in each other" in s.error.what for s in found.values())
 
 
@@ -247,14 +248,14 @@ def test_saved_and_opened_again_a_tree_is_the_same_driven_and_all(tmp_path):
     tree.nodes["Chambers"].wall_mm = 0.95
     tree.driver_add('nodes["Path"].section_mm').driver.expression = "1.5 + frame * 0.0"
     groups.make_group(tree, [tree.nodes[name] for name in ("Cells", "Trim")])
-    state.look(tree)
+    state.refresh(tree)
     name, before = tree.name, conversion.to_tree(tree)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "tree.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "tree.blend"))
     tree = bpy.data.node_groups[name]
     assert conversion.to_tree(tree) == before
     assert len(tree.animation_data.drivers) == 1
-    assert {s.state for s in state.look(tree).values()} <= {"cached", "computed"}
+    assert {s.state for s in state.refresh(tree).values()} <= {"cached", "computed"}
     assert state.folder_of(tree).parent.name == "tree.mu"
 
 
@@ -282,14 +283,14 @@ def test_the_sidebar_and_the_trees_node_edit_the_same_fields():
     (node,) = tree.nodes
     assert node.source == root
     root.mu_unit.chambers.wall_mm = 1.0
-    assert "wall 0.75 mm" in state.look(tree)[node.name].remark
+    assert "wall 0.75 mm" in state.refresh(tree)[node.name].remark
     node.source.mu_unit.chambers.wall_mm = 0.8
-    assert "wall 0.6 mm" in state.look(tree)[node.name].remark
+    assert "wall 0.6 mm" in state.refresh(tree)[node.name].remark
     # As a file the unit's parameters are written out.
     design = conversion.to_tree(tree).nodes[node.name]
     assert "wall_mm = 0.8" in design.settings["parameters"]
     root.mu_unit.chambers.wall_mm = 9.0
-    assert state.look(tree)[node.name].error is not None
+    assert state.refresh(tree)[node.name].error is not None
 
 
 def test_a_unit_follows_the_steps_of_its_tree_and_lets_go_when_it_is_deleted():
@@ -299,7 +300,7 @@ def test_a_unit_follows_the_steps_of_its_tree_and_lets_go_when_it_is_deleted():
     tree.nodes["Chambers"].wall_mm = 1.15
     tree.nodes["Path"].path = "alpha5"
     link(tree, "Wells", "wells", "Assemble Unit", "wells")
-    state.look(tree)
+    state.refresh(tree)
     assert abs(root.mu_unit.chambers.wall_mm - 1.15) < 1e-6
     assert root.mu_unit.path == "alpha5"
     assert root.mu_unit.trouble == ""
@@ -347,7 +348,7 @@ def test_a_tree_runs_in_a_process_of_its_own_and_its_states_stay_with_the_file(t
     assert states(tree)["Compare"] == "waiting"
     child = ended(state.start(tree))
     assert child.state == DONE, child.error
-    found = state.look(tree)
+    found = state.refresh(tree)
     assert {s.state for s in found.values()} == {"cached"}
     assert "° at 40 kPa" in found["Motion, wall 0.8"].remark
     folder = state.folder_of(tree)
@@ -359,6 +360,25 @@ def test_a_tree_runs_in_a_process_of_its_own_and_its_states_stay_with_the_file(t
     assert waiting == {"Motion, wall 0.8", "Compare"}
     tree.nodes["Wall 0.8 mm"].value = 0.8
     assert set(states(tree).values()) == {"cached"}
+
+
+def test_the_run_of_a_tree_is_planned_over_all_of_its_nodes(tmp_path):
+    """What ran before is expected to take as long again; what is there is not done again."""
+    tree = new("three-walls")
+    found = state.refresh(tree)
+    core = conversion.to_tree(tree)
+    motions = [name for name in core.nodes if name.startswith("Motion")]
+    assert len(motions) == 3
+    assert plan.plan_of(core, found, (), tmp_path) == [(name, plan.SECONDS["simulate"]) for name in motions]
+    assert plan.plan_of(core, found, (motions[1],), tmp_path) == [(motions[1], plan.SECONDS["simulate"])]
+    (tmp_path / STATES).write_text(json.dumps({"nodes": {motions[0]: {"cost_s": 7.5}, "x": {}}}))
+    found[motions[2]] = attrs.evolve(found[motions[2]], state="cached")
+    assert plan.plan_of(core, found, (), tmp_path) == [
+        (motions[0], 7.5),
+        (motions[1], plan.SECONDS["simulate"]),
+    ]
+    (tmp_path / STATES).write_text("[")
+    assert len(plan.plan_of(core, found, (), tmp_path)) == 2
 
 
 def test_a_tree_with_a_fault_is_not_run_and_says_where():
@@ -374,7 +394,7 @@ def test_a_tree_in_a_file_without_the_extension_comes_back(tmp_path):
     tree = new("unit")
     tree.nodes["Chambers"].wall_mm = 0.95
     name = tree.name
-    state.look(tree)
+    state.refresh(tree)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "tree.blend"))
     mu_addon.unregister()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "tree.blend"))

@@ -3,10 +3,14 @@
 import bmesh
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from mu_addon.blender.assets import library
 from mu_addon.blender.preview import nodes
 from mu_addon.blender.shared.compat import modifier_input, set_modifier_input
+from mu_addon.blender.unit import object as unit_object
+from mu_addon.blender.unit.properties import to_unit
+from mu_addon.design.parameters import load_preset, preset_names
 
 from .acting import add
 
@@ -178,7 +182,7 @@ def test_a_group_of_an_older_version_in_a_file_is_upgraded(tmp_path):
     assert len(skinned(obj)) == 10
 
 
-def test_the_groups_become_an_asset_library_of_the_users():
+def test_presets_and_groups_become_an_asset_library_of_the_users():
 
     def names():
         return {entry.name for entry in bpy.context.preferences.filepaths.asset_libraries}
@@ -188,9 +192,24 @@ def test_the_groups_become_an_asset_library_of_the_users():
     libraries = bpy.context.preferences.filepaths.asset_libraries
     assert [entry.name for entry in libraries].count("Monolithic Units") == 1
     assert len(bpy.data.node_groups) == 0, "groups that this file does not use were left in it"
+    assert not [o for o in bpy.data.objects if o.mu_unit.uuid], "nor are the presets' units"
     folder = library.user_folder("assets")
     assert nodes.CATALOGUE in (folder / "blender_assets.cats.txt").read_text()
-    assert sorted(p.name for p in folder.iterdir()) == ["blender_assets.cats.txt", "mu-nodes.blend"]
+    assert sorted(p.name for p in folder.iterdir()) == [
+        "blender_assets.cats.txt",
+        "mu-nodes.blend",
+        "mu-units.blend",
+    ]
+    with bpy.data.libraries.load(str(folder / "mu-units.blend"), assets_only=True) as (there, here):
+        assert set(there.objects) == set(preset_names())
+        here.objects = ["mu-0.75x"]
+    dropped = bpy.data.objects["mu-0.75x"]
+    assert dropped.asset_data.catalog_id == library.UNITS_CATALOGUE
+    bpy.context.collection.objects.link(dropped)
+    bpy.context.view_layer.objects.active = dropped
+    assert unit_object.active_root(bpy.context) == dropped
+    assert to_unit(dropped.mu_unit) == load_preset("mu-0.75x")
+    bpy.data.objects.remove(dropped)
     with bpy.data.libraries.load(str(folder / "mu-nodes.blend"), assets_only=True) as (there, here):
         assert set(there.node_groups) == set(nodes.GROUPS)
         here.node_groups = ["MU Tubes"]
@@ -212,4 +231,18 @@ def test_the_sample_scene():
     assert opened.mu_unit.cut
     assert opened.mu_unit.path == "alpha4"
     assert bodied.mu_unit.envelope is not None
-    assert closed_volume(bpy.data.objects["Waveguide on a Curve"]) > 0
+    curve = bpy.data.objects["Waveguide on a Curve"]
+    assert closed_volume(curve) > 0
+    # It is framed: every corner of it lies within the view, and fills a good part of it.
+    area = next(a for w in bpy.context.window_manager.windows for a in w.screen.areas if a.type == "VIEW_3D")
+    space = area.spaces.active
+    half = 36.0 / space.lens
+    seen = []
+    for obj in (whole, opened, bodied, curve):
+        for corner in obj.bound_box:
+            x, y, z = space.region_3d.view_rotation.inverted() @ (
+                obj.matrix_world @ Vector(corner) - space.region_3d.view_location
+            )
+            depth = space.region_3d.view_distance - z
+            seen.append(max(abs(x) / (half * depth), abs(y) / (0.6 * half * depth)))
+    assert 0.5 < max(seen) <= 1.0

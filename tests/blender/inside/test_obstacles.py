@@ -41,7 +41,7 @@ def choose(root, *objects):
 def asked():
     with patch.object(start_child, "start"), patch.object(start_child, "watch"):
         assert bpy.ops.mu.simulate() == {"FINISHED"}
-    return read_job(studies.folder_of(unit_object.active_root(bpy.context)))
+    return read_job(studies.results_folder(unit_object.active_root(bpy.context)))
 
 
 def test_what_a_simulation_is_given():

@@ -73,10 +73,10 @@ def test_what_changes_the_file_is_one_undo_step():
 
     # What these do is in files, processes or preferences, and no undo takes it back.
     outside = {"simulate", "cancel", "dismiss", "open", "export_stl", "preset_save", "preset_remove"}
-    outside |= {"assets", "assets_remove", "picture"}
+    outside |= {"assets", "assets_remove", "picture", "probe", "run_remove"}
     outside |= {"evidence_diagnose", "evidence_cancel", "evidence_dismiss", "evidence_open"}
     outside |= {"tree_evaluate", "tree_save", "tree_cancel", "tree_dismiss", "tree_open"}
-    outside |= {"node_open", "node_group_edit"}
+    outside |= {"node_open", "node_group_edit", "import_page"}
     outside |= {"print_check", "print_export", "print_specimens"}
     outside |= {"print_cancel", "print_dismiss", "print_open"}
     outside |= {"sensor_ports", "sensor_connect", "sensor_disconnect", "sensor_pause"}

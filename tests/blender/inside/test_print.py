@@ -9,7 +9,7 @@ import pytest
 from mathutils import Vector
 
 from mu_addon.blender.jobs import start_child as jobs
-from mu_addon.blender.printing import marks
+from mu_addon.blender.printing import layer, marks
 from mu_addon.blender.printing import panel as print_panel
 from mu_addon.blender.printing import state as printing
 from mu_addon.blender.printing.operators import MU_OT_print_export as operator
@@ -366,3 +366,42 @@ def test_a_body_of_ones_own_is_checked_by_its_solid():
     assert abs(found.found["figures"]["x_mm"] - 40.0) < 0.1
     bpy.ops.mu.body_remove()
     assert "Stale: it belongs to other parameters" in drawn()
+
+
+def test_layers_follow_the_slider_the_direction_and_the_solid():
+    root = short()
+    assert "Build the solid first" in refused(bpy.ops.mu.print_layer)
+    assert bpy.ops.mu.solid() == {"FINISHED"}
+    assert bpy.ops.mu.print_layer() == {"FINISHED"}
+    shown = layer.layer_object(root)
+    d = to_unit(root.mu_unit).dimensions
+
+    def heights(axis):
+        at = np.empty(3 * len(shown.data.vertices), np.float32)
+        shown.data.vertices.foreach_get("co", at)
+        return at.reshape(-1, 3)[:, axis]
+
+    # At a bladder's apex, z = 1.5 U, what is enclosed is a disc of its inner radius.
+    whole = d.height + d.inlet_length
+    root.mu_print.layer = (1.5 * d.cell + d.inlet_length) / whole
+    assert heights(2) == pytest.approx(1.5 * d.cell, abs=0.01)
+    found = layer.facts(shown)
+    assert found["whole_mm"] == pytest.approx(whole, abs=0.01)
+    assert found["enclosed_mm2"] == pytest.approx(np.pi * (d.R - d.wall) ** 2, rel=0.02)
+    faces = np.array([p.material_index for p in shown.data.polygons])
+    areas = np.array([p.area for p in shown.data.polygons])
+    assert areas[faces == 1].sum() == pytest.approx(found["enclosed_mm2"], rel=1e-3)
+    assert areas[faces == 0].sum() == pytest.approx(found["area_mm2"], rel=1e-3)
+    assert f"Enclosed (blue): {found['enclosed_mm2']:.0f} mm2" in drawn()
+    # Along another direction the layer stands square to that.
+    root.mu_print.up = (1.0, 0.0, 0.0)
+    assert np.ptp(heights(0)) < 0.01
+    root.mu_print.layer = 1.0
+    assert len(shown.data.polygons) > 0
+    root.mu_unit.chambers.wall_mm = 1.2
+    assert "Of an earlier solid" in drawn()
+    assert bpy.ops.mu.solid() == {"FINISHED"}
+    assert "Of an earlier solid" not in drawn()
+    assert bpy.ops.mu.print_layer_clear() == {"FINISHED"}
+    assert layer.layer_object(root) is None
+    assert "No layer is shown" in refused(bpy.ops.mu.print_layer_clear)

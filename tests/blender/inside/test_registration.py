@@ -119,6 +119,13 @@ def test_a_new_section_of_the_core_appears_by_itself():
         def column(self, align=False):
             return self
 
+        def panel(self, name, default_closed=False):
+            # The fold is closed.
+            return self, None
+
+        def label(self, text, icon):
+            pass
+
         def prop(self, group, name):
             self.shown.append(name)
 

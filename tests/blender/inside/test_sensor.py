@@ -413,6 +413,23 @@ def test_the_plot_stands_still_while_recording_goes_on():
     assert age[0] < -0.5, "what is still in the ring is drawn again"
 
 
+def test_the_plot_ends_with_its_connection(monkeypatch):
+    root = started()
+    s = connected(root)
+    plots = []
+    monkeypatch.setattr(sensor_plot, "_plot", lambda *given: plots.append(given))
+    sensor_plot._draw()
+    assert len(plots) == 1
+    assert bpy.ops.mu.sensor_freeze() == {"FINISHED"}
+    assert bpy.ops.mu.sensor_disconnect() == {"FINISHED"}
+    assert ended(s) == "done"
+    sensor_plot._draw()
+    assert len(plots) == 1, "not even one that stood still"
+    connected(root)
+    sensor_plot._draw()
+    assert len(plots) == 2, "and it begins anew with the next"
+
+
 def test_what_is_drawn_does_not_grow_with_the_rate_and_stays_in_its_axes(tmp_path, monkeypatch):
     """There is no graphics card in background: what would be drawn is kept instead."""
     calibrated(tmp_path / "study" / "sensor" / "calibration.toml")

@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import re
+from unittest.mock import MagicMock
 
 import bpy
 import numpy as np
@@ -14,12 +15,15 @@ from mu_addon.blender.obstacles import panel as obstacle_panel
 from mu_addon.blender.path import panel as path_panel
 from mu_addon.blender.printing import panel as print_panel
 from mu_addon.blender.results import panel as results_panel
+from mu_addon.blender.shared.panels import parameters
+from mu_addon.blender.shared.wording import in_panel
 from mu_addon.blender.simulate import panel as simulate_panel
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate.job import SIMULATION, job_of
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit import panel as unit_panel
 from mu_addon.errors import InputError
+from mu_addon.meshing import gmsh_libraries
 from mu_addon.usecases.simulate_and_place.motion import read_motion
 
 from .acting import add, refused
@@ -89,6 +93,35 @@ def test_without_the_solver_geometry_works_and_the_panel_says_why(monkeypatch):
     assert "Cannot simulate: warp not found" in drawn()
     assert "Not in this Blender: warp" in refused(bpy.ops.mu.simulate)
     assert bpy.ops.mu.solid() == {"FINISHED"}
+
+
+def test_a_missing_system_library_is_told_before_a_run(monkeypatch):
+    add()
+    assert "apt install" not in drawn()
+    monkeypatch.setitem(gmsh_libraries.SYSTEM_LIBRARIES, "libnone.so.1", "libnone1")
+    assert "Without libnone.so.1 of this system" in drawn()
+    assert "apt install libnone1" in drawn()
+
+
+def test_a_fold_is_red_while_a_rule_is_broken_inside():
+    root = add()
+    layout, header = MagicMock(), MagicMock()
+    layout.panel.return_value = header, None
+    parameters(layout, root, "design")
+    assert not header.alert
+    shown = {call.args[1] for call in layout.column().prop.call_args_list}
+    assert "wall_mm" in shown
+    assert not {"inlet_length_mm", "tip_cap_mm"} & shown, "seldom changed, and so folded"
+    root.mu_unit.chambers.inlet_diameter_mm = 30.0
+    bpy.context.view_layer.update()
+    assert root.mu_unit.trouble
+    parameters(layout, root, "design")
+    assert header.alert
+
+
+def test_errors_speak_of_fields_and_not_of_files_or_options():
+    words = in_panel("where: [chambers] wall_mm, or give --port and --known-deg; see study_folder")
+    assert words == "where: Wall, or give Port and Known Deg; see study_folder"
 
 
 def test_a_worker_whose_solver_does_not_load_says_so(tmp_path, monkeypatch):
@@ -163,7 +196,7 @@ def test_a_quick_look_from_start_to_stale(tmp_path):
     bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
     (root,) = unit_object.roots()
     assert not studies.findings(root).stale, "found again on reopen"
-    (summary,) = tmp_path.glob("seat.mu/*/summary.json")
+    (summary,) = tmp_path.glob("seat.mu/*/runs/*/summary.json")
     assert json.loads(summary.read_text())["status"] == "complete"
 
 
@@ -196,7 +229,7 @@ def test_printed_struts_are_simulated_and_played(tmp_path):
     assert child.state == "done", child.error
     found = studies.findings(root)
     assert found.angles[-1][1] > 0.5
-    motion = read_motion(studies.folder_of(root))
+    motion = read_motion(studies.results_folder(root))
     assert motion.mesh.resolved
     skin = motion.skin("lattice", cut=False)
     assert not np.isin(skin.node[skin.triangles], motion.mesh.tied).all(axis=1).any()

@@ -12,7 +12,7 @@ from mu_addon.design.printing.finding import clustered
 from mu_addon.design.printing.neck import necks
 from mu_addon.design.printing.orientation import Build, directions, fits, ranked, tilted
 from mu_addon.design.printing.thickness import cast_rays, samples
-from mu_addon.design.printing.voxels import frame_along, voxel_columns
+from mu_addon.design.printing.voxels import frame_along, voxel_rows
 
 from .parts import arrays
 
@@ -83,39 +83,37 @@ def test_a_slot_is_as_wide_as_it_is(width, turn):
 
 @settings(max_examples=15)
 @given(way=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda w: sum(x * x for x in w) > 0.1))
-def test_columns_fill_the_same_volume_along_any_direction(way):
+def test_rows_fill_the_same_volume_along_any_direction(way):
     body = shapes.ball(4.0, 48) - shapes.cylinder(1.0, -6, 6, 32)
     vertices, triangles = arrays(body)
-    grid = voxel_columns(vertices, triangles, 0.2, frame=frame_along(np.array(way)))
-    wound = grid.slab(0, grid.shape[2])
-    assert set(np.unique(wound)) == {0, 1}
-    assert np.count_nonzero(wound) * grid.cell_volume == pytest.approx(body.volume(), rel=0.01)
+    grid = voxel_rows(vertices, triangles, 0.2, frame=frame_along(np.array(way)))
+    solid = grid.slab(0, grid.shape[0])
+    assert np.count_nonzero(solid) * grid.cell_volume == pytest.approx(body.volume(), rel=0.01)
     # The middle of the cells, brought back to the body's frame, is its centroid.
-    assert grid.points(np.argwhere(wound)).mean(axis=0) == pytest.approx(np.zeros(3), abs=0.03)
+    assert grid.points(np.argwhere(solid)).mean(axis=0) == pytest.approx(np.zeros(3), abs=0.03)
 
 
 def test_slabs_are_the_whole():
-    grid = voxel_columns(*arrays(shapes.ball(4.0, 32)), 0.3)
-    whole = grid.slab(0, grid.shape[2])
-    parts = [grid.slab(k, min(k + 7, grid.shape[2])) for k in range(0, grid.shape[2], 7)]
-    assert (np.concatenate(parts, axis=2) == whole).all()
+    grid = voxel_rows(*arrays(shapes.ball(4.0, 32)), 0.3)
+    whole = grid.slab(0, grid.shape[0])
+    parts = [grid.slab(k, min(k + 7, grid.shape[0])) for k in range(0, grid.shape[0], 7)]
+    assert (np.concatenate(parts) == whole).all()
 
 
-def test_overlapping_bodies_count_twice():
+def test_overlapping_bodies_count_once():
     one, other = arrays(box(4, 4, 4)), arrays(box(4, 4, 4).translate([2, 0, 0]))
-    grid = voxel_columns(
+    grid = voxel_rows(
         np.concatenate([one[0], other[0]]), np.concatenate([one[1], other[1] + len(one[0])]), 0.25
     )
-    wound = grid.slab(0, grid.shape[2])
-    assert wound.max() == 2
-    assert np.count_nonzero(wound == 2) * grid.cell_volume == pytest.approx(32.0, rel=0.05)
+    solid = grid.slab(0, grid.shape[0])
+    assert np.count_nonzero(solid) * grid.cell_volume == pytest.approx(2 * 64.0 - 32.0, rel=0.05)
 
 
 # Layers.
 
 
 def built(body, up=(0, 0, 1), step=0.2):
-    return voxel_columns(*arrays(body), step, 0.1, frame_along(np.array(up, float)))
+    return voxel_rows(*arrays(body), step, 0.1, frame_along(np.array(up, float)))
 
 
 def cups_of(body, up=(0, 0, 1)):
@@ -197,7 +195,7 @@ def test_a_chamber_and_its_ways_out():
     """A ball's hollow with a bore of 2 mm to the top and one of 1 mm to the side."""
     hollow = box(14, 14, 14) - shapes.ball(5.0, 64)
     body = hollow - shapes.cylinder(1.0, 0, 9, 32) - shapes.cylinder(0.5, 0, 9, 32).rotate([0, 90, 0])
-    found = drain.chambers(drain.distance_field(voxel_columns(*arrays(body), 0.2))).found
+    found = drain.chambers(drain.distance_field(voxel_rows(*arrays(body), 0.2))).found
     assert len(found) == 1
     assert found[0].volume == pytest.approx(4 / 3 * np.pi * 125, rel=0.02)
     assert np.linalg.norm(found[0].place) < 0.7
@@ -215,7 +213,7 @@ def test_a_way_out_is_the_widest_however_far_it_leads(near, monkeypatch):
     monkeypatch.setattr(drain, "NEAR", near)
     hollow = box(12, 12, 42).translate([0, 0, 14]) - shapes.ball(4.0, 48)
     body = hollow - shapes.cylinder(1.0, 0, 40, 24) - shapes.cylinder(0.5, 0, 9, 24).rotate([0, 90, 0])
-    (found,) = drain.chambers(drain.distance_field(voxel_columns(*arrays(body), 0.25))).found
+    (found,) = drain.chambers(drain.distance_field(voxel_rows(*arrays(body), 0.25))).found
     far, side = found.openings
     assert [far.radius, side.radius] == pytest.approx([1.0, 0.5], abs=0.2)
     assert far.place[:2] == pytest.approx([0, 0], abs=0.3)
@@ -227,12 +225,12 @@ def test_a_way_out_is_the_widest_however_far_it_leads(near, monkeypatch):
 
 def test_a_sealed_chamber_has_no_way_out_and_an_open_frame_is_no_chamber():
     sealed = drain.chambers(
-        drain.distance_field(voxel_columns(*arrays(box(12, 12, 12) - shapes.ball(4.0, 48)), 0.25))
+        drain.distance_field(voxel_rows(*arrays(box(12, 12, 12) - shapes.ball(4.0, 48)), 0.25))
     )
     assert [len(chamber.openings) for chamber in sealed.found] == [0]
     assert sealed.hold(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 5.0]])).tolist() == [True, False]
     frame = box(12, 12, 12) - box(9, 9, 14) - box(9, 14, 9) - box(14, 9, 9)
-    assert drain.chambers(drain.distance_field(voxel_columns(*arrays(frame), 0.25))).found == []
+    assert drain.chambers(drain.distance_field(voxel_rows(*arrays(frame), 0.25))).found == []
 
 
 def test_the_shortest_cut_of_a_surface_is_its_waist():

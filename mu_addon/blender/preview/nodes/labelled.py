@@ -8,7 +8,7 @@ from . import tubes
 from .wiring import Wiring
 
 NAME = "MU Labelled Tube"
-VERSION = 1
+VERSION = 2
 TEXT = "Tubes along edges with a name at a place, to be read from +x"
 USES = (tubes.NAME,)
 
@@ -21,6 +21,7 @@ def build(tree, tube_group) -> None:
     w.socket("At", "Vector", text="Where the name begins")
     w.socket("Size", "Float", 3.0, 0.0, 1000.0, "Height of the letters")
     w.socket("Material", "Material")
+    w.socket("In Viewport", "Bool", True, text="Show the name in the viewport, too, not in renders alone")
     tube = w.node("GeometryNodeGroup", {"node_tree": tube_group})
     tree.links.new(w.given("Geometry"), tube.inputs["Geometry"])
     tree.links.new(w.given("Material"), tube.inputs["Material"])
@@ -34,8 +35,18 @@ def build(tree, tube_group) -> None:
     painted = w.node(
         "GeometryNodeSetMaterial", Geometry=turned.outputs["Geometry"], Material=w.given("Material")
     )
+    # Where a name is drawn over the viewport, the text is for renders.
+    rendered = w.node("FunctionNodeBooleanMath", {"operation": "NOT"})
+    tree.links.new(w.node("GeometryNodeIsViewport").outputs[0], rendered.inputs[0])
+    seen = w.node("FunctionNodeBooleanMath", {"operation": "OR"})
+    tree.links.new(w.given("In Viewport"), seen.inputs[0])
+    tree.links.new(rendered.outputs[0], seen.inputs[1])
+    named = w.node("GeometryNodeSwitch", {"input_type": "GEOMETRY"}, Switch=seen.outputs[0])
+    tree.links.new(
+        painted.outputs["Geometry"], next(s for s in named.inputs if s.enabled and s.name == "True")
+    )
     both = w.node("GeometryNodeJoinGeometry")
     # A join takes the last link first; the order does not matter here.
     tree.links.new(tube.outputs["Geometry"], both.inputs[0])
-    tree.links.new(painted.outputs["Geometry"], both.inputs[0])
+    tree.links.new(named.outputs[0], both.inputs[0])
     w.output(both.outputs[0])

@@ -1,4 +1,8 @@
-"""A unit's one mesh, skinned: struts as tubes, anchors as balls, everything else as it is."""
+"""A unit's one mesh, skinned: struts as tubes, anchors as balls, everything else as it is.
+
+Or in its place, on the unit itself, the objects that play a study's motion: so a click on what is shown
+selects the unit, and what moves the unit moves it.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +10,12 @@ from . import balls, tubes
 from .wiring import Wiring
 
 NAME = "MU Unit"
-VERSION = 1
+VERSION = 2
 TEXT = "The mesh of a Monolithic Unit: the point attribute `mu_skin` says what becomes a tube or a ball"
 USES = (tubes.NAME, balls.NAME)
+RESULTS = ("Result 1", "Result 2")
+"""Inputs for the objects to show in place of the mesh, where any is given."""
+SHOW_RESULT = "Show Result"
 PLAIN, TUBE, BALL = 0, 1, 2
 """Values of the point attribute `mu_skin`."""
 
@@ -21,6 +28,9 @@ def build(tree, tube_group, ball_group) -> None:
     w.socket("Detail", "Int", 3, 1, 6, "Subdivisions of an anchor's ball")
     w.socket("Struts", "Material", text="Material of the struts")
     w.socket("Anchors", "Material", text="Material of the anchors")
+    w.socket(SHOW_RESULT, "Bool", False, text="Show the results in place of the design")
+    for name in RESULTS:
+        w.socket(name, "Object", text="Object that plays a study's motion")
     kind = w.node("GeometryNodeInputNamedAttribute", {"data_type": "INT"}, Name="mu_skin").outputs[0]
 
     def those(value: int):
@@ -46,4 +56,14 @@ def build(tree, tube_group, ball_group) -> None:
     # A join takes the last link first: the mesh's own slots stay the first ones.
     for geometry in (anchors.outputs["Geometry"], struts.outputs["Geometry"], those(PLAIN)):
         tree.links.new(geometry, both.inputs[0])
-    w.output(both.outputs[0])
+    played = w.node("GeometryNodeJoinGeometry")
+    for name in RESULTS:
+        # Its mesh, with colours and materials: an instance of a hidden object would not be drawn.
+        found = w.node(
+            "GeometryNodeObjectInfo", {"transform_space": "ORIGINAL"}, Object=w.given(name), As_Instance=False
+        )
+        tree.links.new(found.outputs["Geometry"], played.inputs[0])
+    chosen = w.node("GeometryNodeSwitch", {"input_type": "GEOMETRY"}, Switch=w.given(SHOW_RESULT))
+    tree.links.new(both.outputs[0], next(s for s in chosen.inputs if s.enabled and s.name == "False"))
+    tree.links.new(played.outputs[0], next(s for s in chosen.inputs if s.enabled and s.name == "True"))
+    w.output(chosen.outputs[0])

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mu_addon.run.outlook import Outlook
+from mu_addon.run.progress_estimate import ProgressEstimate
 
 PLAN = (("mesh", 10.0), ("Model A", 60.0), ("report", 10.0))
 
@@ -16,9 +16,9 @@ class Clock:
         return self.now
 
 
-def outlook(plan=PLAN):
+def estimate(plan=PLAN):
     clock = Clock()
-    return Outlook(plan, clock), clock
+    return ProgressEstimate(plan, clock), clock
 
 
 def message(stage, fraction, seconds, left=None, state="run"):
@@ -26,7 +26,7 @@ def message(stage, fraction, seconds, left=None, state="run"):
 
 
 def test_a_run_as_planned_counts_down():
-    run, clock = outlook()
+    run, clock = estimate()
     run.tell(message("mesh", None, 0.0, state="start"))
     assert (run.number, run.count) == (1, 3)
     assert run.seconds_left == 80.0
@@ -44,7 +44,7 @@ def test_a_run_as_planned_counts_down():
 
 
 def test_a_longer_time_says_why_and_a_little_longer_one_is_not_told():
-    run, clock = outlook()
+    run, clock = estimate()
     run.tell(message("Model A", 0.1, 6.0, 54.0))
     assert run.seconds_left == 64.0
     clock.now = 1.0
@@ -65,14 +65,14 @@ def test_a_longer_time_says_why_and_a_little_longer_one_is_not_told():
 
 
 def test_what_the_cache_had_is_passed_over():
-    run, _ = outlook()
+    run, _ = estimate()
     run.tell(message("report", 0.0, 0.0, 10.0))
     assert run.fraction == 70.0 / 80.0
     assert run.seconds_left == 10.0
 
 
 def test_a_pace_of_finished_stages_tells_of_the_later_ones():
-    run, clock = outlook()
+    run, clock = estimate()
     run.tell(message("mesh", 0.5, 10.0, 10.0))
     clock.now = 20.0
     run.tell(message("mesh", 1.0, 20.0, state="end"))
@@ -80,7 +80,7 @@ def test_a_pace_of_finished_stages_tells_of_the_later_ones():
 
 
 def test_without_a_plan_there_is_the_stage_alone():
-    run, _ = outlook(())
+    run, _ = estimate(())
     assert run.seconds_left is None
     run.tell(message("Model A", 0.5, 1.0, 3.0))
     assert run.count == 0
@@ -96,7 +96,7 @@ MESSAGE = st.tuples(STAGES, st.one_of(st.none(), st.floats(0.0, 1.0)), NUMBER, N
 
 @given(st.lists(MESSAGE, max_size=30))
 def test_whatever_is_told_the_fraction_grows_and_the_time_shrinks_or_has_a_reason(messages):
-    run, clock = outlook()
+    run, clock = estimate()
     before, left = 0.0, None
     for stage, fraction, seconds, own, pause in messages:
         clock.now += pause
@@ -106,3 +106,22 @@ def test_whatever_is_told_the_fraction_grows_and_the_time_shrinks_or_has_a_reaso
         if left is not None and now > left:
             assert run.why
         before, left = run.fraction, now
+
+
+def test_a_stage_that_tells_its_parts_counts_down_by_the_clock():
+    """A node of a tree has stages of its own, which nobody knew before; the tree's run has one time left."""
+    run, clock = estimate((("thin", 100.0), ("thick", 100.0)))
+    run.tell(message("thin: mesh", 1.0, 5.0, state="end"))
+    assert (run.number, run.count, run.seconds_left) == (1, 2, 200.0)
+    clock.now = 50.0
+    run.tell(message("thin: Model A", 0.1, 10.0, 30.0))
+    assert (run.number, run.fraction, run.seconds_left) == (1, 0.25, 150.0)
+    clock.now = 60.0
+    run.tell(message("thick: mesh", None, 0.0, state="start"))
+    assert (run.number, run.fraction) == (2, 0.5)
+    assert run.seconds_left == 100.0, "twice as fast as expected in part: 60 s"
+    clock.now = 300.0
+    run.tell(message("thick: Model A", 0.2, 200.0, 500.0))
+    assert run.fraction < 1.0
+    assert run.seconds_left == 500.0
+    assert run.why == "thick takes longer than expected"

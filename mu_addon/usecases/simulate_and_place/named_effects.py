@@ -1,17 +1,20 @@
-"""Identified effects that a quasi-static simulation of the unit can contain."""
+"""Effects that measured data named and a simulation of the unit can contain beside its parameters."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import attrs
+import numpy as np
 
 from ...design.toml_text import nearest
 from ...errors import InputError
-from ...evidence.effect import LIBRARY
+from ...evidence.effect import LIBRARY, Parameter
+from ...evidence.prediction.effective_pressure import in_the_chambers, remembered
+from ...evidence.prediction.unit import RELAXING, TIMED
 from ...evidence.unit_effects import EFFECTS, SMOOTH, Body
 from ...fem.newton_settings import NewtonSettings
 
@@ -21,11 +24,24 @@ if TYPE_CHECKING:
     from ...fem.model import Model
     from ...meshing.mesh import Mesh
 
+Array = np.ndarray[Any, Any]
+
+REFERENCE = Parameter("reference_kPa", "kPa", 0.01, 1e4, 1.0, (), "the largest pressure of the measured data")
 # Those with materials, in the order in which they change what the others left: the first takes the wall as
 # neo-Hookean, and what of it is isotropic then may stiffen.
 _LAWS = ("anisotropy", "strain_stiffening", "tension_compression_asymmetry")
 # The other effects change the unit that is meshed, or the mesh.
-NAMES = tuple(name for name, e in EFFECTS.items() if e.materials or e.model or e.load)
+STATIC = tuple(name for name, e in EFFECTS.items() if e.materials or e.model or e.load)
+# What acts in time: the pressure at which the unit without them would stand, by the evidence's own rules.
+_OF_UNIT = (
+    "line_lag",
+    "leak",
+    "viscoelasticity",
+    "rate_independent_hysteresis",
+    "mullins_softening",
+)
+IN_TIME = {e.name: e for e in TIMED if e.name in _OF_UNIT}
+NAMES = (*STATIC, *_OF_UNIT)
 # Of each in a few words, its size included.
 _DESCRIPTIONS = {
     "gravity": "solid parts have a density of {:.4g} kg/m³",
@@ -33,6 +49,10 @@ _DESCRIPTIONS = {
     "anisotropy": "the wall is stiffer by {:.0%} along the print's layers than across them",
     "tension_compression_asymmetry": "struts are stiffer by {:.0%} in compression than in tension",
     "clogged_chamber": "the last chamber receives less pressure, by {:.0%} of the pressure",
+    "line_lag": "the chambers follow the pressure with a time constant of {:.3g} s",
+    "leak": "a leak conducts {:.2%} of what the line does",
+    "rate_independent_hysteresis": "friction bears {:.1%} of the stiffness",
+    "mullins_softening": "the first loading softens the unit by up to {:.1%}",
 }
 
 Values = Mapping[str, Mapping[str, float]]
@@ -40,11 +60,12 @@ _NONE: Values = MappingProxyType({})
 
 
 @attrs.frozen
-class StaticEffects:
+class NamedEffects:
     """Parameters of each effect by name, and the direction of gravity about x: at 0 the tip hangs down.
 
-    An effect whose parameter is at its null is none, and left out. Raises InputError for an unknown name or
-    parameter and for a value out of bounds. where: a table's name, for that error.
+    Effects of `STATIC` change what is simulated, those of `IN_TIME` the pressure at which it stands. An
+    effect whose size, its first parameter, is at its null is none, and left out. Raises InputError for an
+    unknown name or parameter and for a value out of bounds. where: a table's name, for that error.
     """
 
     values: Values = attrs.field(default=_NONE)
@@ -61,13 +82,13 @@ class StaticEffects:
             )
         if not isinstance(self.values, Mapping):
             raise InputError(f"{self.values!r} is not a table", self.where, "write it as a table")
-        sizes = {name: self._checked(name, given) for name, given in self.values.items()}
-        kept = {n: {EFFECTS[n].parameter.name: s} for n, s in sizes.items() if s != EFFECTS[n].parameter.null}
+        checked = {name: self._checked(name, given) for name, given in self.values.items()}
+        kept = {name: given for name, given in checked.items() if next(iter(given.values())) != _null(name)}
         # In one order, so that the same effects are the same text.
         object.__setattr__(self, "values", {name: kept[name] for name in NAMES if name in kept})
         object.__setattr__(self, "orientation_deg", float(turn) % 360.0)
 
-    def _checked(self, name: str, given: Any) -> float:
+    def _checked(self, name: str, given: Any) -> dict[str, float]:
         where = f"{self.where}.{name}"
         if name not in NAMES:
             why = " it is not an effect that a simulation of the unit can contain" if name in LIBRARY else ""
@@ -76,30 +97,46 @@ class StaticEffects:
                 self.where,
                 f"known: {', '.join(NAMES)}",
             )
-        p = EFFECTS[name].parameter
-        if not isinstance(given, Mapping) or set(given) != {p.name}:
-            keys = ", ".join(map(str, given)) if isinstance(given, Mapping) else repr(given)
-            raise InputError(f"{name} has {p.name}, not {keys or 'nothing'}", where, f"write {p.name} = ..")
-        size = given[p.name]
-        if not _is_number(size) or not p.low <= size <= p.high:
-            unit = f" {p.unit}" if p.unit else ""
-            raise InputError(
-                f"{p.name} = {size!r} is out of bounds", where, f"give {p.low:g} to {p.high:g}{unit}"
-            )
-        return float(size)
+        laws = _laws(name)
+        for law in laws:
+            if isinstance(given, Mapping) and set(given) == {p.name for p in law}:
+                return {p.name: _size(p, given[p.name], where) for p in law}
+        keys = ", ".join(map(str, given)) if isinstance(given, Mapping) else repr(given)
+        wanted = " or ".join(", ".join(p.name for p in law) for law in laws)
+        raise InputError(
+            f"{name} has {wanted}, not {keys or 'nothing'}", where, f"write {laws[0][0].name} = .."
+        )
 
     def __bool__(self) -> bool:
         return bool(self.values)
 
     @property
     def sizes(self) -> dict[str, float]:
-        """Size of every effect by its name."""
-        return {name: given[EFFECTS[name].parameter.name] for name, given in self.values.items()}
+        """Size of every static effect by its name."""
+        return {
+            name: given[EFFECTS[name].parameter.name] for name, given in self.values.items() if name in STATIC
+        }
+
+    @property
+    def in_time(self) -> bool:
+        """Whether the unit stands elsewhere than where its present pressure alone would have it."""
+        return any(name in IN_TIME for name in self.values)
+
+    def effective_kPa(self, time_s: Array, pressure_kPa: Array) -> Array:
+        """Pressure (n,) in kPa at which the unit without the effects in time would stand, from rest on.
+
+        time_s, pressure_kPa (n,): of the supply, linear in between.
+        """
+        if not self.in_time:
+            return pressure_kPa
+        values = {f"{name}.{p}": v for name, given in self.values.items() for p, v in given.items()}
+        chambers = in_the_chambers(time_s, pressure_kPa, values)
+        return remembered(time_s, chambers, values, float(np.abs(pressure_kPa).max()))
 
     @property
     def has_gravity(self) -> bool:
         """Whether the direction of gravity matters."""
-        return any(EFFECTS[name].has_gravity for name in self.values)
+        return any(EFFECTS[name].has_gravity for name in self.sizes)
 
     @property
     def clogged(self) -> bool:
@@ -120,7 +157,7 @@ class StaticEffects:
     @property
     def newton(self) -> NewtonSettings:
         """Newton's settings that these effects ask for."""
-        asked = [EFFECTS[name].newton for name in self.values]
+        asked = [EFFECTS[name].newton for name in self.sizes]
         return next((n for n in asked if n != SMOOTH), NewtonSettings())
 
     @property
@@ -130,7 +167,7 @@ class StaticEffects:
 
     def words(self) -> list[str]:
         """Each effect in words."""
-        return [_DESCRIPTIONS[name].format(size) for name, size in self.sizes.items()]
+        return [_in_words(name, given) for name, given in self.values.items()]
 
     def materials(self, base: Materials, mesh: Mesh) -> Materials:
         """Materials of a unit's mesh with these effects, of those without."""
@@ -157,3 +194,42 @@ class StaticEffects:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _laws(name: str) -> tuple[tuple[Parameter, ...], ...]:
+    """The sets of parameters that an effect may be given by, a law each."""
+    if name in STATIC:
+        return ((EFFECTS[name].parameter,),)
+    own = IN_TIME[name].parameters
+    if name == "viscoelasticity":
+        return own, RELAXING.parameters
+    # With the pressure that the energy of softening was relative to, which a diagnosis of units states.
+    return ((*own, REFERENCE),) if name == "mullins_softening" else (own,)
+
+
+def parameters_of(name: str, given: Iterable[str]) -> tuple[Parameter, ...] | None:
+    """The parameters of an effect that is given by these names, None where no law of it has them."""
+    return next((law for law in _laws(name) if {p.name for p in law} == set(given)), None)
+
+
+def _null(name: str) -> float:
+    return _laws(name)[0][0].null
+
+
+def _in_words(name: str, given: Mapping[str, float]) -> str:
+    """An effect in words, its size included."""
+    if name == "viscoelasticity" and "share" in given:
+        return f"all moduli relax by {given['share']:.1%}, with a time constant of {given['time_s']:.3g} s"
+    if name == "viscoelasticity":
+        share, onset = given["per_decade"], given["onset_s"]
+        return f"all moduli relax by {share:.1%} in each decade of time after {onset:.3g} s"
+    return _DESCRIPTIONS[name].format(next(iter(given.values())))
+
+
+def _size(p: Parameter, size: Any, where: str) -> float:
+    if not _is_number(size) or not p.low <= size <= p.high:
+        unit = f" {p.unit}" if p.unit else ""
+        raise InputError(
+            f"{p.name} = {size!r} is out of bounds", where, f"give {p.low:g} to {p.high:g}{unit}"
+        )
+    return float(size)

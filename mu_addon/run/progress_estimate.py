@@ -11,11 +11,13 @@ Plan = Sequence[tuple[str, float]]
 LONGER = 1.2
 """By what factor an estimate has to grow before it is told, with the reason; else the old one counts on."""
 SLACK_S = 5.0
+MOST_BY_CLOCK = 0.95
+"""How much of a stage is taken for done by the clock alone: it has not ended."""
 UNPLANNED_S = 20.0
 """Seconds that a stage which no plan has is taken for."""
 
 
-class Outlook:
+class ProgressEstimate:
     """The whole of a run as it goes on; `tell` it each progress message.
 
     fraction: done of the whole, 0..1, which never shrinks; number and count: of the present stage and of all;
@@ -33,7 +35,7 @@ class Outlook:
         self._spent = 0.0
         self._own_left: float | None = None
         self._left: float | None = None
-        self._at = clock()
+        self._at = self._began = clock()
         self.fraction = 0.0
         self.why = ""
 
@@ -55,6 +57,11 @@ class Outlook:
     def tell(self, message: Mapping[str, Any]) -> None:
         """Take in a progress message, see `progress`."""
         stage, share = str(message.get("stage", "")), message.get("fraction")
+        whole, _, _ = stage.rpartition(": ")
+        if stage not in self._expected and whole in self._expected:
+            left = message.get("seconds_left")
+            self._tell_part(whole, float(left) if isinstance(left, int | float) else 0.0)
+            return
         added = ""
         if stage not in self._expected:
             added = stage
@@ -69,6 +76,22 @@ class Outlook:
             self._taken[stage] = self._spent
             self._share, self._own_left = 1.0, 0.0
         self._estimate(added)
+
+    def _tell_part(self, stage: str, left: float) -> None:
+        """Take in that a planned stage goes on which tells parts of its own: "wall 0.9: Model A".
+
+        Which parts there are is known to nobody before: what is done of it is by the clock. left: of its
+        present part, in s.
+        """
+        now = self._clock()
+        if stage != self._stage:
+            if self._stage:
+                self._taken.setdefault(self._stage, now - self._began)
+            self._stage, self._began = stage, now
+        self._spent = now - self._began
+        self._share = min(self._spent / self._expected[stage], MOST_BY_CLOCK)
+        self._own_left = max(self._expected[stage] - self._spent, left)
+        self._estimate("")
 
     def _add(self, stage: str) -> None:
         """Put a stage that was not planned after the present one."""

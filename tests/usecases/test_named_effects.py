@@ -15,6 +15,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.design.rigid_body import RigidBody
 from mu_addon.errors import InputError
 from mu_addon.evidence.extended import ExtendedModel, Fitted
+from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.unit_effects import EFFECTS, Body
 from mu_addon.evidence.unit_fem import Run, run
 from mu_addon.fem.equilibrium import Equilibrium
@@ -31,9 +32,10 @@ from mu_addon.run.progress import Progress
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.simulate_and_place.extended_unit import extend
 from mu_addon.usecases.simulate_and_place.job import Job, read_job
+from mu_addon.usecases.simulate_and_place.named_effects import STATIC, NamedEffects
 from mu_addon.usecases.simulate_and_place.run import run_stages
-from mu_addon.usecases.simulate_and_place.static_effects import NAMES, StaticEffects
 from mu_addon.usecases.simulate_and_place.study import Study
+from tests.evidence import analytic
 
 UNIT = load_preset("mu-1.0x")
 ROUGH = MeshSettings(refine=0.4, order=1)
@@ -63,7 +65,7 @@ def named(**sizes):
 
 
 def with_effects(orientation_deg=0.0, job=JOB, **sizes):
-    return attrs.evolve(job, effects=StaticEffects(named(**sizes), orientation_deg))
+    return attrs.evolve(job, effects=NamedEffects(named(**sizes), orientation_deg))
 
 
 def model_file(path, **sizes):
@@ -96,11 +98,11 @@ def ran(job, folder):
 
 
 def test_every_static_effect_of_the_evidence_can_be_simulated():
-    assert set(SIZES) == set(NAMES)
-    assert set(EFFECTS) - set(NAMES) == {"overcure", "skin_cure", "wall_thickness", "mesh_error"}
+    assert set(SIZES) == set(STATIC)
+    assert set(EFFECTS) - set(STATIC) == {"overcure", "skin_cure", "wall_thickness", "mesh_error"}
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", STATIC)
 def test_a_simulation_is_what_the_evidence_computes_of_the_same_effect(name, mesh):
     """On one mesh at the same pressures there is nothing to tell the two apart."""
     of_model = ExtendedModel(
@@ -109,7 +111,7 @@ def test_a_simulation_is_what_the_evidence_computes_of_the_same_effect(name, mes
     effects = attrs.evolve(extend(UNIT, of_model).effects, orientation_deg=90.0)
     _, angles = moved(attrs.evolve(JOB, effects=effects), mesh)
     body = Body(UNIT, ROUGH, ROUGH, orientation_deg=90.0)
-    (expected,) = run(Run(body, (-10.0, 0.0, 20.0), (), name, SIZES[name])).values
+    expected, _volume = run(Run(body, (-10.0, 0.0, 20.0), (), name, SIZES[name])).values
     np.testing.assert_allclose(angles, expected, rtol=1e-9, atol=1e-9)
     _, without = moved(JOB, mesh)
     assert np.abs(angles - without).max() > 0.02
@@ -148,7 +150,7 @@ def test_a_layered_wall_that_stiffens_does_so_in_what_of_it_is_isotropic(mesh):
     """The order in which the two are given changes nothing."""
     one = with_effects(anisotropy=1.3, strain_stiffening=0.4).materials(mesh)
     other = attrs.evolve(
-        JOB, effects=StaticEffects(named(strain_stiffening=0.4) | named(anisotropy=1.3))
+        JOB, effects=NamedEffects(named(strain_stiffening=0.4) | named(anisotropy=1.3))
     ).materials(mesh)
     assert one.hash() == other.hash()
     np.testing.assert_allclose(
@@ -273,7 +275,7 @@ GRAVITY = "[simulate.effects.gravity]\ndensity_kg_m3 = 1300.0\n"
         ("gravity", "gravitty", "did you mean 'gravity'", "known: gravity"),
         (
             "gravity",
-            "viscoelasticity",
+            "pressure_gain",
             "not an effect that a simulation of the unit can contain",
             "known: gravity",
         ),
@@ -300,7 +302,7 @@ def test_effects_that_are_none_are_refused_with_place_and_remedy(tmp_path, old, 
 @pytest.mark.parametrize("turn", ["sideways", True, float("nan"), 400.0])
 def test_a_direction_that_is_none_is_refused(turn):
     with pytest.raises(InputError, match="not a valid orientation"):
-        StaticEffects(named(gravity=1000.0), turn)
+        NamedEffects(named(gravity=1000.0), turn)
 
 
 def test_a_clog_is_refused_where_the_whole_lattice_is_searched():
@@ -344,7 +346,7 @@ def test_a_direction_of_nothing_that_weighs_is_told(tmp_path):
     assert warned == ["gravity is not part of this model, so the orientation has no effect"]
     path = model_file(tmp_path / "model.toml", gravity=1000.0)
     (_, effects), _, warned = given(modelled, "place", "--model", path, "--orientation", "90")
-    assert effects == StaticEffects(named(gravity=1000.0), 90.0)
+    assert effects == NamedEffects(named(gravity=1000.0), 90.0)
     assert not warned
 
 
@@ -356,9 +358,9 @@ def test_homogenize_says_that_it_knows_no_whole_unit(tmp_path):
     assert summary["model"]["applied"] == ()
 
 
-def test_what_has_no_place_in_a_static_simulation_is_left_out_and_says_why():
+def test_what_has_no_place_in_a_simulation_is_left_out_and_says_why():
     effects = {
-        "leak": {"conductance_ratio": Fitted(0.1, 0, 0, 0)},
+        "pressure_gain": {"gain": Fitted(0.1, 0, 0, 0)},
         "contact": {"reach_mm": Fitted(2.0, 0, 0, 0)},
         "mesh_error": {"share": Fitted(1.0, 0, 0, 0)},
         "gravity": {"density_kg_m3": Fitted(1100.0, 0, 0, 0)},
@@ -367,9 +369,9 @@ def test_what_has_no_place_in_a_static_simulation_is_left_out_and_says_why():
     assert found.unit == UNIT
     assert found.effects.sizes == {"gravity": 1100.0}
     assert found.applied == ("solid parts have a density of 1100 kg/m³",)
-    ambiguous, leak, contact, finer = found.left_out
+    ambiguous, gain, contact, finer = found.left_out
     assert "ambiguous" in ambiguous
-    assert "time, gauge or test bench" in leak
+    assert "gauge" in gain
     assert "--obstacle" in contact
     assert "--refine" in finer
     # What a file keeps of it says as much of gravity, and nothing of the rest.
@@ -396,3 +398,66 @@ def test_a_sweep_may_turn_a_unit_that_weighs_something(tmp_path):
     )
     found = [point.job.effects for point in plan.points(plan.values()[0])]
     assert found == [with_effects(turn, gravity=1300.0).effects for turn in (0.0, 90.0)]
+
+
+SLOW = Protocol(np.array([0.0, 1.0, 9.0, 10.0, 18.0]), np.array([0.0, 20.0, 20.0, 0.0, 0.0]))
+IN_TIME = {
+    "viscoelasticity": {"share": 0.3, "time_s": 2.0},
+    "relaxing by decades": {"per_decade": 0.05, "onset_s": 0.5},
+    "line_lag": {"time_s": 0.4},
+    "leak": {"conductance_ratio": 0.2},
+    "rate_independent_hysteresis": {"share": 0.3, "threshold_kPa": 4.0},
+    "mullins_softening": {"softening": 0.3, "energy_share": 0.2, "reference_kPa": 20.0},
+}
+
+
+def in_time(name, **more):
+    effect = "viscoelasticity" if name.startswith("relaxing") else name
+    return attrs.evolve(JOB, protocol=SLOW, times=19, effects=NamedEffects({effect: IN_TIME[name]}), **more)
+
+
+@pytest.mark.parametrize("name", IN_TIME)
+def test_in_time_the_unit_stands_where_the_evidence_has_it(name):
+    """The pressure at which it stands is the evidence's own, of a record of the same pressures."""
+    time = np.linspace(0.0, 18.0, 181)
+    pressure = np.interp(time, SLOW.time_s, SLOW.pressure_kPa)
+    record = analytic.experiment("one", time, pressure, dict.fromkeys(analytic.CHANNELS, 0.0 * time))
+    effect = "viscoelasticity" if name.startswith("relaxing") else name
+    values = {f"{effect}.{p}": v for p, v in IN_TIME[name].items()}
+    expected = UnitPressure([analytic.response()], [record]).effective_kPa(record, values)
+    found = in_time(name).samples[1]
+    np.testing.assert_allclose(found, expected[::10], atol=2e-9 if name != "leak" else 1e-9)
+
+
+def test_a_wall_that_relaxes_creeps_on_and_comes_back(tmp_path):
+    """A step of pressure held: the bending goes from that of the modulus at once to that after long."""
+    job = in_time("viscoelasticity", stages=("design", "simulate"))
+    with run_to_end(Progress()) as context:
+        run_stages(Study(job, tmp_path, context))
+    rows = np.genfromtxt(tmp_path / "angle.csv", delimiter=",", names=True)
+    assert rows["time_s"].tolist() == job.samples[0].tolist()
+    np.testing.assert_allclose(
+        rows["pressure_kPa"], np.interp(rows["time_s"], SLOW.time_s, SLOW.pressure_kPa)
+    )
+    held = (rows["time_s"] >= 1.0) & (rows["time_s"] <= 9.0)
+    assert (np.diff(rows["angle_deg"][held]) > 0).all()
+    # After long it stands where the unit without memory does at 20 kPa, at once where that does at 14.
+    rate = 2.0 / (1 - 0.3)
+    at_once = 20.0 * (1 - 0.3 * rate * (1 - np.exp(-1 / rate)))
+    assert rows["effective_kPa"][1] == pytest.approx(at_once, rel=1e-6)
+    assert rows["effective_kPa"][9] == pytest.approx(20.0, rel=0.03)
+    assert 0.0 < rows["angle_deg"][11] < 0.3 * rows["angle_deg"][9]
+    assert rows["angle_deg"][-1] < 0.1 * rows["angle_deg"][9]
+    assert context.summary["angle_deg"]["20"] == pytest.approx(rows["angle_deg"][1])
+    shown = np.load(tmp_path / "motion/model_a.npz")
+    np.testing.assert_allclose(shown["pressure_kPa"], rows["pressure_kPa"])
+
+
+def test_place_goes_on_where_the_unit_relaxes(tmp_path):
+    with run_to_end(Progress()) as context:
+        run_stages(Study(in_time("viscoelasticity"), tmp_path, context))
+    delta = np.load(tmp_path / "delta.npz")
+    assert delta["pressure_kPa"].max() == 20.0
+    held = (delta["time_s"] >= 1.0) & (delta["time_s"] <= 9.0)
+    worst = delta["delta_volume_fraction_mm"].max(axis=(0, 2))
+    assert (np.diff(worst[held]) > 0).all()

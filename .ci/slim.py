@@ -1,0 +1,116 @@
+"""Wheels without what no module imports: tests, examples, manuals, headers, sources of compiled code.
+
+A slimmed wheel is made from the pinned one and no other: every file that stays is the same to the byte, but
+for the list of files (RECORD) and the build tag in WHEEL. Nothing is left out that another extension of
+Blender's could import, since all extensions share one folder of packages; licences stay. `sbom.cdx.json`
+names the wheel that it was made from, with its SHA-256, and what was left out.
+"""
+
+from __future__ import annotations
+
+import base64
+import csv
+import hashlib
+import io
+import zipfile
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import NamedTuple
+
+PARTS = {
+    "fonttools": ("fontTools/*.c", "fontTools/*.pyx", "fontTools/*.pxd"),
+    "gmsh": ("gmsh-*.data/data/share/doc/*", "gmsh-*.data/data/include/*"),
+    "matplotlib": ("*/tests/*", "matplotlib/mpl-data/sample_data/*"),
+    "scipy": ("*/tests/*",),
+    "warp_lang": ("warp/tests/*", "warp/examples/*"),
+}
+"""What is left out of which package; `*` stands for folders, too."""
+LEGAL = ("licen", "copying", "notice", "credits")
+"""A file with one of these in its name stays."""
+BUILD = "0slim"
+"""Build tag in the name of a slimmed wheel: of two wheels of one version, Blender takes the one without."""
+
+
+class Slimmed(NamedTuple):
+    """A wheel that was slimmed: its name, the wheel it was made from, and what was left out."""
+
+    name: str
+    original: str
+    sha256: str
+    patterns: tuple[str, ...]
+    files: int
+    bytes: int
+
+
+def slimmed_name(name: str) -> str:
+    """Name of the wheel that is made from one of that name; the same where nothing is left out of it."""
+    package, *rest = name.split("-", 2)
+    return "-".join([package, rest[0], BUILD, rest[1]]) if package.lower() in PARTS else name
+
+
+def slim(wheel: Path, folder: Path) -> tuple[Path, Slimmed | None]:
+    """Make the slimmed wheel of a pinned one in `folder`; the wheel itself and None where it stays whole.
+
+    Equal wheels give equal bytes.
+    """
+    patterns = PARTS.get(wheel.name.split("-")[0].lower(), ())
+    if not patterns:
+        return wheel, None
+    folder.mkdir(parents=True, exist_ok=True)
+    made = folder / slimmed_name(wheel.name)
+    beside = made.with_suffix(".part")
+    with zipfile.ZipFile(wheel) as source, zipfile.ZipFile(beside, "w", zipfile.ZIP_DEFLATED) as target:
+        left_out = [i for i in source.infolist() if _left_out(i.filename, patterns)]
+        names = {i.filename for i in left_out}
+        changed = _changed(source, names)
+        for info in source.infolist():
+            if info.filename not in names:
+                target.writestr(info, changed.get(info.filename) or source.read(info), zipfile.ZIP_DEFLATED)
+    beside.replace(made)
+    digest = hashlib.sha256(wheel.read_bytes()).hexdigest()
+    size = sum(i.file_size for i in left_out)
+    return made, Slimmed(made.name, wheel.name, digest, patterns, len(left_out), size)
+
+
+def differences(made: zipfile.ZipFile, original: zipfile.ZipFile) -> list[str]:
+    """What a slimmed wheel has otherwise than PARTS says: a file too many or too few, other content."""
+    package = Path(str(original.filename)).name.split("-")[0].lower()
+    expected = {n for n in original.namelist() if not _left_out(n, PARTS.get(package, ()))}
+    names = set(made.namelist())
+    wrong = [f"{name} was added" for name in sorted(names - expected)]
+    wrong += [f"{name} was lost" for name in sorted(expected - names)]
+    own = _own(original)
+    for name in sorted(names & expected - set(own)):
+        if made.getinfo(name).CRC != original.getinfo(name).CRC or made.read(name) != original.read(name):
+            wrong.append(f"{name} was changed")
+    return wrong
+
+
+def _left_out(name: str, patterns: tuple[str, ...]) -> bool:
+    if any(word in name.rpartition("/")[2].lower() for word in LEGAL):
+        return False
+    return any(fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def _own(package: zipfile.ZipFile) -> tuple[str, str]:
+    """Names of a wheel's own RECORD and WHEEL."""
+    (record,) = (n for n in package.namelist() if n.count("/") == 1 and n.endswith(".dist-info/RECORD"))
+    return record, record.removesuffix("RECORD") + "WHEEL"
+
+
+def _changed(source: zipfile.ZipFile, left_out: set[str]) -> dict[str, bytes]:
+    """RECORD without what is left out, and WHEEL with the build tag."""
+    record, wheel = _own(source)
+    lines = source.read(wheel).decode().rstrip("\n").splitlines()
+    tagged = (
+        "\n".join([*(x for x in lines if not x.startswith("Build:")), f"Build: {BUILD}"]) + "\n"
+    ).encode()
+    digest = base64.urlsafe_b64encode(hashlib.sha256(tagged).digest()).rstrip(b"=").decode()
+    rows = io.StringIO()
+    write = csv.writer(rows, lineterminator="\n").writerow
+    for row in csv.reader(io.StringIO(source.read(record).decode())):
+        if row and row[0] == wheel:
+            write([wheel, f"sha256={digest}", len(tagged)])
+        elif row and row[0] not in left_out:
+            write(row)
+    return {record: rows.getvalue().encode(), wheel: tagged}

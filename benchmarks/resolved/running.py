@@ -1,0 +1,48 @@
+"""What benchmarks of resolved units share: a protocol outward from rest, a study in a folder of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mu_addon.fem.protocol import Protocol
+from mu_addon.run.context import RunContext
+from mu_addon.run.progress import Progress
+from mu_addon.usecases.simulate_and_place.job import Job
+from mu_addon.usecases.simulate_and_place.run import simulate_and_place
+from mu_addon.usecases.simulate_and_place.study import Study, begin_study
+
+
+def outward(pressures_kPa: Sequence[float]) -> Protocol:
+    """From rest outward on either side, suction first: each state starts from one nearer to rest."""
+    pressures = [0.0, *sorted((p for p in pressures_kPa if p < 0), reverse=True)]
+    if any(p > 0 for p in pressures_kPa):
+        pressures += [*([0.0] if len(pressures) > 1 else []), *sorted(p for p in pressures_kPa if p > 0)]
+    return Protocol(np.arange(float(len(pressures))), np.array(pressures))
+
+
+def run_study(job: Job, folder: Path) -> tuple[Study, dict[str, Any]]:
+    """The study and its summary; a run that was stopped goes on in its folder. May raise MuError."""
+    context = RunContext(Progress())
+    begin_study(job, folder, context)
+    study = simulate_and_place(job, folder, context)
+    return study, context.summary
+
+
+def angles_deg(summary: dict[str, Any]) -> dict[float, float]:
+    """Bending angle in degrees by pressure in kPa."""
+    return {float(pressure): angle for pressure, angle in summary["angle_deg"].items()}
+
+
+def print_row(cells: Sequence[object]) -> None:
+    """A row of a Markdown table, at once."""
+    print("| " + " | ".join(map(str, cells)) + " |", flush=True)
+
+
+def print_heading(columns: Sequence[str]) -> None:
+    """The head of a Markdown table."""
+    print_row(columns)
+    print("| --- " * len(columns) + "|", flush=True)

@@ -1,0 +1,1 @@
+"""Files of test machines imported into a unit's measured data."""

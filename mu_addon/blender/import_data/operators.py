@@ -1,0 +1,149 @@
+"""Import files; what they do not say is asked in the panel."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+from pathlib import Path
+
+import bpy
+from bpy.props import CollectionProperty, StringProperty
+
+from ...errors import MuError
+from ...files import make_folder
+from ..shared import viewports
+from ..shared.operators import UnitOperator, open_file, reports_errors
+from ..simulate import study_folder as studies
+from ..unit import object as unit_object
+
+FOLDER = "measured"
+"""Folder of imported data in the unit's study folder, where no folder of measured data is chosen."""
+ENDINGS = "*.csv;*.txt;*.tsv;*.dat;*.tra;*.xlsx;*.xls;*.xlsm;*.xlsb;*.ods"
+
+
+class MU_OT_import_files(UnitOperator, bpy.types.Operator):
+    """Read files as test machines and data loggers export them into the unit's measured data"""
+
+    bl_idname = "mu.import_files"
+    bl_label = "Import Files..."
+    bl_options = {"REGISTER", "UNDO"}
+
+    directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
+    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
+    filter_glob: StringProperty(default=ENDINGS, options={"HIDDEN"})
+
+    def invoke(self, context, event):
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    @reports_errors
+    def execute(self, context):
+        chosen = [str(Path(self.directory) / one.name) for one in self.files if one.name]
+        if not chosen:
+            self.report({"ERROR"}, "No file was chosen: choose one or more files of measured data")
+            return {"CANCELLED"}
+        root = unit_object.active_root(context)
+        root.mu_import.answers.clear()
+        root.mu_import.files = "\n".join(chosen)
+        return _import(self, root)
+
+
+class MU_OT_import_answers(UnitOperator, bpy.types.Operator):
+    """Import the files with these answers"""
+
+    bl_idname = "mu.import_answers"
+    bl_label = "Import with These Answers"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @reports_errors
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        lacking = [one for one in root.mu_import.answers if not one.value.strip()]
+        if lacking:
+            self.report({"ERROR"}, f"Not answered: {lacking[0].words}")
+            return {"CANCELLED"}
+        for one in root.mu_import.answers:
+            one.answered = True
+        try:
+            return _import(self, root)
+        except MuError:
+            # The answers that were refused can be corrected.
+            for one in root.mu_import.answers:
+                one.answered = False
+            raise
+
+
+class MU_OT_import_cancel(UnitOperator, bpy.types.Operator):
+    """Leave these files out"""
+
+    bl_idname = "mu.import_cancel"
+    bl_label = "Do Not Import"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        _forget(unit_object.active_root(context))
+        return {"FINISHED"}
+
+
+class MU_OT_import_page(UnitOperator, bpy.types.Operator):
+    """Open the page that shows what was understood of the files"""
+
+    bl_idname = "mu.import_page"
+    bl_label = "What Was Understood"
+    bl_options = {"REGISTER"}
+
+    @reports_errors
+    def execute(self, context):
+        from ...usecases.import_data.run import PAGE
+
+        page = _folder(unit_object.active_root(context)) / PAGE
+        if not page.exists():
+            self.report({"ERROR"}, "Nothing was imported into this folder: choose Import Files first")
+            return {"CANCELLED"}
+        open_file(context, page)
+        return {"FINISHED"}
+
+
+def _folder(root):
+    """The unit's folder of measured data, or the one that imported files make."""
+    given = root.mu_evidence.folder
+    return Path(bpy.path.abspath(given)) if given else studies.assign_folder(root) / FOLDER
+
+
+def _import(operator, root):
+    """Import what the answers allow; the questions that are left stand in the panel."""
+    # Only now: charts bring in matplotlib.
+    from ...usecases.import_data.run import write, write_page
+    from ...usecases.import_data.understood import understand
+
+    state = root.mu_import
+    given = {one.key: one.value.strip() for one in state.answers if one.answered}
+    found = understand([Path(name) for name in state.files.split("\n")], given)
+    folder = _folder(root)
+    make_folder(folder)
+    if found.open:
+        for p, question in found.asked:
+            one = state.answers.add()
+            one.key, one.words, one.experiment = question.key, question.words, p.name
+            one.choices, one.value = "\n".join(question.choices), question.proposed
+        write_page(found, folder)
+        operator.report({"WARNING"}, f"{len(found.asked)} question(s) in the panel Evidence")
+        viewports.redraw()
+        return {"FINISHED"}
+    remarks = write(found, folder)
+    root.mu_evidence.folder = str(folder)
+    _forget(root)
+    for remark in remarks[:3]:
+        operator.report({"WARNING"}, f"{remark.what} ({remark.where})")
+    operator.report({"INFO"}, f"{len(found.proposals)} experiment(s) imported")
+    viewports.redraw()
+    return {"FINISHED"}
+
+
+def _forget(root):
+    root.mu_import.files = ""
+    root.mu_import.answers.clear()
+    viewports.redraw()
+
+
+register, unregister = bpy.utils.register_classes_factory(
+    (MU_OT_import_files, MU_OT_import_answers, MU_OT_import_cancel, MU_OT_import_page)
+)

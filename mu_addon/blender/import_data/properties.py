@@ -1,0 +1,41 @@
+"""Files on their way into a unit's measured data, and the questions that they leave open."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, StringProperty
+
+from ..shared.registration import property_group_factory
+
+
+def _offered(self, context, typed):
+    """The answers that a question offers."""
+    return [choice for choice in self.choices.split("\n") if typed.casefold() in choice.casefold()]
+
+
+class MU_PG_import_answer(bpy.types.PropertyGroup):
+    """A question that files leave open, and its answer."""
+
+    key: StringProperty(options={"HIDDEN"})
+    words: StringProperty(options={"HIDDEN"})
+    choices: StringProperty(options={"HIDDEN"})
+    experiment: StringProperty(options={"HIDDEN"})
+    answered: BoolProperty(options={"HIDDEN"})
+    value: StringProperty(
+        name="Answer",
+        description="What the file does not say",
+        search=_offered,
+        search_options={"SORT", "SUGGESTION"},
+    )
+
+
+class MU_PG_import(bpy.types.PropertyGroup):
+    """Files on their way into a folder of measured data."""
+
+    files: StringProperty(options={"HIDDEN"})
+    answers: CollectionProperty(type=MU_PG_import_answer, options={"HIDDEN"})
+
+
+register, unregister = property_group_factory(
+    bpy.types.Object, "mu_import", (MU_PG_import_answer, MU_PG_import)
+)

@@ -1,0 +1,56 @@
+"""What the run of a tree is expected to take: a stage for each node that starts a run, with its seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from ...graph.evaluation import WAITING, State
+from ...graph.tree import NodeTree
+from ...reading import file_text, is_number, parse_json
+from ...run.progress_estimate import Plan
+from ...usecases.graph.definitions import definitions
+from ...usecases.graph.job import STATES
+from ..shared.file_cache import UNREADABLE
+
+SECONDS = {
+    "simulate": 110.0,
+    "place": 320.0,
+    "homogenize": 120.0,
+    "grip": 900.0,
+    "diagnose": 120.0,
+    "solid": 10.0,
+}
+"""What a node of a kind takes about, on two cores, where it never ran in the tree's folder."""
+OTHER_S = 30.0
+
+
+def plan_of(tree: NodeTree, states: Mapping[str, State], wanted: Iterable[str], folder: Path) -> Plan:
+    """Nodes whose runs are still to be done, in their order, with the seconds of each.
+
+    states: of the tree's latest refresh; wanted: nodes that are asked for, all where none is; folder: of the
+    tree's runs, whose last evaluation knows what each node took.
+    """
+    order, _ = tree.ordered()
+    needed = tree.upstream(tuple(wanted) or tree.nodes)
+    taken = _taken(folder)
+    return [
+        (name, taken.get(name) or SECONDS.get(tree.nodes[name].kind, OTHER_S))
+        for name in order
+        if name in needed and name in states and states[name].state == WAITING and _runs(tree, name)
+    ]
+
+
+def _runs(tree: NodeTree, name: str) -> bool:
+    node = tree.nodes[name]
+    return definitions()[node.kind].runs and not node.muted
+
+
+def _taken(folder: Path) -> dict[str, float]:
+    """Seconds that the nodes took when they were last computed in a folder, by name."""
+    path = folder / STATES
+    try:
+        nodes = parse_json(file_text(path), str(path))["nodes"]
+        return {name: float(n["cost_s"]) for name, n in nodes.items() if is_number(n.get("cost_s"))}
+    except (*UNREADABLE, AttributeError):
+        return {}

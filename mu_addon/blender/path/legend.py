@@ -1,0 +1,96 @@
+"""Names and ranks of the candidate paths, and what their colours mean, drawn over the viewport."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import blf
+import bpy
+import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+
+from ..results import field_colours, legend
+from ..results import motion as motion_parts
+from ..shared.displays import PART
+from ..shared.overlay import Overlay
+from ..shared.texts import path_symbol
+from ..unit import object as unit_object
+from ..unit.drawing import CANDIDATE
+from . import ranking
+
+BESIDE = 190
+"""Pixels that the legend of a field takes, to the left of this one."""
+
+
+def lines(known: ranking.Known) -> list[str]:
+    """Lines above the ramp: what it shows, and where the ranking is stale, that it is."""
+    if known.stale:
+        return ["J of the paths", "stale: ranked with other parameters, hence grey"]
+    return ["J of the paths [mm], dark is best"]
+
+
+def marks(known: ranking.Known) -> list[tuple[float, str]]:
+    """Share of the ramp's height and text of the smallest, the largest and round values of J between."""
+    low, high = min(known.j.values()), max(known.j.values())
+    if not high > low:
+        return [(0.0, f"{low:.3g}")]
+    between = [v for v in legend.ticks(low, high) if 0.12 < known.share_of(v) < 0.9]
+    return [(known.share_of(value), f"{value:.3g}") for value in (low, *between, high)]
+
+
+def label(root: Any, known: ranking.Known, name: str) -> list[str]:
+    """Name and rank of a path, with a question mark where the ranking is stale."""
+    found = [path_symbol(name)]
+    if name in known.j:
+        found.append(f"#{list(known.j).index(name) + 1}{'?' if known.stale else ''}")
+    return found
+
+
+def _draw() -> None:
+    context = bpy.context
+    root = unit_object.active_root(context)
+    tubes = [] if root is None else _seen(root)
+    if not tubes:
+        return
+    known = ranking.known(root)
+    scale = context.preferences.system.ui_scale
+    size = round(12 * scale)
+    for name, tube in tubes:
+        end = location_3d_to_region_2d(
+            context.region, context.region_data, tube.matrix_world @ tube.data.vertices[0].co
+        )
+        if end is None:
+            continue
+        for line, text in enumerate(label(root, known, name), 1):
+            blf.size(0, size)
+            width = blf.dimensions(0, text)[0]
+            legend.write(text, end.x - width / 2.0, end.y - 1.3 * size * line - 0.3 * size, size)
+    if known.j and root.mu_motion.legend:
+        _legend(context, root, known, scale)
+
+
+def _legend(context: Any, root: Any, known: ranking.Known, scale: float) -> None:
+    left = legend.beside_tools(context.area) + legend.LEFT * scale
+    if any(motion_parts.is_seen(root, part) for part in motion_parts.parts(root)):
+        left += BESIDE * scale
+    if not known.stale:
+        colours = np.array([field_colours.of_map(s) for s in np.linspace(0.0, 1.0, legend.PIECES + 1)])
+        legend.ramp(colours, marks(known), scale, left)
+    size = round(12 * scale)
+    bottom = (legend.BOTTOM + (0 if known.stale else legend.HEIGHT + 14)) * scale
+    for line, text in enumerate(reversed(lines(known))):
+        legend.write(text, left, bottom + 1.5 * size * line, size)
+
+
+def _seen(root: Any) -> list[tuple[str, Any]]:
+    """Candidate paths that are seen, by name."""
+    found = ((str(child.get(PART, "")), child) for child in root.children)
+    return [
+        (part.removeprefix(CANDIDATE), child)
+        for part, child in found
+        if part.startswith(CANDIDATE) and child.visible_get() and len(child.data.vertices)
+    ]
+
+
+_overlay = Overlay(_draw)
+register, unregister = _overlay.register, _overlay.unregister

@@ -1,0 +1,128 @@
+"""One click from a run to a field painted on the unit, framed, at the frame of its largest value."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty
+from mathutils import Quaternion, Vector
+
+from ...errors import InputError
+from ...usecases.simulate_and_place.motion import CONTACT_PRESSURE, MODEL_A, SENSITIVITY
+from ..shared import viewports
+from ..shared.operators import reports_errors
+from ..simulate import study_folder as studies
+from ..unit import object as unit_object
+from . import field_colours, places, run_motions
+from . import motion as motion_parts
+from .operators import MotionOperator, show_colours
+
+ROOM = 1.25
+"""How much wider than what is shown the view is that frames it."""
+OPEN = Quaternion((0.5, 0.5, 0.5, 0.5))
+"""The view from +x, which a body that is cut open is turned to."""
+
+
+class MU_OT_field_show(MotionOperator, bpy.types.Operator):
+    """Paint this field on the unit, in view, at the frame at which it is largest"""
+
+    bl_idname = "mu.field_show"
+    bl_label = "Show on the Unit"
+    bl_options = {"REGISTER", "UNDO"}
+
+    field: EnumProperty(
+        name="Field",
+        description="Physical quantity to show",
+        items=[(f.name, f.label, f.text) for f in field_colours.FIELDS],
+    )
+    frame: BoolProperty(name="Frame in View", description="Bring the unit into view", default=True)
+    jump: BoolProperty(
+        name="Jump to the Largest", description="Go to the frame of the field's largest value", default=True
+    )
+
+    @reports_errors
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        motion = motion_parts.motion_of(root)
+        name = whose(root, motion, self.field)
+        for pair in motion_parts.shown(root):
+            if pair != (name, motion_parts.MESH):
+                motion_parts.hide(root, *pair)
+        settings = root.mu_motion
+        settings.field, settings.on_unit = self.field, True
+        motion_parts.show(root, name, motion_parts.MESH)
+        if self.field == motion_parts.DIFFERENCE and run_motions.difference_words(root):
+            found = motion_parts.parts(root)
+            level = "INFO" if any(self.field in part.data.attributes for part in found) else "ERROR"
+            self.report({level}, run_motions.difference_words(root))
+            if level == "ERROR":
+                return {"CANCELLED"}
+        context.scene.frame_end = motion_parts.last_frame(motion, context.scene)
+        peak = motion_parts.peak_frame(root, context.scene)
+        if self.jump and peak is not None:
+            context.scene.frame_set(peak)
+        show_colours(context)
+        if self.frame:
+            frame_in_view(context, root)
+        return {"FINISHED"}
+
+
+def whose(root, motion, field: str) -> str:
+    """Whose motion shows a field: Model A's or, of a deviation, that of the chosen or the best path.
+
+    Raises InputError where the run has no such field.
+    """
+    if field == motion_parts.DEVIATION:
+        found = studies.findings(root)
+        ranked = [name for name, _ in found.ranking] if found else []
+        wanted = [root.mu_unit.path, *ranked, *motion.paths]
+        name = next((name for name in wanted if name in motion.paths), "")
+        if not name:
+            raise InputError(
+                "this run has no sensor path, so nothing deviates",
+                str(motion.folder.parent),
+                "simulate with Place the Sensor, or choose another run",
+            )
+        return name
+    if field == CONTACT_PRESSURE and not any(field in fields for fields in motion.fields.values()):
+        raise InputError(
+            "this run was simulated without self-contact",
+            str(motion.folder.parent),
+            "simulate Printed Struts with Self-Contact, or choose another run",
+        )
+    if field == SENSITIVITY and not motion.sensitivity:
+        raise InputError(
+            "this run has no map of the sensitivity",
+            str(motion.folder.parent),
+            "simulate with Place the Sensor, or choose another run",
+        )
+    return MODEL_A
+
+
+def frame_in_view(context, root) -> None:
+    """Bring what is seen of a unit's motion into every 3D view; what is cut open, from its open side."""
+    shown = places.seen(root)
+    if not shown or context.screen is None:
+        return
+    points = np.concatenate(
+        [vertices @ np.array(part.matrix_world.to_3x3()).T + np.array(part.matrix_world.translation)
+         for part in shown
+         for vertices in (motion_parts.vertices_of(part.data), places.moved(part))]
+    )  # fmt: skip
+    low, high = points.min(axis=0), points.max(axis=0)
+    inward = root.matrix_world.to_quaternion() @ OPEN
+    for area in viewports.areas():
+        view = area.spaces.active.region_3d
+        toward = root.matrix_world.to_quaternion().inverted() @ (view.view_rotation @ Vector((0, 0, 1)))
+        if root.mu_motion.cut and toward.x < 0.5:
+            view.view_rotation = inward
+        view.view_location = Vector((low + high) / 2.0)
+        # A distance at which an upright sphere around it would fill the height.
+        lens = area.spaces.active.lens
+        view.view_distance = ROOM * float(np.linalg.norm(high - low)) / 2.0 * lens / 18.0
+
+
+CLASSES = (MU_OT_field_show,)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

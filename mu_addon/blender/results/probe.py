@@ -1,0 +1,174 @@
+"""The probe: under the mouse the field's value with its unit, where and when. And the mark at its maximum."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+from typing import Any, ClassVar
+
+import bpy
+import numpy as np
+from bpy_extras.view3d_utils import (
+    location_3d_to_region_2d,
+    region_2d_to_origin_3d,
+    region_2d_to_vector_3d,
+)
+
+from ...usecases.simulate_and_place.motion import MODEL_A
+from ..shared.overlay import Overlay
+from ..shared.texts import path_symbol
+from ..unit import object as unit_object
+from . import field_colours, legend, places
+from . import motion as motion_parts
+from .operators import MotionOperator
+
+SIDE = 5
+"""Half the width of the mark at the largest value, in pixels at a scale of 1."""
+MARK = (1.0, 0.16, 0.16, 1.0)
+
+
+def value_text(field: field_colours.Field, value: float | None) -> str:
+    """A field's value with its unit."""
+    if value is None:
+        return f"{field.label}: not known here"
+    return f"{field.label}: {value:.4g} {field.unit}".rstrip()
+
+
+def lines(root: Any, place: places.Place, scene: Any) -> list[str]:
+    """What the probe says of a place: value, whose, where at rest and now, time and pressure."""
+    motion = motion_parts.motion_of(root)
+    name = place.part[motion_parts.MOTION].partition("|")[0]
+    whose = "Model A" if name == MODEL_A else path_symbol(name)
+    found = [value_text(field_colours.BY_NAME[root.mu_motion.field], place.value)]
+    for what, at in (("at rest", place.rest_mm), ("now", place.now_mm)):
+        x, y, z = (float(v) + 0.0 for v in np.round(at, 2))
+        found.append(f"{what}: x {x:.1f}, y {y:.1f}, z {z:.1f} mm")
+    if motion is not None:
+        time = float(np.clip(motion_parts.time_of(motion, scene), motion.time_s[0], motion.time_s[-1]))
+        pressure = float(np.interp(time, motion.time_s, motion.pressure_kPa))
+        found.append(f"{whose}, {time:.2f} s, {pressure + 0.0:.1f} kPa")
+    return found
+
+
+class MU_OT_probe(MotionOperator, bpy.types.Operator):
+    """Read the field under the mouse: value, place and time. Esc or a right click ends it"""
+
+    bl_idname = "mu.probe"
+    bl_label = "Probe"
+    bl_options = {"REGISTER"}
+
+    running: ClassVar[Any] = None
+    """The probe that runs, which is one at a time."""
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if not places.seen(unit_object.active_root(context)):
+            cls.poll_message_set("Show a motion first: Results, On the Model")
+            return False
+        return True
+
+    def invoke(self, context, event):
+        if context.area is None or context.area.type != "VIEW_3D":
+            self.report({"ERROR"}, "Probe in a 3D view")
+            return {"CANCELLED"}
+        if MU_OT_probe.running is not None:
+            MU_OT_probe.running.end(context)
+            return {"CANCELLED"}
+        MU_OT_probe.running = self
+        self.uuid = unit_object.active_root(context).mu_unit.uuid
+        self.surfaces, self.state, self.found, self.mouse = None, None, None, (0, 0)
+        self.ended = False
+        context.window_manager.modal_handler_add(self)
+        context.workspace.status_text_set("Probe: move over the unit. Esc: end")
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        root = unit_object.by_uuid(self.uuid)
+        if self.ended or root is None or event.type in {"ESC", "RIGHTMOUSE"}:
+            self.end(context)
+            return {"CANCELLED"}
+        # Everything else goes on as ever: orbit, play, other fields.
+        if event.type in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"}:
+            self.look(context, root, event)
+        return {"PASS_THROUGH"}
+
+    def look(self, context, root, event):
+        """Find what lies under the mouse."""
+        area = next(
+            (a for a in context.window.screen.areas if _inside(a, event.mouse_x, event.mouse_y)), None
+        )
+        if area is None or area.type != "VIEW_3D":
+            self.found = None
+            return
+        region = next(r for r in area.regions if r.type == "WINDOW")
+        self.mouse = event.mouse_x - region.x, event.mouse_y - region.y
+        settings = root.mu_motion
+        shown = [part.name_full for part in places.seen(root)]
+        state = context.scene.frame_current_final, settings.field, settings.low, settings.high, shown
+        if state != self.state:
+            self.surfaces, self.state = places.Surfaces(root), state
+        view = area.spaces.active.region_3d
+        origin = region_2d_to_origin_3d(region, view, self.mouse)
+        self.found = self.surfaces.hit(origin, region_2d_to_vector_3d(region, view, self.mouse))
+        self.area = area
+        area.tag_redraw()
+
+    def end(self, context):
+        """Take the text away."""
+        self.ended, self.found = True, None
+        MU_OT_probe.running = None
+        context.workspace.status_text_set(None)
+        for area in context.window.screen.areas if context.window else ():
+            area.tag_redraw()
+
+
+def _inside(area: Any, x: int, y: int) -> bool:
+    return bool(area.x <= x < area.x + area.width and area.y <= y < area.y + area.height)
+
+
+def _draw() -> None:
+    context = bpy.context
+    root = unit_object.active_root(context)
+    if root is None or not places.seen(root):
+        return
+    size = round(12 * context.preferences.system.ui_scale)
+    if root.mu_motion.marker:
+        _mark(context, root, size)
+    probe = MU_OT_probe.running
+    if probe is None or probe.found is None or probe.area != context.area:
+        return
+    x, y = probe.mouse
+    text = lines(root, probe.found, context.scene)
+    for line, words in enumerate(reversed(text)):
+        legend.write(words, x + 1.5 * size, y + 1.2 * size + 1.5 * size * line, size)
+
+
+def _mark(context: Any, root: Any, size: int) -> None:
+    """A cross where the field is largest at this frame, and its value."""
+    place = places.largest(root)
+    at = place and location_3d_to_region_2d(context.region, context.region_data, place.world)
+    if place is None or at is None:
+        return
+    side = SIDE * context.preferences.system.ui_scale
+    legend.cross(at.x, at.y, side, MARK)
+    field = field_colours.BY_NAME[root.mu_motion.field]
+    legend.write(
+        f"largest {place.value:.4g} {field.unit}".rstrip(), at.x + 2 * side, at.y - 0.35 * size, size
+    )
+
+
+_overlay = Overlay(_draw)
+_add, _remove = bpy.utils.register_classes_factory((MU_OT_probe,))
+
+
+def register() -> None:
+    """The operator and what it draws."""
+    _add()
+    _overlay.register()
+
+
+def unregister() -> None:
+    """Take them out."""
+    MU_OT_probe.running = None
+    _overlay.unregister()
+    _remove()

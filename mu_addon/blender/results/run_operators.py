@@ -1,0 +1,156 @@
+"""Work on the list of runs: show one, compare two, take over the parameters of one, delete one."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+from bpy.props import StringProperty
+
+from ...errors import InputError
+from ...usecases.simulate_and_place import history
+from ..shared import updates
+from ..shared.operators import UnitOperator, reports_errors
+from ..simulate import study_folder as studies
+from ..unit import object as unit_object
+from ..unit.properties import from_unit
+from . import motion as motion_parts
+from . import runs
+
+
+class RunOperator(UnitOperator):
+    """An operator on a run of the active unit: the one of its property `key`, else the one that is shown."""
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if not studies.runs_of(unit_object.active_root(context)):
+            cls.poll_message_set("No run yet: simulate this unit first")
+            return False
+        return True
+
+    def run_of(self, root):
+        """The run; raises InputError."""
+        found = studies.run_by_key(root, self.key) if self.key else studies.shown_run(root)
+        if found is None:
+            raise InputError(
+                f"there is no run {self.key!r}",
+                str(studies.folder_of(root)),
+                f"choose one of {', '.join(run.key for run in studies.runs_of(root))}",
+            )
+        return found
+
+
+KEY = StringProperty(name="Run", description="Name of the run's folder; empty: the run that is shown")
+
+
+class MU_OT_run_show(RunOperator, bpy.types.Operator):
+    """Show the results of this run, until the unit's parameters change"""
+
+    bl_idname = "mu.run_show"
+    bl_label = "Show Run"
+    bl_options = {"REGISTER", "UNDO"}
+
+    key: KEY
+
+    @reports_errors
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        runs.show(root, self.run_of(root).key)
+        return {"FINISHED"}
+
+
+class MU_OT_run_compare(RunOperator, bpy.types.Operator):
+    """Compare the shown run with this one, side by side and on the model; again to stop comparing"""
+
+    bl_idname = "mu.run_compare"
+    bl_label = "Compare"
+    bl_options = {"REGISTER", "UNDO"}
+
+    key: KEY
+
+    @reports_errors
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        study, run = root.mu_unit.study, self.run_of(root)
+        shown = studies.shown_run(root)
+        if shown is not None and run.key == shown.key:
+            raise InputError("this run is the one that is shown", str(run.folder), "compare with another one")
+        study.against = "" if study.against == run.key else run.key
+        motion_parts.refresh(root)
+        return {"FINISHED"}
+
+
+class MU_OT_run_restore(RunOperator, bpy.types.Operator):
+    """Give the unit the parameters that this run was made with"""
+
+    bl_idname = "mu.run_restore"
+    bl_label = "Use Its Parameters"
+    bl_options = {"REGISTER", "UNDO"}
+
+    key: KEY
+
+    @reports_errors
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        run, props = self.run_of(root), root.mu_unit
+        title = props.title
+        with updates.paused():
+            from_unit(props, run.unit)
+            props.title = title
+            props.study.command = "place" if "place" in run.tables else "simulate"
+            props.study.detail = run.detail
+        unit_object.rebuild(root)
+        if studies.design_of(root) != run.design:
+            # Bodies, obstacles and named effects are the scene's own, and are left as they are.
+            self.report(
+                {"WARNING"},
+                "The run had another body, other obstacles or other effects: those are not restored",
+            )
+        return {"FINISHED"}
+
+
+class MU_OT_run_remove(RunOperator, bpy.types.Operator):
+    """Delete this run's files from the disk, which cannot be undone"""
+
+    bl_idname = "mu.run_remove"
+    bl_label = "Delete Run"
+    bl_options = {"REGISTER"}
+
+    key: KEY
+
+    def invoke(self, context, event):
+        root = unit_object.active_root(context)
+        found = studies.run_by_key(root, self.key) if self.key else studies.shown_run(root)
+        if found is None:
+            return self.execute(context)
+        # The one that is asked about, whatever is shown once the answer comes.
+        self.key = found.key
+        return context.window_manager.invoke_confirm(
+            self,
+            event,
+            title=f"Delete the run {found.title!r}?",
+            message=f"{history.bytes_of(found) / 1e6:.0f} MB in {found.folder}. This cannot be undone.",
+            confirm_text="Delete",
+            icon="WARNING",
+        )
+
+    @reports_errors
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        run = self.run_of(root)
+        history.remove(run)
+        study = root.mu_unit.study
+        if study.against == run.key:
+            study.against = ""
+        for name, what in motion_parts.shown(root):
+            if motion_parts.one(root, name, what).get(motion_parts.RUN) == run.key:
+                motion_parts.hide(root, name, what)
+        runs.refresh()
+        unit_object.rebuild(root)
+        return {"FINISHED"}
+
+
+CLASSES = (MU_OT_run_show, MU_OT_run_compare, MU_OT_run_restore, MU_OT_run_remove)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -1,0 +1,130 @@
+"""The panels Runs and Comparison: every run of the unit in a list, and two of them side by side."""
+
+from __future__ import annotations
+
+import time
+from typing import ClassVar
+
+import bpy
+
+from ...run.progress import spell
+from ...usecases.simulate_and_place.comparison import compare
+from ..shared.panels import UnitPanel, wrapped
+from ..shared.texts import path_symbol
+from ..simulate import study_folder as studies
+from ..unit import object as unit_object
+from . import runs
+
+ROWS = 4
+"""Runs that the list shows at once."""
+
+
+class MU_UL_runs(bpy.types.UIList):
+    """Runs: star, name, best path or angle, and which one to compare with."""
+
+    bl_idname = "MU_UL_runs"
+
+    def draw_item(self, context, layout, data, item, icon, active_data, active_property, index=0, flt_flag=0):
+        root = unit_object.active_root(context)
+        run = None if root is None else studies.run_by_key(root, item.key)
+        if run is None:
+            layout.label(text="")
+            return
+        row = layout.row(align=True)
+        # Of other parameters than the unit has: still to be seen, and greyed.
+        row.active = run.design == studies.design_of(root)
+        star = "SOLO_ON" if run.starred else "SOLO_OFF"
+        row.prop(item, "starred", text="", icon=star, emboss=False)
+        split = row.split(factor=0.63)
+        split.prop(item, "title", text="", emboss=False)
+        split.label(text=found_in(run))
+        here = root.mu_unit.study.against == run.key
+        arrow = "CHECKBOX_HLT" if here else "CHECKBOX_DEHLT"
+        row.operator("mu.run_compare", text="", icon=arrow, emboss=False).key = run.key
+
+
+def found_in(run) -> str:
+    """What a run has found, in a word: its best path and J, else its largest angle, else how far it came."""
+    if run.ranking:
+        name, j = run.ranking[0]
+        return f"{path_symbol(name)} {j:.3f}"
+    if run.angles:
+        return f"{run.angles[-1][1]:+.1f}°"
+    return str(run.summary.get("status") or "not run")
+
+
+class MU_PT_runs(UnitPanel, bpy.types.Panel):
+    """Every run of this unit, the latest first; a click shows its results"""
+
+    bl_idname = "MU_PT_runs"
+    bl_parent_id = "MU_PT_results"
+    bl_label = "Runs"
+    bl_options: ClassVar[set[str]] = set()
+
+    @classmethod
+    def poll(cls, context):
+        root = unit_object.active_root(context)
+        return root is not None and bool(studies.runs_of(root))
+
+    def show(self, layout, context, root):
+        listed = runs.listed()
+        row = layout.row()
+        row.template_list("MU_UL_runs", "", listed, "entries", listed, "index", rows=ROWS)
+        column = row.column(align=True)
+        column.operator("mu.run_restore", text="", icon="LOOP_BACK").key = ""
+        column.operator("mu.run_remove", text="", icon="TRASH").key = ""
+        run = studies.shown_run(root)
+        if run is not None:
+            ended = time.strftime("%d %b %H:%M", time.localtime(run.changed_s))
+            took = f", took {spell(run.seconds)}" if run.seconds else ""
+            layout.label(text=f"{ended}{took}", icon="TIME")
+        others = len(studies.runs_of(root)) > 1
+        if others and not studies.run_by_key(root, root.mu_unit.study.against):
+            wrapped(layout, "Tick a run to compare the shown one with it", "INFO")
+
+
+class MU_PT_comparison(UnitPanel, bpy.types.Panel):
+    """The shown run beside another one: parameters that differ, angles, J, time"""
+
+    bl_idname = "MU_PT_comparison"
+    bl_parent_id = "MU_PT_results"
+    bl_label = "Comparison"
+    bl_options: ClassVar[set[str]] = set()
+
+    @classmethod
+    def poll(cls, context):
+        root = unit_object.active_root(context)
+        return root is not None and studies.run_by_key(root, root.mu_unit.study.against) is not None
+
+    def show(self, layout, context, root):
+        shown, other = studies.shown_run(root), studies.run_by_key(root, root.mu_unit.study.against)
+        if shown is None or other is None:
+            return
+        if shown.key == other.key:
+            wrapped(layout, "This run is the one that is shown: choose another one in the list", "INFO")
+            return
+        box = layout.box().column(align=True)
+        box.scale_y = 0.85
+        _row(box, "", shown.title, other.title)
+        inputs = None
+        for line in compare([shown, other]):
+            if inputs and not line.is_input:
+                box.separator()
+            inputs = line.is_input
+            _row(box, f"{line.what} ({line.unit})" if line.unit else line.what, *line.values)
+        button = layout.operator("mu.field_show", text="Difference on the Unit", icon="MOD_DATA_TRANSFER")
+        button.field = "run_difference_mm"
+
+
+def _row(column, what: str, one: str, other: str) -> None:
+    split = column.split(factor=0.46)
+    split.label(text=what)
+    split = split.split(factor=0.5)
+    split.label(text=one.replace("alpha", "α"))
+    split.label(text=other.replace("alpha", "α"))
+
+
+CLASSES = (MU_UL_runs, MU_PT_runs, MU_PT_comparison)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -1,0 +1,160 @@
+"""The list of a unit's runs as Blender shows it: an entry a run, with the name and star in its folder."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+from bpy.app.handlers import persistent
+from bpy.props import BoolProperty, CollectionProperty, IntProperty, PointerProperty, StringProperty
+
+from ...errors import MuError
+from ...usecases.simulate_and_place import history
+from ..jobs.start_child import JOB_ENDED
+from ..shared import handlers, viewports
+from ..simulate import study_folder as studies
+from ..unit import object as unit_object
+from . import motion as motion_parts
+
+
+def of_active():
+    """The active unit and its runs, the latest first."""
+    root = unit_object.active_root(bpy.context)
+    return root, ([] if root is None else studies.runs_of(root))
+
+
+def _run_of(entry):
+    return next((run for run in of_active()[1] if run.key == entry.key), None)
+
+
+def _title(entry) -> str:
+    run = _run_of(entry)
+    return run.title if run is not None else ""
+
+
+def _labelled(entry, **changes) -> None:
+    run = _run_of(entry)
+    if run is None:
+        return
+    try:
+        history.label(run, changes.get("name", run.name), changes.get("starred", run.starred))
+    except MuError:
+        # A property cannot refuse: the entry goes on saying what the file says.
+        return
+    viewports.redraw()
+
+
+def _rename(entry, value: str) -> None:
+    name = "".join(c for c in value if c.isprintable())[: history.LONGEST_NAME]
+    if name != _title(entry):
+        _labelled(entry, name=name)
+
+
+def _starred(entry) -> bool:
+    run = _run_of(entry)
+    return run is not None and run.starred
+
+
+def _star(entry, value: bool) -> None:
+    _labelled(entry, starred=value)
+
+
+class MU_PG_run(bpy.types.PropertyGroup):
+    """An entry of the list: a run, by its key."""
+
+    key: StringProperty(options={"HIDDEN"})
+    title: StringProperty(
+        name="Name", description="What you call this run; empty for what it is", get=_title, set=_rename
+    )
+    starred: BoolProperty(name="Star", description="Mark this run, to find it again", get=_starred, set=_star)
+
+
+def _index(listed) -> int:
+    root, _ = of_active()
+    run = None if root is None else studies.shown_run(root)
+    keys = [entry.key for entry in listed.entries]
+    return keys.index(run.key) if run is not None and run.key in keys else -1
+
+
+def _choose(listed, value: int) -> None:
+    root, _ = of_active()
+    if root is not None and 0 <= value < len(listed.entries):
+        show(root, listed.entries[value].key)
+
+
+class MU_PG_runs(bpy.types.PropertyGroup):
+    """The list of the active unit's runs; what it lists is read from their folders."""
+
+    entries: CollectionProperty(type=MU_PG_run, description="Runs, the latest first")
+    index: IntProperty(
+        name="Shown Run",
+        description="The run whose results are shown. A click shows another one, a double click renames it",
+        get=_index,
+        set=_choose,
+    )
+
+
+def show(root, key: str) -> bool:
+    """Show the results of the unit's run of that key, on the model, too; returns whether there is one."""
+    run = studies.run_by_key(root, key)
+    if run is None:
+        return False
+    studies.choose(root, run)
+    motion_parts.follow(root)
+    # Candidate paths have their J from the shown run.
+    unit_object.rebuild(root)
+    viewports.redraw()
+    return True
+
+
+def listed():
+    """The list, brought up to date soon where it is behind; for a panel, which may not write itself."""
+    found = bpy.context.window_manager.mu_runs
+    if _behind() and not bpy.app.timers.is_registered(_later):
+        bpy.app.timers.register(_later, first_interval=0.0)
+    return found
+
+
+def _behind() -> bool:
+    entries = bpy.context.window_manager.mu_runs.entries
+    return [entry.key for entry in entries] != [run.key for run in of_active()[1]]
+
+
+def _later() -> None:
+    refresh()
+    viewports.redraw()
+
+
+def refresh(*_) -> None:
+    """List the runs of the active unit."""
+    if not _behind():
+        return
+    entries = bpy.context.window_manager.mu_runs.entries
+    entries.clear()
+    for run in of_active()[1]:
+        entries.add().key = run.key
+
+
+@persistent
+def _loaded(*_):
+    refresh()
+
+
+_HANDLERS = {"load_post": _loaded}
+_add, _remove = bpy.utils.register_classes_factory((MU_PG_run, MU_PG_runs))
+
+
+def register() -> None:
+    """The list, on the window manager: no file keeps it, and undo leaves it alone."""
+    _add()
+    bpy.types.WindowManager.mu_runs = PointerProperty(type=MU_PG_runs)
+    handlers.add(_HANDLERS)
+    JOB_ENDED.connect(refresh)
+
+
+def unregister() -> None:
+    """Take it out."""
+    JOB_ENDED.disconnect(refresh)
+    handlers.remove(_HANDLERS)
+    if bpy.app.timers.is_registered(_later):
+        bpy.app.timers.unregister(_later)
+    del bpy.types.WindowManager.mu_runs
+    _remove()

@@ -1,0 +1,33 @@
+"""Errors of the core in the words of the panels: fields by their labels, not by names in files."""
+
+from __future__ import annotations
+
+import re
+
+from ...design.parameters import SECTIONS
+from ...design.quantity import describe
+from ...errors import MuError
+from ..unit.fields import label
+
+_LABELS = {d.name: label(d) for section in SECTIONS for d in describe(section)}
+_OPTIONS = {"channel": "Light"}
+"""Options of the command line whose fields have other names here."""
+
+
+def in_panel(text: str) -> str:
+    """A text with its parameters and options by the labels of their fields.
+
+    "[chambers] wall_mm" becomes "Wall", "--known-deg" becomes "Known Deg".
+    """
+    text = re.sub(r"\[\w+\] ", "", text)
+    text = re.sub(r"(?<![\w-])--([a-z]+(?:-[a-z]+)*)", _option, text)
+    return re.sub(r"\b[a-z]+(?:_[a-zA-Z]+)+\b", lambda m: _LABELS.get(m[0], m[0]), text)
+
+
+def _option(found: re.Match[str]) -> str:
+    return _OPTIONS.get(found[1], found[1].replace("-", " ").title())
+
+
+def error_text(error: MuError) -> str:
+    """What happened, where, and what to do, a line each."""
+    return "\n".join(in_panel(text) for text in (error.what, error.where, error.remedy) if text)

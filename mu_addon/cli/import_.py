@@ -1,0 +1,77 @@
+"""`import`: files of test machines and data loggers into a folder of measured data."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .options import add_results, require_out
+
+if TYPE_CHECKING:
+    from ..lab_files.proposal import Proposal, Question
+    from ..run.context import RunContext
+    from .options import Commands
+
+
+def add(commands: Commands[Any]) -> None:
+    """Add the parser of `import`."""
+    command = commands.add_parser(
+        "import",
+        help="Read files as test machines and data loggers export them (CSV, text, Excel), propose kind, "
+        "columns, units and signs, ask what they do not say, and write a folder of measured data.",
+        epilog="example: run.py import tension.csv --set mode=uniaxial --set length_mm=40 --out measured",
+    )
+    command.add_argument("files", nargs="+", metavar="FILE", help="CSV, text, .xlsx, .xls or .ods file.")
+    command.add_argument(
+        "--set",
+        dest="answers",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="Answer to a question, such as kind=coupon, section_mm=12.5x3, length_mm=40, unit.Load=N, "
+        "column.Ch1=force, decimal=, or, for one experiment alone, NAME.KEY=VALUE. Repeat the option for "
+        "each answer.",
+    )
+    add_results(command)
+
+
+def run(options: argparse.Namespace, context: RunContext) -> None:
+    """Import the files; in a terminal, ask what they leave open."""
+    from ..errors import InputError
+    from ..usecases.import_data.run import import_files
+
+    require_out(options)
+    answers = {}
+    for given in options.answers:
+        key, equals, value = given.partition("=")
+        if not equals or not key.strip():
+            raise InputError(f"{given!r} is no answer", "--set", "write it as KEY=VALUE")
+        answers[key.strip()] = value.strip()
+    asks = sys.stdin.isatty() and sys.stderr.isatty() and not options.json
+    import_files(
+        [Path(name) for name in options.files],
+        Path(options.out),
+        answers,
+        context,
+        _asked_in_terminal if asks else None,
+    )
+
+
+def _asked_in_terminal(proposal: Proposal, question: Question) -> str:
+    """The answer that is typed; an empty line takes the proposed one."""
+    proposed = f" [{question.proposed}]" if question.proposed else ""
+    while True:
+        sys.stderr.write(f"{proposal.name}: {question.text}{proposed} ")
+        sys.stderr.flush()
+        line = sys.stdin.readline()
+        if not line:
+            from ..errors import InputError
+
+            raise InputError(
+                "the questions were not answered", "standard input", "answer with --set KEY=VALUE"
+            )
+        answer = line.strip() or question.proposed
+        if answer and (not question.choices or answer in question.choices):
+            return answer

@@ -1,0 +1,267 @@
+"""Repair of a triangle surface where there is only one way: doubled and flipped faces, tiny gaps.
+
+What could be meant in several ways, a larger hole, a self-intersection, an edge of three faces, is left as
+it is and named. Every change is counted and measured.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from ..surface import Triangles, Vertices, bad_edges, volume
+from . import faces
+from .crossing import crossings
+
+GAP_MM = 0.02
+"""Vertices of open edges that are no farther apart are one: a fifth of a layer, less than a printer makes."""
+
+
+@attrs.frozen
+class Change:
+    """One kind of change: what was done, and to how many."""
+
+    what: str
+    count: int
+
+
+@attrs.frozen(eq=False)
+class Repair:
+    """A repaired surface, vertices (n, 3) in mm and triangles (m, 3), and what was done to it.
+
+    largest_move_mm: of a vertex. volume_before_mm3, volume_after_mm3: sums over the triangles, which of a
+    surface that is open or flipped are no volumes. remains: what was left since it has more than one remedy.
+    """
+
+    vertices: Vertices
+    triangles: Triangles
+    changes: list[Change]
+    largest_move_mm: float
+    volume_before_mm3: float
+    volume_after_mm3: float
+    remains: list[str]
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing remains to be repaired."""
+        return not self.remains
+
+    def plain(self) -> dict[str, Any]:
+        """Its figures by name, for a file."""
+        return {
+            "changes": [attrs.asdict(change) for change in self.changes],
+            "largest_move_mm": self.largest_move_mm,
+            "volume_before_mm3": self.volume_before_mm3,
+            "volume_after_mm3": self.volume_after_mm3,
+            "remains": self.remains,
+        }
+
+    def lines(self) -> list[str]:
+        """What was done and what remains, a sentence each."""
+        lines = [f"{change.count} {change.what}" for change in self.changes] or ["nothing was changed"]
+        before, after = self.volume_before_mm3, self.volume_after_mm3
+        lines.append(
+            f"volume {before:.6g} mm3 before and {after:.6g} mm3 after; no vertex moved by more than "
+            f"{self.largest_move_mm:.2g} mm"
+        )
+        return lines + [f"remains: {what}" for what in self.remains]
+
+
+def repaired(vertices: Vertices, triangles: Triangles, gap_mm: float = GAP_MM) -> Repair:
+    """Repair of a surface of vertices (n, 3) in mm and triangles (m, 3), where there is only one way to.
+
+    gap_mm: how far apart vertices of open edges may be to become one. In this order: triangles without area
+    in their corners go, gaps close, doubled triangles go, holes of one triangle are filled, patches that face
+    against their neighbours turn, and shells that are inside out do.
+    """
+    before = volume(vertices, triangles)
+    changes: list[Change] = []
+
+    def note(what: str, count: int) -> None:
+        if count:
+            changes.append(Change(what, count))
+
+    vertices, index, merged = _merged(vertices, np.arange(len(vertices)))
+    triangles = index[triangles]
+    note("vertices at the same place as others were merged", merged)
+    triangles, flat = _without_flat(triangles)
+    note("triangles of fewer than three corners were removed", flat)
+    triangles, doubled = _without_doubled(triangles)
+    note("doubled triangles were removed", doubled)
+    points, index, closed, move = _closed_gaps(vertices, triangles, gap_mm)
+    if closed:
+        vertices, triangles = points, index[triangles]
+        note(f"vertices of open edges were merged with others within {gap_mm:g} mm", closed)
+        triangles, flat = _without_flat(triangles)
+        note("triangles that collapsed in a gap were removed", flat)
+        triangles, doubled = _without_doubled(triangles)
+        note("triangles that then lay on others were removed", doubled)
+    filled = _single_holes(triangles)
+    note("holes of one triangle were filled", len(filled))
+    triangles = np.concatenate([triangles, filled])
+    turned = faces.turned(vertices, triangles)
+    note("flipped triangles were turned", int(turned.sum()))
+    triangles = np.where(turned[:, None], triangles[:, ::-1], triangles)
+    if not bad_edges(triangles):
+        over = _inside_out(vertices, triangles)
+        for members in over:
+            triangles[members] = triangles[members][:, ::-1]
+        note("shells that were inside out were turned", len(over))
+    used, index = np.unique(triangles, return_inverse=True)
+    vertices, triangles = vertices[used], np.ravel(index).reshape(-1, 3)
+    return Repair(
+        vertices,
+        triangles,
+        changes,
+        move,
+        before,
+        volume(vertices, triangles),
+        _remaining(vertices, triangles),
+    )
+
+
+def _merged(vertices: Vertices, names: NDArray[np.int64]) -> tuple[Vertices, NDArray[np.int64], int]:
+    """Distinct vertices (k, 3), the number there of each one given (n,), and how many went."""
+    distinct, index = np.unique(vertices, axis=0, return_inverse=True)
+    return distinct, np.ravel(index)[names], len(vertices) - len(distinct)
+
+
+def _without_flat(triangles: Triangles) -> tuple[Triangles, int]:
+    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    return triangles[whole], int((~whole).sum())
+
+
+def _without_doubled(triangles: Triangles) -> tuple[Triangles, int]:
+    """Triangles without those that lie on another: one of each set stays where its neighbours need one, none
+    where they close without it, all where neither closes the surface."""
+    key = np.sort(triangles, axis=1)
+    _, group, count = np.unique(key, axis=0, return_inverse=True, return_counts=True)
+    group = np.ravel(group)
+    several = count[group] > 1
+    if not several.any():
+        return triangles, 0
+    e = faces.edges(triangles)
+    m = len(triangles)
+    # How many triangles of no such set each edge has.
+    others = np.bincount(e.of_side, np.tile(~several, 3), len(e.ends))
+    kept = np.ones(m, bool)
+    for g in np.flatnonzero(count > 1).tolist():
+        members = np.flatnonzero(group == g)
+        beside = others[e.of_side[members[0] + m * np.arange(3)]]
+        if (beside == 2).all():
+            kept[members] = False
+        elif (beside <= 1).all():
+            kept[members[1:]] = False
+    return triangles[kept], int((~kept).sum())
+
+
+def _closed_gaps(
+    vertices: Vertices, triangles: Triangles, gap_mm: float
+) -> tuple[Vertices, NDArray[np.int64], int, float]:
+    """Vertices with those of open edges within a gap merged, the new number of each, how many went, how far.
+
+    A group of vertices that is wider than the gap stays: which of them belong together cannot be known. So do
+    the ends of one edge: merging them would take a face away, and close nothing.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    index = np.arange(len(vertices))
+    e = faces.edges(triangles)
+    rim = np.unique(e.ends[np.bincount(e.of_side) == 1])
+    if not len(rim):
+        return vertices, index, 0, 0.0
+    pairs = cKDTree(vertices[rim]).query_pairs(gap_mm, output_type="ndarray")
+    if not len(pairs):
+        return vertices, index, 0, 0.0
+    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(rim),) * 2)
+    group = connected_components(graph, directed=False)[1]
+    linked = {tuple(pair) for pair in e.ends.tolist()}
+    points = vertices.copy()
+    merged, move = 0, 0.0
+    for g in np.flatnonzero(np.bincount(group) > 1).tolist():
+        members = rim[group == g]
+        here = vertices[members]
+        wide = float(np.linalg.norm(here[:, None] - here[None], axis=2).max())
+        joined = any((a, b) in linked for a in members.tolist() for b in members.tolist() if a < b)
+        if wide > gap_mm or joined:
+            continue
+        middle = here.mean(axis=0)
+        move = max(move, float(np.linalg.norm(here - middle, axis=1).max()))
+        points[members[0]] = middle
+        index[members] = members[0]
+        merged += len(members) - 1
+    return points, index, merged, move
+
+
+def _single_holes(triangles: Triangles) -> Triangles:
+    """Triangles (k, 3) that fill the holes which three open edges bound, turned like their neighbours."""
+    e = faces.edges(triangles)
+    count = np.bincount(e.of_side)
+    open_sides = np.flatnonzero(count[e.of_side] == 1)
+    m = len(triangles)
+    a = triangles[open_sides % m, open_sides // m]
+    b = triangles[open_sides % m, (open_sides // m + 1) % 3]
+    onward: dict[int, list[int]] = {}
+    # A new face runs along its neighbours' edges the other way.
+    for start, end in zip(b.tolist(), a.tolist(), strict=True):
+        onward.setdefault(start, []).append(end)
+    found = set()
+    for first, ends in onward.items():
+        if len(ends) != 1 or len(onward.get(ends[0], [])) != 1:
+            continue
+        second = ends[0]
+        third = onward[second][0]
+        if third != first and onward.get(third) == [first]:
+            loop = (first, second, third)
+            k = loop.index(min(loop))
+            found.add(loop[k:] + loop[:k])
+    return np.array(sorted(found), np.int64).reshape(-1, 3)
+
+
+def _inside_out(vertices: Vertices, triangles: Triangles) -> list[NDArray[np.int64]]:
+    """Triangles of each shell of a closed surface that must turn: the outer ones that face inward, or all.
+
+    A shell within another may be a void or a solid of its own; it turns only where every shell must, as in a
+    file that is inside out as a whole.
+    """
+    found = faces.pieces(vertices, triangles)
+    shells = [*found.bodies, *found.voids, *found.nested, *found.inside_out]
+    if not found.inside_out or len(shells) > faces.MOST_SHELLS:
+        return []
+    deep = []
+    for shell in shells:
+        at = vertices[triangles[shell.triangles[0]]].mean(axis=0)
+        others = (other for other in shells if other is not shell)
+        around = (faces.winding(at, vertices[triangles[other.triangles]]) for other in others)
+        deep.append(sum(abs(turns) > 0.5 for turns in around))
+    wrong = [(shell.volume < 0.0) != bool(depth % 2) for shell, depth in zip(shells, deep, strict=True)]
+    every = all(wrong)
+    return [
+        shell.triangles
+        for shell, depth, bad in zip(shells, deep, wrong, strict=True)
+        if bad and (every or depth == 0)
+    ]
+
+
+def _remaining(vertices: Vertices, triangles: Triangles) -> list[str]:
+    """What is wrong with a surface that has more than one remedy."""
+    e = faces.edges(triangles)
+    count = np.bincount(e.of_side)
+    agree = np.bincount(e.of_side, np.where(e.forward, 1, -1)) != 0
+    found = []
+    if holes := int((count == 1).sum()):
+        found.append(f"{holes} open edges, of holes of more than one triangle: fill them by hand")
+    if crowded := int((count > 2).sum()):
+        found.append(f"{crowded} edges of more than two faces: remove inner faces, or unite the parts")
+    if against := int((agree & (count == 2)).sum()):
+        found.append(f"{against} edges whose faces cannot all be turned alike: the surface has one side")
+    if cut := len(crossings(vertices, triangles)):
+        found.append(f"{cut} edges that pass through other triangles: unite the parts")
+    if not len(triangles):
+        found.append("no triangle")
+    return found

@@ -1,0 +1,485 @@
+"""Which experiments the tables of laboratory files are, what was concluded, and what has to be asked."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+from ..measured.kinds import AXES, KINDS, MODES, PLATES, VALVES, named
+from .blocks import Block
+from .cells import number
+from .quantities import READ_IN, Column, plain, unit_of
+
+Array = np.ndarray[Any, Any]
+
+# A displacement that begins farther from zero than this share of its range is a place of the machine.
+_OFFSET = 0.02
+_TENSION = re.compile(r"tensil|tension test|zugversuch|\bzug\b|traction|trazione|traccion|rozciagan")
+_COMPRESSION = re.compile(r"compress|druckversuch|stauch|druckspannung|\bdruck\b|schiacc|sciskan")
+_LENGTH = re.compile(
+    r"gau?ge length|grip separation|messlange|einspannlange|anfangslange|initial length|specimen length|"
+    r"\bheight\b|\bhohe\b|probenhohe|longueur|lunghezza|longitud|\bl0\b"
+)
+_WIDTH = re.compile(r"width|breite|largeur|larghezza|anchura|szerokosc|\bb0\b")
+_THICKNESS = re.compile(r"thickness|dicke|epaisseur|spessore|espesor|grubosc|\ba0\b")
+_DIAMETER = re.compile(r"diameter|durchmesser|diametre|diametro|srednica|\bd0\b")
+_AREA = re.compile(r"\barea\b|querschnitt|section area|\bs0\b|aire\b")
+_NAME = re.compile(
+    r"specimen (label|name|id)|sample (name|id)|probenbezeichnung|probenname|specimen$|sample$|probe$"
+)
+_KEYS_OF_NUMBERS = ("temperature_C", "scale", "orientation_deg", "mass_g", "chamber_volume_mm3")
+
+
+@attrs.frozen
+class Question:
+    """What a file cannot say: the key that answers it, in words, and answers that may be given.
+
+    proposed: an answer that suggests itself, "" where none does.
+    """
+
+    key: str
+    words: str
+    choices: tuple[str, ...] = ()
+    proposed: str = ""
+
+    @property
+    def text(self) -> str:
+        """The question with the answers that it offers."""
+        return self.words + (f" ({', '.join(self.choices)})" if self.choices else "")
+
+
+@attrs.frozen(eq=False)
+class Proposal:
+    """One experiment, as far as it is understood.
+
+    file, sheet, lines: where it stands, first and last line; keys: of experiments.toml; columns: arrays (n,)
+    by their names in a folder of measured data; origin: where each column comes from; concluded: what was
+    changed or assumed; unread: columns that are not read; questions: what has still to be answered; titles:
+    of all columns of the table, untitled ones by their number.
+    """
+
+    file: Path
+    sheet: str
+    lines: tuple[int, int]
+    keys: dict[str, Any]
+    columns: dict[str, Array]
+    origin: dict[str, str]
+    concluded: tuple[str, ...]
+    unread: tuple[str, ...]
+    questions: tuple[Question, ...]
+    titles: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """The experiment's name."""
+        return str(self.keys["name"])
+
+    @property
+    def place(self) -> str:
+        """Name of the file, sheet and lines, in words."""
+        sheet = f", sheet {self.sheet!r}" if self.sheet else ""
+        return f"{self.file.name}{sheet}, lines {self.lines[0]} to {self.lines[1]}"
+
+    @property
+    def where(self) -> str:
+        """The same with the file's path."""
+        return f"{self.file}{self.place.removeprefix(self.file.name)}"
+
+
+def propose(path: Path, block: Block, name: str, answers: Mapping[str, str]) -> Proposal:
+    """What experiment a table is.
+
+    name: of the experiment; answers: by key, as text, of this experiment. Raises InputError for an answer
+    that cannot be, and for a time that does not run on.
+    """
+    return _Proposing(path, block, name, dict(answers)).proposal()
+
+
+def answers_for(name: str, given: Mapping[str, str]) -> dict[str, str]:
+    """The answers that hold for an experiment: those under its name before those for all."""
+    general = {key: value for key, value in given.items() if "." not in key or key.startswith(_OWN)}
+    own = {key[len(name) + 1 :]: value for key, value in given.items() if key.startswith(name + ".")}
+    return general | own
+
+
+# Answers about a column begin so, and hold its title.
+_OWN = ("unit.", "column.")
+
+
+class _Proposing:
+    """One table on its way to an experiment: what was found so far."""
+
+    def __init__(self, path: Path, block: Block, name: str, answers: dict[str, str]) -> None:
+        self.path, self.block, self.name, self.answers = path, block, name, answers
+        self.concluded: list[str] = []
+        self.unread: list[str] = []
+        self.questions: list[Question] = []
+        self.keys: dict[str, Any] = {"name": name}
+
+    @property
+    def where(self) -> str:
+        lines = self.block.lines
+        sheet = f", sheet {self.block.sheet!r}" if self.block.sheet else ""
+        return f"{self.path}{sheet}, lines {lines[0]} to {lines[-1]}"
+
+    def proposal(self) -> Proposal:
+        columns, origin = self._columns()
+        kind = self._kind(columns)
+        if kind:
+            self._time(columns, origin, kind)
+            columns = self._of_kind(columns, kind)
+            self._signs(columns, kind)
+            self._zero(columns)
+            self.keys = self._keys(columns, kind)
+        lines = self.block.lines
+        return Proposal(
+            file=self.path,
+            sheet=self.block.sheet,
+            lines=(int(lines[0]), int(lines[-1])),
+            keys=self.keys,
+            columns=columns,
+            origin={column: origin[column] for column in columns},
+            concluded=tuple(self.concluded),
+            unread=tuple(self.unread),
+            questions=tuple(self.questions),
+            titles=tuple(c.title or str(k) for k, c in enumerate(self.block.columns, 1)),
+        )
+
+    def _columns(self) -> tuple[dict[str, Array], dict[str, str]]:
+        """The columns that are understood, in the units that are read, and where each comes from."""
+        columns: dict[str, Array] = {}
+        origin: dict[str, str] = {}
+        position: tuple[Array, str] | None = None
+        for k, one in enumerate(self.block.columns):
+            one = self._answered(one, k)
+            if not one.quantity or one.quantity == "count":
+                self.unread.append(one.title or f"column {k + 1}")
+                continue
+            if one.factor is None:
+                one = self._unit(one)
+            values = self.block.values[:, k] * (one.factor or 1.0)
+            read = f" [{one.unit}]" if one.unit else ""
+            source = f"{one.title or f'column {k + 1}'!r}{read}"
+            if one.quantity == "position":
+                position = position or (values, source)
+                continue
+            target = named(one.quantity)
+            if target in columns:
+                self.unread.append(one.title)
+                continue
+            columns[target], origin[target] = values, source
+        if position:
+            if "displacement_mm" in columns:
+                self.unread.append(position[1])
+            else:
+                columns["displacement_mm"], origin["displacement_mm"] = position
+        return columns, origin
+
+    def _answered(self, one: Column, k: int) -> Column:
+        """A column as an answer names it, `column.TITLE=quantity`; untitled ones by their number."""
+        answer = self.answers.get(f"column.{one.title or k + 1}")
+        if answer is None:
+            if not one.title:
+                self.questions.append(
+                    Question(
+                        f"column.{k + 1}",
+                        f"what does column {k + 1}, which has no title, hold?",
+                        tuple(READ_IN),
+                    )
+                )
+            return one
+        if answer == "none":
+            return attrs.evolve(one, quantity="")
+        if answer not in READ_IN:
+            raise InputError(
+                f"column.{one.title or k + 1} = {answer!r} is no quantity",
+                self.where,
+                f"choose one of {', '.join(READ_IN)}, or none",
+            )
+        known = unit_of(one.unit) if one.unit else None
+        fits = known is not None and known[0] == READ_IN[answer]
+        return attrs.evolve(one, quantity=answer, factor=known[1] if known and fits else None)
+
+    def _unit(self, one: Column) -> Column:
+        """A column with the unit that an answer gives it, `unit.TITLE=N`; asked for where none does."""
+        wanted = READ_IN[one.quantity]
+        key = f"unit.{one.title}"
+        answer = self.answers.get(key)
+        if answer is None:
+            shown = f"{one.unit!r}, which is not known" if one.unit else "not given"
+            choices = tuple(unit for unit in _OFTEN[wanted])
+            self.questions.append(
+                Question(key, f"the unit of {one.title!r} is {shown}", choices, self._likely(one))
+            )
+            return attrs.evolve(one, factor=1.0)
+        known = (wanted, 1.0) if answer == "" or answer == wanted else unit_of(answer)
+        if answer == "1" and wanted == "":
+            known = ("", 1.0)
+        if known is None or known[0] != wanted:
+            raise InputError(
+                f"{key} = {answer!r} is no unit of {one.quantity}",
+                self.where,
+                f"choose one of {', '.join(_OFTEN[wanted])}",
+            )
+        return attrs.evolve(one, unit=answer, factor=known[1])
+
+    def _likely(self, one: Column) -> str:
+        """The unit that suggests itself: for strain by how large the values are."""
+        if one.quantity != "strain":
+            return (
+                _OFTEN[READ_IN[one.quantity]][0] if READ_IN[one.quantity] in ("s", "mm", "N", "deg") else ""
+            )
+        k = self.block.columns.index(next(c for c in self.block.columns if c.title == one.title))
+        return "%" if np.nanmax(np.abs(self.block.values[:, k])) > 1.5 else "1"
+
+    def _kind(self, columns: Mapping[str, Array]) -> str:
+        """The kind of experiment, "" where it must be asked."""
+        answer = self.answers.get("kind")
+        if answer is not None:
+            if answer not in KINDS:
+                raise InputError(
+                    f"kind = {answer!r} is not known", self.where, f"choose one of {', '.join(KINDS)}"
+                )
+            return answer
+        have = set(columns)
+        if {"angle_deg", "voltage_V"} <= have:
+            return "waveguide_bending"
+        if {"pressure_kPa", "angle_deg"} <= have or {"pressure_kPa", "volume_mm3"} <= have:
+            return "unit_pressure"
+        if {"added_mass_g", "tip_deflection_mm"} <= have:
+            return "beam_deadweight"
+        loads = ({"strain", "stress_kPa"}, {"displacement_mm", "force_N"}, {"strain", "force_N"})
+        if any(load <= have for load in loads) or {"displacement_mm", "stress_kPa"} <= have:
+            return self._loading()
+        if "pressure_kPa" in have:
+            return "pressure_hold"
+        if any(question.key.startswith("column.") for question in self.questions):
+            return ""
+        self.questions.append(
+            Question(
+                "kind",
+                f"no kind of experiment has {', '.join(sorted(have)) or 'no known column'} alone",
+                tuple(KINDS),
+            )
+        )
+        return ""
+
+    def _loading(self) -> str:
+        """Whether a specimen is pulled or a lattice compressed, by the words of the file."""
+        words = " ".join(
+            [self.path.stem, self.block.sheet, *(c.title for c in self.block.columns)]
+            + [" ".join((key, *cells)) for key, cells in self.block.facts.items()]
+        )
+        pulled = bool(_TENSION.search(plain(words)))
+        pressed = bool(_COMPRESSION.search(plain(words)))
+        if pulled != pressed:
+            kind = "coupon" if pulled else "lattice_compression"
+            self.concluded.append(f"{kind}: the file speaks of {'tension' if pulled else 'compression'}")
+            return kind
+        self.questions.append(
+            Question(
+                "kind",
+                "a specimen was loaded: was it a coupon of resin, or a block of lattice compressed?",
+                ("coupon", "lattice_compression"),
+            )
+        )
+        return ""
+
+    def _time(self, columns: dict[str, Array], origin: dict[str, str], kind: str) -> None:
+        """Time in s from the first row on; made from an interval where the file has none and needs one."""
+        if "time_s" not in columns:
+            interval = self._positive("interval_s") if "interval_s" in self.answers else None
+            if interval is None:
+                if KINDS[kind].timed:
+                    self.questions.append(
+                        Question(
+                            "interval_s", f"{kind} needs a time, and there is none: seconds from row to row?"
+                        )
+                    )
+                return
+            columns["time_s"] = interval * np.arange(len(self.block.lines), dtype=float)
+            origin["time_s"] = f"rows, {interval:g} s apart"
+            return
+        time = columns["time_s"]
+        step = np.diff(time)
+        if np.isnan(time).any() or (step < 0).any():
+            i = int(np.flatnonzero(np.isnan(time))[0] if np.isnan(time).any() else np.argmax(step < 0) + 1)
+            raise InputError(
+                "the time is missing, or runs backward",
+                f"{self.path}, line {self.block.lines[i]}",
+                "divide the file where a new record begins",
+            )
+
+    def _of_kind(self, columns: Mapping[str, Array], kind: str) -> dict[str, Array]:
+        """The columns that a kind may have."""
+        kept = {name: values for name, values in columns.items() if KINDS[kind].knows(name)}
+        self.unread += [name for name in columns if name not in kept]
+        return kept
+
+    def _signs(self, columns: dict[str, Array], kind: str) -> None:
+        """Compression is positive in a block of lattice; force and stretch of a coupon have one sign."""
+        pairs = [name for name in ("strain", "displacement_mm", "stress_kPa", "force_N") if name in columns]
+        negative = [name for name in pairs if _extreme(columns[name]) < 0]
+        differ = kind == "coupon" and len(negative) < len(pairs)
+        turned = negative if kind == "lattice_compression" or differ else []
+        for name in turned:
+            columns[name] = -columns[name]
+            self.concluded.append(
+                f"{name}: sign turned, positive in {'compression' if kind != 'coupon' else 'tension'}"
+            )
+        if kind == "coupon" and negative and not turned:
+            self.concluded.append("force and displacement are negative: read as compression of the coupon")
+
+    def _zero(self, columns: dict[str, Array]) -> None:
+        """A displacement that begins at a place of the machine begins at zero."""
+        found = columns.get("displacement_mm")
+        if found is None or self.answers.get("zero") == "as_read":
+            return
+        first = float(found[np.isfinite(found)][0])
+        if abs(first) > _OFFSET * float(np.nanmax(found) - np.nanmin(found)):
+            columns["displacement_mm"] = found - first
+            self.concluded.append(
+                f"displacement_mm: less its first value, {first:g} mm, the place of the machine "
+                "(zero=as_read keeps it)"
+            )
+
+    def _keys(self, columns: Mapping[str, Array], kind: str) -> dict[str, Any]:
+        """The keys of experiments.toml: answers, then what the file says, else a question."""
+        keys: dict[str, Any] = {"name": self.name, "kind": kind}
+        keys["specimen"] = self.answers.get("specimen") or self._fact_text(_NAME) or self.name
+        keys["role"] = self._choice("role", ("fit", "held_out")) or "fit"
+        keys["source"] = self.path.name
+        for key in _KEYS_OF_NUMBERS:
+            if key in self.answers and (key in KINDS[kind].keys):
+                keys[key] = self._number(key)
+        if kind == "coupon":
+            keys["mode"] = self._choice("mode", MODES)
+            if keys["mode"] is None:
+                self._ask("mode", "how was the coupon loaded?", MODES, "uniaxial")
+        for key, choices in (("plates", PLATES), ("axis", AXES), ("valve", VALVES)):
+            if key in KINDS[kind].keys and self._choice(key, choices):
+                keys[key] = self._choice(key, choices)
+        if kind in ("unit_pressure", "pressure_hold") and self._choice("pressure", ("gauge", "absolute")):
+            keys["pressure"] = self._choice("pressure", ("gauge", "absolute"))
+        if "cells" in self.answers and kind == "lattice_compression":
+            keys["cells"] = self._numbers("cells", (1, 3), whole=True)
+        # Section and length turn force and displacement into stress and strain.
+        needs_section = "section_mm" in KINDS[kind].keys and (
+            kind == "beam_deadweight" or ("stress_kPa" not in columns and "force_N" in columns)
+        )
+        needs_length = "length_mm" in KINDS[kind].keys and (
+            kind == "beam_deadweight" or ("strain" not in columns and "displacement_mm" in columns)
+        )
+        keys["section_mm"] = self._section()
+        if keys["section_mm"] is None and needs_section:
+            self._ask("section_mm", "width and thickness of the section in mm, as 12.5x3?")
+        keys["length_mm"] = self._length()
+        if keys["length_mm"] is None and needs_length:
+            self._ask(
+                "length_mm",
+                "length in mm over which the displacement is taken (gauge length, height of a block)?",
+            )
+        return {key: value for key, value in keys.items() if value is not None}
+
+    def _ask(self, key: str, words: str, choices: tuple[str, ...] = (), proposed: str = "") -> None:
+        self.questions.append(Question(key, words, choices, proposed))
+
+    def _section(self) -> list[float] | None:
+        """Width and thickness in mm by an answer or the file; of a round one, of a square of its area."""
+        if "section_mm" in self.answers:
+            return self._numbers("section_mm", (2,))
+        width, thickness = self._fact_mm(_WIDTH), self._fact_mm(_THICKNESS)
+        if width and thickness:
+            self.concluded.append(f"section of {width:g} x {thickness:g} mm, as the file says")
+            return [width, thickness]
+        diameter, area = self._fact_mm(_DIAMETER), self._fact_mm(_AREA)
+        if diameter or area:
+            side = math.sqrt(area) if area else 0.5 * math.sqrt(math.pi) * float(diameter or 0.0)
+            words = f"of {area:g} mm2" if area else f"round, {diameter:g} mm"
+            self.concluded.append(f"section {words}, as the file says: given as a square of that area")
+            return [round(side, 6), round(side, 6)]
+        return None
+
+    def _length(self) -> float | None:
+        if "length_mm" in self.answers:
+            return self._positive("length_mm")
+        length = self._fact_mm(_LENGTH)
+        if length:
+            self.concluded.append(f"length of {length:g} mm, as the file says")
+        return length
+
+    def _fact_text(self, pattern: re.Pattern[str]) -> str:
+        return next(
+            (cells[0] for key, cells in self.block.facts.items() if cells and pattern.search(key)), ""
+        )
+
+    def _fact_mm(self, pattern: re.Pattern[str]) -> float | None:
+        """A positive length (or area) in mm that the file states, None without one or without its unit."""
+        for key, cells in self.block.facts.items():
+            if not cells or not pattern.search(key):
+                continue
+            value = number(cells[0], self.block.decimal)
+            text = cells[1] if len(cells) > 1 else (re.search(r"[(\[]([^()\[\]]+)[)\]]", key) or ["", ""])[1]
+            unit = unit_of(text.replace("\u00b2", "").removesuffix("2").removesuffix("^")) if text else None
+            if value is not None and value > 0 and unit and unit[0] == "mm":
+                squared = text.rstrip().endswith(("2", "\u00b2"))
+                return float(value * (unit[1] ** 2 if squared else unit[1]))
+        return None
+
+    def _choice(self, key: str, choices: Sequence[str]) -> str | None:
+        answer = self.answers.get(key)
+        if answer is not None and answer not in choices:
+            raise InputError(
+                f"{key} = {answer!r} is not known", self.where, f"choose one of {', '.join(choices)}"
+            )
+        return answer
+
+    def _number(self, key: str) -> float:
+        return self._numbers(key, (1,))[0]
+
+    def _positive(self, key: str) -> float:
+        value = self._number(key)
+        if value <= 0:
+            raise InputError(f"{key} = {value:g} is not above 0", self.where, "give a number above 0")
+        return value
+
+    def _numbers(self, key: str, counts: Sequence[int], whole: bool = False) -> list[Any]:
+        """The numbers of an answer such as 12.5x3 or 3,3,3."""
+        parts = [part for part in re.split(r"[x\u00d7,; ]+", self.answers[key].strip("[]() ")) if part]
+        try:
+            values = [int(part) if whole else float(part) for part in parts]
+        except ValueError:
+            values = []
+        if len(values) not in counts or not all(math.isfinite(value) for value in values):
+            raise InputError(
+                f"{key} = {self.answers[key]!r} is not {' or '.join(map(str, counts))} numbers",
+                self.where,
+                f"write it as {'3x3x3' if whole else 'x'.join(['12.5', '3', '1'][: counts[0]])}",
+            )
+        return values
+
+
+# Units that a question offers, the usual one first.
+_OFTEN = {
+    "s": ("s", "ms", "min"),
+    "mm": ("mm", "um", "cm", "m", "in"),
+    "N": ("N", "kN", "mN", "lbf", "kgf"),
+    "kPa": ("MPa", "kPa", "Pa", "bar", "mbar", "psi"),
+    "deg": ("deg", "rad"),
+    "": ("1", "%"),
+    "V": ("V", "mV"),
+    "mm3": ("mm3", "ml"),
+    "g": ("g", "kg"),
+}
+
+
+def _extreme(values: Array) -> float:
+    """The value of the largest magnitude."""
+    return float(values[np.nanargmax(np.abs(values))])

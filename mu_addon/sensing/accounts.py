@@ -1,0 +1,124 @@
+"""Every byte of a serial line counted once, by what became of it; those that gave no sample are kept.
+
+What arrives is in a line or frame that was read, in one that could not be, in one cut by the beginning, a
+pulled cable or the end, in a stretch that nothing ended, or still in the decoder's buffer:
+bytes = read_bytes + rejected_bytes + cut_bytes + overlong + buffered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import attrs
+
+# So many bytes without a format are enough to say what is wrong with them; the latest are looked at.
+_COMPLAINT_BYTES, _LATEST_BYTES = 400, 4096
+# A text's share of characters that can be printed; half of all bytes can, in noise a third.
+_TEXT = 0.9
+
+
+@attrs.define
+class Counters:
+    """Counts of bytes, samples, and faults on a line since the decoder began."""
+
+    bytes: int = 0
+    samples: int = 0
+    lost: int = 0
+    """Samples that gaps in the running number say are missing."""
+    repeated: int = 0
+    """Samples that came again, the same in number, clock and values, and were left out."""
+    misnumbered: int = 0
+    """Samples whose running number or clock fits neither before nor after; kept, and counted on."""
+    incomplete: int = 0
+    """Samples without a channel that others have (nan), or with one not yet recorded."""
+    crc_errors: int = 0
+    malformed: int = 0
+    """Lines or frames that could not be read."""
+    restarts: int = 0
+    """Times the device's clock or running number began anew."""
+    read_bytes: int = 0
+    """Bytes of lines and frames that were read."""
+    rejected_bytes: int = 0
+    """Bytes of lines and frames that could not be read, or have a wrong CRC."""
+    overlong: int = 0
+    """Bytes of stretches longer than any line or frame, that nothing ended."""
+    cut_bytes: int = 0
+    """Bytes of lines cut by the beginning, by a pulled cable or by the end."""
+
+
+class Reject(NamedTuple):
+    """Bytes that gave no sample, and why: malformed, crc, repeated, new name, no end, cut."""
+
+    why: str
+    raw: bytes
+
+
+class Accounts:
+    """Counters of a line, and what gave no sample, for the caller to keep and to clear."""
+
+    def __init__(self) -> None:
+        self.counters = Counters()
+        self.rejects: list[Reject] = []
+        self._unrecognised = b""
+
+    def read(self, piece: bytes) -> None:
+        """Count a line or frame that was read."""
+        self.counters.read_bytes += len(piece)
+
+    def reject(self, piece: bytes, why: str) -> None:
+        """Count and keep a line or frame that could not be read: malformed, or with a wrong crc."""
+        self.counters.rejected_bytes += len(piece)
+        if why == "crc":
+            self.counters.crc_errors += 1
+        else:
+            self.counters.malformed += 1
+        self.rejects.append(Reject(why, piece))
+
+    def reject_after_all(self, piece: bytes) -> None:
+        """Count as malformed what had been counted as read."""
+        self.counters.read_bytes -= len(piece)
+        self.reject(piece, "malformed")
+
+    def reject_lines(self, lines: Iterable[bytes]) -> None:
+        """Count lines, without their ends, of no known format."""
+        for line in lines:
+            self._unrecognised = (self._unrecognised + line + b"\n")[-_LATEST_BYTES:]
+            if line.strip():
+                self.reject(line + b"\n", "malformed")
+            else:
+                self.read(line + b"\n")
+
+    def cut(self, piece: bytes) -> None:
+        """Count and keep a line or frame of which a part is missing."""
+        if piece:
+            self.counters.cut_bytes += len(piece)
+            self.rejects.append(Reject("cut", piece))
+
+    def unended(self, piece: bytes) -> None:
+        """Count and keep a stretch that nothing ended."""
+        self.counters.overlong += len(piece)
+        self.rejects.append(Reject("no end", piece))
+
+    def drop(self, piece: bytes) -> None:
+        """Count and keep the beginning of a stretch that is too long to be waited for."""
+        self._unrecognised = (self._unrecognised + piece)[-_LATEST_BYTES:]
+        self.unended(piece)
+
+    def complaint(self, buffered: bytes) -> tuple[str, str] | None:
+        """What is wrong with input of no known format, and what to do; None where too little is known yet."""
+        unread = self.counters.bytes - self.counters.read_bytes
+        if unread < _COMPLAINT_BYTES or 20 * self.counters.read_bytes > self.counters.bytes:
+            return None
+        seen = self._unrecognised + buffered[-_LATEST_BYTES:]
+        shown = sum(32 <= byte < 127 or byte in b"\t\r\n" for byte in seen)
+        if shown < _TEXT * len(seen):
+            return (
+                "what comes is noise: neither text nor frames, as with a wrong baud rate",
+                "give the rate of the device's Serial.begin(...) by --baud (9600, 57600, 115200, ...), "
+                "and check the wiring and the port",
+            )
+        return (
+            "what comes is text in no format that is known",
+            "send `label:value` pairs, CSV, JSON lines or frames (docs/sensing.md), or choose another port",
+        )

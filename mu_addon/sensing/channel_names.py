@@ -1,0 +1,76 @@
+"""Names of channels in labels and JSON: which to believe, where a name may have been damaged on its way."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Iterable, Sequence
+
+import attrs
+
+from .formats import ENOUGH
+from .lines import CLOCKS, NUMBERS, Pairs
+from .samples import Layout
+
+# A name that is new must come this often within so many lines; more, if its line lacks nothing else.
+_NEW_WITHIN, _MORE_WITHIN = 12, 64
+_MOST_NEW = 1000
+
+
+def channels_of(found: Iterable[object]) -> list[str]:
+    """Names that are neither running number nor clock; of a row of numbers there is none."""
+    return [name for name in found if isinstance(name, str) and name not in NUMBERS and name not in CLOCKS]
+
+
+class ChannelNames:
+    """Which names of a line's values are channels, and which may be damaged ones."""
+
+    def __init__(self) -> None:
+        self._doubtful: set[str] = set()
+        self._new: dict[str, deque[int]] = {}
+
+    def forget_new(self) -> None:
+        """Begin anew with names that are to become channels."""
+        self._new = {}
+
+    def learn(self, lines: Sequence[Pairs], layout: Layout | None) -> Layout | None:
+        """The layout that most lines agree on, lest a damaged one that comes first should set it.
+
+        layout: the present one, which stays if there is one.
+        """
+        sets = Counter(tuple(channels_of(line)) for line in lines)
+        names = Counter(name for line in lines for name in channels_of(line))
+        commonest = max(names.values(), default=0)
+        self._doubtful = {name for name, times in names.items() if 2 * times < commonest}
+        if layout is None and sets:
+            most, times = sets.most_common(1)[0]
+            if len(most) > 1 and 4 * times >= 3 * len(lines):
+                return Layout(most)
+        return layout
+
+    def trust(self) -> None:
+        """Doubt no name."""
+        self._doubtful = set()
+
+    def strange(self, names: list[str], layout: Layout | None, number: int) -> tuple[set[str], Layout | None]:
+        """Names that are no channels, or not yet, and the layout with those that became channels.
+
+        Those that keep coming do. number: of the line that holds them.
+        """
+        if layout is None:
+            return {name for name in names if name in self._doubtful}, None
+        known = set(layout.channels)
+        unknown = [name for name in names if name not in known]
+        within = _NEW_WITHIN + 3 * len(known) if known - set(names) else _MORE_WITHIN
+        strange = set()
+        for name in unknown:
+            came = self._new.setdefault(name, deque(maxlen=ENOUGH))
+            came.append(number)
+            if len(came) == ENOUGH and came[-1] - came[0] <= within:
+                layout = attrs.evolve(layout, channels=(*layout.channels, name))
+                del self._new[name]
+            else:
+                strange.add(name)
+        if len(self._new) > _MOST_NEW:
+            old = number - _MORE_WITHIN
+            self._new = {name: came for name, came in self._new.items() if came[-1] > old}
+        return strange, layout

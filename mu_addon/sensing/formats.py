@@ -1,0 +1,55 @@
+"""Which of the formats a serial line speaks, told by what most of the latest whole pieces can be read as."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from .framing import END, payload_of
+from .lines import Pairs, json_of, pairs_of, row_of
+
+ENOUGH = 3
+"""So many pieces or names make a format, a header or a channel believed."""
+# The format is told by the latest lines: what a device says while it starts is soon past.
+_LATEST_LINES = 20
+
+TEXT_READERS: dict[str, Callable[[str], Pairs | list[float] | None]] = {
+    "json": json_of,
+    "labels": pairs_of,
+    "csv": row_of,
+}
+FORMATS = ("frames", *TEXT_READERS)
+
+
+def format_of(data: bytes, whole: bool, enough: int, last: str | None) -> str | None:
+    """One of FORMATS, or None where too few pieces, less than `enough`, can be read as any.
+
+    whole: whether the first piece is known to begin where one begins. last: the format before; it needs less
+    to be believed again.
+    """
+    frames = [p for p in data.split(END)[0 if whole else 1 : -1] if p]
+    framed = sum(payload_of(p) is not None for p in frames)
+    if framed >= enough or (framed and last == "frames"):
+        return "frames"
+    lines = whole_lines(data, whole)[-_LATEST_LINES:]
+    read = {
+        name: sum(reader(line) is not None for line in lines if line) for name, reader in TEXT_READERS.items()
+    }
+    best = max(read, key=lambda name: read[name])
+    if read[best] >= enough and 2 * read[best] > len(lines):
+        return best
+    return last if last in TEXT_READERS and any(TEXT_READERS[last](line or "") for line in lines) else None
+
+
+def whole_lines(data: bytes, whole: bool) -> list[str | None]:
+    """The lines of some bytes that are not blank, None for one that is no text; see `format_of`."""
+    lines = [text_of(p) for p in data.split(b"\n")[0 if whole else 1 : -1]]
+    return [line for line in lines if line != ""]
+
+
+def text_of(piece: bytes) -> str | None:
+    """A line as text without blanks around it, or None if it is none."""
+    try:
+        line = piece.decode().strip()
+    except UnicodeDecodeError:
+        return None
+    return line if line.replace("\t", " ").isprintable() else None

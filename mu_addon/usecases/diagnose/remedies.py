@@ -1,0 +1,50 @@
+"""What to do about each cause, for the people at the bench and at the printer."""
+
+from __future__ import annotations
+
+_INSTRUMENT = "the simulation is not at fault"
+_MODEL = "simulate with --model model.toml, which has it"
+
+# One sentence each, without a full stop. Instruments are put right, physics goes into the simulation.
+TO_DO = {
+    "viscoelasticity": f"{_MODEL}; compare loads at one rate, and read holds at one time",
+    "rate_independent_hysteresis": f"{_MODEL} where a unit was measured; approach a pressure from one side",
+    "strain_stiffening": _MODEL,
+    "mullins_softening": f"{_MODEL} where a unit was measured; load a new print to its full range once",
+    "tension_compression_asymmetry": _MODEL,
+    "anisotropy": f"{_MODEL}; print alike, or along another direction",
+    "fatigue_drift": "replace the specimen, or calibrate anew after so many cycles",
+    "temperature_drift": "keep the temperature, or write it down with every experiment",
+    "overcure": f"{_MODEL}; print with that offset (export --compensate), or expose less",
+    "skin_cure": f"{_MODEL}; cure less, or longer and more evenly",
+    "wall_thickness": f"{_MODEL}; cut one unit and measure its wall",
+    "pressure_offset": f"set the gauge's zero, or take the offset off the readings; {_INSTRUMENT}",
+    "pressure_gain": f"have the gauge calibrated, or divide its readings by the gain; {_INSTRUMENT}",
+    "pressure_drift": f"let the gauge warm up, and read its zero before and after; {_INSTRUMENT}",
+    "force_drift": f"let the load cell warm up, and read its zero before and after; {_INSTRUMENT}",
+    "force_lag": f"switch off the load cell's filter, or test slower; {_INSTRUMENT}",
+    "line_lag": f"{_MODEL}; a shorter or wider line, or a gauge at the unit",
+    "leak": "find the leak (soapy water at joints and inlet) and seal it, then measure again",
+    "clogged_chamber": "drain and clean the unit, and look for cured resin in its necks; print with drains",
+    "gravity": f"{_MODEL}, and the way that the unit hangs with --orientation",
+    "contact": "take away what the unit touches, or give it to the simulation with --obstacle",
+    "angle_offset": f"set the camera's zero by a record at rest; {_INSTRUMENT}",
+    "angle_drift": f"fix the camera, or follow a mark on the bench; {_INSTRUMENT}",
+    "camera_scale": f"measure the scale by a ruler in the plane of the markers; {_INSTRUMENT}",
+    "camera_tilt": f"set the camera at right angles to the plane of bending; {_INSTRUMENT}",
+    "lens_distortion": f"calibrate the lens, or stand farther away; {_INSTRUMENT}",
+    "clock_offset": f"record with one clock, or shift the records by the offset; {_INSTRUMENT}",
+    "seating": "preload the specimen until its faces bear; the simulation is not at fault",
+    "frame_compliance": "take off the machine's compliance, found by a rigid block, or use an extensometer",
+    "led_drift": f"let the light source warm up, or measure it beside the signal; {_INSTRUMENT}",
+    "ambient_light": f"shield the waveguide from light, or take a dark reading off; {_INSTRUMENT}",
+    "optical_nonlinearity": "calibrate the sensor over the whole range of bending",
+    "batch_variation": "print and test the specimens of one batch, or give that specimen its own modulus",
+    "mesh_error": "simulate with a finer mesh, --refine",
+}
+
+
+def what_to_do(effects: tuple[str, ...]) -> str:
+    """What to do about these causes, a sentence each; empty where there is none."""
+    sentences = (TO_DO[name] for name in effects)
+    return " ".join(f"{text[:1].upper()}{text[1:]}." for text in dict.fromkeys(sentences))

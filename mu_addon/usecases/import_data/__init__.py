@@ -1,0 +1,1 @@
+"""From files of a laboratory to a folder of measured data."""

@@ -1,0 +1,140 @@
+"""From files of test machines and data loggers to experiments in a folder of measured data.
+
+What a file cannot say is asked; until it is answered only the page with what was understood is written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ...errors import InputError
+from ...files import write_text
+from ...lab_files.proposal import Proposal, Question
+from ...measured.table import Remark
+from ...measured.writing import csv_text, file_stem, put, require_free, tried
+from ...run.context import RunContext
+from ...toml_writer import toml_text
+from .report import page_of
+from .understood import Understood, understand
+
+PAGE = "import.html"
+Ask = Callable[[Proposal, Question], str]
+
+
+def import_files(
+    files: Sequence[Path],
+    folder: Path,
+    answers: Mapping[str, str],
+    context: RunContext,
+    ask: Ask | None = None,
+) -> tuple[Proposal, ...]:
+    """Put the experiments of files into a folder of measured data; fills `context.summary`.
+
+    ask: gives the answer to a question; without it open questions raise InputError, after the page with what
+    was understood was written.
+    """
+    context.open_folder(folder)
+    context.console_summary = console_summary
+    given = dict(answers)
+    with context.progress.stage("import"):
+        found = understand(files, given)
+        while found.open and ask is not None:
+            # The same question of further experiments has the same answer.
+            given |= {question.key: ask(p, question) for p, question in found.asked}
+            found = understand(files, given)
+        remarks = write(found, folder)
+    for remark in remarks:
+        context.progress.warning(remark.what, remark.where, remark.remedy)
+    context.summary |= {
+        "experiments": {p.name: _figures(p) for p in found.proposals},
+        "left_out": list(found.left_out),
+        "remarks": [remark.what for remark in remarks],
+        "report": str(folder / PAGE),
+    }
+    return found.proposals
+
+
+def write_page(found: Understood, folder: Path) -> None:
+    """Write the page with what was understood; raises OutputError."""
+    write_text(folder / PAGE, page_of(found, folder.name))
+
+
+def write(found: Understood, folder: Path) -> list[Remark]:
+    """Write the page, and where no question is open all experiments, each read as `diagnose` will read it.
+
+    Returns what that reader remarks. Raises InputError where a question is open, OutputError.
+    """
+    write_page(found, folder)
+    if found.open:
+        raise InputError(*_open_questions(found, folder))
+    ready: list[tuple[str, str, str]] = []
+    remarks: list[Remark] = []
+    for p in found.proposals:
+        file = f"{file_stem(p.name)}.csv"
+        block = "[[experiment]]\n" + toml_text({**p.keys, "file": file})
+        text = _table(p)
+        try:
+            remarks += tried(block, file, text)
+        except InputError as error:
+            raise InputError(f"{p.name}: {error.what}", f"{p.where} ({error.where})", error.remedy) from error
+        require_free(folder, p.name, block, file)
+        ready.append((block, file, text))
+    for entry in ready:
+        put(folder, *entry)
+    return remarks
+
+
+def _table(p: Proposal) -> str:
+    """The CSV file of an experiment: comments on where it comes from, then its rows."""
+    lines = [f"from {p.place}"]
+    lines += [f"{column} is {source}" for column, source in p.origin.items()]
+    lines += p.concluded
+    comments = "".join(f"# {' '.join(words.split())}\n" for words in lines)
+    return comments + csv_text(p.columns)
+
+
+def _figures(p: Proposal) -> dict[str, Any]:
+    """What an experiment comes to, in plain data."""
+    return {
+        "kind": p.keys["kind"],
+        "rows": len(next(iter(p.columns.values()))),
+        "from": p.where,
+        "columns": dict(p.origin),
+        "concluded": list(p.concluded),
+        "not_read": list(p.unread),
+    }
+
+
+def _open_questions(found: Understood, folder: Path) -> tuple[str, str, str]:
+    """What, where and what to do of the questions that are open."""
+    lines = [
+        f"{p.name}: {question.text}" + (f"; likely {question.proposed}" if question.proposed else "")
+        for p, question in found.asked
+    ]
+    options = " ".join(f"--set {_quoted(f'{q.key}={_example(q)}')}" for _, q in found.asked)
+    what = "the files leave open\n    " + "\n    ".join(lines)
+    return (
+        what,
+        str(folder / PAGE),
+        f"answer with {options}; for one experiment alone with --set 'NAME.KEY=VALUE'",
+    )
+
+
+def _example(question: Question) -> str:
+    shown = {"section_mm": "WIDTHxTHICKNESS", "length_mm": "LENGTH", "interval_s": "SECONDS"}
+    return question.proposed or shown.get(question.key) or "|".join(question.choices)
+
+
+def _quoted(text: str) -> str:
+    return f"'{text}'" if any(c in text for c in " |()[]*<>;&$%") else text
+
+
+def console_summary(summary: dict[str, Any]) -> list[str]:
+    """What was imported, a line each."""
+    lines = [
+        f"{name}: {one['kind']}, {one['rows']} rows, " + ", ".join(one["columns"])
+        for name, one in summary["experiments"].items()
+    ]
+    return [*lines, *summary["left_out"], f"what was understood: {summary['report']}"]

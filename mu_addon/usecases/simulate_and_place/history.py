@@ -1,0 +1,324 @@
+"""The runs of one unit: every study that was made of it, beside the others, each in a folder of its own.
+
+A unit has a home folder. Its runs lie in `runs/` there, each named by the hash of its inputs, so that the
+same inputs find the same folder again and other inputs never touch it. A study in the home folder itself,
+and what its next study has set aside in `stale/`, are of an older version, and are listed with the others.
+What the user calls a run, and whether it is starred, is in its folder's `label.toml`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import uuid
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import attrs
+
+from ...design.body import MOST_BYTES
+from ...design.parameters import Unit, read_unit
+from ...design.rigid_body import read_rigid_bodies
+from ...errors import InputError, MuError
+from ...files import make_folder, output_error, write_text
+from ...reading import file_bytes, file_text, parse_json, parse_toml
+from ...run.cache import key
+from ...run.folder import ALWAYS, OWN
+from ...run.lock import LOCK, FolderLock
+from ...toml_writer import toml_text
+from . import study_file
+from .study_file import FILES, LAYOUT, NAME, STAGES, Tables
+
+if TYPE_CHECKING:
+    from .job import Job
+
+RUNS, LABEL = "runs", "label.toml"
+HOME, STALE = "home", "stale"
+"""Keys of the runs of older versions: in the home folder itself, and of what its next one set aside."""
+SUMMARY, OUTPUTS = "summary.json", "blender"
+"""What a run says it has found, and where a process that Blender started leaves its output."""
+EFFECTS = ("orientation_deg", "effects")
+"""Keys of study.toml's table of the simulation for what measured data named beside the parameters."""
+LONGEST_NAME = 80
+_REMOVED = ".removed-"
+_UNREADABLE = (OSError, ValueError, KeyError, TypeError, AttributeError, MuError)
+"""What a folder that is half there, or no run's, may raise."""
+
+
+@attrs.frozen(eq=False)
+class Run:
+    """One run: its inputs, what it has found so far, and what the user calls it.
+
+    design: hash of what was simulated, see `design_key`; summary: its summary.json, empty before it has one;
+    changed_s: when it last wrote that, in seconds since 1970.
+    """
+
+    folder: Path
+    tables: Tables
+    unit: Unit
+    design: str
+    summary: dict[str, Any]
+    changed_s: float
+    name: str = ""
+    starred: bool = False
+
+    @property
+    def key(self) -> str:
+        """What tells a unit's runs apart: the name of its folder in `runs/`, else `HOME` or `STALE`."""
+        if self.folder.parent.name == RUNS:
+            return self.folder.name
+        return STALE if self.folder.name == STALE else HOME
+
+    @property
+    def complete(self) -> bool:
+        """Whether it came to its end."""
+        return self.summary.get("status") == "complete"
+
+    @property
+    def has_results(self) -> bool:
+        """Whether it has anything to show: it ended, or its motion is found."""
+        return self.complete or bool(self.angles)
+
+    @property
+    def detail(self) -> str:
+        """`full`, `resolved` or `quick`: what was simulated, and whether by elements that lock."""
+        mesh = self.tables.get("simulate", {}).get("mesh") or {}
+        if mesh.get("fidelity") == "resolved":
+            return "resolved"
+        return "quick" if mesh.get("order") == 1 else "full"
+
+    @property
+    def job(self) -> str:
+        """The last stage that it was asked for: `design`, `simulate` or `place`."""
+        return [stage for stage in STAGES if stage in self.tables][-1]
+
+    @property
+    def title(self) -> str:
+        """What the user calls it, else what it is."""
+        what = {"design": "Design", "simulate": "Motion", "place": "Ranking"}[self.job]
+        if self.tables.get("place", {}).get("paths") == "graph":
+            what += ", lattice"
+        return self.name or what + {"full": "", "resolved": ", struts", "quick": ", quick"}[self.detail]
+
+    @property
+    def seconds(self) -> float:
+        """How long its stages took together, in s."""
+        found = self.summary.get("seconds")
+        return sum(map(float, found.values())) if isinstance(found, dict) else 0.0
+
+    @property
+    def angles(self) -> list[tuple[float, float]]:
+        """Pairs (pressure in kPa, bending angle in degrees) by pressure."""
+        found = self.summary.get("angle_deg") or {}
+        return sorted((float(p), float(a)) for p, a in found.items())
+
+    @property
+    def rule(self) -> str:
+        """The rule whose best path is the answer, or nothing where no paths were ranked."""
+        rules = list(self.summary.get("chosen") or {})
+        return "volume_fraction" if "volume_fraction" in rules else (rules or [""])[0]
+
+    @property
+    def ranking(self) -> list[tuple[str, float]]:
+        """Pairs (path, J_hat in mm) of the rule that gives the answer, the best first."""
+        found = (self.summary.get("J_hat_mm") or {}).get(self.rule) or {}
+        return sorted(((name, float(j)) for name, j in found.items()), key=lambda pair: pair[1])
+
+
+def design_key(
+    unit: Unit, body: str, obstacles: Iterable[tuple[str, float]], effects: Mapping[str, Any]
+) -> str:
+    """Hash of what is simulated, however it is: a unit but for its name, its body, obstacles and effects.
+
+    body: hash of the envelope's surface, or nothing; obstacles: hash and friction of each.
+    """
+    known = {name: effects[name] for name in EFFECTS if name in effects}
+    shape = _shape_hash(unit)
+    met = sorted((surface, float(friction)) for surface, friction in obstacles)
+    return key(shape, body, met, json.dumps(known, sort_keys=True))
+
+
+@lru_cache(maxsize=256)
+def _shape_hash(unit: Unit) -> str:
+    """Hash of a unit but for its name; kept, since a panel asks for the same one many times a second."""
+    return attrs.evolve(unit, name="unit").hash()
+
+
+def folders(home: Path) -> list[Path]:
+    """Folders of a unit's home that hold a run, or may."""
+    try:
+        own = [path for path in (home / RUNS).iterdir() if not path.name.startswith(".")]
+    except OSError:
+        own = []
+    return [path for path in (home, home / STALE, *sorted(own)) if (path / NAME).is_file()]
+
+
+def files_of(folder: Path) -> list[Path]:
+    """Files that a run is read from, its inputs first."""
+    names = (NAME, SUMMARY, LABEL, "unit.toml", FILES["body"], FILES["obstacles"])
+    return [folder / name for name in names]
+
+
+def runs(home: Path) -> list[Run]:
+    """Every run of a unit that can be read, the latest first."""
+    found = []
+    for folder in folders(home):
+        try:
+            found.append(read_run(folder))
+        except _UNREADABLE:
+            continue
+    return ordered(found)
+
+
+def ordered(found: Iterable[Run]) -> list[Run]:
+    """Runs, the latest first."""
+    return sorted(found, key=lambda run: (-run.changed_s, run.key))
+
+
+def read_run(folder: Path) -> Run:
+    """The run in a folder. Raises InputError and OSError where it cannot be read."""
+    tables = study_file.read(folder)
+    if tables is None:
+        raise InputError("this folder contains no run", str(folder), "give a folder that holds study.toml")
+    unit = read_unit(folder / FILES["unit"])
+    asked = tables.get("simulate", {})
+    body = ""
+    if "body" in tables["design"]:
+        body = hashlib.sha256(file_bytes(folder / FILES["body"], MOST_BYTES)).hexdigest()
+    obstacles = []
+    if "obstacles" in asked:
+        met = read_rigid_bodies(folder / FILES["obstacles"], asked.get("friction"))
+        obstacles = [(rigid.body.hash, rigid.friction) for rigid in met]
+    summary: Any = {}
+    latest = folder / NAME
+    if (folder / SUMMARY).is_file():
+        latest = folder / SUMMARY
+        try:
+            summary = parse_json(file_bytes(latest), SUMMARY)
+        except InputError:
+            # Listed all the same, so that it can be run again or removed.
+            summary = {}
+    label = parse_toml(file_text(folder / LABEL), LABEL) if (folder / LABEL).is_file() else {}
+    return Run(
+        folder,
+        tables,
+        unit,
+        design_key(unit, body, obstacles, asked),
+        summary if isinstance(summary, dict) else {},
+        latest.stat().st_mtime,
+        str(label.get("name", ""))[:LONGEST_NAME],
+        label.get("starred") is True,
+    )
+
+
+def best_of(found: Sequence[Run], design: str) -> Run | None:
+    """The run whose results are shown for a design: of those made of it the best, or else the latest of all.
+
+    Complete before incomplete, quadratic elements before linear ones, a ranking before the motion alone, then
+    the latest: a quick look replaces nothing. A run that has just begun is shown only where no other one is.
+    """
+    own = [run for run in found if run.design == design]
+    ready = [run for run in own if run.has_results]
+    if ready:
+        return max(ready, key=lambda r: (r.complete, r.detail != "quick", bool(r.rule), r.changed_s))
+    others = [run for run in found if run.has_results]
+    return next(iter(ordered(others or own)), None)
+
+
+def place_of(home: Path, job: Job) -> tuple[Path, Job]:
+    """Folder of a unit's home in which a job is run, and the job with the name that its unit has there.
+
+    It is that of a run from the same inputs, also where that was asked for fewer or more stages: finished
+    stages are kept, and a new name makes no result old.
+    """
+    own = _tables(job.tables(), job.unit)
+    for run in runs(home):
+        theirs = _tables(run.tables, run.unit)
+        if run.key != STALE and all(own[stage] == theirs[stage] for stage in own if stage in theirs):
+            return run.folder, attrs.evolve(job, unit=attrs.evolve(job.unit, name=run.unit.name))
+    return home / RUNS / key(toml_text(own))[:12], job
+
+
+def _tables(tables: Mapping[str, Mapping[str, Any]], unit: Unit) -> dict[str, dict[str, Any]]:
+    """Inputs by stage, the unit without its name."""
+    shape = _shape_hash(unit)
+    return {s: {**table, **({"unit_sha256": shape} if s == "design" else {})} for s, table in tables.items()}
+
+
+def label(run: Run, name: str, starred: bool) -> None:
+    """Call a run by a name, empty for none, and star it or not. Raises InputError and OutputError."""
+    name = name.strip()
+    if len(name) > LONGEST_NAME or not name.isprintable():
+        raise InputError(
+            f"{name[:20]!r} ... is too long or more than a line for the name of a run",
+            str(run.folder),
+            f"give at most {LONGEST_NAME} characters on one line",
+        )
+    text = toml_text({"name": name, "starred": starred}, "# What the user calls this run.")
+    write_text(run.folder / LABEL, text)
+
+
+def bytes_of(run: Run) -> int:
+    """Size of a run's files, in bytes."""
+    return sum(path.stat().st_size for top in _own(run) for path in (top, *top.rglob("*")) if path.is_file())
+
+
+def remove(run: Run) -> None:
+    """Delete a run's files, whole; what else a unit keeps in its home folder stays.
+
+    Raises InputError where a process works in the folder, and OutputError.
+    """
+    lock = FolderLock(run.folder)
+    try:
+        # Aside first, in one step each: what is then left half deleted is no run any more.
+        aside = make_folder(run.folder.parent / f"{_REMOVED}{uuid.uuid4().hex[:8]}")
+        try:
+            for path in _own(run):
+                if path.name != LOCK:
+                    path.replace(aside / path.name)
+        except OSError as error:
+            raise output_error(error, run.folder) from error
+    finally:
+        lock.release()
+    shutil.rmtree(aside, ignore_errors=True)
+    if run.key != HOME:
+        shutil.rmtree(run.folder, ignore_errors=True)
+
+
+def _own(run: Run) -> list[Path]:
+    """Files and folders of a run: all of its folder, or in the home folder those that a study writes."""
+    if run.key != HOME:
+        return sorted(run.folder.iterdir())
+    names = (NAME, *LAYOUT.optional, *LAYOUT.results, *ALWAYS, *OWN, LABEL, OUTPUTS)
+    found = {path for name in names if name not in (LOCK, STALE) for path in run.folder.glob(name)}
+    return sorted(found)
+
+
+def move_home(old: Path, new: Path) -> bool:
+    """Move a unit's home to another place, whole; returns whether it was: not while a run works in it.
+
+    Nothing is moved where there is something already. Raises OutputError.
+    """
+    if not old.is_dir() or new.exists():
+        return False
+    locks = []
+    try:
+        for folder in {path.parent for path in old.rglob(LOCK)}:
+            locks.append(FolderLock(folder))
+    except InputError:
+        return False
+    finally:
+        for lock in locks:
+            lock.release()
+    beside = new.parent / f".{new.name}-{uuid.uuid4().hex[:8]}"
+    try:
+        make_folder(new.parent)
+        # To another disk it is copied: only what is whole gets its name.
+        shutil.move(old, beside)
+        beside.replace(new)
+    except OSError as error:
+        raise output_error(error, new) from error
+    return True

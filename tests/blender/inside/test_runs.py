@@ -1,0 +1,215 @@
+"""The list of runs: which is shown, what a click and a slider do to it, and where it goes with the file.
+
+The runs are of known bending, written without a solver.
+"""
+
+import shutil
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from mu_addon.blender.results import motion as motion_parts
+from mu_addon.blender.results import panel, places, probe, run_panel, runs
+from mu_addon.blender.simulate import study_folder as studies
+from mu_addon.blender.unit import object as unit_object
+
+from .acting import add, refused
+from .drawing import drawn
+
+PANELS = [panel.MU_PT_results, run_panel.MU_PT_runs, run_panel.MU_PT_comparison, *panel.CLASSES[1:]]
+
+
+def started(home):
+    root = add(preset="mu-0.75x")
+    root.mu_unit.study.folder = str(home)
+    unit_object.rebuild(root)
+    runs.refresh()
+    return root
+
+
+def keys(root):
+    """Keys of the runs by what they are: the full one, the quick one, that of the thicker wall."""
+    found = {("thick" if r.unit.chambers.wall_mm > 1 else r.detail): r.key for r in studies.runs_of(root)}
+    return found["full"], found["quick"], found["thick"]
+
+
+def caches(root):
+    return [Path(bpy.path.abspath(p.modifiers["Motion"].filepath)) for p in motion_parts.parts(root)]
+
+
+def test_a_small_run_replaces_no_large_one_and_undoing_a_parameter_finds_its_run(home):
+    root = started(home)
+    full, quick, thick = keys(root)
+    listed = bpy.context.window_manager.mu_runs
+    assert [entry.key for entry in listed.entries] == [thick, quick, full], "the latest first"
+    assert studies.shown_run(root).key == full
+    assert listed.entries[listed.index].key == full
+    assert "Quick look" not in drawn(PANELS)
+    # Another parameter: its own run is shown at once; then none, and the last one says that it is stale.
+    root.mu_unit.chambers.wall_mm = 1.1
+    assert (studies.findings(root).run.key, studies.findings(root).stale) == (thick, False)
+    root.mu_unit.chambers.wall_mm = 1.2
+    assert (studies.findings(root).run.key, studies.findings(root).stale) == (thick, True)
+    assert "Stale" in drawn(PANELS)
+    root.mu_unit.chambers.wall_mm = 0.9
+    assert (studies.findings(root).run.key, studies.findings(root).stale) == (full, False)
+    # A click shows another one, until the unit changes.
+    listed.index = 1
+    assert studies.findings(root).run.key == quick
+    assert "Quick look" in drawn(PANELS)
+    root.mu_unit.chambers.wall_mm = 1.1
+    root.mu_unit.chambers.wall_mm = 0.9
+    assert studies.findings(root).run.key == full
+    # One of other parameters can be looked at, too, and its parameters taken over.
+    assert bpy.ops.mu.run_show(key=thick) == {"FINISHED"}
+    assert studies.findings(root).stale
+    assert bpy.ops.mu.run_restore() == {"FINISHED"}
+    assert round(root.mu_unit.chambers.wall_mm, 5) == 1.1
+    assert root.mu_unit.study.command == "simulate"
+    assert not studies.findings(root).stale
+    assert "no run 'never'" in refused(bpy.ops.mu.run_show, key="never")
+
+
+def test_what_is_shown_on_the_unit_follows_the_run(home):
+    root = started(home)
+    full, _, thick = keys(root)
+    assert bpy.ops.mu.field_show(field="displacement_mm") == {"FINISHED"}
+    assert all(path.parents[2].name == full for path in caches(root))
+    most = places.largest(root).value
+    root.mu_unit.chambers.wall_mm = 1.1
+    assert all(path.parents[2].name == thick for path in caches(root))
+    bpy.context.scene.frame_set(bpy.context.scene.frame_current)
+    assert places.largest(root).value < 0.9 * most, "that one bends less"
+    root.mu_unit.chambers.wall_mm = 0.9
+    assert abs(places.largest(root).value - most) < 1e-4
+
+
+def test_names_and_stars_are_kept_with_the_run(home):
+    root = started(home)
+    entry = bpy.context.window_manager.mu_runs.entries[2]
+    assert entry.title == "Ranking"
+    entry.title, entry.starred = "as printed", True
+    run = studies.run_by_key(root, entry.key)
+    assert (run.title, run.starred) == ("as printed", True)
+    assert (run.folder / "label.toml").is_file()
+    entry.title = "x" * 200
+    assert len(studies.run_by_key(root, entry.key).title) == 80
+    entry.title = ""
+    assert entry.title == "Ranking"
+
+
+def test_two_runs_side_by_side_and_as_a_difference_on_the_unit(home):
+    root = started(home)
+    full, quick, thick = keys(root)
+    assert "is the one that is shown" in refused(bpy.ops.mu.run_compare, key=full)
+    assert "Compare with another run" in refused(bpy.ops.mu.field_show, field="run_difference_mm")
+    assert bpy.ops.mu.run_compare(key=thick) == {"FINISHED"}
+    texts = drawn(PANELS)
+    assert "wall (mm) 0.9 1.1" in texts, texts
+    assert "At 40 kPa (deg) +50.00 +40.00" in texts, texts
+    assert bpy.ops.mu.field_show(field="run_difference_mm") == {"FINISHED"}
+    scene = bpy.context.scene
+    assert scene.frame_current == 1 + 6 * 24, "the last of seven samples, a second apart"
+    # Bent by 50 and by 40 degrees: the tips of two arcs of the same length.
+    found = places.largest(root)
+    rest = found.rest_mm
+    turn = np.radians([50.0, 40.0]) * rest[2] / 56.25
+    arcs = np.stack(
+        [rest[1] * np.cos(turn) + rest[2] * np.sin(turn), rest[2] * np.cos(turn) - rest[1] * np.sin(turn)]
+    )
+    assert abs(found.value - np.linalg.norm(arcs[:, 0] - arcs[:, 1])) < 0.02 * found.value
+    assert bpy.ops.mu.run_compare(key=quick) == {"FINISHED"}
+    bpy.ops.mu.field_show(field="run_difference_mm")
+    assert places.largest(root).value == 0.0, "both are written of the same bending"
+    assert bpy.ops.mu.run_compare(key=quick) == {"FINISHED"}
+    assert root.mu_unit.study.against == ""
+
+
+def test_deleting_a_run_frees_its_folder_and_takes_away_what_it_shows(home):
+    root = started(home)
+    _, quick, thick = keys(root)
+    bpy.ops.mu.field_show(field="von_mises_kPa")
+    bpy.ops.mu.run_compare(key=quick)
+    assert bpy.ops.mu.run_remove(key=quick) == {"FINISHED"}
+    assert root.mu_unit.study.against == ""
+    assert motion_parts.parts(root), "that of another run stays"
+    assert bpy.ops.mu.run_remove() == {"FINISHED"}
+    assert motion_parts.parts(root) == []
+    assert root.mu_unit.show == "preview"
+    assert sorted(path.name for path in (home / "runs").iterdir()) == [thick]
+    assert [entry.key for entry in bpy.context.window_manager.mu_runs.entries] == [thick]
+    bpy.ops.mu.run_remove(key=thick)
+    assert "Nothing simulated yet" in drawn(PANELS)
+    assert not bpy.ops.mu.run_remove.poll()
+
+
+def test_an_unsaved_files_runs_go_where_saving_finds_them(home, tmp_path):
+    root = add(preset="mu-0.75x")
+    unsaved = studies.assign_folder(root)
+    assert not bpy.data.filepath
+    shutil.copytree(home, unsaved, dirs_exist_ok=True)
+    unit_object.rebuild(root)
+    bpy.ops.mu.field_show(field="displacement_mm")
+    most = places.largest(root).value
+    place = tmp_path / "project"
+    place.mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(place / "seat.blend"))
+    assert not unsaved.exists()
+    assert studies.folder_of(root) == place / "seat.mu" / unsaved.name
+
+    def reopened(path):
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        bpy.ops.wm.open_mainfile(filepath=str(path))
+        (root,) = unit_object.roots()
+        assert root.mu_unit.study.folder.startswith("//")
+        assert len(studies.runs_of(root)) == 3
+        assert not studies.findings(root).stale
+        assert all(path.is_file() for path in caches(root))
+        bpy.context.scene.frame_set(bpy.context.scene.frame_current)
+        assert abs(places.largest(root).value - most) < 1e-4
+        return root
+
+    reopened(place / "seat.blend")
+    # Saved elsewhere, a file finds the runs where they are; a copy changes nothing of the file that is open.
+    (place / "sub").mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(place / "sub" / "copy.blend"), copy=True)
+    (root,) = unit_object.roots()
+    assert root.mu_unit.study.folder.startswith("//seat.mu")
+    reopened(place / "sub" / "copy.blend")
+    # File and folder moved together find each other.
+    shutil.move(place, tmp_path / "moved")
+    reopened(tmp_path / "moved" / "seat.blend")
+
+
+def test_the_probe_says_value_place_and_time(home):
+    root = started(home)
+    assert "Show a motion first" in refused(bpy.ops.mu.probe)
+    bpy.ops.mu.field_show(field="displacement_mm")
+    scene, field = bpy.context.scene, "displacement_mm"
+    scene.frame_set(1 + 6 * 24)
+    surfaces = places.Surfaces(root)
+    # From above through the tip: by how much that point was moved, and where it was.
+    top = max(places.moved(part)[:, 2].max() for part in places.seen(root))
+    found = surfaces.hit((-3.0, 12.0, top + 50.0), (0.0, 0.0, -1.0))
+    away = np.linalg.norm(found.now_mm - found.rest_mm)
+    assert abs(found.value - away) < 0.02 * away
+    assert found.value <= places.largest(root).value + 1e-5
+    first, _, _, last = probe.lines(root, found, scene)
+    assert first == f"Displacement: {found.value:.4g} mm"
+    assert last == "Model A, 6.00 s, 40.0 kPa"
+    assert surfaces.hit((500.0, 0.0, 500.0), (0.0, 0.0, 1.0)) is None
+    root.mu_motion.field = "contact_pressure_kPa"
+    assert places.largest(root) is None
+    assert (
+        "not known here"
+        in probe.lines(root, places.Surfaces(root).hit((-3, 12, top + 50), (0, 0, -1)), scene)[0]
+    )
+    assert places.values_of(found.part, field) is not None
+
+
+def test_a_field_that_the_run_has_not_is_refused_with_what_to_do(home):
+    started(home)
+    assert "without self-contact" in refused(bpy.ops.mu.field_show, field="contact_pressure_kPa")
+    assert "no map of the sensitivity" in refused(bpy.ops.mu.field_show, field="dJ_by_modulus_mm_per_MPa")
+    assert "no sensor path" in refused(bpy.ops.mu.field_show, field="deviation_mm")

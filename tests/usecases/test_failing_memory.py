@@ -1,0 +1,129 @@
+"""A large block of memory is refused to a run: a clear error, no half file, then the same digits."""
+
+from __future__ import annotations
+
+import functools
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+import pytest
+
+from mu_addon.design import shapes
+from mu_addon.design.printing.printer import load_printer
+from mu_addon.design.solid import printable
+from mu_addon.design.surface import stl_bytes
+from mu_addon.errors import MuError
+from mu_addon.materials.library import load_material
+from mu_addon.run.context import RunContext
+from mu_addon.usecases.check_print import run as checking
+from mu_addon.usecases.check_print.job import Job as CheckJob
+from mu_addon.usecases.export import run as exporting
+from mu_addon.usecases.export.job import Job as ExportJob
+from mu_addon.usecases.parameter_study import run as sweeping
+from mu_addon.usecases.parameter_study.plan import parse_plan
+from mu_addon.usecases.sensor.stream import stream
+from mu_addon.usecases.simulate_and_place import run as placing
+from mu_addon.usecases.simulate_and_place import study
+
+from ..run.failing_memory import FailingMemory, short_of_memory
+from .fault_injection import (
+    PARTIAL,
+    PLAN,
+    STUDY,
+    OneProcess,
+    Prepared,
+    answered,
+    computed_once,
+    faults,
+    inject_each,
+    placement,
+    ran,
+    rows_of,
+    unraisable,  # noqa: F401 - a fixture of every test here
+)
+
+
+def layer(folder: Path, at: int, for_good: bool) -> AbstractContextManager[FailingMemory]:
+    """Blocks of 64 kB and more, wherever the run keeps its files."""
+    return short_of_memory(at, for_good)
+
+
+def any_array(folder: Path, at: int, for_good: bool) -> AbstractContextManager[FailingMemory]:
+    """Blocks of any size, for runs that have no large ones."""
+    return short_of_memory(at, for_good, least=1)
+
+
+@pytest.mark.slow
+def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the solid on; all is solved anew, each time."""
+    monkeypatch.setattr(study, "build_solid", functools.cache(study.build_solid))
+    monkeypatch.setattr(study, "mesh_of", computed_once(study.mesh_of))
+
+    def run(folder: Path, context: RunContext) -> None:
+        placing.USE_CASE.start(STUDY, folder, context)
+
+    assert inject_each(run, tmp_path, layer, MuError.status, PARTIAL, step=7) == []
+
+
+@pytest.mark.slow
+def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What follows from the states of the unit and of its candidates; all of it by benchmarks/faults.py."""
+    assert inject_each(placement(monkeypatch), tmp_path, layer, MuError.status, PARTIAL, step=41) == []
+
+
+@pytest.mark.slow
+def test_export(tmp_path: Path) -> None:
+    job = ExportJob(
+        STUDY.unit, load_material("elastic-50a-v1"), formats=("stl", "txt"), quality="interactive"
+    )
+
+    def run(folder: Path, context: RunContext) -> None:
+        exporting.USE_CASE.start(job, folder, context)
+
+    assert inject_each(run, tmp_path, layer, MuError.status, step=31) == []
+
+
+@pytest.mark.slow
+def test_check(tmp_path: Path) -> None:
+    body = shapes.box([-7, -7, 0], [7, 7, 14]) - shapes.box([-5, -5, 2], [5, 5, 12])
+    part = printable(body - shapes.cylinder(2.0, -1.0, 3.0, 32))
+    job = CheckJob(load_printer(), stl=stl_bytes(*part), stl_file=Path("part.stl"))
+
+    def run(folder: Path, context: RunContext) -> None:
+        checking.USE_CASE.start(job, folder, context)
+
+    assert inject_each(run, tmp_path, layer, MuError.status, step=61) == []
+
+
+def test_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweeping, "Cluster", OneProcess)
+    job = sweeping.Job(parse_plan(PLAN, tmp_path), work=answered)
+
+    def run(folder: Path, context: RunContext) -> None:
+        sweeping.USE_CASE.start(job, folder, context)
+
+    assert inject_each(run, tmp_path, any_array, MuError.status, ["points.csv"]) == []
+
+
+def test_record(tmp_path: Path) -> None:
+    def run(folder: Path, context: RunContext) -> None:
+        stream(Prepared(), folder, seconds=None, about={}, context=context)
+
+    assert ran(run, tmp_path / "whole")[0] == 0
+    whole = rows_of(tmp_path / "whole")
+    for at in range(1, 1000):
+        folder = tmp_path / f"at-{at}"
+        with any_array(folder, at, at % 2 == 0) as memory:
+            status, messages = ran(run, folder)
+        if at > memory.places:
+            assert at > 20
+            return
+        wrong = list(faults(folder, (status, messages), None, MuError.status))
+        if (folder / "index.ndjson").exists():
+            found = rows_of(folder)
+            pairs = zip(found, whole, strict=False)
+            wrong += [f"{len(part)} rows" for part, every in pairs if part != every[: len(part)]]
+            if status == 0 and found != whole:
+                wrong.append("rows are missing")
+        assert wrong == [], f"{at}, {memory.where}"
+    raise AssertionError("the run never came to its end")

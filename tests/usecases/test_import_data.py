@@ -1,0 +1,229 @@
+"""Files of test machines become folders of measured data, and nothing is guessed that they do not say."""
+
+import json
+import random
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mu_addon.errors import InputError
+from mu_addon.measured import read_folder
+from mu_addon.run.context import RunContext
+from mu_addon.run.progress import Progress
+from mu_addon.usecases.import_data.run import import_files
+from mu_addon.usecases.import_data.understood import understand
+
+from ..lab_files import exports
+from ..lab_files.test_cells import workbook
+
+ROOT = Path(__file__).resolve().parents[2]
+# What no export of a coupon says.
+COUPON = {"kind": "coupon", "mode": "uniaxial", "section_mm": "12.5x3", "length_mm": "40"}
+
+
+def written(tmp_path, text, name="one.csv", encoding="utf-8"):
+    path = tmp_path / name
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+def imported(tmp_path, paths, answers, ask=None):
+    folder = tmp_path / "measured"
+    import_files([*paths], folder, answers, RunContext(Progress()), ask)
+    return read_folder(folder)
+
+
+def modulus_kPa(experiment):
+    return np.polyfit(experiment["strain"], experiment["stress_kPa"], 1)[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "answers"),
+    [
+        (exports.BLUEHILL, {"mode": "uniaxial"}),
+        (exports.TESTXPERT, {"mode": "uniaxial"}),
+        (exports.TRAPEZIUM, COUPON),
+        (exports.MTS, COUPON),
+        (exports.HORIZON, COUPON),
+        (exports.PLAIN, COUPON | {"unit.Weg": "mm", "unit.Kraft": "N"}),
+        (exports.IMPERIAL, COUPON),
+    ],
+    ids=["bluehill", "testxpert", "trapezium", "mts", "horizon", "plain", "imperial"],
+)
+def test_every_layout_gives_the_coupon_of_2500_kPa(tmp_path, text, answers):
+    measured = imported(tmp_path, [written(tmp_path, text, encoding="cp1252")], answers)
+    first = measured.experiments[0]
+    assert len(first) == exports.ROWS
+    assert modulus_kPa(first) == pytest.approx(2500.0, rel=1e-4)
+    if "time_s" in first.columns:
+        assert first["time_s"] == pytest.approx(np.array(exports.TIME), abs=1e-5)
+
+
+def test_what_the_file_says_is_not_asked(tmp_path):
+    found = understand([written(tmp_path, exports.TESTXPERT, encoding="cp1252")], {"mode": "uniaxial"})
+    assert found.open == ()
+    (p,) = found.proposals
+    assert p.keys["kind"] == "coupon"
+    assert p.keys["specimen"] == "A1"
+    assert p.keys["section_mm"] == [12.5, 3.0]
+    assert p.keys["length_mm"] == 40.0
+
+
+def test_what_it_does_not_say_is_asked_and_nothing_is_written(tmp_path):
+    path = written(tmp_path, exports.PLAIN)
+    with pytest.raises(InputError, match="was it a coupon") as caught:
+        imported(tmp_path, [path], {})
+    assert "unit.Kraft=N" in caught.value.remedy
+    assert not (tmp_path / "measured/experiments.toml").exists()
+    assert "question" in (tmp_path / "measured/import.html").read_text()
+
+
+def test_questions_are_asked_one_by_one(tmp_path):
+    said = {"unit.Weg": "mm", "unit.Kraft": "N", **COUPON}
+    asked = []
+
+    def ask(proposal, question):
+        asked.append(question.key)
+        return said[question.key]
+
+    measured = imported(tmp_path, [written(tmp_path, exports.PLAIN)], {}, ask)
+    assert asked == ["unit.Weg", "unit.Kraft", "kind", "mode", "section_mm", "length_mm"]
+    assert modulus_kPa(measured.experiments[0]) == pytest.approx(2500.0, rel=1e-4)
+
+
+def test_specimens_of_one_file_are_told_apart(tmp_path):
+    measured = imported(
+        tmp_path, [written(tmp_path, exports.TRAPEZIUM)], COUPON | {"one 1 _ 2.role": "held_out"}
+    )
+    one, two = measured.experiments
+    assert (one.name, two.name) == ("one 1 _ 1", "one 1 _ 2")
+    assert modulus_kPa(two) == pytest.approx(2.0 * modulus_kPa(one), rel=1e-4)
+    assert (one.role, two.role) == ("fit", "held_out")
+
+
+def test_a_place_of_the_machine_is_no_displacement(tmp_path):
+    path = written(tmp_path, exports.HORIZON)
+    first = imported(tmp_path, [path], COUPON).experiments[0]
+    assert first["displacement_mm"][0] == 0.0
+    kept = understand([path], COUPON | {"zero": "as_read"}).proposals[0]
+    assert kept.columns["displacement_mm"][0] == pytest.approx(3.7)
+
+
+def test_compression_recorded_as_negative_is_turned_and_told(tmp_path):
+    text = "Compression test\nTime (s),Extension (mm),Load (N)\n" + "".join(
+        f"{t},{-x},{-f}\n" for t, x, f in zip(exports.TIME, exports.MM, exports.N, strict=True)
+    )
+    path = written(tmp_path, text)
+    answers = {"section_mm": "30x30", "length_mm": "30"}
+    found = understand([path], answers)
+    assert found.proposals[0].keys["kind"] == "lattice_compression"
+    assert sum("sign turned" in words for words in found.proposals[0].concluded) == 2
+    experiment = imported(tmp_path, [path], answers).experiments[0]
+    assert experiment["strain"].max() > 0
+    assert experiment["stress_kPa"].max() > 0
+
+
+def test_units_and_holds_are_known_by_their_columns(tmp_path):
+    ladder = written(tmp_path, exports.LADDER, "ladder.csv")
+    hold = written(tmp_path, exports.HOLD, "hold.txt")
+    one, two = imported(tmp_path, [ladder, hold], {}).experiments
+    assert (one.kind, two.kind) == ("unit_pressure", "pressure_hold")
+    assert two["pressure_kPa"][0] == pytest.approx(40.0)
+    assert two["time_s"][1] == pytest.approx(0.05)
+
+
+def test_a_workbook_of_three_specimens(tmp_path):
+    rows = [["Tensile test"], ["Time", "Displacement", "Force"], ["s", "mm", "N"]]
+    rows += [list(values) for values in zip(exports.TIME, exports.MM, exports.N, strict=True)]
+    workbook(tmp_path / "a.xlsx", {f"Specimen {k}": rows for k in (1, 2, 3)})
+    measured = imported(tmp_path, [tmp_path / "a.xlsx"], COUPON)
+    assert [e.name for e in measured.experiments] == [f"a Specimen {k}" for k in (1, 2, 3)]
+    assert modulus_kPa(measured.experiments[2]) == pytest.approx(2500.0, rel=1e-4)
+
+
+def test_a_second_import_adds_and_the_same_one_changes_nothing(tmp_path):
+    path = written(tmp_path, exports.BLUEHILL, "a.csv")
+    imported(tmp_path, [path], {"mode": "uniaxial"})
+    before = (tmp_path / "measured/experiments.toml").read_text()
+    imported(tmp_path, [path], {"mode": "uniaxial"})
+    assert (tmp_path / "measured/experiments.toml").read_text() == before
+    assert len(imported(tmp_path, [written(tmp_path, exports.MTS, "b.csv")], COUPON).experiments) == 2
+
+
+def test_another_experiment_of_the_name_is_kept(tmp_path):
+    path = written(tmp_path, exports.BLUEHILL, "a.csv")
+    imported(tmp_path, [path], {"mode": "uniaxial"})
+    with pytest.raises(InputError, match="already exists"):
+        imported(tmp_path, [path], {"mode": "uniaxial", "length_mm": "50"})
+    assert read_folder(tmp_path / "measured").experiments[0].length_mm == 40.0
+
+
+@pytest.mark.parametrize(
+    ("answers", "words"),
+    [
+        ({"kind": "copuon"}, "is not known"),
+        ({"knd": "coupon"}, "answers no question"),
+        ({"two.kind": "coupon"}, "answers no question"),
+        ({"unit.Krft": "N"}, "answers no question"),
+        ({"unit.Kraft": "mm"}, "is no unit of force"),
+        ({"column.Kraft": "weight"}, "is no quantity"),
+        ({"decimal": "p"}, "is not known"),
+        (COUPON | {"unit.Weg": "mm", "unit.Kraft": "N", "section_mm": "12.5"}, "2 numbers"),
+        (COUPON | {"unit.Weg": "mm", "unit.Kraft": "N", "length_mm": "-4"}, "not above 0"),
+    ],
+)
+def test_a_wrong_answer_is_refused(tmp_path, answers, words):
+    with pytest.raises(InputError, match=words):
+        understand([written(tmp_path, exports.PLAIN)], answers)
+
+
+def test_a_time_that_runs_backward_is_refused_with_its_line(tmp_path):
+    text = "Time (s),Extension (mm),Load (N)\n0,0,0\n1,1,1\n0.5,2,2\n3,3,3\n"
+    with pytest.raises(InputError) as caught:
+        understand([written(tmp_path, text)], COUPON)
+    assert caught.value.where.endswith("line 4")
+
+
+def test_damaged_files_end_in_a_clear_error(tmp_path):
+    random.seed(7)
+    sound = [exports.BLUEHILL, exports.TESTXPERT, exports.TRAPEZIUM, exports.MTS, exports.IMPERIAL]
+    answers = COUPON
+    read = 0
+    for _ in range(150):
+        data = bytearray(random.choice(sound).encode("cp1252"))
+        for _ in range(random.randint(1, 12)):
+            at = random.randrange(len(data))
+            way = random.randrange(4)
+            if way == 0:
+                data[at] = random.randrange(256)
+            elif way == 1:
+                del data[at : at + random.randint(1, 40)]
+            elif way == 2:
+                data[at:at] = bytes(random.randrange(256) for _ in range(random.randint(1, 9)))
+            else:
+                data[at:at] = random.choice([b";", b",", b"\n", b"1e999", b'"', b"\xff\xfe", b"-" * 50])
+        path = tmp_path / "damaged.csv"
+        path.write_bytes(bytes(data))
+        with suppress(InputError):
+            understand([path], answers)
+            read += 1
+    assert 0 < read < 150
+
+
+def test_the_command_line(tmp_path):
+    path = written(tmp_path, exports.PLAIN)
+    run = [sys.executable, str(ROOT / "headless/run.py"), "import", str(path), "--out", str(tmp_path / "out")]
+    asked = subprocess.run(run, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
+    assert asked.returncode == 2
+    assert "--set unit.Kraft=N" in asked.stderr
+    answers = COUPON | {"unit.Weg": "mm", "unit.Kraft": "N"}
+    given = [word for key, value in answers.items() for word in ("--set", f"{key}={value}")]
+    done = subprocess.run([*run, *given], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads((tmp_path / "out/summary.json").read_text())
+    assert summary["experiments"]["one"]["not_read"] == ["Nr"]
+    assert modulus_kPa(read_folder(tmp_path / "out").experiments[0]) == pytest.approx(2500.0, rel=1e-4)
