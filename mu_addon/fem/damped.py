@@ -7,6 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import ConvergenceError
+from .descent import LONGEST_STEP
 from .factor import IndefiniteError
 from .model import MaterialData, Model
 from .newton_settings import NewtonSettings
@@ -23,8 +24,6 @@ EXACT_BELOW = 1e-4
 _FIRST, _LEAST, _MOST = 0.01, 1e-5, 1e4
 _GROWS, _SHRINKS = 4.0, 1 / 3
 _POOR, _GOOD = 0.1, 0.7
-# Largest move of a node in a step, as a share of the body's longest side.
-_LONGEST = 0.02
 # A decrease below this share of the potential's parts is lost in rounding.
 _ROUNDING = 1e-13
 
@@ -60,7 +59,7 @@ def damped_minimum(body: Body, start: Array, pressure_MPa: float) -> State:
     u, damping = start, _FIRST
     force, scale = _force(model, parameters, u, pressure_MPa)
     potential = model.potential(u, pressure_MPa, parameters)
-    longest = _LONGEST * float(np.ptp(model.mesh.nodes, axis=0).max())
+    longest = LONGEST_STEP * float(np.ptp(model.mesh.nodes, axis=0).max())
     factorisations = 0
     for step_number in range(MOST_STEPS):
         level = float(np.linalg.norm(force))

@@ -13,6 +13,9 @@ from .newton_settings import NewtonSettings
 
 Array = np.ndarray[Any, Any]
 
+LONGEST_STEP = 0.025
+"""Largest move of a node in a step, as a share of the body's longest side, where steps are limited."""
+
 
 class Descent:
     """Minimises the potential at one pressure by quasi-Newton steps from a start (n, 3) in mm.
@@ -32,6 +35,10 @@ class Descent:
         if not np.isfinite(self.potential):
             raise ConvergenceError("the predicted state inverts an element")
         self._secants: list[tuple[Array, Array, float]] = []
+        # Walls and struts that are about to buckle or to slide past each other ask for moves longer than a
+        # strut: each costs a search of all that lies on the way, and leads far off the path.
+        touches = model.self_contact is not None
+        self._longest = LONGEST_STEP * float(np.ptp(model.mesh.nodes, axis=0).max()) if touches else np.inf
 
     @property
     def converged(self) -> bool:
@@ -85,9 +92,13 @@ class Descent:
         """Go along a step (f,) in mm as far as it helps; returns the residual's new norm over the old one.
 
         The step is halved until the residual halves or the potential falls enough (Armijo). Raises
-        ConvergenceError where no length tried does either. With self-contact no step goes as far as a touch.
+        ConvergenceError where no length tried does either. With self-contact no step goes as far as a touch,
+        nor does it move a node by more than `LONGEST_STEP`.
         """
         model, s = self.model, self.settings
+        far = float(np.abs(step).max())
+        if far > self._longest:
+            step = step * (self._longest / far)
         slope = float(self.force @ step)
         length = 1.0
         if model.self_contact is not None:
