@@ -11,7 +11,7 @@ from . import all_commands
 
 STATUSES = (
     "exit status: 0 success, 1 other failure, 2 invalid input, 3 meshing failed, 4 no equilibrium found, 5 "
-    "cannot write, 6 not printable, 70 internal error, 130 Ctrl-C, 143 terminated"
+    "cannot write, 6 not printable, 70 internal error, 71 crashed or killed, 130 Ctrl-C, 143 terminated"
 )
 
 
