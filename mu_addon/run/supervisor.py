@@ -50,7 +50,7 @@ def supervised(
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
     ends = *os.pipe(), *os.pipe()
-    life, lifeline, heard, said = ends
+    alive, keep_alive, status_read, status_write = ends
     passed_on = {getattr(signal, name) for name in _PASSED_ON}
     # Until each of the two has its own handlers, none of them may come.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, passed_on)
@@ -62,28 +62,28 @@ def supervised(
             os.close(end)
         return _alone(work, ends_with_input)
     if not worker:
-        os.close(lifeline)
-        os.close(heard)
-        _become_worker(life, said)
+        os.close(keep_alive)
+        os.close(status_read)
+        _become_worker(alive, status_write)
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        return _said(work, said)
-    os.close(life)
-    os.close(said)
+        return _report_status(work, status_write)
+    os.close(alive)
+    os.close(status_write)
     before = _pass_on_signals(worker)
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     if ends_with_input:
         end_with_input()
     try:
         _, ended, usage = os.wait4(worker, 0)
-        os.set_blocking(heard, False)
+        os.set_blocking(status_read, False)
         with suppress(BlockingIOError):
-            return _outcome(os.read(heard, 1 << 16), os.waitstatus_to_exitcode(ended), usage, tell)
+            return _outcome(os.read(status_read, 1 << 16), os.waitstatus_to_exitcode(ended), usage, tell)
         return _outcome(b"", os.waitstatus_to_exitcode(ended), usage, tell)
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        os.close(lifeline)
-        os.close(heard)
+        os.close(keep_alive)
+        os.close(status_read)
 
 
 def _alone(work: Callable[[], int], ends_with_input: bool) -> int:
@@ -92,7 +92,7 @@ def _alone(work: Callable[[], int], ends_with_input: bool) -> int:
     return work()
 
 
-def _said(work: Callable[[], int], said: int) -> int:
+def _report_status(work: Callable[[], int], status_write: int) -> int:
     """Do the work and give its exit status to who watches, before libraries are unloaded, which may crash."""
     status = 1
     try:
@@ -102,45 +102,45 @@ def _said(work: Callable[[], int], said: int) -> int:
         status = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
         raise
     finally:
-        os.write(said, f"status {status}\n".encode())
+        os.write(status_write, f"status {status}\n".encode())
 
 
-def _outcome(words: bytes, ended: int, usage: Any, tell: Callable[[Crash], object]) -> int:
+def _outcome(report: bytes, ended: int, usage: Any, tell: Callable[[Crash], object]) -> int:
     """What a worker said, else that it crashed."""
-    if words.startswith(b"status "):
-        return int(words.split()[1])
+    if report.startswith(b"status "):
+        return int(report.split()[1])
     # Kilobytes, but on macOS, where they are bytes.
     memory = usage.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
-    tell(Crash(max(-ended, 0), max(ended, 0), memory, words.decode("utf-8", "replace")))
+    tell(Crash(max(-ended, 0), max(ended, 0), memory, report.decode("utf-8", "replace")))
     return CRASHED
 
 
-def _become_worker(life: int, said: int) -> None:
+def _become_worker(alive: int, status_write: int) -> None:
     # A group of its own: what a terminal sends comes once, from who watches.
     os.setpgid(0, 0)
     # A terminal may stop whoever writes from another group than its own.
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
-    _end_with(life)
+    _end_with(alive)
     with suppress(OSError, ValueError):
-        faulthandler.enable(said, all_threads=False)
+        faulthandler.enable(status_write, all_threads=False)
 
 
-def _end_with(life: int) -> None:
+def _end_with(alive: int) -> None:
     """Kill this process once the other end of a pipe is closed, as it is when its holder ends."""
-    threading.Thread(target=_wait_for_end, args=(life,), daemon=True).start()
+    threading.Thread(target=_wait_for_end, args=(alive,), daemon=True).start()
     if sys.platform == "linux":
         import fcntl
 
         # The thread waits for the interpreter, which a library may hold for minutes; the kernel does not.
         with suppress(OSError):
-            fcntl.fcntl(life, fcntl.F_SETOWN, os.getpid())
-            fcntl.fcntl(life, fcntl.F_SETSIG, signal.SIGKILL)
-            fcntl.fcntl(life, fcntl.F_SETFL, fcntl.fcntl(life, fcntl.F_GETFL) | os.O_ASYNC)
+            fcntl.fcntl(alive, fcntl.F_SETOWN, os.getpid())
+            fcntl.fcntl(alive, fcntl.F_SETSIG, signal.SIGKILL)
+            fcntl.fcntl(alive, fcntl.F_SETFL, fcntl.fcntl(alive, fcntl.F_GETFL) | os.O_ASYNC)
 
 
-def _wait_for_end(life: int) -> None:
+def _wait_for_end(alive: int) -> None:
     with suppress(OSError):
-        os.read(life, 1)
+        os.read(alive, 1)
     os._exit(1)
 
 

@@ -15,7 +15,7 @@ DEPTH = 2e-3
 
 _ROUNDING = 1e-6
 """Height (mm) above a plane that is no more than rounding, of coordinates up to a kilometre."""
-_AT_ONCE = 4_000_000
+_AT_ONCE = 1_000_000
 _PAIRS_AT_ONCE = 200_000
 
 

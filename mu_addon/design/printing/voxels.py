@@ -95,9 +95,11 @@ def _filled(line: Index, cell: Index, sign: NDArray[np.int8], cells: int) -> Run
     """Runs of cells around which a surface winds, from its crossings along the lines."""
     width = cells + 1
     # Crossings at one cell count together, whatever their order.
-    place, index = np.unique(line * width + cell, return_inverse=True)
-    turns = np.bincount(np.ravel(index), sign, len(place)).astype(np.int64)
-    inside = np.cumsum(turns) > 0
+    every = line * width + cell
+    order = np.argsort(every, kind="stable")
+    every = every[order]
+    last = np.diff(every, append=-1) != 0
+    place, inside = every[last], np.cumsum(sign[order], dtype=np.int64)[last] > 0
     before = np.concatenate([[False], inside[:-1]])
     begin, end = place[inside & ~before], place[before & ~inside]
     return Runs(begin // width, begin % width, end % width, cells)
