@@ -15,6 +15,10 @@ STATUSES = (
 )
 
 
+# Options that are kept under another name than their own.
+_OPTIONS = {"wall_resin": "--resin", "obstacles": "--obstacle"}
+
+
 class _Commands(argparse._SubParsersAction):
     """Shows a subcommand's summary in its own --help, too."""
 
@@ -56,7 +60,7 @@ def _require_usable(options: argparse.Namespace) -> None:
     from ..errors import InputError
 
     for name, given in vars(options).items():
-        where = f"--{name.replace('_', '-')}"
+        where = _OPTIONS.get(name, f"--{name.replace('_', '-')}")
         for value in given if isinstance(given, list | tuple) else [given]:
             if isinstance(value, float) and math.isnan(value):
                 raise InputError("nan is no number", where, "give a number")

@@ -260,8 +260,10 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
             wrapped(layout, "Beams and STEP stay of nominal size", "INFO")
         layout.prop(settings, "vents")
         if settings.vents:
-            along = ", ".join(f"{x:.2f}" for x in settings.up)
-            wrapped(layout, f"Built along Up ({along}); beams and STEP stay without vents", "INFO")
+            along = " ".join(f"{round(x, 2):g}" for x in settings.up)
+            wrapped(layout, f"For a build along Up, {along}", "INFO")
+            if settings.formats & {"3mf-beams", "step"}:
+                wrapped(layout, "Beams and STEP stay without vents", "INFO")
         path = root.mu_unit.path
         wrapped(
             layout,

@@ -300,12 +300,16 @@ def test_vents_for_the_direction_of_the_build(tmp_path):
     root = short()
     settings = root.mu_print
     settings.formats, settings.quality = {"stl"}, "interactive"
-    assert "Built along Up" not in drawn()
+    assert "For a build along Up" not in drawn()
     settings.vents = True
     settings.up = (0.0, 0.0, 0.0)
     assert "Up is not a direction" in refused(bpy.ops.mu.print_export)
     settings.up = (0.0, 0.0, -1.0)
-    assert "Built along Up (0.00, 0.00, -1.00)" in drawn()
+    assert "For a build along Up, 0 0 -1" in drawn()
+    assert "without vents" not in drawn()
+    settings.formats = {"stl", "step"}
+    assert "STEP stay without vents" in drawn()
+    settings.formats = {"stl"}
     assert bpy.ops.mu.print_export() == {"FINISHED"}
     done(root)
     folder = printing.folder_of(root, printing.EXPORT)
