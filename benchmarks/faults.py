@@ -3,6 +3,7 @@
     python benchmarks/faults.py                 # all, 50 kills
     python benchmarks/faults.py --kills 5 disk  # some of them
     python benchmarks/faults.py --every 4 calls # a quarter of the calls that can fail
+    python benchmarks/faults.py --seed 7 kills  # at other moments
 
 The study is the main job on a coarse mesh. Whatever is done to it, the same command must then find the same
 deviations, to the last digit, as a run that nothing happened to.
@@ -54,7 +55,8 @@ JOB = Job(
     rules=("volume_fraction",),
     mesh_check=False,
 )
-SEED = 20
+SEED = [20]
+"""Of what is drawn: moments, places, bytes."""
 
 
 def new(folder):
@@ -131,6 +133,65 @@ def kills(work, reference, count):
         f"kill -9 at {count} random moments ({where})",
         f"{sound} of the {number + 1} studies that they hit came to an end with the same digits",
     )
+
+
+def crashes(work, reference, count):
+    """The process that does a command's work is ended by a signal, as by a library that crashes.
+
+    At moments spread evenly over a run, each run hit once, then run again to its end.
+    """
+    rng = np.random.default_rng([*SEED, 1])
+    begun = time.monotonic()
+    assert finish(new(work / "whole"))[0] == 0
+    seconds = time.monotonic() - begun
+    signals = signal.SIGSEGV, signal.SIGABRT, signal.SIGKILL
+    wrong, stages, ended_before = [], Counter(), 0
+    for number in range(count):
+        folder, kind = new(work / f"crash{number}"), signals[number % len(signals)]
+        process = start(folder)
+        # Python alone takes some tenths of a second to start.
+        time.sleep(rng.uniform(0.5, seconds))
+        worker = worker_of(process.pid)
+        if worker is not None:
+            os.kill(worker, kind)
+        output, _ = process.communicate()
+        message = json.loads(output.splitlines()[-1])
+        if process.returncode == 0:
+            ended_before += 1
+        else:
+            stages[stage_of(folder)] += 1
+            clear = message["type"] == "error" and kind.name in message["what"] and message["what_to_do"]
+            if process.returncode != 71 or not clear:
+                wrong.append(f"{kind.name}: exit {process.returncode}, {message}")
+            if "running" in state_of(folder):
+                wrong.append(f"{kind.name}: summary.json says {state_of(folder)}")
+        status, _ = finish(folder)
+        if not same(folder, reference, status):
+            wrong.append(f"{kind.name} in {stage_of(folder)}: exit {status} afterwards, or other digits")
+        shutil.rmtree(folder)
+    where = ", ".join(f"{name} {n}" for name, n in stages.most_common())
+    yield (
+        f"SIGSEGV, SIGABRT, SIGKILL by turns to the process that works, {count - ended_before} runs "
+        f"({where})",
+        "; ".join(wrong)
+        or "each time exit 71 with stage and what to do, no summary that says running; then same digits",
+    )
+
+
+def worker_of(pid):
+    """Number of the process that a command's own process watches, or None."""
+    try:
+        children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    except OSError:
+        return None
+    return int(children[0]) if children else None
+
+
+def state_of(folder):
+    try:
+        return json.loads((folder / "summary.json").read_text())["status"]
+    except (OSError, ValueError):
+        return "nothing"
 
 
 def forked(folder):
@@ -213,13 +274,60 @@ def disk(work, reference):
         subprocess.run(["umount", mount], check=False)
 
 
-def fill(path):
+def full_disks(work, reference, count):
+    """A disk that is full from a random moment of the run on, with some room left or none."""
+    rng = np.random.default_rng([*SEED, 2])
+    mount = work / "filling"
+    mount.mkdir()
+    if subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=60M", "none", mount], capture_output=True
+    ).returncode:
+        yield "full disks", "not tried: no right to mount one"
+        return
+    wrong, met, finished = [], Counter(), 0
+    try:
+        begun = time.monotonic()
+        assert finish(new(mount / "timed"))[0] == 0
+        seconds = time.monotonic() - begun
+        shutil.rmtree(mount / "timed")
+        for number in range(count):
+            folder, left = new(mount / f"study{number}"), int(rng.choice([0, 4096, 200_000, 2_000_000]))
+            process = start(folder)
+            time.sleep(rng.uniform(0.5, seconds))
+            fill(mount / "filler", left)
+            output, _ = process.communicate()
+            message = json.loads(output.splitlines()[-1])
+            if process.returncode == 0:
+                finished += 1
+            elif process.returncode != 5 or not message.get("what_to_do"):
+                wrong.append(f"exit {process.returncode}, {message}")
+            else:
+                met[message["what"].removeprefix("cannot write ").split(":")[0]] += 1
+            half = [p.name for p in folder.rglob("*.part*")]
+            if half or state_of(folder) == "running":
+                wrong.append(f"{half} half, summary.json says {state_of(folder)}")
+            (mount / "filler").unlink()
+            if (outcome := mended(folder, reference)) != "same digits":
+                wrong.append(outcome)
+            shutil.rmtree(folder)
+    finally:
+        subprocess.run(["umount", mount], check=False)
+    where = ", ".join(f"{name} {n}" for name, n in met.most_common())
+    yield (
+        f"a disk full from a random moment on, {count} times; {finished} had room for all they still wrote",
+        "; ".join(wrong) or f"exit 5 at {where}; no half file; then same digits",
+    )
+
+
+def fill(path, left=0):
+    """Take all room of a disk but the `left` last bytes."""
     with path.open("wb", buffering=0) as stream:
         try:
             while True:
                 stream.write(b"x" * 65536)
         except OSError:
             pass
+        stream.truncate(max(path.stat().st_size - left, 0))
 
 
 def small_files(work, reference):
@@ -319,7 +427,9 @@ FAULTS = {
     "calls": calls,
     "blocks": blocks,
     "kills": kills,
+    "crashes": crashes,
     "disk": disk,
+    "full_disks": full_disks,
     "small_files": small_files,
     "damage": damage,
     "clock": clock,
@@ -331,12 +441,18 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("faults", nargs="*", choices=[*FAULTS, []], help=", ".join(FAULTS))
     parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument("--crashes", type=int, default=12)
+    parser.add_argument("--disks", type=int, default=10)
+    parser.add_argument("--seed", type=int, default=SEED[0])
     parser.add_argument(
         "--every", type=int, default=1, help="of the calls and blocks that can fail only each N-th fails"
     )
     parser.add_argument("--reference", type=Path, help="a folder of this study, finished, to compare with")
     given = parser.parse_args()
-    print(circumstances())
+    SEED[0] = given.seed
+    counts = {"kills": given.kills, "crashes": given.crashes, "full_disks": given.disks}
+    counts |= {"calls": given.every, "blocks": given.every}
+    print(circumstances(), f"Seed {given.seed}.")
     with tempfile.TemporaryDirectory() as name:
         work = Path(name)
         if given.reference is None:
@@ -349,7 +465,7 @@ def main():
         reference = digits(work / "reference")
         print("| fault | what came of it |\n| --- | --- |")
         for fault in given.faults or FAULTS:
-            more = {"kills": (given.kills,), "calls": (given.every,), "blocks": (given.every,)}.get(fault, ())
+            more = (counts[fault],) if fault in counts else ()
             for what, outcome in FAULTS[fault](work, reference, *more):
                 print(f"| {what} | {outcome} |", flush=True)
 

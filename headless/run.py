@@ -70,20 +70,29 @@ def in_own_process(line: list[str]) -> int:
 
 
 def main(line: list[str]) -> int:
-    """Run a command line here, or, inside Blender, in a process of its own; returns the exit status."""
+    """Run a command line, watched, or, inside Blender, without Blender; returns its exit status."""
     if "bpy" in sys.modules:
         if not line or line[0] not in NEED_BLENDER:
             return in_own_process(line)
         sys.path += [str(folder) for folder in extension_packages()]
+    from mu_addon.cli.watched import run_watched
+
+    return run_watched(line, lambda: work(line))
+
+
+def work(line: list[str]) -> int:
+    """Run a command line in this process; returns its exit status, with words where a package is missing."""
     try:
         from mu_addon.cli.main import main as run
+
+        # Its parser asks for packages, too.
+        return run(line)
     except ModuleNotFoundError as error:
         sys.stderr.write(
             f"error: the package {error.name} is not installed\n  where: {sys.executable}\n"
             f"  what to do: {sys.executable} -m pip install -e {ROOT}\n"
         )
         return 1
-    return run(line)
 
 
 if __name__ == "__main__":

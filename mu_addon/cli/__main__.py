@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import sys
 
-from ..run.processes import end_with_input, limit_memory
+from ..run.processes import limit_memory
 from .main import main
+from .watched import run_watched
 
 if __name__ == "__main__":
-    end_with_input()
     limit_memory(int(os.environ.get("MU_MEMORY_MB", "0")))
-    sys.exit(main(sys.argv[1:]))
+    line = sys.argv[1:]
+    sys.exit(run_watched(line, lambda: main(line), ends_with_input=True))

@@ -11,8 +11,12 @@ from . import all_commands
 
 STATUSES = (
     "exit status: 0 success, 1 other failure, 2 invalid input, 3 meshing failed, 4 no equilibrium found, 5 "
-    "cannot write, 6 not printable, 70 internal error, 130 Ctrl-C, 143 terminated"
+    "cannot write, 6 not printable, 70 internal error, 71 crashed or killed, 130 Ctrl-C, 143 terminated"
 )
+
+
+# Options that are kept under another name than their own.
+_OPTIONS = {"wall_resin": "--resin", "obstacles": "--obstacle"}
 
 
 class _Commands(argparse._SubParsersAction):
@@ -56,7 +60,7 @@ def _require_usable(options: argparse.Namespace) -> None:
     from ..errors import InputError
 
     for name, given in vars(options).items():
-        where = f"--{name.replace('_', '-')}"
+        where = _OPTIONS.get(name, f"--{name.replace('_', '-')}")
         for value in given if isinstance(given, list | tuple) else [given]:
             if isinstance(value, float) and math.isnan(value):
                 raise InputError("nan is no number", where, "give a number")

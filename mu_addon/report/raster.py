@@ -30,6 +30,7 @@ def draw(
     faces: wp.array(dtype=wp.vec3i),
     keep: wp.array(dtype=int),  # 0 leaves a face out
     back_bias: float,  # nearness by which a back wins over a front that coincides with it
+    start: int,  # the picture's row that is the first of these
     ceiling: wp.array2d(dtype=float),  # only what lies farther than this is drawn
     depth: wp.array2d(dtype=float),
     owner: wp.array2d(dtype=int),
@@ -52,8 +53,8 @@ def draw(
         a = screen[ia]
         b = screen[ib]
         c = screen[ic]
-        top = wp.max(int(wp.ceil(wp.min(a[1], wp.min(b[1], c[1])) - 0.5)), 0)
-        bottom = wp.min(int(wp.floor(wp.max(a[1], wp.max(b[1], c[1])) - 0.5)), h - 1)
+        top = wp.max(int(wp.ceil(wp.min(a[1], wp.min(b[1], c[1])) - 0.5)), start)
+        bottom = wp.min(int(wp.floor(wp.max(a[1], wp.max(b[1], c[1])) - 0.5)), start + h - 1)
         if top > bottom:
             continue
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
@@ -88,9 +89,10 @@ def draw(
                 dy = y - a[1]
                 z = wp.clamp(a[2] + zx * dx + zy * dy, far, near) + bias
                 shown = sa + sx * dx + sy * dy <= 0.0
-                if shown and z > depth[row, column] and z < ceiling[row, column]:
-                    depth[row, column] = z
-                    owner[row, column] = f
+                here = row - start
+                if shown and z > depth[here, column] and z < ceiling[here, column]:
+                    depth[here, column] = z
+                    owner[here, column] = f
 
 
 @wp.struct
@@ -118,6 +120,8 @@ def surface(
     whole: wp.array(dtype=int),  # 1: this face's part is left whole by the cut
     corner_normals: wp.array2d(dtype=wp.vec3),
     colors: wp.array(dtype=wp.vec3),
+    start: int,  # the picture's row that is the first of these
+    height: int,  # rows of the picture
     owner: wp.array2d(dtype=int),
     depth: wp.array2d(dtype=float),  # moved to the plane where a section shows
     position: wp.array2d(dtype=wp.vec3),
@@ -140,7 +144,7 @@ def surface(
     b = screen[ib]
     c = screen[ic]
     x = float(column) + 0.5
-    y = float(row) + 0.5
+    y = float(row + start) + 0.5
     area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
     wb = wp.clamp(((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / area, 0.0, 1.0)
     wc = wp.clamp(((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / area, 0.0, 1.0 - wb)
@@ -151,7 +155,7 @@ def surface(
     color[row, column] = (colors[ia] * wa + colors[ib] * wb + colors[ic] * wc) / total
 
     right = (x - 0.5 * float(owner.shape[1])) / view.scale
-    up = (0.5 * float(owner.shape[0]) - y) / view.scale
+    up = (0.5 * float(height) - y) / view.scale
     q = view.target + view.right * right + view.up * up
     away = -view.towards
     if view.distance > 0.0:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from copy import copy
 from typing import Any
 
 import attrs
@@ -21,6 +22,8 @@ CREASE_DEG = 40.0  # faces that meet at less than this are shaded as one smooth 
 SKY_DIRECTIONS = 160
 SKY_MAP_PIXELS = 256
 FAR = -1.0e30
+# Values a band of rows has: a whole picture's take a quarter of a gigabyte.
+BAND = 400_000
 
 
 @attrs.frozen(eq=False)
@@ -113,11 +116,30 @@ def render(
     scene = _Scene(parts, cut)
     shot = _Shot(scene, camera, width * samples, height * samples)
     opaque = scene.opacity == 1.0
-    solid = shot.draw(opaque)
     sky = _Sky.around(scene, opaque, camera) if ambient and opaque.any() else _Sky.clear()
+    rows = samples * max(1, BAND // (shot.width * samples))
+    return np.concatenate(
+        [
+            _band(shot.rows(first, min(first + rows, shot.height)), opaque, sky, background, samples, layers)
+            for first in range(0, shot.height, rows)
+        ]
+    )
+
+
+def _band(
+    shot: _Shot,
+    opaque: NDArray[np.bool_],
+    sky: _Sky,
+    background: tuple[float, float, float] | None,
+    samples: int,
+    layers: int,
+) -> Image:
+    """The rows of a picture that `shot` is of; see `render`."""
+    scene = shot.scene
+    solid = shot.draw(opaque)
     shot.shade(solid, sky, samples)
-    rgb = np.zeros((shot.height, shot.width, 3), np.float32)
-    through = np.ones((shot.height, shot.width), np.float32)
+    rgb = np.zeros((*shot.shape, 3), np.float32)
+    through = np.ones(shot.shape, np.float32)
     ceiling = None
     for _ in range(layers if not opaque.all() else 0):
         film = shot.draw(~opaque, ceiling, solid.depth)
@@ -201,11 +223,12 @@ class _Layer:
 
 
 class _Shot:
-    """A scene seen by a camera on a screen of so many pixels."""
+    """A scene seen by a camera on a screen of so many pixels; `shape` of the rows from `first` on."""
 
     def __init__(self, scene: _Scene, camera: Camera, width: int, height: int) -> None:
         self.scene = scene
         self.width, self.height = width, height
+        self.first, self.shape = 0, (height, width)
         self.axes = camera.axes
         self.target = np.asarray(camera.target, float)
         self.distance = camera.distance
@@ -223,6 +246,12 @@ class _Shot:
         self.screen = screen.astype(np.float32)
         self.inverse_distance = inverse.astype(np.float32)
 
+    def rows(self, first: int, last: int) -> _Shot:
+        """The same, of rows first .. last - 1 alone."""
+        part = copy(self)
+        part.first, part.shape = first, (last - first, self.width)
+        return part
+
     def draw(
         self,
         keep: NDArray[np.bool_],
@@ -235,7 +264,7 @@ class _Shot:
         from .raster import View, draw, surface
 
         scene = self.scene
-        shape = (self.height, self.width)
+        shape = self.shape
         layer = _Layer(
             depth=np.full(shape, FAR, np.float32) if floor is None else floor.copy(),
             owner=np.full(shape, -1, np.int32),
@@ -267,6 +296,7 @@ class _Shot:
                     faces,
                     wp.array(keep.astype(np.int32), dtype=int, copy=False),
                     self.back_bias,
+                    self.first,
                     wp.array(ceiling, dtype=float, copy=False),
                     depth,
                     owner,
@@ -284,6 +314,8 @@ class _Shot:
                     wp.array(scene.whole, dtype=int, copy=False),
                     wp.array(scene.corner_normals, dtype=wp.vec3, copy=False),
                     wp.array(scene.colors, dtype=wp.vec3, copy=False),
+                    self.first,
+                    self.height,
                     owner,
                     depth,
                     wp.array(layer.position, dtype=wp.vec3, copy=False),
@@ -303,7 +335,7 @@ class _Shot:
         with wp.ScopedDevice("cpu"):
             wp.launch(
                 shade,
-                dim=(self.height, self.width),
+                dim=self.shape,
                 inputs=[
                     wp.array(layer.owner, dtype=int, copy=False),
                     wp.array(layer.position, dtype=wp.vec3, copy=False),
@@ -368,7 +400,7 @@ class _Sky:
                 screen[:, :2] += 0.5 * SKY_MAP_PIXELS
                 points = wp.array(screen.astype(np.float32), dtype=wp.vec3, copy=False)
                 depth = wp.array(maps[k], dtype=float, copy=False)
-                wp.launch(draw, dim=1, inputs=[points, beyond, faces, keep, 0.0, ceiling, depth, owner])
+                wp.launch(draw, dim=1, inputs=[points, beyond, faces, keep, 0.0, 0, ceiling, depth, owner])
         return cls(axes.astype(np.float32), radiance.astype(np.float32), maps, center, scale)
 
 

@@ -119,6 +119,55 @@ def _says_running(path: Path) -> bool:
     return isinstance(found, dict) and found.get("status") == "running"
 
 
+def record_crash(folder: Path, error: MuError, stack: str = "") -> None:
+    """Have a folder say how its run ended, whose process was lost: in summary.json and log.ndjson.
+
+    stack: Python's, where it crashed. Nothing is written where no run of the folder was going on, or another
+    one has the folder.
+    """
+    if not _says_running(folder / SUMMARY):
+        return
+    # What cannot be written, or is another's, is left: the error is told all the same.
+    with suppress(MuError):
+        lock = FolderLock(folder)
+        try:
+            reason = {"what": error.what, "where": error.where, "what_to_do": error.remedy}
+            _replace_summary(folder / SUMMARY, [{"status": "partial", "reason": reason}])
+            log = log_file(folder / "log.ndjson")
+            if stack:
+                log({"type": "traceback", "text": stack})
+            log({"type": "error", **reason, "status": error.status})
+        finally:
+            lock.release()
+
+
+def last_stage(folder: Path) -> tuple[str, list[str]]:
+    """Stage in which the folder's run that goes on is, and what its stages made: of its log; else nothing."""
+    stage = ""
+    made: dict[str, str] = {}
+    if not _says_running(folder / SUMMARY):
+        return "", []
+    try:
+        lines = file_bytes(folder / "log.ndjson").splitlines()
+    except (OSError, InputError):
+        return "", []
+    for line in lines:
+        try:
+            message = parse_json(line, "log.ndjson")
+        except InputError:
+            continue
+        if not isinstance(message, dict):
+            continue
+        if message.get("type") in ("result", "error"):
+            stage, made = "", {}
+        if message.get("type") == "progress":
+            name = str(message.get("stage"))
+            stage = "" if message.get("state") == "end" else name
+            if message.get("state") == "end" and message.get("detail"):
+                made[name] = str(message["detail"])
+    return stage, list(made.values())
+
+
 @contextmanager
 def run_to_end(progress: Progress) -> Iterator[RunContext]:
     """Run the body; whatever stops it becomes a message and `RunContext.status`, never a traceback.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
 import sys
@@ -30,6 +29,9 @@ def end_with_parent() -> None:
 
 
 def _wait_for_parent() -> None:
+    # Only here: the command line begins with this module, and loads little.
+    import multiprocessing
+
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

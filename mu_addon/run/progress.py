@@ -3,7 +3,7 @@
 A `Progress` makes messages, plain dictionaries with a `type`, and hands each to its sinks:
 
 - progress: stage, state ("start" | "run" | "end"), fraction (0..1 or None), seconds, seconds_left (or None),
-  and detail where there is something to say of what was just done
+  and detail where there is something to say of what was just done, at its end of what the stage made
 - warning: what, where, what_to_do
 - result: whatever the run found; the last message of a run that succeeded
 - error: what, where, what_to_do, status; the last message of a run that did not
@@ -39,6 +39,7 @@ class Progress:
         self._stage = ""
         self._start = 0.0
         self._expected: float | None = None
+        self._made = ""
 
     @contextmanager
     def stage(self, name: str, expected_s: float | None = None) -> Iterator[None]:
@@ -52,11 +53,15 @@ class Progress:
         try:
             self._emit_progress("start", 0.0 if expected_s else None)
             yield
-            self._emit_progress("end", 1.0)
+            self._emit_progress("end", 1.0, self._made)
         finally:
             elapsed = self._clock() - self._start
             self.seconds[name] = self.seconds.get(name, 0.0) + elapsed
-            self._stage = ""
+            self._stage = self._made = ""
+
+    def made(self, size: str) -> None:
+        """Say how large what the present stage makes is, "6210 nodes" say; told with its end."""
+        self._made = size
 
     def update(self, fraction: float, detail: str = "") -> None:
         """Tell that `fraction` (0..1) of the present stage is done; outside a stage, nothing is told.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -29,6 +30,11 @@ def run(*arguments, **options):
         stdin=subprocess.DEVNULL,
         **options,
     )
+
+
+def worker_of(folder):
+    """Number of the process that works in a folder: the command's own only watches it."""
+    return int(json.loads((folder / "run.lock").read_text())["process"])
 
 
 def assert_clear_failure(done, status, *words):

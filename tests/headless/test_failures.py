@@ -2,6 +2,7 @@
 
 import json
 import resource
+import subprocess
 
 import pytest
 
@@ -18,7 +19,6 @@ def test_help_names_every_command():
 
 
 def test_help_loads_nothing_heavy():
-    import subprocess
     import sys
 
     words = [sys.executable, "-X", "importtime", *command("place", "--help")[1:]]
@@ -34,6 +34,21 @@ def test_presets_are_listed():
         "mu-1.5x",
         "gripper",
     ]
+
+
+@pytest.mark.parametrize("words", [("presets",), ("place", "--preset", "mu-1.0x", "--out", "out")])
+def test_without_its_packages_it_says_how_to_install_them(tmp_path, words):
+    python, script = command()[:2]
+    # -S: a Python without site-packages.
+    done = subprocess.run(
+        [python, "-S", script, *words], capture_output=True, text=True, cwd=tmp_path, env={"PATH": ""}
+    )
+    assert_clear_failure(done, 1, "package attr", "is not installed", "-m pip install")
+
+
+def test_an_empty_word_names_its_option(tmp_path):
+    done = run("simulate", "--preset", "mu-1.0x", "--resin", "", "--out", tmp_path / "out")
+    assert_clear_failure(done, 2, "it is empty", "where: --resin")
 
 
 def test_unknown_preset(tmp_path):

@@ -17,7 +17,7 @@ from mu_addon.design.anchors import anchor_points
 from mu_addon.design.parameters import load_preset, read_unit
 
 from ..report.browser import EXECUTABLE, Browser, complaints, requests
-from .processes import COARSE, PATIENCE_S, ROOT, RUN, command, run
+from .processes import COARSE, PATIENCE_S, ROOT, RUN, command, run, worker_of
 
 
 @pytest.fixture(scope="module")
@@ -262,12 +262,15 @@ def test_killed_it_leaves_no_process_behind_and_does_not_pass_for_complete(tmp_p
     out = tmp_path / "out"
     process = started(out)
     wait_for_a_state_swept(process, out)
+    # Whoever watches, and the group of those who work.
+    groups = process.pid, os.getpgid(worker_of(out))
+    assert groups[0] != groups[1]
     process.kill()
     process.communicate(timeout=PATIENCE_S)
     deadline = time.monotonic() + PATIENCE_S
-    while alive(process.pid) and time.monotonic() < deadline:
+    while any(map(alive, groups)) and time.monotonic() < deadline:
         time.sleep(0.1)
-    assert not alive(process.pid)
+    assert not any(map(alive, groups))
     assert json.loads((out / "summary.json").read_text())["status"] == "running"
 
 

@@ -1,6 +1,7 @@
 """`resume`: a folder is enough to go on with a study, after kill -9 too; one process has it at a time."""
 
 import json
+import os
 import signal
 import subprocess
 import time
@@ -13,7 +14,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.folder import keep_inputs
 from mu_addon.usecases.simulate_and_place.job import Job, grasp
 
-from .processes import assert_clear_failure, command, run
+from .processes import assert_clear_failure, command, run, worker_of
 
 JOB = Job(
     load_preset("mu-1.0x"),
@@ -71,10 +72,11 @@ def test_a_second_run_in_the_folder_is_refused_and_names_the_first(tmp_path):
     while not list(tmp_path.glob("cache/mesh-*")):
         assert first.poll() is None
         time.sleep(0.01)
-    first.send_signal(signal.SIGSTOP)  # it holds its lock however long the second takes to start
+    worker = worker_of(tmp_path)
+    os.kill(worker, signal.SIGSTOP)  # it holds its lock however long the second takes to start
     second = run("design", "--preset", "mu-0.75x", "--out", tmp_path)
     assert first.poll() is None
-    assert_clear_failure(second, 2, "another run uses this folder", f"process {first.pid} ", "what to do")
+    assert_clear_failure(second, 2, "another run uses this folder", f"process {worker} ", "what to do")
     assert not (tmp_path / "stale").exists()
     first.kill()
     first.wait()

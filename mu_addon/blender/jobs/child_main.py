@@ -82,6 +82,13 @@ def _command(arguments):
 
 
 def main(arguments):
+    """Exit status of one command line of the core, in a process that is watched."""
+    ends_with_input = bool(os.environ.get("MU_ENDS_WITH_INPUT"))
+    watched = importlib.import_module("mu_addon.cli.watched")
+    return watched.run_watched(arguments, lambda: run(arguments), ends_with_input)
+
+
+def run(arguments):
     """Exit status of one command line of the core; `check` alone only tells whether the solver loads."""
     helps = not arguments or "-h" in arguments or "--help" in arguments
     solves = not helps and (len(arguments) < 2 or _command(arguments) not in WITHOUT_SOLVER)
@@ -98,8 +105,6 @@ def main(arguments):
     if arguments == ["check"]:
         sys.stdout.write(json.dumps({"type": "result"}) + "\n")
         return 0
-    if os.environ.get("MU_ENDS_WITH_INPUT"):
-        importlib.import_module("mu_addon.run.processes").end_with_input()
     # By name: the package is the one provided above, and not one that happens to be on the path.
     return importlib.import_module("mu_addon.cli.main").main(arguments)
 

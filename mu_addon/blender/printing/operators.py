@@ -55,6 +55,15 @@ class MU_OT_print_check(_Job, bpy.types.Operator):
     job = printing.CHECK
 
 
+class MU_OT_print_check_file(_Job, bpy.types.Operator):
+    """Check the printability of an STL file, repaired before where that is asked"""
+
+    bl_idname = "mu.print_check_file"
+    bl_label = "Check File"
+    bl_options = {"REGISTER"}
+    job = printing.FILE_CHECK
+
+
 class MU_OT_print_export(_Job, bpy.types.Operator):
     """Write the chosen files of the unit with its path; asks first where the check found errors"""
 
@@ -89,8 +98,10 @@ class MU_OT_print_specimens(_Job, bpy.types.Operator):
 
 def _path_of(root, what):
     """The file or folder that `what` stands for; log and errors are of the latest job."""
-    if what in (printing.EXPORT, printing.SPECIMENS):
+    if what in (printing.EXPORT, printing.SPECIMENS, printing.FILE_CHECK):
         return printing.folder_of(root, what)
+    if what == "file_report":
+        return printing.folder_of(root, printing.FILE_CHECK) / FILES["report"]
     folder = printing.folder_of(root, printing.CHECK) if what == "report" else printing.latest_folder(root)
     return folder / FILES[what]
 
@@ -260,6 +271,7 @@ class MU_OT_print_layer_clear(UnitOperator, bpy.types.Operator):
 
 CLASSES = (
     MU_OT_print_check,
+    MU_OT_print_check_file,
     MU_OT_print_export,
     MU_OT_print_specimens,
     *job_operators(
@@ -270,6 +282,8 @@ CLASSES = (
         first="check or export first",
         items=[
             ("report", "Report", "Every finding with pictures, and the build directions, in the browser"),
+            ("file_report", "Report of the File", "Every finding in the STL file, in the browser"),
+            (printing.FILE_CHECK, "Checked File", "Folder of the file's check, with part.stl"),
             ("export", "Files", "Folder of the exported files"),
             ("specimens", "Specimens", "Folder of the specimens, their sheet and the folder for the data"),
             *RUN_FILES[1:3],

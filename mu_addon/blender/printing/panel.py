@@ -39,10 +39,16 @@ class MU_PT_print(UnitPanel, bpy.types.Panel):
         child = printing.PRINTING.child(root)
         refused = child is not None and child.state == FAILED
         if refused and (child.error or {}).get("status") == NOT_PRINTABLE:
-            box = alert(layout, "Checked: not printable, see Check")
+            of_file = child.folder.parent.name == printing.FILE_CHECK
+            words = child.error["what"] if of_file else "Checked: not printable, see Check"
+            box = alert(layout, words)
             box.operator("mu.print_dismiss")
         else:
-            where = {printing.CHECK: "see Check", printing.EXPORT: "see Files"}
+            where = {
+                printing.CHECK: "see Check",
+                printing.FILE_CHECK: "see STL File",
+                printing.EXPORT: "see Files",
+            }
             name = child.folder.parent.name if child is not None else ""
             job_state(layout, child, where.get(name, "its folder opens below"), JOB)
 
@@ -174,6 +180,39 @@ def _directions(layout, settings, found) -> None:
         box.label(text=f"{build['support_mm2']:.0f} mm2 to support, {build['inner_mm2']:.0f} in chambers")
 
 
+class MU_PT_print_file(_OfPrint, bpy.types.Panel):
+    """Printability check of an STL file, with a repair before it"""
+
+    bl_idname = "MU_PT_print_file"
+    bl_label = "STL File"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def show(self, layout, context, root):
+        settings = root.mu_print
+        layout.prop(settings, "stl_file")
+        layout.prop(settings, "repair")
+        layout.prop(settings, "against_unit")
+        large_button(layout, "mu.print_check_file", "VIEWZOOM")
+        found = printing.checked_file(root)
+        if found is None:
+            return
+        box = layout.box()
+        for finding in found["findings"]:
+            if finding["severity"] in marks.FAULTS:
+                wrapped(
+                    box, f"{finding['check'].capitalize()}: {finding['what']}", ICONS[finding["severity"]]
+                )
+        if found["verdict"] == "pass":
+            wrapped(box, "Every check passed", ICONS["pass"])
+        if "repair" in found:
+            changes = found["repair"]["changes"]
+            done = "; ".join(f"{change['count']} {change['what']}" for change in changes)
+            wrapped(box, f"Repaired: {done or 'nothing was changed'}", "TOOL_SETTINGS")
+        row = layout.row(align=True)
+        row.operator("mu.print_open", text="Report", icon="URL").what = "file_report"
+        row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = printing.FILE_CHECK
+
+
 class MU_PT_print_layers(_OfPrint, bpy.types.Panel):
     """Layers of the solid as they are built, one at a time in the 3D view"""
 
@@ -219,6 +258,12 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
             layout.prop(settings, "gauge")
         if settings.compensate != "none" and settings.formats & {"3mf-beams", "step"}:
             wrapped(layout, "Beams and STEP stay of nominal size", "INFO")
+        layout.prop(settings, "vents")
+        if settings.vents:
+            along = " ".join(f"{round(x, 2):g}" for x in settings.up)
+            wrapped(layout, f"For a build along Up, {along}", "INFO")
+            if settings.formats & {"3mf-beams", "step"}:
+                wrapped(layout, "Beams and STEP stay without vents", "INFO")
         path = root.mu_unit.path
         wrapped(
             layout,
@@ -266,11 +311,19 @@ def _written(layout, found) -> None:
     column.active = not found.stale
     for entry in found.manifest["files"]:
         column.label(text=f"{entry['file']}, {entry['bytes'] / 1e6:.2f} MB", icon="CHECKMARK")
+    if vented := found.manifest["vents"]:
+        count, before, after = (
+            len(vented["vents"]),
+            vented["trapped_before_ml"],
+            vented["trapped_after_ml"],
+        )
+        words = f"{count} vent(s): {before:.2g} ml trapped before, {after:.2g} after"
+        wrapped(column, words if count else f"No vent is needed: {before:.2g} ml are trapped at most", "INFO")
     for entry in found.manifest["refused"]:
         wrapped(column, f"Not written: {entry['format']}: {entry['why']}", "ERROR")
 
 
-CLASSES = (MU_PT_print, MU_PT_print_check, MU_PT_print_layers, MU_PT_print_files)
+CLASSES = (MU_PT_print, MU_PT_print_check, MU_PT_print_layers, MU_PT_print_files, MU_PT_print_file)
 
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -3,7 +3,14 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    StringProperty,
+)
 
 from ...design.assets import asset_names
 from ...design.printing.printer import DEFAULT
@@ -89,6 +96,27 @@ class MU_PG_print(bpy.types.PropertyGroup):
         description="gauge.csv of the specimens with the sizes that were measured",
         subtype="FILE_PATH",
         options=BESIDE_BLEND_FILE,
+    )
+    vents: BoolProperty(
+        name="Vents",
+        description="Vent what traps resin if the unit is built along Up: STL and 3MF get a hole through the "
+        "wall for each cup of the print check, and plug-1.stl .. close them",
+    )
+    stl_file: StringProperty(
+        name="File",
+        description="STL file to check, with the printer, the measured limits and Up as above",
+        subtype="FILE_PATH",
+        options=BESIDE_BLEND_FILE,
+    )
+    repair: BoolProperty(
+        name="Repair",
+        description="Repair the file before it is checked, where there is only one way to: flipped and "
+        "doubled faces, tiny gaps. part.stl is then the repaired part; what has more than one remedy is "
+        "refused",
+    )
+    against_unit: BoolProperty(
+        name="Compare",
+        description="Compare the file with this unit's nominal geometry: size, inlet, volume and tunnels",
     )
     marker: FloatProperty(
         name="Marks (mm)",

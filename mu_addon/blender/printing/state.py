@@ -35,8 +35,8 @@ from ..unit.fields import exact
 from ..unit.properties import shape_hash, to_unit
 from .properties import FORMATS, OWN_PRINTER
 
-CHECK, EXPORT, SPECIMENS = "check", "export", "specimens"
-"""Jobs for the printer, subcommands of the core, and their folders in the unit's study folder."""
+CHECK, FILE_CHECK, EXPORT, SPECIMENS = "check", "check-file", "export", "specimens"
+"""Jobs for the printer, and their folders in the unit's study folder; a file's check is one of a file."""
 NEEDED = ("scipy", "manifold3d", "matplotlib")
 """Modules that these jobs cannot do without; STEP needs gmsh, too, and says so itself."""
 MANIFEST = "manifest.json"
@@ -81,6 +81,7 @@ PRINTING = JobKind("print", lambda root: root.mu_unit.uuid, latest_folder, "prin
 _printers: FileCache[Printer] = FileCache()
 _measured: FileCache[dict[str, Limit]] = FileCache()
 _checks: FileCache[Any] = FileCache()
+_file_checks: FileCache[tuple[Any, dict[str, Any]]] = FileCache()
 _exports: FileCache[dict[str, Any]] = FileCache()
 
 
@@ -123,14 +124,18 @@ def trouble(root: Any, command: str) -> str:
     if absent := lacking(NEEDED):
         return absent
     settings = root.mu_print
-    if command in (CHECK, EXPORT):
+    if command == FILE_CHECK and not settings.stl_file:
+        return "Choose the STL file"
+    if command in (CHECK, FILE_CHECK, EXPORT):
         try:
-            path_of(root, to_unit(root.mu_unit))
-            if command == CHECK:
+            if command != FILE_CHECK or settings.against_unit:
+                path_of(root, to_unit(root.mu_unit))
+            if command != EXPORT:
                 printer_of(root)
         except MuError as error:
             return f"{error.what}: {error.remedy}"
-    if command == CHECK and Vector(settings.up).length < 1e-3:
+    along_up = command in (CHECK, FILE_CHECK) or (command == EXPORT and settings.vents)
+    if along_up and Vector(settings.up).length < 1e-3:
         return "Up is not a direction: give three numbers, such as 0 0 1"
     if command == EXPORT:
         if not settings.formats:
@@ -154,7 +159,8 @@ def own_body(root: Any) -> bool:
 def write_inputs(root: Any, command: str, folder: Path) -> None:
     """Write what a job for the printer is asked to do into its folder; raises MuError."""
     unit = to_unit(root.mu_unit)
-    layout, job = {CHECK: _check, EXPORT: _export, SPECIMENS: _specimens}[command](root, unit, folder)
+    inputs = {CHECK: _check, FILE_CHECK: _check_file, EXPORT: _export, SPECIMENS: _specimens}[command]
+    layout, job = inputs(root, unit, folder)
     write_run(folder, layout, job.texts())
 
 
@@ -173,6 +179,24 @@ def _check(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
     return LAYOUT, Job(printer_of(root), unit, window(unit, path) if path else None, direction=up)
 
 
+def _check_file(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
+    """A check of an STL file, repaired before where that was asked, and compared with the unit."""
+    from ...usecases.check_print.job import LAYOUT, Job, read_stl
+
+    settings = root.mu_print
+    stl = Path(bpy.path.abspath(settings.stl_file))
+    path = path_of(root, unit) if settings.against_unit else ""
+    return LAYOUT, Job(
+        printer_of(root),
+        unit if settings.against_unit else None,
+        window(unit, path) if path else None,
+        stl=read_stl(stl),
+        stl_file=stl,
+        direction=tuple(exact(x) for x in settings.up),
+        repair=settings.repair,
+    )
+
+
 def _export(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
     from ...usecases.export.job import LAYOUT, Job, resin_of
     from ...usecases.export.print_offsets import compensation_offsets
@@ -189,6 +213,7 @@ def _export(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
         quality=settings.quality,
         take_off=offsets,
         offset_source=origin,
+        vent_along=tuple(exact(x) for x in settings.up) if settings.vents else None,
     )
 
 
@@ -252,6 +277,25 @@ def _stale(root: Any, shape: list[str], up: list[float], limits: str) -> str:
     return "" if same else "it belongs to another build direction"
 
 
+def checked_file(root: Any) -> dict[str, Any] | None:
+    """check.json of the file that is chosen, as it was asked to be checked; None where there is none."""
+    settings = root.mu_print
+    folder = folder_of(root, FILE_CHECK)
+    found, inputs = folder / "check.json", folder / "check.toml"
+
+    def read() -> tuple[Any, dict[str, Any]]:
+        check = parse_json(file_bytes(found), found.name)
+        return check, parse_toml(file_text(inputs), inputs.name)
+
+    known = _file_checks.read([found, inputs], read)
+    if known is None:
+        return None
+    check, of = known
+    file = of.get("run", {}).get("stl") == str(Path(bpy.path.abspath(settings.stl_file)).resolve())
+    asked = (of.get("repair", False), "unit" in of) == (settings.repair, settings.against_unit)
+    return dict(check) if file and asked else None
+
+
 @attrs.frozen(eq=False)
 class Exported:
     """The manifest of an export; stale: why it is not of the unit now."""
@@ -267,7 +311,9 @@ def exported(root: Any) -> Exported | None:
 
     def read() -> dict[str, Any]:
         manifest = parse_json(file_bytes(path), path.name)
-        return {name: manifest[name] for name in ("unit", "path", "resin", "files", "refused")}
+        # An older manifest has none.
+        vents = {"vents": manifest.get("vents")}
+        return {name: manifest[name] for name in ("unit", "path", "resin", "files", "refused")} | vents
 
     found = _exports.read([path], read)
     if found is None:

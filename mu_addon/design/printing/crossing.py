@@ -13,7 +13,9 @@ from .finding import Points
 DEPTH = 2e-3
 """Passing through by less (mm) is rounding: vertices lie on a grid of 1e-4 mm, and layers are 0.1 mm."""
 
-_AT_ONCE = 4_000_000
+_ROUNDING = 1e-6
+"""Height (mm) above a plane that is no more than rounding, of coordinates up to a kilometre."""
+_AT_ONCE = 1_000_000
 _PAIRS_AT_ONCE = 200_000
 
 
@@ -30,17 +32,33 @@ def crossings(vertices: Vertices, triangles: Triangles) -> Points:
     for part in np.array_split(pairs, len(pairs) // _PAIRS_AT_ONCE + 1):
         for one, other in (part.T, part[:, ::-1].T):
             # Most pairs touch and go no farther: the one lies on one side of the other's plane.
-            high = np.full(len(one), -np.inf)
-            low = np.full(len(one), np.inf)
-            for corner in triangles[one].T:
-                height = np.einsum("pj,pj->p", normals[other], vertices[corner]) - level[other]
-                np.maximum(high, height, out=high)
-                np.minimum(low, height, out=low)
+            low, high = _heights(vertices, triangles, one, normals[other], level[other])
             across = (high > 0.5 * depth[other]) & (low < -0.5 * depth[other])
+            one, other = one[across], other[across]
+            # An edge of the one within the other means that the other reaches both sides of the one's plane.
+            low, high = _heights(vertices, triangles, other, normals[one], level[one])
+            across = (high > -_ROUNDING) & (low < _ROUNDING)
             one, other = one[across], other[across]
             shared = (triangles[one][:, :, None] == triangles[other][:, None, :]).sum(axis=(1, 2))
             found.append(_through(vertices, triangles, one[shared < 2], other[shared < 2]))
     return np.concatenate(found)
+
+
+def _heights(
+    vertices: Vertices,
+    triangles: Triangles,
+    which: NDArray[np.int64],
+    normals: NDArray[np.float64],
+    level: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Least and greatest heights (p,) in mm of the triangles `which` (p,) above planes of unit normals (p, 3)
+    whose points have the heights `level` (p,) along them."""
+    low, high = np.full(len(which), np.inf), np.full(len(which), -np.inf)
+    for corner in triangles[which].T:
+        height = np.einsum("pj,pj->p", normals, vertices[corner]) - level
+        np.maximum(high, height, out=high)
+        np.minimum(low, height, out=low)
+    return low, high
 
 
 def near_pairs(corners: NDArray[np.float64]) -> NDArray[np.int64]:

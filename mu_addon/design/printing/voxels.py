@@ -95,9 +95,11 @@ def _filled(line: Index, cell: Index, sign: NDArray[np.int8], cells: int) -> Run
     """Runs of cells around which a surface winds, from its crossings along the lines."""
     width = cells + 1
     # Crossings at one cell count together, whatever their order.
-    place, index = np.unique(line * width + cell, return_inverse=True)
-    turns = np.bincount(np.ravel(index), sign, len(place)).astype(np.int64)
-    inside = np.cumsum(turns) > 0
+    every = line * width + cell
+    order = np.argsort(every, kind="stable")
+    every = every[order]
+    last = np.diff(every, append=-1) != 0
+    place, inside = every[last], np.cumsum(sign[order], dtype=np.int64)[last] > 0
     before = np.concatenate([[False], inside[:-1]])
     begin, end = place[inside & ~before], place[before & ~inside]
     return Runs(begin // width, begin % width, end % width, cells)
@@ -134,32 +136,36 @@ def _crossed(
     shape: tuple[int, int, int],
 ) -> tuple[Index, Index, NDArray[np.int8]]:
     """Crossings of the triangles `part`, which meet `count` planes of a whole coordinate `across`."""
-    along = 1 - across
-    owner = np.repeat(part, count)
-    first = np.ceil(points[:, across]).astype(np.int64)[triangles[part]].min(axis=1)
-    plane = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(first, count)
-    low = np.full(len(owner), np.inf)
-    high = np.full(len(owner), -np.inf)
-    depth_low, depth_high = np.zeros(len(owner)), np.zeros(len(owner))
-    falling = np.zeros(len(owner), bool)
+    # Coordinates one by one: where a triangle has many planes, reading rows of points takes most of the time.
+    x, y, z = (np.ascontiguousarray(points[:, k]) for k in (across, 1 - across, 2))
+    number = np.repeat(np.arange(len(part)), count)
+    first = np.ceil(x).astype(np.int64)[triangles[part]].min(axis=1)
+    plane = np.arange(len(number)) + np.repeat(first - (np.cumsum(count) - count), count)
+    low = np.full(len(number), np.inf)
+    high = np.full(len(number), -np.inf)
+    depth_low, depth_high = np.zeros(len(number)), np.zeros(len(number))
+    falling = np.zeros(len(number), bool)
     for corner in range(3):
-        a, b = triangles[owner, corner], triangles[owner, (corner + 1) % 3]
+        a, b = triangles[part, corner], triangles[part, (corner + 1) % 3]
         # Neighbours see their common edge from the same end, so that it lies at the same place in both.
-        p, q = points[np.minimum(a, b)], points[np.maximum(a, b)]
-        below = p[:, across] <= plane
-        i = np.flatnonzero(below != (q[:, across] <= plane))
-        share = (plane[i] - p[i, across]) / (q[i, across] - p[i, across])
-        at = p[i, along] + share * (q[i, along] - p[i, along])
-        depth = p[i, 2] + share * (q[i, 2] - p[i, 2])
+        p, q = np.minimum(a, b), np.maximum(a, b)
+        below = np.repeat(x[p], count) <= plane
+        i = np.flatnonzero(below != (np.repeat(x[q], count) <= plane))
+        edge, below = number[i], below[i]
+        forward, p, q = (a < b)[edge], p[edge], q[edge]
+        share = (plane[i] - x[p]) / (x[q] - x[p])
+        at = y[p] + share * (y[q] - y[p])
+        depth = z[p] + share * (z[q] - z[p])
         left = at < low[i]
         right = at > high[i]
-        low[i[left]], depth_low[i[left]] = at[left], depth[left]
-        falling[i[left]] = below[i[left]] != (a[i[left]] < b[i[left]])
-        high[i[right]], depth_high[i[right]] = at[right], depth[right]
+        to = i[left]
+        low[to], depth_low[to], falling[to] = at[left], depth[left], (below != forward)[left]
+        to = i[right]
+        high[to], depth_high[to] = at[right], depth[right]
     begin = np.ceil(low).astype(np.int64)
-    number = np.maximum(np.ceil(high).astype(np.int64) - begin, 0)
-    k = np.repeat(np.arange(len(owner)), number)
-    at = np.arange(len(k)) - np.repeat(np.cumsum(number) - number, number) + begin[k]
+    met = np.maximum(np.ceil(high).astype(np.int64) - begin, 0)
+    k = np.repeat(np.arange(len(met)), met)
+    at = np.arange(len(k)) + np.repeat(begin - (np.cumsum(met) - met), met)
     depth = depth_low[k] + (at - low[k]) / (high[k] - low[k]) * (depth_high[k] - depth_low[k])
     cell = np.clip(np.ceil(depth), 0, shape[2]).astype(np.int64)
     layer, row = (plane[k], at) if across == 0 else (at, plane[k])

@@ -31,6 +31,7 @@ def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
             vertices, triangles = mended.vertices, mended.triangles
             require_whole(mended, job.stl_name)
         nominal = nominal_of(job)
+        progress.made(f"{len(triangles)} triangles")
 
     if mended is not None:
         progress.warning(f"repaired: {'; '.join(mended.lines())}", job.stl_name, "look at part.stl")

@@ -63,6 +63,7 @@ class Export:
         job = self.job
         with self.progress.stage("solid", 12.0 if job.quality == "export" else 3.0):
             solid = build_solid(job.unit, job.path, job.quality, take_off=job.take_off)
+            self.progress.made(f"{len(solid.triangles)} triangles")
         if job.vent_along is not None:
             with self.progress.stage("vents", 10.0):
                 solid = self._vent(solid, job.vent_along)

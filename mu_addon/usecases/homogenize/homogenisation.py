@@ -81,6 +81,7 @@ class Homogenisation:
         job = self.job
         with self.progress.stage("mesh of the cell", 5.0):
             self.mesh = mesh_cell(job.cell, job.mesh, self.cache.folder)
+            self.progress.made(f"{len(self.mesh.nodes)} nodes and {len(self.mesh.tets)} elements")
             resin = job.resin
             self.materials = cell_materials(job.cell, self.mesh, resin.modulus_MPa, resin.poisson)
             modulus, _ = self.materials.small_strain(len(self.mesh.tets))

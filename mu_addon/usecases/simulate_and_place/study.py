@@ -202,6 +202,7 @@ class Study:
         """Analysis mesh and its quality; kept, since one of its meshers is not repeatable."""
         with self.progress.stage("mesh"):
             self.mesh = self._mesh(self.job.mesh)
+            self.progress.made(f"{len(self.mesh.nodes)} nodes and {len(self.mesh.tets)} elements")
             self._require_space(len(self.mesh.nodes))
             struts = strut_volume_mm3(self.job.unit, self.job.body) if self.mesh.resolved else None
             self.quality = mesh_quality(self.mesh, self.job.unit, self.job.body, struts)

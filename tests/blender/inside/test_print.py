@@ -19,7 +19,7 @@ from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.parameters import write_unit
 from mu_addon.design.printing.printer import printer_text
-from mu_addon.design.surface import bad_edges, stl_surface
+from mu_addon.design.surface import bad_edges, stl_bytes, stl_surface
 from mu_addon.usecases.export.job import FORMATS, MANIFEST
 
 from .acting import add, refused
@@ -291,6 +291,74 @@ def test_an_export_as_chosen(tmp_path):
     vertices, triangles = stl_surface((folder / "unit.stl").read_bytes())
     assert bad_edges(triangles) == 0
     assert np.ptp(vertices[:, 2]) == pytest.approx(81.0, abs=0.5)
+
+
+@pytest.mark.slow
+def test_vents_for_the_direction_of_the_build(tmp_path):
+    """As `export --vent-along`: upside down the chamber is a cup, which gets a hole and a plug."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "seat.blend"))
+    root = short()
+    settings = root.mu_print
+    settings.formats, settings.quality = {"stl"}, "interactive"
+    assert "For a build along Up" not in drawn()
+    settings.vents = True
+    settings.up = (0.0, 0.0, 0.0)
+    assert "Up is not a direction" in refused(bpy.ops.mu.print_export)
+    settings.up = (0.0, 0.0, -1.0)
+    assert "For a build along Up, 0 0 -1" in drawn()
+    assert "without vents" not in drawn()
+    settings.formats = {"stl", "step"}
+    assert "STEP stay without vents" in drawn()
+    settings.formats = {"stl"}
+    assert bpy.ops.mu.print_export() == {"FINISHED"}
+    done(root)
+    folder = printing.folder_of(root, printing.EXPORT)
+    manifest = json.loads((folder / MANIFEST).read_text())
+    assert manifest["vents"]["along"] == [0.0, 0.0, -1.0]
+    assert len(manifest["vents"]["vents"]) == 1
+    assert (folder / "plug-1.stl").is_file()
+    texts = drawn()
+    assert "1 vent(s)" in texts
+    assert "plug-1.stl" in texts
+
+
+@pytest.mark.slow
+def test_a_file_is_checked_and_repaired_before(tmp_path):
+    """As `check --stl FILE --repair`: a cube with one face turned over."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "seat.blend"))
+    root = add(preset="mu-0.75x")
+    settings = root.mu_print
+    assert "Choose the STL file" in refused(bpy.ops.mu.print_check_file)
+    vertices = 12.0 * np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]]
+    faces = np.array([*faces, [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])
+    faces[0] = faces[0, ::-1]
+    (tmp_path / "part.stl").write_bytes(stl_bytes(vertices, faces))
+    settings.stl_file = str(tmp_path / "part.stl")
+    assert bpy.ops.mu.print_check_file() == {"FINISHED"}
+    child = done(root, state="failed")
+    assert child.error["status"] == print_panel.NOT_PRINTABLE
+    assert "1 triangle is flipped" in drawn()
+
+    settings.repair = True
+    assert "1 triangle is flipped" not in drawn().replace(child.error["what"], ""), "asked otherwise"
+    assert bpy.ops.mu.print_check_file() == {"FINISHED"}
+    done(root)
+    texts = drawn()
+    assert "Repaired: 1 " in texts
+    folder = printing.folder_of(root, printing.FILE_CHECK)
+    assert np.linalg.det(_corners(folder / "part.stl")).sum() / 6.0 == pytest.approx(12.0**3)
+    assert printing.checked(root) is None, "the unit itself was not checked"
+
+    settings.against_unit = True
+    assert bpy.ops.mu.print_check_file() == {"FINISHED"}
+    done(root, state="failed")
+    assert "times its nominal size" in drawn()
+
+
+def _corners(path):
+    vertices, triangles = stl_surface(path.read_bytes())
+    return vertices[triangles]
 
 
 def test_jobs_that_fail_and_one_that_is_stopped():

@@ -1,0 +1,103 @@
+"""A command in a process that is watched, and what is said where that process crashes."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import MuError
+from ..run.supervisor import CRASHED, Crash, supervised
+
+_UNWATCHED = ("presets", "ports", "stream", "record", "replay")
+"""Commands that solve nothing: what a recording has been sent is on disk before anything else is done."""
+_LIMITS = (("RLIMIT_AS", "addresses"), ("RLIMIT_DATA", "memory"))
+
+
+class _Crashed(MuError):
+    """The end of a process that could not say it itself."""
+
+    status = CRASHED
+
+
+def run_watched(line: Sequence[str], work: Callable[[], int], ends_with_input: bool = False) -> int:
+    """Exit status of `work`, which runs that command line: in a process of its own where that may crash.
+
+    ends_with_input: end it once standard input ends, see `run.processes.end_with_input`.
+    """
+    at_once = not line or line[0] in _UNWATCHED or line[0].startswith("-") or {"-h", "--help"} & {*line}
+    # Blender has threads, whose locks a fork would find as they are.
+    if not at_once and "bpy" not in sys.modules:
+        return supervised(work, lambda crash: tell_crash(line, crash), ends_with_input)
+    if ends_with_input:
+        from ..run.processes import end_with_input
+
+        end_with_input()
+    return work()
+
+
+def tell_crash(line: Sequence[str], crash: Crash) -> None:
+    """Say how the process of a command line ended, where it stood and what to do, in its folder as well."""
+    # Only now: as long as all goes well, this process needs none of it.
+    from ..run.context import last_stage, record_crash
+    from ..run.progress import Progress, json_lines, terminal
+    from .main import parser
+
+    options = parser().parse_args(list(line))
+    folder = Path(options.out) if getattr(options, "out", None) else None
+    stage, made = last_stage(folder) if folder is not None else ("", [])
+    error = _error(options, folder, stage, made, crash)
+    if folder is not None:
+        record_crash(folder, error, crash.stack)
+    json = getattr(options, "json", False)
+    if not json and sys.stderr.isatty():
+        # Off the line in which its progress stood.
+        sys.stderr.write("\n")
+    Progress([json_lines(sys.stdout) if json else terminal(sys.stderr)]).error(error)
+
+
+def _error(options: Any, folder: Path | None, stage: str, made: Sequence[str], crash: Crash) -> MuError:
+    limit = _limit()
+    parts = [
+        f"in stage {stage}" if stage else "",
+        f"at {', '.join(made)}" if made else "",
+        f"with {crash.memory_MB:.0f} MB of memory taken",
+        limit,
+    ]
+    where = ", ".join(part for part in parts if part)
+    again = "the same command" if folder is None else f"`run.py resume {folder}` or the same command"
+    coarser = ", or a coarser mesh (--refine below 1)" if hasattr(options, "refine") else ""
+    memory = "raise that limit" if limit else "close other programs, or take a machine with more memory"
+    shared = ", --workers 1" if hasattr(options, "workers") else ""
+    keep = "report it with log.ndjson" if folder is not None else "report it"
+    return _Crashed(
+        f"the process that did the work {_how(crash)}",
+        where,
+        f"if memory was short: {memory}{shared}{coarser}; then {again} takes up what is finished. If it ends "
+        f"like this again, {keep}",
+    )
+
+
+def _how(crash: Crash) -> str:
+    if not crash.signal:
+        return f"was ended by a library, without a word (exit status {crash.status})"
+    name = signal.Signals(crash.signal).name if crash.signal in {*signal.Signals} else str(crash.signal)
+    if name == "SIGKILL":
+        return "was killed (SIGKILL): by somebody, or by the system, which does that where memory runs out"
+    return f"crashed ({name}): a library that it uses was refused memory, or has a fault"
+
+
+def _limit() -> str:
+    """The limits that the system sets to this process's memory, in words."""
+    try:
+        import resource
+    except ImportError:
+        return ""
+    found = []
+    for name, what in _LIMITS:
+        most, _ = resource.getrlimit(getattr(resource, name))
+        if most != resource.RLIM_INFINITY:
+            found.append(f"{most / 1e6:.0f} MB of {what} allowed ({name})")
+    return ", ".join(found)

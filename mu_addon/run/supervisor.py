@@ -1,0 +1,165 @@
+"""Work in a forked process that this one watches, so that no crash ends a command without a word.
+
+A native library (CHOLMOD, BLAS, gmsh, Manifold, Warp) that is refused memory or has a fault ends its process
+by a signal, and no Python in it runs again. So whoever must have the last word is another process, that
+loads nothing and waits. The two are one to the outside: Ctrl-C, SIGTERM and Ctrl-Z reach the worker once,
+the worker's exit status is handed on, and neither outlives the other's `kill -9`.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+from .processes import end_with_input
+
+CRASHED = 71
+"""Exit status of a command whose process was ended by a signal, or by a library without a word."""
+_PASSED_ON = ("SIGINT", "SIGTERM", "SIGTSTP")
+
+
+class Crash(NamedTuple):
+    """A worker that ended without having said its exit status.
+
+    signal: its number, or 0 for a library that ended the process by itself, with exit status `status`.
+    memory_MB: the most that the process held. stack: Python's, where it crashed, or nothing.
+    """
+
+    signal: int
+    status: int
+    memory_MB: float
+    stack: str
+
+
+def supervised(
+    work: Callable[[], int], tell: Callable[[Crash], object], ends_with_input: bool = False
+) -> int:
+    """Exit status of `work`, done in a fork of this process; `CRASHED` where it did not live to give one.
+
+    tell: called in this process, after such an end. ends_with_input: end both once standard input ends.
+    Without fork (Windows), or where the system refuses one, `work` is done in this process.
+    """
+    if not hasattr(os, "fork"):
+        return _alone(work, ends_with_input)
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    ends = *os.pipe(), *os.pipe()
+    alive, keep_alive, status_read, status_write = ends
+    passed_on = {getattr(signal, name) for name in _PASSED_ON}
+    # Until each of the two has its own handlers, none of them may come.
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, passed_on)
+    try:
+        worker = os.fork()
+    except OSError:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for end in ends:
+            os.close(end)
+        return _alone(work, ends_with_input)
+    if not worker:
+        os.close(keep_alive)
+        os.close(status_read)
+        _become_worker(alive, status_write)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        return _report_status(work, status_write)
+    os.close(alive)
+    os.close(status_write)
+    before = _pass_on_signals(worker)
+    signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+    if ends_with_input:
+        end_with_input()
+    try:
+        _, ended, usage = os.wait4(worker, 0)
+        os.set_blocking(status_read, False)
+        with suppress(BlockingIOError):
+            return _outcome(os.read(status_read, 1 << 16), os.waitstatus_to_exitcode(ended), usage, tell)
+        return _outcome(b"", os.waitstatus_to_exitcode(ended), usage, tell)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        os.close(keep_alive)
+        os.close(status_read)
+
+
+def _alone(work: Callable[[], int], ends_with_input: bool) -> int:
+    if ends_with_input:
+        end_with_input()
+    return work()
+
+
+def _report_status(work: Callable[[], int], status_write: int) -> int:
+    """Do the work and give its exit status to who watches, before libraries are unloaded, which may crash."""
+    status = 1
+    try:
+        status = work()
+        return status
+    except SystemExit as ended:
+        status = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
+        raise
+    finally:
+        os.write(status_write, f"status {status}\n".encode())
+
+
+def _outcome(report: bytes, ended: int, usage: Any, tell: Callable[[Crash], object]) -> int:
+    """What a worker said, else that it crashed."""
+    if report.startswith(b"status "):
+        return int(report.split()[1])
+    # Kilobytes, but on macOS, where they are bytes.
+    memory = usage.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
+    tell(Crash(max(-ended, 0), max(ended, 0), memory, report.decode("utf-8", "replace")))
+    return CRASHED
+
+
+def _become_worker(alive: int, status_write: int) -> None:
+    # A group of its own: what a terminal sends comes once, from who watches.
+    os.setpgid(0, 0)
+    # A terminal may stop whoever writes from another group than its own.
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)
+    _end_with(alive)
+    with suppress(OSError, ValueError):
+        faulthandler.enable(status_write, all_threads=False)
+
+
+def _end_with(alive: int) -> None:
+    """Kill this process once the other end of a pipe is closed, as it is when its holder ends."""
+    threading.Thread(target=_wait_for_end, args=(alive,), daemon=True).start()
+    if sys.platform == "linux":
+        import fcntl
+
+        # The thread waits for the interpreter, which a library may hold for minutes; the kernel does not.
+        with suppress(OSError):
+            fcntl.fcntl(alive, fcntl.F_SETOWN, os.getpid())
+            fcntl.fcntl(alive, fcntl.F_SETSIG, signal.SIGKILL)
+            fcntl.fcntl(alive, fcntl.F_SETFL, fcntl.fcntl(alive, fcntl.F_GETFL) | os.O_ASYNC)
+
+
+def _wait_for_end(alive: int) -> None:
+    with suppress(OSError):
+        os.read(alive, 1)
+    os._exit(1)
+
+
+def _pass_on_signals(worker: int) -> dict[int, Any]:
+    """Hand what asks this process to stop on to the worker; returns the handlers that were there before."""
+
+    def stop(number: int, frame: Any) -> None:
+        with suppress(ProcessLookupError):
+            os.kill(worker, number)
+
+    def pause(number: int, frame: Any) -> None:
+        with suppress(ProcessLookupError):
+            os.killpg(worker, signal.SIGSTOP)
+        os.kill(os.getpid(), signal.SIGSTOP)
+        with suppress(ProcessLookupError):
+            os.killpg(worker, signal.SIGCONT)
+
+    handlers = {signal.SIGINT: stop, signal.SIGTERM: stop}
+    # Where nobody could bid it go on, nobody pauses it.
+    if signal.getsignal(signal.SIGTSTP) is not signal.SIG_IGN:
+        handlers[signal.SIGTSTP] = pause
+    return {number: signal.signal(number, handler) for number, handler in handlers.items()}

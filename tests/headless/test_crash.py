@@ -1,0 +1,145 @@
+"""What a command says whose process is ended by a signal, as by a library that is refused memory."""
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import time
+
+import attrs
+import numpy as np
+import pytest
+
+from mu_addon.design.parameters import load_preset, to_toml
+from mu_addon.run.child import FAILED, RUNNING, Child
+from mu_addon.run.context import RESERVED, record_crash
+from mu_addon.run.folder import keep_inputs
+from mu_addon.run.supervisor import CRASHED
+
+from .processes import PATIENCE_S, assert_clear_failure, command, run, worker_of
+from .test_resume import JOB
+
+SIMULATION = attrs.evolve(JOB, stages=("design", "simulate"))
+
+
+def hit(folder, number, *more):
+    """A simulation of which the process that works is ended by a signal once a state is there."""
+    keep_inputs(folder, SIMULATION.texts())
+    words = command("resume", folder, "--no-report", *more)
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while not list(folder.glob("cache/state-*")):
+        assert process.poll() is None
+        time.sleep(0.002)
+    os.kill(worker_of(folder), number)
+    output, errors = process.communicate(timeout=PATIENCE_S)
+    return subprocess.CompletedProcess(words, process.returncode, output, errors)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("crash")
+    keep_inputs(folder, SIMULATION.texts())
+    assert run("resume", folder, "--no-report").returncode == 0
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGABRT, signal.SIGKILL])
+def test_it_says_where_it_stood_and_resumes_to_the_same_digits(whole, tmp_path, number):
+    done = hit(tmp_path, number)
+    assert_clear_failure(
+        done, CRASHED, number.name, "in stage Model A", "nodes and", "MB of memory", "resume"
+    )
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["status"] == "partial"
+    assert number.name in summary["reason"]["what"]
+    assert json.loads((tmp_path / "log.ndjson").read_text().splitlines()[-1])["status"] == CRASHED
+    again = run("resume", tmp_path, "--no-report")
+    assert again.returncode == 0, again.stderr
+    assert "interrupted" not in again.stderr
+    for name in ("angle.csv", "stretch.csv"):
+        assert (tmp_path / name).read_bytes() == (whole / name).read_bytes()
+    for path in whole.glob("cache/state-*"):
+        with np.load(path) as a, np.load(tmp_path / "cache" / path.name) as b:
+            assert all(np.array_equal(a[name], b[name]) for name in a.files)
+
+
+@pytest.mark.slow
+def test_its_last_message_is_for_programs_too(tmp_path):
+    done = hit(tmp_path, signal.SIGSEGV, "--json")
+    last = json.loads(done.stdout.splitlines()[-1])
+    assert (last["type"], last["status"]) == ("error", CRASHED)
+    assert "SIGSEGV" in last["what"]
+    assert last["where"]
+    assert last["what_to_do"]
+
+
+@pytest.mark.slow
+def test_a_child_of_blender_or_a_sweep_tells_it(tmp_path):
+    keep_inputs(tmp_path, SIMULATION.texts())
+    words = [command()[0], "-m", "mu_addon.cli", "resume", str(tmp_path), "--json", "--no-report"]
+    child = Child(words, tmp_path / "words", os.environ, ends_with_parent=True)
+    end = time.monotonic() + PATIENCE_S
+    while not (tmp_path / "unit.stl").exists():
+        assert time.monotonic() < end
+        time.sleep(0.002)
+    os.kill(worker_of(tmp_path), signal.SIGSEGV)
+    while child.state == RUNNING:
+        child.poll()
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    assert child.state == FAILED
+    assert "SIGSEGV" in child.error["what"]
+    assert child.error["status"] == CRASHED
+    assert json.loads((tmp_path / "summary.json").read_text())["status"] == "partial"
+
+
+@pytest.mark.slow
+def test_a_solid_that_finds_no_memory(tmp_path):
+    """Manifold, refused memory by the system, ends its process by a signal or is told of by C++."""
+    file = tmp_path / "unit.toml"
+    file.write_text(to_toml(attrs.evolve(load_preset("mu-1.0x"), scale=2.5)))
+    most = 520_000_000
+
+    def limit():
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+
+    words = ("export", "--unit", file, "--path", "alpha4", "--formats", "stl", "--out", tmp_path / "out")
+    done = run(*words, preexec_fn=limit)
+    assert done.returncode in (1, CRASHED), done.stderr
+    assert_clear_failure(done, done.returncode, "memory", "what to do")
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["status"] == "partial"
+    assert not list((tmp_path / "out").rglob("*.part*"))
+
+
+def test_a_folder_whose_run_has_ended_or_another_has_is_left_as_it_is(tmp_path):
+    from mu_addon.errors import MuError
+    from mu_addon.run.lock import FolderLock
+
+    error = MuError("crashed", "there", "this")
+    record_crash(tmp_path, error)
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "summary.json").write_text('{"status": "complete"}')
+    record_crash(tmp_path, error)
+    assert (tmp_path / "summary.json").read_text() == '{"status": "complete"}'
+    running = '{"status": "running"}'.ljust(RESERVED)
+    (tmp_path / "summary.json").write_text(running)
+    lock = FolderLock(tmp_path)
+    record_crash(tmp_path, error)
+    assert (tmp_path / "summary.json").read_text() == running
+    lock.release()
+    record_crash(tmp_path, error, "a stack")
+    assert json.loads((tmp_path / "summary.json").read_text())["status"] == "partial"
+    kinds = [json.loads(line)["type"] for line in (tmp_path / "log.ndjson").read_text().splitlines()]
+    assert kinds == ["traceback", "error"]
+
+
+@pytest.mark.parametrize("words", [("--help",), ("place", "--help"), ("presets",)])
+def test_what_solves_nothing_is_not_watched(words, tmp_path):
+    """One process, as the system counts it: no second one is paid for."""
+    code = "import os, runpy, sys; os.fork = None; sys.argv[0] = sys.argv[1]; del sys.argv[1]; "
+    code += "runpy.run_path(sys.argv[0], run_name='__main__')"
+    python, script = command()[:2]
+    done = subprocess.run([python, "-c", code, script, *words], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
