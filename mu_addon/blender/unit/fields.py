@@ -28,6 +28,9 @@ _NAMES = {
     "cells_y_minus": "Cells -Y",
     "cells_y_plus": "Cells +Y",
     "allow_symmetric": "Allow Symmetry",
+    "minus_y": "-Y Side",
+    "plus_y": "+Y Side",
+    "beside_x": "X Sides",
 }
 """Parameters whose own names say too little beside a field."""
 
