@@ -44,7 +44,7 @@ def lattice_beams(d: Dimensions, bar: Bar | None = None, pieces: int = PIECES) -
 
 def _radii(lattice: Lattice, bar: Bar | None, t: NDArray[np.float64]) -> NDArray[np.float64]:
     if bar is None:
-        return np.tile(lattice.radius(t), (len(lattice.struts), 1))
+        return lattice.radii(t)
     return strut_radii(lattice, bar.met, bar.half, t)
 
 

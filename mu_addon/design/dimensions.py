@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import attrs
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from . import lattices
+from .grading import Field
 
 
 @attrs.frozen
@@ -14,7 +17,8 @@ class Dimensions:
     cell: the lattice cell U, which is also the pitch of the chambers; count: of chambers. R and r: outer
     radii of the profile at a bladder's apex and at a neck; a and b: half-lengths of their parabola arcs, a
     + b = U/2. wall: along the surface normal. Counts of cells and `row` are whole numbers, see
-    `parameters.Envelope`.
+    `parameters.Envelope`. grading: of the struts, None for struts alike everywhere; strut_growth: by how much
+    printing thickens them, which no grading multiplies.
 
     >>> from mu_addon.design import load_preset
     >>> d = load_preset("mu-1.5x").dimensions
@@ -55,6 +59,18 @@ class Dimensions:
     seat_wall: float
     cable: float
     inclusion_radius: float
+    grading: Field | None = None
+    strut_growth: float = 0.0
+
+    def strut_factors(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Factors (n,) of the grading at points (n, 3) in mm; 1 without one."""
+        at = np.asarray(points, float)
+        return np.ones(len(at)) if self.grading is None else self.grading.at(at)
+
+    def junction_diameters(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Diameters (n,) in mm of struts that meet at nodes (n, 3) in mm."""
+        drawn = self.junction_diameter - self.strut_growth
+        return np.asarray(drawn * self.strut_factors(points) + self.strut_growth)
 
     @property
     def height(self) -> float:

@@ -53,7 +53,7 @@ def estimated_volume(unit: Unit, struts: Struts | None) -> float:
     shown = struts.trimmed
     share = shown.last - shown.first
     t = shown.first[:, None] + share[:, None] * np.linspace(0.0, 1.0, 9)
-    area = math.pi * (struts.lattice.radius(t) ** 2).mean(axis=1)
+    area = math.pi * (struts.lattice.radii(t, shown.rows) ** 2).mean(axis=1)
     length = np.linalg.norm(shown.ends[:, 1] - shown.ends[:, 0], axis=1) * share
     return volume + float((area * length).sum())
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -62,19 +64,65 @@ class Graph:
 
 @attrs.frozen(eq=False)
 class Lattice(Graph):
-    """A graph whose struts have thickness: radius in mm at their junctions and at mid-span."""
+    """A graph whose struts have thickness: radius in mm at their junctions and at mid-span.
+
+    factors (N,): of a grading at the nodes, or None for struts alike everywhere; growth: how much of the
+    radii in mm printing added, which no factor multiplies.
+    """
 
     junction_radius: float
     midspan_radius: float
+    factors: NDArray[np.float64] | None = None
+    growth: float = 0.0
 
     def radius(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Strut radii in mm (any shape) at fractions t, 0 .. 1, (any shape) of the strut's length."""
+        """Radii in mm (any shape) of a strut of factor 1 at fractions t, 0 .. 1, (any shape) of its length.
+
+        Those of every strut where there is no grading; see `radii` otherwise.
+        """
         return self.kind.radius(np.asarray(t, dtype=float), self.junction_radius, self.midspan_radius)
+
+    def radii(self, t: ArrayLike, rows: NDArray[Any] | slice = slice(None)) -> NDArray[np.float64]:
+        """Radii (e, n) in mm of the struts `rows`, by default of all, at fractions t, (n,) or (e, n).
+
+        In a graded lattice the factor goes from that of a strut's first node to that of its second as
+        sin^2(pi t/2): level at both nodes, so that struts which meet there have one radius.
+        """
+        t = np.asarray(t, dtype=float)
+        struts = self.struts[rows]
+        law = np.broadcast_to(self.radius(t), (len(struts), t.shape[-1]))
+        if self.factors is None:
+            return np.array(law)
+        return graded(law, t, self.factors[struts[:, :1]], self.factors[struts[:, 1:]], self.growth)
+
+    @property
+    def node_radii(self) -> NDArray[np.float64]:
+        """Radii (N,) in mm of the struts at their nodes."""
+        law = np.full(len(self.grid), float(self.radius(0.0)))
+        return law if self.factors is None else (law - self.growth) * self.factors + self.growth
+
+
+def graded(law: ArrayLike, t: ArrayLike, first: ArrayLike, last: ArrayLike, growth: float) -> Any:
+    """Radii in mm of a strut of factors `first` and `last` at its ends, of its radii `law` at factor 1.
+
+    t: fractions, 0 .. 1, of its length; growth: the part of the radii in mm that no factor multiplies. Arrays
+    broadcast.
+    """
+    share = np.sin(0.5 * np.pi * np.asarray(t, float)) ** 2
+    factor = first + (np.asarray(last, float) - first) * share
+    return (np.asarray(law, float) - growth) * factor + growth
 
 
 def lattice_of(d: Dimensions) -> Lattice:
     """Lattice of all cells of the unit's envelope; cell centres lie at (iU, jU, (k + 1/2)U) in mm."""
-    return thickened(graph_of(d), d.junction_diameter / 2.0, d.midspan_diameter / 2.0)
+    return with_struts(graph_of(d), d)
+
+
+def with_struts(graph: Graph, d: Dimensions, is_graded: bool = True) -> Lattice:
+    """The graph with the struts of these dimensions, by their grading or, without `is_graded`, all alike."""
+    factors = d.grading.at(graph.nodes) if is_graded and d.grading is not None else None
+    radii = d.junction_diameter / 2.0, d.midspan_diameter / 2.0
+    return attrs.evolve(thickened(graph, *radii), factors=factors, growth=d.strut_growth / 2.0)
 
 
 def graph_of(d: Dimensions) -> Graph:

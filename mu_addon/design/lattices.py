@@ -128,6 +128,12 @@ class LatticeKind:
         return np.asarray(((first == second) & (first % self.divisions == 0)).any(axis=1))
 
     @cached_property
+    def is_half_diagonals(self) -> bool:
+        """Whether the struts are the eight half diagonals of the cell, from its centre to its corners."""
+        apart = np.abs(np.diff(self.nodes[self.struts], axis=1)) == 0.5
+        return bool(apart.all() and len(self.struts) == 8)
+
+    @cached_property
     def opening(self) -> float:
         """Smallest distance, in cells, between the axes of two struts without a common node.
 

@@ -16,6 +16,7 @@ from ..reading import file_text
 from . import lattices, rules, toml_text
 from .assets import asset_file, asset_names
 from .dimensions import Dimensions
+from .grading import Field, Grading
 from .printed import as_printed
 from .quantity import PAPER, Description, choice, describe, in_MPa, quantity
 from .wall import Wall, require_used
@@ -393,6 +394,7 @@ class Unit:
     scale: float = quantity(1.0, "", 0.2, 5.0, "factor on every length that is not fixed", PAPER)
     chambers: Chambers = Chambers()
     lattice: Envelope = Envelope()
+    grading: Grading = attrs.field(factory=Grading)
     waveguide: Waveguide = Waveguide()
     print: Printing = Printing()
     material: Material = Material()
@@ -450,14 +452,24 @@ class Unit:
             seat_wall=w.seat_wall_mm,
             cable=w.cable_mm,
             inclusion_radius=w.inclusion_radius_mm,
+            grading=self._field,
         )
+
+    @property
+    def _field(self) -> Field | None:
+        """The grading over the unit's own envelope, None where struts are alike everywhere."""
+        if not self.grading.names:
+            return None
+        t = self.lattice
+        u = self.scale * self.chambers.cell_mm
+        return Field(self.grading, u, self.chambers.count, t.cells_x // 2, t.cells_y_minus, t.cells_y_plus)
 
     def hash(self) -> str:
         """SHA-256, in hexadecimal, of the unit's canonical TOML without comments."""
         return hashlib.sha256(to_toml(self, comments=False).encode()).hexdigest()
 
 
-SECTIONS: tuple[type, ...] = (Chambers, Envelope, Waveguide, Printing, Material, Wall)
+SECTIONS: tuple[type, ...] = (Chambers, Envelope, Grading, Waveguide, Printing, Material, Wall)
 
 
 class Assumption(NamedTuple):
@@ -488,7 +500,7 @@ def assumed(unit: Unit) -> list[Assumption]:
 def stated(unit: Unit) -> Iterator[tuple[str, Description, Any]]:
     """Section, description and value of every parameter in use, in the order of the unit's file.
 
-    Parameters of the wall that its law does not use are left out.
+    Parameters of the wall that its law does not use are left out, and those of a grading that change nothing.
     """
     for section in SECTIONS:
         values = getattr(unit, _attribute(section))

@@ -50,6 +50,7 @@ def as_printed(d: Dimensions, offset_xy: float, offset_z: float) -> Dimensions:
         inlet_wall=d.inlet_wall + 2.0 * offset_xy,
         junction_diameter=d.junction_diameter + strut,
         midspan_diameter=d.midspan_diameter + strut,
+        strut_growth=d.strut_growth + strut,
         waveguide_section=d.waveguide_section + 2.0 * offset_xy,
         waveguide_end=d.waveguide_end + offset_z,
         well_width=d.well_width - 2.0 * offset_z,

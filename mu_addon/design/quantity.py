@@ -39,7 +39,7 @@ class Description(NamedTuple):
     """What one parameter is: type, default, unit, closed bounds in that unit, meaning and source.
 
     fixed: whether it is a length that is the same at every scale. A choice among names has `choices` and no
-    bounds.
+    bounds, a text (of type str) neither.
     """
 
     name: str
@@ -55,8 +55,8 @@ class Description(NamedTuple):
 
     @property
     def allowed(self) -> str:
-        """The bounds or the choices as text; "" for a flag."""
-        if self.type is bool:
+        """The bounds or the choices as text; "" for a flag or a text."""
+        if self.type is bool or (self.type is str and not self.choices):
             return ""
         return " or ".join(self.choices) if self.choices else f"{self.low:g} to {self.high:g}"
 
@@ -105,6 +105,32 @@ def choice(default: str, names: Callable[[], Sequence[str]], text: str, source: 
         "names": names,
     }
     return attrs.field(default=default, metadata=metadata, validator=_check_choice)
+
+
+def text_quantity(default: str, canonical: Callable[[str], str], text: str, source: str) -> Any:
+    """attrs field of a parameter that is a text of a form of its own, such as a list of entries.
+
+    canonical: the one text of all that mean the same; raises InputError for what means nothing. Setting
+    anything but a text raises InputError.
+    """
+    metadata = {
+        "type": str,
+        "unit": "",
+        "low": math.nan,
+        "high": math.nan,
+        "text": text,
+        "source": source,
+        "fixed": False,
+    }
+
+    def convert(value: Any) -> Any:
+        return canonical(value) if isinstance(value, str) else value
+
+    def check(instance: Any, field: Any, value: Any) -> None:
+        if not isinstance(value, str):
+            raise InputError(f"{field.name} = {value!r} is not a text", where(instance, field.name), text)
+
+    return attrs.field(default=default, metadata=metadata, converter=convert, validator=check)
 
 
 def describe(section: type) -> Iterator[Description]:

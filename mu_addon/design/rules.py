@@ -9,7 +9,11 @@ import attrs
 
 from ..errors import InputError
 from .dimensions import Dimensions
+from .lattice import graph_of
 from .printed import as_printed
+
+LEAST_STRUT_MM = 0.2
+"""Least diameter of a strut at scale 1, that of `parameters.Envelope`."""
 
 
 class RuleError(InputError):
@@ -71,7 +75,8 @@ def check_printed(d: Dimensions, offset_xy: float, offset_z: float) -> None:
 def _printed_breach(d: Dimensions, offset_xy: float, offset_z: float) -> tuple[str, str] | None:
     """Rule and complaint of the first part that the offsets erase, fill or close."""
     least, most = min(offset_xy, offset_z), max(offset_xy, offset_z)
-    thinnest = min(d.junction_diameter, d.midspan_diameter)
+    thin, thick = _factors(d)
+    thinnest = thin * min(d.junction_diameter, d.midspan_diameter)
     if thinnest + 2.0 * least <= 0.0:
         return "struts left when printed", f"leave no material of struts of {thinnest:.4g} mm"
     for part, thickness in {
@@ -83,10 +88,11 @@ def _printed_breach(d: Dimensions, offset_xy: float, offset_z: float) -> tuple[s
         if thickness + 2.0 * least <= 0.0:
             return "walls left when printed", f"leave no material of {part} of {thickness:.4g} mm"
     opening = d.kind.opening * d.cell
-    if d.midspan_diameter + 2.0 * most >= opening:
+    if thick * d.midspan_diameter + 2.0 * most >= opening:
         return (
             "open cells when printed",
-            f"fill the cell: struts of {d.midspan_diameter:.4g} mm close openings of {opening:.4g} mm",
+            f"fill the cell: struts of {thick * d.midspan_diameter:.4g} mm close openings of "
+            f"{opening:.4g} mm",
         )
     if d.inlet_radius <= offset_xy:
         return "an open inlet when printed", f"close the inlet of {2.0 * d.inlet_radius:.4g} mm"
@@ -224,6 +230,7 @@ def _struts(d: Dimensions) -> None:
             "[lattice] midspan_diameter_mm",
             f"choose at least {d.junction_diameter / s:g} mm at mid-span",
         )
+    _grading(d)
     opening = d.kind.opening * d.cell
     if d.midspan_diameter >= opening:
         _refuse(
@@ -232,6 +239,45 @@ def _struts(d: Dimensions) -> None:
             "[lattice] midspan_diameter_mm",
             f"the thickest strut that fits is {_below(opening / s):g} mm",
         )
+
+
+def _grading(d: Dimensions) -> None:
+    if d.grading is None:
+        return
+    if entry := d.grading.misplaced():
+        _refuse(
+            "graded cells within the lattice",
+            f"the cells of {entry!r} lie outside the lattice",
+            "[grading] cells",
+            f"choose columns 0 to {d.grading.half_x}, rows {-d.grading.y_minus} to {d.grading.y_plus}, "
+            f"chambers 1 to {d.grading.count}",
+        )
+    least, most = _factors(d)
+    opening = d.kind.opening * d.cell
+    if most * d.midspan_diameter >= opening:
+        _refuse(
+            "open cells",
+            f"a factor of {most:.4g} makes struts {most * d.midspan_diameter / d.scale:.4g} mm wide, which "
+            f"close the cell's openings, {opening / d.scale:.4g} mm across",
+            "[grading] " + ", ".join(d.grading.grading.names),
+            f"let the factors come to less than {opening / d.midspan_diameter:.4g} everywhere",
+        )
+    if least * d.junction_diameter < LEAST_STRUT_MM * d.scale:
+        _refuse(
+            "struts of some thickness",
+            f"a factor of {least:.4g} makes struts {least * d.junction_diameter / d.scale:.4g} mm wide",
+            "[grading] " + ", ".join(d.grading.grading.names),
+            "let the factors come to "
+            f"{LEAST_STRUT_MM * d.scale / d.junction_diameter:.4g} at least everywhere",
+        )
+
+
+def _factors(d: Dimensions) -> tuple[float, float]:
+    """Least and largest factor of the grading at the lattice's nodes; 1 and 1 without one."""
+    if d.grading is None:
+        return 1.0, 1.0
+    found = d.grading.at(graph_of(d).nodes)
+    return float(found.min()), float(found.max())
 
 
 def _waveguide(d: Dimensions) -> None:

@@ -161,7 +161,7 @@ def with_waveguide(
 
     t = np.linspace(0.0, 1.0, facets.along_strut + 1)
     radii = strut_radii(lattice, bar.met, bar.half, t)
-    raised = (radii > lattice.radius(t) + 1e-9).any(axis=1) & ~bar.replaced
+    raised = (radii > lattice.radii(t) + 1e-9).any(axis=1) & ~bar.replaced
     if (bar.replaced | raised).any():
         bare = lattice_solid(d, lattice, facets, offset, bar.replaced | raised)
     parts = [bare, bar.solid(offset)]
@@ -197,6 +197,8 @@ def lattice_solid(
     """
     from manifold3d import Manifold, OpType
 
+    if lattice.factors is not None:
+        return _graded_solid(d, lattice, facets, offset, without)
     kind, step = lattice.kind, d.cell / lattice.kind.divisions
     radii = lattice.radius(np.linspace(0.0, 1.0, facets.along_strut + 1))
     ball = shapes.ball(float(radii[0]), facets.around_strut, offset)
@@ -242,6 +244,49 @@ def lattice_solid(
     stack += [placed(ball, node) for node in nodes if node[2] == top]
     stack += [placed(strut(ends), ends[0]) for ends in faces if ends[:, 2].min() == top]
     return Manifold.batch_boolean(stack, OpType.Add) ^ _envelope(d, offset)
+
+
+def _graded_solid(
+    d: Dimensions,
+    lattice: Lattice,
+    facets: Facets,
+    offset: NDArray[np.float64] | None,
+    without: NDArray[np.bool_] | None,
+) -> Any:
+    """`lattice_solid` of struts that differ: a half, strut by strut, and its mirror image across x = 0."""
+    from manifold3d import Manifold, OpType
+
+    nodes, t = lattice.nodes, np.linspace(0.0, 1.0, facets.along_strut + 1)
+    kept = np.ones(len(lattice.struts), bool) if without is None else ~without
+    # A waveguide off the bending plane leaves out struts on one side alone.
+    half = without is None
+    slack = 1e-9 * d.cell
+    x = nodes[lattice.struts][:, :, 0]
+    right = (x.max(axis=1) > slack) | (np.abs(x) <= slack).all(axis=1)
+    chosen = kept & right if half else kept
+    low = nodes[lattice.struts[chosen, 0]]
+    way = nodes[lattice.struts[chosen, 1]] - low
+    parts = [
+        (low[n, 2], shapes.spindle(way[n], radii, facets.around_strut, offset).translate(low[n].tolist()))
+        for n, radii in enumerate(lattice.radii(t, chosen))
+    ]
+    at = nodes[:, 0] > -slack if half else np.ones(len(nodes), bool)
+    parts += [
+        (node[2], shapes.ball(float(radius), facets.around_strut, offset).translate(node.tolist()))
+        for node, radius in zip(nodes[at], lattice.node_radii[at], strict=True)
+    ]
+    # Layer by layer first: bodies that are far apart are cheap to unite.
+    floors = np.floor(np.array([z for z, _ in parts]) / d.cell + 1e-9)
+    layers = [
+        Manifold.batch_boolean(
+            [body for (_, body), f in zip(parts, floors, strict=True) if f == floor], OpType.Add
+        )
+        for floor in np.unique(floors)
+    ]
+    whole = Manifold.batch_boolean(layers, OpType.Add)
+    if half:
+        whole += whole.mirror([1.0, 0.0, 0.0])
+    return whole ^ _envelope(d, offset)
 
 
 def _ends(ends: NDArray[np.int64]) -> frozenset[tuple[int, ...]]:

@@ -1,7 +1,7 @@
 """The design as a chain of steps, of which each is evaluated again only where its inputs have changed.
 
     profile -> chambers -> membranes
-       \\-> cells -> trim -> struts
+       \\-> cells -> trim -> grading -> struts
               \\-> anchors -> path -> wells
                                         \\-> solid, of all of them
 
@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .anchors import SHORTEST, Window, anchor_points, window
 from .body import Body, covering, inside
-from .lattice import Graph, Lattice, graph_of, thickened
+from .grading import Grading
+from .lattice import Graph, Lattice, graph_of, with_struts
 from .parameters import Chambers, Envelope, Unit, Waveguide
 from .profile import cavity_polygon, outer_polygon, outer_radius
 from .quantity import describe
@@ -81,12 +82,17 @@ class Section:
 
 @attrs.frozen(eq=False)
 class TrimmedStruts:
-    """Visible struts: ends (e, 2, 3) in mm of each whole strut, and fractions (e,) of its visible part."""
+    """Visible struts: ends (e, 2, 3) in mm of each whole strut, and fractions (e,) of its visible part.
+
+    rows (e,): their numbers among the graph's; is_graded: whether their diameters follow the unit's grading.
+    """
 
     graph: Graph
     ends: Array
     first: Array
     last: Array
+    rows: NDArray[np.int64]
+    is_graded: bool = False
 
 
 @attrs.frozen(eq=False)
@@ -265,22 +271,32 @@ def _trim(given: StepInputs, profile: Array, graph: Graph | None) -> TrimmedStru
         shown &= inside(given.body, at)
     left = shown.any(axis=1)
     ends, shown = ends[left], shown[left]
+    rows = np.flatnonzero(left)
     last = FINE[len(FINE) - 1 - shown[:, ::-1].argmax(axis=1)]
-    return TrimmedStruts(graph, ends, FINE[shown.argmax(axis=1)], last)
+    return TrimmedStruts(graph, ends, FINE[shown.argmax(axis=1)], last, rows)
 
 
 def _untrimmed(given: StepInputs, profile: Array, graph: Graph | None) -> TrimmedStruts | None:
     if graph is None:
         return None
     ends = graph.nodes[graph.struts]
-    return TrimmedStruts(graph, ends, np.zeros(len(ends)), np.ones(len(ends)))
+    return TrimmedStruts(graph, ends, np.zeros(len(ends)), np.ones(len(ends)), np.arange(len(ends)))
+
+
+def _grading(given: StepInputs, trimmed: TrimmedStruts | None) -> TrimmedStruts | None:
+    if trimmed is None or given.unit.dimensions.grading is None:
+        return trimmed
+    return attrs.evolve(trimmed, is_graded=True)
+
+
+def _ungraded(given: StepInputs, trimmed: TrimmedStruts | None) -> TrimmedStruts | None:
+    return trimmed
 
 
 def _struts(given: StepInputs, trimmed: TrimmedStruts | None) -> Struts | None:
     if trimmed is None:
         return None
-    d = given.unit.dimensions
-    return Struts(trimmed, thickened(trimmed.graph, d.junction_diameter / 2.0, d.midspan_diameter / 2.0))
+    return Struts(trimmed, with_struts(trimmed.graph, given.unit.dimensions, trimmed.is_graded))
 
 
 def _lines(given: StepInputs, trimmed: TrimmedStruts | None) -> Struts | None:
@@ -322,7 +338,7 @@ def along(ends: Array, t: Array) -> Array:
     return np.asarray(ends[:, :1] + t[..., None] * (ends[:, 1:] - ends[:, :1]))
 
 
-def _all_of(section: type[Chambers | Envelope | Waveguide]) -> tuple[str, ...]:
+def _all_of(section: type[Chambers | Envelope | Grading | Waveguide]) -> tuple[str, ...]:
     return tuple(f"{section.section}.{d.name}" for d in describe(section))
 
 
@@ -335,6 +351,7 @@ _PROFILE = (
 )
 _CHAMBERS = ("chambers.wall_mm", "chambers.base_cap_mm", "chambers.tip_cap_mm")
 _STRUTS = ("lattice.junction_diameter_mm", "lattice.midspan_diameter_mm")
+_GRADING = _all_of(Grading)
 _PITCH = ("chambers.count", "chambers.cell_mm")
 _WELLS = tuple(p for p in _all_of(Waveguide) if p.startswith("waveguide.well_"))
 _ROW = ("waveguide.row",)
@@ -392,11 +409,21 @@ STEPS: dict[str, Step] = {
             mute=_untrimmed,
         ),
         Step(
+            "grading",
+            "factors on the struts' diameters over the envelope",
+            "lattice",
+            _grading,
+            ("trim",),
+            _GRADING,
+            muting="struts are alike everywhere",
+            mute=_ungraded,
+        ),
+        Step(
             "struts",
             "thickness of the struts, tapered to their ends",
             "lattice",
             _struts,
-            ("trim",),
+            ("grading",),
             _STRUTS,
             muting="struts are lines without thickness",
             mute=_lines,
@@ -429,7 +456,7 @@ STEPS: dict[str, Step] = {
             _wells,
             ("path",),
             _WELLS,
-            (*_PROFILE, *_STRUTS, "chambers.wall_mm"),
+            (*_PROFILE, *_STRUTS, *_GRADING, "chambers.wall_mm"),
             muting="a bar without wells is not sensitive to the bending direction",
             mute=_without_wells,
         ),

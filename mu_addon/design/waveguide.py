@@ -226,14 +226,20 @@ def free_bar(d: Dimensions, length: float) -> Bar:
     )
 
 
-def strut_radii(lattice: Lattice, met: NDArray[np.bool_], least: float, t: ArrayLike) -> Array:
-    """Radii (E, n) in mm of the lattice's struts at fractions t (n,), thickened where they meet a bar.
+def strut_radii(
+    lattice: Lattice,
+    met: NDArray[np.bool_],
+    least: float,
+    t: ArrayLike,
+    rows: NDArray[Any] | slice = slice(None),
+) -> Array:
+    """Radii (e, n) in mm of the struts `rows`, by default of all, at fractions t (n,), thickened at a bar.
 
-    met (E, 2): whether a strut's first and second end meet it. From that end to mid-span a strut's radius is
+    met (e, 2): whether a strut's first and second end meet it. From that end to mid-span a strut's radius is
     at least `least` mm; from there to the other end what was added fades as sin^2(pi t).
     """
     t = np.asarray(t, float)
-    law = lattice.radius(t)
+    law = lattice.radii(t, rows)
     fading = np.sin(np.pi * t) ** 2
     first, second = np.where(t <= 0.5, 1.0, fading), np.where(t >= 0.5, 1.0, fading)
     share = np.maximum(met[:, :1] * first, met[:, 1:] * second)
@@ -249,7 +255,7 @@ class _Struts:
         self.t = np.linspace(0.0, 1.0, 33)
         standing = ~replaced
         self.ends = lattice.nodes[lattice.struts[standing]]
-        self.radii = strut_radii(lattice, met[standing], half, self.t)
+        self.radii = strut_radii(lattice, met[standing], half, self.t, standing)
 
     def gap(self, points: Array) -> float:
         """Least distance in mm of points (n, 3) from the struts' surfaces, negative inside; 1 at most."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
+import attrs
 import numpy as np
 
 from ..design.printed import skin_stiffening
@@ -11,11 +13,13 @@ from ..design.quantity import in_MPa
 from ..design.strut_cell import StrutCell, depth_below_surface
 from ..meshing.mesh import LATTICE
 from .elements import even_points, shape_functions
+from .graded_lattice import element_factors, law_weight, relative_moduli
 from .laws import NeoHooke
 from .materials import Layer, Materials
 from .wall_law import wall_layers
 
 if TYPE_CHECKING:
+    from ..design.dimensions import Dimensions
     from ..design.parameters import Unit
     from ..meshing.mesh import Mesh
     from .lattice_law import LatticeLaw
@@ -24,12 +28,15 @@ Array = np.ndarray[Any, Any]
 
 # An element of a strut is divided this often along each edge to tell how much of it is skin.
 _SKIN_STEPS = 4
+# Of a graded strut's diameter, logarithmic, in which depths below its surface are looked up.
+_FACTOR = 0.02
 
 
 def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> Materials:
     """Materials of a unit's mesh: neo-Hookean membrane and lattice, or the law that the unit's [wall] names.
 
-    lattice: a homogenised lattice law in place of the neo-Hookean one. A resolved mesh is all of the wall's
+    lattice: a homogenised lattice law in place of the neo-Hookean one. Graded struts make either stiffer or
+    softer from place to place (`graded_lattice`). A resolved mesh is all of the wall's
     resin, and takes neither the lattice's modulus nor a law for it. A skin of other cure is spread
     evenly over the wall's thickness (`skin_stiffening`): exact where the wall stretches, too soft where it
     bends.
@@ -40,9 +47,9 @@ def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> M
     stiffer = skin_stiffening(unit.printed.wall, p.skin_depth_mm, p.skin_factor)
     membrane_MPa = in_MPa(stiffer * m.membrane_modulus_kPa)
     inside = mesh.region == LATTICE
-    if unit.wall.names or lattice is not None:
+    if unit.wall.names or lattice is not None or unit.grading.names:
         wall = wall_layers(unit.wall, np.flatnonzero(~inside), membrane_MPa, m.membrane_poisson)
-        return Materials((*wall, *_lattice_layers(unit, np.flatnonzero(inside), lattice)))
+        return Materials((*wall, *_lattice_layers(unit, mesh, np.flatnonzero(inside), lattice)))
     return Materials.neo_hooke(
         np.where(inside, m.lattice_modulus_MPa, membrane_MPa),
         np.where(inside, m.lattice_poisson, m.membrane_poisson),
@@ -68,18 +75,44 @@ def _skin_stiffening(unit: Unit, mesh: Mesh) -> Array:
     if p.skin_depth_mm == 0.0 or p.skin_factor == 1.0:
         return found
     struts = np.flatnonzero(mesh.region == LATTICE)
-    cell = StrutCell(d.kind, d.cell, d.junction_diameter / 2.0, d.midspan_diameter / 2.0)
     shape = shape_functions(even_points(_SKIN_STEPS), mesh.order)
     points = np.einsum("qn,mnd->mqd", shape, mesh.nodes[mesh.tets[struts]]).reshape(-1, 3)
     corner = np.array([d.cell / 2.0, d.cell / 2.0, 0.0])
-    depth = depth_below_surface(cell, points + corner).reshape(len(struts), -1)
+    depth = _depths(d, points, corner).reshape(len(struts), -1)
     found[struts] = 1.0 + (depth < p.skin_depth_mm).mean(axis=1) * (p.skin_factor - 1.0)
     return found
 
 
-def _lattice_layers(unit: Unit, elements: Array, law: LatticeLaw | None) -> tuple[Layer, ...]:
-    if law is not None:
-        return law.fill(elements)
+def _depths(d: Dimensions, points: Array, corner: Array) -> Array:
+    """Depths (n,) in mm below the struts' surface of points (n, 3) in mm; corner (3,): from cells' corners.
+
+    In graded struts those of an endless lattice of the point's own factor, in steps of _FACTOR.
+    """
+    if d.grading is None:
+        cell = StrutCell(d.kind, d.cell, d.junction_diameter / 2.0, d.midspan_diameter / 2.0)
+        return depth_below_surface(cell, points + corner)
+    found = np.zeros(len(points))
+    steps = np.rint(np.log(d.strut_factors(points)) / _FACTOR).astype(int)
+    for step in np.unique(steps):
+        radii = (
+            (diameter - d.strut_growth) * math.exp(step * _FACTOR) / 2.0 + d.strut_growth / 2.0
+            for diameter in (d.junction_diameter, d.midspan_diameter)
+        )
+        own = steps == step
+        found[own] = depth_below_surface(StrutCell(d.kind, d.cell, *radii), points[own] + corner)
+    return found
+
+
+def _lattice_layers(unit: Unit, mesh: Mesh, elements: Array, law: LatticeLaw | None) -> tuple[Layer, ...]:
+    """The lattice's layers in some elements (k,): a law's or of the unit's modulus, graded as the unit is."""
     m = unit.material
-    row = NeoHooke.parameters(m.lattice_modulus_MPa, m.lattice_poisson)
-    return (Layer(NeoHooke, elements, np.tile(row, (len(elements), 1))),)
+    if law is not None:
+        layers = law.fill(elements)
+    else:
+        row = NeoHooke.parameters(m.lattice_modulus_MPa, m.lattice_poisson)
+        layers = (Layer(NeoHooke, elements, np.tile(row, (len(elements), 1))),)
+    if not unit.grading.names:
+        return layers
+    d = unit.printed
+    moduli = relative_moduli(d, element_factors(d, mesh)[elements])
+    return tuple(attrs.evolve(f, weight=f.weight * law_weight(f.law, moduli)) for f in layers)

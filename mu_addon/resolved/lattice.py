@@ -16,11 +16,13 @@ from ..design.parameters import Unit
 from ..design.profile import outer_polygon, outer_radius, outer_slope
 from ..design.solid import QUALITY, lattice_solid
 from ..design.strut_cell import StrutCell
+from ..errors import InputError
 from ..fem.elements import even_points, reference_gradients, shape_functions, shape_gradients
 from ..homogenize.cell_mesh import CellMeshSettings, mesh_cell
 from ..meshing.mesh import FLIPPED_TET, Array, Mesh, mirror
 from ..meshing.surface import Surface, winding_number
 from ..meshing.tiling import tiled
+from .octants import graded_nodes
 from .strut import is_half_diagonal, strut_mesh
 
 Depth = Callable[[Array], Array]
@@ -51,6 +53,12 @@ def struts(
     """
     if body is not None:
         d = covering(d, body)
+    if d.grading is not None and not is_half_diagonal(d):
+        raise InputError(
+            f"graded struts of lattice {d.kind.name!r} are not meshed: only swept half diagonals can be",
+            "[lattice] kind, [grading]",
+            "choose body-centred or body-centred-straight, or leave the grading out",
+        )
     if is_half_diagonal(d):
         octant = strut_mesh(d, rings, layers)
     else:
@@ -68,6 +76,8 @@ def struts(
     mesh = attrs.evolve(right, nodes=nodes, tets=tets, symmetry=("x",))
     if full:
         mesh = mirror(mesh, "x")
+    if d.grading is not None:
+        mesh = attrs.evolve(mesh, nodes=graded_nodes(d, mesh.nodes))
     return filled_outside(mesh, cuts(d, body))
 
 

@@ -1,14 +1,18 @@
-"""What a waveguide does to the struts it meets, octant by octant: it thickens them or takes their place."""
+"""Struts that are not all alike, octant by octant: graded ones, and those that a waveguide meets."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
+import attrs
 import numpy as np
 
 from ..design.dimensions import Dimensions
 from ..design.lattice import Lattice, lattice_of
 from ..design.waveguide import Bar, strut_radii
+from ..errors import InputError
 from ..meshing.mesh import Array
-from .strut import radius_of, thickened
+from .strut import Radius, radius_of, thickened
 
 _STATIONS = np.linspace(0.0, 1.0, 33)
 
@@ -24,24 +28,71 @@ def thickened_nodes(d: Dimensions, bar: Bar, nodes: Array) -> Array:
     The struts are half diagonals of their cells, each alone in its octant (`strut_mesh`). Nodes between
     octants take the mean of their places in those whose struts are thickened.
     """
-    lattice, law = lattice_of(d), radius_of(d)
-    moved, count = np.zeros_like(nodes), np.zeros(len(nodes))
-    for strut in np.flatnonzero(_raised(lattice, bar)).tolist():
-        met = bar.met[strut : strut + 1]
+    lattice, plain = lattice_of(d), radius_of(d)
+
+    def laws(strut: int) -> tuple[Radius, Radius]:
+        one, met = _from_corner(lattice, strut), bar.met[strut : strut + 1]
         if not lattice.is_corner[lattice.struts[strut, 0]]:
             met = met[:, ::-1]
+        own = plain if lattice.factors is None else _radius(one)
+        return own, lambda t: strut_radii(one, met, bar.half, t)[0]
+
+    return _swept_again(lattice, np.flatnonzero(_raised(lattice, bar)).tolist(), laws, nodes)
+
+
+def graded_nodes(d: Dimensions, nodes: Array) -> Array:
+    """Nodes (n, 3) in mm of a lattice's struts that are alike everywhere where graded struts have them.
+
+    As `thickened_nodes`. Struts that meet have one radius at their node and nearly so beside it, so the mean
+    of places between octants is within rounding of either but for steep gradings. Raises InputError for
+    struts that fill their cell.
+    """
+    lattice, plain = lattice_of(d), radius_of(d)
+    assert lattice.factors is not None
+    widest = 2.0 * float(lattice.radii(_STATIONS).max())
+    if widest > 0.4 * d.cell:
+        raise InputError(
+            f"graded struts of {widest:.4g} mm fill their cell of {d.cell:g} mm",
+            "[grading]",
+            f"choose factors that give at most {0.4 * d.cell:g} mm",
+        )
+
+    def laws(strut: int) -> tuple[Radius, Radius]:
+        return plain, _radius(_from_corner(lattice, strut))
+
+    return _swept_again(lattice, range(len(lattice.struts)), laws, nodes)
+
+
+def _swept_again(
+    lattice: Lattice,
+    struts: Iterable[int],
+    laws: Callable[[int], tuple[Radius, Radius]],
+    nodes: Array,
+) -> Array:
+    """Nodes (n, 3) in mm of octants moved from one law of their strut's radius to another, both of `laws`."""
+    moved, count = np.zeros_like(nodes), np.zeros(len(nodes))
+    for strut in struts:
         inside, corner, sign = _octant(lattice, strut, nodes)
+        if not len(inside):
+            continue
         local = (nodes[inside] - corner) * sign
-
-        def radius(t: Array, met: Array = met) -> Array:
-            return strut_radii(lattice, met, bar.half, t)[0]
-
-        moved[inside] += corner + sign * thickened(d.cell / 2.0, local, law, radius) - nodes[inside]
+        law, other = laws(strut)
+        moved[inside] += corner + sign * thickened(lattice.cell / 2.0, local, law, other) - nodes[inside]
         count[inside] += 1.0
     found = nodes + moved / np.maximum(count, 1.0)[:, None]
     # Exactly where it was: what lies in a plane between octants stays there.
-    still = np.abs(found - nodes) < 1e-9 * d.cell
+    still = np.abs(found - nodes) < 1e-9 * lattice.cell
     return np.where(still, nodes, found)
+
+
+def _from_corner(lattice: Lattice, strut: int) -> Lattice:
+    """A lattice of one strut, from its cell's corner to the centre."""
+    ends = lattice.struts[strut : strut + 1]
+    return attrs.evolve(lattice, struts=ends if lattice.is_corner[ends[0, 0]] else ends[:, ::-1])
+
+
+def _radius(one: Lattice) -> Radius:
+    return lambda t: one.radii(t)[0]
 
 
 def in_replaced(d: Dimensions, bar: Bar, points: Array) -> Array:
@@ -55,7 +106,7 @@ def in_replaced(d: Dimensions, bar: Bar, points: Array) -> Array:
 
 def _raised(lattice: Lattice, bar: Bar) -> Array:
     """Whether each strut (E,) is thicker somewhere beside a waveguide than without it."""
-    more = strut_radii(lattice, bar.met, bar.half, _STATIONS) - lattice.radius(_STATIONS)
+    more = strut_radii(lattice, bar.met, bar.half, _STATIONS) - lattice.radii(_STATIONS)
     return np.asarray((more > 1e-9 * lattice.cell).any(axis=1))
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from scipy import sparse
 
 from ..design.dimensions import Dimensions
+from ..design.lattice import graded
 from ..errors import InputError
 from ..fem.kinematics import Probe
 from ..fem.materials import Materials
@@ -50,8 +51,16 @@ def bar_response(
     length = graph.lengths
     bars = [_bar_stiffness(d, modulus, poisson, float(step)) for step in length]
     replaced = length < 0.99 * d.cell  # half diagonals; steps along z have no strut
-    strut = _strut_stiffness(d, modulus, poisson, float(length[replaced].min())) if replaced.any() else 0.0
-    energy, modes = np.linalg.eigh(np.array([k - strut * r for k, r in zip(bars, replaced, strict=True)]))
+    if replaced.any():
+        span = float(length[replaced].min())
+        alike = _strut_stiffness(d, modulus, poisson, span) if d.grading is None else None
+        for step in np.flatnonzero(replaced).tolist():
+            strut = alike
+            if strut is None:
+                first, last = d.strut_factors(ends[step]).tolist()
+                strut = _strut_stiffness(d, modulus, poisson, span, first, last)
+            bars[step] = bars[step] - strut
+    energy, modes = np.linalg.eigh(np.array(bars))
     scaled = modes * np.sqrt(np.abs(energy))[:, None, :]
     states = loaded(trajectory, representative_pressures(trajectory))
     count, q = len(graph.nodes), 6 * len(graph.steps)
@@ -193,10 +202,14 @@ def _bar_stiffness(d: Dimensions, modulus: float, poisson: float, length: float)
     return _stiffness(t, modulus * area * one, shear * torsion * one, modulus * bending * one, length)
 
 
-def _strut_stiffness(d: Dimensions, modulus: float, poisson: float, length: float) -> Array:
-    """As `_bar_stiffness`, of a round strut."""
+def _strut_stiffness(
+    d: Dimensions, modulus: float, poisson: float, length: float, first: float = 1.0, last: float = 1.0
+) -> Array:
+    """As `_bar_stiffness`, of a round strut with these factors of a grading at its ends."""
     t = _clear(d, length)
     r = radius_of(d)(t)
+    if (first, last) != (1.0, 1.0):
+        r = graded(r, t, first, last, d.strut_growth / 2.0)
     bending = modulus * np.pi * r**4 / 4.0
     return _stiffness(t, modulus * np.pi * r**2, bending / (1.0 + poisson), bending, length)
 

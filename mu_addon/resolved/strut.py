@@ -80,9 +80,7 @@ def strut_mesh(d: Dimensions, rings: int, layers: int) -> Mesh:
 
 def is_half_diagonal(d: Dimensions) -> bool:
     """Whether the struts of a unit's lattice are the half diagonals of its cells."""
-    ends = d.kind.nodes[d.kind.struts]
-    half = np.abs(np.diff(ends, axis=1)) == 0.5
-    return bool(half.all() and len(ends) == 8)
+    return d.kind.is_half_diagonals
 
 
 def disc(rings: int) -> tuple[Array, Array]:

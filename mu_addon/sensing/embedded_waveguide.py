@@ -126,7 +126,7 @@ def embed_waveguide(bar: Bar, nodes: Array, d: Dimensions) -> EmbeddedWaveguide:
         points, s = np.vstack([points, bar.points[-1:]]), np.r_[s, corners[-1]]
         joint = np.r_[joint, joint[-1]]
     leg = np.searchsorted(corners, (s[1:] + s[:-1]) / 2, side="right") - 1
-    half = max(d.junction_diameter, d.waveguide_section) / 2
+    halves = np.maximum(d.junction_diameters(nodes), d.waveguide_section) / 2
     total = float(corners[-1])
     shape = WaveguideShape(
         d.waveguide_section,
@@ -134,7 +134,10 @@ def embed_waveguide(bar: Bar, nodes: Array, d: Dimensions) -> EmbeddedWaveguide:
         tuple(_along(bar.points, corners, well.centre) for well in bar.wells),
         d.well_width,
         d.well_depth,
-        tuple((max(0.0, at - half), min(total, at + half)) for at in at_nodes.tolist()),
+        tuple(
+            (max(0.0, at - half), min(total, at + half))
+            for at, half in zip(at_nodes.tolist(), halves.tolist(), strict=True)
+        ),
     )
     return EmbeddedWaveguide(shape, nodes, points, s, joint, bar.normals[leg])
 

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 
 from mu_addon.design import rules
+from mu_addon.design.grading import Grading
 from mu_addon.design.parameters import Chambers, Envelope, Unit, Waveguide
 from mu_addon.errors import InputError
 
@@ -28,6 +29,18 @@ BROKEN = [
     ("inlet boss on the base", "inlet_wall_mm", {"chambers": Chambers(inlet_wall_mm=4.3), "scale": 0.75}),
     ("struts narrow at junctions", "midspan_diameter_mm", {"lattice": Envelope(midspan_diameter_mm=1.4)}),
     ("open cells", "midspan_diameter_mm", {"lattice": Envelope(midspan_diameter_mm=8.9)}),
+    (
+        "open cells",
+        "base, lower",
+        {"lattice": Envelope(midspan_diameter_mm=5.0), "grading": Grading(base=1.9, lower=1.8)},
+    ),
+    ("graded cells within the lattice", "cells", {"grading": Grading(cells="0 3 1: 0.9")}),
+    ("graded cells within the lattice", "cells", {"grading": Grading(cells="* * 7: 0.9"), "scale": 0.75}),
+    (
+        "struts of some thickness",
+        "base, minus_y, cells",
+        {"grading": Grading(base=0.5, minus_y=0.5, cells="0 -1 1: 0.5"), "scale": 0.75},
+    ),
     ("anchors are lattice nodes outside the cavity", "row", {"waveguide": Waveguide(row=0)}),
     ("anchors are lattice nodes outside the cavity", "row", {"waveguide": Waveguide(row=3)}),
     ("anchors are lattice nodes outside the cavity", "row", {"waveguide": Waveguide(row=-2)}),

@@ -52,11 +52,12 @@ def test_each_step_is_made_once(stack):
     [
         ({"chambers__wall_mm": 1.0}, {"chambers", "membranes", "wells"}),  # no well reaches the cavity
         ({"chambers__inlet_length_mm": 7.0}, {"membranes"}),
-        ({"lattice__cells_y_plus": 3}, {"cells", "trim", "struts", "anchors", "path", "wells"}),
+        ({"lattice__cells_y_plus": 3}, {"cells", "trim", "grading", "struts", "anchors", "path", "wells"}),
         (
             {"lattice__midspan_diameter_mm": 2.1},
             {"struts", "wells"},
         ),  # struts' roots decide where wells lie open
+        ({"grading__tip": 0.9, "grading__cells": "1 * 2: 1.1"}, {"grading", "struts", "wells"}),
         ({"waveguide__row": -1, "waveguide__well_depth_mm": 0.5}, {"anchors", "path", "wells"}),
         ({"waveguide__end_mm": 2.0}, {"path", "wells"}),
         ({"waveguide__well_pitch_mm": 4.0}, {"wells"}),
@@ -130,6 +131,8 @@ def test_a_step_reads_nothing_that_is_not_in_its_key(monkeypatch):
             other = value * 1.001
         elif d.type is int:
             other = value + 2
+        elif d.type is str and not d.choices:
+            other = "0 1 1: 0.9"
         elif d.type is str:
             other = next(c for c in d.choices if c != value)
         bare = attrs.evolve(getattr(UNIT, section), **{name: other})
@@ -193,7 +196,9 @@ def test_muted_steps_pass_on_what_they_would_change():
     assert stack.counts == before
 
 
-@pytest.mark.parametrize("name", ["chambers", "membranes", "cells", "trim", "struts", "anchors", "wells"])
+@pytest.mark.parametrize(
+    "name", ["chambers", "membranes", "cells", "trim", "grading", "struts", "anchors", "wells"]
+)
 def test_no_solid_is_built_without_what_it_needs(name):
     with pytest.raises(InputError, match=f"without {name} is not the unit") as error:
         Stack().value("solid", StepInputs(UNIT, "alpha4", {name}))

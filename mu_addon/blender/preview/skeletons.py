@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...design.anchors import anchor_points, windows
 from ...design.block import FACES
-from ...design.lattice import Graph
+from ...design.lattice import Graph, Lattice
 from ...design.parameters import Unit
 from ...design.steps import Path, Section, Struts, TrimmedStruts, along
 from ...design.waveguide import Bar
@@ -104,7 +104,7 @@ def lattice(struts: Struts | None, cut: bool) -> Skeleton | None:
     ends, first, last = shown.ends[here], shown.first[here], shown.last[here]
     pieces = 1 if struts.lattice is None else ALONG_STRUT
     t = first[:, None] + (last - first)[:, None] * np.linspace(0.0, 1.0, pieces + 1)
-    radius = {} if struts.lattice is None else {"radius": struts.lattice.radius(t).ravel()}
+    radius = {} if struts.lattice is None else {"radius": struts.lattice.radii(t, shown.rows[here]).ravel()}
     edges = _polylines(len(ends), pieces + 1)
     return Skeleton(along(ends, t).reshape(-1, 3), edges, attributes=radius)
 
@@ -114,8 +114,14 @@ def anchor_skeleton(points: Floats | None, struts: Struts | None) -> Skeleton | 
     if points is None:
         return None
     thick = struts is not None and struts.lattice is not None
-    widest = max(struts.lattice.junction_radius, struts.lattice.midspan_radius) if thick else 0.8
+    widest = _widest(struts.lattice) if thick else 0.8
     return Skeleton(points, attributes={"radius": np.full(len(points), 1.24 * widest)})
+
+
+def _widest(struts: Lattice) -> float:
+    """Radius in mm of the widest strut."""
+    most = 1.0 if struts.factors is None else float(struts.factors.max())
+    return most * max(struts.junction_radius, struts.midspan_radius)
 
 
 def line_through(path: Path | None) -> Skeleton | None:

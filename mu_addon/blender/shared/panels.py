@@ -16,6 +16,7 @@ from ..unit.object import active_root
 PLACES = {
     "chambers": "design",
     "lattice": "lattice",
+    "grading": "grading",
     "waveguide": "path",
     "material": "simulate",
     "wall": "simulate",
@@ -131,6 +132,17 @@ def parameters(layout, root, place: str) -> None:
                     parameter(column, root, section.section, d)
     if folded:
         _folded(layout, root, place, folded)
+
+
+def folded_section(layout, root, section: str, title: str, hint: str) -> None:
+    """A fold with a section that has a place of its own; its head is red while one of its fields is."""
+    header, body = layout.panel(f"MU_{section}", default_closed=True)
+    found = broken(root)
+    header.alert = found is not None and any(place[0] == section for place in found.fits)
+    header.label(text=title, icon="ERROR" if header.alert else "NONE")
+    if body:
+        wrapped(body, hint, "INFO")
+        parameters(body, root, section)
 
 
 def _folded(layout, root, place: str, fields: Sequence[tuple[str, Description]]) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ...design.nearest import tied
 from ...design.quantity import Description, describe
@@ -28,6 +28,9 @@ _NAMES = {
     "cells_y_minus": "Cells -Y",
     "cells_y_plus": "Cells +Y",
     "allow_symmetric": "Allow Symmetry",
+    "minus_y": "-Y Side",
+    "plus_y": "+Y Side",
+    "beside_x": "X Sides",
 }
 """Parameters whose own names say too little beside a field."""
 
@@ -62,6 +65,8 @@ def blender_property(d: Description, update=None, options=frozenset()):
             (name, name.replace("-", " ").capitalize(), textwrap.shorten(d.text, 60)) for name in d.choices
         ]
         return EnumProperty(items=items, default=d.default, **shared)
+    if d.type is str:
+        return StringProperty(default=d.default, **shared)
     if d.type is bool:
         return BoolProperty(default=d.default, **shared)
     if d.type is int:

@@ -7,9 +7,11 @@ import bpy
 from ..body import panel as body_panel
 from ..gripper import object as gripper_object
 from ..shared.operators import NO_UNIT, linked
-from ..shared.panels import CHARACTERS, TabPanel, UnitPanel, parameters, wrapped
+from ..shared.panels import CHARACTERS, TabPanel, UnitPanel, folded_section, parameters, wrapped
 from . import figures
 from . import object as unit_object
+
+GRADED = "Factors on the struts' diameters; they multiply, and 1 leaves struts as they are"
 
 
 class MU_PT_unit(TabPanel, bpy.types.Panel):
@@ -82,6 +84,7 @@ class MU_PT_lattice(UnitPanel, bpy.types.Panel):
     def show(self, layout, context, root):
         envelope = root.mu_unit.envelope
         parameters(layout, root, "lattice")
+        folded_section(layout, root, "grading", "Grading", GRADED)
         if envelope is not None:
             wrapped(layout, f"The lattice fills {envelope.name}; counts of cells are not used", "INFO")
         body_panel.draw(layout, root)

@@ -11,7 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..anchors import Window
+from ..dimensions import Dimensions
+from ..lattice import graph_of
 from ..parameters import Unit
+from ..profile import outer_radius
 from ..surface import Triangles, Vertices, stl_bytes, stl_surface, volume
 from ..waveguide import waveguide
 from . import faces
@@ -280,15 +283,20 @@ def _flat(extent: Array, room_mm: tuple[float, float, float]) -> float:
 def _drawing(unit: Unit, window: Window | None, printer: Printer) -> list[Finding]:
     """What the drawing's own figures say, with the printer's offsets that the unit knows."""
     d, printed = unit.dimensions, unit.printed
+    strut, where, place = d.junction_diameter, "junctions", NOWHERE
+    if d.grading is not None:
+        strut, place = _thinnest_junctions(d)
+        where = "thinnest junctions of the grading"
     found = [
         at_least(
             "thinnest strut",
-            d.junction_diameter,
+            strut,
             printer,
             "strut_mm",
-            f"struts of {d.junction_diameter:.3g} mm at the junctions; they scale with the unit down to "
-            f"{unit.scale * printer['strut_mm'] / d.junction_diameter:.2f}x",
+            f"struts of {strut:.3g} mm at the {where}; they scale with the unit down to "
+            f"{unit.scale * printer['strut_mm'] / strut:.2f}x",
             "warning",
+            place,
             remedy="keep the strut diameter constant below that scale, or print at a larger scale",
         )
     ]
@@ -319,6 +327,14 @@ def _drawing(unit: Unit, window: Window | None, printer: Printer) -> list[Findin
             ),
         ]
     return found
+
+
+def _thinnest_junctions(d: Dimensions) -> tuple[float, Array]:
+    """Least diameter in mm of struts at nodes outside the actuator, and those nodes (n, 3) in mm."""
+    nodes = graph_of(d).nodes
+    nodes = nodes[np.hypot(nodes[:, 0], nodes[:, 1]) > outer_radius(d, nodes[:, 2])]
+    diameters = d.junction_diameters(nodes)
+    return float(diameters.min()), nodes[diameters <= diameters.min() * (1.0 + 1e-9)]
 
 
 def _step(wanted: float, vertices: Vertices) -> float:

@@ -52,14 +52,18 @@ def _ancestors(names: Iterable[str]) -> set[str]:
 
 
 def _sources(step: Step) -> tuple[str, ...]:
-    """Steps that a step's node is linked to: those before it, and those whose parameters it reads besides."""
+    """Steps that a step's node is linked to: those before it, and those whose parameters it reads besides.
+
+    What comes through another of them is linked once.
+    """
     known = _ancestors(step.after)
     more = [
         other.name
         for other in STEPS.values()
         if other.name not in known and other.name != step.name and set(other.own) & set(step.reads)
     ]
-    return (*step.after, *more)
+    through = {name for other in more for name in _ancestors(STEPS[other].after)}
+    return (*step.after, *(name for name in more if name not in through))
 
 
 def _needs_path(name: str) -> bool:

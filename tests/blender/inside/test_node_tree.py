@@ -91,10 +91,10 @@ def test_links_of_every_type_are_valid_where_the_core_takes_them_and_red_with_a_
 
 def test_a_wrong_link_mended_is_valid_again_and_a_circle_is_named():
     tree = new("unit")
-    wrong = link(tree, "Cells", "cells", "Struts", "trim")
-    assert states(tree)["Struts"] == "failed"
+    wrong = link(tree, "Cells", "cells", "Grading", "trim")
+    assert states(tree)["Grading"] == "failed"
     assert not wrong.is_valid
-    good = link(tree, "Trim", "trim", "Struts", "trim")
+    good = link(tree, "Trim", "trim", "Grading", "trim")
     assert states(tree)["Assemble Unit"] in ("cached", "computed")
     assert good.is_valid
     walls = new("three-walls")
@@ -179,11 +179,11 @@ def test_a_group_is_its_nodes_used_twice_it_is_two_and_taken_apart_it_is_as_befo
     tree = new("unit")
     before = conversion.to_tree(tree)
     state.refresh(tree)
-    node = groups.make_group(tree, [tree.nodes[name] for name in ("Cells", "Trim", "Struts")])
+    node = groups.make_group(tree, [tree.nodes[name] for name in ("Cells", "Trim", "Grading", "Struts")])
     assert [s.name for s in node.inputs] == ["Profile"]
     assert sorted(s.name for s in node.outputs) == ["Cells", "Struts"]
     found = state.refresh(tree)
-    assert {"Group/Cells", "Group/Trim", "Group/Struts"} <= set(found)
+    assert {"Group/Cells", "Group/Trim", "Group/Grading", "Group/Struts"} <= set(found)
     assert {s.state for s in found.values()} <= {"cached", "computed"}
     # An error inside shows on the group, too.
     inner = node.node_tree.nodes["Struts"]
@@ -198,7 +198,7 @@ def test_a_group_is_its_nodes_used_twice_it_is_two_and_taken_apart_it_is_as_befo
     state.refresh(tree)
     assert f"{other.name}/Cells" in conversion.to_tree(tree).nodes
     tree.nodes.remove(other)
-    own = {n: node.node_tree.nodes[n] for n in ("Cells", "Trim", "Struts")}
+    own = {n: node.node_tree.nodes[n] for n in ("Cells", "Trim", "Grading", "Struts")}
     defaults = {s.name: s.description.default for s in definitions()["struts"].settings}
     for name in ("junction_diameter_mm", "midspan_diameter_mm"):
         setattr(own["Struts"], name, defaults[name])
@@ -213,7 +213,7 @@ def test_groups_and_evaluation_are_operators_of_the_editor():
     tree = new("unit")
     with editor(tree):
         for node in tree.nodes:
-            node.select = node.name in ("Cells", "Trim", "Struts")
+            node.select = node.name in ("Cells", "Trim", "Grading", "Struts")
         assert bpy.ops.mu.node_group_make() == {"FINISHED"}
         (group,) = (node for node in tree.nodes if node.bl_idname == classes.GROUP)
         assert bpy.ops.mu.node_group_edit(node=group.name) == {"FINISHED"}

@@ -78,6 +78,8 @@ def test_every_parameter_of_the_core_is_a_property():
                 assert p.default == d.default
             elif d.type is bool:
                 assert p.type == "BOOLEAN"
+            elif d.type is str:
+                assert (p.type, p.default) == ("STRING", d.default)
             else:
                 assert abs(p.hard_min - d.low) < 1e-6
                 assert abs(p.hard_max - d.high) < 1e-3

@@ -1,0 +1,255 @@
+"""Graded struts: a field of factors on the struts' diameters over the envelope, from a few parameters.
+
+The factor at a point is the product of four: along the axis, linear between five values; across y, from 1
+on the axis to a value at either side; across x, from 1 in the bending plane to a value at both sides; and
+factors of single cells, which hold at the cells' centres and are interpolated between them. Struts take it at
+their nodes (`lattice.Lattice`). It is its own mirror image across x = 0, as the unit is.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from .quantity import quantity, text_quantity
+
+Array = NDArray[np.float64]
+
+LEAST, MOST = 0.5, 2.0
+"""Bounds of every single factor; a strut of 1.5 mm is printable (1.0 mm) down to 0.67."""
+
+ALONG_Z = ("base", "lower", "middle", "upper", "tip")
+"""Parameters along the axis, evenly spaced from the middle of the first chamber to that of the last."""
+
+_NONE = "assumed: the paper's struts are alike everywhere"
+
+
+def _factor(text: str) -> Any:
+    return quantity(1.0, "", LEAST, MOST, f"factor on the struts' diameters {text}", _NONE)
+
+
+class CellFactor(NamedTuple):
+    """The factor of an entry's cells: column |i| across x, row j across y, chamber k along z; None is all."""
+
+    i: int | None
+    j: int | None
+    k: int | None
+    factor: float
+
+
+def parsed(text: str) -> tuple[CellFactor, ...]:
+    """The entries of a text such as "0 2 3: 0.8; * * 5: 1.2", in one order. Raises InputError.
+
+    An entry is a cell's column, row and chamber, each a whole number or * for all, and its factor. Columns
+    count from 0 in the bending plane to either side alike, rows from 0 on the axis toward +y, chambers from 1
+    at the inlet.
+    """
+    found: dict[tuple[int | None, int | None, int | None], float] = {}
+    for entry in text.split(";"):
+        if not entry.strip():
+            continue
+        match = re.fullmatch(r"\s*(\*|\d+)\s+(\*|-?\d+)\s+(\*|\d+)\s*:\s*(\S+)\s*", entry)
+        try:
+            factor = float(match[4]) if match else math.nan
+        except ValueError:
+            factor = math.nan
+        if match is None or not math.isfinite(factor):
+            raise _refused(
+                f"{entry.strip()!r} is no entry of cells", 'write column, row and chamber: "0 2 3: 0.8"'
+            )
+        if not LEAST <= factor <= MOST:
+            raise _refused(
+                f"the factor {factor:g} of {entry.strip()!r} is out of bounds",
+                f"choose a value from {LEAST:g} to {MOST:g}",
+            )
+        i, j, k = (None if word == "*" else int(word) for word in match.groups()[:3])
+        if (i, j, k) in found:
+            raise _refused(f"cells lists {entry.strip().split(':')[0]!r} twice", "give each entry once")
+        found[i, j, k] = factor
+    order = sorted(found, key=lambda key: tuple((n is not None, n or 0) for n in key))
+    return tuple(CellFactor(*key, found[key]) for key in order if found[key] != 1.0)
+
+
+def cells_text(entries: Iterable[CellFactor]) -> str:
+    """The text of entries, as `parsed` takes it.
+
+    >>> cells_text([CellFactor(0, 2, None, 0.8)])
+    '0 2 *: 0.8'
+    """
+
+    def word(number: int | None) -> str:
+        return "*" if number is None else str(number)
+
+    return "; ".join(f"{word(i)} {word(j)} {word(k)}: {float(factor)!r}" for i, j, k, factor in entries)
+
+
+def _canonical(text: str) -> str:
+    return cells_text(parsed(text))
+
+
+def _refused(what: str, remedy: str) -> InputError:
+    return InputError(what, "[grading] cells", remedy)
+
+
+@attrs.frozen
+class Grading:
+    """Section [grading]: factors on the struts' diameters at junctions and at mid-span, over the envelope.
+
+    They multiply. All are 1 by default: struts alike everywhere. `names` are the parameters that differ.
+    """
+
+    section: ClassVar[str] = "grading"
+
+    base: float = _factor("in the middle of the first chamber and below")
+    lower: float = _factor("a quarter of the way from the first chamber's middle to the last's")
+    middle: float = _factor("half way up")
+    upper: float = _factor("three quarters of the way up")
+    tip: float = _factor("in the middle of the last chamber and above")
+    minus_y: float = _factor("in the outermost cells on the -y side, over those on the axis")
+    plus_y: float = _factor("in the outermost cells on the +y side, over those on the axis")
+    beside_x: float = _factor("in the outermost cells across x, over those in the bending plane")
+    cells: str = text_quantity(
+        "",
+        _canonical,
+        'factors of single cells besides, as "column row chamber: factor; ..." with * for all; columns '
+        "count from the bending plane to both sides alike, rows from the axis toward +y, chambers from 1 at "
+        "the inlet",
+        _NONE,
+    )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters that differ from their default; empty for struts alike everywhere."""
+        return tuple(f.name for f in attrs.fields(Grading) if getattr(self, f.name) != f.default)
+
+    @cached_property
+    def entries(self) -> tuple[CellFactor, ...]:
+        """The entries of `cells`."""
+        return parsed(self.cells)
+
+
+@attrs.frozen
+class Field:
+    """The factors of a grading over an envelope; lengths in mm.
+
+    cell: edge of a cell; count: of chambers; half_x, y_minus, y_plus: cells beside that on the axis. Beyond
+    this envelope, as in a user-defined body, the outermost values go on.
+    """
+
+    grading: Grading
+    cell: float
+    count: int
+    half_x: int
+    y_minus: int
+    y_plus: int
+
+    def at(self, points: ArrayLike) -> Array:
+        """Factors (n,) at points (n, 3) in mm.
+
+        >>> Field(Grading(tip=0.8), 10.0, 3, 1, 1, 2).at([[0.0, 0.0, 22.5]]).tolist()
+        [0.9]
+        """
+        p = np.asarray(points, float)
+        g = self.grading
+        found = np.ones(len(p))
+        for weights, values in zip(self._weights(p), self._values, strict=True):
+            if any(value != 1.0 for value in values):
+                found *= weights @ np.array(values)
+        return found * self._of_cells(p) if g.entries else found
+
+    def derivatives(self, points: ArrayLike) -> dict[str, Array]:
+        """Derivative (n,) of the factor at points (n, 3) in mm by each parameter but `cells`, by its name."""
+        p = np.asarray(points, float)
+        whole, found = self.at(p), {}
+        for names, weights, values in zip(_NAMES, self._weights(p), self._values, strict=True):
+            own = weights @ np.array(values)
+            for name, column in zip(names, weights.T, strict=True):
+                if name:
+                    found[name] = whole / own * column
+        return found
+
+    def cell_share(self, points: ArrayLike, i: int | None, j: int | None, k: int | None) -> Array:
+        """Weight (n,), 0 to 1, of the cells of an entry at points (n, 3) in mm; indices as `CellFactor` has.
+
+        The derivative of the factor by such an entry's, where the cells have no other.
+        """
+        table = np.zeros((self.half_x + 1, self.y_minus + self.y_plus + 1, self.count))
+        table[self._cells_of(i, j, k)] = 1.0
+        return self._interpolated(table, np.asarray(points, float))
+
+    @property
+    def _values(self) -> tuple[tuple[float, ...], ...]:
+        g = self.grading
+        along = tuple(getattr(g, name) for name in ALONG_Z)
+        return along, (g.minus_y, 1.0, g.plus_y), (1.0, g.beside_x)
+
+    def _weights(self, p: Array) -> tuple[Array, Array, Array]:
+        """Shares of the values along z (n, 5), across y (n, 3) and across x (n, 2) at points (n, 3)."""
+        u = self.cell
+        rows = np.linspace(0.5, self.count - 0.5, len(ALONG_Z)) * u
+        return (
+            _hats(rows, p[:, 2]),
+            _hats(np.array([-self.y_minus * u, 0.0, self.y_plus * u]), p[:, 1]),
+            _hats(np.array([0.0, self.half_x * u]), np.abs(p[:, 0])),
+        )
+
+    @cached_property
+    def _table(self) -> Array:
+        """Product of the entries in each cell: columns from the bending plane, rows from -y, chambers."""
+        table = np.ones((self.half_x + 1, self.y_minus + self.y_plus + 1, self.count))
+        for i, j, k, factor in self.grading.entries:
+            table[self._cells_of(i, j, k)] *= factor
+        return table
+
+    def _cells_of(self, i: int | None, j: int | None, k: int | None) -> tuple[Any, Any, Any]:
+        return (
+            slice(None) if i is None else i,
+            slice(None) if j is None else j + self.y_minus,
+            slice(None) if k is None else k - 1,
+        )
+
+    def _of_cells(self, p: Array) -> Array:
+        return self._interpolated(self._table, p)
+
+    def _interpolated(self, table: Array, p: Array) -> Array:
+        """Values of cells, at their centres, linear along each axis between them; (n,) at points (n, 3)."""
+        u = self.cell
+        place = np.stack([np.abs(p[:, 0]) / u, p[:, 1] / u + self.y_minus, p[:, 2] / u - 0.5], axis=1)
+        place = np.clip(place, 0.0, np.array(table.shape) - 1.0)
+        low = np.minimum(place.astype(int), np.maximum(np.array(table.shape) - 2, 0))
+        share = place - low
+        found = np.zeros(len(p))
+        for corner in np.ndindex(2, 2, 2):
+            weight = np.prod(np.where(corner, share, 1.0 - share), axis=1)
+            at = np.minimum(low + corner, np.array(table.shape) - 1)
+            found += weight * table[tuple(at.T)]
+        return found
+
+    def misplaced(self) -> str:
+        """The first entry of `cells` that names no cell of the envelope, as text; "" where all do."""
+        for entry in self.grading.entries:
+            i, j, k, _ = entry
+            inside = (
+                (i is None or i <= self.half_x)
+                and (j is None or -self.y_minus <= j <= self.y_plus)
+                and (k is None or 1 <= k <= self.count)
+            )
+            if not inside:
+                return cells_text([entry])
+        return ""
+
+
+_NAMES = (ALONG_Z, ("minus_y", "", "plus_y"), ("", "beside_x"))
+
+
+def _hats(places: Array, at: Array) -> Array:
+    """Shares (n, m) of ascending places (m,) in linear interpolation at (n,), constant beyond both ends."""
+    return np.stack([np.interp(at, places, row) for row in np.eye(len(places))], axis=1)
