@@ -198,7 +198,9 @@ class Effect:
 
     parameters: the first is its size, whose null switches the effect off exactly; the others give its shape.
     mechanism, reveals: in words, of `LIBRARY` and `SHOWN_BY` where not given. whose: the one specimen or
-    experiment that has it, "specimen B"; empty where all have. Raises InputError for a name not in `LIBRARY`.
+    experiment that has it, "specimen B"; empty where all have. among: what differs in it, "specimen",
+    each with a parameter of its own; spread: their standard deviation, in the parameters' unit, with its 95 %
+    interval. Raises InputError for a name not in `LIBRARY`.
     """
 
     name: str
@@ -207,6 +209,8 @@ class Effect:
     mechanism: str = attrs.field()
     reveals: str = attrs.field()
     whose: str = ""
+    among: str = ""
+    spread: tuple[float, float, float] = (math.nan, math.nan, math.nan)
 
     @mechanism.default
     def _of_library(self) -> str:
@@ -235,6 +239,8 @@ class Effect:
     @property
     def title(self) -> str:
         """Its name, and whose it is."""
+        if self.among:
+            return f"{self.name} among {self.among}s"
         return f"{self.name}{OF}{self.whose}" if self.whose else self.name
 
     def starts(self) -> tuple[dict[str, float], ...]:

@@ -252,7 +252,6 @@ class _Plan:
     pressures_kPa: tuple[float, ...]
     markers: tuple[Marker, ...]
     channels: tuple[str, ...]
-    with_flat_obstacle: bool
 
     @classmethod
     def of(
@@ -284,7 +283,6 @@ class _Plan:
             pressures(readings, settings.pressures, settings.margin),
             markers,
             tuple(c for c in known if c in measured),
-            CONTACT in settings.effects,
         )
 
     @property
@@ -299,11 +297,15 @@ class _Plan:
     def case(
         self, effect: str = "", size: float = 0.0, orientation: tuple[float, Direction] = (0.0, X)
     ) -> Run:
-        """A run of an effect whose size is that at 1.0x, of the base where none is named."""
+        """A run of an effect whose size is that at 1.0x, of the base where none is named.
+
+        The base's outline is kept whether or not walls are asked for, so that one run serves both.
+        """
         points = tuple(tuple((m.point / self.enlarged).tolist()) for m in self.markers)
         turn, axis = orientation
         body = attrs.evolve(self.body, orientation_deg=turn, orientation_axis=axis)
-        return Run(body, self.pressures_kPa, points, effect, size, not effect and self.with_flat_obstacle)
+        outline = not effect and not self.held
+        return Run(body, self.pressures_kPa, points, effect, size, outline)
 
     def runs(self, settings: UnitSettings) -> Iterator[Run]:
         """The base first, then what takes longest."""

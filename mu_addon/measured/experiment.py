@@ -46,6 +46,7 @@ class Experiment:
     scale: float = 1.0
     orientation_deg: float = 0.0
     specimen: str = ""
+    session: str = ""
     temperature_C: float = math.nan
     source: str = ""
     run_order: float | None = None

@@ -172,6 +172,7 @@ def _described(entry: dict[str, Any], kind: Kind, at: _Place) -> dict[str, Any]:
         "name": _word(entry, "name", at),
         "role": _choice(entry, "role", ROLES, at),
         "specimen": _word(entry, "specimen", at) if "specimen" in entry else "",
+        "session": _word(entry, "session", at) if "session" in entry else "",
         "source": _word(entry, "source", at) if "source" in entry else "",
         "scale": _number(entry.get("scale", 1.0), "scale", at, 0.01, 100.0),
         "orientation_deg": _number(entry.get("orientation_deg", 0.0), "orientation_deg", at, -360.0, 360.0),

@@ -61,6 +61,7 @@ COMMON = (
     "scale",
     "orientation_deg",
     "specimen",
+    "session",
     "temperature_C",
     "source",
 )
