@@ -119,8 +119,8 @@ def select_pooled(
 ) -> Selection:
     """A selection that explains too little, with the effect in which owners differ that explains it.
 
-    Unchanged where there is none. The chance of a false name is that of a spread at its bound of 0 (half a
-    chi squared of one degree), times the number of effects and groupings that were tried. What every second
+    Unchanged where there is none. The false-positive probability is that of a spread at its bound of 0 (half
+    a chi squared of one degree), times the number of effects and groupings that were tried. What every second
     quarter of the records tells of each owner must predict the other quarters. Rivals are other effects, or
     groupings, whose likelihood is as good.
     """

@@ -115,8 +115,11 @@ def _first_look(
 
     It knows instruments and what acts in time, and no weight, walls or print: those have simulations of their
     own, most of the time that a verdict on a unit takes. Told as a stage, and kept in summary.json; what
-    stands in verdict.json is the verdict with all of them.
+    stands in verdict.json is the verdict with all of them. A run that goes on, whose simulations were begun,
+    has had it.
     """
+    if any((folder / "cache").glob("unit*")):
+        return None
     experiments = [e for e in job.measured.experiments if e.kind in OF_A_UNIT and e.kind not in LATER]
     if not any(e.role == "fit" for e in experiments):
         return None
