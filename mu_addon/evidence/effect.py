@@ -78,6 +78,10 @@ LIBRARY = {
         "the camera's lens distorts its picture",
         "a calibration pattern; the camera from farther away",
     ),
+    "inertia": (
+        "the unit's mass swings after each change of pressure",
+        "the same steps through a narrower line; a ballast on the tip lengthens its period",
+    ),
     "clock_offset": ("the clocks of camera and gauge differ", "steps and fast cycles"),
     "seating": (
         "gaps at the specimen's faces close before it carries load",
@@ -118,6 +122,14 @@ SHOWN_BY = {
     ("pressure_gain", "pressure_hold"): "a second gauge beside the first",
     ("pressure_offset", "pressure_hold"): "the gauge open to the air before and after",
     ("temperature_drift", "pressure_hold"): "the same hold with the chamber's temperature recorded",
+    ("line_lag", "pressure_step"): "the same steps with the gauge at the unit's end of the line",
+    ("viscoelasticity", "pressure_step"): "one step held for two decades of time longer",
+    ("leak", "pressure_step"): "the valve shut after the step: what falls is the leak",
+    ("gravity", "unit_pose"): "a full turn about x at two pressures",
+    ("pressure_offset", "blocked_force"): "the gauge open to the air before and after",
+    ("seating", "blocked_force"): "the tip run up to the load cell until it reads, before any pressure",
+    ("frame_compliance", "blocked_force"): "a dead weight hung from the load cell, its stand watched",
+    ("viscoelasticity", "blocked_force"): "the tip blocked at a larger gap, held for two decades of time",
     ("overcure", "unit_pressure"): "the wall of a unit cut open",
     ("wall_thickness", "unit_pressure"): "the wall of a unit cut open",
     ("skin_cure", "unit_pressure"): "coupons of several thicknesses, of the same print",
@@ -186,7 +198,9 @@ class Effect:
 
     parameters: the first is its size, whose null switches the effect off exactly; the others give its shape.
     mechanism, reveals: in words, of `LIBRARY` and `SHOWN_BY` where not given. whose: the one specimen or
-    experiment that has it, "specimen B"; empty where all have. Raises InputError for a name not in `LIBRARY`.
+    experiment that has it, "specimen B"; empty where all have. among: what differs in it, "specimen",
+    each with a parameter of its own; spread: their standard deviation, in the parameters' unit, with its 95 %
+    interval. Raises InputError for a name not in `LIBRARY`.
     """
 
     name: str
@@ -195,6 +209,8 @@ class Effect:
     mechanism: str = attrs.field()
     reveals: str = attrs.field()
     whose: str = ""
+    among: str = ""
+    spread: tuple[float, float, float] = (math.nan, math.nan, math.nan)
 
     @mechanism.default
     def _of_library(self) -> str:
@@ -223,6 +239,8 @@ class Effect:
     @property
     def title(self) -> str:
         """Its name, and whose it is."""
+        if self.among:
+            return f"{self.name} among {self.among}s"
         return f"{self.name}{OF}{self.whose}" if self.whose else self.name
 
     def starts(self) -> tuple[dict[str, float], ...]:

@@ -115,7 +115,7 @@ def extended_model(verdict: Verdict, units: Mapping[str, str] = MappingProxyType
     effects = {
         e.name: {p.name: fitted(k, p.unit) for k, p in zip(e.keys, e.parameters, strict=True)}
         for e in fit.effects
-        if not e.whose
+        if not (e.whose or e.among)
     }
     nuisances = {k: fitted(k, units.get(k, "")) for k in fit.keys if "." not in k}
     return ExtendedModel(verdict.kind, effects, nuisances)

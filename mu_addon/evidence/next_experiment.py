@@ -18,6 +18,9 @@ from .sensitivity import Sensitivity
 
 Array = np.ndarray[Any, Any]
 
+# By how much farther a load cell is put from the tip.
+FURTHER_mm = 2.0
+
 
 @attrs.frozen
 class Proposal:
@@ -96,6 +99,14 @@ def _variations(made: Sequence[Experiment]) -> list[Experiment]:
             for phi in (0.0, 90.0, 180.0)
             if phi != e.orientation_deg
         ]
+        if e.kind == "blocked_force":
+            found.append(
+                attrs.evolve(
+                    e,
+                    name=f"{e.name!r} with the tip free to {FURTHER_mm:g} mm more",
+                    gap_mm=e.gap_mm + FURTHER_mm,
+                )
+            )
     return found
 
 

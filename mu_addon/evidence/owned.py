@@ -51,6 +51,7 @@ OF_NONE = frozenset(("mesh_error", "gravity"))
 # Most effects fitted, those first that promise most.
 MOST_FITS = 12
 CHANGE = Parameter("change", "", -0.5, 1.0, 0.0, (0.1,), "prints and batches differ by 5 to 20 %")
+BATCH_EFFECT = Effect(BATCH, (CHANGE,), ())
 
 
 def owned_effects(effects: Sequence[Effect], experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
@@ -59,7 +60,7 @@ def owned_effects(effects: Sequence[Effect], experiments: Sequence[Experiment]) 
     With them comes what most often tells specimens apart, another modulus of one of them (`BATCH`).
     """
     kinds = tuple(dict.fromkeys(e.kind for e in experiments))
-    batch = Effect(BATCH, (CHANGE,), kinds)
+    batch = attrs.evolve(BATCH_EFFECT, kinds=kinds)
     found = []
     for effect in (*effects, batch):
         if effect.name in OF_NONE:
@@ -72,13 +73,16 @@ def owned_effects(effects: Sequence[Effect], experiments: Sequence[Experiment]) 
 
 
 def _owners(name: str, experiments: Sequence[Experiment]) -> dict[str, list[str]]:
-    """Names of experiments by what they belong to, "specimen B" or "experiment hold 2"."""
+    """Names of experiments by what they belong to, "specimen B", "session 2" or "experiment hold 2"."""
     found: dict[str, list[str]] = {}
     if name not in OF_THE_BENCH:
         for e in experiments:
             if e.specimen:
                 found.setdefault(f"specimen {e.specimen}", []).append(e.name)
     if name in OF_THE_BENCH or name in OF_EITHER:
+        for e in experiments:
+            if e.session and name in OF_THE_BENCH:
+                found.setdefault(f"session {e.session}", []).append(e.name)
         alone = {members[0] for members in found.values() if len(members) == 1}
         found |= {f"experiment {e.name}": [e.name] for e in experiments if e.name not in alone}
     return found

@@ -50,3 +50,32 @@ def ringing(time_s: Array, still: Array, hertz: Array, damping: Array) -> Array:
         z = keeps[i] * z + still[i, :, None] * stays[i] + (still[i + 1] - still[i])[:, None] * grows[i]
         found[i + 1] = scale * z.imag - still[i + 1, :, None]
     return found
+
+
+def swinging(time_s: Array, still: Array, hertz: float, damping: float) -> Array:
+    """Signals (c, n) of a mode that is driven, of those without inertia (c, n), in the signals' unit.
+
+    As `ringing`, whose result is what this adds to `still`, for one mode: exact for signals linear between
+    their samples, from rest. time_s (n,): ascending, in s; hertz: undamped; damping: share of the critical
+    one, below 1.
+    """
+    w = 2.0 * math.pi * hertz
+    rate = w * (-damping + 1j * math.sqrt(1.0 - damping**2))
+    h = np.diff(time_s)
+    keeps = np.exp(rate * h)
+    # For steps much shorter than a period the difference of nearly equal numbers would lose its digits.
+    x = rate * h
+    small = np.abs(x) < 1e-3
+    safe = np.where(small, 1.0, x)
+    stays = np.where(small, h * (1.0 + x / 2.0 + x**2 / 6.0), (keeps - 1.0) / rate)
+    grows = np.where(small, h * (0.5 + x / 6.0 + x**2 / 24.0), h * (keeps - 1.0 - x) / safe**2)
+    driven = still[:, :-1] * stays + np.diff(still, axis=1) * grows
+    steps, found = keeps.tolist(), np.empty_like(still)
+    for row, source in enumerate(driven.tolist()):
+        z = complex(-still[row, 0] / rate)
+        places = [z]
+        for keep, drive in zip(steps, source, strict=True):
+            z = keep * z + drive
+            places.append(z)
+        found[row] = w / math.sqrt(1.0 - damping**2) * np.array(places).imag
+    return found

@@ -135,7 +135,11 @@ class Composite:
         """The values that the experiment's simulator knows, and those of its specimen by their plain keys."""
         knows = self._knows[experiment.kind]
         own = {k: v for k, v in values.items() if k in knows and self._heeds(experiment, k)}
-        owners = (f"specimen {experiment.specimen}", f"experiment {experiment.name}")
+        owners = (
+            f"specimen {experiment.specimen}",
+            f"session {experiment.session}",
+            f"experiment {experiment.name}",
+        )
         for key, value in values.items():
             plain, _, whose = key.partition(OF)
             if key in own or whose not in owners:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -14,32 +13,30 @@ import attrs
 import numpy as np
 
 from ..design.parameters import Unit
-from ..design.quantity import in_MPa
-from ..errors import ConvergenceError, InputError, MeshingError
-from ..fem.equilibrium import Equilibrium
-from ..fem.kinematics import TipSection
+from ..errors import ConvergenceError, InputError
 from ..fem.lattice_law import LatticeLaw
-from ..fem.state import State
-from ..fem.trajectory import branches
 from ..measured import Experiment
+from ..measured.pose import Direction, X
 from ..meshing.mesh import AXES
 from ..meshing.settings import RESOLVED, MeshSettings
 from ..resolved.unit import mesh_of
 from ..run.cache import Cache
 from ..run.pool import each
 from ..run.processes import cores
-from .markers import Marker, attached, material_points
+from .markers import Marker, attached
+from .prediction import blocked_force, pose, step
 from .prediction.flat_obstacle import NAME as CONTACT
 from .prediction.flat_obstacle import NEAREST, ObstacleResponse
 from .prediction.unit import KIND, UnitResponse, Variant
-from .unit_effects import EFFECTS, FLAT_OBSTACLE, Body, UnitEffect, with_flat_obstacle
+from .unit_effects import EFFECTS, HELD, Body
+from .unit_run import Result, Run, effect_of, run
 
 Array = np.ndarray[Any, Any]
 Progress = Callable[[str, float], None]
 
-# Part of every key: raise it when a change of the code changes what is computed.
-REVISION = 3
-ANGLE, VOLUME = "angle_deg", "volume_mm3"
+ANGLE, VOLUME, FORCE = "angle_deg", "volume_mm3", "force_N"
+# Kinds of a unit that bends freely.
+FREE = (KIND, step.KIND, pose.KIND)
 # Fewer pressures make no cubic spline.
 FEWEST = 4
 # Along the meridian as fine as the default: there a coarser mesh misses most.
@@ -107,129 +104,6 @@ class UnitSettings:
             )
 
 
-def _effect(name: str) -> UnitEffect:
-    return FLAT_OBSTACLE if name == CONTACT else EFFECTS[name]
-
-
-@attrs.frozen
-class Run:
-    """One quasi-static simulation: a body, an effect and its size, pressures in kPa, points in mm.
-
-    points: p of (x, y, z). effect: empty for the base model. size: in the effect's unit. outline: whether to
-    find, beside angle and places, how far the outline moves toward +y and -y, in mm.
-    """
-
-    body: Body
-    pressures_kPa: tuple[float, ...]
-    points: tuple[tuple[float, float, float], ...] = ()
-    effect: str = ""
-    size: float = 0.0
-    outline: bool = False
-
-    @property
-    def rows(self) -> int:
-        """Values at each pressure: angle, volume, three coordinates a point, two moves of the outline."""
-        return 2 + 3 * len(self.points) + 2 * self.outline
-
-    @property
-    def changed(self) -> tuple[Body, UnitEffect | None]:
-        """The body with the effect on it, and the effect, or None where it changes the body alone.
-
-        Raises InputError where the body cannot be drawn with the effect.
-        """
-        if not self.effect:
-            return self.body, None
-        effect = _effect(self.effect)
-        body = effect.body(self.body, self.size) if effect.body else self.body
-        return body, effect if effect.materials or effect.model or effect.load else None
-
-    def key(self) -> str:
-        """Hash (32 hex digits) of all that the result depends on."""
-        try:
-            body, effect = self.changed
-        except InputError:
-            # No such body: its failure is kept, too.
-            body, effect = self.body, _effect(self.effect)
-        parts = [REVISION, body.unit.hash(), attrs.astuple(body.mesh), self.pressures_kPa, self.points]
-        parts += [body.newton(effect), body.lattice.hash() if body.lattice else ""]
-        if body.drawn:
-            parts += [body.drawn.hash()]
-        if effect:
-            parts += [effect.name, self.size]
-            parts += [body.distal if effect.name == "clogged_chamber" else 0]
-            parts += [body.orientation_deg if effect.has_gravity else 0.0]
-        if self.outline:
-            parts += ["outline"]
-        return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
-
-
-@attrs.frozen(eq=False)
-class Result:
-    """What a run found: values (rows, k) at k pressures, in degrees, mm3 and mm; nan where not reached.
-
-    why: the reason where values are nan, else empty.
-    """
-
-    values: Array
-    why: str = ""
-
-
-def run(case: Run, cache: Path | None = None) -> Result:
-    """Angle in degrees, growth of the chambers in mm3 and places of points in mm at every pressure.
-
-    cache: folder where a mesher that is not repeatable keeps its meshes. A pressure that is not reached, with
-    those beyond it, is nan; so is all where the body cannot be drawn or meshed.
-    """
-    values = np.full((case.rows, len(case.pressures_kPa)), np.nan)
-    try:
-        body, effect = case.changed
-        mesh = body.meshed(cache)
-        tip = TipSection.of(mesh)
-        points = material_points(mesh, np.array(case.points).reshape(-1, 3))
-        materials, model = body.materials(mesh), body.model(mesh)
-        if effect and effect.materials:
-            materials = effect.materials(materials, mesh, case.size)
-        if effect and effect.model:
-            model = effect.model(body, mesh, case.size)
-        if effect and effect.load:
-            model.load = effect.load(body, mesh, case.size)
-        equilibrium = Equilibrium(model, materials, body.newton(effect), explains=not case.effect)
-        # Out of reach, it only lends the points at which the unit would touch.
-        outline = with_flat_obstacle(body, mesh, 1e6).obstacles[0] if case.outline else None
-        places = slice(2, 2 + 3 * len(case.points))
-        whole, rest = 2 ** len(mesh.symmetry), model.cavity_volume(np.zeros_like(mesh.nodes))
-        for at, state in _states(equilibrium, np.array(case.pressures_kPa)):
-            values[0, at] = tip.angle_deg(state.u)
-            values[1, at] = whole * (model.cavity_volume(state.u) - rest)
-            values[places, at] = points.at(state.u).ravel()
-            if outline:
-                y, still = (outline.places(u)[..., 1] for u in (state.u, np.zeros_like(state.u)))
-                values[places.stop :, at] = y.max() - still.max(), still.min() - y.min()
-    except (InputError, MeshingError, ConvergenceError) as error:
-        return Result(values, str(error))
-    return Result(values)
-
-
-def _states(equilibrium: Equilibrium, pressures_kPa: Array) -> Iterator[tuple[int, State]]:
-    """Number of a pressure and its state, as far as they are reached; the last ConvergenceError is raised."""
-    start = equilibrium.at_zero_pressure()
-    distinct, sides = branches(pressures_kPa)
-    if 0.0 in distinct:
-        yield int(np.flatnonzero(pressures_kPa == 0.0)[0]), start
-    failed: ConvergenceError | None = None
-    for side in sides:
-        history = [start]
-        for pressure in side:
-            try:
-                history.append(equilibrium.reach(in_MPa(pressure), history))
-            except ConvergenceError as error:
-                failed = error
-                break
-            yield int(np.flatnonzero(pressures_kPa == pressure)[0]), history[-1]
-    if failed:
-        raise failed
-
-
 def pressures(readings_kPa: Array, count: int, margin: float) -> tuple[float, ...]:
     """About `count` pressures in kPa, ascending through 0, from a little below the readings to above.
 
@@ -254,7 +128,9 @@ def unit_responses(
     cache: Path | None = None,
     progress: Progress | None = None,
 ) -> tuple[UnitResponse, ...]:
-    """The unit's response at each scale and orientation of the unit_pressure experiments among those given.
+    """The unit's response at each scale and orientation of the experiments, of those given, that bend freely.
+
+    Of unit_pose experiments those are the `pose.STATIONS` about their axis.
 
     The unit keeps its moduli at every scale, as proportional scaling has it. Its runs are kept in the folder
     `cache` and found again there, also by another call; `progress` is called with what is done and the share.
@@ -262,13 +138,41 @@ def unit_responses(
     pressures that the base model does not reach. Raises InputError for markers out of place (`attached`) and
     added masses, which the model lacks, and ConvergenceError where the base model reaches too few pressures.
     """
+    return _computed([e for e in experiments if e.kind in FREE], unit, settings, cache, progress)
+
+
+def blocked_responses(
+    unit: Unit,
+    experiments: Sequence[Experiment],
+    settings: UnitSettings | None = None,
+    cache: Path | None = None,
+    progress: Progress | None = None,
+) -> tuple[UnitResponse, ...]:
+    """As `unit_responses`, the force in N on a load cell that holds the tip, of blocked_force experiments.
+
+    One response for each scale, gap and orientation. A unit of s times the size presses with s^2 times the
+    force at the same pressures.
+    """
+    settings = settings or UnitSettings()
+    names = tuple(n for n in settings.effects if n != CONTACT)
+    chosen = [e for e in experiments if e.kind == blocked_force.KIND]
+    return _computed(chosen, unit, attrs.evolve(settings, effects=names), cache, progress)
+
+
+def _computed(
+    chosen: Sequence[Experiment],
+    unit: Unit,
+    settings: UnitSettings | None,
+    cache: Path | None,
+    progress: Progress | None,
+) -> tuple[UnitResponse, ...]:
     settings = settings or UnitSettings()
     report = progress or (lambda stage, share: None)
-    chosen = [e for e in experiments if e.kind == KIND]
     for e in chosen:
         if e.added_mass_g:
             raise InputError("the model of the unit has no added mass", e.name, "leave the experiment out")
-    plans = [_Plan.of(unit, chosen, scale, settings, cache) for scale in sorted({e.scale for e in chosen})]
+    setups = sorted({(e.scale, _gap(e)) for e in chosen}, key=repr)
+    plans = [_Plan.of(unit, chosen, *setup, settings, cache) for setup in setups]
     for plan in plans:
         for m in plan.markers:
             report(f"marker {m.number} at {plan.scale:g}x lies {m.distance_mm:.2f} mm from its point", 0.0)
@@ -285,6 +189,19 @@ def unit_responses(
     responses = _counted_alike([r for plan in plans for r in plan.responses(settings, found)])
     # Whoever asks for the channels of all looks at the first.
     return tuple(sorted(responses, key=lambda r: -len(r.channels)))
+
+
+def _gap(e: Experiment) -> float | None:
+    return e.gap_mm if e.kind == blocked_force.KIND else None
+
+
+def _orientations(experiments: Sequence[Experiment]) -> tuple[tuple[float, Direction], ...]:
+    """Orientations to simulate, in degrees about an axis, each once."""
+    found: dict[tuple[float, Direction], None] = {}
+    for e in experiments:
+        at = pose.STATIONS if e.kind == pose.KIND else (e.orientation_deg,)
+        found |= dict.fromkeys((deg % 360.0, e.orientation_axis) for deg in at)
+    return tuple(sorted(found))
 
 
 def _counted_alike(responses: Sequence[UnitResponse]) -> list[UnitResponse]:
@@ -331,11 +248,10 @@ class _Plan:
     body: Body
     scale: float
     enlarged: float
-    orientations: tuple[float, ...]
+    orientations: tuple[tuple[float, Direction], ...]
     pressures_kPa: tuple[float, ...]
     markers: tuple[Marker, ...]
     channels: tuple[str, ...]
-    with_flat_obstacle: bool
 
     @classmethod
     def of(
@@ -343,48 +259,69 @@ class _Plan:
         unit: Unit,
         chosen: Sequence[Experiment],
         scale: float,
+        gap_mm: float | None,
         settings: UnitSettings,
         cache: Path | None,
     ) -> _Plan:
-        here = [e for e in chosen if e.scale == scale]
+        here = [e for e in chosen if (e.scale, _gap(e)) == (scale, gap_mm)]
         scaled = attrs.evolve(unit, scale=scale)
         readings = np.concatenate([e["pressure_kPa"] for e in here])
         mesh = mesh_of(scaled, settings.mesh, cache=cache)
         reduced = similar(scaled)
-        body = Body(reduced, settings.mesh, settings.finer, settings.distal, settings.lattice)
+        enlarged = scale / reduced.scale
+        gap = None if gap_mm is None else gap_mm / enlarged
+        body = Body(reduced, settings.mesh, settings.finer, settings.distal, settings.lattice, gap_mm=gap)
         markers = attached(mesh, here, settings.farthest_mm * scale)
         measured = {c for e in here for c, values in e.columns.items() if np.isfinite(values).any()}
         known = [ANGLE, VOLUME, *(f"marker{m.number}_{a}_mm" for m in markers for a in AXES)]
+        known = known if gap is None else [FORCE]
         return cls(
             body,
             scale,
-            scale / reduced.scale,
-            tuple(sorted({e.orientation_deg % 360.0 for e in here})),
+            enlarged,
+            _orientations(here),
             pressures(readings, settings.pressures, settings.margin),
             markers,
             tuple(c for c in known if c in measured),
-            CONTACT in settings.effects,
         )
 
-    def case(self, effect: str = "", size: float = 0.0, orientation_deg: float = 0.0) -> Run:
-        """A run of an effect whose size is that at 1.0x, of the base where none is named."""
+    @property
+    def held(self) -> bool:
+        """Whether a load cell holds the tip."""
+        return self.body.gap_mm is not None
+
+    def names(self, settings: UnitSettings) -> list[str]:
+        """Effects that have runs, walls apart."""
+        return [n for n in settings.effects if n in EFFECTS] + [HELD.name] * self.held
+
+    def case(
+        self, effect: str = "", size: float = 0.0, orientation: tuple[float, Direction] = (0.0, X)
+    ) -> Run:
+        """A run of an effect whose size is that at 1.0x, of the base where none is named.
+
+        The base's outline is kept whether or not walls are asked for, so that one run serves both.
+        """
         points = tuple(tuple((m.point / self.enlarged).tolist()) for m in self.markers)
-        body = attrs.evolve(self.body, orientation_deg=orientation_deg)
-        return Run(body, self.pressures_kPa, points, effect, size, not effect and self.with_flat_obstacle)
+        turn, axis = orientation
+        body = attrs.evolve(self.body, orientation_deg=turn, orientation_axis=axis)
+        outline = not effect and not self.held
+        return Run(body, self.pressures_kPa, points, effect, size, outline)
 
     def runs(self, settings: UnitSettings) -> Iterator[Run]:
         """The base first, then what takes longest."""
         yield self.case()
-        for name in sorted(set(settings.effects) & set(EFFECTS), key=lambda n: (n != "mesh_error", n)):
-            effect = EFFECTS[name]
-            for orientation in self.orientations if effect.has_gravity else (0.0,):
+        for name in sorted(set(self.names(settings)), key=lambda n: (n != "mesh_error", n)):
+            effect = effect_of(name)
+            for orientation in self.orientations if effect.has_gravity else ((0.0, X),):
                 for size in effect.sizes_at(self.enlarged):
                     if size != effect.parameter.null:
                         yield self.case(name, size, orientation)
 
     def base(self, found: dict[str, Result]) -> Result:
-        """The free unit's angle, volume and places."""
+        """The free unit's angle, volume and places, or the force of a held one."""
         result = found[self.case().key()]
+        if self.held:
+            return result
         return Result(result.values[: 2 + 3 * len(self.markers)], result.why)
 
     def free(self, found: dict[str, Result]) -> dict[int, tuple[Array, Array]]:
@@ -442,6 +379,8 @@ class _Plan:
     @property
     def larger(self) -> Array:
         """What each row of a result is multiplied by: lengths grow with the unit, an angle does not."""
+        if self.held:
+            return np.array([[self.enlarged**2]])
         lengths = [self.enlarged] * (3 * len(self.markers))
         return np.array([1.0, self.enlarged**3, *lengths])[:, None]
 
@@ -463,20 +402,26 @@ class _Plan:
         kept = np.ix_(np.array(rows), np.flatnonzero(reached))
         walls = self.sides(found, self.larger * base.values, rows) if CONTACT in settings.effects else {}
         for orientation in self.orientations:
-            names = [n for n in settings.effects if n in EFFECTS]
+            names = self.names(settings)
             every = {n: self._variant(n, orientation, base, found, kept) for n in names}
             variants = {n: v for n, v in every.items() if v is not None}
             at = np.array(self.pressures_kPa)[reached]
             values_ = (self.larger * base.values)[kept]
-            yield UnitResponse(
-                self.channels, at, values_, variants, self.scale, orientation, walls, settings.discrepancy
-            )
+            turn, axis = orientation
+            gap = (self.body.gap_mm or 0.0) * self.enlarged
+            how = (self.scale, turn, axis, walls, settings.discrepancy, gap)
+            yield UnitResponse(self.channels, at, values_, variants, *how)
 
     def _variant(
-        self, name: str, orientation: float, base: Result, found: dict[str, Result], kept: Any
+        self,
+        name: str,
+        orientation: tuple[float, Direction],
+        base: Result,
+        found: dict[str, Result],
+        kept: Any,
     ) -> Variant | None:
         """The response to an effect at the sizes that could be computed; None where that is one alone."""
-        effect = EFFECTS[name]
+        effect = effect_of(name)
         null, grown = effect.parameter.null, self.enlarged**effect.length
         sizes: list[float] = []
         missed: list[float] = []
@@ -497,6 +442,8 @@ class _Plan:
         return Variant(effect.parameter.narrowed(low, high), np.array(sizes), np.array(values))
 
     def _rows(self) -> list[int]:
+        if self.held:
+            return [0]
         order = [ANGLE, VOLUME, *(f"marker{m.number}_{a}_mm" for m in self.markers for a in AXES)]
         return [order.index(c) for c in self.channels]
 

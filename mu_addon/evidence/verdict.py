@@ -18,6 +18,7 @@ from .next_experiment import Proposal, propose_experiment
 from .noise import Source, estimate, span
 from .owned import select_owned
 from .plausibility import require_plausible
+from .pooled import select_pooled
 from .record import Record, record
 from .resolution import without_wrong_readings
 from .selection import Cause, Selection, interval, mainly, one_more, reselected, select, share_taken
@@ -99,6 +100,7 @@ class Verdict:
             {
                 "effect": c.effect.name,
                 "of": c.effect.whose or None,
+                "among": _among(c.effect),
                 "mechanism": c.effect.mechanism,
                 "parameters": {
                     p.name: self._value(k) for k, p in zip(c.effect.keys, c.effect.parameters, strict=True)
@@ -192,7 +194,9 @@ def diagnose(
     chosen = select(fitter, seen, progress)
     if _kind(fitter, chosen) == "unexplained":
         chosen, seen = select_owned(fitter, seen, chosen, progress)
-    if chosen.causes:
+    if _kind(fitter, chosen) == "unexplained":
+        chosen = select_pooled(fitter, chosen, progress)
+    if chosen.causes and not chosen.causes[0].effect.among:
         progress("noise around the causes")
         # What is left of a large cause once its linear part is set aside had counted as noise.
         owned = [e for e in chosen.chosen.effects if e.whose]
@@ -229,6 +233,15 @@ def diagnose(
         tuple(set_aside),
         share_taken(fitter, chosen.base, chosen.chosen),
     )
+
+
+def _among(effect: Effect) -> dict[str, Any] | None:
+    """What differs in an effect, and by how much: a standard deviation with its interval."""
+    if not effect.among:
+        return None
+    value, low, high = effect.spread
+    unit = effect.parameters[0].unit
+    return {"what": effect.among, "spread": {"value": value, "low95": low, "high95": high, "unit": unit}}
 
 
 def _apart(one: Source, other: Source) -> bool:

@@ -34,7 +34,9 @@ _AREA = re.compile(r"\barea\b|querschnitt|section area|\bs0\b|aire\b")
 _NAME = re.compile(
     r"specimen (label|name|id)|sample (name|id)|probenbezeichnung|probenname|specimen$|sample$|probe$"
 )
-_KEYS_OF_NUMBERS = ("temperature_C", "scale", "orientation_deg", "mass_g", "chamber_volume_mm3")
+_KEYS_OF_NUMBERS = ("temperature_C", "scale", "orientation_deg", "mass_g", "chamber_volume_mm3", "gap_mm")
+# A pressure that goes this share of its range within that share of a record, read so many times a second.
+_STEP, _WITHIN, _CAMERA_Hz = 0.6, 0.02, 20.0
 
 
 @attrs.frozen
@@ -251,6 +253,17 @@ class _Proposing:
         have = set(columns)
         if {"angle_deg", "voltage_V"} <= have:
             return "waveguide_bending"
+        if {"pressure_kPa", "orientation_deg", "angle_deg"} <= have:
+            return "unit_pose"
+        if {"pressure_kPa", "force_N"} <= have:
+            self.concluded.append("blocked_force: a force beside a pressure (kind=... for another)")
+            return "blocked_force"
+        if {"pressure_kPa", "angle_deg"} <= have and stepped(columns):
+            self.concluded.append(
+                "pressure_step: the pressure jumps, and was read often enough to see the unit follow "
+                "(kind=unit_pressure where it was slow)"
+            )
+            return "pressure_step"
         if {"pressure_kPa", "angle_deg"} <= have or {"pressure_kPa", "volume_mm3"} <= have:
             return "unit_pressure"
         if {"added_mass_g", "tip_deflection_mm"} <= have:
@@ -366,7 +379,12 @@ class _Proposing:
         for key, choices in (("plates", PLATES), ("axis", AXES), ("valve", VALVES)):
             if key in KINDS[kind].keys and self._choice(key, choices):
                 keys[key] = self._choice(key, choices)
-        if kind in ("unit_pressure", "pressure_hold") and self._choice("pressure", ("gauge", "absolute")):
+        axis = self._choice("orientation_axis", AXES)
+        if axis and "orientation_axis" in KINDS[kind].keys:
+            keys["orientation_axis"] = axis
+        if kind == "blocked_force" and "gap_mm" not in keys:
+            self._ask("gap_mm", "how far in mm did the load cell stand from the tip at rest?", (), "0")
+        if "pressure" in KINDS[kind].keys and self._choice("pressure", ("gauge", "absolute")):
             keys["pressure"] = self._choice("pressure", ("gauge", "absolute"))
         if "cells" in self.answers and kind == "lattice_compression":
             keys["cells"] = self._numbers("cells", (1, 3), whole=True)
@@ -386,7 +404,8 @@ class _Proposing:
                 "length_mm",
                 "length in mm over which the displacement is taken (gauge length, height of a block)?",
             )
-        return {key: value for key, value in keys.items() if value is not None}
+        known = KINDS[kind].keys
+        return {key: value for key, value in keys.items() if value is not None and key in known}
 
     def _ask(self, key: str, words: str, choices: tuple[str, ...] = (), proposed: str = "") -> None:
         self.questions.append(Question(key, words, choices, proposed))
@@ -478,6 +497,18 @@ _OFTEN = {
     "mm3": ("mm3", "ml"),
     "g": ("g", "kg"),
 }
+
+
+def stepped(columns: Mapping[str, Array]) -> bool:
+    """Whether a record is of steps: a pressure that jumps, read by something fast."""
+    t, p = columns.get("time_s"), columns["pressure_kPa"]
+    if t is None or len(t) < 50 or not np.isfinite(p).all() or not (np.diff(t) > 0).all():
+        return False
+    lasts, extent = float(t[-1] - t[0]), float(np.ptp(p))
+    if not extent or len(t) / lasts < _CAMERA_Hz:
+        return False
+    later = np.interp(t + _WITHIN * lasts, t, p)
+    return bool(np.abs(later - p).max() >= _STEP * extent)
 
 
 def _extreme(values: Array) -> float:

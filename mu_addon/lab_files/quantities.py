@@ -47,6 +47,7 @@ _BY_CASE = {
 
 # Words of columns' names in English, German, French, Italian, Spanish and Polish, the more particular first.
 _WORDS: tuple[tuple[str, str], ...] = (
+    ("orientation", r"orientation|\bpose\b|\broll\b|\blage\b|orientacja|orientamento|orientacion"),
     ("angle", r"angle|winkel|angolo|angulo|\bkat\b|biegewinkel"),
     ("strain", r"strain|dehnung|stauchung|allongement relatif|odksztalcenie|deformacion unitaria"),
     ("stress", r"stress|druckspannung|zugspannung|spannung|contrainte|sforzo|esfuerzo|naprezenie"),
@@ -67,6 +68,8 @@ _WORDS: tuple[tuple[str, str], ...] = (
 )
 # What a quantity is read in; a machine's position is a displacement, a count is nothing that is read.
 READ_IN = {**UNITS, "position": "mm", "count": ""}
+# Never concluded from a unit: there is a more usual quantity of it.
+_ONLY_BY_NAME = ("angle_sd", "stress_sd", "orientation")
 _BRACKETED = re.compile(r"^(.*?)\s*(?:\(([^()]*)\)|\[([^\[\]]*)\]|/\s*([^\s()]+)|,\s*([^\s,]+))\s*$")
 
 
@@ -95,7 +98,7 @@ def column(title: str, unit: str = "") -> Column:
     quantity = _named(name, known[0] if known else None)
     if not quantity and known:
         # A unit that only one quantity has names it.
-        fit = [q for q, read in UNITS.items() if read == known[0] and not q.endswith("_sd") and known[0]]
+        fit = [q for q, read in UNITS.items() if read == known[0] and q not in _ONLY_BY_NAME and known[0]]
         quantity = fit[0] if len(fit) == 1 else ""
     if known and quantity and READ_IN[quantity] != known[0]:
         return Column(title, quantity, unit, None)

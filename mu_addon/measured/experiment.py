@@ -31,8 +31,9 @@ class Experiment:
     lattice_compression, tension positive in coupon). A column with _sd_ in its name is the standard deviation
     by which the whole record beside it is uncertain. A lattice that was weighed has columns mass_g and
     mass_sd_g, one value throughout. rows (n,): numbers of the lines in the file. orientation_deg: direction
-    of gravity about x, 0 hanging with the tip down. section_mm: width and thickness of what bears the load.
-    sha256: of the file's bytes.
+    of gravity about `orientation_axis`, x where none is given, 0 hanging with the tip down; see
+    `pose.down`. gap_mm: from the tip at rest to the load cell that holds it. section_mm: width and thickness
+    of what bears the load. sha256: of the file's bytes.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Experiment:
     scale: float = 1.0
     orientation_deg: float = 0.0
     specimen: str = ""
+    session: str = ""
     temperature_C: float = math.nan
     source: str = ""
     run_order: float | None = None
@@ -58,6 +60,8 @@ class Experiment:
     mass_sd_g: float | None = None
     added_mass_g: float | None = None
     valve: str | None = None
+    orientation_axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    gap_mm: float = 0.0
     chamber_volume_mm3: float | None = None
 
     def __getitem__(self, column: str) -> Array:

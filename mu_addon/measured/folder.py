@@ -172,6 +172,7 @@ def _described(entry: dict[str, Any], kind: Kind, at: _Place) -> dict[str, Any]:
         "name": _word(entry, "name", at),
         "role": _choice(entry, "role", ROLES, at),
         "specimen": _word(entry, "specimen", at) if "specimen" in entry else "",
+        "session": _word(entry, "session", at) if "session" in entry else "",
         "source": _word(entry, "source", at) if "source" in entry else "",
         "scale": _number(entry.get("scale", 1.0), "scale", at, 0.01, 100.0),
         "orientation_deg": _number(entry.get("orientation_deg", 0.0), "orientation_deg", at, -360.0, 360.0),
@@ -184,6 +185,16 @@ def _described(entry: dict[str, Any], kind: Kind, at: _Place) -> dict[str, Any]:
     for key, most in (("length_mm", 1e4), ("mass_g", 1e6), ("mass_sd_g", 1e6), ("chamber_volume_mm3", 1e9)):
         if key in entry:
             fields[key] = _number(entry[key], key, at, 0.0, most, above=True)
+    if "gap_mm" in entry:
+        fields["gap_mm"] = _number(entry["gap_mm"], "gap_mm", at, 0.0, 1e3)
+    if "orientation_axis" in entry:
+        fields["orientation_axis"] = _axis(entry["orientation_axis"], at)
+    if kind.name == "unit_pose" and "orientation_deg" in entry:
+        raise InputError(
+            "orientation_deg is a column of unit_pose, one value a row",
+            at("orientation_deg"),
+            f"leave the key out of {FILE}",
+        )
     if "added_mass_g" in entry:
         fields["added_mass_g"] = _number(entry["added_mass_g"], "added_mass_g", at, 0.0, 1e6)
     if "mode" in entry:
@@ -203,6 +214,25 @@ def _described(entry: dict[str, Any], kind: Kind, at: _Place) -> dict[str, Any]:
     if "cells" in entry:
         fields["cells"] = _cells(entry["cells"], at)
     return fields
+
+
+def _axis(value: Any, at: _Place) -> tuple[float, float, float]:
+    """A direction of length 1, of "x", "y", "z" or three numbers."""
+    if isinstance(value, str) and value in AXES:
+        return tuple(float(a == value) for a in AXES)  # type: ignore[return-value]
+    if not isinstance(value, list) or len(value) != 3:
+        raise InputError(
+            f"orientation_axis = {value!r} is no direction",
+            at("orientation_axis"),
+            'give "x", "y", "z" or three numbers, [x, y, z]',
+        )
+    x, y, z = (_number(v, "orientation_axis", at, -1e6, 1e6) for v in value)
+    length = math.hypot(x, y, z)
+    if not length > 0.0:
+        raise InputError(
+            "orientation_axis has no length", at("orientation_axis"), "give three numbers, not all of them 0"
+        )
+    return x / length, y / length, z / length
 
 
 def _cells(value: Any, at: _Place) -> tuple[int, int, int]:

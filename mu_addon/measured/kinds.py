@@ -15,6 +15,8 @@ PLATES = ("hold", "slide")
 # Whether gauge and unit are shut off from the supply together.
 VALVES = ("open", "shut")
 ROLES = ("fit", "held_out")
+# Kinds that are of a unit, whose simulation predicts them.
+OF_A_UNIT = ("unit_pressure", "pressure_step", "unit_pose", "blocked_force")
 
 # Every quantity is read in one unit, which its column's name ends with; "" has none.
 UNITS = {
@@ -31,6 +33,7 @@ UNITS = {
     "tip_deflection": "mm",
     "voltage": "V",
     "volume": "mm3",
+    "orientation": "deg",
 }
 # What a column may be in instead: how much of the unit it is read in one of it is.
 CONVERTED = {
@@ -58,6 +61,7 @@ COMMON = (
     "scale",
     "orientation_deg",
     "specimen",
+    "session",
     "temperature_C",
     "source",
 )
@@ -98,20 +102,28 @@ class Kind:
 
 
 _LOAD = (("strain", "stress_kPa"), ("displacement_mm", "force_N"))
+_BENT = (
+    ("pressure_kPa", "angle_deg"),
+    ("pressure_kPa", "marker1_y_mm", "marker1_z_mm"),
+    ("pressure_kPa", "volume_mm3"),
+)
+_DRIVEN = ("added_mass_g", "chamber_volume_mm3", "valve", "pressure", "orientation_axis")
 
 KINDS = {
     kind.name: kind
     for kind in (
+        Kind("unit_pressure", _BENT, ("angle_sd_deg",), may_have_keys=_DRIVEN, marked=True),
+        Kind("pressure_step", _BENT[:2], may_have_keys=_DRIVEN, fewest=10, marked=True),
         Kind(
-            "unit_pressure",
-            (
-                ("pressure_kPa", "angle_deg"),
-                ("pressure_kPa", "marker1_y_mm", "marker1_z_mm"),
-                ("pressure_kPa", "volume_mm3"),
-            ),
-            ("angle_sd_deg",),
-            may_have_keys=("added_mass_g", "chamber_volume_mm3", "valve", "pressure"),
-            marked=True,
+            "unit_pose",
+            (("pressure_kPa", "orientation_deg", "angle_deg"),),
+            timed=False,
+            may_have_keys=("pressure", "orientation_axis"),
+        ),
+        Kind(
+            "blocked_force",
+            (("pressure_kPa", "force_N"),),
+            may_have_keys=("gap_mm", "valve", "pressure", "orientation_axis"),
         ),
         Kind(
             "lattice_compression",

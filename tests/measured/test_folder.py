@@ -35,8 +35,22 @@ def entry(**keys):
 
 HOLD = {"kind": "pressure_hold", "mode": None}
 UNIT = {"kind": "unit_pressure", "mode": None}
+POSE = {"kind": "unit_pose", "mode": None}
+PRESS = {"kind": "blocked_force", "mode": None}
 LATTICE = {"kind": "lattice_compression", "mode": None}
 GOOD = "strain,stress_kPa\n0,0\n0.1,20\n"
+
+
+def test_poses_and_blocked_forces_are_read_with_what_describes_them(tmp_path):
+    axis = entry(**(POSE | {"orientation_axis": [0.0, 3.0, 4.0]}))
+    press = entry(**(PRESS | {"name": "b", "file": "b.csv", "gap_mm": 1.5, "orientation_axis": "y"}))
+    texts = {"a": "pressure_bar,orientation_rad,angle_deg\n0.1,1,2\n0.1,2,3\n"}
+    texts["b"] = "time_s,pressure_kPa,force_mN\n0,0,0\n1,5,250\n"
+    pose, blocked = read_folder(folder(tmp_path, axis + press, **texts)).experiments
+    assert pose.orientation_axis == pytest.approx((0.0, 0.6, 0.8))
+    np.testing.assert_allclose(pose["orientation_deg"], np.degrees([1.0, 2.0]))
+    assert (blocked.gap_mm, blocked.orientation_axis) == (1.5, (0.0, 1.0, 0.0))
+    np.testing.assert_allclose(blocked["force_N"], [0.0, 0.25])
 
 
 def test_copies_of_public_data_are_read_with_what_is_odd_about_them():
@@ -253,6 +267,10 @@ def test_what_cannot_be_used_is_refused_by_file_and_row(tmp_path, keys, text, wh
         (entry(section_mm=40.0), "is not a pair", "line 7"),
         (entry(section_mm=[40.0, -1.0]), "out of bounds", "line 7"),
         (entry(**(LATTICE | {"cells": 2.5})), "is not a number of cells", "line 6"),
+        (entry(**(POSE | {"orientation_deg": 5.0})), "is a column of unit_pose", "line 6"),
+        (entry(**(POSE | {"orientation_axis": [0, 0, 0]})), "has no length", "line 6"),
+        (entry(**(POSE | {"orientation_axis": 3})), "is no direction", "line 6"),
+        (entry(**(PRESS | {"gap_mm": -1})), "out of bounds", "line 6"),
         (entry(file="../a.csv"), "outside the folder", "line 4"),
         (entry(file="b.csv"), "cannot read b.csv", "b.csv"),
         (entry(name=""), "is not a name", "line 2"),

@@ -179,7 +179,9 @@ def test_a_unit_is_judged_by_its_angle_and_markers(tmp_path, monkeypatch, gauge_
         assert unit.name
         progress("base", 1.0)
         kinds = sorted({(e.scale, e.orientation_deg) for e in experiments})
-        return tuple(analytic.response(*k) for k in kinds)
+        every = tuple(analytic.response(*k) for k in kinds)
+        # What was not asked for is not simulated.
+        return every if settings.effects else tuple(attrs.evolve(r, variants={}) for r in every)
 
     monkeypatch.setattr(unit_fem, "unit_responses", responses)
     out = tmp_path / "out"
@@ -187,6 +189,13 @@ def test_a_unit_is_judged_by_its_angle_and_markers(tmp_path, monkeypatch, gauge_
     assert context.status == 0, messages[-1]
     assert context.summary["verdict"] == "named"
     assert [c["effect"] for c in context.summary["causes"]] == ["clogged_chamber"]
+    # A first look comes before anything but the base is simulated: a clog is not among what it knows.
+    first = context.summary["first_look"]
+    assert "clogged" not in first["headline"]
+    stages = [m["stage"] for m in messages if m["type"] == "progress" and m["state"] == "start"]
+    (told,) = (i for i, stage in enumerate(stages) if stage.startswith("first look"))
+    assert first["headline"] in stages[told]
+    assert stages.index("unit") < told < len(stages) - 1 - stages[::-1].index("unit")
     remarks = [r.partition(";")[0] for r in context.summary["remarks"] if "white noise" in r]
     # What is predicted has noise as well, of which nothing is taken.
     assert remarks == ["pressure_kPa was read with white noise of up to 0.022"] * (gauge_kPa > 0)

@@ -136,6 +136,36 @@ def test_units_and_holds_are_known_by_their_columns(tmp_path):
     assert two["time_s"][1] == pytest.approx(0.05)
 
 
+def test_steps_poses_and_blocked_forces_are_known_by_their_columns(tmp_path):
+    t = np.arange(0.0, 4.0, 0.02)
+    p = np.where(t < 1.0, 0.0, 20.0)
+    slow = np.interp(t, [0.0, 4.0], [0.0, 20.0])
+    rows = {
+        "step": ("Time [s];Pressure [kPa];Angle [deg]", t, p, 0.5 * p),
+        "slow": ("Time [s];Pressure [kPa];Angle [deg]", t, slow, 0.5 * slow),
+        "press": ("Time [s];Pressure [kPa];Load [mN]", t, slow, 4.0 * slow),
+        "turned": ("Pressure [kPa];Orientation [deg];Angle [deg]", slow, 45.0 * t, 0.2 * slow),
+    }
+    for name, (head, *columns) in rows.items():
+        lines = [head, *(";".join(f"{v:.4f}" for v in row) for row in zip(*columns, strict=True))]
+        written(tmp_path, "\n".join(lines) + "\n", f"{name}.csv")
+    paths = [tmp_path / f"{name}.csv" for name in rows]
+    open_ = understand(paths, {}).open
+    assert [(p.name, question.key) for p, question in open_] == [("press", "gap_mm")]
+    measured = imported(tmp_path, paths, {"gap_mm": "1.5", "turned.orientation_axis": "y"})
+    kinds = {e.name: e.kind for e in measured.experiments}
+    assert kinds == {
+        "step": "pressure_step",
+        "slow": "unit_pressure",
+        "press": "blocked_force",
+        "turned": "unit_pose",
+    }
+    by_name = {e.name: e for e in measured.experiments}
+    assert by_name["press"].gap_mm == 1.5
+    assert by_name["press"]["force_N"].max() == pytest.approx(0.08, rel=1e-2)
+    assert by_name["turned"].orientation_axis == (0.0, 1.0, 0.0)
+
+
 def test_a_workbook_of_three_specimens(tmp_path):
     rows = [["Tensile test"], ["Time", "Displacement", "Force"], ["s", "mm", "N"]]
     rows += [list(values) for values in zip(exports.TIME, exports.MM, exports.N, strict=True)]

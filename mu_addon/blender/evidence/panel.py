@@ -62,7 +62,7 @@ def _experiments(layout, context, root, measured):
         text = f"{e.name}, held out" if held_out else f"{e.name}: {len(e)} rows"
         row.label(text=text, icon="HIDE_ON" if held_out else "CHECKBOX_HLT")
         button = row.row(align=True)
-        button.enabled = e.kind == "unit_pressure"
+        button.enabled = e.kind in ("unit_pressure", "pressure_step")
         on = e.name == shown
         button.operator("mu.evidence_motion", text="", icon="PLAY", depress=on).experiment = (
             "" if on else e.name

@@ -66,10 +66,10 @@ def first_order_lag(t: Array, p: Array, time_s: float) -> Array:
         return p
     h = np.diff(t)
     if np.ptp(h) <= 1e-9 * h.mean():
-        a, b0, b1 = _weights(h.mean(), time_s)
+        a, b0, b1 = lag_weights(h.mean(), time_s)
         found, _ = lfilter([b1, b0], [1.0, -a], p, zi=[(1.0 - b1) * p[0]])
         return np.asarray(found)
-    a, b0, b1 = _weights(h, time_s)
+    a, b0, b1 = lag_weights(h, time_s)
     driven = b0 * p[:-1] + b1 * p[1:]
     x = [float(p[0])]
     for ai, di in zip(a.tolist(), driven.tolist(), strict=True):
@@ -82,7 +82,8 @@ def decades_lag(t: Array, p: Array, onset_s: float) -> Array:
     return np.asarray(sum(first_order_lag(t, p, onset_s * 10.0**k) for k in range(DECADES)))
 
 
-def _weights(h: Any, time_s: float) -> tuple[Any, Any, Any]:
+def lag_weights(h: Any, time_s: float) -> tuple[Any, Any, Any]:
+    """Weights by which `first_order_lag` goes over steps h in s, of where it is and of both ends of p."""
     a = np.exp(-h / time_s)
     mean = -np.expm1(-h / time_s) * time_s / h
     return a, mean - a, 1.0 - mean

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...measured import Experiment
+from ...measured.pose import Direction, X, down
 from ..effect import Effect, Parameter
 from .camera import camera_effects, read_by_camera
 from .drift import drift, drifts, largest_reading
@@ -22,6 +23,8 @@ from .flat_obstacle import ObstacleResponse, contact_effect
 Array = np.ndarray[Any, Any]
 
 KIND = "unit_pressure"
+# Kinds that drive a unit over time, which it remembers.
+DRIVEN = (KIND, "pressure_step", "blocked_force")
 REFERENCE_C = 23.0
 # Smaller reversals are noise of the gauge.
 DEADBAND_kPa = 0.2
@@ -65,11 +68,12 @@ class UnitResponse:
     """Quasi-static response of the unit: values (c, k) of channels at pressures (k,) in kPa ascending.
 
     channels: columns as measured (angle_deg, marker1_y_mm, ...), which give the units. variants: by the name
-    of their effect. walls: by the side of the unit they stand on, 1 for +y and -1 for -y. Interpolated by
-    cubic splines, and along their end slopes beyond the last pressures. discrepancy: standard deviation of
-    what another code of the same physics would find, as a smooth change of the pressure over the largest one;
-    0 where the response is exact. Raises InputError for fewer than four pressures and for shapes that do not
-    match.
+    of their effect. orientation_deg, orientation_axis: see `pose.down`. walls: by the side of the unit they
+    stand on, 1 for +y and -1 for -y. Interpolated by cubic splines, and along their end slopes beyond the
+    last pressures. discrepancy: standard deviation of what another code of the same physics would find, as a
+    smooth change of the pressure over the largest one; 0 where the response is exact. gap_mm: of the load
+    cell that holds the tip, where one does. Raises InputError for fewer than four pressures and for shapes
+    that do not match.
     """
 
     channels: tuple[str, ...]
@@ -78,8 +82,10 @@ class UnitResponse:
     variants: Mapping[str, Variant] = attrs.field(factory=dict)
     scale: float = 1.0
     orientation_deg: float = 0.0
+    orientation_axis: Direction = X
     walls: Mapping[int, ObstacleResponse] = attrs.field(factory=dict)
     discrepancy: float = 0.0
+    gap_mm: float = 0.0
     _splines: Mapping[str, Any] = attrs.field(init=False, repr=False)
     _curves: dict[Any, Any] = attrs.field(init=False, repr=False, factory=dict)
 
@@ -148,14 +154,14 @@ class PressureHistory:
 
 
 def pressure_histories(experiments: Sequence[Experiment]) -> dict[str, PressureHistory]:
-    """The history of each unit_pressure experiment, by its name.
+    """The history of each experiment of a kind in `DRIVEN`, by its name.
 
     experiments: in the order they were run; those of one specimen and scale follow one another.
     """
     found: dict[str, PressureHistory] = {}
     now: dict[tuple[str, float], PressureHistory] = {}
     for e in experiments:
-        if e.kind != KIND:
+        if e.kind not in DRIVEN:
             continue
         p = e["pressure_kPa"]
         whose = (e.specimen, e.scale)
@@ -178,6 +184,24 @@ def nuisances(channels: Sequence[str]) -> tuple[Parameter, ...]:
     ]
     modulus = Parameter("modulus_factor", "", 0.2, 5.0, 1.0, (1.0,), "batches of resin differ")
     return (modulus, *zeros)
+
+
+def believed(
+    free: tuple[Parameter, ...], asked: Sequence[tuple[UnitResponse, Experiment]]
+) -> tuple[Parameter, ...]:
+    """Nuisances, with a modulus so low left out that a response would have to be guessed.
+
+    free: the modulus first. asked: experiments, each with the response that predicts it. A softer unit stands
+    where this one stands at a higher pressure: little beyond those computed, it may balloon or collapse.
+    """
+    low = free[0].low
+    for response, e in asked:
+        at, p = response.pressures_kPa, e["pressure_kPa"]
+        ends = ((p.min(), at[0]), (p.max(), at[-1]))
+        low = max([low, *(read / (BEYOND * known) for read, known in ends if read * known > 0)])
+    low = min(low, 1.0)
+    modulus = attrs.evolve(free[0], low=low, source=f"batches of resin differ; above {low:.2g} computed")
+    return (modulus, *free[1:])
 
 
 DISCREPANCIES = ("discrepancy_second", "discrepancy_third")
@@ -291,16 +315,21 @@ class UnitPressure:
     without a response.
     """
 
+    kind = KIND
+
     def __init__(self, responses: Sequence[UnitResponse], experiments: Sequence[Experiment] = ()) -> None:
         if not responses:
-            raise InputError("no response of the unit is given", "unit_pressure", "simulate the unit first")
+            raise InputError("no response of the unit is given", self.kind, "simulate the unit first")
         self._responses = tuple(responses)
         self._past = pressure_histories(experiments)
-        self._nearest: dict[tuple[float, float], UnitResponse] = {}
+        self._nearest: dict[tuple[float, float, Direction], UnitResponse] = {}
         self._zeros = {r.channels: tuple(map(_zero, r.channels)) for r in self._responses}
         self.channels_known = self._responses[0].channels
         self.nuisances = (
-            *self._bounded(nuisances(self.channels_known), experiments),
+            *believed(
+                nuisances(self.channels_known),
+                [(self._response(e), e) for e in experiments if e.kind == self.kind],
+            ),
             *discrepancies(max(r.discrepancy for r in self._responses)),
         )
         known: dict[str, Parameter] = {}
@@ -308,35 +337,16 @@ class UnitPressure:
             for name, v in r.variants.items():
                 p = v.parameter
                 known[name] = known[name].narrowed(p.low, p.high) if name in known else p
-        static = {name: Effect(name, (p,), (KIND,)) for name, p in known.items()}
+        static = {name: Effect(name, (p,), (self.kind,)) for name, p in known.items()}
         walls = [wall for r in self._responses for wall in r.walls.items()]
         if walls:
-            static[CONTACT] = contact_effect(walls, KIND)
-        most = GAUGE_SHARE * largest_reading("pressure_kPa", KIND, experiments)
-        gauge = drifts("pressure_drift", "kPa", most, KIND, experiments)
-        camera = camera_effects(self.channels_known, KIND, experiments)
+            static[CONTACT] = contact_effect(walls, self.kind)
+        most = GAUGE_SHARE * largest_reading("pressure_kPa", self.kind, experiments)
+        gauge = drifts("pressure_drift", "kPa", most, self.kind, experiments)
+        camera = camera_effects(self.channels_known, self.kind, experiments)
         self.effects = (*TIMED, RELAXING, *static.values(), *gauge, *camera)
         self._sizes = {e.name: e.keys[0] for e in static.values()}
         self.reference_kPa = max(float(np.abs(r.pressures_kPa).max()) for r in self._responses)
-
-    def _bounded(
-        self, free: tuple[Parameter, ...], experiments: Sequence[Experiment]
-    ) -> tuple[Parameter, ...]:
-        """The nuisances, with a modulus so low left out that the response would have to be guessed.
-
-        A softer unit stands where this one stands at a higher pressure: little beyond those computed, it may
-        balloon or collapse.
-        """
-        low = free[0].low
-        for e in experiments:
-            if e.kind != KIND:
-                continue
-            at, p = self._response(e).pressures_kPa, e["pressure_kPa"]
-            ends = ((p.min(), at[0]), (p.max(), at[-1]))
-            low = max([low, *(asked / (BEYOND * known) for asked, known in ends if asked * known > 0)])
-        low = min(low, 1.0)
-        modulus = attrs.evolve(free[0], low=low, source=f"batches of resin differ; above {low:.2g} computed")
-        return (modulus, *free[1:])
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
         """The experiment's columns that the response at its scale and orientation predicts.
@@ -351,7 +361,7 @@ class UnitPressure:
         Raises InputError where no response is near the experiment's scale and orientation.
         """
         response = self._response(experiment)
-        pressure = self._discrepant(self.effective_kPa(experiment, values), values)
+        pressure = self.discrepant(self.effective_kPa(experiment, values), values)
         static = {name: values[key] for name, key in self._sizes.items() if key in values}
         if "gravity" in static:
             # Weight bends a unit of stiffer resin by as much less.
@@ -360,13 +370,17 @@ class UnitPressure:
             values.get(zero, 0.0) + (values.get("angle_offset.offset_deg", 0.0) if c == "angle_deg" else 0.0)
             for c, zero in zip(response.channels, self._zeros[response.channels], strict=True)
         ]
-        y = response.at(pressure, static)
+        y = self._moving(experiment, response.at(pressure, static), values)
         y = read_by_camera(response.channels, y, experiment["time_s"], experiment.scale, values)
         y = np.add(y, np.array(zeros)[:, None], order="C")
         kept = [i for i, c in enumerate(response.channels) if c in experiment.columns]
         return y if len(kept) == len(y) else y[kept]
 
-    def _discrepant(self, pressure: Array, values: Mapping[str, float]) -> Array:
+    def _moving(self, experiment: Experiment, still: Array, values: Mapping[str, float]) -> Array:
+        """Channels (c, n) of a unit that moves, of those in equilibrium (c, n): the same, without inertia."""
+        return still
+
+    def discrepant(self, pressure: Array, values: Mapping[str, float]) -> Array:
         """Effective pressures (n,) in kPa with the discrepancy of the model's response."""
         second, third = (values.get(name, 0.0) for name in DISCREPANCIES)
         if not (second or third):
@@ -403,15 +417,16 @@ class UnitPressure:
         return remembered(t, p, values, self.reference_kPa, before)
 
     def _response(self, experiment: Experiment) -> UnitResponse:
-        how = experiment.scale, experiment.orientation_deg
+        how = experiment.scale, experiment.orientation_deg, experiment.orientation_axis
         if how not in self._nearest:
             self._nearest[how] = self._found(experiment)
         return self._nearest[how]
 
     def _found(self, experiment: Experiment) -> UnitResponse:
+        here = down(experiment.orientation_deg, experiment.orientation_axis)
         apart = [
             abs(r.scale - experiment.scale)
-            + abs(_turn(r.orientation_deg - experiment.orientation_deg)) / 90.0
+            + float(np.linalg.norm(down(r.orientation_deg, r.orientation_axis) - here))
             for r in self._responses
         ]
         nearest = int(np.argmin(apart))
@@ -422,10 +437,6 @@ class UnitPressure:
                 "simulate the unit there, or leave the experiment out",
             )
         return self._responses[nearest]
-
-
-def _turn(degrees: float) -> float:
-    return (degrees + 180.0) % 360.0 - 180.0
 
 
 def cycles(p: Array) -> Array:

@@ -20,6 +20,9 @@ Array = np.ndarray[Any, Any]
 # What an experiment of a kind is drawn against.
 AXES = {
     "unit_pressure": ("time_s", "time [s]"),
+    "pressure_step": ("time_s", "time [s]"),
+    "unit_pose": ("orientation_deg", "orientation [deg]"),
+    "blocked_force": ("time_s", "time [s]"),
     "lattice_compression": ("strain", "compression"),
     "coupon": ("strain", "strain"),
     "pressure_hold": ("time_s", "time [s]"),
@@ -29,6 +32,7 @@ AXES = {
 QUANTITIES = {
     "angle": "bending angle",
     "stress": "nominal stress",
+    "force": "force on the load cell",
     "tip_deflection": "deflection of the tip",
 }
 BASE = BY_LENGTH[0]

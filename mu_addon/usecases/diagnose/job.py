@@ -13,9 +13,9 @@ import attrs
 from ...design.parameters import Unit, load_preset, read_unit, to_toml
 from ...errors import InputError
 from ...evidence.extended import ExtendedModel, load_model
-from ...evidence.prediction import unit as unit_pressure
 from ...measured import Experiment, Measured, read_folder
 from ...measured.folder import FILE
+from ...measured.kinds import OF_A_UNIT
 from ...meshing.settings import FIDELITIES, HOMOGENISED
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, named_path, read_inputs
@@ -121,7 +121,7 @@ def unit_behind(experiments: Sequence[Experiment], unit: Unit | None = None) -> 
 
     A block of lattice is a unit's where its cells are counted.
     """
-    if any(e.kind == unit_pressure.KIND or e.cells for e in experiments):
+    if any(e.kind in OF_A_UNIT or e.cells for e in experiments):
         return unit or load_preset(PRESET)
     return None
 

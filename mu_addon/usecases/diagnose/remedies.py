@@ -33,6 +33,7 @@ TO_DO = {
     "camera_scale": f"measure the scale by a ruler in the plane of the markers; {_INSTRUMENT}",
     "camera_tilt": f"set the camera at right angles to the plane of bending; {_INSTRUMENT}",
     "lens_distortion": f"calibrate the lens, or stand farther away; {_INSTRUMENT}",
+    "inertia": "read steps after they have settled, or let pressure in slowly: the simulation has no inertia",
     "clock_offset": f"record with one clock, or shift the records by the offset; {_INSTRUMENT}",
     "seating": "preload the specimen until its faces bear; the simulation is not at fault",
     "frame_compliance": "take off the machine's compliance, found by a rigid block, or use an extensometer",

@@ -23,6 +23,7 @@ from ...evidence.simulator import Composite, Simulator
 from ...evidence.verdict import Verdict, diagnose
 from ...files import write_csv, write_json
 from ...measured import Measured
+from ...measured.kinds import OF_A_UNIT
 from ...reading import file_bytes, parse_json
 from ...run.context import RunContext
 from ...run.folder import begin, same_inputs
@@ -33,6 +34,9 @@ from .job import LAYOUT, Job, read_job
 from .report import write_report
 from .simulators import simulators_of
 from .words import advice, readable, sentence, to_do
+
+# Of a unit, but not before its weight, or the place of what holds it, is simulated.
+LATER = ("unit_pose", "blocked_force")
 
 
 def begin_diagnosis(job: Job, folder: Path, context: RunContext) -> None:
@@ -71,10 +75,13 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | No
     if "verdict" in context.summary:
         with progress.stage("verdict of the same data, from the cache"):
             return None
+    known = job.known.of_effects if job.known else {}
+    first = _first_look(job, folder, progress, known)
+    if first:
+        context.summary["first_look"] = first
     simulators, notes = simulators_of(
         measured.experiments, unit, folder / "cache", progress, job.unit_settings
     )
-    known = job.known.of_effects if job.known else {}
     simulator = Composite(simulators, known=known)
     notes += _known_before(job, simulator)
     with _stages(progress, simulator) as on_model:
@@ -99,6 +106,32 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | No
     context.summary |= summary(found)
     context.report = lambda _: write_report(found, folder, context)
     return found
+
+
+def _first_look(
+    job: Job, folder: Path, progress: Progress, known: Mapping[str, float]
+) -> dict[str, str] | None:
+    """A verdict on a unit by its base simulation alone, told while the others are computed; None without one.
+
+    It knows instruments and what acts in time, and no weight, walls or print: those have simulations of their
+    own, most of the time that a verdict on a unit takes. Told as a stage, and kept in summary.json; what
+    stands in verdict.json is the verdict with all of them. A run that goes on, whose simulations were begun,
+    has had it.
+    """
+    if any((folder / "cache").glob("unit*")):
+        return None
+    experiments = [e for e in job.measured.experiments if e.kind in OF_A_UNIT and e.kind not in LATER]
+    if not any(e.role == "fit" for e in experiments):
+        return None
+    settings = attrs.evolve(job.unit_settings, effects=())
+    simulators, _ = simulators_of(experiments, job.subject, folder / "cache", progress, settings)
+    simulator = Composite(simulators, known=known)
+    with _stages(progress, simulator) as on_model:
+        verdict = diagnose(experiments, simulator, on_model)
+    headline, words = sentence(verdict)
+    with progress.stage(f"first look, without weight, walls and print: {verdict.kind}, {headline}"):
+        pass
+    return {"verdict": verdict.kind, "headline": headline, "sentence": words}
 
 
 def _extended_model(verdict: Verdict, simulator: Composite) -> ExtendedModel:

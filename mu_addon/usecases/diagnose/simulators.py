@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...design.parameters import Unit
-from ...evidence.prediction import lattice
+from ...evidence.prediction import blocked_force, lattice, pose, step
 from ...evidence.prediction import unit as unit_pressure
 from ...evidence.prediction.bench import bench_simulators
 from ...evidence.simulator import Simulator
 from ...measured import Experiment
+from ...measured.kinds import OF_A_UNIT
 from ...run.progress import Progress
 
 if TYPE_CHECKING:
     from ...evidence.unit_fem import UnitSettings
+
+# Kinds of a unit that bends freely, by what predicts them.
+FREE: dict[str, Callable[..., Simulator]] = {
+    unit_pressure.KIND: unit_pressure.UnitPressure,
+    step.KIND: step.PressureStep,
+    pose.KIND: pose.UnitPose,
+}
 
 
 def simulators_of(
@@ -40,18 +48,42 @@ def simulators_of(
         with progress.stage("lattice"):
             scalings, remarks = computed(experiments, unit, cache, lambda _, share: progress.update(share))
     found = bench_simulators(experiments, scalings)
-    bent = [e for e in experiments if e.kind == unit_pressure.KIND]
-    if bent:
+    if any(e.kind in OF_A_UNIT for e in experiments):
         assert unit is not None
-        from ...evidence.unit_fem import unit_responses
-
-        with warnings.catch_warnings(record=True) as caught, progress.stage("unit"):
-            warnings.simplefilter("always")
-            responses = unit_responses(unit, bent, settings, cache, lambda _, share: progress.update(share))
-        # Where and what to do, on further lines, is of a simulation that nobody asked for.
-        left_out = [str(warning.message).partition("\n")[0] for warning in caught]
-        for words in left_out:
-            progress.warning(words, "unit")
+        simulated, left_out = _of_a_unit(experiments, unit, cache, progress, settings)
+        found |= simulated
         remarks += left_out
-        found[unit_pressure.KIND] = unit_pressure.UnitPressure(responses, experiments)
     return found, remarks
+
+
+def _of_a_unit(
+    experiments: Sequence[Experiment],
+    unit: Unit,
+    cache: Path,
+    progress: Progress,
+    settings: UnitSettings | None,
+) -> tuple[dict[str, Simulator], list[str]]:
+    """Simulators of the kinds in `OF_A_UNIT`, and what could not be simulated, in words."""
+    from ...evidence.unit_fem import blocked_responses, unit_responses
+
+    kinds = {e.kind for e in experiments}
+    found: dict[str, Simulator] = {}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        if kinds & set(FREE):
+            with progress.stage("unit"):
+                free = unit_responses(
+                    unit, experiments, settings, cache, lambda _, share: progress.update(share)
+                )
+            found |= {kind: FREE[kind](free, experiments) for kind in FREE if kind in kinds}
+        if blocked_force.KIND in kinds:
+            with progress.stage("unit with its tip held"):
+                held = blocked_responses(
+                    unit, experiments, settings, cache, lambda _, share: progress.update(share)
+                )
+            found[blocked_force.KIND] = blocked_force.BlockedForce(held, experiments)
+    # Where and what to do, on further lines, is of a simulation that nobody asked for.
+    left_out = [str(warning.message).partition("\n")[0] for warning in caught]
+    for words in left_out:
+        progress.warning(words, "unit")
+    return found, left_out

@@ -45,6 +45,11 @@ def between(low: float, high: float) -> str:
 def sized(verdict: Verdict, cause: Cause) -> str:
     """Parameters of a cause with their intervals in words."""
     sizes = []
+    if cause.effect.among:
+        value, low, high = cause.effect.spread
+        unit = cause.effect.parameters[0].unit
+        size = f"{value:.3g} {unit}".rstrip()
+        sizes.append(f"standard deviation between {cause.effect.among}s {size} (95 %: {between(low, high)})")
     for key, p in zip(cause.effect.keys, cause.effect.parameters, strict=True):
         low, high = verdict.intervals.get(key, (math.nan, math.nan))
         unit = f" {p.unit}" if p.unit else ""
@@ -140,6 +145,8 @@ def to_do(verdict: Verdict) -> str:
 
 
 def _of_one_only(cause: Cause) -> str:
+    if cause.effect.among:
+        return f", and differs from {cause.effect.among} to {cause.effect.among}"
     return f", in {cause.effect.whose} only" if cause.effect.whose else ""
 
 

@@ -63,7 +63,11 @@ def _picture(p: Proposal) -> str:
     pairs = [pair for pair in _PICTURES if set(pair) <= set(p.columns)]
     over_time = [pair for pair in pairs if pair[0] == "time_s"]
     # One curve, and what was recorded over time; of a unit the latter alone.
-    pairs = over_time[:2] if p.keys.get("kind") == "unit_pressure" else [*pairs[:1], *over_time[:1]]
+    pairs = (
+        over_time[:2]
+        if p.keys.get("kind") in ("unit_pressure", "pressure_step", "blocked_force")
+        else [*pairs[:1], *over_time[:1]]
+    )
     pairs = list(dict.fromkeys(pairs))
     if not pairs:
         return ""

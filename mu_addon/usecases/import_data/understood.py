@@ -33,6 +33,8 @@ KEYS = (
     "temperature_C",
     "scale",
     "orientation_deg",
+    "orientation_axis",
+    "gap_mm",
     "mass_g",
     "chamber_volume_mm3",
 )

@@ -1,0 +1,192 @@
+"""One simulation of a unit for the evidence: a body, an effect of one size, a path of pressures."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..design.quantity import in_MPa
+from ..errors import ConvergenceError, InputError, MeshingError
+from ..fem.equilibrium import Equilibrium
+from ..fem.held_tip import HeldTip
+from ..fem.kinematics import TipSection
+from ..fem.state import State
+from ..fem.trajectory import branches
+from ..measured.pose import X
+from .markers import material_points
+from .prediction.flat_obstacle import NAME as CONTACT
+from .unit_effects import EFFECTS, FLAT_OBSTACLE, HELD, Body, UnitEffect, with_flat_obstacle
+
+Array = np.ndarray[Any, Any]
+
+# Part of every key: raise it when a change of the code changes what is computed.
+REVISION = 3
+# Steps from a free tip to one that a load cell holds away from its place.
+HELD_STEPS = 4
+
+
+def effect_of(name: str) -> UnitEffect:
+    """The static effect of a name, walls and a load cell's place included."""
+    return FLAT_OBSTACLE if name == CONTACT else {**EFFECTS, HELD.name: HELD}[name]
+
+
+@attrs.frozen
+class Run:
+    """One quasi-static simulation: a body, an effect and its size, pressures in kPa, points in mm.
+
+    points: p of (x, y, z). effect: empty for the base model. size: in the effect's unit. outline: whether to
+    find, beside angle and places, how far the outline moves toward +y and -y, in mm.
+    """
+
+    body: Body
+    pressures_kPa: tuple[float, ...]
+    points: tuple[tuple[float, float, float], ...] = ()
+    effect: str = ""
+    size: float = 0.0
+    outline: bool = False
+
+    @property
+    def rows(self) -> int:
+        """Values at each pressure: angle, volume, three coordinates a point, two moves of the outline.
+
+        Of a held tip the force alone.
+        """
+        if self.body.gap_mm is not None:
+            return 1
+        return 2 + 3 * len(self.points) + 2 * self.outline
+
+    @property
+    def changed(self) -> tuple[Body, UnitEffect | None]:
+        """The body with the effect on it, and the effect, or None where it changes the body alone.
+
+        Raises InputError where the body cannot be drawn with the effect.
+        """
+        if not self.effect:
+            return self.body, None
+        effect = effect_of(self.effect)
+        body = effect.body(self.body, self.size) if effect.body else self.body
+        if effect.has_gravity:
+            body = body.whole
+        return body, effect if effect.materials or effect.model or effect.load else None
+
+    def key(self) -> str:
+        """Hash (32 hex digits) of all that the result depends on."""
+        try:
+            body, effect = self.changed
+        except InputError:
+            # No such body: its failure is kept, too.
+            body, effect = self.body, effect_of(self.effect)
+        parts = [REVISION, body.unit.hash(), attrs.astuple(body.mesh), self.pressures_kPa, self.points]
+        parts += [body.newton(effect), body.lattice.hash() if body.lattice else ""]
+        if body.drawn:
+            parts += [body.drawn.hash()]
+        if effect:
+            parts += [effect.name, self.size]
+            parts += [body.distal if effect.name == "clogged_chamber" else 0]
+            parts += [_turned(body) if effect.has_gravity else 0.0]
+        if body.gap_mm is not None:
+            parts += ["held", body.gap_mm]
+        if self.outline:
+            parts += ["outline"]
+        return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
+
+
+@attrs.frozen(eq=False)
+class Result:
+    """What a run found: values (rows, k) at k pressures, in degrees, mm3 and mm; nan where not reached.
+
+    why: the reason where values are nan, else empty.
+    """
+
+    values: Array
+    why: str = ""
+
+
+def run(case: Run, cache: Path | None = None) -> Result:
+    """Angle in degrees, growth of the chambers in mm3 and places of points in mm at every pressure.
+
+    cache: folder where a mesher that is not repeatable keeps its meshes. A pressure that is not reached, with
+    those beyond it, is nan; so is all where the body cannot be drawn or meshed.
+    """
+    values = np.full((case.rows, len(case.pressures_kPa)), np.nan)
+    try:
+        body, effect = case.changed
+        mesh = body.meshed(cache)
+        tip = TipSection.of(mesh)
+        points = material_points(mesh, np.array(case.points).reshape(-1, 3))
+        materials, model = body.materials(mesh), body.model(mesh)
+        if effect and effect.materials:
+            materials = effect.materials(materials, mesh, case.size)
+        if effect and effect.model:
+            model = effect.model(body, mesh, case.size)
+        if effect and effect.load:
+            model.load = effect.load(body, mesh, case.size)
+        equilibrium = Equilibrium(model, materials, body.newton(effect), explains=not case.effect)
+        start = equilibrium.at_zero_pressure()
+        if body.gap_mm is not None:
+            held, start = _held(equilibrium, start, body.gap_mm)
+            for at, state in _states(equilibrium, np.array(case.pressures_kPa), start):
+                values[0, at] = held.reading_N(state.u)
+            return Result(values)
+        # Out of reach, it only lends the points at which the unit would touch.
+        outline = with_flat_obstacle(body, mesh, 1e6).obstacles[0] if case.outline else None
+        places = slice(2, 2 + 3 * len(case.points))
+        whole, rest = 2 ** len(mesh.symmetry), model.cavity_volume(np.zeros_like(mesh.nodes))
+        for at, state in _states(equilibrium, np.array(case.pressures_kPa), start):
+            values[0, at] = tip.angle_deg(state.u)
+            values[1, at] = whole * (model.cavity_volume(state.u) - rest)
+            values[places, at] = points.at(state.u).ravel()
+            if outline:
+                y, still = (outline.places(u)[..., 1] for u in (state.u, np.zeros_like(state.u)))
+                values[places.stop :, at] = y.max() - still.max(), still.min() - y.min()
+    except (InputError, MeshingError, ConvergenceError) as error:
+        return Result(values, str(error))
+    return Result(values)
+
+
+def _turned(body: Body) -> Any:
+    """What of a body's orientation its weight depends on: degrees about x, or a direction."""
+    if tuple(body.orientation_axis) == X:
+        return body.orientation_deg
+    return tuple(body.down.tolist())
+
+
+def _held(equilibrium: Equilibrium, start: State, gap_mm: float) -> tuple[HeldTip, State]:
+    """The load cell that holds the tip gap_mm away from a state without pressure, and the state there."""
+    held = HeldTip(equilibrium.model.mesh, gap_mm, start.u[:, 1])
+    equilibrium.model.obstacles = (held,)
+    if gap_mm == 0.0:
+        return held, start
+    # From where the tip is to where it is held, in steps of which each converges on its own.
+    way = held.way.copy()
+    for share in np.linspace(0.0, 1.0, HELD_STEPS + 1)[1:]:
+        held.way = way - (1.0 - share) * gap_mm
+        start = equilibrium.newton(start.u, 0.0)
+    return held, start
+
+
+def _states(equilibrium: Equilibrium, pressures_kPa: Array, start: State) -> Iterator[tuple[int, State]]:
+    """Number of a pressure and its state, as far as they are reached; the last ConvergenceError is raised.
+
+    start: without pressure.
+    """
+    distinct, sides = branches(pressures_kPa)
+    if 0.0 in distinct:
+        yield int(np.flatnonzero(pressures_kPa == 0.0)[0]), start
+    failed: ConvergenceError | None = None
+    for side in sides:
+        history = [start]
+        for pressure in side:
+            try:
+                history.append(equilibrium.reach(in_MPa(pressure), history))
+            except ConvergenceError as error:
+                failed = error
+                break
+            yield int(np.flatnonzero(pressures_kPa == pressure)[0]), history[-1]
+    if failed:
+        raise failed
