@@ -52,6 +52,7 @@ _MODULES = (
     "sensor.operators",
     "node_tree.groups",
     "node_tree.operators",
+    "scene.dropping",
     # What draws; panels stand in the sidebar in this order, that of the work.
     "unit.panel",
     "steps.panel",

@@ -1,0 +1,137 @@
+"""The film of the whole way: runs inside a Blender with a window, where the built extension is installed.
+
+    MU_FILM=FOLDER MU_TEST_FOLDER=FOLDER real-window-blender benchmarks/blender_film.py ...
+
+From an empty scene to a shaped unit, its ranked paths, the painted deviation and the motion: each step by the
+extension's own operators, a picture of the whole window after it. Blender itself makes `film.webm` of them.
+What takes minutes, the simulation, is seen at some of its moments.
+"""
+
+import os
+import sys
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "blender"))
+from simulated import called, module, parts, run
+
+FOLDER = Path(os.environ["MU_FILM"])
+RATE = 12
+SIZE = 1280, 720
+CAPTIONS = FOLDER / "captions.txt"
+unit_object, jobs = module("blender.unit.object"), module("blender.jobs.start_child")
+SIMULATION = module("blender.simulate.job").SIMULATION
+shots = []
+
+
+def shot(hold_s):
+    """A picture of the window, to be seen so long."""
+    window, area, region = parts()
+    file = FOLDER / f"shot{len(shots):03d}.png"
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.screen.screenshot(filepath=str(file), check_existing=False)
+    shots.append((file, hold_s))
+    print("shot", file.name, flush=True)
+
+
+def root():
+    return unit_object.roots()[0]
+
+
+def shape():
+    yield 4.0
+    parts()[1].spaces.active.show_region_ui = True
+    yield 4.0
+    parts()[2].active_panel_category = "MU"
+    yield 4.0
+    shot(1.0)
+    assert called(bpy.ops.mu.add, preset="mu-0.75x") == {"FINISHED"}
+    yield 6.0
+    shot(1.5)
+    props = root().mu_unit
+    for wall in (0.94, 0.98, 1.02, 1.06, 1.0):
+        props.chambers.wall_mm = wall
+        yield 3.0
+        shot(0.3)
+    props.cut = True
+    yield 5.0
+    shot(1.5)
+    props.candidates = True
+    yield 5.0
+    shot(1.2)
+    assert called(bpy.ops.mu.path, name="alpha4") == {"FINISHED"}
+    yield 4.0
+    shot(1.2)
+
+
+def simulate():
+    study = root().mu_unit.study
+    study.command, study.detail = "place", "quick"
+    assert called(bpy.ops.mu.simulate) == {"FINISHED"}
+    child = SIMULATION.child(root())
+    stage = ""
+    while child.state in ("running", "waiting"):
+        yield 2.0
+        now = str(child.progress.get("stage", ""))
+        if now != stage:
+            stage = now
+            shot(0.5)
+    assert child.state == "done", child.error
+    yield 3.0
+    shot(1.0)
+
+
+def results():
+    called(bpy.ops.mu.field_show, field="deviation_mm")
+    yield 6.0
+    shot(2.0)
+    scene = bpy.context.scene
+    last = scene.frame_end
+    for k in range(24):
+        scene.frame_set(1 + round(k * (last - 1) / 23))
+        yield 1.5
+        shot(0.17)
+    called(bpy.ops.mu.field_show, field="von_mises_kPa")
+    yield 5.0
+    shot(2.0)
+    called(bpy.ops.mu.motion_clear)
+    yield 4.0
+    shot(1.5)
+
+
+def film():
+    """film.webm of the pictures, by Blender's sequencer."""
+    scene = bpy.data.scenes.new("film")
+    editor = scene.sequence_editor_create()
+    strips = getattr(editor, "strips", None) or editor.sequences
+    at = 1
+    for file, hold_s in shots:
+        length = max(round(hold_s * RATE), 1)
+        strip = strips.new_image(file.stem, str(file), 1, at)
+        strip.frame_final_duration = length
+        at += length
+    render = scene.render
+    scene.frame_start, scene.frame_end = 1, at - 1
+    render.fps, render.resolution_x, render.resolution_y = RATE, *SIZE
+    scene.view_settings.view_transform = "Standard"
+    if hasattr(render.image_settings, "media_type"):
+        render.image_settings.media_type = "VIDEO"
+    render.image_settings.file_format = "FFMPEG"
+    render.ffmpeg.format, render.ffmpeg.codec = "WEBM", "WEBM"
+    render.ffmpeg.constant_rate_factor, render.ffmpeg.gopsize = "MEDIUM", 60
+    render.ffmpeg.audio_codec = "NONE"
+    render.use_file_extension = False
+    render.filepath = str(FOLDER / "film.webm")
+    bpy.context.window.scene = scene
+    bpy.ops.render.render(animation=True)
+    print("film", (FOLDER / "film.webm").stat().st_size, flush=True)
+
+
+def session():
+    for part in (shape, simulate, results):
+        yield from part()
+    film()
+
+
+run(session)
