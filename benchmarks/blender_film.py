@@ -1,13 +1,15 @@
 """The film of the whole way: runs inside a Blender with a window, where the built extension is installed.
 
-    MU_FILM=FOLDER MU_TEST_FOLDER=FOLDER real-window-blender benchmarks/blender_film.py ...
+    MU_FILM=FOLDER MU_TEST_FOLDER=FOLDER MU_BLENDER_UI... benchmarks/blender_film.py last.png SECONDS
 
+(MU_BLENDER_UI as of tests/blender/test_installed.py; it needs ImageMagick's `import`.)
 From an empty scene to a shaped unit, its ranked paths, the painted deviation and the motion: each step by the
 extension's own operators, a picture of the whole window after it. Blender itself makes `film.webm` of them.
 What takes minutes, the simulation, is seen at some of its moments.
 """
 
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -17,20 +19,19 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "blender"
 from simulated import called, module, parts, run
 
 FOLDER = Path(os.environ["MU_FILM"])
+RUNS = os.environ.get("MU_FILM_RUNS", "")
+"""Folder of the same unit's runs, if an earlier session was cut off: what it finished is taken up."""
 RATE = 12
 SIZE = 1280, 720
-CAPTIONS = FOLDER / "captions.txt"
 unit_object, jobs = module("blender.unit.object"), module("blender.jobs.start_child")
 SIMULATION = module("blender.simulate.job").SIMULATION
 shots = []
 
 
 def shot(hold_s):
-    """A picture of the window, to be seen so long."""
-    window, area, region = parts()
+    """A picture of the whole screen, to be seen so long; Blender's own are black where no card draws it."""
     file = FOLDER / f"shot{len(shots):03d}.png"
-    with bpy.context.temp_override(window=window, area=area, region=region):
-        bpy.ops.screen.screenshot(filepath=str(file), check_existing=False)
+    subprocess.run(["import", "-window", "root", str(file)], check=True)
     shots.append((file, hold_s))
     print("shot", file.name, flush=True)
 
@@ -68,6 +69,16 @@ def shape():
 def simulate():
     study = root().mu_unit.study
     study.command, study.detail = "place", "quick"
+    if RUNS:
+        study.folder = RUNS
+    stage = ""
+    while jobs.running():
+        # Of the session before, which was cut off.
+        (child,) = (jobs.child_of(key) for key in jobs.running())
+        yield 2.0
+        if child.progress.get("stage") != stage:
+            stage = child.progress.get("stage")
+            shot(0.6)
     assert called(bpy.ops.mu.simulate) == {"FINISHED"}
     child = SIMULATION.child(root())
     stage = ""
@@ -88,10 +99,10 @@ def results():
     shot(2.0)
     scene = bpy.context.scene
     last = scene.frame_end
-    for k in range(24):
-        scene.frame_set(1 + round(k * (last - 1) / 23))
-        yield 1.5
-        shot(0.17)
+    for k in range(16):
+        scene.frame_set(1 + round(k * (last - 1) / 15))
+        yield 1.0
+        shot(0.25)
     called(bpy.ops.mu.field_show, field="von_mises_kPa")
     yield 5.0
     shot(2.0)
