@@ -236,8 +236,8 @@ def test_a_sample_scene_for_each_task_has_what_it_begins_with_in_view(scene):
         "ranking": lambda: unit_object.roots()[0].mu_unit.candidates,
         "obstacle": lambda: obstacles.of_unit(unit_object.roots()[0]),
         "gripper": gripper_object.roots,
-        "measured": lambda: evidence.measured_data(unit_object.roots()[0]).experiments,
-        "tree": lambda: trees.trees()[0].nodes,
+        "measured": lambda: evidence.measured_data(unit_object.roots()[0]).measured,
+        "tree": lambda: [n for t in trees.trees() for n in t.nodes],
     }[scene]
     assert made()
     area = next(a for w in bpy.context.window_manager.windows for a in w.screen.areas if a.type == "VIEW_3D")
