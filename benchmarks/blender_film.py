@@ -5,9 +5,11 @@
 (MU_BLENDER_UI as of tests/blender/test_installed.py; it needs ImageMagick's `import`.)
 From an empty scene to a shaped unit, its ranked paths, the painted deviation and the motion: each step by the
 extension's own operators, a picture of the whole window after it. Blender itself makes `film.webm` of them.
-What takes minutes, the simulation, is seen at some of its moments.
+What takes minutes, the simulation, is seen at some of its moments. In background (`blender -b -P
+benchmarks/blender_film.py`) the film is made anew of the pictures in MU_FILM.
 """
 
+import json
 import os
 import subprocess
 import sys
@@ -16,15 +18,14 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "blender"))
-from simulated import called, module, parts, run
 
 FOLDER = Path(os.environ["MU_FILM"])
 RUNS = os.environ.get("MU_FILM_RUNS", "")
 """Folder of the same unit's runs, if an earlier session was cut off: what it finished is taken up."""
 RATE = 12
 SIZE = 1280, 720
-unit_object, jobs = module("blender.unit.object"), module("blender.jobs.start_child")
-SIMULATION = module("blender.simulate.job").SIMULATION
+SHOTS = "shots.json"
+"""Names of the pictures, and how many seconds each is seen."""
 shots = []
 
 
@@ -32,7 +33,8 @@ def shot(hold_s):
     """A picture of the whole screen, to be seen so long; Blender's own are black where no card draws it."""
     file = FOLDER / f"shot{len(shots):03d}.png"
     subprocess.run(["import", "-window", "root", str(file)], check=True)
-    shots.append((file, hold_s))
+    shots.append((file.name, hold_s))
+    (FOLDER / SHOTS).write_text(json.dumps(shots))
     print("shot", file.name, flush=True)
 
 
@@ -117,9 +119,9 @@ def film():
     editor = scene.sequence_editor_create()
     strips = getattr(editor, "strips", None) or editor.sequences
     at = 1
-    for file, hold_s in shots:
+    for name, hold_s in json.loads((FOLDER / SHOTS).read_text()):
         length = max(round(hold_s * RATE), 1)
-        strip = strips.new_image(file.stem, str(file), 1, at)
+        strip = strips.new_image(name, str(FOLDER / name), 1, at)
         strip.frame_final_duration = length
         at += length
     render = scene.render
@@ -134,8 +136,7 @@ def film():
     render.ffmpeg.audio_codec = "NONE"
     render.use_file_extension = False
     render.filepath = str(FOLDER / "film.webm")
-    bpy.context.window.scene = scene
-    bpy.ops.render.render(animation=True)
+    bpy.ops.render.render(animation=True, scene=scene.name)
     print("film", (FOLDER / "film.webm").stat().st_size, flush=True)
 
 
@@ -145,4 +146,12 @@ def session():
     film()
 
 
-run(session)
+if bpy.app.background:
+    # Of the pictures that are there.
+    film()
+else:
+    from simulated import called, module, parts, run
+
+    unit_object, jobs = module("blender.unit.object"), module("blender.jobs.start_child")
+    SIMULATION = module("blender.simulate.job").SIMULATION
+    run(session)

@@ -30,7 +30,9 @@ class _Dropped:
 
     bl_options = {"REGISTER", "UNDO"}
 
-    filepath: StringProperty(name="File", subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filepath: StringProperty(
+        name="File", description="The file that was dropped", subtype="FILE_PATH", options={"SKIP_SAVE"}
+    )
 
     def path(self) -> Path:
         """The file; raises InputError where none is named."""
@@ -45,7 +47,9 @@ class MU_OT_drop_toml(_Dropped, bpy.types.Operator):
     bl_idname = "mu.drop_toml"
     bl_label = "Unit or Node Tree"
 
-    place: FloatVectorProperty(name="Place", options={"HIDDEN", "SKIP_SAVE"})
+    place: FloatVectorProperty(
+        name="Place", description="Where it was dropped", options={"HIDDEN", "SKIP_SAVE"}
+    )
 
     def invoke(self, context, event):
         # Where the mouse is, at the depth of the 3D cursor.
