@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "blender"
 FOLDER = Path(os.environ["MU_FILM"])
 RUNS = os.environ.get("MU_FILM_RUNS", "")
 """Folder of the same unit's runs, if an earlier session was cut off: what it finished is taken up."""
-RATE = 12
+RATE = 6
 SIZE = 1280, 720
 SHOTS = "shots.json"
 """Names of the pictures, and how many seconds each is seen."""
@@ -117,12 +117,16 @@ def film():
     """film.webm of the pictures, by Blender's sequencer."""
     scene = bpy.data.scenes.new("film")
     editor = scene.sequence_editor_create()
-    strips = getattr(editor, "strips", None) or editor.sequences
+    strips = editor.strips if hasattr(editor, "strips") else editor.sequences
     at = 1
     for name, hold_s in json.loads((FOLDER / SHOTS).read_text()):
         length = max(round(hold_s * RATE), 1)
         strip = strips.new_image(name, str(FOLDER / name), 1, at)
         strip.frame_final_duration = length
+        # Pictures are as large as the screen, and a strip shows them so.
+        picture = bpy.data.images.load(str(FOLDER / name))
+        strip.transform.scale_x = strip.transform.scale_y = SIZE[0] / picture.size[0]
+        bpy.data.images.remove(picture)
         at += length
     render = scene.render
     scene.frame_start, scene.frame_end = 1, at - 1
