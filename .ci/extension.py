@@ -6,7 +6,7 @@
     python .ci/extension.py FOLDER --install  install bpy into this Python first, where it is missing
 
 The tool needs bpy, which a plain `pip install -e .` leaves out: without it this says so before any work.
-Beside them it puts sample.blend, the sample scene.
+Beside them it puts sample.blend and sample-NAME.blend, the sample scenes.
 
 Blender wants the manifest beside the package's `__init__.py`; the checkout keeps them apart so that the core
 is an ordinary package. What ships is copied together first. Wheels come from pip, each with the SHA-256 that
@@ -160,9 +160,9 @@ def main(arguments: list[str]) -> int:
         return 2
     out = options.folder.resolve()
     out.mkdir(parents=True, exist_ok=True)
-    sample = [sys.executable, str(ROOT / ".ci" / "sample.py"), str(out / "sample.blend")]
+    sample = [sys.executable, str(ROOT / ".ci" / "sample.py"), str(out)]
     if subprocess.run(sample, check=False).returncode:
-        sys.stderr.write("the sample scene could not be built\n")
+        sys.stderr.write("the sample scenes could not be built\n")
         return 1
     if not options.bundle:
         return build(tool, out)

@@ -19,6 +19,7 @@ _MODULES = (
     "results.runs",
     "results.unsaved",
     "results.legend_object",
+    "jobs.preferences",
     "jobs.start_child",
     "sensor.twin",
     "sensor.state",
@@ -51,6 +52,7 @@ _MODULES = (
     "sensor.operators",
     "node_tree.groups",
     "node_tree.operators",
+    "scene.dropping",
     # What draws; panels stand in the sidebar in this order, that of the work.
     "unit.panel",
     "steps.panel",
@@ -94,7 +96,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take everything out of Blender again and end the simulations that this session started."""
+    """Take everything out of Blender again and end the jobs that do not go on without it."""
     global _registered
     if _registered:
         _remove(_modules())

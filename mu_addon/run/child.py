@@ -173,9 +173,7 @@ class Child:
     def _end(self, status: int) -> None:
         self._read()
         self._stream.close()
-        if self._process.stdin is not None:
-            with suppress(OSError):
-                self._process.stdin.close()
+        self._close_input()
         if self._asked is not None:
             self.state = CANCELLED
         elif self.result is not None and status == 0:
@@ -184,6 +182,11 @@ class Child:
             self.state = FAILED
             if self.error is None:
                 self.error = self._without_message(status)
+
+    def _close_input(self) -> None:
+        if self._process.stdin is not None:
+            with suppress(OSError):
+                self._process.stdin.close()
 
     def _without_message(self, status: int) -> dict[str, Any]:
         tail = " / ".join(_last_lines(self.folder / ERRORS, 3)) or "it left no message"

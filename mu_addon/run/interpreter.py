@@ -14,6 +14,10 @@ from pathlib import Path
 
 from ..errors import InputError
 
+ROOT = Path(__file__).resolve().parents[2]
+ENTRY = "MU_ENTRY"
+"""Environment variable: the Python file that runs the core's command line where its package has another name,
+as in Blender; `jobs/child_main.py` sets it to itself."""
 _LIBRARY_FOLDERS = ("site-packages", "dist-packages")
 
 
@@ -47,3 +51,15 @@ def environment(more: Iterable[Path] = ()) -> dict[str, str]:
     found = [Path(p) for p in sys.path if Path(p).name in _LIBRARY_FOLDERS]
     folders = dict.fromkeys(str(p) for p in [*more, *found])
     return {**os.environ, "PYTHONPATH": os.pathsep.join(folders), "PYTHONUNBUFFERED": "1"}
+
+
+def core_command() -> list[str]:
+    """Command to which the words of a line of the core's command line are added. Raises InputError."""
+    entry = os.environ.get(ENTRY)
+    return worker_command(Path(entry), ()) if entry else [sys.executable, "-m", "mu_addon.cli"]
+
+
+def core_path() -> str:
+    """PYTHONPATH for `core_command`."""
+    before = os.environ.get("PYTHONPATH", "")
+    return before if os.environ.get(ENTRY) else os.pathsep.join(filter(None, [str(ROOT), before]))

@@ -79,6 +79,40 @@ class FolderLock:
         os.write(self._handle, (json.dumps(mine) + "\n").encode())
 
 
+def holder(folder: Path) -> int | None:
+    """Number of the process of this machine that works in a folder, or None: nobody does, or another's.
+
+    0 where one does that has not signed yet. Where the file system offers no locks nobody is found.
+    """
+    flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
+    try:
+        handle = os.open(folder / LOCK, flags)
+    except OSError:
+        return None
+    try:
+        _lock(handle)
+    except BlockingIOError:
+        found = _signature(handle)
+        if found.get("machine", socket.gethostname()) != socket.gethostname():
+            return None
+        number = found.get("process")
+        return number if isinstance(number, int) and number > 0 else 0
+    else:
+        return None
+    finally:
+        os.close(handle)
+
+
+def _signature(handle: int) -> dict[str, Any]:
+    """What the holder of a lock has signed; empty before it has."""
+    try:
+        os.lseek(handle, 0, os.SEEK_SET)
+        signed: Any = json.loads(os.read(handle, 1000))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return signed if isinstance(signed, dict) else {}
+
+
 def _owner(handle: int) -> str:
     """Who signed the lock, in words."""
     try:

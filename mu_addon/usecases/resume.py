@@ -26,6 +26,8 @@ MODULES = {
     "protocols.toml": ".diagnose.design_experiments",
     "fit.toml": ".fit_material.run",
     "calibrate.toml": ".sensor.calibrate",
+    "record.toml": ".sensor.record",
+    "motion.toml": ".sensor.measured_motion",
     "sweep.toml": ".parameter_study.run",
     "reproduce.toml": ".reproduce.run",
     "graph.toml": ".graph.run",

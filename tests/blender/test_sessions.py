@@ -5,6 +5,7 @@ import time
 from pathlib import Path
 
 from mu_addon.design.parameters import read_unit
+from mu_addon.run.lock import holder
 
 from .session import PATIENCE_S, Blender, needs_bpy
 
@@ -46,3 +47,11 @@ def test_a_sensor_outlives_undo_load_and_render_and_dies_with_blender(each_bpy, 
     pid, folder = session(each_bpy, tmp_path, "leave_a_sensor", tmp_path=tmp_path)
     wait_for_the_end_of(pid)
     assert json.loads((folder / "status.json").read_text())["state"] == "ended", "and it ended well"
+
+
+def test_a_run_outlives_blender_and_the_next_session_shows_and_stops_it(each_bpy, tmp_path):
+    pid, folder = session(each_bpy, tmp_path, "leave_a_lasting_run")
+    assert holder(folder) == pid, "it goes on"
+    assert session(each_bpy, tmp_path, "find_a_lasting_run") == "cancelled"
+    wait_for_the_end_of(pid)
+    assert session(each_bpy, tmp_path, "find_nothing") == ([], [])

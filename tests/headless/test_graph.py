@@ -1,6 +1,7 @@
 """`graph` as a user runs it: killed and resumed to the same digits, cached, bad files without a traceback."""
 
 import json
+import shutil
 import signal
 import subprocess
 import time
@@ -146,7 +147,7 @@ def test_the_shipped_unit_is_evaluated_from_its_file(tmp_path):
     assert out["nodes"]["Trim"]["remark"].endswith("struts")
 
 
-def every_kind(wall):
+def every_kind(wall, bench):
     """A tree with every kind of node, as coarse as each goes."""
     nodes = dict(template("unit").nodes)
 
@@ -181,13 +182,45 @@ def every_kind(wall):
     add("Wall", "obstacle", file=str(wall), friction=0.3)
     add("Gripper", "gripper", {"unit": "U.unit"})
     add("Grasp", "grip", {"gripper": "Gripper.gripper"}, coarse=True, cubes_mm="20", rank_paths=False)
+    add("Thin Or Thick", "range", values="0.8 1.0")
+    add("Study", "sweep", {"unit": "U.unit", "ranges": "Thin Or Thick.range"}, stages="design", workers=1)
+    add("Heaviest", "best", {"table": "Study.table"}, figure="mass_g")
+    angles = str(ROOT / "assets" / "examples" / "bench" / "angles.csv")
+    add("Record", "record", simulated=True, seconds=18.0)
+    add(
+        "Calibrate", "calibrate", {"bending": "Record.recording"},
+        channel="light_V", dark="dark_V", angles=angles,
+    )  # fmt: skip
+    # The simulated sensor has no gauge: its dark level stands for one.
+    add(
+        "Motion", "measure", {"recording": "Record.recording", "calibration": "Calibrate.calibration"},
+        pressure="dark_V",
+    )  # fmt: skip
+    add("Kept Map", "calibration", file=str(bench / "calibration.toml"))
+    add("Kept Take", "recording", folder=str(bench / "take"))
     return NodeTree("every kind", nodes)
+
+
+def calibrated(folder):
+    """A recording and its calibration, made before."""
+    angles = ROOT / "assets" / "examples" / "bench" / "angles.csv"
+    for line in (
+        ("record", "--simulate", "--seconds", "18", "--out", folder / "take"),
+        (
+            "calibrate", folder / "take", "--channel", "light_V", "--dark", "dark_V", "--angles", angles,
+            "--out", folder / "map",
+        ),
+    ):  # fmt: skip
+        done = run(*line)
+        assert done.returncode == 0, done.stdout + done.stderr
+    shutil.copy(folder / "map" / "calibration.toml", folder)
+    return folder
 
 
 def test_every_kind_of_node_is_computed_and_found_again(tmp_path):
     wall = tmp_path / "wall.stl"
     trimesh.creation.box((10.0, 10.0, 10.0)).export(wall)
-    tree = every_kind(wall)
+    tree = every_kind(wall, calibrated(tmp_path / "bench"))
     assert {node.kind for node in tree.nodes.values()} == set(definitions())
     (tmp_path / "every.toml").write_text(tree_text(tree), encoding="utf-8")
     first = evaluated(tmp_path / "every.toml", tmp_path / "out")

@@ -78,7 +78,7 @@ def test_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweeping, "Cluster", OneProcess)
+    monkeypatch.setattr(sweeping, "cluster_at", OneProcess)
     job = sweeping.Job(parse_plan(PLAN, tmp_path), work=answered)
 
     def run(folder: Path, context: RunContext) -> None:

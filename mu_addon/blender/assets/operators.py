@@ -62,15 +62,21 @@ class MU_OT_skin(bpy.types.Operator):
 
 
 class MU_OT_sample(bpy.types.Operator):
-    """Add a sample: a whole unit, one cut open with its candidate paths, and one in a body of its own"""
+    """Add a sample: an overview, or what one task begins with"""
 
     bl_idname = "mu.sample"
     bl_label = "Sample Scene"
     bl_options = {"REGISTER", "UNDO"}
 
+    scene: EnumProperty(
+        name="Scene",
+        description="What is added",
+        items=[(name, name.capitalize(), text) for name, (text, _) in sample.SCENES.items()],
+    )
+
     @reports_errors
     def execute(self, context):
-        sample.build(context)
+        sample.build(context, self.scene)
         return {"FINISHED"}
 
 

@@ -1,13 +1,17 @@
-"""The sample scene: what the extension makes, side by side, by the same operators that a designer uses."""
+"""Sample scenes: what the extension makes, side by side, and one for each task, by a designer's operators."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import bpy
 from mathutils import Vector
 
+from ...design.assets import asset_root
+from ..gripper import object as gripper_object
+from ..obstacles import state as obstacles
 from ..preview import nodes
 from ..shared import scene_units, viewports
 from ..shared.compat import set_modifier_input
@@ -16,7 +20,12 @@ from ..unit import object as unit_object
 APART_MM = 130.0
 
 
-def build(context: Any) -> list[Any]:
+def build(context: Any, name: str = "overview") -> list[Any]:
+    """The sample scene of that name, in view; its roots."""
+    return SCENES[name][1](context)
+
+
+def _overview(context: Any) -> list[Any]:
     """Three units in the scene, whole, cut open with paths, and in a body, and a curve; the roots."""
     cursor = context.scene.cursor.location.copy()
     roots = []
@@ -47,6 +56,71 @@ def build(context: Any) -> list[Any]:
     context.view_layer.objects.active = whole
     viewports.frame([*roots, curve])
     return roots
+
+
+def _unit(context: Any, preset: str = "mu-0.75x") -> Any:
+    bpy.ops.mu.add(preset=preset, frame=False)
+    return unit_object.active_root(context)
+
+
+def _ranking(context: Any) -> list[Any]:
+    """A unit cut open with its candidate paths, ready for *Place the Sensor*."""
+    root = _unit(context)
+    root.mu_unit.cut = root.mu_unit.candidates = True
+    root.mu_unit.study.command, root.mu_unit.study.detail = "place", "quick"
+    context.view_layer.update()
+    viewports.frame([root])
+    return [root]
+
+
+def _obstacle(context: Any) -> list[Any]:
+    """A unit beside a box that it bends against, ready for *Motion Only*."""
+    root = _unit(context)
+    root.mu_unit.study.command, root.mu_unit.study.detail = "simulate", "quick"
+    bpy.ops.mu.obstacle_box(size=(20.0, 12.0, 12.0), gap=0.6)
+    context.view_layer.objects.active = root
+    context.view_layer.update()
+    viewports.frame([root, *obstacles.of_unit(root)])
+    return [root]
+
+
+def _gripper(context: Any) -> list[Any]:
+    """A gripper over a cube, ready for *Grasp*."""
+    bpy.ops.mu.gripper_add()
+    root = gripper_object.active(context)
+    root.mu_gripper.detail = "quick"
+    context.view_layer.update()
+    viewports.frame([root, *root.children])
+    return [root]
+
+
+def _measured(context: Any) -> list[Any]:
+    """A unit with the paper's compression tests as measured data, ready for *Diagnose*."""
+    root = _unit(context, "mu-1.0x")
+    root.mu_evidence.folder = str(asset_root() / "examples" / "paper-moduli")
+    viewports.frame([root])
+    return [root]
+
+
+def _tree(context: Any) -> list[Any]:
+    """A unit that follows the tree of its steps in the node editor."""
+    root = _unit(context, "mu-1.0x")
+    root.mu_unit.cut = True
+    bpy.ops.mu.path(name="alpha4")
+    bpy.ops.mu.tree_of_unit(steps=True)
+    viewports.frame([root])
+    return [root]
+
+
+SCENES: dict[str, tuple[str, Callable[[Any], list[Any]]]] = {
+    "overview": ("Units whole, cut open with paths, and in a body of their own", _overview),
+    "ranking": ("A unit with its candidate paths, ready for Place the Sensor", _ranking),
+    "obstacle": ("A unit beside a box that it bends against, ready for Motion Only", _obstacle),
+    "gripper": ("A gripper over a cube, ready for Grasp", _gripper),
+    "measured": ("A unit with measured data, ready for Diagnose", _measured),
+    "tree": ("A unit that follows the node tree of its steps", _tree),
+}
+"""Sample scenes by name: what is in it, and what makes it."""
 
 
 def _beside(context: Any, number: int) -> Any:

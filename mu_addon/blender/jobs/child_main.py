@@ -47,6 +47,8 @@ def _provide_gmsh():
 
 _provide_package()
 _provide_gmsh()
+# A study of a parameter study is a process of its own, which is to begin here, too.
+os.environ["MU_ENTRY"] = str(Path(__file__).resolve())
 
 
 def _trouble(solves):
@@ -105,6 +107,7 @@ def run(arguments):
     if arguments == ["check"]:
         sys.stdout.write(json.dumps({"type": "result"}) + "\n")
         return 0
+    importlib.import_module("mu_addon.run.processes").limit_memory(int(os.environ.get("MU_MEMORY_MB", "0")))
     # By name: the package is the one provided above, and not one that happens to be on the path.
     return importlib.import_module("mu_addon.cli.main").main(arguments)
 

@@ -65,6 +65,15 @@ class MU_MT_jobs(bpy.types.Menu):
             _, text = whole(start_child.child_of(key))
             title = f"Cancel {start_child.title_of(key)} ({text})"
             self.layout.operator("mu.job_cancel", text=title, icon="CANCEL").key = key
+        self.layout.separator()
+        going = sum(map(start_child.goes_on, listed()))
+        words = (
+            f"When Blender is closed {going} of them go on" if going else "They end when Blender is closed"
+        )
+        self.layout.label(text=words, icon="INFO")
+        kept = bpy.context.preferences.addons.get(start_child.PACKAGE)
+        if kept is not None and kept.preferences is not None:
+            self.layout.prop(kept.preferences, "jobs_go_on")
 
 
 _seen: set[str] = set()

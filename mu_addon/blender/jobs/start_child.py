@@ -1,4 +1,7 @@
-"""Child processes that this session started: one a job, read by a timer, ended with the session.
+"""Child processes of jobs: one a job, read by a timer.
+
+Those that take minutes go on when Blender is closed, unless the user wants otherwise, and the next session
+takes them up (`sessions`); the others end with the session that started them.
 
 What runs is kept here, in Python, and never in the .blend file: a file that is loaded later has no button
 stuck at "running". Nothing here writes to Blender's data.
@@ -9,6 +12,7 @@ from __future__ import annotations
 import atexit
 import importlib
 import importlib.util
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,16 +22,30 @@ import bpy
 
 from ...errors import InputError, MuError
 from ...run.child import FAILED, RUNNING, WAITING, Child
+from ...run.found_child import FoundChild
 from ...run.interpreter import environment, worker_command
 from ...run.progress_estimate import Plan
 from ..shared import viewports
 from ..shared.updates import Signal
+from . import sessions
 
 INTERVAL_S = 0.2
-LOAD_AFTER_S = 1.0
+LOAD_AFTER_S, LOAD_EVERY_S = 1.0, 0.1
+WRITERS = (
+    "tomlkit",
+    "mu_addon.evidence.effect",
+    "mu_addon.evidence.unit_effects",
+    "mu_addon.fem.newton_settings",
+    "mu_addon.placement.graph",
+    "mu_addon.usecases.simulate_and_place.named_effects",
+    "mu_addon.usecases.simulate_and_place.job",
+)
+"""What writes a job's inputs, in parts that each load well within a tenth of a second; no solver."""
 CHILD_MAIN = Path(__file__).with_name("child_main.py")
 SOLVER = ("warp", "scipy", "cvxopt", "meshio", "matplotlib")
 """Modules that a simulation cannot do without."""
+PACKAGE = __package__.rpartition(".blender")[0]
+"""Name of the extension's package, by which Blender keeps its preferences."""
 OWN_FOLDER = "blender"
 """Folder within a run's folder for what the child writes to its outputs."""
 
@@ -38,6 +56,8 @@ _children: dict[str, Child] = {}
 _titles: dict[str, str] = {}
 _heavy: set[str] = set()
 """Keys of jobs of which one runs at a time."""
+_lasting: set[str] = set()
+"""Keys of jobs that may go on without Blender."""
 
 
 def missing(modules: Sequence[str] = SOLVER) -> list[str]:
@@ -69,7 +89,8 @@ class JobKind:
 
     name: what tells the kinds apart; uuid_of, folder_of: identifier of a root object and folder of its run.
     title: the job in words; heavy: whether it takes the machine for minutes, so that of such jobs one runs at
-    a time and the others wait for it; plan_of: its stages for an object, as they are expected.
+    a time and the others wait for it; plan_of: its stages for an object, as they are expected; outlives:
+    whether it may go on when Blender is closed, as the heavy ones may.
     """
 
     name: str
@@ -78,6 +99,7 @@ class JobKind:
     title: str = "job"
     heavy: bool = False
     plan_of: Callable[[Any], Plan] = lambda root: ()
+    outlives: bool = False
 
     def key(self, root: Any) -> str:
         """Identifier of the job of that object."""
@@ -106,7 +128,10 @@ class JobKind:
         child = start(["resume", str(folder), "--json", *options], folder, plan=plan, waits=waits)
         if self.heavy:
             _heavy.add(key)
-        return watch(key, child, f"{root.name}: {self.title}")
+        title = f"{root.name}: {self.title}"
+        if self.heavy or self.outlives:
+            last(sessions.Record(key, title, folder, sessions.now_s(), tuple(plan), self.heavy))
+        return watch(key, child, title)
 
     def dismiss(self, root: Any) -> None:
         """Forget an ended job, so that no panel shows it."""
@@ -133,6 +158,24 @@ def title_of(key: str) -> str:
 def ended() -> list[str]:
     """Keys of the jobs with a title that have ended and were not dismissed, the latest last."""
     return [key for key, child in _children.items() if key in _titles and key not in running()]
+
+
+def last(record: sessions.Record) -> None:
+    """Have a job go on when Blender is closed, where the user does not want otherwise."""
+    _lasting.add(record.key)
+    sessions.keep(record)
+
+
+def goes_on(key: str) -> bool:
+    """Whether a job goes on when Blender is closed: one that runs, and not one that waits."""
+    child = _children.get(key)
+    return _wanted() and key in _lasting and child is not None and child.state == RUNNING
+
+
+def _wanted() -> bool:
+    """Whether the user wants jobs to go on; without preferences, as in a script, there is no next session."""
+    extension = bpy.context.preferences.addons.get(PACKAGE)
+    return bool(getattr(getattr(extension, "preferences", None), "jobs_go_on", False))
 
 
 def forget(key: str) -> None:
@@ -181,33 +224,64 @@ def _poll() -> float | None:
         # Headers each time: the time left counts down between messages.
         viewports.redraw() if news else viewports.redraw_headers()
     for key in set(before) - set(running()):
+        sessions.drop(key)
         JOB_ENDED.send(key)
     return INTERVAL_S if running() else None
 
 
 def _end_all() -> None:
-    for child in _children.values():
-        child.kill()
+    """What does not go on without Blender ends with it."""
+    leaves = False
+    for key, child in _children.items():
+        if goes_on(key):
+            leaves = True
+        else:
+            child.kill()
+            sessions.drop(key)
+    sessions.close(leaves)
 
 
-def _load_writer() -> None:
-    """Load what writes a job's inputs: so the first job of a session starts as quickly as the next."""
-    if not missing(("tomlkit",)):
-        importlib.import_module("tomlkit")
+def _take_up() -> None:
+    """Watch what former sessions left: it goes on, or has ended meanwhile."""
+    for record in sessions.take_up():
+        if record.key in running():
+            continue
+        try:
+            child = FoundChild(record.run, record.run / OWN_FOLDER, record.plan, record.started_s)
+        except MuError:
+            # Its folder is gone, and with it what could be said.
+            continue
+        if record.heavy:
+            _heavy.add(record.key)
+        last(record)
+        watch(record.key, child, record.title)
+
+
+def _load_writer() -> float | None:
+    """Load what writes a job's inputs, a module at a time: so the first job starts as quickly as the next."""
+    if missing(WRITERS[:1]):
+        return None
+    for name in WRITERS:
+        module = name.replace("mu_addon", PACKAGE, 1) if name.startswith("mu_addon.") else name
+        if module not in sys.modules:
+            importlib.import_module(module)
+            return LOAD_EVERY_S
+    return None
 
 
 def register() -> None:
-    """Children end with the session that started them."""
+    """Take up what former sessions left; at the end, end what does not go on without Blender."""
     atexit.register(_end_all)
-    bpy.app.timers.register(_load_writer, first_interval=LOAD_AFTER_S)
+    for timer in (_load_writer, _take_up):
+        bpy.app.timers.register(timer, first_interval=LOAD_AFTER_S, persistent=True)
 
 
 def unregister() -> None:
-    """End every child and its timer."""
+    """End every child that does not go on without Blender, and the timers."""
     atexit.unregister(_end_all)
     _end_all()
-    for kept in (_children, _titles, _heavy):
+    for kept in (_children, _titles, _heavy, _lasting):
         kept.clear()
-    for timer in (_poll, _load_writer):
+    for timer in (_poll, _load_writer, _take_up):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)

@@ -26,8 +26,10 @@ from .groups import TreeOperator, active_tree
 _TEXTS = {
     "unit": "A unit by the steps of its design, with a waveguide",
     "three-walls": "Three walls of one unit, simulated and compared",
+    "best-wall": "Three walls as a parameter study, and whether the one that bends most can be printed",
     "gripper": "Two units on a plate, and their grasp of a cube",
     "data-to-cause": "Measured data, the effects they name, and what these change",
+    "bench": "A sensor recorded and calibrated, here a simulated one",
 }
 
 

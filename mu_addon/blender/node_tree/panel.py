@@ -101,7 +101,7 @@ def _menu(category: str) -> type:
         for d in kinds:
             _entry(self.layout, d.label, classes.node_class(d.kind))
 
-    name = f"MU_MT_nodes_{category.lower()}"
+    name = f"MU_MT_nodes_{category.lower().replace(' ', '_')}"
     members = {"__doc__": category, "bl_idname": name, "bl_label": category, "draw": draw}
     return type(name, (bpy.types.Menu,), members)
 

@@ -20,6 +20,9 @@ SECONDS = {
     "grip": 900.0,
     "diagnose": 120.0,
     "solid": 10.0,
+    "sweep": 600.0,
+    "calibrate": 2.0,
+    "measure": 1.0,
 }
 """What a node of a kind takes about, on two cores, where it never ran in the tree's folder."""
 OTHER_S = 30.0

@@ -27,6 +27,10 @@ _COLOURS = {
     "model": (0.75, 0.25, 0.45),
     "data": (0.65, 0.85, 0.25),
     "table": (0.45, 0.62, 1.00),
+    "study table": (0.25, 0.40, 0.85),
+    "range": (0.70, 0.70, 0.45),
+    "recording": (0.95, 0.80, 0.60),
+    "calibration": (0.60, 0.45, 0.30),
 }
 ANY = "any"
 """Sockets of inputs that take several types."""

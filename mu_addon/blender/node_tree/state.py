@@ -76,7 +76,7 @@ def _number(tree: Any) -> str:
     return str(tree.mu_uuid)
 
 
-RUN = JobKind("graph", uuid_of, folder_of)
+RUN = JobKind("graph", uuid_of, folder_of, outlives=True)
 """The evaluation of a tree."""
 
 

@@ -23,7 +23,11 @@ class MU_PT_path(UnitPanel, bpy.types.Panel):
         row.use_property_split = False
         row.prop(props, "candidates", toggle=True, icon="HIDE_OFF" if props.candidates else "HIDE_ON")
         column = layout.column(align=True)
-        for window in windows(props.chambers.count):
+        # The best first, once they are ranked; a sort keeps the order of what it finds equal.
+        unranked = (float("inf"), 0)
+        for window in sorted(
+            windows(props.chambers.count), key=lambda window: ranked.get(window.name, unranked)[0]
+        ):
             chosen = props.path == window.name
             text = f"{window.name}    P{window.start} to P{window.start + window.length - 1}"
             if window.name in ranked:

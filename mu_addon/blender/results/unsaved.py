@@ -1,8 +1,8 @@
 """Where runs go when the file is saved: beside it, and found again from wherever it is saved to.
 
-A unit of a file that was never saved keeps its runs in the user's own folder. Saving moves them beside the
-file, and what the file keeps of them is the way from there. A save elsewhere leaves them where they are, and
-changes that way.
+A unit or a gripper of a file that was never saved keeps its runs in the user's own folder. Saving moves them
+beside the file, and what the file keeps of them is the way from there. A save elsewhere leaves them where
+they are, and changes that way.
 """
 
 from __future__ import annotations
@@ -15,18 +15,22 @@ from bpy.app.handlers import persistent
 
 from ...errors import MuError
 from ...usecases.simulate_and_place import history
+from ..gripper import object as gripper_object
+from ..gripper import state as grasps
 from ..shared import displays, handlers
 from ..shared.compat import user_folder
-from ..shared.displays import MOTION
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 
 _homes: dict[str, Path] = {}
-"""By UUID: the folders that units named as the file was about to be saved."""
+"""By UUID: the folders that units and grippers named as the file was about to be saved."""
 
 
-def _units() -> list[Any]:
-    return [root for root in unit_object.roots() if root.mu_unit.study.folder]
+def _owners() -> list[tuple[Any, Any, Any, Path]]:
+    """Object, what has its UUID, what names its folder, and that folder, of every unit and gripper."""
+    units = [(r, r.mu_unit, r.mu_unit.study, studies.folder_of(r)) for r in unit_object.roots()]
+    grippers = [(r, r.mu_gripper, r.mu_gripper, grasps.folder_of(r)) for r in gripper_object.roots()]
+    return [owner for owner in (*units, *grippers) if owner[2].folder]
 
 
 @persistent
@@ -36,28 +40,27 @@ def _before_save(path: str = "", *_: Any) -> None:
     if not isinstance(path, str) or not path:
         return
     blend = Path(bpy.path.abspath(path))
-    for root in _units():
-        home = studies.folder_of(root)
+    for root, props, named, home in _owners():
         if home.parent == user_folder("studies"):
             home = _moved(root, home, blend)
-        _homes[root.mu_unit.uuid] = home
-        root.mu_unit.study.folder = _way(home, blend)
+        _homes[props.uuid] = home
+        named.folder = _way(home, blend)
 
 
 @persistent
 def _after_save(*_: Any) -> None:
     # A copy is saved elsewhere, and this file goes on from its own place.
-    for root in _units():
-        home = _homes.get(root.mu_unit.uuid)
+    for _root, props, named, _home in _owners():
+        home = _homes.get(props.uuid)
         if home is not None:
             way = studies.relative(home)
-            if root.mu_unit.study.folder != way:
-                root.mu_unit.study.folder = way
+            if named.folder != way:
+                named.folder = way
     _homes.clear()
 
 
 def _moved(root: Any, old: Path, blend: Path) -> Path:
-    """The unit's folder beside the file, where it could be moved there; else where it is."""
+    """The folder beside the file, where it could be moved there; else where it is."""
     new = studies.beside(blend, old.name)
     try:
         if not history.move_home(old, new):
@@ -66,7 +69,7 @@ def _moved(root: Any, old: Path, blend: Path) -> Path:
         # The file is saved all the same; the runs stay where they were and are found there.
         return old
     for part in root.children:
-        modifier = part.modifiers.get("Motion") if part.get(MOTION) else None
+        modifier = _cache_of(part)
         if modifier is not None:
             played = Path(bpy.path.abspath(modifier.filepath))
             if played.is_relative_to(old):
@@ -85,15 +88,24 @@ def _way(home: Path, blend: Path) -> str:
 @persistent
 def _loaded(*_: Any) -> None:
     """Point caches whose way has changed with the file are found again in the folder of their run."""
-    for root in unit_object.roots():
+    for root in (*unit_object.roots(), *gripper_object.roots()):
         for part in root.children:
-            modifier = part.modifiers.get("Motion") if part.get(MOTION) else None
+            modifier = _cache_of(part)
             if modifier is None or Path(bpy.path.abspath(modifier.filepath)).is_file():
                 continue
-            name = Path(bpy.path.abspath(modifier.filepath)).name
-            found = studies.results_folder(root) / "motion" / "played" / name
+            before = Path(bpy.path.abspath(modifier.filepath))
+            if root.mu_gripper.uuid:
+                found = grasps.folder_of(root) / before.parent.name / before.name
+            else:
+                found = studies.results_folder(root) / "motion" / "played" / before.name
             if found.is_file() and displays.editable(part):
                 modifier.filepath = studies.relative(found)
+
+
+def _cache_of(part: Any) -> Any:
+    """The modifier that plays a part of a run's motion, or None."""
+    found = part.modifiers.get("Motion")
+    return found if found is not None and found.type == "MESH_CACHE" else None
 
 
 _HANDLERS = {"save_pre": _before_save, "save_post": _after_save, "load_post": _loaded}

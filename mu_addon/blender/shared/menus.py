@@ -65,14 +65,14 @@ def _object(self, context):
 
 
 class MU_MT_more(bpy.types.Menu):
-    """Sample scene, gripper, node groups for curves of your own, and the asset browser"""
+    """Sample scenes, gripper, node groups for curves of your own, and the asset browser"""
 
     bl_idname = "MU_MT_more"
     bl_label = "More"
 
     def draw(self, context):
         layout = self.layout
-        layout.operator("mu.sample", icon="SCENE_DATA")
+        layout.operator_menu_enum("mu.sample", "scene", icon="SCENE_DATA")
         layout.operator("mu.gripper_add", text="Gripper of This Unit", icon="MOD_MIRROR").of_unit = True
         layout.operator_menu_enum("mu.skin", "group", text="Skin with Nodes", icon="GEOMETRY_NODES")
         layout.operator("mu.millimetres", icon="DRIVER_DISTANCE")

@@ -1,4 +1,4 @@
-"""Functions of `orders`, which loads the solver: imported when one is called, not to list nodes."""
+"""Functions of modules that load the solver: imported when one is called, not to list nodes."""
 
 from __future__ import annotations
 
@@ -7,6 +7,6 @@ from importlib import import_module
 from typing import Any
 
 
-def of_orders(name: str) -> Callable[..., Any]:
-    """A function of `orders`, which is loaded when it is called."""
-    return lambda *given: getattr(import_module(".orders", __package__), name)(*given)
+def of_orders(name: str, module: str = "orders") -> Callable[..., Any]:
+    """A function of `orders`, or of another module beside it, which is loaded when it is called."""
+    return lambda *given: getattr(import_module(f".{module}", __package__), name)(*given)

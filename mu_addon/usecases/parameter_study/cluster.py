@@ -1,13 +1,20 @@
-"""Tasks on a Dask cluster: one in this process by default, or that of a scheduler at an address."""
+"""Tasks on a Dask cluster: one in this process by default, or that of a scheduler at an address.
+
+Where Dask is not installed, as in Blender, this machine's processes do them.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import suppress
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
+import attrs
+
 from ...errors import InputError, MuError
+from ...run.pool import each
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -23,6 +30,29 @@ ALONE_S = 10.0
 # Tasks that wait at the scheduler for every thread of its workers.
 AHEAD = 3
 Work = Callable[["Task"], dict[str, Any]]
+
+
+@attrs.frozen
+class Processes:
+    """So many processes of this machine, without Dask."""
+
+    workers: int
+
+    def results(
+        self, tasks: Sequence[Task], work: Work, warn: Callable[[str], None]
+    ) -> Generator[tuple[int, dict[str, Any]]]:
+        """As `Cluster.results`; raises what `work` raises, and MuError where a process dies."""
+        yield from each(work, tasks, self.workers, "parameter study")
+
+    def close(self) -> None:
+        """Nothing is left: whoever stops listening ends the processes."""
+
+
+def cluster_at(scheduler: str | None, workers: int) -> Cluster | Processes:
+    """The scheduler at an address, or `workers` here. Raises InputError and MuError."""
+    if scheduler is None and find_spec("distributed") is None:
+        return Processes(workers)
+    return Cluster(scheduler, workers)
 
 
 class Cluster:
@@ -91,7 +121,7 @@ class Cluster:
 
     def results(
         self, tasks: Sequence[Task], work: Work, warn: Callable[[str], None]
-    ) -> Iterator[tuple[int, dict[str, Any]]]:
+    ) -> Generator[tuple[int, dict[str, Any]]]:
         """Number of each task as it is done, and what `work` made of it or why it failed, in any order.
 
         A task whose worker is lost is given to another; a scheduler that is restarted is given all that is

@@ -17,28 +17,30 @@ import attrs
 
 from ...errors import MuError
 from ...files import output_error, plain
+from ...reading import file_text
 from ...run.cache import REVISION, key
 from ...run.child import RUNNING, Child
 from ...run.folder import keep_inputs
+from ...run.interpreter import core_command, core_path
 from ...run.versions import package_versions
 
 # Seconds between two looks at a study's memory.
 LOOK_S = 0.05
-ROOT = Path(__file__).resolve().parents[3]
 
 
 @attrs.frozen
 class Task:
     """One study to run: files of inputs by name, and what it may take; plain data, so that it travels.
 
-    version: of the program that asks, which has to be the worker's; module: what the process runs.
+    version: of the program that asks, which has to be the worker's; module: what the process runs in place
+    of the core's command line.
     """
 
     files: Mapping[str, str]
     memory_MB: int
     minutes: float
     version: str
-    module: tuple[str, ...] = ("-m", "mu_addon.cli", "resume")
+    module: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -72,9 +74,8 @@ def run_point(task: Task) -> dict[str, Any]:
     with scratch as name:
         folder = Path(name)
         keep_inputs(folder / "study", task.files)
-        command = [
-            sys.executable, *task.module, str(folder / "study"), "--json", "--no-report", "--workers", "1",
-        ]  # fmt: skip
+        line = [sys.executable, *task.module] if task.module else [*core_command(), "resume"]
+        command = [*line, str(folder / "study"), "--json", "--no-report", "--workers", "1"]
         child = Child(command, folder / "words", _environment(task), ends_with_parent=True)
         try:
             peak_MB, stopped = _watch(child, task)
@@ -106,8 +107,8 @@ def _worker() -> str:
 
 def _environment(task: Task) -> dict[str, str]:
     threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
-    return {**os.environ, **threads, "PYTHONPATH": path, "MU_MEMORY_MB": str(task.memory_MB)}
+    more = {"PYTHONPATH": core_path(), "MU_MEMORY_MB": str(task.memory_MB), "MU_ENDS_WITH_INPUT": "1"}
+    return {**os.environ, **threads, **more}
 
 
 def _watch(child: Child, task: Task) -> tuple[float, dict[str, str] | None]:
@@ -142,8 +143,11 @@ def _too_much(child: Child, task: Task, peak_MB: float) -> dict[str, str] | None
 
 def _memory_MB(pid: int) -> float:
     """Memory that a process and its children hold, in MB; 0 once it has ended."""
-    import psutil
-
+    try:
+        import psutil
+    except ImportError:
+        # Blender's archive has none.
+        return _of_proc(pid)
     try:
         process = psutil.Process(pid)
         family: Sequence[Any] = [process, *process.children(recursive=True)]
@@ -154,5 +158,19 @@ def _memory_MB(pid: int) -> float:
         try:
             found += one.memory_info().rss
         except psutil.Error:
+            continue
+    return found / 1e6
+
+
+def _of_proc(pid: int) -> float:
+    """The same by the files that Linux gives of each process; 0 on other systems, which are not looked at."""
+    found, family = 0, [pid]
+    while family:
+        place = Path("/proc") / str(family.pop())
+        try:
+            # Pages: the second figure is what lies in memory.
+            found += int(file_text(place / "statm").split()[1]) * os.sysconf("SC_PAGE_SIZE")
+            family += [int(n) for n in file_text(place / "task" / place.name / "children").split()]
+        except (OSError, ValueError, IndexError, AttributeError):
             continue
     return found / 1e6

@@ -20,7 +20,7 @@ from ...run.cache import Cache
 from ...run.context import RunContext
 from ...run.progress import Progress
 from ...run.usecase import UseCase
-from .cluster import Cluster, Work
+from .cluster import Work, cluster_at
 from .csv_columns import Row, cell, column_names, figures
 from .found import Found
 from .plan import LAYOUT, PLAN, REPORT, TABLE, Plan, Point, read_plan_of_run
@@ -128,8 +128,11 @@ class Run:
             return
         tasks = [self.task(point) for point in todo]
         written = time.monotonic()
-        with closing(Cluster(scheduler, workers)) as cluster:
-            for done, (position, row) in enumerate(cluster.results(tasks, work, progress.warning), 1):
+        with (
+            closing(cluster_at(scheduler, workers)) as found,
+            closing(found.results(tasks, work, progress.warning)) as results,
+        ):
+            for done, (position, row) in enumerate(results, 1):
                 self.known[todo[position].number] = row
                 if not row.get("again"):
                     self.cache.put("point", tasks[position].name, {"row": np.array(json.dumps(row))})

@@ -91,7 +91,7 @@ def stream(
         elif event == "unreadable":
             progress.warning(str(details["detail"]), "", str(details["what_to_do"]))
 
-    with _ctrl_c_stops(control):
+    with ctrl_c_stops(control):
         status = run_session(
             source,
             folder,
@@ -106,7 +106,7 @@ def stream(
 
 
 @contextmanager
-def _ctrl_c_stops(control: Control) -> Iterator[None]:
+def ctrl_c_stops(control: Control) -> Iterator[None]:
     """A stream has no end of its own: asked by Ctrl-C or SIGTERM to stop, it ends well."""
     if threading.current_thread() is not threading.main_thread():
         yield

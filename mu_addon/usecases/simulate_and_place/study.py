@@ -300,15 +300,19 @@ class Study:
         name = key(model.mesh.hash(), materials.hash(), visited, self.job.newton, *self.job.effects.parts)
         total = len(np.union1d(visited, 0.0))
         done = 0
+        body = Equilibrium(model, materials, self.job.newton)
 
         def keep(state: State) -> None:
             nonlocal done
             done += 1
-            self.progress.update(done / total, f"{state.pressure_kPa:.4g} kPa, residual {state.residual:.1e}")
+            least, _ = model.smallest_jacobian(state.u, body.parameters)
+            words = f"{state.pressure_kPa:.4g} kPa, residual {state.residual:.1e}"
+            words += f", {state.iterations} iterations, smallest det F {least:.2f}"
+            self.progress.update(done / total, words)
             on_state(state)
 
         return simulate(
-            Equilibrium(model, materials, self.job.newton),
+            body,
             time,
             pressure,
             keep,

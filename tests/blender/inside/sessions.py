@@ -1,12 +1,19 @@
 """Parts of `test_sessions`: what one session of Blender does before it ends, and what another one finds."""
 
+import sys
+from pathlib import Path
+
 import bpy
 
 import mu_addon
 from mu_addon.blender.jobs import start_child as jobs
 from mu_addon.blender.sensor import state as sensor
+from mu_addon.blender.simulate import study_folder as studies
+from mu_addon.blender.simulate.job import SIMULATION
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit import presets
+from mu_addon.run.child import Child
+from mu_addon.run.interpreter import environment
 
 from .acting import add, refused
 from .jobs import launch, watch
@@ -14,6 +21,9 @@ from .test_sensor import connected, started
 from .test_sensor import drawn as sensor_panel_drawn
 from .test_sensor import watch as watch_sensor
 from .test_simulation import drawn
+
+ROOT = Path(__file__).resolve().parents[3]
+LOCKED = str(ROOT / "tests" / "run" / "locked_worker.py")
 
 
 def begin():
@@ -68,6 +78,53 @@ def leave_a_simulation():
     add()
     assert "other job" in drawn()
     return child._process.pid
+
+
+def leave_a_lasting_run():
+    """A simulation that goes on as the session ends; returns its process and its folder."""
+    begin()
+    # As with the extension's preferences, which a process without the extension has not; it ends with this.
+    jobs._wanted = lambda: True
+    root = add()
+    folder = studies.folder_of(root) / "runs" / "one"
+    own = folder / jobs.OWN_FOLDER
+    child = Child([sys.executable, LOCKED, str(folder)], own, environment([ROOT]))
+    key = SIMULATION.key(root)
+    jobs.last(
+        jobs.sessions.Record(key, "arm: simulation", folder, jobs.sessions.now_s(), (("Model A", 9.0),), True)
+    )
+    jobs.watch(key, child, "arm: simulation")
+    watch(lambda: child.progress)
+    assert jobs.goes_on(key)
+    bpy.ops.wm.save_as_mainfile(filepath="arm.blend")
+    return child.pid, folder
+
+
+def find_a_lasting_run():
+    """The next session finds it, with its unit or without, and stops it; returns how it ended."""
+    begin()
+    jobs._take_up()
+    (key,) = jobs.running()
+    assert jobs.title_of(key) == "arm: simulation"
+    bpy.ops.wm.open_mainfile(filepath="arm.blend")
+    (root,) = unit_object.roots()
+    child = SIMULATION.child(root)
+    watch(lambda: child.progress)
+    assert child.estimate.number == 1
+    assert "is being simulated" in refused(bpy.ops.mu.simulate) or not bpy.ops.mu.simulate.poll()
+    jobs._take_up()
+    assert jobs.running() == [key], "found once"
+    assert bpy.ops.mu.job_cancel(key=key) == {"FINISHED"}
+    watch(lambda: child.state != "running")
+    mu_addon.unregister()
+    return child.state
+
+
+def find_nothing():
+    """What was seen to its end is not found again."""
+    begin()
+    jobs._take_up()
+    return jobs.running(), jobs.ended()
 
 
 def leave_a_sensor(tmp_path):

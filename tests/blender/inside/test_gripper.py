@@ -1,6 +1,7 @@
 """A gripper in Blender: drawn from the core's parameters, sent to grasp, its grasp on the timeline."""
 
 import json
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -249,6 +250,29 @@ def test_a_grasp_plays_on_the_timeline(tmp_path):
     gripper_object.part(root, "cube").location.z += 2.0
     assert grasps.of(root).stale
     assert "Stale" in drawn()
+
+
+def test_an_unsaved_files_grasp_goes_where_saving_finds_it(tmp_path):
+    root = held()
+    unsaved = grasps.folder_of(root)
+    root.mu_gripper.folder = str(unsaved)
+    root.mu_gripper.cube_mm = 20.0
+    write_folder(unsaved)
+    assert bpy.ops.mu.grasp_show() == {"FINISHED"}
+    place = tmp_path / "project"
+    place.mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(place / "hand.blend"))
+    assert not unsaved.exists()
+    assert grasps.folder_of(root) == place / "hand.mu" / unsaved.name
+    place.rename(tmp_path / "moved")
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "moved" / "hand.blend"))
+    (root,) = gripper_object.roots()
+    left, right, _ = grasp_motion.parts(root)
+    for part in (left, right):
+        path = bpy.path.abspath(part.modifiers["Motion"].filepath)
+        assert Path(path).is_file(), path
+    assert grasps.of(root) is not None
 
 
 def test_the_cube_is_drawn_where_the_core_puts_it():

@@ -54,7 +54,7 @@ def test_every_kind_of_node_of_the_core_has_its_class_sockets_fields_and_menu():
     assert len(colours) == len(types), "two types of one colour"
 
 
-@pytest.mark.parametrize("shipped", ["unit", "three-walls", "gripper", "data-to-cause"])
+@pytest.mark.parametrize("shipped", ["unit", "three-walls", "best-wall", "gripper", "data-to-cause", "bench"])
 def test_a_template_becomes_a_tree_that_becomes_the_same_file(shipped):
     assert shipped in template_names()
     tree = new(shipped)

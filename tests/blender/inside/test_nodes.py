@@ -3,9 +3,14 @@
 import bmesh
 import bpy
 import numpy as np
+import pytest
 from mathutils import Vector
 
 from mu_addon.blender.assets import library
+from mu_addon.blender.evidence import state as evidence
+from mu_addon.blender.gripper import object as gripper_object
+from mu_addon.blender.node_tree import state as trees
+from mu_addon.blender.obstacles import state as obstacles
 from mu_addon.blender.preview import nodes
 from mu_addon.blender.shared.compat import modifier_input, set_modifier_input
 from mu_addon.blender.unit import object as unit_object
@@ -221,6 +226,26 @@ def test_presets_and_groups_become_an_asset_library_of_the_users():
     assert bpy.ops.mu.assets_remove() == {"FINISHED"}
     assert "Monolithic Units" not in names()
     assert list(folder.iterdir()) == []
+
+
+@pytest.mark.parametrize("scene", ["ranking", "obstacle", "gripper", "measured", "tree"])
+def test_a_sample_scene_for_each_task_has_what_it_begins_with_in_view(scene):
+    assert bpy.ops.mu.sample(scene=scene) == {"FINISHED"}
+    bpy.context.view_layer.update()
+    made = {
+        "ranking": lambda: unit_object.roots()[0].mu_unit.candidates,
+        "obstacle": lambda: obstacles.of_unit(unit_object.roots()[0]),
+        "gripper": gripper_object.roots,
+        "measured": lambda: evidence.measured_data(unit_object.roots()[0]).measured,
+        "tree": lambda: [n for t in trees.trees() for n in t.nodes],
+    }[scene]
+    assert made()
+    area = next(a for w in bpy.context.window_manager.windows for a in w.screen.areas if a.type == "VIEW_3D")
+    view = area.spaces.active.region_3d
+    bodies = [o for o in bpy.data.objects if o.type == "MESH" and len(o.data.vertices) and not o.hide_get()]
+    assert bodies
+    for obj in bodies:
+        assert (obj.matrix_world.translation - view.view_location).length < view.view_distance
 
 
 def test_the_sample_scene():

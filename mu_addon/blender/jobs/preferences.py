@@ -1,0 +1,28 @@
+"""The extension's preferences: what becomes of jobs when Blender is closed."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+from bpy.props import BoolProperty
+
+from .start_child import PACKAGE
+
+
+class MU_AP_preferences(bpy.types.AddonPreferences):
+    """Preferences of the extension"""
+
+    bl_idname = PACKAGE
+
+    jobs_go_on: BoolProperty(
+        name="Runs Go On When Blender Is Closed",
+        description="Simulations, grasps, diagnoses and node trees that run as Blender is closed go on by "
+        "themselves, and the next session shows them. Off: they end with Blender, and what they have "
+        "finished is kept. Jobs that only wait end either way",
+        default=True,
+    )
+
+    def draw(self, context):
+        self.layout.prop(self, "jobs_go_on")
+
+
+register, unregister = bpy.utils.register_classes_factory((MU_AP_preferences,))

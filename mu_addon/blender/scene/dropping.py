@@ -1,0 +1,182 @@
+"""Files dropped into a view: a unit or a node tree as TOML, a closed surface as envelope or obstacle.
+
+Blender asks which where several of its own importers take a file, too.
+"""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+from pathlib import Path
+
+import bpy
+from bpy.props import FloatVectorProperty, StringProperty
+
+from ...design.body import read_body
+from ...design.parameters import read_unit
+from ...errors import InputError
+from ...reading import file_text, parse_toml
+from ..preview import skeletons
+from ..shared import viewports
+from ..shared.operators import UnitOperator, reports_errors
+from ..unit import object as unit_object
+from . import landing
+
+SURFACES = ".stl;.obj;.ply"
+# Far more than a unit's file or a tree's has.
+_LONGEST = 10_000_000
+
+
+class _Dropped:
+    """An operator on a dropped file."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: StringProperty(
+        name="File", description="The file that was dropped", subtype="FILE_PATH", options={"SKIP_SAVE"}
+    )
+
+    def path(self) -> Path:
+        """The file; raises InputError where none is named."""
+        if not self.filepath:
+            raise InputError("no file is named", "filepath", "drop one into the view")
+        return Path(bpy.path.abspath(self.filepath))
+
+
+class MU_OT_drop_toml(_Dropped, bpy.types.Operator):
+    """Add the unit that a TOML file describes where it is dropped, or open the node tree that it holds"""
+
+    bl_idname = "mu.drop_toml"
+    bl_label = "Unit or Node Tree"
+
+    place: FloatVectorProperty(
+        name="Place", description="Where it was dropped", options={"HIDDEN", "SKIP_SAVE"}
+    )
+
+    def invoke(self, context, event):
+        # Where the mouse is, at the depth of the 3D cursor.
+        region, space = context.region, getattr(context, "region_data", None)
+        if space is not None and region is not None:
+            from bpy_extras.view3d_utils import region_2d_to_location_3d
+
+            mouse = event.mouse_region_x, event.mouse_region_y
+            self.place = region_2d_to_location_3d(region, space, mouse, context.scene.cursor.location)
+        return self.execute(context)
+
+    @reports_errors
+    def execute(self, context):
+        path = self.path()
+        try:
+            document = parse_toml(file_text(path, _LONGEST), str(path))
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(f"cannot read the file: {error}", str(path), "drop a TOML file") from error
+        if "nodes" in document:
+            bpy.ops.mu.tree_load(filepath=str(path))
+            return {"FINISHED"}
+        unit = read_unit(path)
+        if context.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        root = unit_object.create(context, unit)
+        if self.properties.is_property_set("place"):
+            root.location = self.place
+        landing.land(context, root)
+        viewports.redraw()
+        return {"FINISHED"}
+
+
+class _Surface(_Dropped, UnitOperator):
+    """A closed surface, in mm in the active unit's frame, put into the scene and then used."""
+
+    @reports_errors
+    def execute(self, context):
+        path, root = self.path(), unit_object.active_root(context)
+        body = read_body(path)
+        mesh = bpy.data.meshes.new(path.stem)
+        skeletons.write(mesh, skeletons.Skeleton(body.vertices, faces=(body.triangles,), smooth=False))
+        obj = bpy.data.objects.new(path.stem, mesh)
+        context.collection.objects.link(obj)
+        obj.matrix_world = root.matrix_world
+        context.view_layer.update()
+        for other in context.selected_objects:
+            other.select_set(False)
+        obj.select_set(True)
+        root.select_set(True)
+        context.view_layer.objects.active = root
+        try:
+            done = self.use()
+        except RuntimeError as error:
+            # The surface stays in the scene, selected, to be mended.
+            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+            return {"FINISHED"}
+        return done
+
+
+class MU_OT_drop_envelope(_Surface, bpy.types.Operator):
+    """Add a closed surface from a file, in mm in the unit's frame, and have the lattice fill it"""
+
+    bl_idname = "mu.drop_envelope"
+    bl_label = "Envelope of the Unit"
+
+    def use(self):
+        """As by its button."""
+        return bpy.ops.mu.body()
+
+
+class MU_OT_drop_obstacle(_Surface, bpy.types.Operator):
+    """Add a closed surface from a file, in mm in the unit's frame, as an obstacle of the unit"""
+
+    bl_idname = "mu.drop_obstacle"
+    bl_label = "Obstacle of the Unit"
+
+    def use(self):
+        """As by its button."""
+        return bpy.ops.mu.obstacle()
+
+
+class MU_FH_toml(bpy.types.FileHandler):
+    """Units and node trees"""
+
+    bl_idname = "MU_FH_toml"
+    bl_label = "Monolithic Unit or Node Tree"
+    bl_import_operator = "mu.drop_toml"
+    bl_file_extensions = ".toml"
+
+    @classmethod
+    def poll_drop(cls, context):
+        return context.area is not None and context.area.type in ("VIEW_3D", "NODE_EDITOR")
+
+
+class _SurfaceHandler:
+    bl_file_extensions = SURFACES
+
+    @classmethod
+    def poll_drop(cls, context):
+        in_view = context.area is not None and context.area.type == "VIEW_3D"
+        return in_view and unit_object.active_root(context) is not None
+
+
+class MU_FH_envelope(_SurfaceHandler, bpy.types.FileHandler):
+    """Envelopes"""
+
+    bl_idname = "MU_FH_envelope"
+    bl_label = "Envelope of the Unit"
+    bl_import_operator = "mu.drop_envelope"
+
+
+class MU_FH_obstacle(_SurfaceHandler, bpy.types.FileHandler):
+    """Obstacles"""
+
+    bl_idname = "MU_FH_obstacle"
+    bl_label = "Obstacle of the Unit"
+    bl_import_operator = "mu.drop_obstacle"
+
+
+CLASSES = (
+    MU_OT_drop_toml,
+    MU_OT_drop_envelope,
+    MU_OT_drop_obstacle,
+    MU_FH_toml,
+    MU_FH_envelope,
+    MU_FH_obstacle,
+)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -1,0 +1,126 @@
+"""Nodes of the sensor on the bench: recordings, calibrations, and measured data from both."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ...errors import InputError
+from ...graph.definition import FILE, FOLDER, Call, Definition, Input, Output, Outputs, setting
+from .loading import of_orders
+
+BENCH = "Bench"
+_ORDERS = "bench_orders"
+_LEFT_OUT = "neither this nor what needs it is computed"
+
+
+def _recording(call: Call) -> Outputs:
+    from ...sensing.recording import read_recording
+
+    folder = call.settings["folder"]
+    if not folder:
+        raise InputError("no recording is named", "folder", "give a folder that `record` or the bench wrote")
+    found = read_recording(Path(folder))
+    if not found:
+        raise InputError("the recording contains no samples", folder, "choose another recording")
+    time_s = found[-1].columns["time_s"]
+    words = f"{len(time_s)} samples, {time_s[-1] - time_s[0]:.3g} s: {', '.join(found[-1].channels)}"
+    return {"recording": Path(folder), "words": words}
+
+
+def _calibration(call: Call) -> Outputs:
+    from ...sensing.calibration import read_calibration
+
+    file = call.settings["file"]
+    if not file:
+        raise InputError("no calibration is named", "file", "give the calibration.toml of `calibrate`")
+    found = read_calibration(Path(file))
+    return {"calibration": Path(file), "range": found.range_deg}
+
+
+def bench_nodes() -> tuple[Definition, ...]:
+    """Definitions of the nodes of the bench."""
+    return (
+        Definition(
+            "record",
+            "Record",
+            BENCH,
+            "so many seconds of the sensor on its serial port",
+            outputs=(Output("recording", "recording", "its samples"),),
+            settings=(
+                setting("port", "", "serial port, or usb:VID:PID; empty: the only USB one"),
+                setting("baud", 115200, "bits a second", low=300, high=10_000_000),
+                setting("simulated", False, "a simulated sensor that bends to and fro, in place of a port"),
+                setting("seconds", 10.0, "duration", unit="s", low=0.1, high=86_400),
+                setting(
+                    "take", 1, "raise it to record once more; earlier takes are kept", low=1, high=10_000
+                ),
+            ),
+            order=of_orders("record_order", _ORDERS),
+            read=of_orders("recording_of", _ORDERS),
+            muting=_LEFT_OUT,
+            remark=lambda outputs: outputs["words"],
+        ),
+        Definition(
+            "recording",
+            "Recording",
+            BENCH,
+            "a recording that was made before",
+            outputs=(Output("recording", "recording", "its samples"),),
+            settings=(setting("folder", "", "folder of a recording", path=FOLDER),),
+            make=_recording,
+            remark=lambda outputs: outputs["words"],
+        ),
+        Definition(
+            "calibrate",
+            "Calibrate",
+            BENCH,
+            "the map from voltage to bending angle, by recorded bending",
+            (Input("bending", ("recording", "data"), "link recordings, or measured data", many=True),),
+            (
+                Output("calibration", "calibration", "the map"),
+                Output("error", "number", "error in sweeps left out of the fit, in deg"),
+            ),
+            (
+                setting("channel", "", "column of the light; empty: the only one"),
+                setting("dark", "", "column of the dark level, or volts; empty: 0"),
+                setting("angles", "", "CSV of time_s,angle_deg; empty: by marks such as angle 30", path=FILE),
+            ),
+            order=of_orders("calibrate_order", _ORDERS),
+            read=of_orders("calibration_of", _ORDERS),
+            muting=_LEFT_OUT,
+            remark=lambda outputs: f"error {outputs['error']:.2g} deg",
+        ),
+        Definition(
+            "calibration",
+            "Calibration",
+            BENCH,
+            "a calibration that was made before",
+            outputs=(Output("calibration", "calibration", "the map"),),
+            settings=(setting("file", "", "calibration.toml", path=FILE),),
+            make=_calibration,
+            remark=lambda outputs: "{:.3g} to {:.3g} deg".format(*outputs["range"]),
+        ),
+        Definition(
+            "measure",
+            "Measured Motion",
+            BENCH,
+            "a recording as measured data: the angle by the calibration against the pressure",
+            (
+                Input("recording", ("recording",), "link a node Record or Recording"),
+                Input("calibration", ("calibration",), "link a node Calibrate or Calibration"),
+            ),
+            (Output("data", "data", "an experiment of a unit under pressure"),),
+            (
+                setting("pressure", "pressure_kPa", "channel of the gauge"),
+                setting("kPa_per_unit", 1.0, "what the channel is multiplied by", low=-1e6, high=1e6),
+                setting("zero", 0.0, "what the channel reads without pressure", low=-1e9, high=1e9),
+                setting("rate_hz", 10.0, "rows a second", unit="Hz", low=1e-3, high=1e5),
+                setting("name", "bench", "name of the experiment"),
+                setting("specimen", "A", "which specimen"),
+            ),
+            order=of_orders("measure_order", _ORDERS),
+            read=of_orders("measured_of", _ORDERS),
+            muting=_LEFT_OUT,
+            remark=lambda outputs: "{:.3g} to {:.3g} deg".format(*outputs["range"]),
+        ),
+    )

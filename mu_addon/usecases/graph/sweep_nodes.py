@@ -1,0 +1,147 @@
+"""Nodes of parameter studies: ranges of parameters, the studies over them, and the best of these."""
+
+from __future__ import annotations
+
+from ...errors import InputError
+from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, setting
+from ...meshing.settings import FIDELITIES, HOMOGENISED
+from .loading import of_orders
+from .parts import described
+
+STUDY = "Parameter Study"
+# As the parameter study names them, which is not loaded for a look at its nodes; a test compares them.
+METHODS = ("grid", "latin_hypercube", "sobol")
+STAGES = ("design", "simulate", "place")
+FACTOR = "protocol.factor"
+REFINE = "simulate.mesh.refine"
+GOALS = ("largest", "smallest")
+_ORDERS = "sweep_orders"
+
+
+def _varied() -> dict[str, bool]:
+    """Every parameter that a range may be of, and whether it takes whole numbers alone."""
+    numbers = {name: d.type is int for name, d in described().items() if d.type in (int, float)}
+    return numbers | {FACTOR: False, REFINE: False}
+
+
+def _range(call: Call) -> Outputs:
+    """A range as a line of [vary] in sweep.toml: its name and its table."""
+    s = call.settings
+    whole = _varied()[s["parameter"]]
+    if s["values"].strip():
+        try:
+            found = [float(word) for word in s["values"].split()]
+        except ValueError:
+            raise InputError(
+                f"{s['values']!r} are no values", "values", "give numbers, such as 0.8 0.9 1.0"
+            ) from None
+        return {"range": (s["parameter"], {"values": [_number(v, whole) for v in found]})}
+    if not s["low"] < s["high"]:
+        raise InputError(
+            f"low = {s['low']:g} is not below high = {s['high']:g}", "low, high", "give low < high, or values"
+        )
+    if s["log"] and s["low"] <= 0.0:
+        raise InputError(f"low = {s['low']:g} has no logarithm", "low, log", "give a positive low")
+    table = {
+        "low": _number(s["low"], whole),
+        "high": _number(s["high"], whole),
+        "log": s["log"],
+        "steps": s["steps"],
+    }
+    return {"range": (s["parameter"], table)}
+
+
+def _number(value: float, whole: bool) -> float | int:
+    if not whole:
+        return value
+    if not value.is_integer():
+        raise InputError(f"{value:g} is no whole number", "low, high, values", "give whole numbers")
+    return int(value)
+
+
+def _range_remark(outputs: Outputs) -> str:
+    name, table = outputs["range"]
+    if "values" in table:
+        return f"{name}: {', '.join(f'{v:g}' for v in table['values'])}"
+    return f"{name}: {table['low']:g} to {table['high']:g}"
+
+
+def sweep_nodes() -> tuple[Definition, ...]:
+    """Definitions of the nodes of parameter studies."""
+    return (
+        Definition(
+            "range",
+            "Range",
+            STUDY,
+            "values of one parameter, for a parameter study",
+            outputs=(Output("range", "range", "the values"),),
+            settings=(
+                setting(
+                    "parameter",
+                    "chambers.wall_mm",
+                    "which parameter, by section and name",
+                    choices=tuple(_varied()),
+                ),
+                setting("low", 0.8, "the lowest value, in the parameter's unit", low=-1e6, high=1e6),
+                setting("high", 1.0, "the highest value", low=-1e6, high=1e6),
+                setting("steps", 3, "how many values a grid has", low=2, high=1000),
+                setting("log", False, "sample evenly in the logarithm"),
+                setting("values", "", "values in place of low and high, such as 0.8 0.9 1.0"),
+            ),
+            make=_range,
+            muting="the parameter is not varied",
+            remark=_range_remark,
+        ),
+        Definition(
+            "sweep",
+            "Parameter Study",
+            STUDY,
+            "many studies of a unit over ranges of its parameters: a table, main effects, Pareto fronts",
+            (
+                Input("unit", ("unit",), "link a unit"),
+                Input("ranges", ("range",), "link one or more nodes Range", many=True),
+            ),
+            (Output("table", "study table", "a row a study"),),
+            (
+                setting(
+                    "stages",
+                    "simulate",
+                    "what is done of every study, with what is before it",
+                    choices=STAGES,
+                ),
+                setting("method", "grid", "how points are chosen", choices=METHODS),
+                setting("points", 16, "number of points; a grid has its steps'", low=2, high=10_000),
+                setting("seed", 0, "of a method that draws", low=0, high=1_000_000),
+                setting("protocol", "", "CSV of time_s,pressure_kPa; empty: the shipped grasp", path=FILE),
+                setting("times", 7, "time samples of the protocol", low=2, high=1001),
+                setting("order", 2, "order of the elements: 1 for a look only", low=1, high=2),
+                setting("refine", 0.5, "what divides every element size", low=0.2, high=8.0),
+                setting(
+                    "fidelity", HOMOGENISED, "strut by strut, or as a continuum", choices=tuple(FIDELITIES)
+                ),
+                setting("minimize", "", "columns of the table to make small, for Pareto fronts"),
+                setting("maximize", "", "columns of the table to make large"),
+                setting("memory_MB", 4000, "one study takes no more", unit="MB", low=300, high=1_000_000),
+                setting("minutes", 60.0, "nor longer", unit="min", low=0.01, high=1e5),
+                setting("workers", 2, "studies at a time; decides no result", low=1, high=256),
+            ),
+            order=of_orders("sweep_order", _ORDERS),
+            read=of_orders("table_of", _ORDERS),
+            muting="neither this nor what needs it is computed",
+            remark=lambda outputs: outputs["table"].remark(),
+        ),
+        Definition(
+            "best",
+            "Best of a Study",
+            STUDY,
+            "the study whose figure is largest or smallest: its unit, and the figure",
+            (Input("table", ("study table",), "link a node Parameter Study"),),
+            (Output("unit", "unit", "its unit"), Output("number", "number", "its figure")),
+            (
+                setting("figure", "angle_range_deg", "column of the table"),
+                setting("goal", GOALS[0], "which of them", choices=GOALS),
+            ),
+            make=of_orders("best_of", _ORDERS),
+            remark=lambda outputs: f"point {outputs['point']}: {outputs['number']:.6g}",
+        ),
+    )

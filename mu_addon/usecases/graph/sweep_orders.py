@@ -1,0 +1,135 @@
+"""The run that a node Parameter Study asks for, and what is read of it. Loads the solver."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from ...errors import InputError
+from ...graph.definition import Call, Outputs
+from ...graph.evaluation import Finished, Order
+from ...reading import file_text
+from ..parameter_study.plan import TABLE, Plan
+from ..parameter_study.run import LAST, USE_CASE, Job
+from ..parameter_study.variable import Inputs, changed_inputs, variable
+from ..simulate_and_place.job import job_with, protocol_of
+from .parts import Design, refuse_body
+from .sweep_nodes import GOALS, STAGES
+
+# No file is named by such a plan: where it would lie decides nothing, and is the same wherever it is made.
+_NOWHERE = Path("/")
+
+
+@attrs.frozen(eq=False)
+class StudyTable:
+    """A parameter study that is done: its plan, folder, and a row a point as points.csv has it."""
+
+    plan: Plan
+    folder: Path
+    rows: tuple[Mapping[str, str], ...]
+
+    @property
+    def done(self) -> tuple[Mapping[str, str], ...]:
+        """Rows of the studies that were solved."""
+        return tuple(row for row in self.rows if row["status"] == "done")
+
+    def remark(self) -> str:
+        """How many studies there are, and how many failed."""
+        failed = len(self.rows) - len(self.done)
+        return f"{len(self.rows)} studies" + (f", {failed} failed" if failed else "")
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns of figures that some study has a number in."""
+        inputs = ("point", "status", *(v.name for v in self.plan.variables), *LAST)
+        names = dict.fromkeys(name for row in self.done for name in row if name not in inputs)
+        return tuple(name for name in names if any(_number(row, name) is not None for row in self.done))
+
+
+def _plan_of(call: Call) -> Plan:
+    """The plan of a node Parameter Study. Raises InputError."""
+    s, design = call.settings, call.inputs["unit"]
+    refuse_body(design, "a parameter study")
+    protocol = protocol_of(s["protocol"] or None)
+    mesh = {"order": s["order"], "refine": s["refine"], "fidelity": s["fidelity"]}
+    tables: dict[str, dict[str, Any]] = {
+        "design": {},
+        "simulate": {"times": s["times"], "mesh": mesh},
+        "place": {},
+    }
+    tables = {stage: tables[stage] for stage in STAGES[: STAGES.index(s["stages"]) + 1]}
+    ranges = [given for _, given in call.inputs["ranges"]]
+    names = [name for name, _ in ranges]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise InputError(
+            f"{twice[0]} is varied by two ranges",
+            "ranges",
+            "leave one of them out, or vary another parameter",
+        )
+    variables = tuple(variable(name, dict(table), call.node) for name, table in ranges)
+    # A setting that is wrong for every point is told before any work.
+    job_with(tables, call.node, unit=design.unit, protocol=protocol, workers=1)
+    plan = Plan(
+        inputs=Inputs(design.unit, protocol, tables),
+        variables=variables,
+        folder=_NOWHERE,
+        method=s["method"],
+        count=s["points"],
+        seed=s["seed"],
+        memory_MB=s["memory_MB"],
+        minutes=s["minutes"],
+        minimize=tuple(s["minimize"].split()),
+        maximize=tuple(s["maximize"].split()),
+    )
+    if plan.size > 10_000:
+        raise InputError(
+            f"the grid has {plan.size} points", "steps", "give fewer steps: 10000 points at most"
+        )
+    return plan
+
+
+def sweep_order(call: Call) -> Order:
+    """The parameter study of a unit."""
+    return Order(USE_CASE, Job(_plan_of(call), workers=call.settings["workers"]))
+
+
+def table_of(call: Call, done: Finished) -> Outputs:
+    """What a parameter study found; raises InputError where it has none to be used."""
+    path = done.folder / TABLE
+    try:
+        rows = tuple(csv.DictReader(file_text(path).splitlines()))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"cannot read {TABLE}: {error}", str(path), "evaluate this node again") from error
+    found = StudyTable(_plan_of(call), done.folder, rows)
+    if not found.done:
+        why = next((row.get("what", "") for row in rows if row.get("what")), "see its table")
+        raise InputError(f"every study failed: {why}", str(path), "see points.csv; vary less, or otherwise")
+    return {"table": found}
+
+
+def best_of(call: Call) -> Outputs:
+    """Unit, figure and number of the point whose figure is largest or smallest; raises InputError."""
+    table: StudyTable = call.inputs["table"]
+    figure = call.settings["figure"].strip()
+    rows = [(value, row) for row in table.done if (value := _number(row, figure)) is not None]
+    if not rows:
+        raise InputError(f"no study has a number {figure!r}", "figure", f"one of: {', '.join(table.columns)}")
+    sign = 1.0 if call.settings["goal"] == GOALS[1] else -1.0
+    value, row = min(rows, key=lambda found: (sign * found[0], int(found[1]["point"])))
+    values, _ = table.plan.values()
+    inputs = changed_inputs(table.plan.inputs, values[int(row["point"]) - 1], table.plan.folder)
+    return {"unit": Design(inputs.unit), "number": value, "point": int(row["point"])}
+
+
+def _number(row: Mapping[str, str], name: str) -> float | None:
+    try:
+        found = float(row.get(name) or "nan")
+    except ValueError:
+        return None
+    return found if math.isfinite(found) else None

@@ -1,0 +1,103 @@
+"""`record` as a run of a node tree: so many seconds of the sensor, in a folder of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from ...errors import InputError, MuError
+from ...run.context import RunContext
+from ...run.folder import FolderLayout
+from ...run.inputs import FORMAT, read_inputs, structured
+from ...run.usecase import UseCase
+from ...sensing.session import Control, run_session
+from ...toml_writer import toml_text
+from .stream import console_summary, ctrl_c_stops, serial_source, simulated_source
+
+LAYOUT = FolderLayout(
+    "record.toml",
+    "# The inputs of this recording.",
+    results=("recording-[0-9]*",),
+)
+FOLDER = "recording"
+# A clock that is read before and after may be off by a look of the session.
+_SHORT_S = 0.5
+
+
+@attrs.frozen
+class Job:
+    """Inputs of a recording: where the samples come from, for how many seconds, and which take it is.
+
+    port: as of `serial_source`, "" for the only USB one; simulated: a sensor that bends to and fro instead.
+    """
+
+    port: str = ""
+    baud: int = 115200
+    simulated: bool = False
+    seconds: float = 10.0
+    take: int = 1
+
+    def __attrs_post_init__(self) -> None:
+        if not 0 < self.seconds < float("inf"):
+            raise InputError(
+                f"{self.seconds:g} s is no time to record", "seconds", "give a number above zero"
+            )
+        if self.baud <= 0:
+            raise InputError(f"{self.baud} is no rate", "baud", "give bits a second, such as 115200")
+
+    def texts(self) -> dict[str, str]:
+        """Text of every file of inputs, by name."""
+        return {LAYOUT.inputs: toml_text({"format": FORMAT, **attrs.asdict(self)}, LAYOUT.header)}
+
+
+def read_job(folder: Path) -> Job:
+    """The job that a folder of a recording describes; raises InputError."""
+    path = folder / LAYOUT.inputs
+    values, _ = read_inputs(path)
+    return structured(Job, values, str(path))
+
+
+def record(job: Job, folder: Path, context: RunContext) -> Path:
+    """Record into a new folder within the run's; returns that. What a stopped run recorded stays beside it.
+
+    Raises InputError, OutputError, and MuError where the recording was stopped before its time.
+    """
+    place = next(p for k in range(1, 10**6) if not (p := folder / f"{FOLDER}-{k}").exists())
+    source = simulated_source() if job.simulated else serial_source(job.port or None, job.baud)
+    about = {"source": "simulated" if job.simulated else job.port, "baud": job.baud, "take": job.take}
+    control, progress = Control(), context.progress
+
+    def on_event(event: str, details: dict[str, Any]) -> None:
+        if event == "status":
+            progress.update(min(float(details["duration_s"]) / job.seconds, 1.0))
+        elif event in ("disconnected", "waiting"):
+            progress.warning(f"{event}: {details.get('detail', '')}", "sensor", "it is searched for")
+
+    with progress.stage("record", expected_s=job.seconds), ctrl_c_stops(control):
+        status = run_session(
+            source, place, about=about, control=control, seconds=job.seconds, on_event=on_event
+        )
+    context.summary |= {**status, "recording": place.name}
+    short = job.seconds - float(status["duration_s"])
+    if short > _SHORT_S:
+        raise _Stopped(
+            f"the recording was stopped {short:.1f} s before its end",
+            str(place),
+            "evaluate again: it is recorded anew; what there is stays in that folder",
+        )
+    if not status["rows"]:
+        raise InputError(
+            "nothing came from the sensor", str(place), "check its cable, its power and its firmware"
+        )
+    return place
+
+
+class _Stopped(MuError):
+    """Asked to stop: so a whole evaluation stops, too."""
+
+    status = 143
+
+
+USE_CASE = UseCase[Any]("record", LAYOUT, read_job, record, console_summary)
