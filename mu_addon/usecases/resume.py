@@ -27,6 +27,7 @@ MODULES = {
     "fit.toml": ".fit_material.run",
     "calibrate.toml": ".sensor.calibrate",
     "sweep.toml": ".parameter_study.run",
+    "design.toml": ".optimize.run",
     "reproduce.toml": ".reproduce.run",
     "graph.toml": ".graph.run",
 }
