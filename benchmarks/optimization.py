@@ -71,7 +71,8 @@ class Counted:
     def one(self, values: tuple[Any, ...]) -> Observed:
         """What is found of one design."""
         targets, freedoms = self.design.targets, self.design.freedoms
-        found, slopes, sound = np.full(len(targets), np.nan), np.full((len(targets), len(freedoms)), np.nan), False
+        found, slopes = np.full(len(targets), np.nan), np.full((len(targets), len(freedoms)), np.nan)
+        sound = False
         try:
             unit = self.design.unit_of(values)
             result = evaluate(unit, targets, freedoms, self.mechanics, self.with_gradient)
@@ -101,9 +102,7 @@ def ours(counted: Counted, budget: int, seed: int) -> None:
     """The search of mu_addon."""
     d = counted.design
     settings = SearchSettings(evaluations=int(budget / 1.5), seed=seed)
-    search_units(
-        d.freedoms, d.targets, lambda xs: [counted.one(x) for x in xs], d.start, settings
-    )
+    search_units(d.freedoms, d.targets, lambda xs: [counted.one(x) for x in xs], d.start, settings)
 
 
 def random(counted: Counted, budget: int, seed: int) -> None:
