@@ -1,7 +1,9 @@
 """Model A's that a search needs until a unit meets all that is asked: ours, random search and NSGA-II.
 
-`python benchmarks/optimization.py --method ours --budget 60 --seed 1` on a coarse mesh; NSGA-II needs pymoo, and
-TPE optuna, which mu_addon does not depend on. A gradient counts as half a Model A (docs/optimize.md).
+    python benchmarks/optimization.py --method ours --budget 60 --seed 1
+
+On a coarse mesh. NSGA-II needs pymoo, and TPE optuna, which mu_addon does not depend on. A gradient counts as
+half a Model A (docs/optimize.md).
 """
 
 from __future__ import annotations

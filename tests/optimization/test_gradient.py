@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mu_addon.design.anchors import window
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem.relocated import relocated
@@ -10,6 +11,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.optimization.freedoms import Freedom, changed_unit
 from mu_addon.optimization.gradient import adjoint, by_element, gradients
 from mu_addon.optimization.quantities import AirVolume, Angle, RestStiffness, Stretch
+from mu_addon.optimization.sensor import Disturbance
 from mu_addon.optimization.structure import Structure, solve
 from mu_addon.optimization.unit_body import Mechanics, UnitBody
 
@@ -107,3 +109,18 @@ def test_a_body_in_contact_is_not_relocated(body):
     finally:
         model.obstacles = ()
     assert isinstance(body[0].structure, Structure)
+
+
+@pytest.mark.slow
+def test_the_sensors_disturbance_has_the_slope_of_full_solutions():
+    """Of a difference of two bodies, hence by one solution a freedom in each."""
+    unit = UnitBody(UNIT, COARSE, {"alpha4": window(UNIT, "alpha4")})
+    asked = [Disturbance("J", "alpha4", (-8.0, 15.0))]
+    states, _ = solve(unit.structure, asked[0].conditions)
+    found = gradients(unit.structure, states, asked, unit.pairs(FREE[:1]))[0, 0]
+    sides = []
+    for wall in (0.9005, 0.8995):
+        other = unit.moved(changed_unit(UNIT, FREE[:1], [wall]))
+        moved, _ = solve(other, asked[0].conditions)
+        sides.append(asked[0].value(other, moved))
+    assert found == pytest.approx((sides[0] - sides[1]) / 1e-3, rel=1e-4)
