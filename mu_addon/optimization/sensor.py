@@ -62,7 +62,8 @@ class SensorSlope:
     """Size of the light's relative change by bending at rest, 1/deg, of the waveguide along a path.
 
     By the fast law of the waveguide (`sensing.law`) through Model A's states at some pressures in kPa and at
-    rest; the waveguide itself follows the lattice, as in `place`.
+    rest; the waveguide itself follows the lattice, as in `place`. The law is fitted to traced rays, whose
+    scatter would drown its change between two units a little apart: their difference is by one law.
     """
 
     name: str
@@ -86,7 +87,8 @@ class SensorSlope:
         tip = TipSection.of(mesh)
         displacements = [np.zeros_like(mesh.nodes), *(states[c] for c in self.conditions)]
         moved = [tuple(part[numbers] for part in joints.moved(u)) for u in displacements]
-        light = signal_of_nodes(_law(unit.printed), bar, moved)  # type: ignore[arg-type]
+        law = structure.once("light", lambda: _law(unit.printed))
+        light = signal_of_nodes(law, bar, moved)  # type: ignore[arg-type]
         angle = np.array([tip.angle_deg(u) for u in displacements])
         return abs(response(angle, light.transmitted, 0.0).sensitivity_per_deg)
 
