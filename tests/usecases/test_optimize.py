@@ -9,13 +9,14 @@ import pytest
 
 from mu_addon.errors import InputError
 from mu_addon.optimization.evaluation import Evaluated, Evaluator
+from mu_addon.optimization.robustness import Verified
 from mu_addon.optimization.search import Found, Observed
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.optimize import run as optimize_run
 from mu_addon.usecases.optimize.job import job_from, mechanics_of, read_job
 from mu_addon.usecases.optimize.run import USE_CASE, console_summary
-from mu_addon.usecases.optimize.words import changes, outcome, reasons
+from mu_addon.usecases.optimize.words import changes, outcome, reasons, verdict
 from mu_addon.usecases.optimize.worker import Task, run_task
 
 TEXT = """
@@ -163,6 +164,17 @@ def test_words_say_what_changed_and_what_moved_it(job):
     assert "Without angle at 10 kPa the others can be met" in words
     failed = Found((Observed((0.7,), np.full(2, np.nan), np.zeros((2, 1)), False),), (0,), False)
     assert "could be simulated" in outcome(failed, d.targets)
+
+
+def test_what_the_print_check_refuses_is_in_the_outcome():
+    yes, zero = np.ones(2, bool), np.zeros(2)
+    good = Verified(zero, zero, zero, zero, yes, yes)
+    refused = Verified(zero, zero, zero, zero, np.array([True, False]), np.array([True, False]), "", "error")
+    assert verdict([]) == ""
+    assert verdict([good]) == "Of 1 proposed, 1 meet all of it on a finer mesh, 1 robustly."
+    words = verdict([good, refused])
+    assert words.startswith("Of 2 proposed, 1 meet all")
+    assert words.endswith("refuses 1.")
 
 
 def test_what_was_kept_of_a_unit_is_what_was_found(job):

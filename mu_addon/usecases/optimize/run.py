@@ -23,7 +23,7 @@ from ...run.usecase import UseCase
 from .job import LAYOUT, MODEL, REPORT, TABLE, Job, mechanics_of, read_job
 from .report import write_report
 from .results import Optimised, Proposal
-from .words import changes, outcome, reasons
+from .words import changes, outcome, reasons, verdict
 from .worker import several
 
 Array = np.ndarray[Any, Any]
@@ -68,7 +68,7 @@ def optimise(job: Job, folder: Path, context: RunContext) -> Optimised:
         design,
         found,
         tuple(proposals),
-        outcome(found, design.targets),
+        f"{outcome(found, design.targets)} {verdict([p.checked for p in proposals])}".strip(),
         evaluator.computed,
         evaluator.model_a,
         job.model is not None,

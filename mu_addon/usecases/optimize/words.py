@@ -9,6 +9,7 @@ import numpy as np
 
 from ...design.parameters import Unit
 from ...optimization.freedoms import Freedom
+from ...optimization.robustness import Verified
 from ...optimization.search import Found, Observed
 from ...optimization.targets import Target
 
@@ -37,6 +38,17 @@ def outcome(found: Found, targets: Sequence[Target]) -> str:
     elif len(missed) > 1:
         words += " No single target stands in the way: leaving out any one of them is not enough."
     return words
+
+
+def verdict(checked: Sequence[Verified]) -> str:
+    """How proposed units stand on a finer mesh and in the print check, in a sentence; "" without any."""
+    if not checked:
+        return ""
+    met = sum(bool(c.met.all()) and not c.why for c in checked)
+    robust = sum(c.is_robust for c in checked)
+    printed = sum(c.print_worst == "error" for c in checked)
+    words = f"Of {len(checked)} proposed, {met} meet all of it on a finer mesh, {robust} robustly."
+    return words + (f" The print check refuses {printed}." if printed else "")
 
 
 def changes(freedoms: Sequence[Freedom], start: Sequence[Any], design: Sequence[Any]) -> list[str]:
