@@ -21,6 +21,7 @@ NAMES = (
     "place",
     "resume",
     "sweep",
+    "optimize",
     "graph",
     "reproduce",
     "homogenize",

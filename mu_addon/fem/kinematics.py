@@ -93,9 +93,10 @@ class TipSection:
     area: Array
 
     @classmethod
-    def of(cls, mesh: Mesh) -> TipSection:
-        """The end plane of a mesh, at the height of its first `tip` node."""
-        nodes, area = _tip_areas(mesh)
+    def of(cls, mesh: Mesh, faces: tuple[Array, Array, Array] | None = None) -> TipSection:
+        """The end plane of a mesh, at the height of its first `tip` node; faces: its `tip_faces`, if
+        known."""
+        nodes, area = _tip_areas(mesh, faces)
         return cls(nodes, mesh.nodes[nodes, 1:], area)
 
     def angle_deg(self, u: Array) -> float:
@@ -119,24 +120,39 @@ def bending_angle_deg(mesh: Mesh, u: Array) -> float:
     return TipSection.of(mesh).angle_deg(u)
 
 
-def _tip_areas(mesh: Mesh) -> tuple[Array, Array]:
-    """Tip nodes with weights that integrate over what fills the end plane, a third of a triangle a node.
+def tip_faces(mesh: Mesh) -> tuple[Array, Array, Array]:
+    """Faces of the tip's end plane: corners (f, 3), elements (f,), and the nodes (f, 3) that integrate.
 
-    On quadratic triangles these nodes are the mid-edge ones, which makes the rule exact to degree 2.
+    They depend on the elements alone, and not on where exactly the nodes are: found once for a mesh and those
+    morphed from it.
     """
     height = mesh.nodes[mesh.tip[0], 2]
     faces, owner = boundary_faces(mesh.tets)
     on_tip = (mesh.nodes[faces][:, :, 2] == height).all(axis=1)
     faces, owner = faces[on_tip], owner[on_tip]
+    if mesh.order == 1:
+        return faces, owner, faces
+    return (
+        faces,
+        owner,
+        np.array([_middles(mesh.tets[e], face) for e, face in zip(owner, faces, strict=True)]),
+    )
+
+
+def _tip_areas(mesh: Mesh, found: tuple[Array, Array, Array] | None = None) -> tuple[Array, Array]:
+    """Tip nodes with weights that integrate over what fills the end plane, a third of a triangle a node.
+
+    On quadratic triangles these nodes are the mid-edge ones, which makes the rule exact to degree 2. found:
+    the `tip_faces`.
+    """
+    faces, owner, carrying = tip_faces(mesh) if found is None else found
     a, b, c = (mesh.nodes[faces[:, i]] for i in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
     if mesh.resolved:
         # Struts end in the same plane beside the cap; what of them lies within it counts once.
         area *= mesh.filled[owner].mean(axis=1)
-    if mesh.order == 2:
-        faces = np.array([_middles(mesh.tets[e], face) for e, face in zip(owner, faces, strict=True)])
     weight = np.zeros(len(mesh.nodes))
-    np.add.at(weight, faces, area[:, None] / 3)
+    np.add.at(weight, carrying, area[:, None] / 3)
     nodes = np.nonzero(weight)[0]
     return nodes, weight[nodes]
 

@@ -10,73 +10,113 @@ import numpy as np
 from ..design.dimensions import Dimensions
 from ..design.parameters import Unit
 from ..errors import MeshingError
-from .harmonic import harmonic
+from .harmonic import Harmonic
 from .membrane import Membrane, Meridian, division, membrane_mesh, stations
 from .mesh import LATTICE, MEMBRANE, TET_EDGES, Array, Mesh, edge_keys, edges_of
 from .quality import check_positive
 from .settings import CELL_MM, MeshSettings
 
 
+class Morph:
+    """Moves the half or quarter mesh that gmsh made of a unit under some settings to other units.
+
+    What depends on the mesh alone is done once, so that many units near to it cost little.
+    """
+
+    def __init__(self, mesh: Mesh, drawn: Unit, settings: MeshSettings) -> None:
+        """Raises MeshingError where the mesh is not that of the unit by gmsh under the settings."""
+        a = drawn.printed
+        self.mesh, self.drawn, self._settings = mesh, drawn, settings
+        size = a.cell / CELL_MM / settings.refine
+        quarters = 1 if settings.fraction == "quarter" else 2
+        self._meridian = Meridian.of(a)
+        self._heights = stations(self._meridian, settings.meridian_mm * size)
+        self._grid = (
+            quarters * math.pi / 2,
+            quarters * division(a.R * math.pi / 2, settings.hoop_mm * size),
+            max(1, int(settings.through_wall * settings.refine + 0.5)),
+            division(a.r, settings.hoop_mm * size),
+        )
+        self._before = self._membrane(self._meridian, self._heights)
+        count = len(self._before.nodes)
+        close = 1e-6 * a.cell
+        if len(mesh.nodes) < count or np.abs(mesh.nodes[:count] - self._before.nodes).max() > close:
+            raise _failed("its mesh is not by gmsh, or has other settings")
+        known = np.zeros(len(mesh.nodes), bool)
+        known[:count] = True
+        if mesh.order == 2:
+            self._middle_nodes = _middles(mesh, self._before)
+            known[self._middle_nodes] = True
+        prescribed = known[:, None] | np.any(
+            [mesh.nodes == planes for planes in (0.0, *np.transpose(np.array(a.bounds)))], axis=0
+        )
+        self._between = _laplace(mesh.nodes, mesh.corners[mesh.region == LATTICE], prescribed)
+        corner = np.zeros(len(mesh.nodes), bool)
+        corner[mesh.corners] = True
+        self._rest = np.flatnonzero(~known & ~corner)
+        self._rest_ends = _ends(mesh)[self._rest] if mesh.order == 2 else np.empty((0, 2), int)
+
+    def to(self, other: Unit, checked: bool = True) -> Mesh:
+        """The mesh moved to the unit `other`, of as many chambers and cells.
+
+        Another cell or scale first scales all of it. The membrane goes to its exact place; what is between it
+        and the envelope follows harmonically. checked: whether elements are looked at for inversion, as a
+        tiny move leaves them. Raises MeshingError where that cannot be done.
+        """
+        mesh, a, b = self.mesh, self.drawn.printed, other.printed
+        if a == b:
+            return mesh
+        factor = b.cell / a.cell
+        after = self._moved_membrane(b if factor == 1.0 else _shrunk(b, a.cell))
+        count = len(self._before.nodes)
+        moved = np.zeros_like(mesh.nodes)
+        moved[:count] = after.nodes - self._before.nodes
+        if mesh.order == 2:
+            moved[self._middle_nodes] = after.middles - self._before.middles
+        moved = self._between.between(moved)
+        if mesh.order == 2:
+            moved[self._rest] = moved[self._rest_ends].mean(axis=1)
+        found = attrs.evolve(mesh, nodes=factor * (mesh.nodes + moved))
+        if checked:
+            check_positive(found)
+        return found
+
+    def _membrane(self, meridian: Meridian, heights: Array) -> Membrane:
+        turn, sectors, layers, rings = self._grid
+        return membrane_mesh(meridian, turn, heights, sectors, layers, rings)
+
+    def _moved_membrane(self, b: Dimensions) -> Membrane:
+        """The grid of another membrane of the same cell, alike node by node."""
+        a = self._meridian.d
+        if a.count != b.count or not np.allclose(a.bounds, b.bounds, rtol=0, atol=1e-9 * a.cell):
+            raise _failed("its envelope differs")
+        second = Meridian.of(b)
+        breaks = [_breaks(m) for m in (self._meridian, second)]
+        order = np.argsort(breaks[0])
+        from_, to = (x[order] for x in breaks)
+        if not (np.diff(to) > 0).all():
+            raise _failed("its profile differs")
+        made = self._membrane(second, np.interp(self._heights, from_, to))
+        if not np.array_equal(self._before.tets, made.tets):
+            raise _failed("its membrane folds")
+        return made
+
+
 def morphed(mesh: Mesh, drawn: Unit, other: Unit, settings: MeshSettings) -> Mesh:
     """The half or quarter mesh that gmsh made of `drawn` under `settings`, moved to the unit `other`.
 
-    Both share cell, count, scale and envelope. The membrane goes to its exact place; what is between it and
-    the envelope follows harmonically. Raises MeshingError where that cannot be done.
+    See `Morph.to`. Raises MeshingError where that cannot be done.
     """
-    a, b = drawn.printed, other.printed
-    if a == b:
+    if drawn.printed == other.printed:
         return mesh
-    before, after = _membranes(a, b, settings)
-    count = len(before.nodes)
-    close = 1e-6 * a.cell
-    if len(mesh.nodes) < count or np.abs(mesh.nodes[:count] - before.nodes).max() > close:
-        raise _failed("its mesh is not by gmsh, or has other settings")
-    corner = np.zeros(len(mesh.nodes), bool)
-    corner[mesh.corners] = True
-    known = np.zeros(len(mesh.nodes), bool)
-    moved = np.zeros_like(mesh.nodes)
-    known[:count] = True
-    moved[:count] = after.nodes - before.nodes
-    inside = mesh.region == LATTICE
-    if mesh.order == 2:
-        middles = _middles(mesh, before)
-        known[middles] = True
-        moved[middles] = after.middles - before.middles
-    prescribed = known[:, None] | np.any(
-        [mesh.nodes == planes for planes in (0.0, *np.transpose(np.array(a.bounds)))], axis=0
-    )
-    moved = _moved_along(mesh.nodes, mesh.corners[inside], moved, prescribed)
-    if mesh.order == 2:
-        rest = ~known & ~corner
-        moved[rest] = moved[_ends(mesh)[rest]].mean(axis=1)
-    found = attrs.evolve(mesh, nodes=mesh.nodes + moved)
-    check_positive(found)
-    return found
+    return Morph(mesh, drawn, settings).to(other)
 
 
-def _membranes(a: Dimensions, b: Dimensions, settings: MeshSettings) -> tuple[Membrane, Membrane]:
-    """The grids of two membranes, alike node by node, the first as `mesh_unit` makes it."""
-    size = a.cell / CELL_MM / settings.refine
-    quarters = 1 if settings.fraction == "quarter" else 2
-    first, second = Meridian.of(a), Meridian.of(b)
-    if (a.height, a.count, a.bounds) != (b.height, b.count, b.bounds):
-        raise _failed("its envelope differs")
-    breaks = [_breaks(m) for m in (first, second)]
-    order = np.argsort(breaks[0])
-    from_, to = (x[order] for x in breaks)
-    if not (np.diff(to) > 0).all():
-        raise _failed("its profile differs")
-    p = stations(first, settings.meridian_mm * size)
-    turn, edge = quarters * math.pi / 2, settings.hoop_mm * size
-    sectors, rings = quarters * division(a.R * math.pi / 2, edge), division(a.r, edge)
-    layers = max(1, int(settings.through_wall * settings.refine + 0.5))
-    made = [
-        membrane_mesh(meridian, turn, heights, sectors, layers, rings)
-        for meridian, heights in ((first, p), (second, np.interp(p, from_, to)))
-    ]
-    if not np.array_equal(made[0].tets, made[1].tets):
-        raise _failed("its membrane folds")
-    return made[0], made[1]
+def _shrunk(d: Dimensions, cell: float) -> Dimensions:
+    """Dimensions with every length of the membrane and its envelope scaled to another cell in mm."""
+    by = cell / d.cell
+    lengths = ("R", "r", "a", "b", "wall", "base_cap", "tip_cap")
+    return attrs.evolve(d, cell=cell, **{name: by * getattr(d, name) for name in lengths})
 
 
 def _breaks(meridian: Meridian) -> Array:
@@ -104,13 +144,13 @@ def _middles(mesh: Mesh, membrane: Membrane) -> Array:
     return node[rows]
 
 
-def _moved_along(nodes: Array, tets: Array, moved: Array, prescribed: Array) -> Array:
-    """Displacements (n, 3): `moved` where `prescribed`, harmonic in linear tets (m, 4), small ones stiff."""
+def _laplace(nodes: Array, tets: Array, prescribed: Array) -> Harmonic:
+    """Displacements harmonic in linear tets (m, 4) between those `prescribed`; small elements are stiff."""
     x = nodes[tets]
     inverse = np.linalg.inv(x[:, 1:] - x[:, :1]).transpose(0, 2, 1)
     slopes = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
     local = np.einsum("mad,mbd->mab", slopes, slopes)
-    return harmonic(len(nodes), tets, local, moved, prescribed)
+    return Harmonic(len(nodes), tets, local, prescribed)
 
 
 def _failed(why: str) -> MeshingError:

@@ -29,6 +29,7 @@ MODULES = {
     "record.toml": ".sensor.record",
     "motion.toml": ".sensor.measured_motion",
     "sweep.toml": ".parameter_study.run",
+    "design.toml": ".optimize.run",
     "reproduce.toml": ".reproduce.run",
     "graph.toml": ".graph.run",
 }

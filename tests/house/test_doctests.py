@@ -14,6 +14,7 @@ PACKAGES = (
     "materials",
     "measured",
     "meshing",
+    "optimization",
     "placement",
     "resolved",
     "sensing",

@@ -185,10 +185,17 @@ class NamedEffects:
         # One at most has a model of its own.
         found = next((make(body, mesh, s) for n, s in sizes.items() if (make := EFFECTS[n].model)), None)
         found = found or body.model(mesh)
-        for name, size in sizes.items():
-            if load := EFFECTS[name].load:
-                found.load = load(body, mesh, size)
+        found.load = self.load(unit, mesh, device)
         found.threads = threads
+        return found
+
+    def load(self, unit: Unit, mesh: Mesh, device: str = "cpu") -> Array | None:
+        """Dead forces (n, 3) in N on a unit's mesh by these effects, None where there are none."""
+        body = Body(unit, orientation_deg=self.orientation_deg, device=device)
+        found = None
+        for name, size in self.sizes.items():
+            if load := EFFECTS[name].load:
+                found = load(body, mesh, size)
         return found
 
 

@@ -1,0 +1,166 @@
+"""From a unit to all that is asked of it, from one Model A, with gradients; never computed twice."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..design.anchors import window
+from ..design.parameters import Unit
+from ..errors import ConvergenceError, InputError, MeshingError
+from ..fem.factor import IndefiniteError
+from ..run.cache import Cache, key
+from .freedoms import Freedom
+from .gradient import gradients
+from .structure import WITHOUT, solve
+from .targets import Target
+from .unit_body import Mechanics, UnitBody
+
+Array = np.ndarray[Any, Any]
+
+
+@attrs.frozen(eq=False)
+class Evaluated:
+    """What was found of one unit.
+
+    values (q,) of the targets' quantities, nan where it failed; gradient (q, f) by the continuous freedoms,
+    nan where there is none; why: what stopped it, "" where nothing did; model_a: solutions of the unit along
+    its path that it took, one for each body simulated.
+    """
+
+    unit: Unit
+    values: Array
+    gradient: Array
+    why: str = ""
+    model_a: int = 1
+
+    @property
+    def sound(self) -> bool:
+        """Whether it was simulated."""
+        return not self.why
+
+    def plain(self) -> dict[str, Any]:
+        """As plain data, without the unit; `restored` is its inverse."""
+        return {
+            "values": [None if np.isnan(v) else float(v) for v in self.values],
+            "gradient": [[None if np.isnan(v) else float(v) for v in row] for row in self.gradient],
+            "why": self.why,
+            "model_a": self.model_a,
+        }
+
+
+def restored(unit: Unit, plain: dict[str, Any]) -> Evaluated:
+    """What `Evaluated.plain` gave, of a unit."""
+
+    def numbers(row: Sequence[float | None]) -> list[float]:
+        return [np.nan if v is None else v for v in row]
+
+    gradient = np.array([numbers(row) for row in plain["gradient"]])
+    return Evaluated(
+        unit,
+        np.array(numbers(plain["values"])),
+        gradient.reshape(len(plain["values"]), -1),
+        str(plain["why"]),
+        int(plain["model_a"]),
+    )
+
+
+def evaluate(
+    unit: Unit,
+    targets: Sequence[Target],
+    freedoms: Sequence[Freedom],
+    mechanics: Mechanics,
+    with_gradient: bool = True,
+) -> Evaluated:
+    """All targets' quantities of a unit, and their gradients by its continuous freedoms.
+
+    A unit that cannot be meshed or does not bear a pressure is an answer (`why`), not an error. A resolved
+    unit's gradients are those that need no morph of its mesh; the others are nan. Raises InputError for
+    targets that the mechanics cannot answer.
+    """
+    asked = [t for t in targets if t.quantity is not None]
+    quantities = [t.quantity for t in asked if t.quantity is not None]
+    continuous = [f for f in freedoms if not f.discrete]
+    values = np.full(len(targets), np.nan)
+    gradient = np.full((len(targets), len(continuous)), np.nan)
+    conditions = {c for q in quantities for c in q.conditions}
+    paths = {c.materials for c in conditions} - {WITHOUT}
+    body = UnitBody(unit, mechanics, {name: window(unit, name) for name in sorted(paths)})
+    simulated = 1 + len(paths)
+    rows = [i for i, t in enumerate(targets) if t.quantity is not None]
+    try:
+        states, _ = solve(body.structure, conditions)
+        values[rows] = [q.value(body.structure, states) for q in quantities]
+    except (ConvergenceError, MeshingError) as error:
+        return Evaluated(unit, values, gradient, error.what, simulated)
+    if with_gradient and continuous:
+        try:
+            usable = [f for f in continuous if not mechanics.settings.resolved or _material_only(f)]
+            places = [continuous.index(f) for f in usable]
+            found = gradients(body.structure, states, quantities, body.pairs(usable))
+            gradient[np.ix_(rows, places)] = found
+        except (MeshingError, InputError, IndefiniteError):
+            # Beside a rule's limit or a folded mesh: the values stand, and the search goes on without slopes.
+            gradient[:] = np.nan
+    return Evaluated(unit, values, gradient, "", simulated)
+
+
+def _material_only(freedom: Freedom) -> bool:
+    return freedom.name.startswith(("material.", "wall."))
+
+
+@attrs.define(eq=False)
+class Evaluator:
+    """Evaluates units, each once: from its cache where it was found before, by this run or a killed one.
+
+    origin: text of all that decides a value besides the unit (targets, mesh, extended model); workers:
+    several units at a time by `many`, a function of units that yields their number and what was found;
+    None: one after the other, here. computed: how many units were simulated by this run, and model_a the
+    solutions they took.
+    """
+
+    targets: Sequence[Target]
+    freedoms: Sequence[Freedom]
+    mechanics: Mechanics
+    cache: Cache | None = None
+    origin: str = ""
+    many: Callable[[Sequence[Unit]], Any] | None = None
+    on_each: Callable[[Evaluated], None] = lambda found: None
+    computed: int = 0
+    model_a: int = 0
+
+    def of(self, units: Sequence[Unit]) -> list[Evaluated]:
+        """What is found of some units, in their order."""
+        found: list[Evaluated | None] = [self._kept(unit) for unit in units]
+        todo = [i for i, known in enumerate(found) if known is None]
+        for number, result in self._each([units[i] for i in todo]):
+            self.computed += 1
+            self.model_a += result.model_a
+            found[todo[number]] = result
+            if self.cache is not None:
+                text = json.dumps(result.plain())
+                self.cache.put("unit", self._key(result.unit), {"found": np.array(text)})
+            self.on_each(result)
+        return [result for result in found if result is not None]
+
+    def _each(self, units: Sequence[Unit]) -> Any:
+        if self.many is not None and len(units) > 1:
+            return self.many(units)
+        return (
+            (i, evaluate(unit, self.targets, self.freedoms, self.mechanics)) for i, unit in enumerate(units)
+        )
+
+    def _key(self, unit: Unit) -> str:
+        return key("optimise 1", attrs.evolve(unit, name="unit").hash(), self.origin)
+
+    def _kept(self, unit: Unit) -> Evaluated | None:
+        stored = None if self.cache is None else self.cache.get("unit", self._key(unit))
+        if stored is None:
+            return None
+        result = restored(unit, json.loads(str(stored["found"])))
+        self.model_a += result.model_a
+        return result

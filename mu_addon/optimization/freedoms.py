@@ -1,0 +1,207 @@
+"""Freedoms of a design: which parameters of a unit may change, within which bounds or among which values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import attrs
+
+from ..design.parameters import SECTIONS, Unit
+from ..design.quantity import Description, describe
+from ..design.toml_text import nearest
+from ..errors import InputError
+
+SCALE = "scale"
+# Struts of a homogenised lattice have no stiffness of their own: its modulus is a parameter.
+UNSEEN = ("lattice.junction_diameter_mm", "lattice.midspan_diameter_mm", "lattice.kind")
+
+
+@attrs.frozen
+class Freedom:
+    """One parameter of the unit, by its dotted name, that may change.
+
+    low, high: bounds of a continuous one, or of whole numbers; values: those of a discrete one; also: factors
+    by the names of parameters that follow it, as the bladder's diameter follows the cell.
+    """
+
+    name: str
+    low: float = math.nan
+    high: float = math.nan
+    values: tuple[Any, ...] = ()
+    also: Mapping[str, float] = attrs.field(factory=dict)
+    unit: str = ""
+
+    @property
+    def discrete(self) -> bool:
+        """Whether it has values in place of a range."""
+        return bool(self.values)
+
+    def value_of(self, unit: Unit) -> Any:
+        """Its value in a unit."""
+        return parameter_of(unit, self.name)
+
+    def place(self, value: float) -> float:
+        """A value of a continuous freedom as its place between the bounds, 0 to 1."""
+        return (value - self.low) / (self.high - self.low)
+
+    def at(self, place: float) -> float:
+        """The value at a place, 0 to 1, to nine figures: what means nothing would only make a new unit."""
+        value = self.low + place * (self.high - self.low)
+        return min(max(float(f"{value:.9g}"), self.low), self.high)
+
+
+def parameters() -> dict[str, Description]:
+    """Every parameter of a unit by its dotted name; `scale` stands alone."""
+    head = {d.name: d for d in describe(Unit)}
+    return head | {f"{s.section}.{d.name}": d for s in SECTIONS for d in describe(s)}  # type: ignore[attr-defined]
+
+
+def parameter_of(unit: Unit, name: str) -> Any:
+    """Value of a unit's parameter by its dotted name."""
+    found: Any = unit
+    for part in name.split("."):
+        found = getattr(found, part)
+    return found
+
+
+def changed_unit(unit: Unit, freedoms: Sequence[Freedom], values: Sequence[Any]) -> Unit:
+    """The unit with other values of some freedoms, and of what follows them; raises InputError.
+
+    All at once, so that a rule sees the whole change.
+    """
+    sections: dict[str, dict[str, Any]] = {}
+    head: dict[str, Any] = {}
+    for freedom, value in zip(freedoms, values, strict=True):
+        for name, factor in ((freedom.name, None), *freedom.also.items()):
+            own = value if factor is None else factor * value
+            section, _, key = name.rpartition(".")
+            if section:
+                sections.setdefault(section, {})[key] = own
+            else:
+                head[key] = own
+    changed = {section: attrs.evolve(getattr(unit, section), **own) for section, own in sections.items()}
+    return attrs.evolve(unit, **head, **changed)
+
+
+def read_freedoms(tables: Sequence[Mapping[str, Any]], where: Sequence[str], unit: Unit) -> list[Freedom]:
+    """The freedoms of [[freedom]] tables; those that are fixed only change `fixed_unit`.
+
+    where: file and line of each. Raises InputError that names key and line.
+    """
+    found: list[Freedom] = []
+    for table, place in zip(tables, where, strict=True):
+        freedom = _freedom(table, place)
+        if freedom is None:
+            continue
+        if freedom.name in {f.name for f in found}:
+            raise InputError(f"{freedom.name} is listed twice", place, "leave one of the two out")
+        _require_start(freedom, unit, place)
+        found.append(freedom)
+    if not found:
+        raise InputError(
+            "no parameter is free",
+            "[[freedom]]",
+            'add [[freedom]] with parameter = "chambers.wall_mm", low = .. and high = ..',
+        )
+    return found
+
+
+def fixed_values(tables: Sequence[Mapping[str, Any]], where: Sequence[str]) -> dict[str, Any]:
+    """Values by name of the [[freedom]] tables that say `fixed`; raises InputError for an unknown name."""
+    found = {}
+    for table, place in zip(tables, where, strict=True):
+        if "fixed" in table:
+            name, _ = _parameter(table, place)
+            _require_keys(table, ("parameter", "fixed"), place)
+            found[name] = table["fixed"]
+    return found
+
+
+def _parameter(table: Mapping[str, Any], where: str) -> tuple[str, Description]:
+    known = parameters()
+    name = table.get("parameter")
+    if not isinstance(name, str) or name not in known:
+        hint = nearest(name, list(known)) if isinstance(name, str) else ""
+        raise InputError(
+            f"parameter = {name!r} is not a parameter of a unit{hint}",
+            f"{where}, parameter",
+            "name it as in a unit's file: chambers.wall_mm, material.lattice_modulus_kPa, scale",
+        )
+    return name, known[name]
+
+
+def _require_keys(table: Mapping[str, Any], known: Sequence[str], where: str) -> None:
+    for key in table:
+        if key not in known:
+            raise InputError(
+                f"unknown key {key!r}{nearest(key, known)}", f"{where}, {key}", f"known: {', '.join(known)}"
+            )
+
+
+def _freedom(table: Mapping[str, Any], where: str) -> Freedom | None:
+    name, d = _parameter(table, where)
+    if "fixed" in table:
+        return None
+    _require_keys(table, ("parameter", "low", "high", "values", "also"), where)
+    also = _also(table.get("also", {}), where)
+    if "values" in table:
+        values = table["values"]
+        if "low" in table or "high" in table or not isinstance(values, list) or not values:
+            raise InputError(
+                f"{name} has both bounds and values, or an empty list", f"{where}, values",
+                "write values = [..] alone, or low and high",
+            )  # fmt: skip
+        return Freedom(name, values=tuple(dict.fromkeys(values)), also=also, unit=d.unit)
+    low, high = table.get("low"), table.get("high")
+    for key, value in (("low", low), ("high", high)):
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise InputError(
+                f"{key} = {value!r} of {name} is not a number",
+                f"{where}, {key}",
+                "write low = .. and high = ..",
+            )
+    assert isinstance(low, int | float)
+    assert isinstance(high, int | float)
+    if d.type not in (float, int):
+        raise InputError(f"{name} has no range", f"{where}, low", f"write values = [..] of {d.allowed}")
+    if not d.low <= low < high <= d.high:
+        raise InputError(
+            f"low = {low:g} and high = {high:g} of {name} are not a range within its bounds",
+            f"{where}, low",
+            f"choose from {d.low:g} to {d.high:g} {d.unit}".rstrip(),
+        )
+    if d.type is int:
+        if low != int(low) or high != int(high):
+            raise InputError(f"{name} is a whole number", f"{where}, low", "give whole numbers")
+        return Freedom(name, values=tuple(range(int(low), int(high) + 1)), also=also, unit=d.unit)
+    return Freedom(name, float(low), float(high), also=also, unit=d.unit)
+
+
+def _also(given: Any, where: str) -> dict[str, float]:
+    known = parameters()
+    if not isinstance(given, dict):
+        raise InputError(f"also = {given!r} is not a table", f"{where}, also", 'write { "a.b" = 2.0 }')
+    for name, factor in given.items():
+        if name not in known or isinstance(factor, bool) or not isinstance(factor, int | float):
+            raise InputError(
+                f"also: {name} = {factor!r} is not a parameter and a factor",
+                f"{where}, also",
+                'write { "chambers.bladder_diameter_mm" = 2.0 }',
+            )
+    return {name: float(factor) for name, factor in given.items()}
+
+
+def _require_start(freedom: Freedom, unit: Unit, where: str) -> None:
+    """Raise InputError where a value is none that the parameter may have."""
+    d = parameters()[freedom.name]
+    for value in freedom.values:
+        fits = type(value) is d.type or (d.type is float and type(value) is int)
+        within = value in d.choices if d.choices else d.type is bool or (fits and d.low <= value <= d.high)
+        if not (fits and within):
+            raise InputError(
+                f"{value!r} is no value of {freedom.name}",
+                f"{where}, values",
+                f"choose {d.allowed or 'true or false'}",
+            )

@@ -1,0 +1,303 @@
+"""What a design is judged by, each read off a body in equilibrium, with its slope by the displacements."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..errors import InputError
+from ..fem.elements import reference_gradients
+from ..fem.kinematics import TipSection, tip_faces
+from ..fem.lattice_law import deformation_gradients
+from ..fem.model import Model
+from ..fem.relocated import relocated
+from ..fem.self_intersection import crossings
+from ..meshing.mesh import AXES, LATTICE, MEMBRANE
+from .structure import WITHOUT, Condition, States, Structure
+
+Array = np.ndarray[Any, Any]
+
+REGIONS = {"wall": MEMBRANE, "struts": LATTICE}
+MOST_STRETCHED = 0.01
+"""Share of a region's volume over which its largest stretch is averaged."""
+SMALL_MM = 1e-3
+"""Largest displacement at which the stiffness at rest is read off residuals."""
+
+
+def _under_pressure(pressure_kPa: float) -> tuple[Condition, ...]:
+    return (Condition(WITHOUT, pressure_kPa),)
+
+
+@attrs.frozen
+class Angle:
+    """Bending angle in degrees at a pressure in kPa, see `bending_angle_deg`."""
+
+    name: str
+    pressure_kPa: float
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """The state at its pressure."""
+        return _under_pressure(self.pressure_kPa)
+
+    def value(self, structure: Structure, states: States) -> float:
+        """In degrees."""
+        return _tip(structure).angle_deg(states[self.conditions[0]])
+
+    def slope(self, structure: Structure, states: States) -> dict[Condition, Array]:
+        """By the displacements (n, 3), in degrees/mm.
+
+        With s and c the sums whose quotient is the tangent of the angle, d = -(c ds - s dc)/(c^2 + s^2); the
+        places at rest are relative to their mean, so that the mean of the moved ones drops out.
+        """
+        tip = _tip(structure)
+        u = states[self.conditions[0]]
+        before = tip.yz - np.average(tip.yz, axis=0, weights=tip.area)
+        after = tip.yz + u[tip.nodes, 1:]
+        after = after - np.average(after, axis=0, weights=tip.area)
+        s = (tip.area * (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])).sum()
+        c = (tip.area[:, None] * before * after).sum()
+        ds = tip.area[:, None] * np.column_stack([-before[:, 1], before[:, 0]])
+        dc = tip.area[:, None] * before
+        found = np.zeros_like(u)
+        found[tip.nodes, 1:] = -np.degrees((c * ds - s * dc) / (c * c + s * s))
+        return {self.conditions[0]: found}
+
+
+@attrs.frozen
+class AirVolume:
+    """Volume of air in ml inside the chambers at a pressure in kPa; at 0 as printed."""
+
+    name: str
+    pressure_kPa: float = 0.0
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """The state at its pressure, none at 0."""
+        return _under_pressure(self.pressure_kPa) if self.pressure_kPa else ()
+
+    def value(self, structure: Structure, states: States) -> float:
+        """In ml."""
+        model = structure.model
+        u = states[self.conditions[0]] if self.conditions else np.zeros_like(model.mesh.nodes)
+        return _whole(model) * model.cavity_volume(u) / 1000.0
+
+    def slope(self, structure: Structure, states: States) -> dict[Condition, Array]:
+        """By the displacements (n, 3), in ml/mm: minus the nodal forces of unit pressure."""
+        if not self.conditions:
+            return {}
+        model, u = structure.model, states[self.conditions[0]]
+        data = model.parameters(structure.materials[WITHOUT])
+        forces = model.residual(u, 0.0, data) - model.residual(u, 1.0, data)
+        return {self.conditions[0]: _whole(model) * forces / 1000.0}
+
+
+@attrs.frozen
+class Stretch:
+    """Largest principal stretch in the wall or the struts at a pressure in kPa.
+
+    The mean over that 1 % of the region's volume that is stretched most: the largest of all points depends on
+    the mesh where struts meet a wall, and it jumps from point to point as a design changes. elongation: at
+    break, as a ratio; where it is given, the value is the safety factor elongation/(stretch - 1).
+    """
+
+    name: str
+    pressure_kPa: float
+    region: str = "wall"
+    elongation: float | None = None
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """The state at its pressure."""
+        return _under_pressure(self.pressure_kPa)
+
+    def value(self, structure: Structure, states: States) -> float:
+        """A ratio."""
+        mesh = structure.model.mesh
+        found, share, _, _ = self._most(mesh, states[self.conditions[0]])
+        stretch = float((found * share).sum())
+        return stretch if self.elongation is None else self.elongation / max(stretch - 1.0, 1e-9)
+
+    def slope(self, structure: Structure, states: States) -> dict[Condition, Array]:
+        """By the displacements (n, 3), in 1/mm: of a stretch n . F N along its direction N, n = F N/|F N|.
+
+        The set of points changes with the displacements, but not to first order in their mean.
+        """
+        mesh, u = structure.model.mesh, states[self.conditions[0]]
+        stretch, share, (element, point), (now, then) = self._most(mesh, u)
+        tets = mesh.tets[element]
+        chosen, place = np.unique(element, return_inverse=True)
+        gradients = reference_gradients(mesh.nodes, mesh.tets[chosen]).gradients[place, point]
+        parts = share[:, None, None] * np.einsum("ki,knj,kj->kni", now, gradients, then)
+        found = np.zeros_like(u)
+        np.add.at(found, tets, parts)
+        if self.elongation is not None:
+            excess = max(float((stretch * share).sum()) - 1.0, 1e-9)
+            found *= -self.elongation / excess**2
+        return {self.conditions[0]: found}
+
+    def change(self, structure: Structure, states: States, plus: Structure, minus: Structure) -> float:
+        """Difference between two bodies near to `structure` at its displacements, to first order.
+
+        The mean is t + the integral of (stretch - t) over the points above t, by 1 % of the volume; the
+        points may be held, and t, for it is largest by t there.
+        """
+        mesh, u = structure.model.mesh, states[self.conditions[0]]
+        kept_name, known = f"most {self.pressure_kPa} {self.region}", None
+        if kept_name in structure.shared and structure.shared[kept_name][0] is u:
+            known = structure.shared[kept_name][1]
+        else:
+            known = self._most(mesh, u)
+            structure.shared[kept_name] = u, known
+        stretch, share, (element, point), _ = known
+        mean, least = float((stretch * share).sum()), float(stretch[-1])
+        chosen, place = np.unique(element, return_inverse=True)
+        _, volumes = deformation_gradients(mesh, u, chosen)
+        kept = share / volumes[place, point]
+        inside = mesh.region == REGIONS[self.region]
+        total = float(structure.model.volumes[inside].sum())
+        sides = []
+        for s in (plus, minus):
+            F, dV = deformation_gradients(s.model.mesh, u, chosen)
+            largest = np.sqrt(np.linalg.eigvalsh(np.swapaxes(F, -1, -2) @ F)[..., 2])[place, point]
+            above = ((largest - least) * dV[place, point] * kept).sum()
+            sides.append(above - (mean - least) * s.model.volumes[inside].sum() / total)
+        found = float(sides[0] - sides[1])
+        return found if self.elongation is None else -self.elongation * found / max(mean - 1.0, 1e-9) ** 2
+
+    def _most(self, mesh: Any, u: Array) -> tuple[Array, Array, tuple[Array, Array], tuple[Array, Array]]:
+        """The points stretched most: stretches (k,), shares (k,) that sum to 1, their elements and points,
+        and the stretch's directions now and at rest, (k, 3) each."""
+        elements = np.flatnonzero(mesh.region == REGIONS[self.region])
+        F, volumes = deformation_gradients(mesh, u, elements)
+        squares, directions = np.linalg.eigh(np.swapaxes(F, -1, -2) @ F)
+        largest = np.sqrt(squares[..., 2])
+        if mesh.resolved:
+            filled = mesh.filled[elements]
+            volumes = np.where(filled < 0.5, 0.0, volumes * filled)
+        order = np.argsort(-largest, axis=None, kind="stable")
+        volume = volumes.ravel()[order]
+        wanted = MOST_STRETCHED * volume.sum()
+        until = np.cumsum(volume)
+        count = int(np.searchsorted(until, wanted)) + 1
+        order, volume = order[:count], volume[:count].copy()
+        volume[-1] -= until[count - 1] - wanted
+        e, q = np.unravel_index(order, largest.shape)
+        then = directions[e, q][..., 2]
+        now = np.einsum("kij,kj->ki", F[e, q], then)
+        stretch = np.linalg.norm(now, axis=1)
+        return stretch, volume / wanted, (elements[e], q), (now / stretch[:, None], then)
+
+
+@attrs.frozen
+class RestStiffness:
+    """Force in N on the tip's end plane, spread evenly, for a mean displacement of 1 mm of it along an axis.
+
+    Of the unpressurised body, to first order: k = 1/(w . K^-1 w), w the share of the plane of each node.
+    """
+
+    name: str
+    direction: str
+    conditions: tuple[Condition, ...] = ()
+
+    def value(self, structure: Structure, states: States) -> float:
+        """In N/mm."""
+        model, weights = self._side(structure)
+        moved = self._moved(structure, model, weights)
+        return _whole(model) / float(weights.ravel()[model.free] @ moved)
+
+    def change(self, structure: Structure, states: States, plus: Structure, minus: Structure) -> float:
+        """Difference in N/mm between two bodies near to `structure`, to first order.
+
+        Of the flexibility c = w . K^-1 w: dc = 2 dw . v - v . dK v with v = K^-1 w. K v is a difference of
+        residuals at a displacement so small that the body is linear there.
+        """
+        model, weights = self._side(structure)
+        moved = self._moved(structure, model, weights)
+        flexibility = float(weights.ravel()[model.free] @ moved)
+        small = SMALL_MM / np.abs(moved).max()
+        u = np.zeros_like(model.mesh.nodes)
+        u.ravel()[model.free] = small * moved
+        sides = []
+        for s in (plus, minus):
+            other, w = self._side(s)
+            data = other.parameters(s.materials[WITHOUT])
+            ahead, behind = (other.residual(sign * u, 0.0, data).ravel()[other.free] for sign in (1, -1))
+            forces = (ahead - behind) / (2 * small)
+            sides.append(2 * w.ravel()[other.free] @ moved - moved @ forces)
+        return -_whole(model) * float(sides[0] - sides[1]) / flexibility**2
+
+    def _side(self, structure: Structure) -> tuple[Model, Array]:
+        """The model whose supports admit the direction, and the weights (n, 3) of the tip's displacement."""
+        model = structure.model
+        axis = AXES.index(self.direction)
+        if self.direction in model.mesh.symmetry:
+            model = _odd(structure)
+        tip = _tip(structure)
+        weights = np.zeros_like(model.mesh.nodes)
+        weights[tip.nodes, axis] = tip.area / tip.area.sum()
+        return model, model.mesh.folded(weights)
+
+    def _moved(self, structure: Structure, model: Model, weights: Array) -> Array:
+        """Displacement (free,) under the weights as forces in N, found once for one body."""
+        known = structure.shared.get(f"moved {self.direction}")
+        if known is not None and known[0] is structure:
+            return np.asarray(known[1])
+        values = model.tangent(
+            np.zeros_like(model.mesh.nodes), 0.0, model.parameters(structure.materials[WITHOUT])
+        )
+        moved = model.factor.factor(values).solve(weights.ravel()[model.free])
+        structure.shared[f"moved {self.direction}"] = structure, moved
+        return np.asarray(moved)
+
+
+@attrs.frozen
+class WallsApart:
+    """1 where no wall of the body passes through another at a pressure in kPa, else 0; it has no slope."""
+
+    name: str
+    pressure_kPa: float
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """The state at its pressure."""
+        return _under_pressure(self.pressure_kPa)
+
+    def value(self, structure: Structure, states: States) -> float:
+        """1 or 0."""
+        return float(not crossings(structure.model.mesh, states[self.conditions[0]]))
+
+    def change(self, structure: Structure, states: States, plus: Structure, minus: Structure) -> float:
+        """None, since it is a yes or a no."""
+        return 0.0
+
+
+def _tip(structure: Structure) -> TipSection:
+    mesh = structure.model.mesh
+    return TipSection.of(mesh, structure.once("tip", lambda: tip_faces(mesh)))
+
+
+def _whole(model: Model) -> int:
+    """How often the mesh fills the whole body."""
+    return 2 ** len(model.mesh.symmetry)
+
+
+def _odd(structure: Structure) -> Model:
+    """The model of a half whose mirror plane moves across itself, for loads across it."""
+    mesh = structure.model.mesh
+    if mesh.symmetry != ("x",):
+        raise InputError(
+            "stiffness across a mirror plane needs a half mesh",
+            f"mirrors: {mesh.symmetry}",
+            'fraction "half"',
+        )
+    whole = attrs.evolve(mesh, symmetry=())
+
+    def made() -> Model:
+        held = np.zeros((len(mesh.nodes), 3), bool)
+        held[mesh.symmetry_nodes("x"), 1:] = True
+        return Model(whole, supports=held, threads=structure.model.threads)
+
+    return relocated(structure.once("odd", made), whole)

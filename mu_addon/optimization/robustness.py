@@ -1,0 +1,121 @@
+"""A proposed unit simulated again on a finer mesh, and what print and resin leave uncertain of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..design.parameters import Unit
+from ..design.printing.check import check
+from ..design.printing.printer import Printer
+from ..design.solid import build_solid
+from ..errors import MuError
+from .evaluation import evaluate
+from .freedoms import Freedom
+from .targets import Target
+from .unit_body import Mechanics
+
+Array = np.ndarray[Any, Any]
+
+SURE = 2.0
+"""A unit is robust where it meets a target this many standard errors either way."""
+_UNCERTAIN = ("print", "resin")
+
+
+@attrs.frozen(eq=False)
+class Verified:
+    """A proposed unit on a finer mesh.
+
+    values (q,), and standard errors (q,) by mesh, print and resin, in the quantities' units; robust (q,):
+    whether it meets each target for all values within `SURE` errors, met (q,): for the value itself; why:
+    what stopped it, "" where nothing did. print_worst: of the printability check, "" where none was asked
+    for, and its findings in words.
+    """
+
+    values: Array
+    by_mesh: Array
+    by_print: Array
+    by_resin: Array
+    met: Array
+    robust: Array
+    why: str = ""
+    print_worst: str = ""
+    print_findings: tuple[str, ...] = ()
+
+    @property
+    def error(self) -> Array:
+        """Standard errors (q,) of all three together, root sum of squares."""
+        return np.asarray(np.sqrt(self.by_mesh**2 + self.by_print**2 + self.by_resin**2))
+
+    @property
+    def is_robust(self) -> bool:
+        """Whether it meets every target robustly, and is printable where that was asked for."""
+        return not self.why and bool(self.robust.all()) and self.print_worst != "error"
+
+
+def verified(
+    unit: Unit,
+    coarse: Array,
+    targets: Sequence[Target],
+    finer: Mechanics,
+    print_mm: float,
+    modulus_share: float,
+    printer: Printer | None = None,
+) -> Verified:
+    """A unit with values `coarse` (q,) on the search's mesh, simulated on a finer mesh of its own.
+
+    print_mm: standard error of every printed surface; modulus_share: of all moduli together, as a share. Both
+    act to first order, by adjoint gradients on the finer mesh. The mesh's error is taken as the difference of
+    the two meshes, which for a converging method is more than is left. printer: the printability check
+    (thickness, chambers) is run where it is given.
+    """
+    spread = _spread(unit)
+    found = evaluate(unit, targets, spread, finer)
+    zero = np.zeros(len(targets))
+    worst, words = ("", ()) if printer is None else _print_check(unit, printer)
+    if not found.sound:
+        none = np.zeros(len(targets), bool)
+        return Verified(found.values, zero, zero, zero, none, none, found.why, worst, words)
+    by_mesh = np.nan_to_num(np.abs(found.values - coarse))
+    slopes = dict(zip([f.name for f in spread], np.nan_to_num(found.gradient).T, strict=True))
+    by_print = print_mm * np.abs(slopes["print.offset_xy_mm"])
+    modulus = unit.material.membrane_modulus_kPa
+    by_resin = modulus_share * modulus * np.abs(slopes["material.membrane_modulus_kPa"])
+    error = np.sqrt(by_mesh**2 + by_print**2 + by_resin**2)
+    met, robust = np.ones(len(targets), bool), np.ones(len(targets), bool)
+    for i, t in enumerate(targets):
+        if t.kind == "printable":
+            met[i] = robust[i] = worst != "error"
+        elif t.goal is None:
+            met[i] = t.met(found.values[i])
+            ends = found.values[i] + SURE * error[i] * np.array([-1.0, 1.0])
+            robust[i] = bool(met[i]) and all(t.met(v) for v in ends)
+    return Verified(found.values, by_mesh, by_print, by_resin, met, robust, "", worst, words)
+
+
+def _spread(unit: Unit) -> list[Freedom]:
+    """What differs from print to print, as freedoms: the surfaces' offset, and all moduli together."""
+    m = unit.material
+    return [
+        Freedom("print.offset_xy_mm", -0.3, 0.5, also={"print.offset_z_mm": 1.0}, unit="mm"),
+        Freedom(
+            "material.membrane_modulus_kPa",
+            10.0,
+            1e6,
+            also={"material.lattice_modulus_kPa": m.lattice_modulus_kPa / m.membrane_modulus_kPa},
+            unit="kPa",
+        ),
+    ]
+
+
+def _print_check(unit: Unit, printer: Printer) -> tuple[str, tuple[str, ...]]:
+    """The worst severity of the printability check, and its findings that are not a pass, in words."""
+    try:
+        solid = build_solid(unit)
+    except MuError as error:
+        return "error", (f"no solid: {error.what}",)
+    found = check(solid.vertices, solid.triangles, printer, unit, stages=("thickness", "chambers"))
+    return found.worst, tuple(f"{f.severity}: {f.what}" for f in found.findings if f.severity != "pass")

@@ -1,0 +1,437 @@
+"""The search for designs: a trust region on a surrogate that knows slopes, for one goal or a front of
+several.
+
+Each step fits a surrogate to every quantity computed so far, looks on it for the best design within reach of
+those known, and has that computed. Bounds and targets are met first; then the objectives are weighed in turn
+(augmented Chebyshev, as in ParEGO: Knowles, IEEE Trans. Evol. Comput. 10 (2006) 50), so that the designs
+spread along the Pareto front.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from .freedoms import Freedom
+from .surrogate import Surrogate, fit_all
+from .targets import Target
+
+Array = np.ndarray[Any, Any]
+Values = tuple[Any, ...]
+"""A design: one value for each freedom."""
+
+PENALTY = 10.0
+INWARD = 0.25
+"""How far inside a bound the search aims, in tolerances: a surrogate is wrong by a little."""
+AIM = 0.7
+"""Beside objectives, a target counts as met within this share of its tolerance."""
+FIRST_REACH, LEAST_REACH, MOST_REACH = 0.35, 0.01, 1.5
+ROUNDS, SAMPLES = 9, 384
+STALLED = 8
+"""A search ends after so many steps without progress."""
+
+
+@attrs.frozen
+class SearchSettings:
+    """evaluations: designs that may be computed at most; batch: so many at a time; seed: of its samples."""
+
+    evaluations: int = 40
+    batch: int = 1
+    seed: int = 0
+
+
+@attrs.frozen(eq=False)
+class Observed:
+    """What is known of a design: values (q,), slopes (q, c) by its continuous freedoms, nan where unknown.
+
+    sound: whether it could be computed.
+    """
+
+    design: Values
+    values: Array
+    slopes: Array
+    sound: bool = True
+
+
+@attrs.frozen(eq=False)
+class Found:
+    """All designs computed, in order, and which of them are proposed: the Pareto set, or the nearest."""
+
+    observed: tuple[Observed, ...]
+    proposed: tuple[int, ...]
+    feasible: bool
+    in_the_way: tuple[str, ...] = ()
+
+
+Observe = Callable[[Sequence[Values]], Sequence[Observed]]
+
+
+def search_units(
+    freedoms: Sequence[Freedom],
+    targets: Sequence[Target],
+    observe: Observe,
+    start: Values,
+    settings: SearchSettings | None = None,
+    on_step: Callable[[int, str], None] = lambda done, words: None,
+) -> Found:
+    """The designs found for some targets, from a start, which may break bounds of its freedoms.
+
+    observe: computes designs; on_step: called with how many were computed, and how things stand.
+    """
+    return _Search(freedoms, targets, observe, settings or SearchSettings(), on_step).run(start)
+
+
+class _Search:
+    def __init__(
+        self,
+        freedoms: Sequence[Freedom],
+        targets: Sequence[Target],
+        observe: Observe,
+        settings: SearchSettings,
+        on_step: Callable[[int, str], None],
+    ) -> None:
+        self.freedoms, self.settings, self.observe, self.on_step = freedoms, settings, observe, on_step
+        self.judged = [i for i, t in enumerate(targets) if t.quantity is not None]
+        self.targets = [targets[i] for i in self.judged]
+        self.goals = [i for i, t in enumerate(self.targets) if t.goal is not None]
+        self.signs = np.array([1.0 if self.targets[i].goal == "minimise" else -1.0 for i in self.goals])
+        self.continuous = [i for i, f in enumerate(freedoms) if not f.discrete]
+        self.discrete = [i for i, f in enumerate(freedoms) if f.discrete]
+        self.rng = np.random.default_rng(settings.seed)
+        self.observed: list[Observed] = []
+        self.reach = FIRST_REACH
+
+    # Designs as places: continuous freedoms from 0 to 1, discrete ones by the number of their value.
+
+    def places(self, design: Values) -> Array:
+        """Places (f,) of a design."""
+        return np.array(
+            [
+                float(f.values.index(v)) if f.discrete else f.place(float(v))
+                for f, v in zip(self.freedoms, design, strict=True)
+            ]
+        )
+
+    def design(self, places: Array) -> Values:
+        """The design at places (f,)."""
+        return tuple(
+            f.values[int(p)] if f.discrete else f.at(float(p))
+            for f, p in zip(self.freedoms, places, strict=True)
+        )
+
+    def coordinates(self, places: Array) -> Array:
+        """Coordinates (m, d) of a surrogate at places (m, f): numbers by their size, names one by one."""
+        columns = [places[:, self.continuous]]
+        for i in self.discrete:
+            values = self.freedoms[i].values
+            number = places[:, i].astype(int)
+            if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
+                size = np.array(values, float)
+                span = float(np.ptp(size)) or 1.0
+                columns.append(((size - size.min()) / span)[number][:, None])
+            else:
+                columns.append(np.eye(len(values))[number])
+        return np.concatenate(columns, axis=1)
+
+    # The course of the search.
+
+    def run(self, start: Values) -> Found:
+        """See `search_units`."""
+        self._compute(self._first(start))
+        weights = self._weights()
+        stalled = 0
+        while len(self.observed) < self.settings.evaluations and stalled < STALLED and not self._done():
+            if not any(o.sound for o in self.observed):
+                self._compute([self._random()])
+                continue
+            room = self.settings.evaluations - len(self.observed)
+            chosen: list[Values] = []
+            used: list[Array] = []
+            models = self._models()
+            for _ in range(min(self.settings.batch, room)):
+                weighed = next(weights)
+                proposal = self._proposed(models, weighed, chosen)
+                if proposal is not None:
+                    chosen.append(proposal)
+                    used.append(weighed)
+            if not chosen:
+                if self.reach >= MOST_REACH:
+                    break
+                self.reach, stalled = min(2 * self.reach, MOST_REACH), stalled + 1
+                continue
+            known = len(self.observed)
+            self._compute(chosen)
+            better = any(self._improved(known + i, known, w) for i, w in enumerate(used))
+            self.reach = float(np.clip(self.reach * self._trust(models, known), LEAST_REACH, MOST_REACH))
+            stalled = 0 if better else stalled + 1
+        return self._found()
+
+    def _first(self, start: Values) -> list[Values]:
+        """The start, moved inside the bounds, and it with each other value of the discrete freedoms."""
+        inside = []
+        for f, v in zip(self.freedoms, start, strict=True):
+            inside.append(
+                (v if v in f.values else f.values[0]) if f.discrete else f.at(np.clip(f.place(v), 0, 1))
+            )
+        first = [tuple(inside)]
+        for i in self.discrete:
+            others = [v for v in self.freedoms[i].values if v != inside[i]]
+            if len(others) > 3:
+                others = [others[0], others[len(others) // 2], others[-1]]
+            first += [(*inside[:i], v, *inside[i + 1 :]) for v in others]
+        return first[: max(1, self.settings.evaluations // 2)]
+
+    def _random(self) -> Values:
+        places = [
+            float(self.rng.integers(len(f.values))) if f.discrete else self.rng.random()
+            for f in self.freedoms
+        ]
+        return self.design(np.array(places))
+
+    def _compute(self, designs: Sequence[Values]) -> None:
+        self.observed += [
+            attrs.evolve(o, values=o.values[self.judged], slopes=o.slopes[self.judged])
+            for o in self.observe(designs)
+        ]
+        best = self.observed[self._best()]
+        self.on_step(len(self.observed), self._words(best))
+
+    def _words(self, best: Observed) -> str:
+        if not best.sound:
+            return "no design could be computed yet"
+        missed = sum(not t.met(v) for t, v in zip(self.targets, best.values, strict=True))
+        return (
+            f"{missed} of {len(self.targets) - len(self.goals)} targets missed"
+            if missed
+            else "all targets met"
+        )
+
+    def _models(self) -> Sequence[Surrogate]:
+        sound = [o for o in self.observed if o.sound]
+        x = self.coordinates(np.array([self.places(o.design) for o in sound]))
+        widths = np.array([self.freedoms[i].high - self.freedoms[i].low for i in self.continuous])
+        slopes = np.full((len(sound), len(self.targets), x.shape[1]), np.nan)
+        if len(self.continuous):
+            slopes[:, :, : len(self.continuous)] = np.array([o.slopes for o in sound]) * widths
+        return fit_all(x, np.array([o.values for o in sound]), slopes)
+
+    def _done(self) -> bool:
+        """Without objectives: whether a design meets all that is asked, targets near to their middle."""
+        if self.goals or not self.observed:
+            return False
+        best = self.observed[self._best()]
+        if not best.sound:
+            return False
+        misfits = [t.misfit(v) for t, v in zip(self.targets, best.values, strict=True)]
+        return all(abs(m) <= 0.1 for m in misfits) and all(
+            t.met(v) for t, v in zip(self.targets, best.values, strict=True)
+        )
+
+    # How good values are.
+
+    def _misfits(self, values: Array, inward: float) -> Array:
+        """Squared misfits (m, q) of values (m, q); inward: how far inside their bounds they shall be."""
+        found = np.zeros_like(values)
+        for i, t in enumerate(self.targets):
+            if t.goal is not None:
+                continue
+            v = values[:, i] / t.tolerance
+            if not np.isnan(t.value):
+                off = np.abs(v - t.value / t.tolerance)
+                found[:, i] = np.maximum(off - (AIM if self.goals else 0.0), 0.0) ** 2
+                continue
+            if not np.isnan(t.low):
+                found[:, i] += np.maximum(t.low / t.tolerance + inward - v, 0.0) ** 2
+            if not np.isnan(t.high):
+                found[:, i] += np.maximum(v - t.high / t.tolerance + inward, 0.0) ** 2
+        return found
+
+    def _merit(self, values: Array, weights: Array, inward: float = INWARD) -> Array:
+        """Merits (m,) of values (m, q), to be small, for weights (g,) of the objectives."""
+        merit = PENALTY * self._misfits(values, inward).sum(axis=1)
+        if not self.goals:
+            return merit
+        ideal, span = self._scale()
+        part = weights * (self.signs * values[:, self.goals] - ideal) / span
+        return np.asarray(merit + part.max(axis=1) + 0.05 * part.sum(axis=1))
+
+    def _scale(self) -> tuple[Array, Array]:
+        """The best value (g,) of each objective, smaller is better, and the spread (g,) that counts as
+        one."""
+        sound = [o for o in self.observed if o.sound]
+        good = [o for o in sound if self._feasible(o)] or sound
+        costs = self.signs * np.array([o.values for o in good])[:, self.goals]
+        least, spread = costs.min(axis=0), np.ptp(costs, axis=0)
+        span = np.maximum(spread, 1e-2 * np.maximum(np.abs(least), 1e-9))
+        return least - span, span
+
+    def _feasible(self, o: Observed) -> bool:
+        return o.sound and all(t.met(v) for t, v in zip(self.targets, o.values, strict=True))
+
+    def _trust(self, models: Sequence[Surrogate], before: int) -> float:
+        """Factor on the reach, by how well the surrogates foresaw the designs computed since.
+
+        Their errors over the change that they foresaw from the nearest design known, as in any trust region.
+        """
+        sound = [o for o in self.observed[:before] if o.sound]
+        places = np.array([self.places(o.design) for o in sound])
+        sizes = np.array([m.size for m in models])
+        factors = []
+        for o in self.observed[before:]:
+            if not o.sound:
+                factors.append(0.5)
+                continue
+            at = self.places(o.design)
+            nearest = sound[int(np.abs(places - at).max(axis=1).argmin())]
+            foreseen = self._predicted(models, at[None])[0]
+            change = np.linalg.norm((foreseen - nearest.values) / sizes)
+            wrong = np.linalg.norm((foreseen - o.values) / sizes) / max(float(change), 1e-12)
+            factors.append(2.0 if wrong < 0.1 else 1.0 if wrong < 0.35 else 0.5)
+        return min(factors)
+
+    def _improved(self, number: int, before: int, weights: Array) -> bool:
+        """Whether a design is better for some weights than all of those before."""
+        if not self.observed[number].sound:
+            return False
+        rows = [o.values for o in self.observed[:before] if o.sound]
+        merit = self._merit(np.array([*rows, self.observed[number].values]), weights, 0.0)
+        return len(rows) == 0 or bool(merit[-1] < merit[:-1].min() - 1e-9 * abs(merit[-1]))
+
+    def _best(self) -> int:
+        """The number of the design with the least misfit, then the best objectives, equally weighed."""
+
+        def cost(o: Observed) -> tuple[bool, float, float]:
+            if not o.sound:
+                return (True, np.inf, np.inf)
+            values = o.values[None]
+            goal = float(self._merit(values, np.ones(len(self.goals)), 0.0)[0])
+            feasible = self._feasible(o)
+            return (not feasible, 0.0 if feasible else float(self._misfits(values, 0.0).sum()), goal)
+
+        return min(range(len(self.observed)), key=lambda i: cost(self.observed[i]))
+
+    # The next design.
+
+    def _weights(self) -> Any:
+        """Weights (g,) of the objectives, each alone first, then even mixes and others."""
+        g = len(self.goals)
+        if g < 2:
+            return itertools.repeat(np.ones(g))
+        corners = [np.eye(g)[i] * 0.98 + 0.02 / g for i in range(g)]
+        mixes = [np.full(g, 1.0 / g)]
+        if g == 2:
+            mixes += [np.array([a, 1 - a]) for a in (0.75, 0.25, 0.9, 0.1, 0.62, 0.38)]
+        else:
+            mixes += list(self.rng.dirichlet(np.ones(g), 8))
+        return itertools.cycle([*corners, *mixes])
+
+    def _proposed(
+        self, models: Sequence[Surrogate], weights: Array, besides: Sequence[Values]
+    ) -> Values | None:
+        """The design that the surrogate has for the best within reach, None where all near it are known."""
+        sound = np.array([self.places(o.design) for o in self.observed if o.sound])
+        failed = np.array([self.places(o.design) for o in self.observed if not o.sound]).reshape(
+            -1, len(self.freedoms)
+        )
+        values = np.array([o.values for o in self.observed if o.sound])
+        order = np.argsort(self._merit(values, weights))
+        best, width = sound[order[: min(4, len(order))]], self.reach
+        for _ in range(ROUNDS):
+            trial = np.concatenate([best, self._around(best, width)])
+            trial = trial[self._within(trial, sound, failed)]
+            if not len(trial):
+                return None
+            merit = self._merit(self._predicted(models, trial), weights)
+            best = trial[np.argsort(merit, kind="stable")[:6]]
+            width *= 0.5
+        known = {o.design for o in self.observed} | set(besides)
+        for places in best:
+            design = self.design(places)
+            near = [np.abs(places - self.places(k))[self.continuous].max(initial=0.0) for k in known
+                    if all(self.places(k)[i] == places[i] for i in self.discrete)]  # fmt: skip
+            if design not in known and min(near, default=1.0) > 1e-4:
+                return design
+        return None
+
+    def _predicted(self, models: Sequence[Surrogate], places: Array) -> Array:
+        x = self.coordinates(places)
+        return np.stack([m.mean(x) for m in models], axis=1)
+
+    def _around(self, centres: Array, width: float) -> Array:
+        """Places (SAMPLES, f) about some centres, a discrete freedom changed now and then."""
+        chosen = centres[self.rng.integers(len(centres), size=SAMPLES)].copy()
+        if self.continuous:
+            steps = width * self.rng.standard_normal((SAMPLES, len(self.continuous)))
+            # Half of them move along few axes, as the best often lies on a bound.
+            steps *= self.rng.random(steps.shape) < self.rng.choice([0.4, 1.0], size=(SAMPLES, 1))
+            chosen[:, self.continuous] = np.clip(chosen[:, self.continuous] + steps, 0.0, 1.0)
+        for i in self.discrete:
+            flip = self.rng.random(SAMPLES) < 0.2
+            chosen[flip, i] = self.rng.integers(len(self.freedoms[i].values), size=int(flip.sum()))
+        return chosen
+
+    def _within(self, trial: Array, sound: Array, failed: Array) -> Array:
+        """Which of some places (m, f) are within reach of a computed design and not nearer to a failed
+        one."""
+        if not self.continuous:
+            return np.ones(len(trial), bool)
+
+        def distance(to: Array) -> Array:
+            step = np.abs(trial[:, None, self.continuous] - to[None][:, :, self.continuous]).max(axis=2)
+            return np.asarray(step.min(axis=1))
+
+        near = distance(sound)
+        kept = near <= self.reach
+        return kept & (distance(failed) > near) if len(failed) else kept
+
+    # What was found.
+
+    def _found(self) -> Found:
+        feasible = [i for i, o in enumerate(self.observed) if self._feasible(o)]
+        if not feasible:
+            return Found(tuple(self.observed), (self._best(),), False, self._in_the_way())
+        if len(self.goals) < 2:
+            return Found(tuple(self.observed), (self._best(),), True)
+        costs = self.signs * np.array([self.observed[i].values for i in feasible])[:, self.goals]
+        front = pareto(costs)
+        ordered = sorted(front.tolist(), key=lambda n: costs[n, 0])
+        return Found(tuple(self.observed), tuple(feasible[n] for n in ordered), True)
+
+    def _in_the_way(self) -> tuple[str, ...]:
+        """Names of the targets without any one of which the others could be met, by the surrogate."""
+        if not any(o.sound for o in self.observed):
+            return ()
+        models = self._models()
+        best = self.observed[self._best()]
+        self.reach = MOST_REACH
+        found = []
+        for number, target in enumerate(self.targets):
+            if target.goal is not None or target.met(best.values[number]):
+                continue
+            places, width = self.places(best.design)[None], 0.5
+            least = np.inf
+            for _ in range(ROUNDS):
+                trial = np.concatenate([places, self._around(places, width)])
+                rest = self._misfits(self._predicted(models, trial), 0.0)
+                rest[:, number] = 0.0
+                total = rest.sum(axis=1)
+                places, width = trial[np.argsort(total, kind="stable")[:6]], 0.6 * width
+                least = min(least, float(total.min()))
+            if least <= 1.0:
+                found.append(target.name)
+        return tuple(found)
+
+
+def pareto(costs: Array) -> Array:
+    """Numbers of the points (n, c), each cost to be small, that no other point is as good as and better in
+    one."""
+    found = []
+    for number, cost in enumerate(costs):
+        no_worse = (costs <= cost).all(axis=1)
+        if not (no_worse & (costs < cost).any(axis=1)).any():
+            found.append(number)
+    return np.array(found, dtype=int)

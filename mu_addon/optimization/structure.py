@@ -1,0 +1,109 @@
+"""A body for one choice of freedoms, and its equilibria under the pressures that quantities are read at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple, Protocol
+
+import attrs
+import numpy as np
+
+from ..design.quantity import in_MPa
+from ..errors import InputError
+from ..fem.equilibrium import Equilibrium
+from ..fem.materials import Materials
+from ..fem.model import Model
+from ..fem.newton_settings import NewtonSettings
+from ..fem.state import State, rest
+
+Array = np.ndarray[Any, Any]
+
+WITHOUT = ""
+"""Name of the body's materials without a sensor, Model A."""
+
+
+class Condition(NamedTuple):
+    """One state that a quantity needs: a name of the structure's materials, and a pressure in kPa."""
+
+    materials: str
+    pressure_kPa: float
+
+
+States = Mapping[Condition, Array]
+"""Displacements (n, 3) in mm by condition."""
+
+
+@attrs.frozen(eq=False)
+class Structure:
+    """A discretised body for one choice of freedoms.
+
+    materials: by name, `WITHOUT` for the body alone, and the name of a sensor's path for the body with it;
+    about: what it was made of (a Unit), for quantities that are read off the design; shared: what was found
+    of its elements, whatever their nodes' places, and holds for bodies of the same elements too.
+    """
+
+    model: Model
+    materials: Mapping[str, Materials]
+    about: Any = None
+    newton: NewtonSettings = attrs.field(factory=NewtonSettings)
+    shared: dict[str, Any] = attrs.field(factory=dict)
+
+    def once(self, name: str, make: Callable[[], Any]) -> Any:
+        """What is found of the elements, made when it is first asked for."""
+        if name not in self.shared:
+            self.shared[name] = make()
+        return self.shared[name]
+
+
+class Quantity(Protocol):
+    """Something to be read off a body in equilibrium; a quantity has one `name`, by which it is known.
+
+    A quantity that has `slope(structure, states)`, its derivative (n, 3) by the displacements of each
+    condition, gets its gradient by one adjoint solution a condition, whatever the number of freedoms; its
+    difference between two bodies at the same displacements is `change(structure, states, plus, minus)` where
+    it has that, else that of its values. Any other quantity with conditions is read once more, with moved
+    displacements, for every freedom.
+    """
+
+    @property
+    def name(self) -> str:
+        """By which it is known."""
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """The states it is read from, all under pressure."""
+
+    def value(self, structure: Structure, states: States) -> float:
+        """Its value."""
+
+
+def solve(structure: Structure, conditions: Iterable[Condition]) -> tuple[dict[Condition, Array], int]:
+    """The displacements in every condition, each from those of smaller pressure, and the factorisations.
+
+    Raises ConvergenceError where a pressure cannot be reached, and InputError for materials that remember.
+    """
+    wanted = set(conditions)
+    found: dict[Condition, Array] = {}
+    factorisations = 0
+    for name in sorted({c.materials for c in wanted}):
+        equilibrium = Equilibrium(
+            structure.model, structure.materials[name], structure.newton, explains=False
+        )
+        if equilibrium.parameters.has_history or structure.model.has_friction:
+            raise InputError(
+                "the state of a body with friction or memory depends on its history",
+                "[wall], freedoms",
+                "optimise with an elastic law of the wall",
+            )
+        model = structure.model
+        start = rest(model.mesh) if model.load is None else equilibrium.at_zero_pressure()
+        pressures = sorted(c.pressure_kPa for c in wanted if c.materials == name)
+        sides = [[p for p in pressures if p < 0][::-1], [p for p in pressures if p > 0]]
+        found |= {Condition(name, p): start.u for p in pressures if p == 0}
+        for side in sides:
+            history: list[State] = [start]
+            for pressure in side:
+                history.append(equilibrium.reach(in_MPa(pressure), history))
+                found[Condition(name, pressure)] = history[-1].u
+                factorisations += history[-1].factorisations
+    return found, factorisations

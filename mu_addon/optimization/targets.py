@@ -1,0 +1,304 @@
+"""What a design shall do: targets, bounds and objectives, and how far a unit is from them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import attrs
+
+from ..design.toml_text import nearest
+from ..errors import InputError
+from .quantities import AirVolume, Angle, RestStiffness, Stretch, WallsApart
+from .sensor import Disturbance, SensorSlope
+from .structure import Quantity
+from .whole import Mass, PrintTime
+
+Goal = Literal["minimise", "maximise"]
+
+# Keys of each kind besides those of `_FORM`, and the unit of its value.
+KINDS: dict[str, tuple[tuple[str, ...], str]] = {
+    "angle": (("pressure_kPa",), "deg"),
+    "stiffness": (("direction",), "N/mm"),
+    "stretch": (("pressure_kPa", "region"), ""),
+    "safety": (("pressure_kPa", "region"), ""),
+    "air_volume": (("pressure_kPa",), "ml"),
+    "mass": ((), "g"),
+    "print_time": ((), "h"),
+    "deviation": (("pressures_kPa", "path"), "mm"),
+    "sensor_slope": (("pressures_kPa", "path"), "1/deg"),
+    "walls_apart": (("pressure_kPa",), ""),
+    "printable": ((), ""),
+}
+_FORM = ("kind", "name", "value", "tolerance", "low", "high", "objective", "points")
+NARROW = 0.02
+"""A bound without a tolerance is missed by one unit of misfit where it is missed by this share of itself."""
+HIGHEST_kPa = 500.0
+
+
+@attrs.frozen
+class Target:
+    """One quantity and what is asked of it.
+
+    value with tolerance: within it; low, high: bounds, nan where there is none; goal: an objective.
+    tolerance: what one unit of `misfit` is, in the quantity's unit; line: place in its file.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    quantity: Quantity | None
+    value: float = math.nan
+    tolerance: float = math.nan
+    low: float = math.nan
+    high: float = math.nan
+    goal: Goal | None = None
+    line: str = ""
+
+    @property
+    def is_bound(self) -> bool:
+        """Whether it can be missed, as an objective cannot."""
+        return self.goal is None
+
+    def misfit(self, found: float) -> float:
+        """How far a value is from what is asked, in tolerances, with its sign; 0 where a bound is kept.
+
+        A target's misfit is its whole distance: within one tolerance it is met.
+        """
+        if self.goal is not None:
+            return 0.0
+        if not math.isnan(self.value):
+            return (found - self.value) / self.tolerance
+        if not math.isnan(self.low) and found < self.low:
+            return (found - self.low) / self.tolerance
+        if not math.isnan(self.high) and found > self.high:
+            return (found - self.high) / self.tolerance
+        return 0.0
+
+    def met(self, found: float) -> bool:
+        """Whether a value keeps it: a target within its tolerance, a bound to a millionth of its own."""
+        return abs(self.misfit(found)) <= (1.0 if not math.isnan(self.value) else 1e-6)
+
+    @property
+    def words(self) -> str:
+        """What is asked, in words."""
+        unit = f" {self.unit}" if self.unit else ""
+        if self.kind in ("walls_apart", "printable"):
+            return "yes"
+        if self.goal is not None:
+            return "as small as possible" if self.goal == "minimise" else "as large as possible"
+        if not math.isnan(self.value):
+            return f"{self.value:g} ± {self.tolerance:g}{unit}"
+        parts = [
+            f"at {word} {bound:g}{unit}"
+            for word, bound in (("least", self.low), ("most", self.high))
+            if not math.isnan(bound)
+        ]
+        return " and ".join(parts)
+
+
+@attrs.frozen
+class Supplies:
+    """What targets need besides: elongation at break as a ratio, density in g/ml and a printer, and paths."""
+
+    elongation: float
+    density_g_per_ml: float
+    printer: Any
+    paths: Sequence[str]
+
+
+def read_targets(
+    tables: Sequence[Mapping[str, Any]], where: Sequence[str], supplies: Supplies
+) -> list[Target]:
+    """The targets of [[target]] tables; where: file and line of each.
+
+    A curve of points is a target a point. Raises InputError that names key and line.
+    """
+    found: list[Target] = []
+    for table, place in zip(tables, where, strict=True):
+        for target in _targets(table, place, supplies):
+            if target.name in {t.name for t in found}:
+                raise InputError(
+                    f"two targets are named {target.name!r}", f"{place}, name", "give one of them a name"
+                )
+            found.append(target)
+    if not any(t.kind != "printable" for t in found):
+        raise InputError(
+            "no target is given", "[[target]]",
+            'add [[target]] with kind = "angle", pressure_kPa = 30 and low = 40',
+        )  # fmt: skip
+    return found
+
+
+def _targets(table: Mapping[str, Any], where: str, supplies: Supplies) -> list[Target]:
+    kind = table.get("kind")
+    if not isinstance(kind, str) or kind not in KINDS:
+        hint = nearest(kind, list(KINDS)) if isinstance(kind, str) else ""
+        raise InputError(
+            f"kind = {kind!r} is not known{hint}", f"{where}, kind", f"one of: {', '.join(KINDS)}"
+        )
+    known = (*_FORM, *KINDS[kind][0])
+    for key in table:
+        if key not in known:
+            raise InputError(
+                f"unknown key {key!r} of {kind}{nearest(key, known)}", f"{where}, {key}",
+                f"known: {', '.join(known)}",
+            )  # fmt: skip
+    if "points" in table:
+        return _curve(table, where, supplies)
+    name = table.get("name", _name(kind, table))
+    if not isinstance(name, str) or not name.strip() or len(name) > 60 or not name.isprintable():
+        raise InputError(f"name = {name!r} is not a name", f"{where}, name", "write a short text in quotes")
+    quantity = _quantity(kind, name, table, where, supplies)
+    if kind in ("walls_apart", "printable"):
+        _refuse(table, ("value", "tolerance", "low", "high", "objective"), where, f"{kind} is a yes or a no")
+        return [Target(name, kind, "", quantity, tolerance=1.0, low=1.0, line=where)]
+    return [Target(name, kind, KINDS[kind][1], quantity, **_asked(table, where, kind), line=where)]
+
+
+def _name(kind: str, table: Mapping[str, Any]) -> str:
+    """A name from what the quantity is read at: "angle at 30 kPa", "stiffness along x"."""
+    words = kind.replace("_", " ")
+    if "region" in table:
+        words += f" of {table['region']}"
+    if "path" in table:
+        words += f" of {table['path']}"
+    if "pressure_kPa" in table:
+        words += f" at {table['pressure_kPa']:g} kPa" if _is_number(table["pressure_kPa"]) else ""
+    return f"{words} along {table['direction']}" if "direction" in table else words
+
+
+def _asked(table: Mapping[str, Any], where: str, kind: str) -> dict[str, Any]:
+    goal = table.get("objective")
+    has_bound = "low" in table or "high" in table
+    if ("value" in table) + has_bound + (goal is not None) != 1:
+        raise InputError(
+            f"{kind} must have either value and tolerance, or low and high, or objective", where,
+            'write value = 40, tolerance = 1; or low = 40; or objective = "minimise"',
+        )  # fmt: skip
+    if goal is not None:
+        if goal not in ("minimise", "maximise"):
+            raise InputError(
+                f"objective = {goal!r} is not known", f"{where}, objective", '"minimise" or "maximise"'
+            )
+        _refuse(table, ("tolerance",), where, "an objective has no tolerance")
+        return {"goal": goal}
+    if "value" in table:
+        if "tolerance" not in table:
+            raise InputError("a value has no tolerance", f"{where}, tolerance", "write tolerance = ..")
+        found = {key: _number(table, key, where) for key in ("value", "tolerance")}
+    else:
+        found = {key: _number(table, key, where) for key in ("low", "high") if key in table}
+        if found.get("low", -math.inf) >= found.get("high", math.inf):
+            raise InputError("low is not below high", f"{where}, low", "exchange the two")
+        largest = max(abs(v) for v in found.values())
+        found["tolerance"] = (
+            _number(table, "tolerance", where) if "tolerance" in table else NARROW * (largest or 1.0)
+        )
+    if found["tolerance"] <= 0:
+        raise InputError(
+            f"tolerance = {found['tolerance']:g} is not positive", f"{where}, tolerance", "give more than 0"
+        )
+    return found
+
+
+def _curve(table: Mapping[str, Any], where: str, supplies: Supplies) -> list[Target]:
+    """A target at every point (pressure in kPa, value) of a curve."""
+    points = table["points"]
+    good = isinstance(points, list) and len(points) >= 2
+    if not good or not all(isinstance(p, list) and len(p) == 2 and all(map(_is_number, p)) for p in points):
+        raise InputError(
+            f"points = {points!r} is not a curve", f"{where}, points", "write [[-15, -20], [30, 40]]"
+        )
+    if "pressure_kPa" not in KINDS[table["kind"]][0]:
+        raise InputError(f"{table['kind']} has no curve", f"{where}, points", "give a value")
+    _refuse(table, ("value", "low", "high", "objective", "pressure_kPa"), where, "points say it already")
+    rest = {key: v for key, v in table.items() if key not in ("points", "name")}
+    return [
+        target
+        for pressure, value in points
+        for target in _targets({**rest, "pressure_kPa": pressure, "value": value}, where, supplies)
+    ]
+
+
+def _quantity(
+    kind: str, name: str, table: Mapping[str, Any], where: str, supplies: Supplies
+) -> Quantity | None:
+    if kind == "printable":
+        return None
+    if kind == "mass":
+        return Mass(name, supplies.density_g_per_ml, supplies.printer)
+    if kind == "print_time":
+        return PrintTime(name, supplies.printer)
+    if kind == "stiffness":
+        direction = table.get("direction")
+        if direction not in ("x", "y", "z"):
+            raise InputError(
+                f"direction = {direction!r} is not an axis", f"{where}, direction", 'write "x", "y" or "z"'
+            )
+        return RestStiffness(name, direction)
+    if kind in ("deviation", "sensor_slope"):
+        pressures, path = _pressures(table, where), table.get("path")
+        if path not in supplies.paths:
+            raise InputError(
+                f"path = {path!r} is not a path of the unit", f"{where}, path",
+                f"one of: {', '.join(supplies.paths)}",
+            )  # fmt: skip
+        made = Disturbance if kind == "deviation" else SensorSlope
+        return made(name, str(path), pressures)
+    pressure = 0.0 if kind == "air_volume" and "pressure_kPa" not in table else _pressure(table, where)
+    if kind == "air_volume":
+        return AirVolume(name, pressure)
+    if pressure == 0:
+        raise InputError(
+            f"{kind} at 0 kPa is that of the unit at rest", f"{where}, pressure_kPa", "give another"
+        )
+    if kind == "angle":
+        return Angle(name, pressure)
+    if kind == "walls_apart":
+        return WallsApart(name, pressure)
+    region = table.get("region", "wall")
+    if region not in ("wall", "struts"):
+        raise InputError(f"region = {region!r} is not known", f"{where}, region", 'write "wall" or "struts"')
+    return Stretch(name, pressure, region, supplies.elongation if kind == "safety" else None)
+
+
+def _refuse(table: Mapping[str, Any], keys: Sequence[str], where: str, why: str) -> None:
+    for key in keys:
+        if key in table:
+            raise InputError(f"{why}: {key} has no place there", f"{where}, {key}", "leave it out")
+
+
+def _pressures(table: Mapping[str, Any], where: str) -> tuple[float, ...]:
+    given = table.get("pressures_kPa")
+    if not isinstance(given, list) or not given or not all(_is_number(p) for p in given):
+        raise InputError(
+            f"pressures_kPa = {given!r} is not a list of pressures", f"{where}, pressures_kPa",
+            "write pressures_kPa = [-15, 30]",
+        )  # fmt: skip
+    found = tuple(sorted({_pressure({"pressure_kPa": p}, where) for p in given} - {0.0}))
+    if not found:
+        raise InputError("no pressure differs from 0", f"{where}, pressures_kPa", "give one")
+    return found
+
+
+def _pressure(table: Mapping[str, Any], where: str) -> float:
+    found = _number(table, "pressure_kPa", where)
+    if abs(found) > HIGHEST_kPa:
+        raise InputError(
+            f"pressure_kPa = {found:g} is out of bounds", f"{where}, pressure_kPa",
+            f"give {-HIGHEST_kPa:g} to {HIGHEST_kPa:g} kPa",
+        )  # fmt: skip
+    return found
+
+
+def _number(table: Mapping[str, Any], key: str, where: str) -> float:
+    value = table.get(key)
+    if not _is_number(value):
+        raise InputError(f"{key} = {value!r} is not a number", f"{where}, {key}", f"write {key} = ..")
+    return float(value)  # type: ignore[arg-type]
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

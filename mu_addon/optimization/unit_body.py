@@ -1,0 +1,157 @@
+"""A unit as a body whose freedoms can be moved a little: its mesh, its materials, and pairs of neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..design.anchors import Window, anchor_points
+from ..design.parameters import Unit
+from ..errors import InputError
+from ..fem.materials import Materials
+from ..fem.model import Model
+from ..fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
+from ..fem.relocated import relocated
+from ..fem.unit import materials_of
+from ..meshing.mesh import Mesh
+from ..meshing.morph import Morph
+from ..meshing.settings import MeshSettings
+from ..placement.candidates import Candidate, roi, with_sensor
+from ..placement.inclusion import sensor_share
+from ..resolved.unit import mesh_of
+from .freedoms import Freedom, changed_unit
+from .gradient import Pair
+from .structure import WITHOUT, Structure
+
+Array = np.ndarray[Any, Any]
+
+STEP = 1e-4
+"""Half step of a freedom's central differences, relative to its value (or its range, where that is
+smaller)."""
+RULE = "volume_fraction"
+"""How a sensor stiffens the homogenised lattice: the rule that converges with the mesh."""
+
+
+def _same(unit: Unit) -> Unit:
+    return unit
+
+
+def _model(unit: Unit, mesh: Mesh) -> Model:
+    return Model(mesh, threads=1)
+
+
+def _materials(unit: Unit, mesh: Mesh) -> Materials:
+    return materials_of(unit, mesh)
+
+
+@attrs.frozen(eq=False)
+class Mechanics:
+    """How units are simulated: mesh settings, and what an extended model changes.
+
+    as_printed: a drawn unit with the parts of the model that a unit has parameters for; materials, model: of
+    such a unit and its mesh; load: dead forces (n, 3) in N, or None; newton: settings, None for the
+    fidelity's usual ones.
+    """
+
+    settings: MeshSettings = attrs.field(factory=lambda: MeshSettings(refine=0.5))
+    as_printed: Callable[[Unit], Unit] = _same
+    materials: Callable[[Unit, Mesh], Materials] = _materials
+    model: Callable[[Unit, Mesh], Model] = _model
+    load: Callable[[Unit, Mesh], Array | None] = lambda unit, mesh: None
+    newton: NewtonSettings | None = None
+    mesher: str = "auto"
+    cache: Path | None = None
+
+
+@attrs.frozen
+class UnitBody:
+    """One unit as a body, with its sensors' paths; `structure` is meshed on first use.
+
+    unit: as drawn; windows: paths by name whose sensors are simulated beside the unit without.
+    """
+
+    unit: Unit
+    mechanics: Mechanics
+    windows: Mapping[str, Window] = attrs.field(factory=dict)
+    _shared: dict[str, Any] = attrs.field(factory=dict, init=False, eq=False, repr=False)
+
+    @cached_property
+    def printed(self) -> Unit:
+        """The unit with the extended model in it."""
+        return self.mechanics.as_printed(self.unit)
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """Its own mesh. Raises InputError and MeshingError."""
+        m = self.mechanics
+        return mesh_of(self.printed, m.settings, mesher=m.mesher, cache=m.cache)
+
+    @cached_property
+    def structure(self) -> Structure:
+        """The body; see `mesh` for the errors."""
+        model = self.mechanics.model(self.printed, self.mesh)
+        return self._structure(self.unit, self.printed, model)
+
+    @cached_property
+    def morph(self) -> Morph:
+        """What moves its mesh to units near to it. Raises MeshingError, for a resolved mesh in any case."""
+        return Morph(self.mesh, self.printed, self.mechanics.settings)
+
+    def moved(self, unit: Unit) -> Structure:
+        """Another unit on this one's mesh, morphed; it shares this one's buffers (`relocated`).
+
+        Raises InputError where the unit breaks a rule and MeshingError where it needs a mesh of its own.
+        """
+        printed = self.mechanics.as_printed(unit)
+        mesh = self.mesh if printed.printed == self.printed.printed else self.morph.to(printed, checked=False)
+        model = relocated(self.structure.model, mesh)
+        model.load = self.mechanics.load(printed, mesh)
+        return self._structure(unit, printed, model)
+
+    def pair(self, freedom: Freedom) -> Pair:
+        """The two neighbours by one continuous freedom, and the difference between them in its unit.
+
+        One-sided where the unit may be moved to one side only. Raises InputError and MeshingError.
+        """
+        value = float(freedom.value_of(self.unit))
+        step = STEP * min(freedom.high - freedom.low, abs(value) or np.inf)
+        ends = []
+        for sign in (1.0, -1.0):
+            try:
+                ends.append(value + sign * step)
+                changed_unit(self.unit, [freedom], [ends[-1]])
+            except InputError:
+                ends[-1] = value
+        if ends[0] == ends[1]:
+            raise InputError(
+                f"{freedom.name} = {value:g} can be moved to neither side", freedom.name, "fix it"
+            )
+        plus, minus = (self.moved(changed_unit(self.unit, [freedom], [end])) for end in ends)
+        return plus, minus, ends[0] - ends[1]
+
+    def pairs(self, freedoms: Sequence[Freedom]) -> list[Callable[[], Pair]]:
+        """`pair` of every freedom, each made when it is called for."""
+        return [lambda freedom=freedom: self.pair(freedom) for freedom in freedoms]  # type: ignore[misc]
+
+    def _structure(self, unit: Unit, printed: Unit, model: Model) -> Structure:
+        mesh = model.mesh
+        own = self.mechanics.materials(printed, mesh)
+        materials = {WITHOUT: own}
+        for name, window in self.windows.items():
+            if mesh.resolved:
+                raise InputError(
+                    "a resolved unit's sensor is meshed with it, which the optimisation does not do",
+                    f"path {name}",
+                    'optimise with fidelity = "homogenised" and check the result with `place`',
+                )
+            points = anchor_points(printed)[list(window.indices)]
+            found = roi(mesh, Candidate(name, window.start, points), printed.waveguide.inclusion_radius_mm)
+            share = sensor_share(RULE, found)
+            materials[name] = with_sensor(own, share, printed.material.sensor_modulus_MPa)
+        newton = self.mechanics.newton or (RESOLVED_NEWTON if mesh.resolved else NewtonSettings())
+        return Structure(model, materials, printed, newton, self._shared)

@@ -1,0 +1,1 @@
+"""Design by intent: targets and freedoms in, units that meet them out."""

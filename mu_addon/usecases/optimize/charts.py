@@ -1,0 +1,97 @@
+"""Charts of an optimisation: the front, the way there, and each unit's half section."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...design.parameters import Unit
+from ...design.profile import cavity_polygon, outer_polygon
+from ...report.charts import BY_LENGTH, CHOSEN, INK, QUIET, canvas
+from .results import Optimised
+
+Array = np.ndarray[Any, Any]
+
+ALONG = 6
+
+
+def front(found: Optimised, first: int, second: int) -> str:
+    """SVG of all computed designs by two judged targets (numbers); proposals are numbered squares."""
+    targets = [t for t in found.design.targets if t.quantity is not None]
+    sound = [o for o in found.search.observed if o.sound]
+    values = np.array([[o.values[first], o.values[second]] for o in sound])
+    meets = np.array([all(t.met(v) for t, v in zip(targets, o.values, strict=True)) for o in sound])
+    with canvas(4.6, 3.5) as (drawn, svg):
+        axes = drawn.add_axes((0.15, 0.14, 0.81, 0.82))
+        if (~meets).any():
+            axes.plot(*values[~meets].T, "o", color=QUIET, markersize=3.5, alpha=0.8, label="misses a target")
+        if meets.any():
+            axes.plot(*values[meets].T, "o", color=BY_LENGTH[0], markersize=4, label="meets all")
+        for row, p in enumerate(found.proposals):
+            x, y = p.observed.values[first], p.observed.values[second]
+            axes.plot(x, y, "s", color=CHOSEN, markersize=6.5, label="" if row else "proposed")
+            axes.annotate(str(p.place), (x, y), (5, 5), textcoords="offset points", fontsize=8, color=INK)
+        for target, line in ((targets[first], axes.axvline), (targets[second], axes.axhline)):
+            for bound in (target.low, target.high, target.value):
+                if not np.isnan(bound):
+                    line(bound, color=INK, linewidth=0.8, linestyle="--")
+        axes.set(xlabel=_axis(targets[first]), ylabel=_axis(targets[second]))
+        axes.legend(fontsize=7, frameon=False)
+    return svg()
+
+
+def course(found: Optimised) -> str:
+    """SVG of the largest misfit in tolerances by the number of designs computed, and of the best so far."""
+    targets = [t for t in found.design.targets if t.quantity is not None]
+    misfit = np.array(
+        [
+            max((abs(t.misfit(v)) for t, v in zip(targets, o.values, strict=True)), default=0.0)
+            if o.sound
+            else np.nan
+            for o in found.search.observed
+        ]
+    )
+    number = np.arange(1, len(misfit) + 1)
+    with canvas(4.6, 2.6) as (drawn, svg):
+        axes = drawn.add_axes((0.15, 0.19, 0.81, 0.76))
+        shown = np.maximum(misfit, 1e-2)
+        axes.plot(number, shown, "o", color=QUIET, markersize=4)
+        axes.plot(number, np.fmin.accumulate(shown), color=CHOSEN, linewidth=1.6, drawstyle="steps-post")
+        axes.set_yscale("log")
+        axes.axhline(1.0, color=INK, linewidth=0.8, linestyle="--")
+        axes.set(xlabel="units computed", ylabel="largest misfit, tolerances")
+        axes.locator_params(axis="x", integer=True)
+    return svg()
+
+
+def thumbnail(unit: Unit, widest_mm: float, tallest_mm: float) -> str:
+    """SVG of a unit cut along its sagittal plane, at one scale for all units: wall, chambers, envelope.
+
+    widest_mm, tallest_mm: size of the largest unit to be shown beside it.
+    """
+    d = unit.dimensions
+    with canvas(1.15, 1.15 * tallest_mm / widest_mm) as (drawn, svg):
+        axes = drawn.add_axes((0.0, 0.0, 1.0, 1.0))
+        (_, _), (y0, y1), (z0, z1) = d.bounds
+        axes.fill([y0, y1, y1, y0], [z0, z0, z1, z1], color="#dfe6ee", linewidth=0)
+        for polygon, color in ((outer_polygon(d, ALONG), "#c98a3a"), (cavity_polygon(d, ALONG), "#ffffff")):
+            for sign in (1, -1):
+                axes.fill(sign * polygon[:, 0], polygon[:, 1], color=color, linewidth=0)
+        middle = 0.5 * (y0 + y1)
+        axes.set_xlim(middle - 0.52 * widest_mm, middle + 0.52 * widest_mm)
+        axes.set_ylim(-0.02 * tallest_mm, 1.02 * tallest_mm)
+        axes.set_aspect("equal")
+        axes.axis("off")
+    return svg()
+
+
+def sizes(units: Sequence[Unit]) -> tuple[float, float]:
+    """Largest width and height in mm of some units."""
+    bounds = [u.dimensions.bounds for u in units]
+    return max(y1 - y0 for _, (y0, y1), _ in bounds), max(z1 - z0 for _, _, (z0, z1) in bounds)
+
+
+def _axis(target: Any) -> str:
+    return f"{target.name} [{target.unit}]" if target.unit else str(target.name)

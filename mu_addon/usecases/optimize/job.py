@@ -1,0 +1,99 @@
+"""The inputs of an optimisation: design.toml, the unit beside it, and an extended model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import attrs
+
+from ...design.parameters import Unit, from_toml
+from ...errors import InputError
+from ...evidence.extended import ExtendedModel, load_model
+from ...fem.unit import materials_of
+from ...optimization.design_file import HEADER, UNIT, Design, parse_design, read_design
+from ...optimization.unit_body import Mechanics
+from ...reading import file_text
+from ...run.folder import FolderLayout
+from ..simulate_and_place.extended_unit import extend
+
+DESIGN, MODEL = "design.toml", "model.toml"
+TABLE, REPORT = "designs.csv", "report.html"
+LAYOUT = FolderLayout(DESIGN, HEADER, results=(TABLE, REPORT, "proposed-*.toml"), optional=(UNIT, MODEL))
+# No file of inputs is longer, in bytes.
+_LONGEST = 1_000_000
+
+
+@attrs.frozen(eq=False)
+class Job:
+    """A design to be found, and how. model: the extended model that is optimised, or None.
+
+    workers: units at a time on this machine; scheduler: address of a Dask scheduler whose workers evaluate
+    them, in place of that.
+    """
+
+    design: Design
+    model: ExtendedModel | None = None
+    workers: int = 1
+    scheduler: str | None = None
+
+    def texts(self) -> dict[str, str]:
+        """Text of every file of inputs, by name; design.toml is the first."""
+        found = self.design.texts()
+        return found if self.model is None else {**found, MODEL: self.model.text()}
+
+
+def job_from(file: Path, model: Path | None = None, workers: int = 1, scheduler: str | None = None) -> Job:
+    """The job of a design file and a model's; raises InputError."""
+    try:
+        text = file_text(file, _LONGEST)
+    except OSError as error:
+        raise InputError(
+            f"cannot read the design: {error.strerror or error}", str(file), "give the path of a design.toml"
+        ) from error
+    except UnicodeDecodeError as error:
+        raise InputError("the file is not UTF-8 text", str(file), "save it as UTF-8") from error
+    return Job(read_design(file, text), None if model is None else load_model(model), workers, scheduler)
+
+
+def read_job(folder: Path) -> Job:
+    """The optimisation that a folder describes; raises InputError."""
+    model = folder / MODEL
+    return job_from(folder / DESIGN, model if model.is_file() else None)
+
+
+def design_of(texts: Mapping[str, str]) -> Design:
+    """The design of a run's own texts, which hold its unit; raises InputError."""
+    return parse_design(texts[DESIGN], DESIGN, unit=from_toml(texts[UNIT], UNIT))
+
+
+def mechanics_of(
+    design: Design, model: ExtendedModel | None, refine: float | None = None
+) -> tuple[Mechanics, list[str]]:
+    """How the design's units are simulated, and what of the model is left out, in words.
+
+    refine: of the mesh, by default the search's. Raises InputError where the unit cannot have the model.
+    """
+    settings = design.settings if refine is None else attrs.evolve(design.settings, refine=refine)
+    if model is None:
+        return Mechanics(settings), []
+    first = extend(design.unit, model)
+    effects = first.effects
+    left_out = list(first.left_out)
+    if effects.in_time:
+        left_out.append(
+            "effects in time (viscoelasticity, lag, leak, softening): targets are of the unit at rest under "
+            "its pressure"
+        )
+
+    def printed(unit: Unit) -> Unit:
+        return extend(unit, model).unit
+
+    return Mechanics(
+        settings,
+        as_printed=printed,
+        materials=lambda unit, mesh: effects.materials(materials_of(unit, mesh), mesh),
+        model=lambda unit, mesh: effects.model(unit, mesh, threads=1),
+        load=effects.load,
+        newton=None if design.settings.resolved else effects.newton,
+    ), left_out

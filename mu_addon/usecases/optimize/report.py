@@ -1,0 +1,191 @@
+"""The report of an optimisation: the outcome, the front, the units, what changed and why."""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+
+import numpy as np
+
+from ...files import write_text
+from ...report.html import cards, facts_table, figure, note, number, page, table
+from ...run.progress import Progress
+from ...run.versions import package_versions
+from . import charts
+from .results import Optimised, Proposal
+from .words import sensitivities
+
+
+def write_report(found: Optimised, path: Path, progress: Progress) -> None:
+    """Write report.html; raises OutputError."""
+    with progress.stage("report", expected_s=3.0):
+        write_text(path, report(found))
+
+
+def report(found: Optimised) -> str:
+    """The report as one page of HTML."""
+    robust = sum(p.checked.is_robust for p in found.proposals)
+    lead = f"<p>{escape(found.words)}</p>" + cards(
+        [
+            ("units computed", str(len(found.search.observed))),
+            ("Model A's", str(found.model_a)),
+            ("proposed", str(len(found.proposals))),
+            ("robust", str(robust)),
+        ]
+    )
+    d = found.design
+    return page(
+        f"Optimisation of {d.unit.name}",
+        f"{len(d.targets)} targets, {len(d.freedoms)} freedoms, {d.settings.fidelity}",
+        note([f"Not in the simulation: {words}." for words in found.left_out]),
+        lead,
+        [
+            ("front", "Front", _front(found)),
+            ("units", "Proposed units", _units(found)),
+            ("targets", "Targets and errors", _targets(found)),
+            ("why", "What changed and why", _why(found)),
+            ("sensitivity", "What a tenth of each freedom moves", _sensitivity(found)),
+            ("inputs", "Inputs", _inputs(found)),
+            ("versions", "Versions", facts_table("package", "version", package_versions())),
+        ],
+    )
+
+
+def _front(found: Optimised) -> str:
+    if not any(o.sound for o in found.search.observed):
+        return ""
+    targets = [t for t in found.design.targets if t.quantity is not None]
+    goals = [i for i, t in enumerate(targets) if t.goal is not None]
+    rest = [i for i in range(len(targets)) if i not in goals]
+    shown = (goals + rest)[:2]
+    html = ""
+    if len(shown) == 2:
+        alt = f"{targets[shown[1]].name} against {targets[shown[0]].name} of all units computed."
+        words = "All units computed; squares are proposed. Dashed lines are what is asked."
+        html += figure(charts.front(found, *shown), words, alt)
+    words = "Largest misfit of any target, in its tolerances: below 1 all are met."
+    html += figure(charts.course(found), words, "Misfit by the number of units computed.")
+    return f'<div class="pair">{html}</div>'
+
+
+def _units(found: Optimised) -> str:
+    if not found.proposals:
+        return ""
+    units = [found.design.unit, *(p.unit for p in found.proposals)]
+    widest, tallest = charts.sizes(units)
+    names = ["start", *(f"{p.place}: {_state(p)}" for p in found.proposals)]
+    html = "".join(
+        figure(charts.thumbnail(unit, widest, tallest), escape(name), f"Half section of unit {name}.")
+        for unit, name in zip(units, names, strict=True)
+    )
+    rows = [
+        (
+            [
+                f.name,
+                _shown(f.value_of(found.design.unit)),
+                *(_shown(f.value_of(p.unit)) for p in found.proposals),
+            ],
+            False,
+        )
+        for f in found.design.freedoms
+    ]
+    head = [("freedom", ""), ("start", "n"), *((str(p.place), "n") for p in found.proposals)]
+    return f'<div class="triple">{html}</div>' + table("Each lies beside as proposed-N.toml.", head, rows)
+
+
+def _state(p: Proposal) -> str:
+    if p.checked.why:
+        return "fails on a finer mesh"
+    words = "robust" if p.checked.is_robust else "not robust"
+    return f"{words}, print check: {p.checked.print_worst}" if p.checked.print_worst else words
+
+
+def _targets(found: Optimised) -> str:
+    html = ""
+    for p in found.proposals:
+        rows = []
+        for i, t in enumerate(found.design.targets):
+            c = p.checked
+            if t.quantity is None:
+                verdict = _verdict(c.met[i], c.robust[i])
+                rows.append(([t.name, t.words, c.print_worst, "", "", "", "", verdict], False))
+                continue
+            cells = [f"{v:.3g}" for v in (c.by_mesh[i], c.by_print[i], c.by_resin[i])]
+            values = [number(float(f"{v:.5g}")) for v in (p.values[i], c.values[i])]
+            verdict = _verdict(c.met[i], c.robust[i]) if t.goal is None else "objective"
+            name = f"{t.name} [{t.unit}]" if t.unit else t.name
+            rows.append(([name, t.words, *values, *cells, verdict], False))
+        head = [
+            ("target", ""), ("asked", ""), ("found", "n"), ("on a finer mesh", "n"), ("± mesh", "n"),
+            ("± print", "n"), ("± resin", "n"), ("verdict", ""),
+        ]  # fmt: skip
+        caption = f"Unit {p.place}" + (f": {p.checked.why}" if p.checked.why else "")
+        html += table(caption, head, rows)
+        if p.checked.print_findings:
+            html += note(p.checked.print_findings)
+    d = found.design
+    words = (
+        "Standard errors: the mesh's is the difference to a mesh of refinement "
+        f"{d.check_refine:g}; a print's surfaces are off by {d.print_tolerance_mm:g} mm, all moduli by "
+        f"{d.modulus_tolerance:.0%}. Robust: met for all values within two standard errors of the three "
+        "together."
+    )
+    return f"<p>{escape(words)}</p>{html}" if html else ""
+
+
+def _verdict(met: bool, robust: bool) -> str:
+    return "robust" if robust else "met" if met else "missed"
+
+
+def _why(found: Optimised) -> str:
+    html = ""
+    for p in found.proposals:
+        changed = "".join(f"<li>{escape(words)}</li>" for words in p.changes) or "<li>nothing</li>"
+        moved = "".join(f"<li>{escape(words)}</li>" for words in p.reasons)
+        html += f"<h3>Unit {p.place}</h3><ul>{changed}</ul>"
+        html += f"<p>What moved each target, by its slopes at this unit:</p><ul>{moved}</ul>" if moved else ""
+    return html
+
+
+def _sensitivity(found: Optimised) -> str:
+    continuous = [f for f in found.design.freedoms if not f.discrete]
+    if not found.proposals or not continuous:
+        return ""
+    p = found.proposals[0]
+    judged = [t for t in found.design.targets if t.quantity is not None]
+    rows = [
+        ([t.name, *("-" if np.isnan(v) else f"{v:+.3g}" for v in row)], False)
+        for t, row in zip(judged, sensitivities(found.design.freedoms, p.observed), strict=True)
+    ]
+    head = [("target", ""), *((f.name, "n") for f in continuous)]
+    return table("At unit 1, in each target's unit; by adjoint gradients.", head, rows)
+
+
+def _inputs(found: Optimised) -> str:
+    d = found.design
+    asked = [([t.name, t.words], False) for t in d.targets]
+    free = [
+        (
+            [f.name, ", ".join(map(str, f.values)) if f.discrete else f"{f.low:g} to {f.high:g} {f.unit}"],
+            False,
+        )
+        for f in d.freedoms
+    ]
+    facts = {
+        "fidelity": d.settings.fidelity,
+        "refinement of the search's mesh": d.settings.refine,
+        "most units": d.search.evaluations,
+        "seed": d.search.seed,
+        "resin": d.resin,
+        "printer": d.printer,
+        "extended model": found.has_model,
+    }
+    return (
+        table("", [("target", ""), ("asked", "")], asked)
+        + table("", [("freedom", ""), ("range", "")], free)
+        + facts_table("setting", "", facts)
+    )
+
+
+def _shown(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,54 @@
+"""What an optimisation found, for its report and summary."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...design.parameters import Unit
+from ...optimization.design_file import Design
+from ...optimization.robustness import Verified
+from ...optimization.search import Found, Observed
+
+Array = np.ndarray[Any, Any]
+
+
+@attrs.frozen(eq=False)
+class Proposal:
+    """A proposed unit: its place among them from 1, its design's number, and what was found of it.
+
+    values (q,): on the search's mesh; checked: on a finer one; changes, reasons: in words.
+    """
+
+    place: int
+    number: int
+    unit: Unit
+    observed: Observed
+    values: Array
+    checked: Verified
+    changes: tuple[str, ...]
+    reasons: tuple[str, ...]
+
+
+@attrs.frozen(eq=False)
+class Optimised:
+    """An optimisation's result: the search, its proposals, the outcome in words, and what it cost.
+
+    computed: units simulated by this run; model_a: Model A's, those of earlier runs in the folder included.
+    """
+
+    design: Design
+    search: Found
+    proposals: tuple[Proposal, ...]
+    words: str
+    computed: int
+    model_a: int
+    has_model: bool = False
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the targets."""
+        return [t.name for t in self.design.targets]

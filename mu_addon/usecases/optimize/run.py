@@ -1,0 +1,264 @@
+"""An optimisation in its folder: units computed once, a table kept up to date, what is proposed checked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...design.parameters import Unit, write_unit
+from ...design.printing.printer import load_printer
+from ...errors import InputError, OutputError
+from ...files import write_csv
+from ...optimization.evaluation import Evaluated, Evaluator
+from ...optimization.robustness import Verified, verified
+from ...optimization.search import Found, Observed, Values, search_units
+from ...run.cache import Cache, key
+from ...run.context import RunContext
+from ...run.usecase import UseCase
+from .job import LAYOUT, MODEL, REPORT, TABLE, Job, mechanics_of, read_job
+from .report import write_report
+from .results import Optimised, Proposal
+from .words import changes, outcome, reasons, verdict
+from .worker import several
+
+Array = np.ndarray[Any, Any]
+
+MOST_CHECKED = 6
+"""Units of a front that are simulated again on a finer mesh, its ends and some evenly between."""
+
+
+def optimise(job: Job, folder: Path, context: RunContext) -> Optimised:
+    """Search for a job's units, check what is proposed, and write table, units and report.
+
+    Units computed by an earlier run in the folder are not computed again. Raises InputError, OutputError and
+    MuError where a worker or the scheduler is lost.
+    """
+    design, progress = job.design, context.progress
+    mechanics, left_out = mechanics_of(design, job.model)
+    for words in left_out:
+        progress.warning(f"the model's {words}", MODEL)
+    run = _Run(job, folder, context, mechanics.settings.refine)
+    texts = job.texts()
+    origin = "\n".join(texts.get(name, "") for name in (MODEL,)) + run.asked
+    evaluator = Evaluator(
+        design.targets,
+        design.freedoms,
+        mechanics,
+        Cache(folder / "cache"),
+        origin,
+        several(job, progress.warning),
+    )
+    run.evaluator = evaluator
+    start = Observed(design.start, np.empty(0), np.empty((0, 0)), False)
+    try:
+        with progress.stage("search"):
+            found = search_units(
+                design.freedoms, design.targets, run.observe, design.start, run.settings, run.step
+            )
+    finally:
+        with suppress(OutputError):
+            run.write(())
+    proposals = run.proposals(found, start)
+    result = Optimised(
+        design,
+        found,
+        tuple(proposals),
+        f"{outcome(found, design.targets)} {verdict([p.checked for p in proposals])}".strip(),
+        evaluator.computed,
+        evaluator.model_a,
+        job.model is not None,
+        tuple(left_out),
+    )
+    run.write(tuple(p.number for p in proposals))
+    context.summary |= summary(result)
+    context.report = lambda _: write_report(result, folder / REPORT, progress)
+    return result
+
+
+@attrs.define
+class _Run:
+    """An optimisation under way."""
+
+    job: Job
+    folder: Path
+    context: RunContext
+    refine: float
+    evaluator: Evaluator = attrs.field(init=False)
+    rows: list[tuple[Values, Evaluated | None]] = attrs.field(factory=list)
+
+    @property
+    def settings(self) -> Any:
+        """The search's, with as many designs at a time as there are workers."""
+        search = self.job.design.search
+        batch = max(search.batch, self.job.workers if self.job.scheduler is None else search.batch)
+        return attrs.evolve(search, batch=batch)
+
+    @property
+    def asked(self) -> str:
+        """All that decides a unit's values and slopes besides the unit, as text."""
+        design = self.job.design
+        return repr(
+            (
+                [(t.kind, t.quantity) for t in design.targets],
+                [(f.name, f.low, f.high, tuple(f.also.items())) for f in design.freedoms if not f.discrete],
+                design.settings,
+            )
+        )
+
+    def observe(self, designs: Sequence[Values]) -> list[Observed]:
+        """Designs as the search takes them; one that breaks a rule of units is not computed."""
+        design = self.job.design
+        units: list[Unit | None] = []
+        for values in designs:
+            try:
+                units.append(design.unit_of(values))
+            except InputError:
+                units.append(None)
+        found = iter(self.evaluator.of([u for u in units if u is not None]))
+        observed = []
+        none = len(design.targets), sum(not f.discrete for f in design.freedoms)
+        for values, unit in zip(designs, units, strict=True):
+            result = None if unit is None else next(found)
+            self.rows.append((values, result))
+            if result is None:
+                observed.append(Observed(values, np.full(none[0], np.nan), np.full(none, np.nan), False))
+            else:
+                observed.append(Observed(values, result.values, result.gradient, result.sound))
+        self.write(())
+        return observed
+
+    def step(self, done: int, words: str) -> None:
+        """Say how the search goes."""
+        self.context.progress.update(min(done / self.settings.evaluations, 1.0), f"{done} units, {words}")
+
+    def proposals(self, found: Found, start: Observed) -> list[Proposal]:
+        """What is proposed, simulated on a finer mesh and checked for print, each written as a unit's
+        file."""
+        design, progress = self.job.design, self.context.progress
+        chosen = _spread(found.proposed, MOST_CHECKED)
+        sound = [n for n in chosen if found.observed[n].sound]
+        finer, _ = mechanics_of(design, self.job.model, design.check_refine)
+        printer = load_printer(design.printer) if any(t.kind == "printable" for t in design.targets) else None
+        proposals = []
+        with progress.stage("check of what is proposed"):
+            for place, number in enumerate(sound, 1):
+                observed = found.observed[number]
+                unit = attrs.evolve(design.unit_of(observed.design), name=f"proposed-{place}")
+                result = self.rows[number][1]
+                assert result is not None
+                name = key(
+                    "verified 1", attrs.evolve(unit, name="unit").hash(), self.asked, design.check_refine,
+                    design.print_tolerance_mm, design.modulus_tolerance, design.printer if printer else "",
+                    "" if self.job.model is None else self.job.model.text(),
+                    [(t.value, t.tolerance, t.low, t.high, t.goal) for t in design.targets],
+                )  # fmt: skip
+                checked = self._kept(name)
+                if checked is None:
+                    checked = verified(
+                        unit,
+                        result.values,
+                        design.targets,
+                        finer,
+                        design.print_tolerance_mm,
+                        design.modulus_tolerance,
+                        printer,
+                    )
+                    self._keep(name, checked)
+                write_unit(unit, self.folder / f"proposed-{place}.toml")
+                proposals.append(
+                    Proposal(
+                        place,
+                        number,
+                        unit,
+                        observed,
+                        result.values,
+                        checked,
+                        tuple(changes(design.freedoms, design.start, observed.design)),
+                        tuple(reasons(design.freedoms, design.targets, observed, design.start)),
+                    )
+                )
+                progress.update(place / len(sound))
+        return proposals
+
+    def _keep(self, name: str, found: Verified) -> None:
+        arrays = attrs.asdict(found, recurse=False)
+        arrays["print_findings"] = np.array(found.print_findings, dtype=np.str_)
+        self.evaluator.cache.put("verified", name, arrays) if self.evaluator.cache else None
+
+    def _kept(self, name: str) -> Verified | None:
+        found = None if self.evaluator.cache is None else self.evaluator.cache.get("verified", name)
+        if found is None:
+            return None
+        why, worst = (str(found.pop(k)) for k in ("why", "print_worst"))
+        findings = tuple(map(str, found.pop("print_findings")))
+        return Verified(**found, why=why, print_worst=worst, print_findings=findings)
+
+    def write(self, proposed: Sequence[int]) -> None:
+        """designs.csv: a row for every design, whatever became of it."""
+        design = self.job.design
+        judged = [(i, t) for i, t in enumerate(design.targets) if t.quantity is not None]
+        head = ["design", *(f.name for f in design.freedoms)]
+        head += [f"{t.name} [{t.unit}]" if t.unit else t.name for _, t in judged]
+        head += ["meets_all", "proposed", "what"]
+        rows = []
+        for number, (values, result) in enumerate(self.rows):
+            if result is None:
+                cells, meets, why = [""] * len(judged), "no", "breaks a rule of units"
+            else:
+                cells = ["" if np.isnan(result.values[i]) else f"{result.values[i]:.7g}" for i, _ in judged]
+                good = result.sound and all(t.met(result.values[i]) for i, t in judged)
+                meets, why = "yes" if good else "no", result.why
+            shown = [f"{v:.9g}" if isinstance(v, float) else v for v in values]
+            rows.append([number + 1, *shown, *cells, meets, "yes" if number in proposed else "no", why])
+        write_csv(self.folder / TABLE, head, rows)
+
+
+def _spread(numbers: Sequence[int], most: int) -> list[int]:
+    """At most so many of some numbers in order, the first and the last among them."""
+    if len(numbers) <= most:
+        return list(numbers)
+    return [numbers[i] for i in np.unique(np.linspace(0, len(numbers) - 1, most).round().astype(int))]
+
+
+def summary(found: Optimised) -> dict[str, Any]:
+    """Figures of an optimisation for summary.json."""
+    return {
+        "outcome": found.words,
+        "feasible": found.search.feasible,
+        "in_the_way": list(found.search.in_the_way),
+        "designs": len(found.search.observed),
+        "simulated_now": found.computed,
+        "model_a": found.model_a,
+        "front": len(found.search.proposed),
+        "proposed": [
+            {
+                "file": f"proposed-{p.place}.toml",
+                "robust": p.checked.is_robust,
+                "printable": p.checked.print_worst or "not asked",
+                "values": dict(zip(found.names, map(float, p.checked.values), strict=True)),
+                "standard_error": dict(zip(found.names, map(float, p.checked.error), strict=True)),
+                "changes": list(p.changes),
+            }
+            for p in found.proposals
+        ],
+    }
+
+
+def console_summary(summary: dict[str, Any]) -> list[str]:
+    """What an optimisation came to, in a few lines of text."""
+    if "outcome" not in summary:
+        return []
+    lines = [summary["outcome"], f"{summary['designs']} units computed, {summary['model_a']} Model A's"]
+    for p in summary["proposed"]:
+        values = ", ".join(f"{n} {v:.4g}" for n, v in p["values"].items() if v == v)
+        robust = "robust" if p["robust"] else "not robust"
+        lines.append(f"{p['file']}: {robust}; print check: {p['printable']}; {values}")
+    return lines
+
+
+USE_CASE = UseCase("optimize", LAYOUT, read_job, optimise, console_summary)

@@ -1,0 +1,92 @@
+"""Targets and freedoms as a file has them: what they mean, and what is wrong with them by key and line."""
+
+import pytest
+
+from mu_addon.errors import InputError
+from mu_addon.optimization.design_file import parse_design
+from mu_addon.optimization.freedoms import changed_unit, parameter_of
+
+HEAD = 'format = 1\npreset = "mu-1.0x"\n'
+WALL = '[[freedom]]\nparameter = "chambers.wall_mm"\nlow = 0.6\nhigh = 1.2\n'
+ANGLE = '[[target]]\nkind = "angle"\npressure_kPa = 30\nlow = 20\n'
+
+KIND = '[[freedom]]\nparameter = "lattice.kind"\nvalues = ["octet"]\n'
+SENSOR = '[[target]]\nkind = "deviation"\npressures_kPa = [5]\npath = "x"\nhigh = 1\n'
+
+
+def design(text):
+    return parse_design(text, "design.toml")
+
+
+def test_a_design_has_its_unit_targets_and_freedoms():
+    found = design(
+        HEAD
+        + ANGLE
+        + '[[target]]\nkind = "mass"\nobjective = "minimise"\n'
+        + '[[target]]\nkind = "printable"\n'
+        + WALL
+        + '[[freedom]]\nparameter = "chambers.count"\nlow = 5\nhigh = 7\n'
+        + '[[freedom]]\nparameter = "chambers.neck_diameter_mm"\nfixed = 11.0\n'
+    )
+    assert [t.words for t in found.targets] == ["at least 20 deg", "as small as possible", "yes"]
+    assert [f.name for f in found.freedoms] == ["chambers.wall_mm", "chambers.count"]
+    assert found.freedoms[1].values == (5, 6, 7)
+    assert found.unit.chambers.neck_diameter_mm == 11.0
+    again = parse_design(found.texts()["design.toml"], "again", found.unit)
+    assert again.texts() == found.texts() | {"design.toml": again.texts()["design.toml"]}
+    assert (again.start, again.search, again.unit) == (found.start, found.search, found.unit)
+
+
+def test_a_curve_is_a_target_a_point():
+    found = design(
+        HEAD + '[[target]]\nkind = "angle"\npoints = [[-15, -10], [30, 16]]\ntolerance = 1\n' + WALL
+    )
+    assert [(t.quantity.pressure_kPa, t.value) for t in found.targets] == [(-15.0, -10.0), (30.0, 16.0)]
+
+
+def test_what_follows_a_freedom_changes_with_it():
+    found = design(
+        HEAD
+        + ANGLE
+        + '[[freedom]]\nparameter = "chambers.cell_mm"\nlow = 11\nhigh = 14\n'
+        + 'also = { "chambers.bladder_diameter_mm" = 2.0 }\n'
+    )
+    unit = changed_unit(found.unit, found.freedoms, [13.0])
+    assert parameter_of(unit, "chambers.bladder_diameter_mm") == 26.0
+
+
+@pytest.mark.parametrize(
+    ("text", "what", "where"),
+    [
+        (HEAD + ANGLE.replace("angle", "angel") + WALL, "did you mean 'angle'", "line 4"),
+        (HEAD + ANGLE + WALL.replace("wall_mm", "wal_mm"), "did you mean", "line 8"),
+        (HEAD + ANGLE + WALL.replace("1.2", "0.2"), "not a range", "line 9"),
+        (HEAD + ANGLE.replace("low = 20", "value = 20") + WALL, "no tolerance", "line 3"),
+        (HEAD + ANGLE.replace("low = 20", "low = true") + WALL, "not a number", "line 6"),
+        (HEAD + ANGLE + 'objective = "minimise"\n' + WALL, "must have either", "line 3"),
+        (HEAD + ANGLE.replace("30", "3000") + WALL, "out of bounds", "line 5"),
+        (HEAD + ANGLE + ANGLE + WALL, "two targets are named", "line 7"),
+        (HEAD + ANGLE + WALL + WALL, "listed twice", "line 11"),
+        (HEAD + ANGLE, "no parameter is free", "freedom"),
+        (HEAD + WALL, "no target is given", "target"),
+        (HEAD + 'fidelty = "resolved"\n' + ANGLE + WALL, "did you mean 'fidelity'", "line 3"),
+        (HEAD + ANGLE + KIND, "no value of", "line 9"),
+        (
+            HEAD + ANGLE + '[[freedom]]\nparameter = "lattice.midspan_diameter_mm"\nlow = 1.6\nhigh = 2.4\n',
+            "does not see",
+            "line 7",
+        ),
+        (HEAD + ANGLE.replace("angle", "stretch") + 'region = "struts"\n' + WALL, "has no struts", "line"),
+        (HEAD + '[[target]]\nkind = "stiffness"\nlow = 1\n' + WALL, "not an axis", "direction"),
+        (HEAD + SENSOR + WALL, "path", "path"),
+        (ANGLE + WALL, "format", "format"),
+        ("format = 1\n" + ANGLE + WALL, "no unit is given", "design.toml"),
+        (HEAD + "target = 3\n" + WALL, "list of tables", "target"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_named_by_key_and_line(text, what, where):
+    with pytest.raises(InputError) as error:
+        design(text)
+    assert what in error.value.what
+    assert where in error.value.where
+    assert error.value.remedy

@@ -1,0 +1,188 @@
+"""An optimisation in its folder: its table and report, resumed without computing again, its words, its
+refusals."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from mu_addon.errors import InputError
+from mu_addon.optimization.evaluation import Evaluated, Evaluator
+from mu_addon.optimization.robustness import Verified
+from mu_addon.optimization.search import Found, Observed
+from mu_addon.run.context import RunContext
+from mu_addon.run.progress import Progress
+from mu_addon.usecases.optimize import run as optimize_run
+from mu_addon.usecases.optimize.job import job_from, mechanics_of, read_job
+from mu_addon.usecases.optimize.run import USE_CASE, console_summary
+from mu_addon.usecases.optimize.words import changes, outcome, reasons, verdict
+from mu_addon.usecases.optimize.worker import Task, run_task
+
+TEXT = """
+format = 1
+preset = "mu-1.0x"
+evaluations = 4
+refine = 0.3
+check_refine = 0.35
+
+[[target]]
+kind = "angle"
+pressure_kPa = 10
+low = 5
+tolerance = 0.2
+
+[[target]]
+kind = "mass"
+objective = "minimise"
+
+[[freedom]]
+parameter = "chambers.wall_mm"
+low = 0.7
+high = 1.3
+"""
+
+
+@pytest.fixture
+def job(tmp_path):
+    file = tmp_path / "design.toml"
+    file.write_text(TEXT)
+    return job_from(file)
+
+
+def started(job, folder):
+    context = RunContext(Progress([]))
+    found = USE_CASE.start(job, folder, context)
+    context.unlock()
+    return found, context.summary
+
+
+@pytest.mark.slow
+def test_it_is_resumed_with_the_same_digits_and_nothing_computed_twice(job, tmp_path, monkeypatch):
+    folder = tmp_path / "out"
+    found, summary = started(job, folder)
+    assert found.computed == len(found.search.observed) == summary["designs"]
+    table = (folder / "designs.csv").read_text()
+    page = (folder / "report.html").read_text()
+    assert "Optimisation of" in page
+    assert "wall_mm" in page
+    assert (folder / "proposed-1.toml").is_file()
+    # Each is its own: a thinner wall bends further and is lighter.
+    values = np.array([o.values for o in found.search.observed])
+    walls = np.array([o.design[0] for o in found.search.observed])
+    order = np.argsort(walls)
+    assert (np.diff(values[order, 0]) < 0).all()
+    assert (np.diff(values[order, 1]) > 0).all()
+    proposal = found.proposals[0]
+    assert (proposal.checked.error >= proposal.checked.by_mesh).all()
+    assert proposal.checked.by_print[0] > 0
+    assert any("wall_mm" in words for words in proposal.changes)
+    lines = console_summary(summary)
+    assert str(summary["designs"]) in lines[1]
+
+    monkeypatch.setattr(optimize_run, "verified", None)
+    again, _ = started(read_job(folder), folder)
+    assert again.computed == 0
+    assert (folder / "designs.csv").read_text() == table
+
+    # Killed: half of what was computed is lost, and comes back the same.
+    monkeypatch.undo()
+    kept = sorted((folder / "cache").glob("unit-*.npz"))
+    for path in kept[::2]:
+        path.unlink()
+    third, _ = started(read_job(folder), folder)
+    assert third.computed == len(kept[::2])
+    assert (folder / "designs.csv").read_text() == table
+    shutil.rmtree(folder)
+
+
+@pytest.mark.slow
+def test_a_worker_finds_what_the_run_does(job):
+    files = tuple(sorted(job.texts().items()))
+    from mu_addon.design.parameters import to_toml
+
+    row = run_task(Task(to_toml(job.design.unit), files))
+    evaluator = Evaluator(job.design.targets, job.design.freedoms, mechanics_of(job.design, None)[0])
+    [own] = evaluator.of([job.design.unit])
+    assert row["status"] == "done"
+    assert row["values"] == own.plain()["values"]
+    assert json.loads(json.dumps(row))["gradient"] == own.plain()["gradient"]
+
+
+def test_its_folder_holds_all_that_a_run_needs(job, tmp_path):
+    for name, text in job.texts().items():
+        (tmp_path / name).write_text(text)
+    again = read_job(tmp_path)
+    assert again.texts() == job.texts()
+    assert again.design.start == job.design.start
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(InputError, match="cannot read the design"):
+        job_from(tmp_path / "none.toml")
+    (tmp_path / "bad.toml").write_bytes(b"\xff\xfe")
+    with pytest.raises(InputError, match="UTF-8"):
+        job_from(tmp_path / "bad.toml")
+
+
+def test_a_design_that_breaks_a_rule_is_a_row_and_not_the_end(job, tmp_path):
+    context = RunContext(Progress([]), folder=tmp_path)
+    run = optimize_run._Run(job, tmp_path, context, 0.3)
+    run.evaluator = Evaluator(job.design.targets, job.design.freedoms, mechanics_of(job.design, None)[0])
+    [observed] = run.observe([(50.0,)])
+    assert not observed.sound
+    assert "breaks a rule of units" in (tmp_path / "designs.csv").read_text()
+
+
+def test_a_unit_that_does_not_bear_its_pressure_is_an_answer(job):
+    design = job_from_text(TEXT.replace("pressure_kPa = 10", "pressure_kPa = -400"))
+    [found] = Evaluator(design.targets, design.freedoms, mechanics_of(design, None)[0]).of([design.unit])
+    assert not found.sound
+    assert "no equilibrium" in found.why
+    assert np.isnan(found.values).all()
+
+
+def job_from_text(text):
+    from mu_addon.optimization.design_file import parse_design
+
+    return parse_design(text, "design.toml")
+
+
+def test_words_say_what_changed_and_what_moved_it(job):
+    d = job.design
+    observed = Observed((0.7,), np.array([6.0, 18.0]), np.array([[-10.0], [5.0]]))
+    assert changes(d.freedoms, (0.9,), (0.7,)) == ["chambers.wall_mm: 0.9 to 0.7 mm (its lower bound)"]
+    assert reasons(d.freedoms, d.targets, observed, (0.9,)) == [
+        "angle at 10 kPa: chambers.wall_mm by +2 deg",
+        "mass: chambers.wall_mm by -1 g",
+    ]
+    missed = Found(
+        (Observed((0.7,), np.array([4.0, 18.0]), np.zeros((2, 1))),), (0,), False, ("angle at 10 kPa",)
+    )
+    words = outcome(missed, d.targets)
+    assert "angle at 10 kPa is 4 instead of at least 5 deg" in words
+    assert "Without angle at 10 kPa the others can be met" in words
+    failed = Found((Observed((0.7,), np.full(2, np.nan), np.zeros((2, 1)), False),), (0,), False)
+    assert "could be simulated" in outcome(failed, d.targets)
+
+
+def test_what_the_print_check_refuses_is_in_the_outcome():
+    yes, zero = np.ones(2, bool), np.zeros(2)
+    good = Verified(zero, zero, zero, zero, yes, yes)
+    refused = Verified(zero, zero, zero, zero, np.array([True, False]), np.array([True, False]), "", "error")
+    assert verdict([]) == ""
+    assert verdict([good]) == "Of 1 proposed, 1 meet all of it on a finer mesh, 1 robustly."
+    words = verdict([good, refused])
+    assert words.startswith("Of 2 proposed, 1 meet all")
+    assert words.endswith("refuses 1.")
+
+
+def test_what_was_kept_of_a_unit_is_what_was_found(job):
+    from mu_addon.optimization.evaluation import restored
+
+    unit = job.design.unit
+    found = Evaluated(unit, np.array([1.5, np.nan]), np.array([[2.0], [np.nan]]), "", 3)
+    again = restored(unit, json.loads(json.dumps(found.plain())))
+    np.testing.assert_array_equal(again.values, found.values)
+    np.testing.assert_array_equal(again.gradient, found.gradient)
+    assert (again.why, again.model_a) == ("", 3)
