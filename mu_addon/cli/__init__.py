@@ -25,6 +25,7 @@ NAMES = (
     "reproduce",
     "homogenize",
     "grip",
+    "chain",
     "fit_material",
     "import_",
     "track",
