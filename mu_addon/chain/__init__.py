@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from .chain import ChainState as ChainState
     from .chain import Link as Link
     from .chain import Loads as Loads
-    from .full_model import FullModel as FullModel
-    from .full_model import full_model as full_model
     from .inverse import Reach as Reach
     from .inverse import reach_point as reach_point
+    from .joined import FullModel as FullModel
+    from .joined import full_model as full_model
     from .joint import Joint as Joint
     from .learning import Learned as Learned
     from .learning import Sampling as Sampling
@@ -31,7 +31,7 @@ else:
         __name__,
         {
             "chain": "Chain ChainState Link Loads",
-            "full_model": "FullModel full_model",
+            "joined": "FullModel full_model",
             "inverse": "Reach reach_point",
             "joint": "Joint",
             "learning": "Learned Sampling learn",

@@ -16,7 +16,7 @@ DOWN = np.array([0.0, 0.0, 1.0])
 
 
 def elastica(load):
-    """Tip (across, along) of a cantilever of length and stiffness 1 under a dead load across it, by shooting."""
+    """Tip (across, along) of a cantilever of length and stiffness 1 under a load across it, by shooting."""
 
     def over(moment):
         def rates(_, y):
@@ -29,8 +29,7 @@ def elastica(load):
 
 
 def test_small_loads_bend_a_chain_as_a_cantilever():
-    # A beam of constant strain under an end load has half its moments' linear share: exact for n equal pieces is
-    # P L^3/3 EI (1 - 1/4 n^2), by the sum of (L/n)(s_i)^2 with s_i at the middles of the pieces.
+    # Links of constant curvature see the moment at their middles: P L^3/3 EI (1 - 1/4 n^2)
     length, bending, force = 100.0, 1e3, 1e-4
     for n in (1, 2, 5):
         chain = Chain([Link(beam(length / n, bending))] * n, Loads(tip_force_N=np.array([0.0, force, 0.0])))

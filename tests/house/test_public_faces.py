@@ -22,7 +22,7 @@ PACKAGES = (
     "placement",
     "report",
 )
-PACKAGES += ("resolved", "sensing")
+PACKAGES += ("chain", "resolved", "sensing")
 HEAVY = ("bpy", "gmsh", "matplotlib", "meshio", "scipy", "trimesh", "warp")
 FOLDER = Path(mu_addon.__file__).parent
 

@@ -110,13 +110,14 @@ def full_model(
     def add_plate(z: float, side: float) -> Array:
         """Corner nodes (4,) of a stiff element on the plane at z."""
         corners = np.array([[-side, -side, z], [side, -side, z], [0.0, side, z], [0.0, 0.0, z + side]])
-        middles = corners[TET_EDGES].mean(axis=1)
         start = first
-        ties.append((start + 4 + np.arange(6), start + TET_EDGES, np.full((6, 2), 0.5)))
+        middles = corners[TET_EDGES].mean(axis=1) if meshes[0].order == 2 else np.zeros((0, 3))
+        if len(middles):
+            ties.append((start + 4 + np.arange(6), start + TET_EDGES, np.full((6, 2), 0.5)))
         stiff = NeoHooke.parameters(np.array([PLATE_MPA]), np.array([0.3]))
         layers.append(Layer(NeoHooke, np.array([element]), stiff))
         density.append(np.zeros(1))
-        add(np.vstack([corners, middles]), np.arange(10)[None], np.array([LATTICE]))
+        add(np.vstack([corners, middles]), np.arange(4 + len(middles))[None], np.array([LATTICE]))
         plates.append((start + np.arange(4), z))
         return start + np.arange(4)
 
