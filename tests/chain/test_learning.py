@@ -67,7 +67,7 @@ def test_a_free_tip_on_a_plate_bends_about_as_the_unit_does(unit, mesh, learned)
     equilibrium = Equilibrium(Model(half, threads=1), materials_of(unit, half))
     state = equilibrium.reach(0.02, [rest(half)])
     angle = bending_angle_deg(half, state.u)
-    # Positive toward +y, a negative rotation about x. A plate that keeps the tip plane can only stiffen: 7.5 %
+    # Positive toward +y, a negative rotation about x. A plate on the tip can only stiffen it: by 7.5 %
     # of this mesh.
     assert 0.9 * angle < -np.degrees(learned.joint.at(20.0).eta0[0]) < angle
 
