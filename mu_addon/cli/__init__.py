@@ -26,6 +26,7 @@ NAMES = (
     "reproduce",
     "homogenize",
     "grip",
+    "chain",
     "fit_material",
     "import_",
     "track",

@@ -371,13 +371,21 @@ class Model:
         self._launch_layers("energy", m, [self._energy, self._smallest_J])
         if self._smallest_J.numpy().min() <= 0:
             return float("inf")
-        work = pressure * self._volume()
+        work = self._pressure_work(pressure)
         if self.load is not None:
             work += np.einsum("ij,ij->", self.load, u)
         work -= sum(obstacle.energy_mJ(u) for obstacle in self.obstacles)
         if self.self_contact is not None:
             work -= self.self_contact.energy_mJ(u)
         return float(self._energy.numpy().sum() - work)
+
+    def _pressures(self, pressure: float) -> list[tuple[float, int, wp.array]]:
+        """What acts on each run of the cavity's faces: pressure in MPa, first face, faces (f, 3 | 6)."""
+        return [(pressure, 0, self._faces)] if len(self.mesh.cavity) else []
+
+    def _pressure_work(self, pressure: float) -> float:
+        """Pressure in MPa times the volume that it fills, in mJ; the volume is that at `_place`."""
+        return pressure * self._volume()
 
     def _volume(self) -> float:
         if len(self.mesh.cavity) == 0:
@@ -405,9 +413,9 @@ class Model:
         self._place(u)
         self._least_force = m.least_force_N
         self._launch_layers("force", m, [self._mean_slope, self._element_force])
-        if len(self.mesh.cavity):
-            inputs = [pressure, self._x, self._faces, *self._face_rule, 0, self._face_force]
-            wp.launch(kernels.pressure_force, len(self.mesh.cavity), inputs, device=self.device)
+        for part_MPa, first, faces in self._pressures(pressure):
+            inputs = [part_MPa, self._x, faces, *self._face_rule, first, self._face_force]
+            wp.launch(kernels.pressure_force, len(faces), inputs, device=self.device)
         inputs = [self._parts, *self._node_lists, self._residual]
         wp.launch(kernels.gather_vectors, len(self.mesh.nodes), inputs, device=self.device)
         residual: Array = self._residual.numpy().copy()
@@ -436,10 +444,11 @@ class Model:
         """
         self._place(u)
         self._launch_layers("stiffness", m, [self._mean_slope, self._block_parts])
-        if len(self.mesh.cavity):
-            inputs = [pressure, self._x, self._faces, *self._face_rule]
-            inputs += [self._element_blocks, self._block_parts]
-            wp.launch(kernels.pressure_stiffness, len(self.mesh.cavity), inputs, device=self.device)
+        per_face = self.mesh.cavity.shape[1] * (self.mesh.cavity.shape[1] + 1) // 2
+        for part_MPa, first, faces in self._pressures(pressure):
+            inputs = [part_MPa, self._x, faces, *self._face_rule]
+            inputs += [self._element_blocks + first * per_face, self._block_parts]
+            wp.launch(kernels.pressure_stiffness, len(faces), inputs, device=self.device)
         values = self._gathered(u)
         if self.self_contact is None and self.pattern is self._own_pattern:
             return values

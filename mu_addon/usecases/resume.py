@@ -22,6 +22,7 @@ MODULES = {
     "specimens.toml": ".export.specimens",
     "homogenize.toml": ".homogenize.run",
     "grip.toml": ".grip.run",
+    "chain.toml": ".chain.run",
     "diagnose.toml": ".diagnose.run",
     "protocols.toml": ".diagnose.design_experiments",
     "fit.toml": ".fit_material.run",

@@ -7,6 +7,7 @@ import pkgutil
 import pytest
 
 PACKAGES = (
+    "chain",
     "design",
     "evidence",
     "fem",

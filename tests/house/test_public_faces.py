@@ -23,6 +23,7 @@ PACKAGES = (
     "report",
 )
 PACKAGES += ("optimization", "resolved", "sensing")
+PACKAGES += ("chain", "resolved", "sensing")
 HEAVY = ("bpy", "gmsh", "matplotlib", "meshio", "scipy", "trimesh", "warp")
 FOLDER = Path(mu_addon.__file__).parent
 

@@ -1,0 +1,205 @@
+"""Two units as one body of finite elements, to check what a chain of their joints says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from ..design.strut_cell import relative_density, strut_cell
+from ..errors import InputError
+from ..fem.cavities import CavitiesModel
+from ..fem.embedding import embed
+from ..fem.equilibrium import Equilibrium
+from ..fem.laws import NeoHooke
+from ..fem.loads import gravity
+from ..fem.materials import Layer, Materials
+from ..fem.state import State
+from ..fem.unit import materials_of
+from ..meshing.mesh import LATTICE, TET_EDGES, Mesh
+from .body import frame, tip_nodes
+from .chain import GRAVITY_N_PER_G, Loads
+from .rigid_motion import motion
+
+if TYPE_CHECKING:
+    from ..design.parameters import Unit
+
+Array = np.ndarray[Any, Any]
+
+PLATE_MPA = 1e3
+"""Young's modulus of a plate's one element: ten thousand times the lattice's."""
+# Half the side of a plate's element over the unit's height.
+_PLATE_SHARE = 0.3
+
+
+@attrs.frozen(eq=False)
+class FullModel:
+    """A body of units one on the other, each with a pressure of its own, and rigid plates as stiff elements.
+
+    mesh: one body; plate (4,): the corner nodes of the plate at the tip, height_mm: of its middle at rest.
+    model, equilibrium: its finite elements.
+    """
+
+    mesh: Mesh
+    model: CavitiesModel
+    equilibrium: Equilibrium
+    plate: Array
+    height_mm: float
+
+    def tip(self, u: Array) -> Array:
+        """Frame (4, 4) of the tip's plate under displacements u (n, 3) in mm; at rest it is on the axis."""
+        before = self.mesh.nodes[self.plate]
+        after = before + u[self.plate]
+        weights = _weights(before, np.array([[0.0, 0.0, self.height_mm]]))[0]
+        gradient = (after[1:] - after[0]).T @ np.linalg.inv((before[1:] - before[0]).T)
+        left, _, right = np.linalg.svd(gradient)
+        return motion(left @ right, weights @ after)
+
+    def states(self, pressures_kPa: Sequence[Sequence[float]]) -> list[State]:
+        """Equilibria at rows of pressures in kPa, each from the loaded body. Raises ConvergenceError."""
+        found = []
+        self.model.shares = np.ones(len(self.model.shares))
+        start = self.equilibrium.at_zero_pressure()
+        for row in pressures_kPa:
+            p = np.asarray(row, float) / 1e3
+            largest = float(np.abs(p).max())
+            if largest == 0.0:
+                found.append(start)
+                continue
+            self.model.shares = p / largest
+            found.append(self.equilibrium.reach(largest, [start]))
+        return found
+
+
+def full_model(
+    units: Sequence[Unit],
+    meshes: Sequence[Mesh],
+    turns_deg: Sequence[float],
+    loads: Loads,
+    density_g_per_ml: float,
+    plate_between: bool = False,
+    threads: int = 1,
+) -> FullModel:
+    """Units on their whole meshes as one body, the base clamped, the tip's plane on a rigid plate.
+
+    turns_deg: of each about the axis. plate_between: whether the planes between units are on rigid plates,
+    too, as joints have them; otherwise the nodes of a base are tied to the elements of the tip below, as
+    printed in one piece. Raises InputError for a load that is not dead: a couple.
+    """
+    if np.any(loads.tip_couple_N_mm):
+        raise InputError("a full model takes no couple at its tip", "tip couple", "give a force or a mass")
+    nodes: list[Array] = []
+    tets: list[Array] = []
+    ties: list[tuple[Array, Array, Array]] = []
+    layers: list[Layer] = []
+    density: list[Array] = []
+    plates: list[tuple[Array, float]] = []
+    counts, cavities, region = [], [], []
+    first, element, height = 0, 0, 0.0
+
+    def add(x: Array, t: Array, kind: Array) -> None:
+        nonlocal first, element
+        nodes.append(x)
+        tets.append(t + first)
+        region.append(kind)
+        first += len(x)
+        element += len(t)
+
+    def add_plate(z: float, side: float) -> Array:
+        """Corner nodes (4,) of a stiff element on the plane at z."""
+        corners = np.array([[-side, -side, z], [side, -side, z], [0.0, side, z], [0.0, 0.0, z + side]])
+        start = first
+        middles = corners[TET_EDGES].mean(axis=1) if meshes[0].order == 2 else np.zeros((0, 3))
+        if len(middles):
+            ties.append((start + 4 + np.arange(6), start + TET_EDGES, np.full((6, 2), 0.5)))
+        stiff = NeoHooke.parameters(np.array([PLATE_MPA]), np.array([0.3]))
+        layers.append(Layer(NeoHooke, np.array([element]), stiff))
+        density.append(np.zeros(1))
+        add(np.vstack([corners, middles]), np.arange(4 + len(middles))[None], np.array([LATTICE]))
+        plates.append((start + np.arange(4), z))
+        return start + np.arange(4)
+
+    def tie_to_plate(rows: Array, points: Array, corners: Array) -> None:
+        at = np.concatenate(nodes)[corners]
+        ties.append((rows, np.tile(corners, (len(rows), 1)), _weights(at, points)))
+
+    base: Array | None = None
+    below: tuple[Mesh, int, Array, float] | None = None
+    for unit, mesh, turn in zip(units, meshes, turns_deg, strict=True):
+        if len(mesh.tied) or mesh.symmetry:
+            raise InputError(
+                "a full model is made of whole homogenised meshes", "mesh", 'give fraction "full"'
+            )
+        turned = frame(turn)[:3, :3]
+        x = mesh.nodes @ turned.T + [0.0, 0.0, height]
+        start = first
+        for layer in materials_of(unit, mesh).layers:
+            layers.append(attrs.evolve(layer, elements=layer.elements + element))
+        hollow = np.where(mesh.region == LATTICE, relative_density(strut_cell(unit)), 1.0)
+        density.append(density_g_per_ml * 1e-9 * hollow)
+        cavities.append(mesh.cavity + start)
+        counts.append(len(mesh.cavity))
+        add(x, mesh.tets, mesh.region)
+        if below is None:
+            base = mesh.base + start
+        elif plate_between:
+            lower, lower_start, _, _ = below
+            corners = add_plate(height, _PLATE_SHARE * float(np.ptp(mesh.nodes[:, 2])))
+            whole = np.concatenate(nodes)
+            for rows in (tip_nodes(lower) + lower_start, mesh.base + start):
+                tie_to_plate(rows, whole[rows], corners)
+        else:
+            lower, lower_start, turn_below, z = below
+            local = (x[mesh.base] - [0.0, 0.0, z]) @ turn_below
+            follows = embed(lower, local)
+            ties.append((mesh.base + start, follows.nodes + lower_start, follows.weights))
+        below = (mesh, start, turned, height)
+        height += float(mesh.nodes[mesh.tip[0], 2])
+    assert below is not None
+    assert base is not None
+    last, last_start, _, _ = below
+    corners = add_plate(height, _PLATE_SHARE * float(np.ptp(last.nodes[:, 2])))
+    rows = tip_nodes(last) + last_start
+    tie_to_plate(rows, np.concatenate(nodes)[rows], corners)
+
+    width = max(to.shape[1] for _, to, _ in ties)
+    padded = [
+        (
+            rows_,
+            np.pad(to, ((0, 0), (0, width - to.shape[1])), "edge"),
+            np.pad(w, ((0, 0), (0, width - w.shape[1]))),
+        )
+        for rows_, to, w in ties
+    ]
+    joined = Mesh(
+        np.concatenate(nodes),
+        np.concatenate(tets),
+        np.concatenate(region),
+        np.concatenate(cavities),
+        base,
+        rows,
+        (),
+        tied=np.concatenate([rows_ for rows_, _, _ in padded]),
+        tied_to=np.concatenate([to for _, to, _ in padded]),
+        tied_weights=np.concatenate([w for _, _, w in padded]),
+    )
+    model = CavitiesModel(joined, counts, threads=threads)
+    pull = np.asarray(loads.tip_force_N, float)
+    pull = pull + loads.tip_mass_g * GRAVITY_N_PER_G * np.asarray(loads.down, float)
+    load = np.zeros_like(joined.nodes)
+    load[corners] += _weights(joined.nodes[corners], np.array([[0.0, 0.0, height]]))[0][:, None] * pull
+    if np.any(loads.down):
+        length = float(np.linalg.norm(loads.down))
+        load += length * gravity(joined, np.concatenate(density), np.asarray(loads.down, float))
+    model.load = load if load.any() else None
+    equilibrium = Equilibrium(model, Materials(tuple(layers)), explains=False)
+    return FullModel(joined, model, equilibrium, corners, height)
+
+
+def _weights(corners: Array, points: Array) -> Array:
+    """Weights (k, 4) by which points (k, 3) follow the four corners (4, 3) of an element affinely."""
+    edges = (corners[1:] - corners[0]).T
+    local = np.linalg.solve(edges, (points - corners[0]).T).T
+    return np.column_stack([1.0 - local.sum(axis=1), local])

@@ -1,0 +1,1 @@
+"""Units in series: their joints, their motion under pressures or to a point, a report."""

@@ -1,0 +1,46 @@
+"""`chain`: units in series, their motion under their pressures, or the pressures that reach a point."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ...run.context import RunContext
+from ...run.usecase import UseCase
+from .job import LAYOUT, Job, read_job
+from .report import write_report
+from .running import Running
+
+
+def run_chain(job: Job, folder: Path, context: RunContext) -> Running:
+    """Learn the units' joints, solve the chain, write its motion, and report as far as it came."""
+    run = Running(job, folder, context)
+    context.report = lambda stopped: write_report(run, stopped)
+    run.run()
+    return run
+
+
+def console_summary(summary: dict[str, Any]) -> list[str]:
+    """What a run found, in a few lines of text, of its `summary`."""
+    lines = []
+    for joint in summary["joints"]:
+        lines.append(
+            f"{joint['unit']}: {joint['mass_g']:.1f} g, held-out error {joint['error_deg']:.2f} deg and "
+            f"{joint['error_mm']:.2f} mm"
+        )
+    lines = list(dict.fromkeys(lines))
+    found = summary["chain"]
+    x, y, z = found["tip_mm"]
+    rest = ", ".join(f"{v:.1f}" for v in found["tip_at_rest_mm"])
+    lines.append(
+        f"tip of {found['units']} units at ({x:.1f}, {y:.1f}, {z:.1f}) mm, "
+        f"{found['angle_deg']:.1f} deg; at rest ({rest}) mm"
+    )
+    if "target" in summary:
+        target = summary["target"]
+        pressures = ", ".join(f"{p:.4g}" for p in target["pressures_kPa"])
+        lines.append(f"target missed by {target['miss_mm']:.3g} mm, at {pressures} kPa")
+    return lines
+
+
+USE_CASE = UseCase("chain", LAYOUT, read_job, run_chain, console_summary)

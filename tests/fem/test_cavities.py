@@ -1,0 +1,65 @@
+"""Several cavities in one body, each under its own pressure: forces are slopes of the potential."""
+
+import attrs
+import numpy as np
+import pytest
+
+from mu_addon.design.parameters import load_preset
+from mu_addon.errors import InputError
+from mu_addon.fem import Materials, Model
+from mu_addon.fem.cavities import CavitiesModel
+from mu_addon.meshing.mesh import Mesh
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.unit import mesh_unit
+
+
+@pytest.fixture(scope="module")
+def unit_mesh():
+    return mesh_unit(load_preset("mu-1.0x"), MeshSettings(order=1, refine=0.3, fraction="full"))
+
+
+def beside(mesh: Mesh) -> Mesh:
+    """Two of one mesh side by side, not joined."""
+    n = len(mesh.nodes)
+    return attrs.evolve(
+        mesh,
+        nodes=np.vstack([mesh.nodes, mesh.nodes + np.array([100.0, 0.0, 0.0])]),
+        tets=np.vstack([mesh.tets, mesh.tets + n]),
+        region=np.tile(mesh.region, 2),
+        cavity=np.vstack([mesh.cavity, mesh.cavity + n]),
+        base=np.concatenate([mesh.base, mesh.base + n]),
+        tip=np.concatenate([mesh.tip, mesh.tip + n]),
+    )
+
+
+def materials(mesh):
+    count = len(mesh.tets)
+    return Materials.neo_hooke(np.full(count, 0.1), np.full(count, 0.3))
+
+
+def test_each_of_two_bodies_feels_its_own_share_alone(unit_mesh):
+    one, two = (
+        Model(unit_mesh, threads=1),
+        CavitiesModel(beside(unit_mesh), [len(unit_mesh.cavity)] * 2, threads=1),
+    )
+    two.shares = np.array([0.3, -0.5])
+    single, both = one.parameters(materials(unit_mesh)), two.parameters(materials(two.mesh))
+    u = 0.05 * np.random.default_rng(1).normal(size=unit_mesh.nodes.shape)
+    whole = np.vstack([u, u])
+    n = len(u)
+    found = two.residual(whole, 0.02, both)
+    np.testing.assert_allclose(found[:n], one.residual(u, 0.006, single), atol=1e-12)
+    np.testing.assert_allclose(found[n:], one.residual(u, -0.01, single), atol=1e-12)
+    energies = [one.potential(u, p, single) for p in (0.006, -0.01)]
+    assert two.potential(whole, 0.02, both) == pytest.approx(sum(energies), rel=1e-12)
+    np.testing.assert_allclose(two.cavity_volumes(whole), one.cavity_volume(u), rtol=1e-9)
+    # Numbered body by body, the tangent is both bodies' own.
+    tangent = two.matrix(two.tangent(whole, 0.02, both)).toarray()
+    for rows, p in ((two.free < 3 * n, 0.006), (two.free >= 3 * n, -0.01)):
+        own = one.matrix(one.tangent(u, p, single)).toarray()
+        np.testing.assert_allclose(tangent[np.ix_(rows, rows)], own, atol=1e-12)
+
+
+def test_cavities_that_do_not_cover_the_faces_are_refused(unit_mesh):
+    with pytest.raises(InputError, match="in a mesh with"):
+        CavitiesModel(unit_mesh, [3, 4])
