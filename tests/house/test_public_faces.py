@@ -22,8 +22,7 @@ PACKAGES = (
     "placement",
     "report",
 )
-PACKAGES += ("optimization", "resolved", "sensing")
-PACKAGES += ("chain", "resolved", "sensing")
+PACKAGES += ("chain", "optimization", "resolved", "sensing")
 HEAVY = ("bpy", "gmsh", "matplotlib", "meshio", "scipy", "trimesh", "warp")
 FOLDER = Path(mu_addon.__file__).parent
 
