@@ -106,7 +106,7 @@ def test_weight_is_found_by_turning_the_unit_and_not_where_there_is_none(density
     assert verdict.names == names
     if names:
         low, high = verdict.intervals["gravity.density_kg_m3"]
-        # Of nine such sets in ten thousand the truth lies half an interval beyond its ends.
+        # Half an interval beyond its ends lies the truth of one such set in ten thousand.
         assert abs(0.5 * (low + high) - density) < high - low
 
 
