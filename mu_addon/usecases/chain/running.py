@@ -16,10 +16,10 @@ from ...chain.inverse import Reach, reach_point
 from ...chain.learning import Learned, learn
 from ...design.parameters import Unit
 from ...errors import ConvergenceError
-from ...evidence.unit_effects import down
 from ...fem.state import State
 from ...files import write_csv
 from ...materials.library import load_material
+from ...measured.pose import down
 from ...meshing.mesh import Mesh
 from ...meshing.unit import MeshingWarning
 from ...report.vtk import write_trajectory
