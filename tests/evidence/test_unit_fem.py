@@ -156,7 +156,8 @@ def test_what_was_run_is_found_again(responses, cache, monkeypatch):
         with pytest.raises(AssertionError, match="ran again"):
             unit_responses(UNIT, [bench(orientation_deg=45.0)], QUICK, cache)
     # A damaged entry is missing: one run is done again, with the same result.
-    base = Run(Body(UNIT, ROUGH, FINER), tuple(responses[0].pressures_kPa), tuple(MARKERS.values()))
+    at = tuple(responses[0].pressures_kPa)
+    base = Run(Body(UNIT, ROUGH, FINER), at, tuple(MARKERS.values()), outline=True)
     path = cache / f"unit-{base.key()}.npz"
     path.write_bytes(path.read_bytes()[:-40])
     one = unit_responses(UNIT, [bench()], QUICK, cache, lambda stage, share: reports.append((stage, share)))
@@ -315,7 +316,7 @@ def test_without_x_a_marker_lies_in_the_sagittal_plane(mesh):
 
 def markers_of(experiment):
     """Where the markers of an experiment at 1.0x sit on the unit."""
-    return _Plan.of(UNIT, [experiment], 1.0, UnitSettings(), None).markers
+    return _Plan.of(UNIT, [experiment], 1.0, None, UnitSettings(), None).markers
 
 
 def test_a_marker_off_the_unit_is_named():
