@@ -62,7 +62,9 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     angles = summary.get("angle_deg")
     if isinstance(angles, dict):
         ends = sorted((float(p), a) for p, a in angles.items())
-        lines.append("angle: " + ", ".join(f"{a:+.1f} deg at {p:g} kPa" for p, a in (ends[0], ends[-1])))
+        # Without a sign on what rounds to nothing.
+        ends = [(p, round(a, 1) + 0.0) for p, a in (ends[0], ends[-1])]
+        lines.append("angle: " + ", ".join(f"{a:+.1f} deg at {p:g} kPa" for p, a in ends))
     chosen = summary.get("chosen")
     if isinstance(chosen, dict):
         J, tied = summary["J_hat_mm"], summary["tied_with_chosen"]
