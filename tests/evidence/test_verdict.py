@@ -80,7 +80,7 @@ def test_the_file_says_what_the_design_asks(lagging):
     }
     assert written["partly_explained_by"] == []
     cause = written["causes"][0]
-    assert set(cause) == {"effect", "mechanism", "parameters", "p_value", "rivals", "share", "of"}
+    assert set(cause) == {"effect", "mechanism", "parameters", "p_value", "rivals", "share", "of", "among"}
     assert 0.9 < cause["share"] <= 1.0
     assert set(written["remaining_structure"]) == {"detected", "where", "size", "unit"}
     assert set(cause["parameters"]["share"]) == {"value", "low95", "high95"}
