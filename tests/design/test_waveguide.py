@@ -128,8 +128,9 @@ def test_wells_and_pockets_are_clear_of_struts(number):
     bar = bent("mu-1.5x", number)
     lattice = lattice_of(load_preset("mu-1.5x").dimensions)
     t = np.linspace(0, 1, 201)
-    ends = lattice.nodes[lattice.struts[~bar.replaced]]
-    radii = strut_radii(lattice, bar.met[~bar.replaced], bar.half, t)
+    kept = ~bar.replaced
+    ends = lattice.nodes[lattice.struts[kept]]
+    radii = strut_radii(lattice, bar.met[kept], bar.half, t, kept)
     for cut in bar.cuts:
         for (start, end), radius in zip(ends, radii, strict=True):
             if np.linalg.norm((start + end) / 2 - cut.centre) > 14:

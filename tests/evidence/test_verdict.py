@@ -237,7 +237,7 @@ def test_moduli_that_agree_are_called_none():
 def test_every_effect_of_the_design_is_in_the_library():
     page = Path(__file__).parents[2] / "mu_addon" / "evidence"
     assert page.is_dir()
-    assert len(LIBRARY) == 34
+    assert len(LIBRARY) == 35
 
 
 def test_an_effect_of_other_parameters_elsewhere_is_another_of_its_name():

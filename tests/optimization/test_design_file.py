@@ -1,5 +1,7 @@
 """Targets and freedoms as a file has them: what they mean, and what is wrong with them by key and line."""
 
+from pathlib import Path
+
 import pytest
 
 from mu_addon.errors import InputError
@@ -35,6 +37,14 @@ def test_a_design_has_its_unit_targets_and_freedoms():
     again = parse_design(found.texts()["design.toml"], "again", found.unit)
     assert again.texts() == found.texts() | {"design.toml": again.texts()["design.toml"]}
     assert (again.start, again.search, again.unit) == (found.start, found.search, found.unit)
+
+
+@pytest.mark.parametrize("folder", ["stronger-finger", "graded-finger"])
+def test_the_examples_are_read(folder):
+    path = Path(__file__).parents[2] / "assets/examples" / folder / "design.toml"
+    found = design(path.read_text())
+    assert {"angle", "mass", "printable"} <= {t.kind for t in found.targets}
+    assert len(found.freedoms) >= 2
 
 
 def test_a_curve_is_a_target_a_point():
