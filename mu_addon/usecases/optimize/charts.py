@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...design.lattice import lattice_of
 from ...design.parameters import Unit
 from ...design.profile import cavity_polygon, outer_polygon
 from ...report.charts import BY_LENGTH, CHOSEN, INK, QUIET, canvas
@@ -15,6 +16,8 @@ from .results import Optimised
 Array = np.ndarray[Any, Any]
 
 ALONG = 6
+STATIONS = np.linspace(0.0, 1.0, 7)
+"""Places along a strut at which its outline is drawn."""
 
 
 def front(found: Optimised, first: int, second: int) -> str:
@@ -67,7 +70,9 @@ def course(found: Optimised) -> str:
 
 
 def thumbnail(unit: Unit, widest_mm: float, tallest_mm: float) -> str:
-    """SVG of a unit cut along its sagittal plane, at one scale for all units: wall, chambers, envelope.
+    """SVG of a unit cut along its sagittal plane, at one scale for all units: wall, chambers, struts, envelope.
+
+    Struts are those of the half cell on one side of the plane, at their own thickness.
 
     widest_mm, tallest_mm: size of the largest unit to be shown beside it.
     """
@@ -75,7 +80,9 @@ def thumbnail(unit: Unit, widest_mm: float, tallest_mm: float) -> str:
     with canvas(1.15, 1.15 * tallest_mm / widest_mm) as (drawn, svg):
         axes = drawn.add_axes((0.0, 0.0, 1.0, 1.0))
         (_, _), (y0, y1), (z0, z1) = d.bounds
-        axes.fill([y0, y1, y1, y0], [z0, z0, z1, z1], color="#dfe6ee", linewidth=0)
+        (envelope,) = axes.fill([y0, y1, y1, y0], [z0, z0, z1, z1], color="#dfe6ee", linewidth=0)
+        for strut in axes.fill(*_strut_outlines(unit), color="#8a97a8", linewidth=0):
+            strut.set_clip_path(envelope)
         for polygon, color in ((outer_polygon(d, ALONG), "#c98a3a"), (cavity_polygon(d, ALONG), "#ffffff")):
             for sign in (1, -1):
                 axes.fill(sign * polygon[:, 0], polygon[:, 1], color=color, linewidth=0)
@@ -85,6 +92,24 @@ def thumbnail(unit: Unit, widest_mm: float, tallest_mm: float) -> str:
         axes.set_aspect("equal")
         axes.axis("off")
     return svg()
+
+
+def _strut_outlines(unit: Unit) -> list[Array]:
+    """Outlines of the struts beside the sagittal plane: y and z in mm of each in turn."""
+    d = unit.dimensions
+    lattice = lattice_of(d)
+    x = lattice.nodes[lattice.struts][..., 0]
+    rows = np.flatnonzero((x.min(axis=1) > -1e-6) & (x.max(axis=1) < 0.51 * d.cell))
+    first, last = (lattice.nodes[lattice.struts[rows, end]][:, None, 1:] for end in (0, 1))
+    along = last - first
+    length = np.linalg.norm(along, axis=2, keepdims=True)
+    # A strut that is seen end on has no direction in the picture, and is hidden by others.
+    shown = length[:, 0, 0] > 0
+    aside = (along / np.where(length > 0, length, 1.0))[..., ::-1] * (1.0, -1.0)
+    middle = first + STATIONS[:, None] * along
+    wide = lattice.radii(STATIONS, rows)[..., None] * aside
+    outline = np.concatenate([middle + wide, (middle - wide)[:, ::-1]], axis=1)[shown]
+    return [strut[:, column] for strut in outline for column in (0, 1)]
 
 
 def sizes(units: Sequence[Unit]) -> tuple[float, float]:
