@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import re
+
 import bpy
 
+from ...optimization.freedoms import parameters
 from ..jobs.panel import job_state, start_button
 from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.wording import in_panel
+from ..unit.fields import label
 from . import state as optimization
 from .properties import ASKED, AT_PRESSURE, FREE, OF_PATH, YES, present
 
 JOB = "optimize_"
+_KNOWN = parameters()
 UNITS = {"angle": "deg", "stiffness": "N/mm", "air_volume": "ml", "mass": "g", "print_time": "h"}
 UNITS |= {"deviation": "mm", "sensor_slope": "1/deg"}
 
@@ -116,8 +121,7 @@ def _proposed(layout, proposed) -> None:
     """A fold for a proposed unit: how it stands to every target, what changed, and what to do with it."""
     header, body = layout.panel(f"MU_proposed_{proposed.number}", default_closed=proposed.number > 1)
     missed = [t for t in proposed.targets if not t["met"]]
-    state = "applied" if proposed.applied else f"misses {len(missed)}" if missed else "meets all"
-    header.label(text=f"Unit {proposed.number}: {state}", icon="ERROR" if missed else "CHECKMARK")
+    header.label(text=f"Unit {proposed.number}", icon="ERROR" if missed else "CHECKMARK")
     row = header.row(align=True)
     button = row.row(align=True)
     button.enabled = not proposed.applied
@@ -126,12 +130,21 @@ def _proposed(layout, proposed) -> None:
     if not body:
         return
     column = body.column(align=True)
+    if proposed.applied:
+        wrapped(column, "The unit has its parameters", "INFO")
     for target in proposed.targets:
         wrapped(column, target_line(target), target_icon(target))
     for text in proposed.changes:
-        wrapped(column, in_panel(text), "FORWARD")
+        wrapped(column, labelled(text), "FORWARD")
+    if proposed.reasons:
+        column.label(text="What moved each target most:")
     for text in proposed.reasons:
-        wrapped(column, f"Moved by: {in_panel(text)}", "BLANK1")
+        wrapped(column, labelled(text), "BLANK1")
+
+
+def labelled(text: str) -> str:
+    """A text with parameters by their labels: "chambers.wall_mm" becomes "Wall"."""
+    return re.sub(r"\b[a-z]+\.[a-z]\w*", lambda m: label(_KNOWN[m[0]]) if m[0] in _KNOWN else m[0], text)
 
 
 def target_line(target) -> str:

@@ -92,19 +92,19 @@ class MU_PG_target(bpy.types.PropertyGroup):
             ("maximise", "As Large as Possible", "An objective: several of them give a Pareto front"),
         ],
     )
-    value: FloatProperty(name="Value", description="In the quantity's unit", default=20.0, precision=4)
+    value: FloatProperty(name="Value", description="In the quantity's unit", default=20.0, precision=3)
     tolerance: FloatProperty(
         name="Tolerance",
         description="The value is met within it",
         default=1.0,
         min=1e-6,
-        precision=4,
+        precision=3,
     )
     low: FloatProperty(
-        name="Low", description="Lower bound, in the quantity's unit", default=20.0, precision=4
+        name="Low", description="Lower bound, in the quantity's unit", default=20.0, precision=3
     )
     high: FloatProperty(
-        name="High", description="Upper bound, in the quantity's unit", default=30.0, precision=4
+        name="High", description="Upper bound, in the quantity's unit", default=30.0, precision=3
     )
 
 
@@ -146,10 +146,10 @@ class MU_PG_freedom(bpy.types.PropertyGroup):
         update=_first_range,
     )
     low: FloatProperty(
-        name="From", description="Lowest value, in the parameter's unit at scale 1", default=0.7, precision=4
+        name="From", description="Lowest value, in the parameter's unit at scale 1", default=0.7, precision=3
     )
     high: FloatProperty(
-        name="To", description="Highest value, in the parameter's unit at scale 1", default=1.3, precision=4
+        name="To", description="Highest value, in the parameter's unit at scale 1", default=1.3, precision=3
     )
 
 
@@ -185,7 +185,7 @@ class MU_PG_optimize(bpy.types.PropertyGroup):
         max=10_000,
     )
     refine: FloatProperty(
-        name="Mesh of the Search",
+        name="Search Mesh",
         description="What divides every element size; 1 is the mesh of a full simulation",
         default=0.5,
         min=0.2,
@@ -194,7 +194,7 @@ class MU_PG_optimize(bpy.types.PropertyGroup):
         step=5,
     )
     check_refine: FloatProperty(
-        name="Mesh of the Check",
+        name="Check Mesh",
         description="What divides every element size when a proposed unit is simulated again",
         default=0.75,
         min=0.2,

@@ -180,7 +180,7 @@ def findings(root: Any) -> Findings | None:
     """What the unit's optimisation has found, or None where there is none that can be read."""
     folder = folder_of(root)
     files = [folder / name for name in (SUMMARY, UNIT)]
-    found = _found.read(files, lambda: _read(*files))
+    found = _found.read(files, lambda: _read(files[0]))
     if found is None:
         return None
     now = _now(root)
@@ -193,10 +193,10 @@ def _hash_of(file: Path) -> str | None:
     return _units.read([file], lambda: shape_hash(as_kept(read_unit(file))))
 
 
-def _read(summary: Path, unit: Path) -> Findings:
-    found, folder = parse_json(file_bytes(summary), summary.name), summary.parent
+def _read(summary: Path) -> Findings:
+    found, folder = dict(parse_json(file_bytes(summary), summary.name)), summary.parent
     proposed = []
-    for number, row in enumerate(found.get("proposed") or (), 1):
+    for number, row in enumerate(map(dict, found.get("proposed") or ()), 1):
         targets = tuple(
             {key: t[key] for key in TARGET_KEYS} | {"standard_error": float(t["standard_error"] or 0.0)}
             for t in row.get("targets") or ()
@@ -209,7 +209,7 @@ def _read(summary: Path, unit: Path) -> Findings:
         str(found.get("status", "")),
         str(found.get("outcome", "")),
         int(found.get("simulated_now") or 0),
-        {name: float(taken) for name, taken in (found.get("seconds") or {}).items()},
+        {name: float(taken) for name, taken in dict(found.get("seconds") or {}).items()},
         tuple(map(str, found.get("in_the_way") or ())),
         tuple(proposed),
     )

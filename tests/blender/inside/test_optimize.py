@@ -58,7 +58,10 @@ def finished(root, **changed):
          "met": True, "robust": True, **common},
     ]  # fmt: skip
     row = {"file": "proposed-1.toml", "printable": "pass", "targets": targets}
-    row |= {"changes": ["chambers.wall_mm: 0.9 to 0.7123 mm"], "reasons": []}
+    row |= {
+        "changes": ["chambers.wall_mm: 0.9 to 0.7123 mm"],
+        "reasons": ["angle at 30 kPa: chambers.wall_mm by +1.2 deg"],
+    }
     summary = {"status": "complete", "outcome": "No unit of 3 meets every target.", "proposed": [row]}
     (folder / "summary.json").write_text(json.dumps({**summary, "in_the_way": ["mass"], **changed}))
     return proposed
@@ -155,8 +158,9 @@ def test_a_proposed_unit_is_applied_undone_and_added_beside(tmp_path):
     finished(root)
     texts = drawn()
     for expected in (
-        "No unit of 3 meets every target", "Stands in the way: mass", "Unit 1: misses 1",
-        "angle at 30 kPa: 18.25 ± 0.5 deg, asked:", "printable: yes", "0.9 to 0.7123 mm",
+        "No unit of 3 meets every target", "Stands in the way: mass", "Unit 1",
+        "angle at 30 kPa: 18.25 ± 0.5 deg, asked:", "printable: yes", "Wall: 0.9 to 0.7123 mm",
+        "What moved each target most: angle at 30 kPa: Wall by",
     ):  # fmt: skip
         assert expected in texts, (expected, texts)
     assert "other parameters" not in texts
@@ -167,15 +171,23 @@ def test_a_proposed_unit_is_applied_undone_and_added_beside(tmp_path):
     assert abs(to_unit(root.mu_unit).chambers.wall_mm - 0.712345678) < 1e-7
     assert root.name == name
     assert not unit_object.behind(root)
-    assert "Unit 1: applied" in drawn()
+    assert "The unit has its parameters" in drawn()
     assert "other parameters" not in drawn()
     bpy.ops.ed.undo()
     root = unit_object.active_root(bpy.context)
     assert to_unit(root.mu_unit).chambers.wall_mm == 0.9
-    assert "Unit 1: misses 1" in drawn()
+    assert "The unit has its parameters" not in drawn()
     assert "no unit 2 is proposed" in refused(bpy.ops.mu.optimize_apply, number=2)
     root.mu_unit.chambers.wall_mm = 1.0
     assert "started from other parameters" in drawn()
+
+    summary = optimization.folder_of(root) / "summary.json"
+    good = summary.read_text()
+    for bad in ("{", '{"proposed": ["a text"]}', '{"proposed": 3}', "[]"):
+        summary.write_text(bad)
+        assert not bpy.ops.mu.optimize_apply.poll()
+        assert "Stands in the way" not in drawn()
+    summary.write_text(good)
 
     uuid = root.mu_unit.uuid
     assert bpy.ops.mu.optimize_add(number=1) == {"FINISHED"}
