@@ -105,7 +105,7 @@ def _freedoms(layout, root, props) -> None:
 
 def _results(layout, found) -> None:
     box = layout.box()
-    wrapped(box, in_panel(found.outcome), "CHECKMARK" if not found.in_the_way else "INFO")
+    wrapped(box, in_panel(found.outcome), "CHECKMARK" if found.feasible else "INFO")
     for name in found.in_the_way:
         alert(box, f"Stands in the way: {name}")
     if found.other_start:

@@ -56,12 +56,14 @@ class Proposed:
 class Findings:
     """What the optimisation in a unit's folder has found; other_start: of a unit with other parameters.
 
-    simulated: how many units that run simulated; seconds: what its stages took; in_the_way: names of the
-    targets without which the others can be met.
+    feasible: whether a unit met every target on the search's mesh; simulated: how many units that run
+    simulated; seconds: what its stages took; in_the_way: names of the targets without which the others can
+    be met.
     """
 
     folder: Path
     status: str
+    feasible: bool
     outcome: str
     simulated: int
     seconds: dict[str, float]
@@ -207,6 +209,7 @@ def _read(summary: Path) -> Findings:
     return Findings(
         folder,
         str(found.get("status", "")),
+        found.get("feasible") is True,
         str(found.get("outcome", "")),
         int(found.get("simulated_now") or 0),
         {name: float(taken) for name, taken in dict(found.get("seconds") or {}).items()},

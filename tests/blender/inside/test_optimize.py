@@ -9,11 +9,13 @@ import pytest
 from mu_addon.blender.optimize import panel as panels
 from mu_addon.blender.optimize import state as optimization
 from mu_addon.blender.optimize.properties import FREE, KINDS
+from mu_addon.blender.simulate import effects
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import shape_hash, to_unit
 from mu_addon.design.parameters import write_unit
+from mu_addon.evidence.extended import ExtendedModel, Fitted
 from mu_addon.optimization.targets import KINDS as KNOWN
-from mu_addon.usecases.optimize.job import read_job
+from mu_addon.usecases.optimize.job import mechanics_of, read_job
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by
@@ -127,6 +129,27 @@ def test_what_the_core_refuses_is_said_and_nothing_is_written(tmp_path):
     assert bpy.ops.mu.optimize_unlist(what="targets", index=0) == {"FINISHED"}
     assert bpy.ops.mu.optimize_unlist(what="targets", index=0) == {"CANCELLED"}
     assert not bpy.ops.mu.optimize.poll()
+
+
+def test_named_effects_of_the_unit_are_optimised_with_it(tmp_path):
+    root = add()
+    root.mu_unit.study.folder = str(tmp_path)
+    target(root, "angle")
+    free(root, "chambers.wall_mm")
+    known = {"sd": 0.1, "low95": 0.3, "high95": 1.2}
+    found = {name: {} for name in ("clogged_chamber", "gravity")}
+    found["clogged_chamber"]["share_lost"] = Fitted(0.5, **known)
+    found["gravity"]["density_kg_m3"] = Fitted(1100.0, **known)
+    effects.keep(root, ExtendedModel("named", found, {}).text())
+    assert "With the named effects" in drawn()
+    optimization.write_inputs(root, tmp_path / "run")
+    job = read_job(tmp_path / "run")
+    assert mechanics_of(job.design, job.model)[1] == [], "nothing of it is left out"
+    assert job.model.of_effects == {
+        "clogged_chamber.share_lost": 0.5, "gravity.density_kg_m3": 1100.0,
+    }  # fmt: skip
+    root.mu_unit.study.orientation_deg = 90.0
+    assert "a unit that hangs" in refused(bpy.ops.mu.optimize)
 
 
 def test_a_file_is_searched_from_this_unit_or_from_its_own(tmp_path):
