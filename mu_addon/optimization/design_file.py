@@ -72,9 +72,9 @@ class Design:
         return changed_unit(self.unit, self.freedoms, design)
 
 
-def read_design(path: Path, text: str) -> Design:
-    """The design of a file's text; raises InputError with file, line and key."""
-    return parse_design(text, str(path), folder=path.parent)
+def read_design(path: Path, text: str, unit: Unit | None = None) -> Design:
+    """The design of a file's text, see `parse_design`; raises InputError with file, line and key."""
+    return parse_design(text, str(path), unit, path.parent)
 
 
 def parse_design(text: str, origin: str, unit: Unit | None = None, folder: Path | None = None) -> Design:

@@ -147,6 +147,22 @@ def test_the_shipped_unit_is_evaluated_from_its_file(tmp_path):
     assert out["nodes"]["Trim"]["remark"].endswith("struts")
 
 
+LIGHTER = """
+format = 1
+preset = "mu-0.75x"
+evaluations = 2
+refine = 0.25
+check_refine = 0.3
+[[target]]
+kind = "mass"
+objective = "minimise"
+[[freedom]]
+parameter = "chambers.wall_mm"
+low = 0.8
+high = 1.0
+"""
+
+
 def every_kind(wall, bench):
     """A tree with every kind of node, as coarse as each goes."""
     nodes = dict(template("unit").nodes)
@@ -184,6 +200,13 @@ def every_kind(wall, bench):
     add("Grasp", "grip", {"gripper": "Gripper.gripper"}, coarse=True, cubes_mm="20", rank_paths=False)
     add("Thin Or Thick", "range", values="0.8 1.0")
     add("Study", "sweep", {"unit": "U.unit", "ranges": "Thin Or Thick.range"}, stages="design", workers=1)
+    add(
+        "Lighter", "optimize", {"unit": "U.unit", "model": "Cause.model"}, file=str(bench / "design.toml"),
+    )  # fmt: skip
+    add(
+        "Two", "chain", {"units": "U.unit"}, copies=2, turns_deg="0 90", reach_mm="0 -2 110", high_kPa=20.0,
+        step_kPa=50.0, loaded=False, order=1, refine=0.25,
+    )  # fmt: skip
     add("Heaviest", "best", {"table": "Study.table"}, figure="mass_g")
     angles = str(ROOT / "assets" / "examples" / "bench" / "angles.csv")
     add("Record", "record", simulated=True, seconds=18.0)
@@ -214,6 +237,7 @@ def calibrated(folder):
         done = run(*line)
         assert done.returncode == 0, done.stdout + done.stderr
     shutil.copy(folder / "map" / "calibration.toml", folder)
+    (folder / "design.toml").write_text(LIGHTER, encoding="utf-8")
     return folder
 
 

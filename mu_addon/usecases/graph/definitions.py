@@ -7,8 +7,10 @@ from types import MappingProxyType
 
 from ...graph.definition import Definition, Definitions
 from .bench_nodes import bench_nodes
+from .chain_nodes import chain_nodes
 from .design_nodes import design_nodes
 from .evidence_nodes import evidence_nodes
+from .optimize_nodes import optimize_nodes
 from .study_nodes import study_nodes
 from .sweep_nodes import sweep_nodes
 
@@ -17,6 +19,9 @@ from .sweep_nodes import sweep_nodes
 def definitions() -> Definitions:
     """Definitions of all kinds of nodes; made once."""
     found: dict[str, Definition] = {}
-    for definition in (*design_nodes(), *study_nodes(), *sweep_nodes(), *evidence_nodes(), *bench_nodes()):
-        found[definition.kind] = definition
+    makers = (
+        design_nodes, study_nodes, sweep_nodes, optimize_nodes, chain_nodes, evidence_nodes, bench_nodes,
+    )  # fmt: skip
+    for made in makers:
+        found |= {definition.kind: definition for definition in made()}
     return MappingProxyType(found)

@@ -43,8 +43,14 @@ class Job:
         return found if self.model is None else {**found, MODEL: self.model.text()}
 
 
-def job_from(file: Path, model: Path | None = None, workers: int = 1, scheduler: str | None = None) -> Job:
-    """The job of a design file and a model's; raises InputError."""
+def job_from(
+    file: Path,
+    model: Path | None = None,
+    workers: int = 1,
+    scheduler: str | None = None,
+    unit: Unit | None = None,
+) -> Job:
+    """The job of a design file and a model's; unit: in place of the file's own. Raises InputError."""
     try:
         text = file_text(file, _LONGEST)
     except OSError as error:
@@ -53,7 +59,9 @@ def job_from(file: Path, model: Path | None = None, workers: int = 1, scheduler:
         ) from error
     except UnicodeDecodeError as error:
         raise InputError("the file is not UTF-8 text", str(file), "save it as UTF-8") from error
-    return Job(read_design(file, text), None if model is None else load_model(model), workers, scheduler)
+    return Job(
+        read_design(file, text, unit), None if model is None else load_model(model), workers, scheduler
+    )
 
 
 def read_job(folder: Path) -> Job:

@@ -243,10 +243,30 @@ def summary(found: Optimised) -> dict[str, Any]:
                 "values": dict(zip(found.names, map(float, p.checked.values), strict=True)),
                 "standard_error": dict(zip(found.names, map(float, p.checked.error), strict=True)),
                 "changes": list(p.changes),
+                "reasons": list(p.reasons),
+                "targets": _judged(found, p),
             }
             for p in found.proposals
         ],
     }
+
+
+def _judged(found: Optimised, proposal: Proposal) -> list[dict[str, Any]]:
+    """Every target with what a proposed unit has of it on the finer mesh, and whether that meets it."""
+    checked = proposal.checked
+    return [
+        {
+            "name": t.name,
+            "asked": t.words,
+            "unit": t.unit,
+            "value": float(checked.values[i]),
+            "standard_error": float(checked.error[i]),
+            "objective": t.goal is not None,
+            "met": bool(checked.met[i]),
+            "robust": bool(checked.robust[i]),
+        }
+        for i, t in enumerate(found.design.targets)
+    ]
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:

@@ -169,7 +169,7 @@ def test_frames_and_reroutes_change_nothing():
     before = conversion.to_tree(tree)
     assert before.nodes["Cells"].frame == "Lattice"
     reroute = tree.nodes.new("NodeReroute")
-    tree.links.new(tree.nodes["Trim"].outputs[0], reroute.inputs[0])
+    tree.links.new(tree.nodes["Grading"].outputs[0], reroute.inputs[0])
     tree.links.new(reroute.outputs[0], tree.nodes["Struts"].inputs[0])
     tree.nodes.new("NodeFrame")
     assert conversion.to_tree(tree) == before

@@ -75,9 +75,10 @@ def test_what_changes_the_file_is_one_undo_step():
     outside = {"simulate", "cancel", "dismiss", "open", "export_stl", "preset_save", "preset_remove"}
     outside |= {"assets", "assets_remove", "picture", "probe", "run_remove"}
     outside |= {"evidence_diagnose", "evidence_cancel", "evidence_dismiss", "evidence_open"}
+    outside |= {"optimize", "optimize_cancel", "optimize_dismiss", "optimize_open"}
     outside |= {"tree_evaluate", "tree_save", "tree_cancel", "tree_dismiss", "tree_open"}
     outside |= {"node_open", "node_group_edit", "import_page"}
-    outside |= {"print_check", "print_export", "print_specimens"}
+    outside |= {"print_check", "print_check_file", "print_export", "print_specimens"}
     outside |= {"print_cancel", "print_dismiss", "print_open"}
     outside |= {"sensor_ports", "sensor_connect", "sensor_disconnect", "sensor_pause"}
     outside |= {"sensor_mark", "sensor_freeze", "sensor_sweep", "sensor_hold"}

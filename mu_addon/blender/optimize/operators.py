@@ -1,0 +1,188 @@
+"""List targets and freedoms, start the search, and take a proposed unit into the scene."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import attrs
+import bpy
+from bpy.props import EnumProperty, IntProperty
+
+from ..jobs import start_child
+from ..jobs.operators import job_operators
+from ..scene import landing
+from ..shared import updates, viewports
+from ..shared.operators import UnitOperator, ValidUnitOperator, reports_errors
+from ..simulate import study_folder as studies
+from ..unit import object as unit_object
+from ..unit.properties import from_unit
+from . import state as optimization
+
+LONGEST_TITLE = 80
+_LIST = EnumProperty(
+    name="List",
+    description="Which list",
+    items=[("targets", "Targets", "What the unit shall do"), ("freedoms", "Freedoms", "What may change")],
+)
+
+
+class MU_OT_optimize_list(UnitOperator, bpy.types.Operator):
+    """Add a target, or a parameter that may change, to the unit's list"""
+
+    bl_idname = "mu.optimize_list"
+    bl_label = "Add to List"
+    bl_options = {"REGISTER", "UNDO"}
+
+    what: _LIST
+
+    def execute(self, context):
+        props = unit_object.active_root(context).mu_optimize
+        if self.what == "targets":
+            props.targets.add()
+            return {"FINISHED"}
+        taken = {freedom.parameter for freedom in props.freedoms}
+        free = next((name for name in FIRST if name not in taken), FIRST[0])
+        # Set, not left at its default: so its range is that of the unit.
+        props.freedoms.add().parameter = free
+        return {"FINISHED"}
+
+
+FIRST = (
+    "chambers.wall_mm",
+    "chambers.neck_diameter_mm",
+    "chambers.bladder_share",
+    "material.lattice_modulus_kPa",
+    "scale",
+)
+"""Parameters in the order in which the list proposes them: those that move a unit's angle most come first."""
+
+
+class MU_OT_optimize_unlist(UnitOperator, bpy.types.Operator):
+    """Remove a target, or a parameter that may change, from the unit's list"""
+
+    bl_idname = "mu.optimize_unlist"
+    bl_label = "Remove from List"
+    bl_options = {"REGISTER", "UNDO"}
+
+    what: _LIST
+    index: IntProperty(name="Row", description="Row of the list, from 0", min=0)
+
+    def execute(self, context):
+        rows = getattr(unit_object.active_root(context).mu_optimize, self.what)
+        if self.index >= len(rows):
+            return {"CANCELLED"}
+        rows.remove(self.index)
+        return {"FINISHED"}
+
+
+class MU_OT_optimize(ValidUnitOperator, bpy.types.Operator):
+    """Search for units that meet the targets, in a child process; units that were simulated are kept"""
+
+    bl_idname = "mu.optimize"
+    bl_label = "Optimize"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        root = unit_object.active_root(context)
+        props, trouble = root.mu_optimize, ""
+        if optimization.OPTIMIZATION.is_running(root):
+            trouble = "This unit is being optimised"
+        elif props.source == "file":
+            trouble = "" if props.file else "Choose a design.toml first"
+        elif not props.targets or not props.freedoms:
+            trouble = f"Add a {'parameter that may change' if props.targets else 'target'} first"
+        trouble = trouble or start_child.lacking()
+        if trouble:
+            cls.poll_message_set(trouble)
+        return not trouble
+
+    @reports_errors
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        studies.assign_folder(root)
+        optimization.OPTIMIZATION.start(
+            root, optimization.folder_of(root), lambda folder: optimization.write_inputs(root, folder)
+        )
+        viewports.redraw()
+        return {"FINISHED"}
+
+
+class _OfProposed(UnitOperator):
+    """Takes a proposed unit; greyed out, with the reason, where none is proposed."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        found = optimization.findings(unit_object.active_root(context))
+        if found is None or not found.proposed:
+            cls.poll_message_set("No unit is proposed: run the optimisation first")
+            return False
+        return True
+
+
+_NUMBER = IntProperty(name="Proposed Unit", description="Number of the proposed unit", default=1, min=1)
+
+
+class MU_OT_optimize_apply(_OfProposed, bpy.types.Operator):
+    """Give the unit the parameters of a proposed one; undo takes them back"""
+
+    bl_idname = "mu.optimize_apply"
+    bl_label = "Apply"
+
+    number: _NUMBER
+
+    @reports_errors
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        core = attrs.evolve(optimization.proposed_unit(root, self.number), name=root.mu_unit.title)
+        with updates.paused():
+            from_unit(root.mu_unit, core)
+        if not unit_object.rebuild(root):
+            self.report({"ERROR"}, root.mu_unit.trouble)
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class MU_OT_optimize_add(_OfProposed, bpy.types.Operator):
+    """Add a proposed unit to the scene, beside the present one"""
+
+    bl_idname = "mu.optimize_add"
+    bl_label = "Add Beside"
+
+    number: _NUMBER
+
+    @reports_errors
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        core = optimization.proposed_unit(root, self.number)
+        end = f" {self.number}"
+        title = root.mu_unit.title[: LONGEST_TITLE - len(end)] + end
+        if context.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        added = unit_object.create(context, attrs.evolve(core, name=title))
+        added.location = root.matrix_world.translation
+        landing.land(context, added)
+        return {"FINISHED"}
+
+
+CLASSES = (
+    MU_OT_optimize_list,
+    MU_OT_optimize_unlist,
+    MU_OT_optimize,
+    MU_OT_optimize_apply,
+    MU_OT_optimize_add,
+    *job_operators(
+        optimization.OPTIMIZATION,
+        "optimize_",
+        "optimisation",
+        kept="units that were simulated are kept, and the next run continues from there",
+        first="run the optimisation first",
+    ),
+)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

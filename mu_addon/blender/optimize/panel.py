@@ -1,0 +1,171 @@
+"""The panel Optimize: targets, parameters that may change, progress, and the units that are proposed."""
+
+from __future__ import annotations
+
+import re
+
+import bpy
+
+from ...optimization.freedoms import parameters
+from ..jobs.panel import job_state, start_button
+from ..shared.panels import UnitPanel, alert, wrapped
+from ..shared.wording import in_panel
+from ..unit.fields import label
+from . import state as optimization
+from .properties import ASKED, AT_PRESSURE, FREE, OF_PATH, YES, present
+
+JOB = "optimize_"
+_KNOWN = parameters()
+UNITS = {"angle": "deg", "stiffness": "N/mm", "air_volume": "ml", "mass": "g", "print_time": "h"}
+UNITS |= {"deviation": "mm", "sensor_slope": "1/deg"}
+
+
+class MU_PT_optimize(UnitPanel, bpy.types.Panel):
+    """Units that do what is asked: targets and parameters that may change in, proposed units out"""
+
+    bl_idname = "MU_PT_optimize"
+    bl_label = "Optimize"
+
+    def show(self, layout, context, root):
+        props = root.mu_optimize
+        layout.prop(props, "source")
+        if props.source == "file":
+            layout.prop(props, "file")
+            layout.prop(props, "own_unit")
+        else:
+            _targets(layout, props)
+            _freedoms(layout, root, props)
+            column = layout.column(align=True)
+            column.prop(props, "evaluations")
+            column.prop(props, "refine")
+            column.prop(props, "check_refine")
+        if root.mu_unit.study.effects:
+            wrapped(layout, "With the named effects that the panel Simulate lists", "LIGHT")
+        child = optimization.OPTIMIZATION.child(root)
+        start_button(layout, child, "mu.optimize", "CON_TRACKTO")
+        job_state(layout, child, "see below", JOB)
+        found = optimization.findings(root)
+        if found is not None and found.outcome:
+            _results(layout, found)
+
+
+def _head(layout, text: str, what: str):
+    """A head with a button that adds a row to a list."""
+    row = layout.row()
+    row.label(text=text)
+    row.operator("mu.optimize_list", text="", icon="ADD").what = what
+
+
+def _remove(row, what: str, index: int) -> None:
+    button = row.operator("mu.optimize_unlist", text="", icon="X")
+    button.what, button.index = what, index
+
+
+def _targets(layout, props) -> None:
+    """A box a target: the quantity, where it is read, and what is asked of it."""
+    _head(layout, "The Unit Shall Have", "targets")
+    for index, target in enumerate(props.targets):
+        box = layout.box()
+        row = box.row(align=True)
+        row.prop(target, "kind", text="")
+        _remove(row, "targets", index)
+        column = box.column(align=True)
+        if target.kind in AT_PRESSURE:
+            column.prop(target, "pressure_kPa")
+        elif target.kind in OF_PATH:
+            column.prop(target, "path")
+            column.prop(target, "pressures_kPa")
+        elif target.kind == "stiffness":
+            column.prop(target, "direction")
+        if target.kind in YES:
+            continue
+        column.prop(target, "ask")
+        unit = UNITS.get(target.kind, "")
+        for name in ASKED[target.ask]:
+            title = target.bl_rna.properties[name].name
+            column.prop(target, name, text=f"{title} ({unit})" if unit else title)
+
+
+def _freedoms(layout, root, props) -> None:
+    """A box a parameter that may change: which, from where to where, and what it is now."""
+    _head(layout, "By Changing", "freedoms")
+    for index, freedom in enumerate(props.freedoms):
+        box = layout.box()
+        row = box.row(align=True)
+        row.prop(freedom, "parameter", text="")
+        _remove(row, "freedoms", index)
+        column = box.column(align=True)
+        column.prop(freedom, "low")
+        column.prop(freedom, "high")
+        d = FREE[freedom.parameter]
+        words = f"now {present(root, freedom.parameter):.4g} {d.unit}".rstrip()
+        scaled = d.unit == "mm" and root.mu_unit.scale != 1.0 and not d.fixed
+        column.label(text=f"{words} at scale 1" if scaled else words)
+
+
+def _results(layout, found) -> None:
+    box = layout.box()
+    wrapped(box, in_panel(found.outcome), "CHECKMARK" if found.feasible else "INFO")
+    for name in found.in_the_way:
+        alert(box, f"Stands in the way: {name}")
+    if found.other_start:
+        wrapped(box, "The search started from other parameters than the unit has now", "INFO")
+    row = box.row(align=True)
+    row.operator("mu.optimize_open", text="Report", icon="URL").what = "report"
+    row.operator("mu.optimize_open", text="Folder", icon="FILE_FOLDER").what = "folder"
+    for proposed in found.proposed:
+        _proposed(layout, proposed)
+
+
+def _proposed(layout, proposed) -> None:
+    """A fold for a proposed unit: how it stands to every target, what changed, and what to do with it."""
+    header, body = layout.panel(f"MU_proposed_{proposed.number}", default_closed=proposed.number > 1)
+    missed = [t for t in proposed.targets if not t["met"]]
+    header.label(text=f"Unit {proposed.number}", icon="ERROR" if missed else "CHECKMARK")
+    row = header.row(align=True)
+    button = row.row(align=True)
+    button.enabled = not proposed.applied
+    button.operator("mu.optimize_apply").number = proposed.number
+    row.operator("mu.optimize_add", text="", icon="DUPLICATE").number = proposed.number
+    if not body:
+        return
+    column = body.column(align=True)
+    if proposed.applied:
+        wrapped(column, "The unit has its parameters", "INFO")
+    for target in proposed.targets:
+        wrapped(column, target_line(target), target_icon(target))
+    for text in proposed.changes:
+        wrapped(column, labelled(text), "FORWARD")
+    if proposed.reasons:
+        column.label(text="What moved each target most:")
+    for text in proposed.reasons:
+        wrapped(column, labelled(text), "BLANK1")
+
+
+def labelled(text: str) -> str:
+    """A text with parameters by their labels: "chambers.wall_mm" becomes "Wall"."""
+    return re.sub(r"\b[a-z]+\.[a-z]\w*", lambda m: label(_KNOWN[m[0]]) if m[0] in _KNOWN else m[0], text)
+
+
+def target_line(target) -> str:
+    """A target in a line: its name, the value with its standard error, and what is asked."""
+    if target["value"] is None:
+        # The print check's answer, or that of a unit that does not bear the pressure.
+        return f"{target['name']}: {'yes' if target['met'] else 'no'}"
+    unit = f" {target['unit']}" if target["unit"] else ""
+    error = target["standard_error"]
+    spread = f" ± {error:.2g}" if error else ""
+    return f"{target['name']}: {target['value']:.4g}{spread}{unit}, asked: {target['asked']}"
+
+
+def target_icon(target) -> str:
+    """Met for all values within two standard errors, met, or missed; an objective has none of these."""
+    if target["objective"]:
+        return "DRIVER_DISTANCE"
+    return "CHECKMARK" if target["robust"] else "QUESTION" if target["met"] else "ERROR"
+
+
+CLASSES = (MU_PT_optimize,)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

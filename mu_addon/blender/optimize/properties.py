@@ -1,0 +1,209 @@
+"""What a unit shall do and what of it is free, as Blender properties on the unit's object."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    StringProperty,
+)
+
+from ...design.quantity import Description
+from ...optimization.freedoms import UNSEEN, parameters
+from ..shared.registration import property_group_factory
+from ..shared.texts import sentence
+from ..unit.fields import exact, label
+from ..unit.properties import BESIDE_BLEND_FILE, section_of
+
+SECTIONS = ("chambers", "lattice", "grading", "material")
+"""Sections whose numbers may be free; those of sensor, printer and laws with memory are not offered."""
+FREE = {
+    name: d
+    for name, d in parameters().items()
+    if d.type in (int, float) and name not in UNSEEN and (name == "scale" or name.split(".")[0] in SECTIONS)
+}
+"""Parameters that the panel offers to be free, by dotted name."""
+AROUND = 0.25
+"""A parameter that is made free may first change by this share of its value to either side."""
+
+KINDS = [
+    ("angle", "Angle", "Bending angle under a pressure, in degrees"),
+    ("stiffness", "Stiffness", "Force that moves the tip by 1 mm, the unit at rest, in N/mm"),
+    ("stretch", "Stretch", "Largest principal stretch of the wall under a pressure"),
+    ("safety", "Safety", "The resin's elongation at break over the wall's strain under a pressure"),
+    ("air_volume", "Air", "Air in the chambers under a pressure, in ml"),
+    ("mass", "Mass", "Mass without the waveguide, in g"),
+    ("print_time", "Print Time", "Time of the print, upright, in h"),
+    ("deviation", "J of a Path", "Mean deviation that the sensor along a path causes, in mm"),
+    ("sensor_slope", "Slope of the Sensor", "Relative change of the light per degree, along a path"),
+    ("walls_apart", "Walls Apart", "No wall passes through another under a pressure"),
+    ("printable", "Printable", "No error in the print check of what is proposed"),
+]
+AT_PRESSURE = ("angle", "stretch", "safety", "air_volume", "walls_apart")
+OF_PATH = ("deviation", "sensor_slope")
+YES = ("walls_apart", "printable")
+"""Kinds of targets that are read at one pressure, that are of a path at two, that are a yes or a no."""
+ASKED = {"low": ("low",), "high": ("high",), "range": ("low", "high"), "value": ("value", "tolerance")}
+ASKED |= {"minimise": (), "maximise": ()}
+"""Numbers that each way of asking needs."""
+
+
+class MU_PG_target(bpy.types.PropertyGroup):
+    """One target of a design: a quantity and what is asked of it."""
+
+    kind: EnumProperty(name="Quantity", description="What is asked for", items=KINDS)
+    pressure_kPa: FloatProperty(
+        name="At (kPa)",
+        description="Gauge pressure in all chambers; negative: vacuum",
+        default=30.0,
+        min=-500.0,
+        max=500.0,
+        precision=1,
+        step=100,
+    )
+    pressures_kPa: FloatVectorProperty(
+        name="At (kPa)",
+        description="Two gauge pressures over which it is taken",
+        size=2,
+        default=(-15.0, 30.0),
+        min=-500.0,
+        max=500.0,
+        precision=1,
+        step=100,
+    )
+    direction: EnumProperty(
+        name="Along", description="Direction of the force", items=[(axis, axis.upper(), "") for axis in "xyz"]
+    )
+    path: StringProperty(name="Path", description="Sensor path, alpha1 and on", default="alpha4")
+    ask: EnumProperty(
+        name="Shall Be",
+        description="What is asked of the quantity",
+        items=[
+            ("low", "At Least", "Not less than a bound"),
+            ("high", "At Most", "Not more than a bound"),
+            ("range", "Between", "Within two bounds"),
+            ("value", "Equal to", "A value within a tolerance"),
+            ("minimise", "As Small as Possible", "An objective: several of them give a Pareto front"),
+            ("maximise", "As Large as Possible", "An objective: several of them give a Pareto front"),
+        ],
+    )
+    value: FloatProperty(name="Value", description="In the quantity's unit", default=20.0, precision=3)
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description="The value is met within it",
+        default=1.0,
+        min=1e-6,
+        precision=3,
+    )
+    low: FloatProperty(
+        name="Low", description="Lower bound, in the quantity's unit", default=20.0, precision=3
+    )
+    high: FloatProperty(
+        name="High", description="Upper bound, in the quantity's unit", default=30.0, precision=3
+    )
+
+
+def _first_range(freedom, context) -> None:
+    """Let a parameter's first range lie around the unit's present value, within the parameter's bounds."""
+    d = FREE[freedom.parameter]
+    now = present(freedom.id_data, freedom.parameter)
+    step = max(abs(now) * AROUND, 1.0 if d.type is int else 0.0)
+    low, high = max(now - step, d.low), min(now + step, d.high)
+    if d.type is int:
+        low, high = round(low), round(high)
+    if not low < high:
+        low, high = d.low, d.high
+    freedom.low, freedom.high = float(f"{low:.4g}"), float(f"{high:.4g}")
+
+
+def present(root, name: str) -> float:
+    """A unit's own value of a parameter by its dotted name."""
+    section, _, key = name.rpartition(".")
+    if not section:
+        return exact(root.mu_unit.scale)
+    return section_of(root.mu_unit, section)[key]
+
+
+def title(name: str, d: Description) -> str:
+    """How a parameter is listed: its section and its label, as "Chambers: Wall"."""
+    section = name.rpartition(".")[0]
+    return f"{sentence(section)}: {label(d)}" if section else label(d)
+
+
+class MU_PG_freedom(bpy.types.PropertyGroup):
+    """One parameter that may change, and its range."""
+
+    parameter: EnumProperty(
+        name="Parameter",
+        description="What may change",
+        items=[(name, title(name, d), sentence(d.text)) for name, d in FREE.items()],
+        default="chambers.wall_mm",
+        update=_first_range,
+    )
+    low: FloatProperty(
+        name="From", description="Lowest value, in the parameter's unit at scale 1", default=0.7, precision=3
+    )
+    high: FloatProperty(
+        name="To", description="Highest value, in the parameter's unit at scale 1", default=1.3, precision=3
+    )
+
+
+class MU_PG_optimize(bpy.types.PropertyGroup):
+    """Targets and freedoms of a unit, and how the search goes about them."""
+
+    source: EnumProperty(
+        name="Targets",
+        description="Where targets and freedoms stand",
+        items=[
+            ("panel", "Listed Here", "Targets and freedoms of the lists below"),
+            ("file", "In a File", "Those of a design.toml"),
+        ],
+    )
+    file: StringProperty(
+        name="File",
+        description="design.toml with targets and freedoms",
+        subtype="FILE_PATH",
+        options=BESIDE_BLEND_FILE,
+    )
+    own_unit: BoolProperty(
+        name="Start from This Unit",
+        description="The search starts from this unit in place of the one that the file names",
+        default=True,
+    )
+    targets: CollectionProperty(type=MU_PG_target, description="What the unit shall do")
+    freedoms: CollectionProperty(type=MU_PG_freedom, description="What may change")
+    evaluations: IntProperty(
+        name="Units at Most",
+        description="How many units are simulated at most, those on the finer mesh not counted",
+        default=24,
+        min=1,
+        max=10_000,
+    )
+    refine: FloatProperty(
+        name="Search Mesh",
+        description="What divides every element size; 1 is the mesh of a full simulation",
+        default=0.5,
+        min=0.2,
+        max=4.0,
+        precision=2,
+        step=5,
+    )
+    check_refine: FloatProperty(
+        name="Check Mesh",
+        description="What divides every element size when a proposed unit is simulated again",
+        default=0.75,
+        min=0.2,
+        max=8.0,
+        precision=2,
+        step=5,
+    )
+
+
+register, unregister = property_group_factory(
+    bpy.types.Object, "mu_optimize", (MU_PG_target, MU_PG_freedom, MU_PG_optimize)
+)

@@ -1,0 +1,246 @@
+"""A unit's optimisation: from the properties to the core's job, and what its run has found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import bpy
+
+from ...design.nearest import tied
+from ...design.parameters import SECTIONS, Unit, read_unit
+from ...design.quantity import describe
+from ...errors import InputError, MuError
+from ...reading import file_bytes, parse_json
+from ...run.folder import write_run
+from ..body import state as bodies
+from ..jobs.start_child import JobKind
+from ..shared.file_cache import FileCache
+from ..simulate import effects
+from ..simulate import study_folder as studies
+from ..unit.fields import exact
+from ..unit.properties import shape_hash, to_unit
+from .properties import ASKED, AT_PRESSURE, FREE, OF_PATH, YES
+
+if TYPE_CHECKING:
+    from ...usecases.optimize.job import Job
+
+FOLDER = "optimize"
+"""Folder of the optimisation in the unit's study folder."""
+DESIGN, UNIT, MODEL, SUMMARY = "design.toml", "unit.toml", "model.toml", "summary.json"
+A_UNIT_S, A_CHECK_S, MOST_CHECKED = 15.0, 60.0, 6
+"""Seconds that a unit of the search, and one that is proposed, take about; a finished run tells better."""
+
+
+TARGET_KEYS = ("name", "asked", "unit", "value", "objective", "met", "robust")
+
+
+@attrs.frozen(eq=False)
+class Proposed:
+    """A proposed unit: its file and, as summary.json has them, its targets, changes and reasons in words.
+
+    targets: of each the values of `TARGET_KEYS` and its standard_error;
+    applied: whether the unit in the scene has its parameters.
+    """
+
+    number: int
+    file: Path
+    targets: tuple[dict[str, Any], ...]
+    changes: tuple[str, ...]
+    reasons: tuple[str, ...]
+    applied: bool = False
+
+
+@attrs.frozen(eq=False)
+class Findings:
+    """What the optimisation in a unit's folder has found; other_start: of a unit with other parameters.
+
+    feasible: whether a unit met every target on the search's mesh; simulated: how many units that run
+    simulated; seconds: what its stages took; in_the_way: names of the targets without which the others can
+    be met.
+    """
+
+    folder: Path
+    status: str
+    feasible: bool
+    outcome: str
+    simulated: int
+    seconds: dict[str, float]
+    in_the_way: tuple[str, ...]
+    proposed: tuple[Proposed, ...]
+    other_start: bool = False
+
+
+def folder_of(root: Any) -> Path:
+    """Folder of the unit's optimisation."""
+    return studies.folder_of(root) / FOLDER
+
+
+def plan_of(root: Any) -> list[tuple[str, float]]:
+    """Stages of an optimisation, with the seconds that each is expected to take."""
+    units = root.mu_optimize.evaluations
+    mostly = {
+        "search": A_UNIT_S * units,
+        "check of what is proposed": A_CHECK_S * MOST_CHECKED,
+        "report": 20.0,
+    }
+    found = findings(root)
+    taken = {} if found is None else found.seconds
+    if found is not None and found.simulated and "search" in taken:
+        taken = {**taken, "search": taken["search"] * units / found.simulated}
+    return [(name, taken.get(name, seconds)) for name, seconds in mostly.items()]
+
+
+OPTIMIZATION = JobKind(
+    FOLDER, lambda root: root.mu_unit.uuid, folder_of, "optimisation", heavy=True, plan_of=plan_of
+)
+
+
+def target_table(target: Any) -> dict[str, Any]:
+    """A target of the panel as its [[target]] table."""
+    table: dict[str, Any] = {"kind": target.kind}
+    if target.kind in AT_PRESSURE:
+        table["pressure_kPa"] = exact(target.pressure_kPa)
+    elif target.kind in OF_PATH:
+        table |= {"path": target.path, "pressures_kPa": [exact(p) for p in target.pressures_kPa]}
+    elif target.kind == "stiffness":
+        table["direction"] = target.direction
+    if target.kind in YES:
+        return table
+    keys = ASKED[target.ask]
+    asked = {key: exact(getattr(target, key)) for key in keys}
+    return table | (asked if keys else {"objective": target.ask})
+
+
+def freedom_table(freedom: Any) -> dict[str, Any]:
+    """A freedom of the panel as its [[freedom]] table; what a rule ties to it follows."""
+    section, _, name = freedom.parameter.rpartition(".")
+    low, high = exact(freedom.low), exact(freedom.high)
+    if FREE[freedom.parameter].type is int:
+        low, high = round(low), round(high)
+    table = {"parameter": freedom.parameter, "low": low, "high": high}
+    follows = {f"{section}.{key}": factor for key, factor in tied({name: 1.0}).items() if key != name}
+    return table | ({"also": follows} if follows else {})
+
+
+def document(root: Any) -> dict[str, Any]:
+    """What design.toml says of the panel's targets and freedoms."""
+    s = root.mu_optimize
+    return {
+        "format": 1,
+        "unit": UNIT,
+        "evaluations": s.evaluations,
+        "refine": exact(s.refine),
+        "check_refine": exact(s.check_refine),
+        "target": [target_table(t) for t in s.targets],
+        "freedom": [freedom_table(f) for f in s.freedoms],
+    }
+
+
+def job_of(root: Any) -> Job:
+    """The optimisation that a unit's properties ask for; raises InputError."""
+    # Only now: it brings in the solver's packages, which a Blender may lack.
+    from ...optimization.design_file import parse_design
+    from ...toml_writer import toml_text
+    from ...usecases.optimize.job import Job, job_from
+
+    unit, s = to_unit(root.mu_unit), root.mu_optimize
+    if bodies.envelope_in(root, unit) is not None:
+        raise InputError(
+            "the unit has a body of your own", "", "the search knows the lattice's box alone: remove the body"
+        )
+    if s.source == "file":
+        if not s.file:
+            raise InputError("no file is chosen", "Optimize, File", "choose a design.toml")
+        return job_from(Path(bpy.path.abspath(s.file)), unit=unit if s.own_unit else None)
+    return Job(parse_design(toml_text(document(root)), DESIGN, unit))
+
+
+def write_inputs(root: Any, folder: Path) -> None:
+    """Write what the unit's optimisation is asked to do into a folder; raises InputError, OutputError."""
+    from ...usecases.optimize.job import LAYOUT
+
+    texts = job_of(root).texts()
+    model = root.mu_unit.study.effects
+    if model:
+        if effects.inputs(root).get("orientation_deg", 0.0) != 0.0:
+            raise InputError(
+                "the search takes gravity for a unit that hangs",
+                "Simulate, Gravity",
+                "set it to 0, or remove the effects",
+            )
+        texts[MODEL] = model
+    write_run(folder, LAYOUT, texts)
+
+
+_found: FileCache[Findings] = FileCache()
+_units: FileCache[str] = FileCache()
+
+
+def findings(root: Any) -> Findings | None:
+    """What the unit's optimisation has found, or None where there is none that can be read."""
+    folder = folder_of(root)
+    files = [folder / name for name in (SUMMARY, UNIT)]
+    found = _found.read(files, lambda: _read(files[0]))
+    if found is None:
+        return None
+    now = _now(root)
+    proposed = tuple(attrs.evolve(p, applied=_hash_of(p.file) == now) for p in found.proposed)
+    other = now != _hash_of(files[1]) and not any(p.applied for p in proposed)
+    return attrs.evolve(found, proposed=proposed, other_start=other)
+
+
+def _hash_of(file: Path) -> str | None:
+    return _units.read([file], lambda: shape_hash(as_kept(read_unit(file))))
+
+
+def _read(summary: Path) -> Findings:
+    found, folder = dict(parse_json(file_bytes(summary), summary.name)), summary.parent
+    proposed = []
+    for number, row in enumerate(map(dict, found.get("proposed") or ()), 1):
+        targets = tuple(
+            {key: t[key] for key in TARGET_KEYS} | {"standard_error": float(t["standard_error"] or 0.0)}
+            for t in row.get("targets") or ()
+        )
+        texts = (tuple(map(str, row.get(key) or ())) for key in ("changes", "reasons"))
+        file = folder / Path(str(row["file"])).name
+        proposed.append(Proposed(number, file, targets, *texts))
+    return Findings(
+        folder,
+        str(found.get("status", "")),
+        found.get("feasible") is True,
+        str(found.get("outcome", "")),
+        int(found.get("simulated_now") or 0),
+        {name: float(taken) for name, taken in dict(found.get("seconds") or {}).items()},
+        tuple(map(str, found.get("in_the_way") or ())),
+        tuple(proposed),
+    )
+
+
+def _now(root: Any) -> str:
+    try:
+        return shape_hash(to_unit(root.mu_unit))
+    except MuError:
+        return ""
+
+
+def as_kept(unit: Unit) -> Unit:
+    """The unit with its numbers as Blender's single precision keeps them; raises InputError by a rule."""
+    sections = {}
+    for section in SECTIONS:
+        own = getattr(unit, section.section)
+        values = {d.name: exact(getattr(own, d.name)) for d in describe(section) if d.type is float}
+        # The bladder is two cells wide to the last digit, see `section_of`.
+        ties = tied({"cell_mm": values["cell_mm"]}) if "bladder_diameter_mm" in values else {}
+        sections[section.section] = attrs.evolve(own, **values | ties)
+    return attrs.evolve(unit, scale=exact(unit.scale), **sections)
+
+
+def proposed_unit(root: Any, number: int) -> Unit:
+    """The proposed unit of a number from 1, as its file has it; raises InputError where there is none."""
+    found = findings(root)
+    rows = () if found is None else found.proposed
+    if not 1 <= number <= len(rows):
+        raise InputError(f"no unit {number} is proposed", "Optimize", "run the optimisation first")
+    return read_unit(rows[number - 1].file)

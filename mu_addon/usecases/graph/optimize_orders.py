@@ -1,0 +1,40 @@
+"""The run that a node Optimize asks for, and the unit that is read of it. Loads the solver."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import attrs
+
+from ...design.parameters import read_unit
+from ...errors import InputError
+from ...graph.definition import Call, Outputs
+from ...graph.evaluation import Finished, Order
+from ..optimize.job import job_from
+from ..optimize.run import USE_CASE
+from .parts import refuse_body
+
+
+def optimize_order(call: Call) -> Order:
+    """The optimisation of a unit by a file's targets and freedoms; raises InputError."""
+    s, design = call.settings, call.inputs["unit"]
+    refuse_body(design, "an optimisation")
+    if not s["file"]:
+        raise InputError("no targets are named", "file", "give a design.toml")
+    job = job_from(Path(s["file"]), call.inputs["model"], s["workers"], unit=design.unit)
+    return Order(USE_CASE, job)
+
+
+def proposed_of(call: Call, done: Finished) -> Outputs:
+    """A proposed unit of an optimisation; raises InputError where there are not so many."""
+    rows, number = done.summary["proposed"], call.settings["proposed"]
+    if number > len(rows):
+        raise InputError(
+            f"{len(rows)} units are proposed: there is no number {number}",
+            "proposed",
+            f"choose 1 to {len(rows)}" if rows else f"see the outcome: {done.summary['outcome']}",
+        )
+    row = rows[number - 1]
+    design = call.inputs["unit"]
+    unit = attrs.evolve(read_unit(done.folder / row["file"]), name=design.unit.name)
+    return {"unit": attrs.evolve(design, unit=unit), "proposed": row}

@@ -1,0 +1,260 @@
+"""Targets and freedoms in Blender: written as design.toml, searched, proposed units put into the scene."""
+
+import json
+
+import attrs
+import bpy
+import pytest
+
+from mu_addon.blender.optimize import panel as panels
+from mu_addon.blender.optimize import state as optimization
+from mu_addon.blender.optimize.properties import FREE, KINDS
+from mu_addon.blender.simulate import effects
+from mu_addon.blender.unit import object as unit_object
+from mu_addon.blender.unit.properties import shape_hash, to_unit
+from mu_addon.design.parameters import write_unit
+from mu_addon.evidence.extended import ExtendedModel, Fitted
+from mu_addon.optimization.targets import KINDS as KNOWN
+from mu_addon.usecases.optimize.job import mechanics_of, read_job
+
+from .acting import add, refused
+from .drawing import drawn as drawn_by
+from .jobs import ended, fake
+
+
+def drawn():
+    return drawn_by([panels.MU_PT_optimize])
+
+
+def target(root, kind, **values):
+    assert bpy.ops.mu.optimize_list(what="targets") == {"FINISHED"}
+    made = root.mu_optimize.targets[-1]
+    made.kind = kind
+    for name, value in values.items():
+        setattr(made, name, value)
+    return made
+
+
+def free(root, parameter, **values):
+    assert bpy.ops.mu.optimize_list(what="freedoms") == {"FINISHED"}
+    made = root.mu_optimize.freedoms[-1]
+    made.parameter = parameter
+    for name, value in values.items():
+        setattr(made, name, value)
+    return made
+
+
+def finished(root, **changed):
+    """A run's folder with one proposed unit, as a run leaves it."""
+    folder = optimization.folder_of(root)
+    optimization.write_inputs(root, folder)
+    unit = to_unit(root.mu_unit)
+    chambers = attrs.evolve(unit.chambers, wall_mm=0.712345678)
+    proposed = attrs.evolve(unit, name="proposed-1", chambers=chambers)
+    write_unit(proposed, folder / "proposed-1.toml")
+    common = {"standard_error": 0.5, "objective": False}
+    targets = [
+        {"name": "angle at 30 kPa", "asked": "at least 20 deg", "unit": "deg", "value": 18.25,
+         "met": False, "robust": False, **common},
+        {"name": "printable", "asked": "yes", "unit": "", "value": None,
+         "met": True, "robust": True, **common},
+    ]  # fmt: skip
+    row = {"file": "proposed-1.toml", "printable": "pass", "targets": targets}
+    row |= {
+        "changes": ["chambers.wall_mm: 0.9 to 0.7123 mm"],
+        "reasons": ["angle at 30 kPa: chambers.wall_mm by +1.2 deg"],
+    }
+    summary = {"status": "complete", "outcome": "No unit of 3 meets every target.", "proposed": [row]}
+    (folder / "summary.json").write_text(json.dumps({**summary, "in_the_way": ["mass"], **changed}))
+    return proposed
+
+
+def test_every_quantity_of_the_core_is_offered_and_every_parameter_has_a_range():
+    assert [kind for kind, _, _ in KINDS] == list(KNOWN)
+    root = add()
+    for name, d in FREE.items():
+        table = optimization.freedom_table(free(root, name))
+        assert d.low <= table["low"] < table["high"] <= d.high, name
+
+
+def test_properties_are_written_as_the_file_that_the_core_reads(tmp_path):
+    root = add()
+    root.mu_unit.study.folder = str(tmp_path)
+    assert "add a target first" in refused(bpy.ops.mu.optimize).casefold()
+    target(root, "angle", pressure_kPa=30.0, ask="value", value=19.2, tolerance=0.3)
+    target(root, "angle", pressure_kPa=-10.0, ask="high", high=-8.0)
+    target(root, "safety", ask="low", low=4.0)
+    target(root, "air_volume", ask="range", low=10.0, high=60.0)
+    target(root, "stiffness", direction="z", ask="maximise")
+    target(root, "mass", ask="minimise")
+    target(root, "deviation", path="alpha2", pressures_kPa=(-15.0, 30.0), ask="minimise")
+    target(root, "printable")
+    assert "may change first" in refused(bpy.ops.mu.optimize)
+    free(root, "chambers.wall_mm", low=0.65, high=1.4)
+    free(root, "lattice.cells_x", low=3.0, high=5.0)
+    free(root, "chambers.cell_mm", low=12.0, high=13.0)
+    root.mu_optimize.evaluations = 7
+
+    optimization.write_inputs(root, tmp_path / "run")
+    design = read_job(tmp_path / "run").design
+    assert shape_hash(design.unit) == shape_hash(to_unit(root.mu_unit))
+    angle, vacuum, safety, air, stiffness, mass, deviation, printable = design.targets
+    assert (angle.quantity.pressure_kPa, angle.value, angle.tolerance) == (30.0, 19.2, 0.3)
+    assert (vacuum.name, vacuum.high) == ("angle at -10 kPa", -8.0)
+    assert safety.low == 4.0
+    assert (air.low, air.high) == (10.0, 60.0)
+    assert (stiffness.goal, stiffness.quantity.direction) == ("maximise", "z")
+    assert mass.goal == "minimise"
+    assert deviation.quantity.path == "alpha2"
+    assert printable.kind == "printable"
+    wall, cells, cell = design.freedoms
+    assert (wall.low, wall.high) == (0.65, 1.4)
+    assert cells.values == (3, 4, 5)
+    assert cell.also == {"chambers.bladder_diameter_mm": 2.0}, "the bladder is two cells wide"
+    assert (design.search.evaluations, design.settings.refine, design.check_refine) == (7, 0.5, 0.75)
+    # What the core reads is what it writes again.
+    assert read_job(tmp_path / "run").texts() == design.texts()
+
+
+def test_what_the_core_refuses_is_said_and_nothing_is_written(tmp_path):
+    root = add()
+    root.mu_unit.study.folder = str(tmp_path)
+    target(root, "angle", ask="range", low=30.0, high=20.0)
+    free(root, "chambers.wall_mm")
+    assert "low is not below high" in refused(bpy.ops.mu.optimize)
+    root.mu_optimize.targets[0].ask = "low"
+    root.mu_optimize.freedoms[0].low = 0.01
+    assert "are not a range within its bounds" in refused(bpy.ops.mu.optimize)
+    assert not (optimization.folder_of(root) / "design.toml").exists()
+    assert bpy.ops.mu.optimize_unlist(what="targets", index=0) == {"FINISHED"}
+    assert bpy.ops.mu.optimize_unlist(what="targets", index=0) == {"CANCELLED"}
+    assert not bpy.ops.mu.optimize.poll()
+
+
+def test_named_effects_of_the_unit_are_optimised_with_it(tmp_path):
+    root = add()
+    root.mu_unit.study.folder = str(tmp_path)
+    target(root, "angle")
+    free(root, "chambers.wall_mm")
+    known = {"sd": 0.1, "low95": 0.3, "high95": 1.2}
+    found = {name: {} for name in ("clogged_chamber", "gravity")}
+    found["clogged_chamber"]["share_lost"] = Fitted(0.5, **known)
+    found["gravity"]["density_kg_m3"] = Fitted(1100.0, **known)
+    effects.keep(root, ExtendedModel("named", found, {}).text())
+    assert "With the named effects" in drawn()
+    optimization.write_inputs(root, tmp_path / "run")
+    job = read_job(tmp_path / "run")
+    assert mechanics_of(job.design, job.model)[1] == [], "nothing of it is left out"
+    assert job.model.of_effects == {
+        "clogged_chamber.share_lost": 0.5, "gravity.density_kg_m3": 1100.0,
+    }  # fmt: skip
+    root.mu_unit.study.orientation_deg = 90.0
+    assert "a unit that hangs" in refused(bpy.ops.mu.optimize)
+
+
+def test_a_file_is_searched_from_this_unit_or_from_its_own(tmp_path):
+    root = add()
+    root.mu_unit.chambers.wall_mm = 1.05
+    root.mu_optimize.source = "file"
+    assert "Choose a design.toml first" in refused(bpy.ops.mu.optimize)
+    file = tmp_path / "design.toml"
+    file.write_text(
+        'format = 1\npreset = "mu-0.75x"\n[[target]]\nkind = "mass"\nobjective = "minimise"\n'
+        '[[freedom]]\nparameter = "chambers.wall_mm"\nlow = 0.8\nhigh = 1.3\n'
+    )
+    root.mu_optimize.file = str(file)
+    assert optimization.job_of(root).design.unit.chambers.wall_mm == 1.05
+    root.mu_optimize.own_unit = False
+    assert optimization.job_of(root).design.unit.scale == 0.75
+    file.write_text(file.read_text().replace("low = 0.8", "low = true"))
+    assert "line 8" in refused(bpy.ops.mu.optimize)
+
+
+def test_a_proposed_unit_is_applied_undone_and_added_beside(tmp_path):
+    bpy.context.preferences.edit.use_global_undo = True
+    root = add()
+    root.mu_unit.study.folder = str(tmp_path)
+    assert "Stands in the way" not in drawn()
+    assert not bpy.ops.mu.optimize_apply.poll()
+    target(root, "angle")
+    free(root, "chambers.wall_mm")
+    finished(root)
+    texts = drawn()
+    for expected in (
+        "No unit of 3 meets every target", "Stands in the way: mass", "Unit 1",
+        "angle at 30 kPa: 18.25 ± 0.5 deg, asked:", "printable: yes", "Wall: 0.9 to 0.7123 mm",
+        "What moved each target most: angle at 30 kPa: Wall by",
+    ):  # fmt: skip
+        assert expected in texts, (expected, texts)
+    assert "other parameters" not in texts
+    name = root.name
+    bpy.ops.ed.undo_push(message="found")
+    assert bpy.ops.mu.optimize_apply(number=1) == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="applied")
+    assert abs(to_unit(root.mu_unit).chambers.wall_mm - 0.712345678) < 1e-7
+    assert root.name == name
+    assert not unit_object.behind(root)
+    assert "The unit has its parameters" in drawn()
+    assert "other parameters" not in drawn()
+    bpy.ops.ed.undo()
+    root = unit_object.active_root(bpy.context)
+    assert to_unit(root.mu_unit).chambers.wall_mm == 0.9
+    assert "The unit has its parameters" not in drawn()
+    assert "no unit 2 is proposed" in refused(bpy.ops.mu.optimize_apply, number=2)
+    root.mu_unit.chambers.wall_mm = 1.0
+    assert "started from other parameters" in drawn()
+
+    summary = optimization.folder_of(root) / "summary.json"
+    good = summary.read_text()
+    for bad in ("{", '{"proposed": ["a text"]}', '{"proposed": 3}', "[]"):
+        summary.write_text(bad)
+        assert not bpy.ops.mu.optimize_apply.poll()
+        assert "Stands in the way" not in drawn()
+    summary.write_text(good)
+
+    uuid = root.mu_unit.uuid
+    assert bpy.ops.mu.optimize_add(number=1) == {"FINISHED"}
+    beside = unit_object.active_root(bpy.context)
+    assert beside.mu_unit.uuid != uuid
+    assert abs(to_unit(beside.mu_unit).chambers.wall_mm - 0.712345678) < 1e-7
+    old = unit_object.by_uuid(uuid)
+    assert to_unit(old.mu_unit).chambers.wall_mm == 1.0
+    assert beside.location.x - old.location.x >= old.dimensions.x, "none stands in the other"
+
+
+def test_a_search_that_fails_and_one_that_is_stopped(tmp_path):
+    root = add()
+    root.mu_unit.study.folder = str(tmp_path)
+    for how, expected in {"reported_error": "thicker wall", "good": "see below"}.items():
+        child = fake(optimization.OPTIMIZATION, root, how)
+        ended(child)
+        assert expected in drawn(), (how, drawn())
+        assert bpy.ops.mu.optimize_dismiss() == {"FINISHED"}
+    child = fake(optimization.OPTIMIZATION, root, "hang")
+    assert "mu.optimize_cancel" in drawn()
+    assert not bpy.ops.mu.optimize.poll()
+    assert bpy.ops.mu.optimize_cancel() == {"FINISHED"}
+    ended(child)
+    assert "Cancelled" in drawn()
+
+
+@pytest.mark.slow
+def test_a_search_from_the_panel_to_a_thinner_wall_in_the_scene(tmp_path):
+    """The whole way with a real, rough search: a unit that bends further has a thinner wall."""
+    root = add()
+    root.mu_unit.study.folder = str(tmp_path)
+    target(root, "angle", pressure_kPa=10.0, ask="maximise")
+    free(root, "chambers.wall_mm", low=0.8, high=1.0)
+    props = root.mu_optimize
+    props.evaluations, props.refine, props.check_refine = 3, 0.25, 0.3
+    assert bpy.ops.mu.optimize() == {"FINISHED"}
+    child = optimization.OPTIMIZATION.child(root)
+    ended(child)
+    assert child.state == "done", child.error
+    found = optimization.findings(root)
+    assert found.status == "complete"
+    assert "angle at 10 kPa" in drawn()
+    assert bpy.ops.mu.optimize_apply(number=1) == {"FINISHED"}
+    assert 0.8 <= to_unit(root.mu_unit).chambers.wall_mm < 0.9
+    (search, seconds), *_ = optimization.plan_of(root)
+    assert (search, seconds) == ("search", found.seconds["search"]), "it is expected to take as long again"
