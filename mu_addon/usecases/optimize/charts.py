@@ -70,7 +70,7 @@ def course(found: Optimised) -> str:
 
 
 def thumbnail(unit: Unit, widest_mm: float, tallest_mm: float) -> str:
-    """SVG of a unit cut along its sagittal plane, at one scale for all units: wall, chambers, struts, envelope.
+    """SVG of a unit cut along its sagittal plane, all units at one scale: wall, chambers, struts, envelope.
 
     Struts are those of the half cell on one side of the plane, at their own thickness.
 
