@@ -15,7 +15,7 @@ from ..design.parameters import Unit, load_preset, read_unit, to_toml
 from ..design.printing.printer import DEFAULT, load_printer
 from ..design.toml_text import nearest
 from ..errors import InputError
-from ..materials.library import load_material, read_material
+from ..materials.library import Material, load_material, material_text, read_material
 from ..meshing.settings import FIDELITIES, HOMOGENISED, MeshSettings
 from ..reading import parse_toml
 from ..toml_writer import toml_text
@@ -24,7 +24,7 @@ from .search import SearchSettings
 from .targets import Supplies, Target, read_targets
 
 FORMAT = 1
-UNIT = "unit.toml"
+UNIT, RESIN = "unit.toml", "resin.toml"
 HEADER = "# The inputs of this optimisation; unit.toml beside it is the unit that it starts from."
 _KEYS = (
     "format", "preset", "unit", "fidelity", "refine", "check_refine", "evaluations", "batch", "seed", "resin",
@@ -41,7 +41,7 @@ class Design:
     unit: where the search starts, with fixed values in it; check_refine: of the mesh that proposed units are
     simulated on again; print_tolerance_mm, modulus_tolerance: standard errors of a print's surfaces, and of
     the resin's modulus as a share of it, for the uncertainty of what is proposed. document: the file's own
-    tables.
+    tables; material: the resin's, for density and elongation at break.
     """
 
     unit: Unit
@@ -55,12 +55,20 @@ class Design:
     print_tolerance_mm: float
     modulus_tolerance: float
     document: Mapping[str, Any]
+    material: Material
 
     def texts(self) -> dict[str, str]:
-        """Text of every file of inputs, by name; the unit lies beside, with fixed values in it."""
+        """Text of every file of inputs, by name; the unit lies beside, with fixed values in it.
+
+        So does a resin that is a file of the user's.
+        """
         tables = {key: v for key, v in self.document.items() if key not in ("preset", "unit", "run")}
         tables["unit"] = UNIT
-        return {"design.toml": toml_text(tables, HEADER), UNIT: to_toml(self.unit)}
+        beside = {UNIT: to_toml(self.unit)}
+        if self.resin.endswith(".toml"):
+            tables["resin"] = RESIN
+            beside[RESIN] = material_text(self.material)
+        return {"design.toml": toml_text(tables, HEADER), **beside}
 
     @property
     def start(self) -> tuple[Any, ...]:
@@ -77,13 +85,19 @@ def read_design(path: Path, text: str, unit: Unit | None = None) -> Design:
     return parse_design(text, str(path), unit, path.parent)
 
 
-def parse_design(text: str, origin: str, unit: Unit | None = None, folder: Path | None = None) -> Design:
-    """The design in TOML text. unit: in place of the one that the text names; folder: where its files lie.
+def parse_design(
+    text: str,
+    origin: str,
+    unit: Unit | None = None,
+    folder: Path | None = None,
+    material: Material | None = None,
+) -> Design:
+    """The design in TOML text; raises InputError with file, line and key.
 
-    Raises InputError with file, line and key.
+    unit, material: in place of those that the text names; folder: where its files lie.
     """
     with located_keys(text):
-        return _design(text, origin, unit, folder)
+        return _design(text, origin, unit, folder, material)
 
 
 @contextmanager
@@ -105,7 +119,9 @@ def located_keys(text: str) -> Iterator[None]:
         raise
 
 
-def _design(text: str, origin: str, unit: Unit | None, folder: Path | None) -> Design:
+def _design(
+    text: str, origin: str, unit: Unit | None, folder: Path | None, material: Material | None
+) -> Design:
     document = parse_toml(text, origin)
     for key in document:
         if key not in _KEYS:
@@ -133,7 +149,9 @@ def _design(text: str, origin: str, unit: Unit | None, folder: Path | None) -> D
         _word(document, "resin", "elastic-50a-v1", origin),
         _word(document, "printer", DEFAULT, origin),
     )
-    material = read_material((folder or Path()) / resin) if resin.endswith(".toml") else load_material(resin)
+    if material is None:
+        own = resin.endswith(".toml")
+        material = read_material((folder or Path()) / resin) if own else load_material(resin)
     if "elongation" not in material.values:
         raise InputError(
             f"{resin} has no elongation at break", f"{origin}, resin", "add [elongation] to its file"
@@ -160,6 +178,7 @@ def _design(text: str, origin: str, unit: Unit | None, folder: Path | None) -> D
         base, tuple(targets), tuple(freedoms), settings,
         number("check_refine", min(FINER * settings.refine, 8.0), 0.2, 8.0), search, printer, resin,
         number("print_tolerance_mm", 0.05, 0.0, 0.3), number("modulus_tolerance", 0.1, 0.0, 1.0), document,
+        material,
     )  # fmt: skip
 
 

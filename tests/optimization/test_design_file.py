@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from mu_addon.errors import InputError
-from mu_addon.optimization.design_file import parse_design
+from mu_addon.materials.library import load_material, material_text, parse_material
+from mu_addon.optimization.design_file import parse_design, read_design
 from mu_addon.optimization.freedoms import changed_unit, parameter_of
 
 HEAD = 'format = 1\npreset = "mu-1.0x"\n'
@@ -37,6 +38,21 @@ def test_a_design_has_its_unit_targets_and_freedoms():
     again = parse_design(found.texts()["design.toml"], "again", found.unit)
     assert again.texts() == found.texts() | {"design.toml": again.texts()["design.toml"]}
     assert (again.start, again.search, again.unit) == (found.start, found.search, found.unit)
+
+
+def test_a_resin_of_ones_own_lies_beside_what_is_written(tmp_path):
+    own = material_text(load_material("elastic-50a-v1")).replace("Elastic 50A", "My Resin")
+    (tmp_path / "mine.toml").write_text(own)
+    text = HEAD.replace("format = 1", 'format = 1\nresin = "mine.toml"') + ANGLE + WALL
+    found = parse_design(text, "design.toml", folder=tmp_path)
+    texts = found.texts()
+    material = parse_material(texts["resin.toml"])
+    again = parse_design(texts["design.toml"], "again", found.unit, material=material)
+    assert again.texts() == texts
+    for name, content in texts.items():
+        (tmp_path / name).write_text(content)
+    (tmp_path / "mine.toml").unlink()
+    assert read_design(tmp_path / "design.toml", texts["design.toml"]).texts() == texts
 
 
 @pytest.mark.parametrize("folder", ["stronger-finger", "graded-finger"])

@@ -11,7 +11,8 @@ from ...design.parameters import Unit, from_toml
 from ...errors import InputError
 from ...evidence.extended import ExtendedModel, load_model
 from ...fem.unit import materials_of
-from ...optimization.design_file import HEADER, UNIT, Design, parse_design, read_design
+from ...materials.library import parse_material
+from ...optimization.design_file import HEADER, RESIN, UNIT, Design, parse_design, read_design
 from ...optimization.unit_body import Mechanics
 from ...reading import file_text
 from ...run.folder import FolderLayout
@@ -19,7 +20,9 @@ from ..simulate_and_place.extended_unit import extend
 
 DESIGN, MODEL = "design.toml", "model.toml"
 TABLE, REPORT = "designs.csv", "report.html"
-LAYOUT = FolderLayout(DESIGN, HEADER, results=(TABLE, REPORT, "proposed-*.toml"), optional=(UNIT, MODEL))
+LAYOUT = FolderLayout(
+    DESIGN, HEADER, results=(TABLE, REPORT, "proposed-*.toml"), optional=(UNIT, RESIN, MODEL)
+)
 # No file of inputs is longer, in bytes.
 _LONGEST = 1_000_000
 
@@ -71,8 +74,9 @@ def read_job(folder: Path) -> Job:
 
 
 def design_of(texts: Mapping[str, str]) -> Design:
-    """The design of a run's own texts, which hold its unit; raises InputError."""
-    return parse_design(texts[DESIGN], DESIGN, unit=from_toml(texts[UNIT], UNIT))
+    """The design of a run's own texts, which hold its unit and resin; raises InputError."""
+    material = parse_material(texts[RESIN], RESIN) if RESIN in texts else None
+    return parse_design(texts[DESIGN], DESIGN, from_toml(texts[UNIT], UNIT), material=material)
 
 
 def mechanics_of(
