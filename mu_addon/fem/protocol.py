@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,11 +40,48 @@ class Protocol:
         return time, np.round(np.interp(time, self.time_s, self.pressure_kPa), 9)
 
 
-def read_protocol(path: Path) -> Protocol:
-    """Read a protocol: columns time_s and pressure_kPa, `#` comments allowed.
+@attrs.frozen
+class ProtocolText:
+    """A protocol's file: the names of its columns with their line, and every row below them.
 
-    Raises InputError naming file and line where the file is unreadable, a value is missing or not a
-    finite number, time does not increase, or the protocol does not start at atmospheric pressure.
+    heading, rows: number in the file and text without comment; rows hold their cells, too.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    heading: tuple[int, str]
+    rows: tuple[tuple[int, str, tuple[str, ...]], ...]
+
+    def values(self, names: Sequence[str]) -> Array:
+        """Values (c, k) of k columns of numbers, the first of them time; needs their names in the heading.
+
+        Raises InputError naming file and line where a value is missing or not a finite number, time does not
+        increase, or there are fewer than two rows.
+        """
+        columns = [self.names.index(name) for name in names]
+        found: list[list[float]] = []
+        for number, line, cells in self.rows:
+            where = f"{self.path}, line {number}: {line}"
+            try:
+                row = [float(cells[column]) for column in columns]
+            except (ValueError, IndexError):
+                raise InputError("a value is missing or not a number", where, "give numbers only") from None
+            if not np.isfinite(row).all():
+                raise InputError("a value is not finite", where, "give finite numbers only")
+            if found and row[0] <= found[-1][0]:
+                raise InputError("time does not increase", where, "sort the rows and remove repeated times")
+            found.append(row)
+        if len(found) < 2:
+            raise InputError(
+                "the protocol has fewer than two rows", str(self.path), "give at least a start and an end"
+            )
+        return np.array(found)
+
+
+def read_protocol_text(path: Path, columns: Sequence[str]) -> ProtocolText:
+    """Read a protocol's names and rows; `#` begins a comment.
+
+    columns: the names to ask for. Raises InputError where the file is unreadable, too long or empty.
     """
     try:
         lines = file_text(path, _LONGEST).splitlines()
@@ -52,39 +90,40 @@ def read_protocol(path: Path) -> Protocol:
     except UnicodeDecodeError:
         raise InputError("the protocol is not a text file", str(path), "save it as UTF-8 CSV") from None
     require_rows(sum(1 for line in lines if line.split("#")[0].strip()) - 1, str(path))
-    rows = [(i, line) for i, line in enumerate(lines, 1) if line.split("#")[0].strip()]
-    if not rows:
-        raise InputError("the protocol is empty", str(path), f"give the columns {', '.join(COLUMNS)}")
-    header = [name.strip() for name in next(csv.reader([rows[0][1].split("#")[0]]))]
-    missing = [name for name in COLUMNS if name not in header]
-    if missing:
-        raise InputError(
-            f"the protocol lacks the column {missing[0]}",
-            f"{path}, line {rows[0][0]}: {rows[0][1].strip()}",
-            f"name the columns {', '.join(COLUMNS)}",
-        )
-    values: list[list[float]] = []
-    for number, line in rows[1:]:
-        cells = next(csv.reader([line.split("#")[0]]))
-        where = f"{path}, line {number}: {line.strip()}"
-        try:
-            row = [float(cells[header.index(name)]) for name in COLUMNS]
-        except (ValueError, IndexError):
-            raise InputError("a value is missing or not a number", where, "give numbers only") from None
-        if not np.isfinite(row).all():
-            raise InputError("a value is not finite", where, "give finite numbers only")
-        if values and row[0] <= values[-1][0]:
-            raise InputError("time does not increase", where, "sort the rows and remove repeated times")
-        values.append(row)
-    if len(values) < 2:
-        raise InputError(
-            "the protocol has fewer than two rows", str(path), "give at least a start and an end"
-        )
-    if values[0][1] != 0:
+    numbered = [(n, words) for n, line in enumerate(lines, 1) if (words := line.split("#")[0].strip())]
+    if not numbered:
+        raise InputError("the protocol is empty", str(path), f"give the columns {', '.join(columns)}")
+    rows = tuple((n, words, _cells(words, f"{path}, line {n}")) for n, words in numbered)
+    return ProtocolText(path, rows[0][2], rows[0][:2], rows[1:])
+
+
+def _cells(line: str, where: str) -> tuple[str, ...]:
+    try:
+        return tuple(cell.strip() for cell in next(csv.reader([line])))
+    except csv.Error as error:
+        raise InputError(f"not CSV: {error}", where, "correct that line") from None
+
+
+def read_protocol(path: Path) -> Protocol:
+    """Read a protocol: columns time_s and pressure_kPa, `#` comments allowed.
+
+    Raises InputError naming file and line where the file is unreadable, a value is missing or not a
+    finite number, time does not increase, or the protocol does not start at atmospheric pressure.
+    """
+    text = read_protocol_text(path, COLUMNS)
+    number, line = text.heading
+    for name in COLUMNS:
+        if name not in text.names:
+            raise InputError(
+                f"the protocol lacks the column {name}",
+                f"{path}, line {number}: {line}",
+                f"name the columns {', '.join(COLUMNS)}",
+            )
+    time, pressure = text.values(COLUMNS).T
+    if pressure[0] != 0:
         raise InputError(
             "the protocol does not start at 0 kPa",
-            f"{path}, line {rows[1][0]}",
+            f"{path}, line {text.rows[0][0]}",
             "start at atmospheric pressure (gauge 0)",
         )
-    time, pressure = np.array(values).T
     return Protocol(time, pressure)

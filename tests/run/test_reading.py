@@ -33,6 +33,7 @@ from mu_addon.reading import MOST_ROWS, file_text, parse_json, parse_toml
 from mu_addon.run.folder import FolderLayout, claim
 from mu_addon.sensing.calibration import read_calibration
 from mu_addon.sensing.recording import read_recording
+from mu_addon.usecases.chain.job import read_chain, read_pressures
 from mu_addon.usecases.export.job import path_of
 from mu_addon.usecases.export.print_offsets import read_sheet
 from mu_addon.usecases.grip.phases import read_phases
@@ -70,6 +71,15 @@ READERS: dict[str, tuple[Callable[[Path], Any], str | None]] = {
     "bench": (read_bench, None),
     "protocol": (read_protocol, "time_s,pressure_kPa\n0,0\n1,5\n"),
     "phases": (read_phases, None),
+    "chain": (
+        read_chain,
+        "[target]\nreach = [0.0, 5.0, 40.0]\n"
+        + 2 * '[[unit]]\npreset = "mu-1.0x"\npressure_kPa = [-5.0, 10.0]\n',
+    ),
+    "chain's protocol": (
+        lambda path: read_pressures(path, 2),
+        "time_s,pressure_1_kPa,pressure_2_kPa\n0,0,0\n1,5,6\n",
+    ),
     "pressure": (read_pressure, "time_s,pressure_kPa\n0,0\n1,5\n"),
     "pixels": (read_pixels, None),
     "gauge": (read_sheet, None),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,8 +12,8 @@ import numpy as np
 from ...chain.learning import Sampling
 from ...design.parameters import Unit, load_preset, read_unit, to_toml
 from ...errors import InputError
+from ...fem.protocol import read_protocol_text
 from ...meshing.settings import MeshSettings
-from ...reading import file_text, require_rows
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...toml_writer import toml_text
@@ -33,7 +32,6 @@ LAYOUT = FolderLayout(
 MOST_UNITS = 8
 REFINE = 0.5
 """What divides the element sizes of the units' meshes."""
-_LONGEST = 1 << 25
 _ENTRY = ("preset", "file", "turn_deg", "pressure_kPa")
 
 
@@ -233,38 +231,12 @@ def read_pressures(path: Path, count: int) -> Pressures:
     Raises InputError naming file and line.
     """
     wanted = columns_of(count)
-    try:
-        lines = file_text(path, _LONGEST).splitlines()
-    except OSError as error:
-        raise InputError(f"cannot read the protocol: {error.strerror}", str(path), "check the path") from None
-    except UnicodeDecodeError:
-        raise InputError("the protocol is not a text file", str(path), "save it as UTF-8 CSV") from None
-    rows = [(n, line.split("#")[0].strip()) for n, line in enumerate(lines, 1)]
-    rows = [(n, line) for n, line in rows if line]
-    require_rows(len(rows) - 1, str(path))
-    header = [name.strip() for name in next(csv.reader([rows[0][1]]))] if rows else []
-    if sorted(header) != sorted(wanted):
+    text = read_protocol_text(path, wanted)
+    if sorted(text.names) != sorted(wanted):
         raise InputError(
-            f"the protocol of {count} units has the columns {', '.join(header) or 'none'}",
+            f"the protocol of {count} units has the columns {', '.join(text.names)}",
             str(path),
             f"name the columns {', '.join(wanted)}",
         )
-    values: list[list[float]] = []
-    for number, line in rows[1:]:
-        cells = next(csv.reader([line]))
-        where = f"{path}, line {number}: {line}"
-        try:
-            row = [float(cells[header.index(name)]) for name in wanted]
-        except (ValueError, IndexError):
-            raise InputError("a value is missing or not a number", where, "give numbers only") from None
-        if not np.isfinite(row).all():
-            raise InputError("a value is not finite", where, "give finite numbers only")
-        if values and row[0] <= values[-1][0]:
-            raise InputError("time does not increase", where, "sort the rows and remove repeated times")
-        values.append(row)
-    if len(values) < 2:
-        raise InputError(
-            "the protocol has fewer than two rows", str(path), "give at least a start and an end"
-        )
-    table = np.array(values)
+    table = text.values(wanted)
     return Pressures(table[:, 0], table[:, 1:])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,7 @@ import numpy as np
 
 from ...design.assets import asset_root
 from ...errors import InputError
-from ...fem.protocol import Protocol, read_protocol
-from ...reading import file_text
+from ...fem.protocol import COLUMNS, Protocol, read_protocol, read_protocol_text
 
 Array = np.ndarray[Any, Any]
 
@@ -67,13 +65,11 @@ def read_phases(path: Path) -> Phases:
     Raises InputError as `read_protocol` does, and for phases that are missing, out of order or unknown.
     """
     protocol = read_protocol(path)
-    lines = file_text(path).splitlines()
-    rows = list(csv.reader(words for line in lines if (words := line.split("#")[0].strip())))
-    header = [name.strip() for name in rows[0]]
-    if "phase" not in header:
+    text = read_protocol_text(path, COLUMNS)
+    if "phase" not in text.names:
         raise InputError("the protocol lacks the column phase", str(path), f"name phases {', '.join(NAMES)}")
-    column = header.index("phase")
-    phase = tuple(row[column].strip() if column < len(row) else "" for row in rows[1:])
+    column = text.names.index("phase")
+    phase = tuple(cells[column] if column < len(cells) else "" for _, _, cells in text.rows)
     met = tuple(dict.fromkeys(phase[1:]))
     changes = sum(a != b for a, b in pairwise(phase[1:]))
     if met != NAMES or changes != len(NAMES) - 1:
