@@ -49,18 +49,16 @@ class PrintedWaveguides:
     settings: NewtonSettings
     body: Body | None = None
 
-    def states(self, state: State) -> list[State]:
-        """Every candidate's state, on its own mesh, at the pressure of one of Model A's.
+    def state(self, number: int, state: State) -> State:
+        """A candidate's state, on its own mesh, at the pressure of one of Model A's.
 
         The mesh of a candidate begins with the nodes of the unit's. Raises ConvergenceError, and InputError
         for a candidate that cannot be printed.
         """
-        found = []
-        for path in self.paths:
-            equilibrium = self._equilibrium(path)
-            start = started(self.mesh, equilibrium.model.mesh, path, state.u)
-            found.append(_solved(equilibrium, eased(equilibrium, start, state.u), state.pressure_MPa))
-        return found
+        path = self.paths[number]
+        equilibrium = self._equilibrium(path)
+        start = started(self.mesh, equilibrium.model.mesh, path, state.u)
+        return _solved(equilibrium, eased(equilibrium, start, state.u), state.pressure_MPa)
 
     def alone(self, number: int, pressures_MPa: Array) -> Array:
         """Anchors (s, p, 3) in mm of one candidate along its whole path through pressures (s,), from rest.

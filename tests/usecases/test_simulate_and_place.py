@@ -239,3 +239,25 @@ def test_a_study_says_where_walls_and_struts_touch(tmp_path):
     pressed = max(values["contact_pressure_kPa"][k].max() for values in motion.fields.values())
     assert pressed > 0.0
     assert pressed <= float(by_pressure[-10.0]["largest_contact_pressure_kPa"]) * 1.001
+
+
+@pytest.mark.slow
+def test_a_printed_candidate_that_is_lost_is_solved_alone(tmp_path):
+    """Each printed waveguide is kept as soon as it is solved: a killed run loses no other's."""
+    unit = load_preset("mu-1.0x")
+    job = Job(
+        unit=attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=4)),
+        protocol=Protocol(np.arange(2.0), np.array([0.0, 1.0])),
+        mesh=MeshSettings(refine=0.4, fidelity="resolved"),
+        times=2,
+        mesh_check=False,
+        workers=1,
+    )
+    found = ran(job, tmp_path)["J_hat_mm"]
+    kept = sorted((tmp_path / "cache").glob("sweep-*"))
+    assert len(kept) == len(found["printed"]) == 3
+    kept[1].unlink()
+    before = {path.name: path.stat().st_mtime_ns for path in kept[::2]}
+    assert ran(job, tmp_path)["J_hat_mm"] == found
+    assert kept[1].exists()
+    assert {path.name: path.stat().st_mtime_ns for path in kept[::2]} == before

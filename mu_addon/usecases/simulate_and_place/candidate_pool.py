@@ -44,9 +44,19 @@ class CandidateProblem:
     whole: tuple[int, ...] = ()
     study: Job | None = None
 
+    @property
+    def parts(self) -> tuple[tuple[int, ...], ...]:
+        """The jobs, by number, that are solved together: each printed waveguide has a mesh of its own."""
+        every = tuple(range(len(self.jobs)))
+        return tuple((job,) for job in every) if self.mesh.resolved else (every,)
+
+    def whole_of(self, part: int) -> tuple[int, ...]:
+        """The jobs of a part, by number, whose displacement of the whole mesh is wanted, too."""
+        return tuple(job for job in self.whole if job in self.parts[part])
+
 
 class Moved(NamedTuple):
-    """What all jobs do at one state: anchors (jobs, p, 3) in mm, and of the `whole` ones the differences.
+    """What the jobs of a part do at a state: anchors (jobs, p, 3) in mm, and the `whole` ones' differences.
 
     whole: displacements (w, n, 3) in mm against Model A's, single precision.
     """
@@ -71,14 +81,15 @@ class PrintedEvaluator:
             job.newton,
             job.body,
         )
-        self._whole = setting.whole
+        self._setting = setting
 
-    def __call__(self, state: State) -> Moved:
-        """What all jobs do at a state of Model A. Raises ConvergenceError."""
-        states = self._candidates.states(state)
-        own = [self._candidates.of_unit(job, states[job]) for job in self._whole]
+    def __call__(self, state: State, part: int) -> Moved:
+        """What the jobs of a part do at a state of Model A. Raises ConvergenceError."""
+        jobs = self._setting.parts[part]
+        states = {job: self._candidates.state(job, state) for job in jobs}
+        own = [self._candidates.of_unit(job, states[job]) for job in self._setting.whole_of(part)]
         apart = [(u - state.u).astype(np.float32) for u in own]
-        moved = self._candidates.points(states)
+        moved = self._candidates.points([states[job] for job in jobs])
         return Moved(moved, np.array(apart, np.float32).reshape(-1, *state.u.shape))
 
     def alone(self, job: int, pressures_MPa: Array) -> Array:
@@ -108,8 +119,8 @@ class Evaluator:
         self._sweep = CandidateBatch(model, s.materials, monitored, shares, s.sensor_MPa, newton)
         self._whole = s.whole
 
-    def __call__(self, state: State) -> Moved:
-        """What all jobs do at a state of Model A. Raises ConvergenceError."""
+    def __call__(self, state: State, part: int = 0) -> Moved:
+        """What all jobs, the one part, do at a state of Model A. Raises ConvergenceError."""
         states = self._sweep.states(state)
         apart = [(states[job].u - state.u).astype(np.float32) for job in self._whole]
         return Moved(self._sweep.points(states), np.array(apart, np.float32).reshape(-1, *state.u.shape))
@@ -131,9 +142,9 @@ def _start(setting: CandidateProblem) -> None:
     _evaluator = evaluator_of(setting, threads=1)
 
 
-def _work(state: State) -> Moved:
+def _work(state: State, part: int) -> Moved:
     assert _evaluator is not None
-    return _evaluator(state)
+    return _evaluator(state, part)
 
 
 def _work_alone(job: int, pressures_MPa: Array) -> Array:
@@ -153,12 +164,12 @@ class CandidatePool:
         self.setting, self.workers = setting, workers
         self._alone: Evaluator | PrintedEvaluator | None = None
         self._pool = Pool(workers, "candidates", _start, (setting,))
-        self._submitted: dict[float, Future[Moved]] = {}
+        self._submitted: dict[tuple[float, int], Future[Moved]] = {}
 
-    def submit(self, state: State) -> None:
-        """Have a process solve a state; needs two workers or more."""
-        if state.pressure_MPa not in self._submitted:
-            self._submitted[state.pressure_MPa] = self._pool.submit(_work, state)
+    def submit(self, state: State, part: int) -> None:
+        """Have a process solve the jobs of a part at a state; needs two workers or more."""
+        if (state.pressure_MPa, part) not in self._submitted:
+            self._submitted[state.pressure_MPa, part] = self._pool.submit(_work, state, part)
 
     def alone(self, tasks: Sequence[tuple[int, Array]]) -> list[Array]:
         """Anchors (s, p, 3) in mm that jobs, by number, move along their paths through pressures (s,)."""
@@ -181,19 +192,19 @@ class CandidatePool:
         for done in as_completed(waiting):
             yield waiting[done], self._pool.result(done)
 
-    def solve(self, states: Sequence[State]) -> Iterator[tuple[int, Moved]]:
-        """Number of each state as it is done, and what all jobs do there.
+    def solve(self, tasks: Sequence[tuple[State, int]]) -> Iterator[tuple[int, Moved]]:
+        """Number of each task, a state and a part, as it is done, and what the part's jobs do there.
 
         The same for any `workers`. Raises the first ConvergenceError of any.
         """
         if self.workers == 1:
-            for number, state in enumerate(states):
+            for number, (state, part) in enumerate(tasks):
                 self._alone = self._alone or evaluator_of(self.setting, threads=1)
-                yield number, self._alone(state)
+                yield number, self._alone(state, part)
             return
-        for state in states:
-            self.submit(state)
-        numbers = {self._submitted[s.pressure_MPa]: n for n, s in enumerate(states)}
+        for task in tasks:
+            self.submit(*task)
+        numbers = {self._submitted[s.pressure_MPa, part]: n for n, (s, part) in enumerate(tasks)}
         for done in as_completed(numbers):
             yield numbers[done], self._pool.result(done)
 

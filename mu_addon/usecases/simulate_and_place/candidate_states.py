@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -51,10 +52,10 @@ class CandidateSolver:
         self._radius = unit.dimensions.inclusion_radius
         sensor = unit.material.sensor_modulus_MPa
         materials = job.materials(mesh)
-        self._whole = tuple(i for i, (_, rule) in enumerate(jobs) if rule == whole)
+        kept_whole = tuple(i for i, (_, rule) in enumerate(jobs) if rule == whole)
         self._sweeper = CandidatePool(
             CandidateProblem(
-                mesh, materials, self._anchors, tuple(jobs), self._radius, sensor, self._whole, job
+                mesh, materials, self._anchors, tuple(jobs), self._radius, sensor, kept_whole, job
             ),
             job.workers,
         )
@@ -85,19 +86,24 @@ class CandidateSolver:
     def _rounds(self, distinct: Array) -> list[list[int]]:
         return solution_order(distinct, self._job.effects.has_gravity)
 
-    def _name(self, state: State) -> str:
-        return key(self._key, state.pressure_MPa)
+    def _name(self, state: State, part: int) -> str:
+        return key(self._key, state.pressure_MPa, part)
 
     def reached(self, state: State) -> None:
         """Start on a state that Model A has just reached, beside Model A's next one."""
-        wanted = any(abs(state.pressure_MPa - p) < 1e-12 for p in self._certain)
-        if wanted and not all(self._cache.has(kind, self._name(state)) for kind in self._kinds):
-            self._sweeper.submit(state)
+        if any(abs(state.pressure_MPa - p) < 1e-12 for p in self._certain):
+            for part in self._parts:
+                if not self._is_kept(state, part):
+                    self._sweeper.submit(state, part)
 
     @property
-    def _kinds(self) -> tuple[str, ...]:
-        """What is kept of a state."""
-        return ("sweep", "whole") if self._whole else ("sweep",)
+    def _parts(self) -> range:
+        return range(len(self._sweeper.setting.parts))
+
+    def _is_kept(self, state: State, part: int) -> bool:
+        """Whether the cache holds what is to be kept of a part's jobs at a state."""
+        kinds = ("sweep", "whole") if self._sweeper.setting.whole_of(part) else ("sweep",)
+        return all(self._cache.has(kind, self._name(state, part)) for kind in kinds)
 
     def evaluations(
         self, trajectory: Trajectory, on_progress: Callable[[float], None], verify: bool = False
@@ -115,9 +121,9 @@ class CandidateSolver:
         still = np.array([self._anchors + monitor.displacement(s.u) for s in trajectory.states])
         known: dict[int, Array] = {}
         for pair in order:
-            for number, points in self._solved(trajectory, pair):
-                known[number] = points - still[number]
-                on_progress(len(known) / loaded)
+            share = partial(_in_share, on_progress, len(known) / loaded, len(pair) / loaded)
+            found = self._solved(trajectory, pair, share)
+            known |= {number: points - still[number] for number, points in found.items()}
             self.error = 0.0
             if len(known) < loaded:
                 without_last = {n: d for n, d in known.items() if n != pair[-1]}
@@ -177,23 +183,38 @@ class CandidateSolver:
                     known[n][job] = points - still[n]
         return known
 
-    def _solved(self, trajectory: Trajectory, numbers: list[int]) -> Iterator[tuple[int, Array]]:
-        """Number of each of some states and the anchors moved by every job, from the cache where there."""
+    def _solved(
+        self, trajectory: Trajectory, numbers: list[int], on_progress: Callable[[float], None]
+    ) -> dict[int, Array]:
+        """Anchors (jobs, p, 3) in mm moved by every job at some states, by number; cached part by part.
+
+        on_progress: called with the share that is done.
+        """
+        setting = self._sweeper.setting
+        points = np.empty((len(numbers), len(self._jobs), *self._anchors.shape))
         missing = []
-        for number in numbers:
-            name = self._name(trajectory.states[number])
-            kept = self._cache.get("sweep", name)
-            if kept is None or not all(self._cache.has(kind, name) for kind in self._kinds):
-                missing.append(number)
-            else:
-                yield number, kept["moved_mm"]
-        for position, moved in self._sweeper.solve([trajectory.states[n] for n in missing]):
-            number = missing[position]
-            name = self._name(trajectory.states[number])
-            if self._whole:
+        for row, number in enumerate(numbers):
+            for part in self._parts:
+                state = trajectory.states[number]
+                kept = self._cache.get("sweep", self._name(state, part))
+                if kept is None or not self._is_kept(state, part):
+                    missing.append((row, part))
+                else:
+                    points[row, list(setting.parts[part])] = kept["moved_mm"]
+        total = len(numbers) * len(self._parts)
+        done = total - len(missing)
+        tasks = [(trajectory.states[numbers[row]], part) for row, part in missing]
+        on_progress(done / total)
+        for task, moved in self._sweeper.solve(tasks):
+            row, part = missing[task]
+            name = self._name(*tasks[task])
+            if setting.whole_of(part):
                 self._cache.put("whole", name, {"difference_mm": moved.whole})
             self._cache.put("sweep", name, {"moved_mm": moved.anchors})
-            yield number, moved.anchors
+            points[row, list(setting.parts[part])] = moved.anchors
+            done += 1
+            on_progress(done / total)
+        return dict(zip(numbers, points, strict=True))
 
     def whole(self, trajectory: Trajectory) -> Iterator[tuple[str, Array, Array]]:
         """Name of each path whose displacement was kept, pressures (r,) in kPa and differences (r, n, 3).
@@ -201,20 +222,26 @@ class CandidateSolver:
         In mm against Model A's, at the pressures that were solved from its states; none where every path was
         solved from rest instead.
         """
-        found = {
-            s.pressure_kPa: self._cache.get("whole", self._name(s))
-            for s in trajectory.states
-            if any(abs(s.pressure_kPa - p) < 1e-9 for p in self.solved_kPa)
-        }
-        if not self.independent_of_path or not found:
+        if not self.independent_of_path:
             return
-        kept = {p: arrays["difference_mm"] for p, arrays in found.items() if arrays is not None}
-        for row, job in enumerate(self._whole if len(kept) == len(found) else ()):
-            yield self._jobs[job][0].name, np.array(list(kept)), np.array([d[row] for d in kept.values()])
+        setting = self._sweeper.setting
+        states = [
+            s for s in trajectory.states if any(abs(s.pressure_kPa - p) < 1e-9 for p in self.solved_kPa)
+        ]
+        for part in self._parts:
+            kept = [self._cache.get("whole", self._name(s, part)) for s in states]
+            found = [arrays["difference_mm"] for arrays in kept if arrays is not None]
+            for row, job in enumerate(setting.whole_of(part) if found and len(found) == len(kept) else ()):
+                pressures = np.array([s.pressure_kPa for s in states])
+                yield self._jobs[job][0].name, pressures, np.array([d[row] for d in found])
 
     def close(self) -> None:
         """End the processes."""
         self._sweeper.close()
+
+
+def _in_share(on_progress: Callable[[float], None], done: float, share: float, of_share: float) -> None:
+    on_progress(done + share * of_share)
 
 
 def _outward(distinct: Array, target: float) -> Array:
