@@ -10,6 +10,7 @@ from ..import_data.drawing import draw_import
 from ..jobs.panel import job_state, start_button
 from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.texts import readable
+from ..shared.wording import in_panel
 from . import motion as evidence_motion
 from . import state as evidence
 
@@ -94,7 +95,7 @@ def _verdict(layout, root, judged):
         column, f"{title}: {headline}" if judged.name in ("named", "ambiguous") else title, ICONS[judged.name]
     )
     if judged.summary.get("to_do"):
-        wrapped(column, str(judged.summary["to_do"]), "TOOL_SETTINGS")
+        wrapped(column, in_panel(str(judged.summary["to_do"])), "TOOL_SETTINGS")
     # Mechanism and parameters with their intervals, or why nothing is named.
     wrapped(column, str(judged.summary.get("sentence", "")))
     for cause in judged.verdict.get("causes") or ():

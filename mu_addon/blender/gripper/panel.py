@@ -93,7 +93,7 @@ def _found(layout, scene, root, found):
     if f:
         column.label(text=f"{f['angle_at_hold_deg']:.1f} deg, {f['normal_at_hold_N']:.2f} N a finger at hold")
         held, icon = ("Held", "CHECKMARK") if f["held"] else ("Slips", "ERROR")
-        column.label(text=f"{held}: friction carries {f['margin']:.2g} times the weight", icon=icon)
+        wrapped(column, f"{held}: friction carries {f['margin']:.2g} times the weight", icon)
         column.label(text=f"Gap error {f['gap_error_mm']:.3f} mm")
     on = bool(motion.parts(root))
     row = box.row(align=True)

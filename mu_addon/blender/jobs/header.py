@@ -11,10 +11,12 @@ from ...run.progress import spell
 from ..shared import viewports
 from ..shared.operators import reports_errors
 from . import start_child
-from .panel import whole
+from .panel import shortened, whole
 
 WIDTH = 14
 """Width of the bar in the interface's units: what it says changes, its place does not."""
+STAGE_LETTERS, NOTICE_LETTERS = 14, 48
+"""What fits: the name of a stage beside its number and the time left; a notice in the bar and a bit more."""
 
 
 def listed() -> list[str]:
@@ -30,6 +32,14 @@ class MU_OT_job_cancel(bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     key: StringProperty(name="Job", description="Key of the job", options={"HIDDEN"})
+
+    @classmethod
+    def description(cls, context, properties):
+        child = start_child.child_of(properties.key)
+        if child is None:
+            return cls.__doc__
+        fraction, text = whole(child)
+        return f"{start_child.title_of(properties.key)}: {fraction:.0%}, {text}.\n{cls.__doc__}"
 
     @reports_errors
     def execute(self, context):
@@ -47,6 +57,11 @@ class MU_OT_job_dismiss(bpy.types.Operator):
     bl_idname = "mu.job_dismiss"
     bl_label = "Dismiss Notices"
     bl_options = {"REGISTER"}
+
+    @classmethod
+    def description(cls, context, properties):
+        words = [_words(key) for key in _notices()]
+        return "\n".join([*words, cls.__doc__])
 
     def execute(self, context):
         _seen.update(start_child.ended())
@@ -87,9 +102,14 @@ def draw(self, context) -> None:
     if keys:
         _running(self.layout, keys)
         return
-    ended = [key for key in start_child.ended() if key not in _seen]
+    ended = _notices()
     if ended:
         _notice(self.layout, ended[-1])
+
+
+def _notices() -> list[str]:
+    """Keys of the jobs that have ended since notices were dismissed, the latest last."""
+    return [key for key in start_child.ended() if key not in _seen]
 
 
 def _running(layout, keys: list[str]) -> None:
@@ -100,25 +120,31 @@ def _running(layout, keys: list[str]) -> None:
     more.ui_units_x = 3
     waiting = sum(start_child.child_of(key).state == WAITING for key in keys)
     more.menu("MU_MT_jobs", text=f"+{waiting}" if waiting else "Jobs")
-    fraction, text = whole(start_child.child_of(keys[0]))
+    fraction, text = whole(start_child.child_of(keys[0]), STAGE_LETTERS)
     bar = row.row(align=True)
     bar.ui_units_x = WIDTH
-    bar.progress(factor=fraction, text=f"{fraction:.0%}, {text}: {start_child.title_of(keys[0])}")
+    # The job's name and all of its words are in the tooltip of Cancel and in the menu.
+    bar.progress(factor=fraction, text=f"{fraction:.0%}, {text}")
+
+
+def _words(key: str) -> str:
+    """How a job ended, in words."""
+    child, title = start_child.child_of(key), start_child.title_of(key)
+    if child.state == DONE:
+        return f"Done in {spell(child.seconds)}: {title}"
+    if child.state == CANCELLED:
+        return f"Cancelled: {title}"
+    return f"Failed: {title}, {(child.error or {}).get('what', 'without a message')}"
 
 
 def _notice(layout, key: str) -> None:
-    child, title = start_child.child_of(key), start_child.title_of(key)
     row = layout.row(align=True)
     row.operator("mu.job_dismiss", text="", icon="X")
     words = row.row(align=True)
     words.ui_units_x = WIDTH + 4
-    if child.state == DONE:
-        words.label(text=f"{title}: done in {spell(child.seconds)}", icon="CHECKMARK")
-    elif child.state == CANCELLED:
-        words.label(text=f"{title}: cancelled", icon="CANCEL")
-    else:
-        words.alert = True
-        words.label(text=f"{title}: {(child.error or {}).get('what', 'failed')}", icon="ERROR")
+    icon = {DONE: "CHECKMARK", CANCELLED: "CANCEL"}.get(start_child.child_of(key).state, "ERROR")
+    words.alert = icon == "ERROR"
+    words.label(text=shortened(_words(key), NOTICE_LETTERS), icon=icon)
 
 
 CLASSES = (MU_OT_job_cancel, MU_OT_job_dismiss, MU_MT_jobs)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import textwrap
+
 from ...run.child import CANCELLED, DONE, FAILED, RUNNING, WAITING
 from ...run.progress import spell
 from ..shared.panels import alert, large_button, wrapped
@@ -27,20 +29,32 @@ def job_state(layout, child, where: str, prefix: str = "") -> None:
         _ended(layout, child, where, prefix)
 
 
-def whole(child) -> tuple[float, str]:
-    """How much of a job's whole is done, 0..1, and its stage, number of stages and time left in words."""
+def whole(child, width: int = 0) -> tuple[float, str]:
+    """How much of a job's whole is done, 0..1, and its stage, number of stages and time left in words.
+
+    width: letters that the stage's name has at most, 0 for all of it: a longer one is only numbered.
+    """
     if child.state == WAITING:
         return 0.0, "waiting for the job before it"
     estimate = child.estimate
     if child.stopping:
         return estimate.fraction, "stopping ..."
     stage = str(child.progress.get("stage", "starting"))
+    long = width and len(stage) > width
     if estimate.count:
-        stage += f" ({estimate.number} of {estimate.count})"
+        number = f"{estimate.number} of {estimate.count}"
+        stage = f"stage {number}" if long else f"{stage} ({number})"
+    elif long:
+        stage = shortened(stage, width)
     left = estimate.seconds_left
     # Without a plan the bar is the stage's own, and so is the time.
     fraction = estimate.fraction if estimate.count else child.progress.get("fraction") or 0.0
     return fraction, stage if left is None else f"{stage}, {spell(left)} left"
+
+
+def shortened(text: str, width: int) -> str:
+    """A text of one line in at most so many letters, cut between words where it is longer."""
+    return textwrap.shorten(text, width, placeholder=" ...")
 
 
 def _running(layout, child, prefix: str) -> None:

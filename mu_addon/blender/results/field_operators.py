@@ -50,6 +50,8 @@ class MU_OT_field_show(MotionOperator, bpy.types.Operator):
                 motion_parts.hide(root, *pair)
         settings = root.mu_motion
         settings.field, settings.on_unit = self.field, True
+        # They would lie over the colours, in the place of the unit at rest.
+        root.mu_unit.candidates = False
         motion_parts.show(root, name, motion_parts.MESH)
         if self.field == motion_parts.DIFFERENCE and run_motions.difference_words(root):
             found = motion_parts.parts(root)

@@ -24,7 +24,11 @@ _PLACE = (
 
 
 def renew() -> None:
-    """Turn every such root of this file into one object; others are left alone."""
+    """Turn every such root of this file into one object, and rename older marks; others are left alone."""
+    for obj in bpy.data.objects:
+        if displays.editable(obj) and isinstance(older := obj.get(displays.OLDER_MOTION), str):
+            del obj[displays.OLDER_MOTION]
+            obj[displays.MOTION] = older
     for old in [*unit_object.roots(), *gripper_object.roots()]:
         if old.type == "EMPTY":
             _renewed(old)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -34,3 +35,9 @@ def length(scene: Any, value_mm: float, digits: int = 4) -> str:
     if system == "IMPERIAL":
         return f"{value_mm / 25.4:.{digits}g} in"
     return f"{value_mm:.{digits}g}" + (" mm" if system == "METRIC" else "")
+
+
+def size(scene: Any, values_mm: Sequence[float]) -> str:
+    """Lengths of a body's sides as `length` has one, the unit said once: "37.5 x 50 x 81 mm"."""
+    *first, last = (length(scene, value, digits=3) for value in values_mm)
+    return " x ".join([*(text.partition(" ")[0] for text in first), last])

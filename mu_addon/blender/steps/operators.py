@@ -4,7 +4,7 @@
 
 import attrs
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ...design.nearest import tied
 from ...design.parameters import SECTIONS
@@ -14,7 +14,7 @@ from ..shared import updates
 from ..shared.operators import UnitOperator, reports_errors
 from ..shared.texts import sentence
 from ..unit import object as unit_object
-from ..unit.fields import blender_property, exact
+from ..unit.fields import TRUE, blender_property, exact, in_scene, label, tooltip
 from ..unit.properties import from_unit, to_unit
 from . import state as stack
 
@@ -27,8 +27,14 @@ def _annotations(step: Step) -> dict:
     found = {}
     for section in SECTIONS:
         for d in describe(section):
-            if f"{section.section}.{d.name}" in step.own:
-                found[d.name] = blender_property(d, options={"SKIP_SAVE"})
+            if f"{section.section}.{d.name}" not in step.own:
+                continue
+            found[d.name] = blender_property(d, options={"SKIP_SAVE"})
+            if d.unit == "mm":
+                # Scripts set it in mm at scale 1; the redo panel has it as it is, in the scene's unit.
+                found[d.name] = blender_property(d, options={"SKIP_SAVE", "HIDDEN"})
+                shared = {"name": label(d), "description": tooltip(d), "subtype": "DISTANCE"}
+                found[d.name + TRUE] = FloatProperty(precision=6, options={"SKIP_SAVE"}, **shared)
     if step.muting:
         found["muted"] = BoolProperty(
             name="Mute", description=f"Leave this step out: {step.muting}", options={"SKIP_SAVE"}
@@ -44,8 +50,7 @@ class _OfStep(UnitOperator):
 
     def invoke(self, context, event):
         props = unit_object.active_root(context).mu_unit
-        for section, name in stack.own_parameters(self.step):
-            setattr(self, name, getattr(getattr(props, section), name))
+        self._take(props)
         if self.step.muting:
             self.muted = props.stack[self.step.name].muted
         return self.execute(context)
@@ -57,8 +62,10 @@ class _OfStep(UnitOperator):
         unit = to_unit(props)
         given: dict[str, dict] = {}
         for section, name in stack.own_parameters(self.step):
-            if self.properties.is_property_set(name):
+            if self.properties.is_property_set(name) or self._has_true(name):
                 value = getattr(self, name)
+                if self._has_true(name):
+                    value = getattr(self, name + TRUE) / self._in_scene(props, section, name)
                 value = exact(value) if isinstance(value, float) else value
                 if value != getattr(getattr(unit, section), name):
                     given.setdefault(section, {})[name] = value
@@ -75,9 +82,24 @@ class _OfStep(UnitOperator):
         if not unit_object.rebuild(root):
             self.report({"ERROR"}, props.trouble)
             return {"CANCELLED"}
+        self._take(props)
         made = [name for name in STEPS if stack.STACK.counts[name] > before[name]]
         self.report({"INFO"}, f"Updated: {', '.join(made)}; all other steps unchanged")
         return {"FINISHED"}
+
+    def _has_true(self, name: str) -> bool:
+        return hasattr(self, name + TRUE) and self.properties.is_property_set(name + TRUE)
+
+    def _in_scene(self, props, section: str, name: str) -> float:
+        return in_scene(props, not stack.description(section, name).fixed)
+
+    def _take(self, props) -> None:
+        """Take over what the unit has, for the redo panel."""
+        for section, name in stack.own_parameters(self.step):
+            value = getattr(getattr(props, section), name)
+            setattr(self, name, value)
+            if hasattr(self, name + TRUE):
+                setattr(self, name + TRUE, exact(value) * self._in_scene(props, section, name))
 
 
 def _generated(step: Step) -> type:

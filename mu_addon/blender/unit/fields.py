@@ -24,6 +24,8 @@ def exact(value: float) -> float:
 
 _NAMES = {
     "count": "Chambers",
+    "bladder_diameter_mm": "Bladder Ø",
+    "neck_diameter_mm": "Neck Ø",
     "row": "Anchor Row",
     "cells_y_minus": "Cells -Y",
     "cells_y_plus": "Cells +Y",
@@ -32,11 +34,11 @@ _NAMES = {
     "plus_y": "+Y Side",
     "beside_x": "X Sides",
 }
-"""Parameters whose own names say too little beside a field."""
+"""Parameters whose own names say too little beside a field, or are too long for it."""
 
 
 def label(d: Description) -> str:
-    """Name of a parameter for a panel: `bladder_diameter_mm` becomes "Bladder Diameter"."""
+    """Name of a parameter for a panel: `junction_diameter_mm` becomes "Junction Diameter"."""
     if d.name in _NAMES:
         return _NAMES[d.name]
     words = d.name.split("_")
@@ -91,19 +93,18 @@ def true_length(name: str, title: str, text: str, scales: bool):
     """
 
     def read(group) -> float:
-        return exact(getattr(group, name)) * _factor(group, scales)
+        return exact(getattr(group, name)) * in_scene(group.id_data.mu_unit, scales)
 
     def write(group, value: float) -> None:
-        setattr(group, name, exact(value / _factor(group, scales)))
+        setattr(group, name, exact(value / in_scene(group.id_data.mu_unit, scales)))
 
     shared = {"name": title, "description": text, "subtype": "DISTANCE", "precision": 6}
     return FloatProperty(get=read, set=write, options={"SKIP_SAVE"}, **shared)
 
 
-def _factor(group, scales: bool) -> float:
-    """Blender units of the scene in a millimetre of a parameter."""
-    scale = exact(group.id_data.mu_unit.scale) if scales else 1.0
-    return scene_units.mm(bpy.context.scene) * scale
+def in_scene(unit, scales: bool) -> float:
+    """Blender units of the scene in a millimetre of a parameter of a unit."""
+    return scene_units.mm(bpy.context.scene) * (exact(unit.scale) if scales else 1.0)
 
 
 def shown_value(group, d: Description, value: float) -> str:

@@ -58,7 +58,7 @@ def _made(root: Any, current: bool) -> list[str]:
     found = core.figures(unit, printer, struts, _volume(root) if current else None)
     about = "about " if found.approximate else ""
     return [
-        "Size " + " x ".join(scene_units.length(bpy.context.scene, mm) for mm in found.size_mm),
+        f"Size {scene_units.size(bpy.context.scene, found.size_mm)}",
         f"Resin {about}{found.mass_g:.3g} g, {found.volume_mm3 / 1000.0:.3g} ml",
         f"Prints upright in about {spell(found.print_s)}",
         _assumed(printer),

@@ -6,6 +6,7 @@ import pytest
 
 from mu_addon.blender.gripper import object as gripper_object
 from mu_addon.blender.jobs import start_child
+from mu_addon.blender.shared import displays
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate.job import SIMULATION
 from mu_addon.blender.unit import object as unit_object
@@ -143,7 +144,7 @@ def test_a_duplicate_of_everything_selected_has_no_results_of_the_other(study):
     bpy.context.view_layer.update()
     copy = other_than(root)
     assert len(belonging(root)) == count
-    assert [o for o in belonging(copy) if o.get("mu_motion")] == []
+    assert [o for o in belonging(copy) if o.get(displays.MOTION)] == []
     assert sum(o.get("mu_part", "").startswith("candidate:") for o in belonging(copy)) == 10
     assert studies.findings(root) is not None
     assert studies.findings(copy) is None

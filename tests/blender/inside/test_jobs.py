@@ -1,6 +1,7 @@
 """Jobs in the header: one runs, the others wait; Cancel, and a notice at the end."""
 
 import sys
+from types import SimpleNamespace
 from unittest.mock import MagicMock
 
 import bpy
@@ -35,6 +36,11 @@ def said():
     return " ".join(texts)
 
 
+def told(operator, **settings):
+    """The tooltip of a button of the header."""
+    return getattr(header, f"MU_OT_{operator}").description(bpy.context, SimpleNamespace(**settings))
+
+
 def test_one_runs_the_others_wait_and_each_ends_with_a_notice(monkeypatch):
     first, second = add(), add()
     assert said() == ""
@@ -44,7 +50,7 @@ def test_one_runs_the_others_wait_and_each_ends_with_a_notice(monkeypatch):
     assert (one.state, two.state) == ("running", "waiting")
     assert SIMULATION.is_running(second)
     assert "Model A (3 of 8)" in said()
-    assert "left: mu-1.0x: simulation" in said()
+    assert "mu-1.0x: simulation: " in told("job_cancel", key=SIMULATION.key(first))
     assert "+1" in said()
     assert bpy.ops.mu.job_cancel() == {"FINISHED"}
     assert "stopping" in said()
@@ -52,7 +58,8 @@ def test_one_runs_the_others_wait_and_each_ends_with_a_notice(monkeypatch):
     watch(lambda: two.state != "waiting")
     ended(two)
     assert (one.state, two.state) == ("cancelled", "done")
-    assert "mu-1.0x.001: simulation: done in" in said()
+    assert "Done in" in said()
+    assert "mu-1.0x.001: simulation" in said()
     assert bpy.ops.mu.job_dismiss() == {"FINISHED"}
     assert said() == ""
     assert "no such job" in refused(bpy.ops.mu.job_cancel)
@@ -74,7 +81,25 @@ def test_what_waits_can_be_taken_out_of_the_queue(monkeypatch):
 def test_a_failed_one_says_what_in_the_header(monkeypatch):
     child = started(add(), "reported_error", monkeypatch)
     ended(child)
-    assert "no equilibrium" in said()
+    assert "Failed: mu-1.0x: simulation" in said()
+    assert len(said()) <= header.NOTICE_LETTERS
+    assert child.error["what"] in told("job_dismiss")
+
+
+def test_a_bar_is_short_whatever_a_stage_is_called(monkeypatch):
+    root = add()
+    root.name = "a name of a unit that nobody can read at a glance"
+    child = started(root, "hang", monkeypatch)
+    watch(lambda: child.progress)
+    child.progress["stage"] = "candidates behind the third limit point"
+    assert "stage 3 of 8" in said()
+    assert "limit point" not in said()
+    everything = told("job_cancel", key=SIMULATION.key(root))
+    assert "limit point" in everything
+    assert root.name in everything
+    assert everything.endswith("what it has finished is kept")
+    assert bpy.ops.mu.job_cancel() == {"FINISHED"}
+    ended(child)
 
 
 def test_a_plan_has_the_stages_of_the_job_and_the_seconds_of_the_last_run(study):

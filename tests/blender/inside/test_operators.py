@@ -153,15 +153,15 @@ def test_the_head_says_what_a_unit_comes_to():
     lines, wrong = figures.lines(root, 38)
     assert not wrong
     assert lines[:3] == [
-        "Size 37.5 mm x 50 mm x 81 mm",
+        "Size 37.5 x 50 x 81 mm",
         "Resin about 19.1 g, 19 ml",
         "Prints upright in about 3 h 40 min",
     ]
     assert "assumed" in lines[3]
     root.mu_unit.scale = 2.0
-    assert figures.lines(root, 38)[0][0] == "Size 75 mm x 100 mm x 162 mm"
+    assert figures.lines(root, 38)[0][0] == "Size 75 x 100 x 162 mm"
     bpy.context.scene.unit_settings.system = "IMPERIAL"
-    assert figures.lines(root, 38)[0][0] == "Size 2.953 in x 3.937 in x 6.378 in"
+    assert figures.lines(root, 38)[0][0] == "Size 2.95 x 3.94 x 6.38 in"
     bpy.ops.mu.millimetres()
     root.mu_unit.scale = 1.0
     bpy.ops.mu.solid()

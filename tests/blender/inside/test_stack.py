@@ -52,7 +52,9 @@ def test_each_step_runs_alone_with_its_own_parameters():
             continue
         operator = getattr(bpy.ops.mu, step.name)
         own = {name for _, name in stack.own_parameters(step)}
-        shown = {p.identifier for p in operator.get_rna_type().properties} - {"rna_type"}
+        shown = {p.identifier.removesuffix("_true") for p in operator.get_rna_type().properties} - {
+            "rna_type"
+        }
         assert shown == own | ({"muted"} if step.muting else set()), (step.name, shown)
         assert made(operator) == {step.name}
         assert props.step == list(STEPS).index(step.name)
@@ -67,6 +69,18 @@ def test_each_step_runs_alone_with_its_own_parameters():
     assert props.trouble == ""
     bpy.ops.mu.wells(well_depth_mm=0.3)
     assert round(props.waveguide.well_depth_mm, 4) == 0.3
+
+
+def test_a_steps_redo_panel_shows_true_lengths():
+    props = add(preset="mu-0.75x").mu_unit
+    bpy.context.scene.unit_settings.scale_length = 1.0
+    shown = {p.identifier for p in bpy.ops.mu.chambers.get_rna_type().properties if not p.is_hidden}
+    assert "wall_mm_true" in shown
+    assert not {p for p in shown if p.endswith("_mm")}
+    assert bpy.ops.mu.chambers(wall_mm_true=0.00075) == {"FINISHED"}
+    assert round(props.chambers.wall_mm, 4) == 1.0
+    assert bpy.ops.mu.chambers(wall_mm=0.9) == {"FINISHED"}
+    assert round(props.chambers.wall_mm, 4) == 0.9
 
 
 def test_muted_steps_are_left_out_and_not_printed(tmp_path):

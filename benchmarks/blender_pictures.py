@@ -1,0 +1,352 @@
+"""The pictures that the pages on Blender show, taken of the extension as it is.
+
+    python benchmarks/blender_pictures.py            what takes minutes, without a window: FOLDER/*.blend
+    MU_BLENDER_UI... benchmarks/blender_pictures.py last.png SECONDS        FOLDER/blender-*.png
+
+with FOLDER as MU_PICTURES (MU_BLENDER_UI as of tests/blender/test_installed.py, MU_TEST_FOLDER=FOLDER; it
+needs ImageMagick). The first needs bpy, the second the built extension. MU_ONLY names some of the pictures,
+with blanks between them. Each is made in a Blender as new, whose window is as large as the picture.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import bpy
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "blender")]
+
+FOLDER = Path(os.environ["MU_PICTURES"])
+ONLY = os.environ.get("MU_ONLY", "").split()
+SIZE = 1100, 830
+TITLE = 20
+"""Height of the bar with the file's name, which is left out."""
+COLOURS = 128
+CLIP = "clip"
+BASE, TIP = ("base a", "base b"), ("tip a", "tip b")
+
+
+# What takes minutes, in a Python with bpy.
+
+
+def prepare():
+    """A grasp, a unit that met an obstacle, a diagnosis and a filmed bench, as Blender's files."""
+    import mu_addon
+    from mu_addon.blender.evidence.state import DIAGNOSIS
+    from mu_addon.blender.gripper.state import GRASP
+    from mu_addon.blender.simulate.job import SIMULATION
+    from tests.blender.filming import ANGLES, film, pressures
+    from tests.usecases.diagnosis_data import weighed_blocks
+
+    weighed_blocks(FOLDER / "blocks", 0.09)
+    truth = film(FOLDER / CLIP, ANGLES)[:, 0].tolist()
+    (FOLDER / "markers.json").write_text(json.dumps(dict(zip(BASE + TIP, truth, strict=True))))
+    pressures(FOLDER, ANGLES)
+    jobs = {
+        "obstacle": ("obstacle", SIMULATION, bpy.ops.mu.simulate),
+        "evidence": ("measured", DIAGNOSIS, bpy.ops.mu.evidence_diagnose),
+        "gripper": ("gripper", GRASP, bpy.ops.mu.grasp),
+    }
+    for name, (scene, kind, start) in jobs.items():
+        if ONLY and name not in ONLY:
+            continue
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        mu_addon.register()
+        bpy.ops.mu.millimetres()
+        bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / f"{name}.blend"))
+        bpy.ops.mu.sample(scene=scene)
+        root = bpy.context.view_layer.objects.active
+        if name == "evidence":
+            root.mu_evidence.folder = "//blocks"
+        assert start() == {"FINISHED"}
+        _wait(kind.child(root))
+        bpy.ops.wm.save_mainfile()
+        mu_addon.unregister()
+        print(name, flush=True)
+
+
+def _wait(child):
+    from mu_addon.blender.jobs import start_child
+
+    while child.state in ("running", "waiting"):
+        start_child.poll()
+        time.sleep(0.2)
+    assert child.state == "done", child.error
+
+
+# The pictures, in a Blender with a window.
+
+
+def shot(name):
+    """The window as a picture of few colours."""
+    file = FOLDER / f"blender-{name}.png"
+    crop = f"{SIZE[0]}x{SIZE[1] - TITLE}+0+{TITLE}"
+    command = ["import", "-window", "root", "-crop", crop, "+repage", "+dither", "-colors", str(COLOURS)]
+    subprocess.run([*command, "-strip", str(file)], check=True)
+    print("picture", name, flush=True)
+
+
+def new(*panels, file="", sidebar=True):
+    """A Blender as new: one 3D view, the tab MU beside it, and of our panels those open that are named."""
+    import addon_utils
+
+    addon_utils.disable(package)
+    for kind in panel_kinds:
+        if panels and kind.bl_idname == "MU_PT_design":
+            kind.bl_options = {"DEFAULT_CLOSED"}
+        elif "DEFAULT_CLOSED" in usual[kind]:
+            kind.bl_options = usual[kind] - ({"DEFAULT_CLOSED"} if kind.bl_idname in panels else set())
+    bpy.ops.wm.read_homefile(load_ui=True, use_empty=False, use_factory_startup=False)
+    yield 2.0
+    if file:
+        bpy.ops.wm.open_mainfile(filepath=str(FOLDER / file), load_ui=False)
+        yield 2.0
+    addon_utils.enable(package)
+    yield 2.0
+    for other in list(bpy.data.objects):
+        if not file:
+            bpy.data.objects.remove(other)
+    window, area, _ = parts()
+    with bpy.context.temp_override(window=window, area=area):
+        bpy.ops.screen.screen_full_area(use_hide_panels=False)
+    yield 2.0
+    if sidebar:
+        parts()[1].spaces.active.show_region_ui = True
+        yield 3.0
+        parts()[2].active_panel_category = "MU"
+        yield 1.0
+    if not file:
+        bpy.ops.mu.millimetres()
+
+
+def added(cut=True, preset="mu-1.0x", path="alpha4"):
+    """A unit, cut open, with a path."""
+    assert called(bpy.ops.mu.add, preset=preset) == {"FINISHED"}
+    yield 2.0
+    root().mu_unit.cut = cut
+    if path:
+        assert called(bpy.ops.mu.path, name=path) == {"FINISHED"}
+    yield 3.0
+
+
+def root():
+    return unit_object.roots()[0]
+
+
+def over_view(right=0.35, up=0.55):
+    _, area, _ = parts()
+    move(area.x + area.width * right, area.y + area.height * up)
+
+
+def scrolled(times):
+    """The sidebar turned down."""
+    region = parts()[2]
+    move(region.x + region.width * 0.5, region.y + region.height * 0.4)
+    yield 1.0
+    for _ in range(times):
+        event("WHEELDOWNMOUSE", "PRESS")
+        yield 0.3
+    yield 2.0
+
+
+def seen_from(turn_deg, objects=None, wider=1.0):
+    """Turn the view about the vertical axis, from the right view, and frame what is given or the unit."""
+    from mathutils import Euler
+
+    view = parts()[1].spaces.active.region_3d
+    view.view_rotation = Euler((math.radians(78), 0.0, math.radians(90 + turn_deg))).to_quaternion()
+    view.view_perspective = "PERSP"
+    viewports.frame(objects or [root()])
+    view.view_distance *= wider
+
+
+def add():
+    yield from new(sidebar=True)
+    over_view(0.3, 0.75)
+    yield 1.0
+    key("A", shift=True)
+    yield 2.0
+    for letter in "mono":
+        key(letter.upper(), unicode=letter)
+        yield 1.0
+    yield 1.0
+    shot("add")
+    key("ESC")
+    key("ESC")
+    yield 1.0
+
+
+def steps():
+    yield from new("MU_PT_stack")
+    yield from added()
+    seen_from(20)
+    yield 2.0
+    shot("steps")
+    over_view(0.1, 0.6)
+    yield 1.0
+    assert called(bpy.ops.mu.chambers, "INVOKE_DEFAULT") == {"FINISHED"}
+    yield 2.0
+    key("F9")
+    yield 3.0
+    shot("redo")
+    key("ESC")
+    yield 1.0
+    assert called(bpy.ops.mu.mute, step="trim") == {"FINISHED"}
+    yield 3.0
+    shot("muted")
+
+
+def print_part():
+    yield from new("MU_PT_print", "MU_PT_print_files")
+    yield from added(preset="mu-0.75x")
+    assert called(bpy.ops.mu.solid) == {"FINISHED"}
+    yield 3.0
+    seen_from(20)
+    yield 2.0
+    shot("print")
+
+
+def print_check():
+    yield from new("MU_PT_print", "MU_PT_print_check")
+    yield from added(preset="mu-0.75x")
+    assert called(bpy.ops.mu.print_check) == {"FINISHED"}
+    child = printing.PRINTING.child(root())
+    while child.state in ("running", "waiting"):
+        yield 1.0
+    assert child.state == "done", child.error
+    yield 2.0
+    assert called(bpy.ops.mu.print_show, finding=0) == {"FINISHED"}
+    yield 2.0
+    seen_from(20)
+    yield from scrolled(4)
+    shot("print-check")
+
+
+def simulate():
+    yield from new("MU_PT_simulate")
+    yield from added(preset="mu-0.75x")
+    seen_from(20)
+    study = root().mu_unit.study
+    study.command, study.detail = "place", "quick"
+    assert called(bpy.ops.mu.simulate) == {"FINISHED"}
+    child = SIMULATION.child(root())
+    while child.state == "running" and child.progress.get("stage") != "Model A":
+        yield 1.0
+    yield 4.0
+    shot("simulate")
+    assert called(bpy.ops.mu.cancel) == {"FINISHED"}
+    while child.state == "running":
+        yield 1.0
+
+
+def obstacle():
+    yield from new("MU_PT_simulate", "MU_PT_obstacles", file="obstacle.blend")
+    assert called(bpy.ops.mu.field_show, field="displacement_mm") == {"FINISHED"}
+    yield 3.0
+    seen_from(0, [root(), *root().children], 1.4)
+    yield 2.0
+    shot("obstacle")
+
+
+def gripper():
+    yield from new("MU_PT_gripper", "MU_PT_grasp", file="gripper.blend")
+    seen_from(14, [gripper_object.active(bpy.context), *gripper_object.active(bpy.context).children], 1.2)
+    yield 2.0
+    shot("gripper")
+    assert called(bpy.ops.mu.grasp_show) == {"FINISHED"}
+    scene = bpy.context.scene
+    scene.frame_set(round(0.55 * scene.frame_end))
+    yield 3.0
+    shot("grasp")
+
+
+def apply():
+    yield from new("MU_PT_evidence", file="evidence.blend")
+    assert called(bpy.ops.mu.evidence_apply) == {"FINISHED"}
+    yield 2.0
+    seen_from(20)
+    yield from scrolled(9)
+    shot("apply")
+
+
+def assets():
+    yield from new(sidebar=False)
+    assert called(bpy.ops.mu.assets) == {"FINISHED"}
+    yield 3.0
+    area = parts()[1]
+    area.ui_type = "ASSETS"
+    yield 3.0
+    area.spaces.active.params.asset_library_reference = "Monolithic Units"
+    yield 3.0
+    shot("assets")
+
+
+def track():
+    yield from new(sidebar=False)
+    window, area, _ = parts()
+    clip = bpy.data.movieclips.load(str(FOLDER / CLIP / "shot0001.png"))
+    area.ui_type = "CLIP_EDITOR"
+    space = area.spaces.active
+    space.clip, space.show_region_ui = clip, True
+    yield 2.0
+    region = next(r for r in area.regions if r.type == "WINDOW")
+    side = next(r for r in area.regions if r.type == "UI")
+    places = json.loads((FOLDER / "markers.json").read_text())
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        for name, pixel in places.items():
+            tracking._place(clip, name, pixel, MarkerSettings({}), "")
+        assert bpy.ops.mu.track() == {"FINISHED"}
+        bpy.ops.clip.view_all()
+    bench = clip.mu_bench
+    (bench.base_1, bench.base_2), (bench.tip_1, bench.tip_2) = BASE, TIP
+    bench.base_1_mm, bench.base_2_mm, bench.fps = (-15, 0), (15, 0), 10
+    bench.pressure, bench.folder = "//pressure.csv", "//measured"
+    bpy.context.scene.frame_set(30)
+    side.active_panel_category = "MU"
+    yield 2.0
+    shot("track")
+
+
+PICTURES = {
+    "add": add, "steps": steps, "print": print_part, "print-check": print_check, "simulate": simulate,
+    "obstacle": obstacle, "gripper": gripper, "apply": apply, "assets": assets, "track": track,
+}  # fmt: skip
+
+
+def session():
+    ids = subprocess.run(
+        ["xdotool", "search", "--class", "blender"], capture_output=True, text=True, check=True
+    )
+    for number in ids.stdout.split():
+        subprocess.run(["xdotool", "windowsize", number, *map(str, SIZE)], check=False)
+        subprocess.run(["xdotool", "windowmove", number, "0", "0"], check=False)
+    yield 3.0
+    for name, picture in PICTURES.items():
+        if not ONLY or name in ONLY:
+            yield from picture()
+
+
+if bpy.app.background:
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    prepare()
+else:
+    import math
+
+    from simulated import called, event, key, module, move, package, parts, run
+
+    unit_object, printing = module("blender.unit.object"), module("blender.printing.state")
+    gripper_object, viewports = module("blender.gripper.object"), module("blender.shared.viewports")
+    SIMULATION = module("blender.simulate.job").SIMULATION
+    tracking, MarkerSettings = (
+        module("blender.track.state"),
+        module("usecases.track_video.run").MarkerSettings,
+    )
+    panel_kinds = [
+        kind for kind in bpy.types.Panel.__subclasses__() if str(kind.__module__).startswith(package)
+    ]
+    usual = {kind: getattr(kind, "bl_options", set()) for kind in panel_kinds}
+    run(session)
