@@ -48,13 +48,15 @@ class SearchSettings:
 class Observed:
     """What is known of a design: values (q,), slopes (q, c) by its continuous freedoms, nan where unknown.
 
-    sound: whether it could be computed.
+    sound: whether it could be computed. margins (q,): how far to either side of each value its target shall
+    be met too; None for no margin.
     """
 
     design: Values
     values: Array
     slopes: Array
     sound: bool = True
+    margins: Array | None = None
 
 
 @attrs.frozen(eq=False)
@@ -194,7 +196,12 @@ class _Search:
 
     def _compute(self, designs: Sequence[Values]) -> None:
         self.observed += [
-            attrs.evolve(o, values=o.values[self.judged], slopes=o.slopes[self.judged])
+            attrs.evolve(
+                o,
+                values=o.values[self.judged],
+                slopes=o.slopes[self.judged],
+                margins=(np.zeros_like(o.values) if o.margins is None else o.margins)[self.judged],
+            )
             for o in self.observe(designs)
         ]
         best = self.observed[self._best()]
@@ -203,7 +210,7 @@ class _Search:
     def _words(self, best: Observed) -> str:
         if not best.sound:
             return "no design could be computed yet"
-        missed = sum(not t.met(v) for t, v in zip(self.targets, best.values, strict=True))
+        missed = sum(not met for met in self._met(best))
         return (
             f"{missed} of {len(self.targets) - len(self.goals)} targets missed"
             if missed
@@ -211,13 +218,16 @@ class _Search:
         )
 
     def _models(self) -> Sequence[Surrogate]:
+        """Of every value, and where there are margins of those after them."""
         sound = [o for o in self.observed if o.sound]
         x = self.coordinates(np.array([self.places(o.design) for o in sound]))
         widths = np.array([self.freedoms[i].high - self.freedoms[i].low for i in self.continuous])
         slopes = np.full((len(sound), len(self.targets), x.shape[1]), np.nan)
         if len(self.continuous):
             slopes[:, :, : len(self.continuous)] = np.array([o.slopes for o in sound]) * widths
-        return fit_all(x, np.array([o.values for o in sound]), slopes)
+        found = list(fit_all(x, np.array([o.values for o in sound]), slopes))
+        margins = np.array([o.margins for o in sound])
+        return found + list(fit_all(x, margins, np.full_like(slopes, np.nan))) if margins.any() else found
 
     def _done(self) -> bool:
         """Without objectives: whether a design meets all that is asked, targets near to their middle."""
@@ -227,36 +237,48 @@ class _Search:
         if not best.sound:
             return False
         misfits = [t.misfit(v) for t, v in zip(self.targets, best.values, strict=True)]
-        return all(abs(m) <= 0.1 for m in misfits) and all(
-            t.met(v) for t, v in zip(self.targets, best.values, strict=True)
-        )
+        return all(abs(m) <= 0.1 for m in misfits) and all(self._met(best))
 
     # How good values are.
 
-    def _misfits(self, values: Array, inward: float) -> Array:
-        """Squared misfits (m, q) of values (m, q); inward: how far inside their bounds they shall be."""
-        found = np.zeros_like(values)
+    def _met(self, o: Observed) -> list[bool]:
+        """Whether each target is met, within its margin."""
+        assert o.margins is not None
+        rows = zip(self.targets, o.values, o.margins, strict=True)
+        return [t.met(float(v), float(margin)) for t, v, margin in rows]
+
+    def _known(self, observed: Sequence[Observed]) -> Array:
+        """Values and behind them margins (n, 2 q) of computed designs."""
+        return np.array([[*o.values, *o.margins] for o in observed])  # type: ignore[misc]
+
+    def _misfits(self, found: Array, inward: float) -> Array:
+        """Squared misfits (m, q) of values and margins (m, 2 q).
+
+        inward: how far inside their bounds they shall be, in tolerances.
+        """
+        values, margins = found[:, : len(self.targets)], found[:, len(self.targets) :]
+        misfits = np.zeros_like(values)
         for i, t in enumerate(self.targets):
             if t.goal is not None:
                 continue
-            v = values[:, i] / t.tolerance
+            v, margin = values[:, i] / t.tolerance, margins[:, i] / t.tolerance
             if not np.isnan(t.value):
-                off = np.abs(v - t.value / t.tolerance)
-                found[:, i] = np.maximum(off - (AIM if self.goals else 0.0), 0.0) ** 2
+                off = np.abs(v - t.value / t.tolerance) + margin
+                misfits[:, i] = np.maximum(off - (AIM if self.goals else 0.0), 0.0) ** 2
                 continue
             if not np.isnan(t.low):
-                found[:, i] += np.maximum(t.low / t.tolerance + inward - v, 0.0) ** 2
+                misfits[:, i] += np.maximum(t.low / t.tolerance + inward + margin - v, 0.0) ** 2
             if not np.isnan(t.high):
-                found[:, i] += np.maximum(v - t.high / t.tolerance + inward, 0.0) ** 2
-        return found
+                misfits[:, i] += np.maximum(v - t.high / t.tolerance + inward + margin, 0.0) ** 2
+        return misfits
 
-    def _merit(self, values: Array, weights: Array, inward: float = INWARD) -> Array:
-        """Merits (m,) of values (m, q), to be small, for weights (g,) of the objectives."""
-        merit = PENALTY * self._misfits(values, inward).sum(axis=1)
+    def _merit(self, found: Array, weights: Array, inward: float = INWARD) -> Array:
+        """Merits (m,) of values and margins (m, 2 q), to be small, for weights (g,) of the objectives."""
+        merit = PENALTY * self._misfits(found, inward).sum(axis=1)
         if not self.goals:
             return merit
         ideal, span = self._scale()
-        part = weights * (self.signs * values[:, self.goals] - ideal) / span
+        part = weights * (self.signs * found[:, self.goals] - ideal) / span
         return np.asarray(merit + part.max(axis=1) + 0.05 * part.sum(axis=1))
 
     def _scale(self) -> tuple[Array, Array]:
@@ -270,7 +292,7 @@ class _Search:
         return least - span, span
 
     def _feasible(self, o: Observed) -> bool:
-        return o.sound and all(t.met(v) for t, v in zip(self.targets, o.values, strict=True))
+        return o.sound and all(self._met(o))
 
     def _trust(self, models: Sequence[Surrogate], before: int) -> float:
         """Factor on the reach, by how well the surrogates foresaw the designs computed since.
@@ -279,7 +301,7 @@ class _Search:
         """
         sound = [o for o in self.observed[:before] if o.sound]
         places = np.array([self.places(o.design) for o in sound])
-        sizes = np.array([m.size for m in models])
+        sizes = np.array([m.size for m in models[: len(self.targets)]])
         factors = []
         for o in self.observed[before:]:
             if not o.sound:
@@ -287,7 +309,7 @@ class _Search:
                 continue
             at = self.places(o.design)
             nearest = sound[int(np.abs(places - at).max(axis=1).argmin())]
-            foreseen = self._predicted(models, at[None])[0]
+            foreseen = self._predicted(models, at[None])[0, : len(self.targets)]
             change = np.linalg.norm((foreseen - nearest.values) / sizes)
             wrong = np.linalg.norm((foreseen - o.values) / sizes) / max(float(change), 1e-12)
             factors.append(2.0 if wrong < 0.1 else 1.0 if wrong < 0.35 else 0.5)
@@ -297,8 +319,8 @@ class _Search:
         """Whether a design is better for some weights than all of those before."""
         if not self.observed[number].sound:
             return False
-        rows = [o.values for o in self.observed[:before] if o.sound]
-        merit = self._merit(np.array([*rows, self.observed[number].values]), weights, 0.0)
+        rows = [o for o in self.observed[:before] if o.sound]
+        merit = self._merit(self._known([*rows, self.observed[number]]), weights, 0.0)
         return len(rows) == 0 or bool(merit[-1] < merit[:-1].min() - 1e-9 * abs(merit[-1]))
 
     def _best(self) -> int:
@@ -307,7 +329,7 @@ class _Search:
         def cost(o: Observed) -> tuple[bool, float, float]:
             if not o.sound:
                 return (True, np.inf, np.inf)
-            values = o.values[None]
+            values = self._known([o])
             goal = float(self._merit(values, np.ones(len(self.goals)), 0.0)[0])
             feasible = self._feasible(o)
             return (not feasible, 0.0 if feasible else float(self._misfits(values, 0.0).sum()), goal)
@@ -337,7 +359,7 @@ class _Search:
         failed = np.array([self.places(o.design) for o in self.observed if not o.sound]).reshape(
             -1, len(self.freedoms)
         )
-        values = np.array([o.values for o in self.observed if o.sound])
+        values = self._known([o for o in self.observed if o.sound])
         order = np.argsort(self._merit(values, weights))
         best, width = sound[order[: min(4, len(order))]], self.reach
         for _ in range(ROUNDS):
@@ -358,8 +380,13 @@ class _Search:
         return None
 
     def _predicted(self, models: Sequence[Surrogate], places: Array) -> Array:
+        """Values and margins (m, 2 q) at places (m, f)."""
         x = self.coordinates(places)
-        return np.stack([m.mean(x) for m in models], axis=1)
+        means = np.stack([m.mean(x) for m in models], axis=1)
+        missing = np.zeros((len(x), 2 * len(self.targets) - means.shape[1]))
+        found = np.concatenate([means, missing], axis=1)
+        found[:, len(self.targets) :] = np.maximum(found[:, len(self.targets) :], 0.0)
+        return found
 
     def _around(self, centres: Array, width: float) -> Array:
         """Places (SAMPLES, f) about some centres, a discrete freedom changed now and then."""
@@ -410,7 +437,7 @@ class _Search:
         self.reach = MOST_REACH
         found = []
         for number, target in enumerate(self.targets):
-            if target.goal is not None or target.met(best.values[number]):
+            if target.goal is not None or self._met(best)[number]:
                 continue
             places, width = self.places(best.design)[None], 0.5
             least = np.inf

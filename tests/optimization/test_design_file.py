@@ -15,6 +15,8 @@ ANGLE = '[[target]]\nkind = "angle"\npressure_kPa = 30\nlow = 20\n'
 
 KIND = '[[freedom]]\nparameter = "lattice.kind"\nvalues = ["octet"]\n'
 SENSOR = '[[target]]\nkind = "deviation"\npressures_kPa = [5]\npath = "x"\nhigh = 1\n'
+ASIDE = ANGLE.replace("angle", "tip_position") + 'direction = "x"\n'
+FORCE = '[[target]]\nkind = "tip_force"\npressure_kPa = 20\ngap_mm = 2\nlow = 1\n'
 
 
 def design(text):
@@ -63,6 +65,32 @@ def test_the_examples_are_read(folder):
     assert len(found.freedoms) >= 2
 
 
+def test_force_place_and_path_of_the_tip_are_targets():
+    found = design(
+        HEAD
+        + FORCE
+        + '[[target]]\nkind = "tip_position"\npressure_kPa = 30\ndirection = "z"\nhigh = 1\n'
+        + '[[target]]\nkind = "workspace"\npressures_kPa = [-10, 30]\nobjective = "maximise"\n'
+        + WALL
+    )
+    assert [(t.name, t.unit) for t in found.targets] == [
+        ("tip force at 20 kPa on a wall at 2 mm", "N"),
+        ("tip position at 30 kPa along z", "mm"),
+        ("workspace", "mm"),
+    ]
+    force, place, path = (t.quantity for t in found.targets)
+    assert (force.pressure_kPa, force.gap_mm, place.direction) == (20.0, 2.0, "z")
+    assert [c.pressure_kPa for c in path.conditions] == [-10.0, 0.0, 30.0]
+
+
+def test_a_unit_with_weight_has_an_angle_at_rest():
+    found = design(HEAD + "orientation_deg = 90\nrobust = true\n" + ANGLE.replace("30", "0") + WALL)
+    assert found.orientation_deg == 90.0
+    assert found.targets[0].quantity.pressure_kPa == 0.0
+    assert found.robust
+    assert design(HEAD + ANGLE + WALL).orientation_deg is None
+
+
 def test_a_curve_is_a_target_a_point():
     found = design(
         HEAD + '[[target]]\nkind = "angle"\npoints = [[-15, -10], [30, 16]]\ntolerance = 1\n' + WALL
@@ -108,6 +136,13 @@ def test_what_follows_a_freedom_changes_with_it():
         (ANGLE + WALL, "format", "format"),
         ("format = 1\n" + ANGLE + WALL, "no unit is given", "design.toml"),
         (HEAD + "target = 3\n" + WALL, "list of tables", "target"),
+        (HEAD + ANGLE.replace("30", "0") + WALL, "the unit at rest", "line 5"),
+        (HEAD + ANGLE.replace("angle", "tip_force").replace("30", "-5") + WALL, "toward which", "line 5"),
+        (HEAD + FORCE.replace("gap_mm = 2", "gap_mm = 999") + WALL, "gap_mm = 999 is out", "line 6"),
+        (HEAD + FORCE.replace("gap_mm = 2", 'direction = "y"') + WALL, "unknown key 'direction'", "line 6"),
+        (HEAD + ASIDE + WALL, "none in which", "line 7"),
+        (HEAD + "robust = 1\n" + ANGLE + WALL, "neither true nor false", "line 3"),
+        (HEAD + "orientation_deg = 400\n" + ANGLE + WALL, "out of bounds", "line 3"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_named_by_key_and_line(text, what, where):

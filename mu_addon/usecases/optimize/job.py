@@ -17,6 +17,7 @@ from ...optimization.unit_body import Mechanics
 from ...reading import file_text
 from ...run.folder import FolderLayout
 from ..simulate_and_place.extended_unit import extend
+from ..simulate_and_place.named_effects import NamedEffects
 
 DESIGN, MODEL = "design.toml", "model.toml"
 TABLE, REPORT = "designs.csv", "report.html"
@@ -88,10 +89,12 @@ def mechanics_of(
     """
     settings = design.settings if refine is None else attrs.evolve(design.settings, refine=refine)
     if model is None:
-        return Mechanics(settings), []
-    first = extend(design.unit, model)
-    effects = first.effects
-    left_out = list(first.left_out)
+        effects, left_out = _with_weight(NamedEffects(), design), []
+        if not effects:
+            return Mechanics(settings), []
+    else:
+        first = extend(design.unit, model)
+        effects, left_out = _with_weight(first.effects, design), list(first.left_out)
     if effects.in_time:
         left_out.append(
             "effects in time (viscoelasticity, lag, leak, softening): targets are of the unit at rest under "
@@ -99,7 +102,7 @@ def mechanics_of(
         )
 
     def printed(unit: Unit) -> Unit:
-        return extend(unit, model).unit
+        return unit if model is None else extend(unit, model).unit
 
     return Mechanics(
         settings,
@@ -109,3 +112,12 @@ def mechanics_of(
         load=effects.load,
         newton=None if design.settings.resolved else effects.newton,
     ), left_out
+
+
+def _with_weight(effects: NamedEffects, design: Design) -> NamedEffects:
+    """The effects and the unit's weight as the design turns it, by default of the resin's density."""
+    if design.orientation_deg is None:
+        return effects
+    values = {name: dict(given) for name, given in effects.values.items()}
+    values.setdefault("gravity", {"density_kg_m3": 1000.0 * design.material.density_g_per_ml})
+    return NamedEffects(values, design.orientation_deg, effects.where)

@@ -14,9 +14,10 @@ from ...design.parameters import Unit, write_unit
 from ...design.printing.printer import load_printer
 from ...errors import InputError, OutputError
 from ...files import write_csv
-from ...optimization.evaluation import Evaluated, Evaluator
+from ...optimization.evaluation import Evaluated, Evaluator, evaluate
 from ...optimization.robustness import Verified, verified
 from ...optimization.search import Found, Observed, Values, search_units
+from ...optimization.uncertainty import SURE
 from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.usecase import UseCase
@@ -27,6 +28,9 @@ from .words import changes, outcome, reasons, verdict
 from .worker import several
 
 Array = np.ndarray[Any, Any]
+
+LARGEST_CHANGE = 0.5
+"""Share of a value that a finer mesh is taken to change it by at most."""
 
 MOST_CHECKED = 6
 """Units of a front that are simulated again on a finer mesh, its ends and some evenly between."""
@@ -52,11 +56,14 @@ def optimise(job: Job, folder: Path, context: RunContext) -> Optimised:
         Cache(folder / "cache"),
         origin,
         several(job, progress.warning),
+        uncertainty=design.uncertainty if design.robust else None,
     )
     run.evaluator = evaluator
     start = Observed(design.start, np.empty(0), np.empty((0, 0)), False)
     try:
         with progress.stage("search"):
+            if design.robust:
+                run.mesh_change = run.change_by_mesh()
             found = search_units(
                 design.freedoms, design.targets, run.observe, design.start, run.settings, run.step
             )
@@ -90,6 +97,7 @@ class _Run:
     refine: float
     evaluator: Evaluator = attrs.field(init=False)
     rows: list[tuple[Values, Evaluated | None]] = attrs.field(factory=list)
+    mesh_change: Array | None = None
 
     @property
     def settings(self) -> Any:
@@ -107,8 +115,43 @@ class _Run:
                 [(t.kind, t.quantity) for t in design.targets],
                 [(f.name, f.low, f.high, tuple(f.also.items())) for f in design.freedoms if not f.discrete],
                 design.settings,
+                (design.orientation_deg, design.material.density_g_per_ml),
+                design.uncertainty if design.robust else None,
             )
         )
+
+    def change_by_mesh(self) -> Array:
+        """Share (q,) by which each value of the start changes from the search's mesh to the finer one.
+
+        0 where the start fails on either.
+        """
+        design = self.job.design
+        name = key("change by mesh 1", design.unit.hash(), self.asked, design.check_refine, self._model_text)
+        cache = self.evaluator.cache
+        kept = None if cache is None else cache.get("mesh", name)
+        if kept is not None:
+            return np.asarray(kept["change"])
+        finer, _ = mechanics_of(design, self.job.model, design.check_refine)
+        [coarse] = self.evaluator.of([design.unit])
+        fine = evaluate(design.unit, design.targets, (), finer).values - coarse.values
+        share = np.divide(fine, coarse.values, out=np.zeros_like(fine), where=coarse.values != 0)
+        change = np.clip(np.nan_to_num(share), -LARGEST_CHANGE, LARGEST_CHANGE)
+        if cache is not None:
+            cache.put("mesh", name, {"change": change})
+        return change
+
+    @property
+    def _model_text(self) -> str:
+        return "" if self.job.model is None else self.job.model.text()
+
+    def _observed(self, values: Values, found: Evaluated) -> Observed:
+        """A computed unit as the search takes it; where it shall be robust, as expected on the finer mesh."""
+        if self.mesh_change is None:
+            return Observed(values, found.values, found.gradient, found.sound)
+        by_mesh, factor = self.mesh_change * found.values, 1.0 + self.mesh_change
+        error = np.sqrt(by_mesh**2 + found.by_print**2 + found.by_resin**2)
+        slopes = factor[:, None] * found.gradient
+        return Observed(values, factor * found.values, slopes, found.sound, SURE * np.nan_to_num(error))
 
     def observe(self, designs: Sequence[Values]) -> list[Observed]:
         """Designs as the search takes them; one that breaks a rule of units is not computed."""
@@ -128,7 +171,7 @@ class _Run:
             if result is None:
                 observed.append(Observed(values, np.full(none[0], np.nan), np.full(none, np.nan), False))
             else:
-                observed.append(Observed(values, result.values, result.gradient, result.sound))
+                observed.append(self._observed(values, result))
         self.write(())
         return observed
 
@@ -154,7 +197,7 @@ class _Run:
                 name = key(
                     "verified 1", attrs.evolve(unit, name="unit").hash(), self.asked, design.check_refine,
                     design.print_tolerance_mm, design.modulus_tolerance, design.printer if printer else "",
-                    "" if self.job.model is None else self.job.model.text(),
+                    self._model_text,
                     [(t.value, t.tolerance, t.low, t.high, t.goal) for t in design.targets],
                 )  # fmt: skip
                 checked = self._kept(name)
@@ -164,8 +207,7 @@ class _Run:
                         result.values,
                         design.targets,
                         finer,
-                        design.print_tolerance_mm,
-                        design.modulus_tolerance,
+                        design.uncertainty,
                         printer,
                     )
                     self._keep(name, checked)
