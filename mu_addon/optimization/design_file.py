@@ -30,7 +30,7 @@ HEADER = "# The inputs of this optimisation; unit.toml beside it is the unit tha
 _KEYS = (
     "format", "preset", "unit", "fidelity", "refine", "check_refine", "evaluations", "batch", "seed", "resin",
     "printer", "print_tolerance_mm", "modulus_tolerance", "target", "freedom", "run",
-    "orientation_deg", "robust",
+    "orientation_deg", "robust", "check_fidelity",
 )  # fmt: skip
 # A finer mesh for what is proposed, over the search's.
 FINER = 1.5
@@ -45,7 +45,8 @@ class Design:
     the resin's modulus as a share of it, for the uncertainty of what is proposed. document: the file's own
     tables; material: the resin's, for density and elongation at break. orientation_deg: in which the unit
     bears its weight, 0 hanging, tip down, turned about x; None: without weight. robust:
-    whether the search asks for what is met within the uncertainty.
+    whether the search asks for what is met within the uncertainty. check_struts: whether what is proposed is
+    simulated strut by strut besides.
     """
 
     unit: Unit
@@ -62,6 +63,7 @@ class Design:
     material: Material
     orientation_deg: float | None = None
     robust: bool = False
+    check_struts: bool = False
 
     @property
     def uncertainty(self) -> Uncertainty:
@@ -192,6 +194,8 @@ def _design(
         number("check_refine", min(FINER * settings.refine, 8.0), 0.2, 8.0), search, printer, resin,
         number("print_tolerance_mm", 0.05, 0.0, 0.3), number("modulus_tolerance", 0.1, 0.0, 1.0), document,
         material, turned, _flag(document, "robust", text, origin),
+        not settings.resolved
+        and _word(document, "check_fidelity", HOMOGENISED, origin, FIDELITIES) != HOMOGENISED,
     )  # fmt: skip
 
 

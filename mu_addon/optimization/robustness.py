@@ -14,7 +14,7 @@ from ..design.printing.printer import Printer
 from ..design.solid import build_solid
 from ..errors import MuError
 from .evaluation import evaluate
-from .targets import Target
+from .targets import OF_SENSOR, Target
 from .uncertainty import SURE, Uncertainty
 from .unit_body import Mechanics
 
@@ -28,7 +28,8 @@ class Verified:
     values (q,), and standard errors (q,) by mesh, print and resin, in the quantities' units; robust (q,):
     whether it meets each target for all values within `SURE` errors, met (q,): for the value itself; why:
     what stopped it, "" where nothing did. print_worst: of the printability check, "" where none was asked
-    for, and its findings in words.
+    for, and its findings in words. with_struts (q,): values of the body as printed, strut by strut, nan where
+    none were asked for or found, and struts_why, what stopped that one.
     """
 
     values: Array
@@ -40,6 +41,10 @@ class Verified:
     why: str = ""
     print_worst: str = ""
     print_findings: tuple[str, ...] = ()
+    with_struts: Array = attrs.field(
+        default=attrs.Factory(lambda self: np.full_like(self.values, np.nan), True)
+    )
+    struts_why: str = ""
 
     @property
     def error(self) -> Array:
@@ -59,19 +64,22 @@ def verified(
     finer: Mechanics,
     uncertainty: Uncertainty,
     printer: Printer | None = None,
+    as_printed: Mechanics | None = None,
 ) -> Verified:
     """A unit with values `coarse` (q,) on the search's mesh, simulated on a finer mesh of its own.
 
     What is uncertain of a print acts to first order, by adjoint gradients on the finer mesh. The mesh's error
     is taken as the difference of the two meshes, which for a converging method is more than is left. printer:
-    the printability check (thickness, chambers) is run where it is given.
+    the printability check (thickness, chambers) is run where it is given. as_printed: of the resolved body,
+    which is simulated besides where it is given.
     """
     found = evaluate(unit, targets, (), finer, uncertainty=uncertainty)
     zero = np.zeros(len(targets))
+    struts = {} if as_printed is None else _with_struts(unit, targets, as_printed)
     worst, words = ("", ()) if printer is None else _print_check(unit, printer)
     if not found.sound:
         none = np.zeros(len(targets), bool)
-        return Verified(found.values, zero, zero, zero, none, none, found.why, worst, words)
+        return Verified(found.values, zero, zero, zero, none, none, found.why, worst, words, **struts)
     by_mesh = np.nan_to_num(np.abs(found.values - coarse))
     by_print, by_resin = found.by_print, found.by_resin
     error = np.sqrt(by_mesh**2 + by_print**2 + by_resin**2)
@@ -82,7 +90,16 @@ def verified(
         elif t.goal is None:
             met[i] = t.met(found.values[i])
             robust[i] = t.met(found.values[i], SURE * float(error[i]))
-    return Verified(found.values, by_mesh, by_print, by_resin, met, robust, "", worst, words)
+    return Verified(found.values, by_mesh, by_print, by_resin, met, robust, "", worst, words, **struts)
+
+
+def _with_struts(unit: Unit, targets: Sequence[Target], as_printed: Mechanics) -> dict[str, Any]:
+    """Values (q,) of the resolved body and why there are none; those along a sensor's path are nan."""
+    asked = [i for i, t in enumerate(targets) if t.quantity is not None and t.kind not in OF_SENSOR]
+    found = evaluate(unit, [targets[i] for i in asked], (), as_printed)
+    values = np.full(len(targets), np.nan)
+    values[asked] = found.values
+    return {"with_struts": values, "struts_why": found.why}
 
 
 def _print_check(unit: Unit, printer: Printer) -> tuple[str, tuple[str, ...]]:

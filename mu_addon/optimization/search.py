@@ -10,7 +10,7 @@ spread along the Pareto front.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import attrs
@@ -32,7 +32,7 @@ AIM = 0.7
 FIRST_REACH, LEAST_REACH, MOST_REACH = 0.35, 0.01, 1.5
 ROUNDS, SAMPLES = 9, 384
 STALLED = 8
-"""A search ends after so many steps without progress."""
+"""A search ends after so many steps without progress, of several objectives after so many for each."""
 
 
 @attrs.frozen
@@ -79,12 +79,14 @@ def search_units(
     start: Values,
     settings: SearchSettings | None = None,
     on_step: Callable[[int, str], None] = lambda done, words: None,
+    known: Sequence[Observed] = (),
 ) -> Found:
     """The designs found for some targets, from a start, which may break bounds of its freedoms.
 
-    observe: computes designs; on_step: called with how many were computed, and how things stand.
+    observe: computes designs; on_step: called with how many were computed, and how things stand. known:
+    designs computed before, in place of the start; they count as evaluations.
     """
-    return _Search(freedoms, targets, observe, settings or SearchSettings(), on_step).run(start)
+    return _Search(freedoms, targets, observe, settings or SearchSettings(), on_step).run(start, known)
 
 
 class _Search:
@@ -141,12 +143,15 @@ class _Search:
 
     # The course of the search.
 
-    def run(self, start: Values) -> Found:
+    def run(self, start: Values, known_before: Sequence[Observed] = ()) -> Found:
         """See `search_units`."""
-        self._compute(self._first(start))
+        if known_before:
+            self.observed = [self._judged(o) for o in known_before]
+        else:
+            self._compute(self._first(start))
         weights = self._weights()
-        stalled = 0
-        while len(self.observed) < self.settings.evaluations and stalled < STALLED and not self._done():
+        stalled, most = 0, STALLED * max(len(self.goals), 1)
+        while len(self.observed) < self.settings.evaluations and stalled < most and not self._done():
             if not any(o.sound for o in self.observed):
                 self._compute([self._random()])
                 continue
@@ -161,7 +166,8 @@ class _Search:
                     chosen.append(proposal)
                     used.append(weighed)
             if not chosen:
-                if self.reach >= MOST_REACH:
+                # Of several objectives other weights may still have a new design.
+                if self.reach >= MOST_REACH and len(self.goals) < 2:
                     break
                 self.reach, stalled = min(2 * self.reach, MOST_REACH), stalled + 1
                 continue
@@ -195,17 +201,16 @@ class _Search:
         return self.design(np.array(places))
 
     def _compute(self, designs: Sequence[Values]) -> None:
-        self.observed += [
-            attrs.evolve(
-                o,
-                values=o.values[self.judged],
-                slopes=o.slopes[self.judged],
-                margins=(np.zeros_like(o.values) if o.margins is None else o.margins)[self.judged],
-            )
-            for o in self.observe(designs)
-        ]
+        self.observed += [self._judged(o) for o in self.observe(designs)]
         best = self.observed[self._best()]
         self.on_step(len(self.observed), self._words(best))
+
+    def _judged(self, o: Observed) -> Observed:
+        """A design with the quantities alone that the search knows."""
+        margins = np.zeros_like(o.values) if o.margins is None else o.margins
+        return attrs.evolve(
+            o, values=o.values[self.judged], slopes=o.slopes[self.judged], margins=margins[self.judged]
+        )
 
     def _words(self, best: Observed) -> str:
         if not best.sound:
@@ -289,7 +294,8 @@ class _Search:
         costs = self.signs * np.array([o.values for o in good])[:, self.goals]
         least, spread = costs.min(axis=0), np.ptp(costs, axis=0)
         span = np.maximum(spread, 1e-2 * np.maximum(np.abs(least), 1e-9))
-        return least - span, span
+        # A little below the best found, so that weights from 0 to 1 end all along the front.
+        return least - 0.3 * span, span
 
     def _feasible(self, o: Observed) -> bool:
         return o.sound and all(self._met(o))
@@ -344,12 +350,12 @@ class _Search:
         if g < 2:
             return itertools.repeat(np.ones(g))
         corners = [np.eye(g)[i] * 0.98 + 0.02 / g for i in range(g)]
-        mixes = [np.full(g, 1.0 / g)]
+        even = [np.full(g, 1.0 / g)]
         if g == 2:
-            mixes += [np.array([a, 1 - a]) for a in (0.75, 0.25, 0.9, 0.1, 0.62, 0.38)]
+            mixes: Any = (np.array([a, 1 - a]) for a in _halvings())
         else:
-            mixes += list(self.rng.dirichlet(np.ones(g), 8))
-        return itertools.cycle([*corners, *mixes])
+            mixes = (self.rng.dirichlet(np.ones(g)) for _ in itertools.count())
+        return itertools.chain(corners, even, corners, mixes)
 
     def _proposed(
         self, models: Sequence[Surrogate], weights: Array, besides: Sequence[Values]
@@ -451,6 +457,14 @@ class _Search:
             if least <= 1.0:
                 found.append(target.name)
         return tuple(found)
+
+
+def _halvings() -> Iterator[float]:
+    """Shares between 0 and 1 that halve the gaps between those before: 1/4, 3/4, 1/8, 5/8, ..."""
+    for level in itertools.count(2):
+        size = 2**level
+        # The odd ones far from each other in turn (van der Corput).
+        yield from sorted((k / size for k in range(1, size, 2)), key=lambda a: (a * size // 2) % 4)
 
 
 def pareto(costs: Array) -> Array:

@@ -43,6 +43,8 @@ KINDS: dict[str, tuple[tuple[str, ...], str]] = {
     "walls_apart": (("pressure_kPa",), ""),
     "printable": ((), ""),
 }
+OF_SENSOR = ("deviation", "sensor_slope")
+"""Kinds that need a sensor in the body."""
 _FORM = ("kind", "name", "value", "tolerance", "low", "high", "objective", "points")
 NARROW = 0.02
 """A bound without a tolerance is missed by one unit of misfit where it is missed by this share of itself."""
@@ -263,7 +265,7 @@ def _quantity(
         return RestStiffness(name, direction)
     if kind == "workspace":
         return Workspace(name, _pressures(table, where))
-    if kind in ("deviation", "sensor_slope"):
+    if kind in OF_SENSOR:
         pressures, path = _pressures(table, where), table.get("path")
         if path not in supplies.paths:
             raise InputError(

@@ -8,6 +8,7 @@ import bpy
 
 from ...optimization.freedoms import parameters
 from ..jobs.panel import job_state, start_button
+from ..results import thumbnails
 from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.wording import in_panel
 from ..unit.fields import label
@@ -139,6 +140,9 @@ def _proposed(layout, proposed) -> None:
     row.operator("mu.optimize_add", text="", icon="DUPLICATE").number = proposed.number
     if not body:
         return
+    icon = thumbnails.icon_of(proposed.file.with_suffix(".png"))
+    if icon is not None:
+        body.template_icon(icon, scale=6.0)
     column = body.column(align=True)
     if proposed.applied:
         wrapped(column, "The unit has its parameters", "INFO")

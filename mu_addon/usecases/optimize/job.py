@@ -12,6 +12,7 @@ from ...errors import InputError
 from ...evidence.extended import ExtendedModel, load_model
 from ...fem.unit import materials_of
 from ...materials.library import parse_material
+from ...meshing.settings import RESOLVED
 from ...optimization.design_file import HEADER, RESIN, UNIT, Design, parse_design, read_design
 from ...optimization.unit_body import Mechanics
 from ...reading import file_text
@@ -22,7 +23,10 @@ from ..simulate_and_place.named_effects import NamedEffects
 DESIGN, MODEL = "design.toml", "model.toml"
 TABLE, REPORT = "designs.csv", "report.html"
 LAYOUT = FolderLayout(
-    DESIGN, HEADER, results=(TABLE, REPORT, "proposed-*.toml"), optional=(UNIT, RESIN, MODEL)
+    DESIGN,
+    HEADER,
+    results=(TABLE, REPORT, "proposed-*.toml", "proposed-*.png"),
+    optional=(UNIT, RESIN, MODEL),
 )
 # No file of inputs is longer, in bytes.
 _LONGEST = 1_000_000
@@ -81,13 +85,16 @@ def design_of(texts: Mapping[str, str]) -> Design:
 
 
 def mechanics_of(
-    design: Design, model: ExtendedModel | None, refine: float | None = None
+    design: Design, model: ExtendedModel | None, refine: float | None = None, with_struts: bool = False
 ) -> tuple[Mechanics, list[str]]:
     """How the design's units are simulated, and what of the model is left out, in words.
 
-    refine: of the mesh, by default the search's. Raises InputError where the unit cannot have the model.
+    refine: of the mesh, by default the search's; with_struts: as printed, strut by strut. Raises InputError
+    where the unit cannot have the model.
     """
     settings = design.settings if refine is None else attrs.evolve(design.settings, refine=refine)
+    if with_struts:
+        settings = attrs.evolve(settings, fidelity=RESOLVED)
     if model is None:
         effects, left_out = _with_weight(NamedEffects(), design), []
         if not effects:
@@ -110,7 +117,7 @@ def mechanics_of(
         materials=lambda unit, mesh: effects.materials(materials_of(unit, mesh), mesh),
         model=lambda unit, mesh: effects.model(unit, mesh, threads=1),
         load=effects.load,
-        newton=None if design.settings.resolved else effects.newton,
+        newton=None if settings.resolved else effects.newton,
     ), left_out
 
 

@@ -15,6 +15,7 @@ from mu_addon.blender.unit.properties import shape_hash, to_unit
 from mu_addon.design.parameters import write_unit
 from mu_addon.evidence.extended import ExtendedModel, Fitted
 from mu_addon.optimization.targets import KINDS as KNOWN
+from mu_addon.usecases.optimize.charts import picture
 from mu_addon.usecases.optimize.job import mechanics_of, read_job
 
 from .acting import add, refused
@@ -52,6 +53,7 @@ def finished(root, **changed):
     chambers = attrs.evolve(unit.chambers, wall_mm=0.712345678)
     proposed = attrs.evolve(unit, name="proposed-1", chambers=chambers)
     write_unit(proposed, folder / "proposed-1.toml")
+    picture(proposed, folder / "proposed-1.png")
     common = {"standard_error": 0.5, "objective": False}
     targets = [
         {"name": "angle at 30 kPa", "asked": "at least 20 deg", "unit": "deg", "value": 18.25,
@@ -221,6 +223,7 @@ def test_a_proposed_unit_is_applied_undone_and_added_beside(tmp_path):
     assert not unit_object.behind(root)
     assert "The unit has its parameters" in drawn()
     assert "other parameters" not in drawn()
+    assert "a picture" in drawn()
     bpy.ops.ed.undo()
     root = unit_object.active_root(bpy.context)
     assert to_unit(root.mu_unit).chambers.wall_mm == 0.9
