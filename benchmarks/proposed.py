@@ -1,6 +1,6 @@
 """A proposed unit by another code on a mesh of its own: felupe, after a mesher that no search uses.
 
-    python benchmarks/proposed.py out/finger/proposed-1.toml [--pressure -10 30] [--refine 0.75] [--keep DIR]
+    python benchmarks/proposed.py out/finger/proposed-1.toml [--pressure -10 30] [--mesher pytetwild]
 
 The search and the check of its proposals mesh by gmsh, the membrane as a grid along its profile. Here
 pytetwild fills the unit's surfaces with straight-sided tetrahedra, and felupe's elements, law and Newton's
@@ -55,6 +55,7 @@ def main() -> None:
     options.add_argument("--pressure", type=float, nargs="+", default=[-10.0, 30.0])
     options.add_argument("--refine", type=float, default=0.75)
     options.add_argument("--order", type=int, default=2)
+    options.add_argument("--mesher", nargs="+", default=["gmsh", "pytetwild"])
     options.add_argument("--keep", type=Path)
     given = options.parse_args()
     unit = read_unit(given.unit)
@@ -65,7 +66,7 @@ def main() -> None:
     print("| --- | --- | --- | --- | --- | --- |")
     with tempfile.TemporaryDirectory() as scratch:
         folder = given.keep or Path(scratch)
-        for mesher in ("gmsh", "pytetwild"):
+        for mesher in given.mesher:
             settings = MeshSettings(refine=given.refine, order=given.order)
             mesh = mesh_unit(unit, settings, mesher=mesher, cache=folder)
             for pressure in given.pressure:

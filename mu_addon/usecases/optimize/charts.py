@@ -107,7 +107,8 @@ def _half_section(drawn: Any, unit: Unit, widest_mm: float, tallest_mm: float) -
         strut.set_clip_path(envelope)
     for polygon, color in ((outer_polygon(d, ALONG), "#c98a3a"), (cavity_polygon(d, ALONG), "#ffffff")):
         for sign in (1, -1):
-            axes.fill(sign * polygon[:, 0], polygon[:, 1], color=color, linewidth=0)
+            # The edge hides the seam between the halves.
+            axes.fill(sign * polygon[:, 0], polygon[:, 1], color=color, linewidth=0.3)
     middle = 0.5 * (y0 + y1)
     axes.set_xlim(middle - 0.52 * widest_mm, middle + 0.52 * widest_mm)
     axes.set_ylim(-0.02 * tallest_mm, 1.02 * tallest_mm)
