@@ -22,6 +22,7 @@ from ..toml_writer import toml_text
 from .freedoms import UNSEEN, Freedom, changed_unit, fixed_values, read_freedoms
 from .search import SearchSettings
 from .targets import Supplies, Target, read_targets
+from .uncertainty import Uncertainty
 
 FORMAT = 1
 UNIT, RESIN = "unit.toml", "resin.toml"
@@ -29,6 +30,7 @@ HEADER = "# The inputs of this optimisation; unit.toml beside it is the unit tha
 _KEYS = (
     "format", "preset", "unit", "fidelity", "refine", "check_refine", "evaluations", "batch", "seed", "resin",
     "printer", "print_tolerance_mm", "modulus_tolerance", "target", "freedom", "run",
+    "orientation_deg", "robust", "check_fidelity",
 )  # fmt: skip
 # A finer mesh for what is proposed, over the search's.
 FINER = 1.5
@@ -41,7 +43,10 @@ class Design:
     unit: where the search starts, with fixed values in it; check_refine: of the mesh that proposed units are
     simulated on again; print_tolerance_mm, modulus_tolerance: standard errors of a print's surfaces, and of
     the resin's modulus as a share of it, for the uncertainty of what is proposed. document: the file's own
-    tables; material: the resin's, for density and elongation at break.
+    tables; material: the resin's, for density and elongation at break. orientation_deg: in which the unit
+    bears its weight, 0 hanging, tip down, turned about x; None: without weight. robust:
+    whether the search asks for what is met within the uncertainty. check_struts: whether what is proposed is
+    simulated strut by strut besides.
     """
 
     unit: Unit
@@ -56,6 +61,14 @@ class Design:
     modulus_tolerance: float
     document: Mapping[str, Any]
     material: Material
+    orientation_deg: float | None = None
+    robust: bool = False
+    check_struts: bool = False
+
+    @property
+    def uncertainty(self) -> Uncertainty:
+        """What differs from print to print."""
+        return Uncertainty(self.print_tolerance_mm, self.modulus_tolerance)
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; the unit lies beside, with fixed values in it.
@@ -157,6 +170,7 @@ def _design(
             f"{resin} has no elongation at break", f"{origin}, resin", "add [elongation] to its file"
         )
     counts = [v for f in freedoms if f.name == "chambers.count" for v in f.values] or [base.chambers.count]
+    turned = number("orientation_deg", 0.0, -360.0, 360.0) if "orientation_deg" in document else None
     targets = read_targets(
         tables["target"],
         where["target"],
@@ -165,6 +179,7 @@ def _design(
             material.density_g_per_ml,
             load_printer(printer),
             [w.name for w in windows(min(counts))],
+            turned is not None,
         ),
     )
     if not settings.resolved:
@@ -178,7 +193,9 @@ def _design(
         base, tuple(targets), tuple(freedoms), settings,
         number("check_refine", min(FINER * settings.refine, 8.0), 0.2, 8.0), search, printer, resin,
         number("print_tolerance_mm", 0.05, 0.0, 0.3), number("modulus_tolerance", 0.1, 0.0, 1.0), document,
-        material,
+        material, turned, _flag(document, "robust", text, origin),
+        not settings.resolved
+        and _word(document, "check_fidelity", HOMOGENISED, origin, FIDELITIES) != HOMOGENISED,
     )  # fmt: skip
 
 
@@ -241,6 +258,17 @@ def _word(
     if not isinstance(found, str) or (allowed and found not in allowed):
         words = f"one of: {', '.join(allowed)}" if allowed else "write it in quotes"
         raise InputError(f"{key} = {found!r} is not offered", f"{origin}, {key}", words)
+    return found
+
+
+def _flag(document: Mapping[str, Any], key: str, text: str, origin: str) -> bool:
+    found = document.get(key, False)
+    if not isinstance(found, bool):
+        raise InputError(
+            f"{key} = {found!r} is neither true nor false",
+            f"{origin}, {_line(text, key)}, {key}",
+            "write true or false",
+        )
     return found
 
 

@@ -18,6 +18,7 @@ from .freedoms import Freedom
 from .gradient import gradients
 from .structure import WITHOUT, solve
 from .targets import Target
+from .uncertainty import Uncertainty
 from .unit_body import Mechanics, UnitBody
 
 Array = np.ndarray[Any, Any]
@@ -29,7 +30,8 @@ class Evaluated:
 
     values (q,) of the targets' quantities, nan where it failed; gradient (q, f) by the continuous freedoms,
     nan where there is none; why: what stopped it, "" where nothing did; model_a: solutions of the unit along
-    its path that it took, one for each body simulated.
+    its path that it took, one for each body simulated. by_print, by_resin (q,): standard errors of the
+    values, 0 where none were asked for.
     """
 
     unit: Unit
@@ -37,6 +39,8 @@ class Evaluated:
     gradient: Array
     why: str = ""
     model_a: int = 1
+    by_print: Array = attrs.field(default=attrs.Factory(lambda self: np.zeros_like(self.values), True))
+    by_resin: Array = attrs.field(default=attrs.Factory(lambda self: np.zeros_like(self.values), True))
 
     @property
     def sound(self) -> bool:
@@ -50,6 +54,8 @@ class Evaluated:
             "gradient": [[None if np.isnan(v) else float(v) for v in row] for row in self.gradient],
             "why": self.why,
             "model_a": self.model_a,
+            "by_print": self.by_print.tolist(),
+            "by_resin": self.by_resin.tolist(),
         }
 
 
@@ -66,6 +72,8 @@ def restored(unit: Unit, plain: dict[str, Any]) -> Evaluated:
         gradient.reshape(len(plain["values"]), -1),
         str(plain["why"]),
         int(plain["model_a"]),
+        np.array(plain["by_print"], float),
+        np.array(plain["by_resin"], float),
     )
 
 
@@ -75,16 +83,20 @@ def evaluate(
     freedoms: Sequence[Freedom],
     mechanics: Mechanics,
     with_gradient: bool = True,
+    uncertainty: Uncertainty | None = None,
 ) -> Evaluated:
     """All targets' quantities of a unit, and their gradients by its continuous freedoms.
 
     A unit that cannot be meshed or does not bear a pressure is an answer (`why`), not an error. A resolved
-    unit's gradients are those that need no morph of its mesh; the others are nan. Raises InputError for
-    targets that the mechanics cannot answer.
+    unit's gradients are those that need no morph of its mesh; the others are nan. uncertainty: what of a
+    print the values' standard errors are found by. Raises InputError for targets that the mechanics cannot
+    answer.
     """
     asked = [t for t in targets if t.quantity is not None]
     quantities = [t.quantity for t in asked if t.quantity is not None]
+    count = sum(not f.discrete for f in freedoms)
     continuous = [f for f in freedoms if not f.discrete]
+    continuous += uncertainty.freedoms(unit) if uncertainty else []
     values = np.full(len(targets), np.nan)
     gradient = np.full((len(targets), len(continuous)), np.nan)
     conditions = {c for q in quantities for c in q.conditions}
@@ -96,7 +108,7 @@ def evaluate(
         states, _ = solve(body.structure, conditions)
         values[rows] = [q.value(body.structure, states) for q in quantities]
     except (ConvergenceError, MeshingError) as error:
-        return Evaluated(unit, values, gradient, error.what, simulated)
+        return Evaluated(unit, values, gradient[:, :count], error.what, simulated)
     if with_gradient and continuous:
         try:
             usable = [f for f in continuous if not mechanics.settings.resolved or _material_only(f)]
@@ -106,7 +118,8 @@ def evaluate(
         except (MeshingError, InputError, IndefiniteError):
             # Beside a rule's limit or a folded mesh: the values stand, and the search goes on without slopes.
             gradient[:] = np.nan
-    return Evaluated(unit, values, gradient, "", simulated)
+    errors = uncertainty.errors(unit, gradient[:, count:]) if uncertainty else ()
+    return Evaluated(unit, values, gradient[:, :count], "", simulated, *errors)
 
 
 def _material_only(freedom: Freedom) -> bool:
@@ -119,7 +132,8 @@ class Evaluator:
 
     origin: text of all that decides a value besides the unit (targets, mesh, extended model); workers:
     several units at a time by `many`, a function of units that yields their number and what was found;
-    None: one after the other, here. computed: how many units were simulated by this run, and model_a the
+    None: one after the other, here. uncertainty: as `evaluate` has it. computed: how many units were
+    simulated by this run, and model_a the
     solutions they took.
     """
 
@@ -130,6 +144,7 @@ class Evaluator:
     origin: str = ""
     many: Callable[[Sequence[Unit]], Any] | None = None
     on_each: Callable[[Evaluated], None] = lambda found: None
+    uncertainty: Uncertainty | None = None
     computed: int = 0
     model_a: int = 0
 
@@ -151,11 +166,12 @@ class Evaluator:
         if self.many is not None and len(units) > 1:
             return self.many(units)
         return (
-            (i, evaluate(unit, self.targets, self.freedoms, self.mechanics)) for i, unit in enumerate(units)
+            (i, evaluate(unit, self.targets, self.freedoms, self.mechanics, uncertainty=self.uncertainty))
+            for i, unit in enumerate(units)
         )
 
     def _key(self, unit: Unit) -> str:
-        return key("optimise 1", attrs.evolve(unit, name="unit").hash(), self.origin)
+        return key("optimise 2", attrs.evolve(unit, name="unit").hash(), self.origin)
 
     def _kept(self, unit: Unit) -> Evaluated | None:
         stored = None if self.cache is None else self.cache.get("unit", self._key(unit))

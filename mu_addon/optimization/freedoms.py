@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
 
+from ..design.grading import LEAST, MOST, CellFactor, cells_text, parsed
 from ..design.parameters import SECTIONS, Unit
 from ..design.quantity import Description, describe
 from ..design.toml_text import nearest
@@ -18,9 +20,24 @@ SCALE = "scale"
 UNSEEN = ("lattice.junction_diameter_mm", "lattice.midspan_diameter_mm", "lattice.kind")
 
 
+# Of the text of single cells' factors one entry: "grading.cells[0 2 *]".
+CELLS = "grading.cells"
+_CELLS = re.compile(re.escape(CELLS) + r"\[(.+)\]")
+
+
+def _entry(cells: str) -> CellFactor:
+    """An entry of cells by their indices as text; raises InputError."""
+    # Any factor but 1, which would be no entry.
+    [entry] = parsed(f"{cells}: 1.5")
+    return entry
+
+
 @attrs.frozen
 class Freedom:
     """One parameter of the unit, by its dotted name, that may change.
+
+    "grading.cells[0 2 *]" is the factor on the struts of these cells: column, row and chamber as
+    `design.grading` has them.
 
     low, high: bounds of a continuous one, or of whole numbers; values: those of a discrete one; also: factors
     by the names of parameters that follow it, as the bladder's diameter follows the cell.
@@ -60,6 +77,9 @@ def parameters() -> dict[str, Description]:
 
 def parameter_of(unit: Unit, name: str) -> Any:
     """Value of a unit's parameter by its dotted name."""
+    if place := _CELLS.fullmatch(name):
+        entries = {entry[:3]: entry.factor for entry in unit.grading.entries}
+        return entries.get(_entry(place[1])[:3], 1.0)
     found: Any = unit
     for part in name.split("."):
         found = getattr(found, part)
@@ -73,14 +93,22 @@ def changed_unit(unit: Unit, freedoms: Sequence[Freedom], values: Sequence[Any])
     """
     sections: dict[str, dict[str, Any]] = {}
     head: dict[str, Any] = {}
+    cells: dict[tuple[int | None, ...], CellFactor] = {}
     for freedom, value in zip(freedoms, values, strict=True):
         for name, factor in ((freedom.name, None), *freedom.also.items()):
             own = value if factor is None else factor * value
+            if place := _CELLS.fullmatch(name):
+                entry = _entry(place[1])
+                cells[entry[:3]] = CellFactor(*entry[:3], float(own))
+                continue
             section, _, key = name.rpartition(".")
             if section:
                 sections.setdefault(section, {})[key] = own
             else:
                 head[key] = own
+    if cells:
+        kept = {entry[:3]: entry for entry in unit.grading.entries}
+        sections.setdefault("grading", {})["cells"] = cells_text((kept | cells).values())
     changed = {section: attrs.evolve(getattr(unit, section), **own) for section, own in sections.items()}
     return attrs.evolve(unit, **head, **changed)
 
@@ -144,6 +172,8 @@ def _freedom(table: Mapping[str, Any], where: str) -> Freedom | None:
     name, d = _parameter(table, where)
     if "fixed" in table:
         return None
+    if name == CELLS and "cells" in table:
+        return _of_cells(table, where)
     _require_keys(table, ("parameter", "low", "high", "values", "also"), where)
     also = _also(table.get("also", {}), where)
     if "values" in table:
@@ -179,6 +209,27 @@ def _freedom(table: Mapping[str, Any], where: str) -> Freedom | None:
     return Freedom(name, float(low), float(high), also=also, unit=d.unit)
 
 
+def _of_cells(table: Mapping[str, Any], where: str) -> Freedom:
+    """The factor on the struts of the cells that a table names; raises InputError."""
+    _require_keys(table, ("parameter", "cells", "low", "high"), where)
+    cells, low, high = (table.get(key) for key in ("cells", "low", "high"))
+    try:
+        entry = _entry(cells if isinstance(cells, str) and ";" not in cells else "?")
+    except InputError as error:
+        raise InputError(
+            f"cells = {cells!r} is no column, row and chamber", f"{where}, cells", 'write cells = "0 2 *"'
+        ) from error
+    good = all(isinstance(v, int | float) and not isinstance(v, bool) for v in (low, high))
+    if not good or not LEAST <= low < high <= MOST:  # type: ignore[operator]
+        raise InputError(
+            f"low = {low!r} and high = {high!r} of cells {cells!r} are not a range of factors",
+            f"{where}, low",
+            f"choose from {LEAST:g} to {MOST:g}",
+        )
+    name = cells_text([entry]).rpartition(":")[0]
+    return Freedom(f"{CELLS}[{name}]", float(low), float(high))  # type: ignore[arg-type]
+
+
 def _also(given: Any, where: str) -> dict[str, float]:
     known = parameters()
     if not isinstance(given, dict):
@@ -195,6 +246,12 @@ def _also(given: Any, where: str) -> dict[str, float]:
 
 def _require_start(freedom: Freedom, unit: Unit, where: str) -> None:
     """Raise InputError where a value is none that the parameter may have."""
+    if _CELLS.fullmatch(freedom.name):
+        try:
+            changed_unit(unit, [freedom], [freedom.low])
+        except InputError as error:
+            raise InputError(error.what, f"{where}, cells", error.remedy) from error
+        return
     d = parameters()[freedom.name]
     for value in freedom.values:
         fits = type(value) is d.type or (d.type is float and type(value) is int)

@@ -22,6 +22,7 @@ import numpy as np
 
 from ..design.quantity import in_MPa
 from ..fem.elementwise import element_forces
+from ..fem.model import Model
 from .structure import Condition, Quantity, States, Structure
 
 Array = np.ndarray[Any, Any]
@@ -42,7 +43,6 @@ def adjoint(structure: Structure, states: States, quantities: Sequence[Quantity]
 
     Raises IndefiniteError at an unstable state.
     """
-    model = structure.model
     wanted: dict[Condition, list[tuple[int, Array]]] = {}
     for number, quantity in enumerate(quantities):
         if hasattr(quantity, "slope"):
@@ -50,9 +50,7 @@ def adjoint(structure: Structure, states: States, quantities: Sequence[Quantity]
                 wanted.setdefault(condition, []).append((number, slope))
     found = {}
     for condition, served in wanted.items():
-        data = model.parameters(structure.materials[condition.materials])
-        pressure = in_MPa(condition.pressure_kPa)
-        factor = model.factor.factor(model.tangent(states[condition], pressure, data))
+        factor, model = _tangent_factor(structure, states, condition)
         loads = np.stack([model.mesh.folded(slope).ravel()[model.free] for _, slope in served], axis=1)
         found[condition] = tuple(n for n, _ in served), factor.solve(loads)
     return Adjoint(found)
@@ -134,25 +132,29 @@ def _everywhere(structure: Structure, free: Array) -> Array:
 def _residual_change(plus: Structure, minus: Structure, condition: Condition, states: States) -> Array:
     """Difference (free,) in N of the residual between two bodies at the same displacements."""
     pressure, u = in_MPa(condition.pressure_kPa), states[condition]
-    ahead, behind = (
-        s.model.residual(u, pressure, s.model.parameters(s.materials[condition.materials])).ravel()[
-            s.model.free
-        ]
-        for s in (plus, minus)
-    )
-    return np.asarray(ahead - behind)
+    sides = []
+    for s in (plus, minus):
+        model = s.under(condition)
+        data = model.parameters(s.materials[condition.materials])
+        sides.append(model.residual(u, pressure, data).ravel()[model.free])
+    return np.asarray(sides[0] - sides[1])
+
+
+def _tangent_factor(structure: Structure, states: States, condition: Condition) -> tuple[Any, Model]:
+    """The factor of the tangent at a condition's state, and the condition's model."""
+    model = structure.under(condition)
+    data = model.parameters(structure.materials[condition.materials])
+    values = model.tangent(states[condition], in_MPa(condition.pressure_kPa), data)
+    return model.factor.factor(values), model
 
 
 def _displacement_derivatives(
     structure: Structure, states: States, forces: dict[Condition, list[Array]]
 ) -> dict[Condition, list[Array]]:
     """Derivatives (n, 3) of the displacements by each freedom, a list for every condition: -K^-1 dr/dp."""
-    model = structure.model
     found = {}
     for condition, changes in forces.items():
-        data = model.parameters(structure.materials[condition.materials])
-        pressure = in_MPa(condition.pressure_kPa)
-        factor = model.factor.factor(model.tangent(states[condition], pressure, data))
+        factor, _ = _tangent_factor(structure, states, condition)
         moved = factor.solve(-np.stack(changes, axis=1))
         found[condition] = [_everywhere(structure, column) for column in moved.T]
     return found

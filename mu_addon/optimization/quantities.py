@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..fem.elements import reference_gradients
+from ..fem.held_tip import HeldTip
 from ..fem.kinematics import TipSection, tip_faces
 from ..fem.lattice_law import deformation_gradients
 from ..fem.model import Model
@@ -64,6 +65,95 @@ class Angle:
         found = np.zeros_like(u)
         found[tip.nodes, 1:] = -np.degrees((c * ds - s * dc) / (c * c + s * s))
         return {self.conditions[0]: found}
+
+
+@attrs.frozen
+class TipForce:
+    """Force in N with which the tip presses on a wall at a pressure in kPa: the blocked force.
+
+    The wall lies along the axis, gap_mm from the +y edge of the tip as drawn, toward which pressure bends the
+    unit; the tip slides on it without friction, and turns. It is held to either side (`HeldTip`), so that
+    the force is smooth: below 0 it does not reach the wall, and would have to be pulled there.
+    """
+
+    name: str
+    pressure_kPa: float
+    gap_mm: float = 0.0
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """The state at its pressure, the tip held."""
+        return (Condition(WITHOUT, self.pressure_kPa, self.gap_mm),)
+
+    def value(self, structure: Structure, states: States) -> float:
+        """In N."""
+        return self._wall(structure).reading_N(states[self.conditions[0]])
+
+    def slope(self, structure: Structure, states: States) -> dict[Condition, Array]:
+        """By the displacements (n, 3), in N/mm: the wall's stiffness at the tip's edge."""
+        wall = self._wall(structure)
+        found = np.zeros_like(structure.model.mesh.nodes)
+        found[wall.edge, 1] = wall.copies * wall.stiffness
+        return {self.conditions[0]: found}
+
+    def _wall(self, structure: Structure) -> HeldTip:
+        return HeldTip(structure.model.mesh, self.gap_mm)
+
+
+@attrs.frozen
+class TipPosition:
+    """Displacement in mm of the tip's end plane along y or z at a pressure in kPa, its mean."""
+
+    name: str
+    pressure_kPa: float
+    direction: str = "y"
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """The state at its pressure."""
+        return _under_pressure(self.pressure_kPa)
+
+    def value(self, structure: Structure, states: States) -> float:
+        """In mm."""
+        return float(_tip_centre(structure, states[self.conditions[0]])[AXES.index(self.direction)])
+
+    def slope(self, structure: Structure, states: States) -> dict[Condition, Array]:
+        """By the displacements (n, 3), without unit: each node's share of the plane."""
+        return {self.conditions[0]: _tip_slope(structure, np.eye(3)[AXES.index(self.direction)])}
+
+
+@attrs.frozen
+class Workspace:
+    """Length in mm of the path of the tip's centre through its places at some pressures in kPa and at rest.
+
+    With one pressure line a unit reaches the points of a curve in its bending plane; its length is the
+    workspace's size. The path is taken as straight between the places, in the order of pressure.
+    """
+
+    name: str
+    pressures_kPa: tuple[float, ...]
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """Its pressures and 0, in ascending order."""
+        return tuple(Condition(WITHOUT, p) for p in sorted({0.0, *self.pressures_kPa}))
+
+    def value(self, structure: Structure, states: States) -> float:
+        """In mm."""
+        return float(np.linalg.norm(self._steps(structure, states), axis=1).sum())
+
+    def slope(self, structure: Structure, states: States) -> dict[Condition, Array]:
+        """By the displacements (n, 3) in every state, without unit: along the path, back and ahead."""
+        steps = self._steps(structure, states)
+        # A unit that does not move has a path without direction.
+        along = steps / np.maximum(np.linalg.norm(steps, axis=1), 1e-12)[:, None]
+        none = np.zeros((1, 3))
+        pulls = np.concatenate([none, along]) - np.concatenate([along, none])
+        return {c: _tip_slope(structure, pull) for c, pull in zip(self.conditions, pulls, strict=True)}
+
+    def _steps(self, structure: Structure, states: States) -> Array:
+        """From each place to the next, (k - 1, 3) in mm."""
+        return np.diff([_tip_centre(structure, states[c]) for c in self.conditions], axis=0)
 
 
 @attrs.frozen
@@ -277,6 +367,26 @@ class WallsApart:
 def _tip(structure: Structure) -> TipSection:
     mesh = structure.model.mesh
     return TipSection.of(mesh, structure.once("tip", lambda: tip_faces(mesh)))
+
+
+def _tip_centre(structure: Structure, u: Array) -> Array:
+    """Displacement (3,) in mm of the tip's end plane, the mean over the plane."""
+    tip = _tip(structure)
+    return np.asarray(_whole_x(structure, np.average(u[tip.nodes], axis=0, weights=tip.area)))
+
+
+def _tip_slope(structure: Structure, along: Array) -> Array:
+    """Derivative (n, 3) of the displacement of the tip's centre along a direction (3,)."""
+    tip = _tip(structure)
+    found = np.zeros_like(structure.model.mesh.nodes)
+    found[tip.nodes] = tip.area[:, None] / tip.area.sum() * _whole_x(structure, along)
+    return found
+
+
+def _whole_x(structure: Structure, vector: Array) -> Array:
+    """A vector (3,) of a part as one of the whole body: nothing moves across a mirror plane."""
+    mirrored = [axis in structure.model.mesh.symmetry for axis in AXES]
+    return np.where(mirrored, 0.0, vector)
 
 
 def _whole(model: Model) -> int:

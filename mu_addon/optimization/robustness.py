@@ -14,15 +14,11 @@ from ..design.printing.printer import Printer
 from ..design.solid import build_solid
 from ..errors import MuError
 from .evaluation import evaluate
-from .freedoms import Freedom
-from .targets import Target
+from .targets import OF_SENSOR, Target
+from .uncertainty import SURE, Uncertainty
 from .unit_body import Mechanics
 
 Array = np.ndarray[Any, Any]
-
-SURE = 2.0
-"""A unit is robust where it meets a target this many standard errors either way."""
-_UNCERTAIN = ("print", "resin")
 
 
 @attrs.frozen(eq=False)
@@ -32,7 +28,8 @@ class Verified:
     values (q,), and standard errors (q,) by mesh, print and resin, in the quantities' units; robust (q,):
     whether it meets each target for all values within `SURE` errors, met (q,): for the value itself; why:
     what stopped it, "" where nothing did. print_worst: of the printability check, "" where none was asked
-    for, and its findings in words.
+    for, and its findings in words. with_struts (q,): values of the body as printed, strut by strut, nan where
+    none were asked for or found, and struts_why, what stopped that one.
     """
 
     values: Array
@@ -44,6 +41,10 @@ class Verified:
     why: str = ""
     print_worst: str = ""
     print_findings: tuple[str, ...] = ()
+    with_struts: Array = attrs.field(
+        default=attrs.Factory(lambda self: np.full_like(self.values, np.nan), True)
+    )
+    struts_why: str = ""
 
     @property
     def error(self) -> Array:
@@ -61,29 +62,26 @@ def verified(
     coarse: Array,
     targets: Sequence[Target],
     finer: Mechanics,
-    print_mm: float,
-    modulus_share: float,
+    uncertainty: Uncertainty,
     printer: Printer | None = None,
+    as_printed: Mechanics | None = None,
 ) -> Verified:
     """A unit with values `coarse` (q,) on the search's mesh, simulated on a finer mesh of its own.
 
-    print_mm: standard error of every printed surface; modulus_share: of all moduli together, as a share. Both
-    act to first order, by adjoint gradients on the finer mesh. The mesh's error is taken as the difference of
-    the two meshes, which for a converging method is more than is left. printer: the printability check
-    (thickness, chambers) is run where it is given.
+    What is uncertain of a print acts to first order, by adjoint gradients on the finer mesh. The mesh's error
+    is taken as the difference of the two meshes, which for a converging method is more than is left. printer:
+    the printability check (thickness, chambers) is run where it is given. as_printed: of the resolved body,
+    which is simulated besides where it is given.
     """
-    spread = _spread(unit)
-    found = evaluate(unit, targets, spread, finer)
+    found = evaluate(unit, targets, (), finer, uncertainty=uncertainty)
     zero = np.zeros(len(targets))
+    struts = {} if as_printed is None else _with_struts(unit, targets, as_printed)
     worst, words = ("", ()) if printer is None else _print_check(unit, printer)
     if not found.sound:
         none = np.zeros(len(targets), bool)
-        return Verified(found.values, zero, zero, zero, none, none, found.why, worst, words)
+        return Verified(found.values, zero, zero, zero, none, none, found.why, worst, words, **struts)
     by_mesh = np.nan_to_num(np.abs(found.values - coarse))
-    slopes = dict(zip([f.name for f in spread], np.nan_to_num(found.gradient).T, strict=True))
-    by_print = print_mm * np.abs(slopes["print.offset_xy_mm"])
-    modulus = unit.material.membrane_modulus_kPa
-    by_resin = modulus_share * modulus * np.abs(slopes["material.membrane_modulus_kPa"])
+    by_print, by_resin = found.by_print, found.by_resin
     error = np.sqrt(by_mesh**2 + by_print**2 + by_resin**2)
     met, robust = np.ones(len(targets), bool), np.ones(len(targets), bool)
     for i, t in enumerate(targets):
@@ -91,24 +89,17 @@ def verified(
             met[i] = robust[i] = worst != "error"
         elif t.goal is None:
             met[i] = t.met(found.values[i])
-            ends = found.values[i] + SURE * error[i] * np.array([-1.0, 1.0])
-            robust[i] = bool(met[i]) and all(t.met(v) for v in ends)
-    return Verified(found.values, by_mesh, by_print, by_resin, met, robust, "", worst, words)
+            robust[i] = t.met(found.values[i], SURE * float(error[i]))
+    return Verified(found.values, by_mesh, by_print, by_resin, met, robust, "", worst, words, **struts)
 
 
-def _spread(unit: Unit) -> list[Freedom]:
-    """What differs from print to print, as freedoms: the surfaces' offset, and all moduli together."""
-    m = unit.material
-    return [
-        Freedom("print.offset_xy_mm", -0.3, 0.5, also={"print.offset_z_mm": 1.0}, unit="mm"),
-        Freedom(
-            "material.membrane_modulus_kPa",
-            10.0,
-            1e6,
-            also={"material.lattice_modulus_kPa": m.lattice_modulus_kPa / m.membrane_modulus_kPa},
-            unit="kPa",
-        ),
-    ]
+def _with_struts(unit: Unit, targets: Sequence[Target], as_printed: Mechanics) -> dict[str, Any]:
+    """Values (q,) of the resolved body and why there are none; those along a sensor's path are nan."""
+    asked = [i for i, t in enumerate(targets) if t.quantity is not None and t.kind not in OF_SENSOR]
+    found = evaluate(unit, [targets[i] for i in asked], (), as_printed)
+    values = np.full(len(targets), np.nan)
+    values[asked] = found.values
+    return {"with_struts": values, "struts_why": found.why}
 
 
 def _print_check(unit: Unit, printer: Printer) -> tuple[str, tuple[str, ...]]:

@@ -10,7 +10,7 @@ spread along the Pareto front.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import attrs
@@ -32,7 +32,7 @@ AIM = 0.7
 FIRST_REACH, LEAST_REACH, MOST_REACH = 0.35, 0.01, 1.5
 ROUNDS, SAMPLES = 9, 384
 STALLED = 8
-"""A search ends after so many steps without progress."""
+"""A search ends after so many steps without progress, of several objectives after so many for each."""
 
 
 @attrs.frozen
@@ -48,13 +48,15 @@ class SearchSettings:
 class Observed:
     """What is known of a design: values (q,), slopes (q, c) by its continuous freedoms, nan where unknown.
 
-    sound: whether it could be computed.
+    sound: whether it could be computed. margins (q,): how far to either side of each value its target shall
+    be met too; None for no margin.
     """
 
     design: Values
     values: Array
     slopes: Array
     sound: bool = True
+    margins: Array | None = None
 
 
 @attrs.frozen(eq=False)
@@ -77,12 +79,14 @@ def search_units(
     start: Values,
     settings: SearchSettings | None = None,
     on_step: Callable[[int, str], None] = lambda done, words: None,
+    known: Sequence[Observed] = (),
 ) -> Found:
     """The designs found for some targets, from a start, which may break bounds of its freedoms.
 
-    observe: computes designs; on_step: called with how many were computed, and how things stand.
+    observe: computes designs; on_step: called with how many were computed, and how things stand. known:
+    designs computed before, in place of the start; they count as evaluations.
     """
-    return _Search(freedoms, targets, observe, settings or SearchSettings(), on_step).run(start)
+    return _Search(freedoms, targets, observe, settings or SearchSettings(), on_step).run(start, known)
 
 
 class _Search:
@@ -139,12 +143,15 @@ class _Search:
 
     # The course of the search.
 
-    def run(self, start: Values) -> Found:
+    def run(self, start: Values, known_before: Sequence[Observed] = ()) -> Found:
         """See `search_units`."""
-        self._compute(self._first(start))
+        if known_before:
+            self.observed = [self._judged(o) for o in known_before]
+        else:
+            self._compute(self._first(start))
         weights = self._weights()
-        stalled = 0
-        while len(self.observed) < self.settings.evaluations and stalled < STALLED and not self._done():
+        stalled, most = 0, STALLED * max(len(self.goals), 1)
+        while len(self.observed) < self.settings.evaluations and stalled < most and not self._done():
             if not any(o.sound for o in self.observed):
                 self._compute([self._random()])
                 continue
@@ -159,7 +166,8 @@ class _Search:
                     chosen.append(proposal)
                     used.append(weighed)
             if not chosen:
-                if self.reach >= MOST_REACH:
+                # Of several objectives other weights may still have a new design.
+                if self.reach >= MOST_REACH and len(self.goals) < 2:
                     break
                 self.reach, stalled = min(2 * self.reach, MOST_REACH), stalled + 1
                 continue
@@ -193,17 +201,21 @@ class _Search:
         return self.design(np.array(places))
 
     def _compute(self, designs: Sequence[Values]) -> None:
-        self.observed += [
-            attrs.evolve(o, values=o.values[self.judged], slopes=o.slopes[self.judged])
-            for o in self.observe(designs)
-        ]
+        self.observed += [self._judged(o) for o in self.observe(designs)]
         best = self.observed[self._best()]
         self.on_step(len(self.observed), self._words(best))
+
+    def _judged(self, o: Observed) -> Observed:
+        """A design with the quantities alone that the search knows."""
+        margins = np.zeros_like(o.values) if o.margins is None else o.margins
+        return attrs.evolve(
+            o, values=o.values[self.judged], slopes=o.slopes[self.judged], margins=margins[self.judged]
+        )
 
     def _words(self, best: Observed) -> str:
         if not best.sound:
             return "no design could be computed yet"
-        missed = sum(not t.met(v) for t, v in zip(self.targets, best.values, strict=True))
+        missed = sum(not met for met in self._met(best))
         return (
             f"{missed} of {len(self.targets) - len(self.goals)} targets missed"
             if missed
@@ -211,13 +223,16 @@ class _Search:
         )
 
     def _models(self) -> Sequence[Surrogate]:
+        """Of every value, and where there are margins of those after them."""
         sound = [o for o in self.observed if o.sound]
         x = self.coordinates(np.array([self.places(o.design) for o in sound]))
         widths = np.array([self.freedoms[i].high - self.freedoms[i].low for i in self.continuous])
         slopes = np.full((len(sound), len(self.targets), x.shape[1]), np.nan)
         if len(self.continuous):
             slopes[:, :, : len(self.continuous)] = np.array([o.slopes for o in sound]) * widths
-        return fit_all(x, np.array([o.values for o in sound]), slopes)
+        found = list(fit_all(x, np.array([o.values for o in sound]), slopes))
+        margins = np.array([o.margins for o in sound])
+        return found + list(fit_all(x, margins, np.full_like(slopes, np.nan))) if margins.any() else found
 
     def _done(self) -> bool:
         """Without objectives: whether a design meets all that is asked, targets near to their middle."""
@@ -227,36 +242,48 @@ class _Search:
         if not best.sound:
             return False
         misfits = [t.misfit(v) for t, v in zip(self.targets, best.values, strict=True)]
-        return all(abs(m) <= 0.1 for m in misfits) and all(
-            t.met(v) for t, v in zip(self.targets, best.values, strict=True)
-        )
+        return all(abs(m) <= 0.1 for m in misfits) and all(self._met(best))
 
     # How good values are.
 
-    def _misfits(self, values: Array, inward: float) -> Array:
-        """Squared misfits (m, q) of values (m, q); inward: how far inside their bounds they shall be."""
-        found = np.zeros_like(values)
+    def _met(self, o: Observed) -> list[bool]:
+        """Whether each target is met, within its margin."""
+        assert o.margins is not None
+        rows = zip(self.targets, o.values, o.margins, strict=True)
+        return [t.met(float(v), float(margin)) for t, v, margin in rows]
+
+    def _known(self, observed: Sequence[Observed]) -> Array:
+        """Values and behind them margins (n, 2 q) of computed designs."""
+        return np.array([[*o.values, *o.margins] for o in observed])  # type: ignore[misc]
+
+    def _misfits(self, found: Array, inward: float) -> Array:
+        """Squared misfits (m, q) of values and margins (m, 2 q).
+
+        inward: how far inside their bounds they shall be, in tolerances.
+        """
+        values, margins = found[:, : len(self.targets)], found[:, len(self.targets) :]
+        misfits = np.zeros_like(values)
         for i, t in enumerate(self.targets):
             if t.goal is not None:
                 continue
-            v = values[:, i] / t.tolerance
+            v, margin = values[:, i] / t.tolerance, margins[:, i] / t.tolerance
             if not np.isnan(t.value):
-                off = np.abs(v - t.value / t.tolerance)
-                found[:, i] = np.maximum(off - (AIM if self.goals else 0.0), 0.0) ** 2
+                off = np.abs(v - t.value / t.tolerance) + margin
+                misfits[:, i] = np.maximum(off - (AIM if self.goals else 0.0), 0.0) ** 2
                 continue
             if not np.isnan(t.low):
-                found[:, i] += np.maximum(t.low / t.tolerance + inward - v, 0.0) ** 2
+                misfits[:, i] += np.maximum(t.low / t.tolerance + inward + margin - v, 0.0) ** 2
             if not np.isnan(t.high):
-                found[:, i] += np.maximum(v - t.high / t.tolerance + inward, 0.0) ** 2
-        return found
+                misfits[:, i] += np.maximum(v - t.high / t.tolerance + inward + margin, 0.0) ** 2
+        return misfits
 
-    def _merit(self, values: Array, weights: Array, inward: float = INWARD) -> Array:
-        """Merits (m,) of values (m, q), to be small, for weights (g,) of the objectives."""
-        merit = PENALTY * self._misfits(values, inward).sum(axis=1)
+    def _merit(self, found: Array, weights: Array, inward: float = INWARD) -> Array:
+        """Merits (m,) of values and margins (m, 2 q), to be small, for weights (g,) of the objectives."""
+        merit = PENALTY * self._misfits(found, inward).sum(axis=1)
         if not self.goals:
             return merit
         ideal, span = self._scale()
-        part = weights * (self.signs * values[:, self.goals] - ideal) / span
+        part = weights * (self.signs * found[:, self.goals] - ideal) / span
         return np.asarray(merit + part.max(axis=1) + 0.05 * part.sum(axis=1))
 
     def _scale(self) -> tuple[Array, Array]:
@@ -267,10 +294,11 @@ class _Search:
         costs = self.signs * np.array([o.values for o in good])[:, self.goals]
         least, spread = costs.min(axis=0), np.ptp(costs, axis=0)
         span = np.maximum(spread, 1e-2 * np.maximum(np.abs(least), 1e-9))
-        return least - span, span
+        # A little below the best found, so that weights from 0 to 1 end all along the front.
+        return least - 0.3 * span, span
 
     def _feasible(self, o: Observed) -> bool:
-        return o.sound and all(t.met(v) for t, v in zip(self.targets, o.values, strict=True))
+        return o.sound and all(self._met(o))
 
     def _trust(self, models: Sequence[Surrogate], before: int) -> float:
         """Factor on the reach, by how well the surrogates foresaw the designs computed since.
@@ -279,7 +307,7 @@ class _Search:
         """
         sound = [o for o in self.observed[:before] if o.sound]
         places = np.array([self.places(o.design) for o in sound])
-        sizes = np.array([m.size for m in models])
+        sizes = np.array([m.size for m in models[: len(self.targets)]])
         factors = []
         for o in self.observed[before:]:
             if not o.sound:
@@ -287,7 +315,7 @@ class _Search:
                 continue
             at = self.places(o.design)
             nearest = sound[int(np.abs(places - at).max(axis=1).argmin())]
-            foreseen = self._predicted(models, at[None])[0]
+            foreseen = self._predicted(models, at[None])[0, : len(self.targets)]
             change = np.linalg.norm((foreseen - nearest.values) / sizes)
             wrong = np.linalg.norm((foreseen - o.values) / sizes) / max(float(change), 1e-12)
             factors.append(2.0 if wrong < 0.1 else 1.0 if wrong < 0.35 else 0.5)
@@ -297,8 +325,8 @@ class _Search:
         """Whether a design is better for some weights than all of those before."""
         if not self.observed[number].sound:
             return False
-        rows = [o.values for o in self.observed[:before] if o.sound]
-        merit = self._merit(np.array([*rows, self.observed[number].values]), weights, 0.0)
+        rows = [o for o in self.observed[:before] if o.sound]
+        merit = self._merit(self._known([*rows, self.observed[number]]), weights, 0.0)
         return len(rows) == 0 or bool(merit[-1] < merit[:-1].min() - 1e-9 * abs(merit[-1]))
 
     def _best(self) -> int:
@@ -307,7 +335,7 @@ class _Search:
         def cost(o: Observed) -> tuple[bool, float, float]:
             if not o.sound:
                 return (True, np.inf, np.inf)
-            values = o.values[None]
+            values = self._known([o])
             goal = float(self._merit(values, np.ones(len(self.goals)), 0.0)[0])
             feasible = self._feasible(o)
             return (not feasible, 0.0 if feasible else float(self._misfits(values, 0.0).sum()), goal)
@@ -322,12 +350,12 @@ class _Search:
         if g < 2:
             return itertools.repeat(np.ones(g))
         corners = [np.eye(g)[i] * 0.98 + 0.02 / g for i in range(g)]
-        mixes = [np.full(g, 1.0 / g)]
+        even = [np.full(g, 1.0 / g)]
         if g == 2:
-            mixes += [np.array([a, 1 - a]) for a in (0.75, 0.25, 0.9, 0.1, 0.62, 0.38)]
+            mixes: Any = (np.array([a, 1 - a]) for a in _halvings())
         else:
-            mixes += list(self.rng.dirichlet(np.ones(g), 8))
-        return itertools.cycle([*corners, *mixes])
+            mixes = (self.rng.dirichlet(np.ones(g)) for _ in itertools.count())
+        return itertools.chain(corners, even, corners, mixes)
 
     def _proposed(
         self, models: Sequence[Surrogate], weights: Array, besides: Sequence[Values]
@@ -337,7 +365,7 @@ class _Search:
         failed = np.array([self.places(o.design) for o in self.observed if not o.sound]).reshape(
             -1, len(self.freedoms)
         )
-        values = np.array([o.values for o in self.observed if o.sound])
+        values = self._known([o for o in self.observed if o.sound])
         order = np.argsort(self._merit(values, weights))
         best, width = sound[order[: min(4, len(order))]], self.reach
         for _ in range(ROUNDS):
@@ -358,8 +386,13 @@ class _Search:
         return None
 
     def _predicted(self, models: Sequence[Surrogate], places: Array) -> Array:
+        """Values and margins (m, 2 q) at places (m, f)."""
         x = self.coordinates(places)
-        return np.stack([m.mean(x) for m in models], axis=1)
+        means = np.stack([m.mean(x) for m in models], axis=1)
+        missing = np.zeros((len(x), 2 * len(self.targets) - means.shape[1]))
+        found = np.concatenate([means, missing], axis=1)
+        found[:, len(self.targets) :] = np.maximum(found[:, len(self.targets) :], 0.0)
+        return found
 
     def _around(self, centres: Array, width: float) -> Array:
         """Places (SAMPLES, f) about some centres, a discrete freedom changed now and then."""
@@ -410,7 +443,7 @@ class _Search:
         self.reach = MOST_REACH
         found = []
         for number, target in enumerate(self.targets):
-            if target.goal is not None or target.met(best.values[number]):
+            if target.goal is not None or self._met(best)[number]:
                 continue
             places, width = self.places(best.design)[None], 0.5
             least = np.inf
@@ -424,6 +457,14 @@ class _Search:
             if least <= 1.0:
                 found.append(target.name)
         return tuple(found)
+
+
+def _halvings() -> Iterator[float]:
+    """Shares between 0 and 1 that halve the gaps between those before: 1/4, 3/4, 1/8, 5/8, ..."""
+    for level in itertools.count(2):
+        size = 2**level
+        # The odd ones far from each other in turn (van der Corput).
+        yield from sorted((k / size for k in range(1, size, 2)), key=lambda a: (a * size // 2) % 4)
 
 
 def pareto(costs: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple, Protocol
 
@@ -11,6 +12,7 @@ import numpy as np
 from ..design.quantity import in_MPa
 from ..errors import InputError
 from ..fem.equilibrium import Equilibrium
+from ..fem.held_tip import HeldTip
 from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.newton_settings import NewtonSettings
@@ -18,15 +20,21 @@ from ..fem.state import State, rest
 
 Array = np.ndarray[Any, Any]
 
+WALL_STEPS = 4
+"""Steps in which a tip is brought to the wall that holds it."""
 WITHOUT = ""
 """Name of the body's materials without a sensor, Model A."""
 
 
 class Condition(NamedTuple):
-    """One state that a quantity needs: a name of the structure's materials, and a pressure in kPa."""
+    """One state that a quantity needs: a name of the structure's materials, and a pressure in kPa.
+
+    wall_mm: distance at which a wall holds the tip, from where it is drawn (`HeldTip`); None: it is free.
+    """
 
     materials: str
     pressure_kPa: float
+    wall_mm: float | None = None
 
 
 States = Mapping[Condition, Array]
@@ -53,6 +61,16 @@ class Structure:
         if name not in self.shared:
             self.shared[name] = make()
         return self.shared[name]
+
+    def under(self, condition: Condition) -> Model:
+        """The model of a condition: the body's own, or one with the wall that holds its tip beside it."""
+        if condition.wall_mm is None:
+            return self.model
+        # Made first, so that both have the same one.
+        _ = self.model.factor
+        found = copy.copy(self.model)
+        found.obstacles = (*self.model.obstacles, HeldTip(self.model.mesh, condition.wall_mm))
+        return found
 
 
 class Quantity(Protocol):
@@ -85,25 +103,37 @@ def solve(structure: Structure, conditions: Iterable[Condition]) -> tuple[dict[C
     wanted = set(conditions)
     found: dict[Condition, Array] = {}
     factorisations = 0
-    for name in sorted({c.materials for c in wanted}):
-        equilibrium = Equilibrium(
-            structure.model, structure.materials[name], structure.newton, explains=False
-        )
-        if equilibrium.parameters.has_history or structure.model.has_friction:
+    for name, wall_mm in sorted({(c.materials, c.wall_mm) for c in wanted}, key=repr):
+        model = structure.under(Condition(name, 0.0, wall_mm))
+        equilibrium = Equilibrium(model, structure.materials[name], structure.newton, explains=False)
+        if equilibrium.parameters.has_history or model.has_friction:
             raise InputError(
                 "the state of a body with friction or memory depends on its history",
                 "[wall], freedoms",
                 "optimise with an elastic law of the wall",
             )
-        model = structure.model
-        start = rest(model.mesh) if model.load is None else equilibrium.at_zero_pressure()
-        pressures = sorted(c.pressure_kPa for c in wanted if c.materials == name)
+        start = _start(equilibrium, wall_mm)
+        pressures = sorted(c.pressure_kPa for c in wanted if (c.materials, c.wall_mm) == (name, wall_mm))
         sides = [[p for p in pressures if p < 0][::-1], [p for p in pressures if p > 0]]
-        found |= {Condition(name, p): start.u for p in pressures if p == 0}
+        found |= {Condition(name, p, wall_mm): start.u for p in pressures if p == 0}
         for side in sides:
             history: list[State] = [start]
             for pressure in side:
                 history.append(equilibrium.reach(in_MPa(pressure), history))
-                found[Condition(name, pressure)] = history[-1].u
+                found[Condition(name, pressure, wall_mm)] = history[-1].u
                 factorisations += history[-1].factorisations
     return found, factorisations
+
+
+def _start(equilibrium: Equilibrium, wall_mm: float | None) -> State:
+    """The state without pressure, the tip brought to its wall; raises ConvergenceError."""
+    model = equilibrium.model
+    start = rest(model.mesh) if model.load is None else equilibrium.at_zero_pressure()
+    if not wall_mm:
+        return start
+    wall = model.obstacles[-1]
+    assert isinstance(wall, HeldTip)
+    for share in np.linspace(0.0, 1.0, WALL_STEPS + 1)[1:]:
+        wall.share = share
+        start = equilibrium.newton(start.u, 0.0)
+    return start

@@ -10,7 +10,16 @@ import attrs
 
 from ..design.toml_text import nearest
 from ..errors import InputError
-from .quantities import AirVolume, Angle, RestStiffness, Stretch, WallsApart
+from .quantities import (
+    AirVolume,
+    Angle,
+    RestStiffness,
+    Stretch,
+    TipForce,
+    TipPosition,
+    WallsApart,
+    Workspace,
+)
 from .sensor import Disturbance, SensorSlope
 from .structure import Quantity
 from .whole import Mass, PrintTime
@@ -20,6 +29,9 @@ Goal = Literal["minimise", "maximise"]
 # Keys of each kind besides those of `_FORM`, and the unit of its value.
 KINDS: dict[str, tuple[tuple[str, ...], str]] = {
     "angle": (("pressure_kPa",), "deg"),
+    "tip_force": (("pressure_kPa", "gap_mm"), "N"),
+    "tip_position": (("pressure_kPa", "direction"), "mm"),
+    "workspace": (("pressures_kPa",), "mm"),
     "stiffness": (("direction",), "N/mm"),
     "stretch": (("pressure_kPa", "region"), ""),
     "safety": (("pressure_kPa", "region"), ""),
@@ -31,10 +43,13 @@ KINDS: dict[str, tuple[tuple[str, ...], str]] = {
     "walls_apart": (("pressure_kPa",), ""),
     "printable": ((), ""),
 }
+OF_SENSOR = ("deviation", "sensor_slope")
+"""Kinds that need a sensor in the body."""
 _FORM = ("kind", "name", "value", "tolerance", "low", "high", "objective", "points")
 NARROW = 0.02
 """A bound without a tolerance is missed by one unit of misfit where it is missed by this share of itself."""
 HIGHEST_kPa = 500.0
+FARTHEST_WALL_MM = 200.0
 
 
 @attrs.frozen
@@ -76,9 +91,13 @@ class Target:
             return (found - self.high) / self.tolerance
         return 0.0
 
-    def met(self, found: float) -> bool:
-        """Whether a value keeps it: a target within its tolerance, a bound to a millionth of its own."""
-        return abs(self.misfit(found)) <= (1.0 if not math.isnan(self.value) else 1e-6)
+    def met(self, found: float, margin: float = 0.0) -> bool:
+        """Whether a value keeps it: a target within its tolerance, a bound to a millionth of its own.
+
+        margin: so far to either side of the value too.
+        """
+        least = 1.0 if not math.isnan(self.value) else 1e-6
+        return all(abs(self.misfit(v)) <= least for v in (found - margin, found, found + margin))
 
     @property
     def words(self) -> str:
@@ -100,12 +119,16 @@ class Target:
 
 @attrs.frozen
 class Supplies:
-    """What targets need besides: elongation at break as a ratio, density in g/ml and a printer, and paths."""
+    """What targets need besides: elongation at break as a ratio, density in g/ml and a printer, and paths.
+
+    has_gravity: whether the unit bears its weight, so that it is bent at 0 kPa.
+    """
 
     elongation: float
     density_g_per_ml: float
     printer: Any
     paths: Sequence[str]
+    has_gravity: bool = False
 
 
 def read_targets(
@@ -166,6 +189,8 @@ def _name(kind: str, table: Mapping[str, Any]) -> str:
         words += f" of {table['path']}"
     if "pressure_kPa" in table:
         words += f" at {table['pressure_kPa']:g} kPa" if _is_number(table["pressure_kPa"]) else ""
+    if "gap_mm" in table:
+        words += f" on a wall at {table['gap_mm']:g} mm" if _is_number(table["gap_mm"]) else ""
     return f"{words} along {table['direction']}" if "direction" in table else words
 
 
@@ -238,7 +263,9 @@ def _quantity(
                 f"direction = {direction!r} is not an axis", f"{where}, direction", 'write "x", "y" or "z"'
             )
         return RestStiffness(name, direction)
-    if kind in ("deviation", "sensor_slope"):
+    if kind == "workspace":
+        return Workspace(name, _pressures(table, where))
+    if kind in OF_SENSOR:
         pressures, path = _pressures(table, where), table.get("path")
         if path not in supplies.paths:
             raise InputError(
@@ -250,18 +277,43 @@ def _quantity(
     pressure = 0.0 if kind == "air_volume" and "pressure_kPa" not in table else _pressure(table, where)
     if kind == "air_volume":
         return AirVolume(name, pressure)
-    if pressure == 0:
+    if pressure == 0 and not (supplies.has_gravity and kind in ("angle", "tip_position")):
         raise InputError(
-            f"{kind} at 0 kPa is that of the unit at rest", f"{where}, pressure_kPa", "give another"
-        )
+            f"{kind} at 0 kPa is that of the unit at rest", f"{where}, pressure_kPa",
+            "give another; with orientation_deg, under its weight, an angle or a tip position may be at 0",
+        )  # fmt: skip
     if kind == "angle":
         return Angle(name, pressure)
+    if kind == "tip_force":
+        return _tip_force(name, pressure, table, where)
+    if kind == "tip_position":
+        direction = table.get("direction", "y")
+        if direction not in ("y", "z"):
+            raise InputError(
+                f"direction = {direction!r} is none in which the tip moves", f"{where}, direction",
+                'write "y", toward which it bends, or "z", along the axis',
+            )  # fmt: skip
+        return TipPosition(name, pressure, str(direction))
     if kind == "walls_apart":
         return WallsApart(name, pressure)
     region = table.get("region", "wall")
     if region not in ("wall", "struts"):
         raise InputError(f"region = {region!r} is not known", f"{where}, region", 'write "wall" or "struts"')
     return Stretch(name, pressure, region, supplies.elongation if kind == "safety" else None)
+
+
+def _tip_force(name: str, pressure: float, table: Mapping[str, Any], where: str) -> TipForce:
+    gap = _number(table, "gap_mm", where) if "gap_mm" in table else 0.0
+    if pressure < 0:
+        raise InputError(
+            "the wall is on the side toward which pressure bends the unit", f"{where}, pressure_kPa",
+            "give a pressure above 0",
+        )  # fmt: skip
+    if not 0 <= gap <= FARTHEST_WALL_MM:
+        raise InputError(
+            f"gap_mm = {gap:g} is out of bounds", f"{where}, gap_mm", f"give 0 to {FARTHEST_WALL_MM:g} mm"
+        )
+    return TipForce(name, pressure, gap)
 
 
 def _refuse(table: Mapping[str, Any], keys: Sequence[str], where: str, why: str) -> None:

@@ -95,6 +95,7 @@ class UnitBody:
     def structure(self) -> Structure:
         """The body; see `mesh` for the errors."""
         model = self.mechanics.model(self.printed, self.mesh)
+        model.load = self.mechanics.load(self.printed, self.mesh)
         return self._structure(self.unit, self.printed, model)
 
     @cached_property

@@ -15,6 +15,10 @@ ANGLE = '[[target]]\nkind = "angle"\npressure_kPa = 30\nlow = 20\n'
 
 KIND = '[[freedom]]\nparameter = "lattice.kind"\nvalues = ["octet"]\n'
 SENSOR = '[[target]]\nkind = "deviation"\npressures_kPa = [5]\npath = "x"\nhigh = 1\n'
+ASIDE = ANGLE.replace("angle", "tip_position") + 'direction = "x"\n'
+GRADED = '[[freedom]]\nparameter = "grading.cells"\nfixed = "* 0 *: 1.1; 0 2 3: 0.9"\n'
+CELL = '[[freedom]]\nparameter = "grading.cells"\ncells = "0 2"\nlow = 0.7\nhigh = 1.3\n'
+FORCE = '[[target]]\nkind = "tip_force"\npressure_kPa = 20\ngap_mm = 2\nlow = 1\n'
 
 
 def design(text):
@@ -55,7 +59,7 @@ def test_a_resin_of_ones_own_lies_beside_what_is_written(tmp_path):
     assert read_design(tmp_path / "design.toml", texts["design.toml"]).texts() == texts
 
 
-@pytest.mark.parametrize("folder", ["stronger-finger", "graded-finger"])
+@pytest.mark.parametrize("folder", ["stronger-finger", "graded-finger", "robust-finger", "straight-finger"])
 def test_the_examples_are_read(folder):
     path = Path(__file__).parents[2] / "assets/examples" / folder / "design.toml"
     found = design(path.read_text())
@@ -63,11 +67,52 @@ def test_the_examples_are_read(folder):
     assert len(found.freedoms) >= 2
 
 
+def test_force_place_and_path_of_the_tip_are_targets():
+    found = design(
+        HEAD
+        + FORCE
+        + '[[target]]\nkind = "tip_position"\npressure_kPa = 30\ndirection = "z"\nhigh = 1\n'
+        + '[[target]]\nkind = "workspace"\npressures_kPa = [-10, 30]\nobjective = "maximise"\n'
+        + WALL
+    )
+    assert [(t.name, t.unit) for t in found.targets] == [
+        ("tip force at 20 kPa on a wall at 2 mm", "N"),
+        ("tip position at 30 kPa along z", "mm"),
+        ("workspace", "mm"),
+    ]
+    force, place, path = (t.quantity for t in found.targets)
+    assert (force.pressure_kPa, force.gap_mm, place.direction) == (20.0, 2.0, "z")
+    assert [c.pressure_kPa for c in path.conditions] == [-10.0, 0.0, 30.0]
+
+
+def test_a_unit_with_weight_has_an_angle_at_rest():
+    found = design(HEAD + "orientation_deg = 90\nrobust = true\n" + ANGLE.replace("30", "0") + WALL)
+    assert found.orientation_deg == 90.0
+    assert found.targets[0].quantity.pressure_kPa == 0.0
+    assert found.robust
+    assert design(HEAD + ANGLE + WALL).orientation_deg is None
+
+
 def test_a_curve_is_a_target_a_point():
     found = design(
         HEAD + '[[target]]\nkind = "angle"\npoints = [[-15, -10], [30, 16]]\ntolerance = 1\n' + WALL
     )
     assert [(t.quantity.pressure_kPa, t.value) for t in found.targets] == [(-15.0, -10.0), (30.0, 16.0)]
+
+
+def test_the_struts_of_single_cells_are_free_each_by_a_factor():
+    rows = [
+        f'[[freedom]]\nparameter = "grading.cells"\ncells = "{cells}"\nlow = 0.7\nhigh = 1.3\n'
+        for cells in ("0 -1 *", "0 2 3")
+    ]
+    found = design(HEAD + ANGLE + "".join(rows) + GRADED)
+    assert [f.name for f in found.freedoms] == ["grading.cells[0 -1 *]", "grading.cells[0 2 3]"]
+    assert found.start == (1.0, 0.9)
+    unit = changed_unit(found.unit, found.freedoms, [0.8, 1.2])
+    assert unit.grading.cells == "* 0 *: 1.1; 0 -1 *: 0.8; 0 2 3: 1.2"
+    assert [f.value_of(unit) for f in found.freedoms] == [0.8, 1.2]
+    # A factor of 1 is no entry.
+    assert changed_unit(unit, found.freedoms, [1.0, 1.2]).grading.cells == "* 0 *: 1.1; 0 2 3: 1.2"
 
 
 def test_what_follows_a_freedom_changes_with_it():
@@ -108,6 +153,16 @@ def test_what_follows_a_freedom_changes_with_it():
         (ANGLE + WALL, "format", "format"),
         ("format = 1\n" + ANGLE + WALL, "no unit is given", "design.toml"),
         (HEAD + "target = 3\n" + WALL, "list of tables", "target"),
+        (HEAD + ANGLE.replace("30", "0") + WALL, "the unit at rest", "line 5"),
+        (HEAD + ANGLE.replace("angle", "tip_force").replace("30", "-5") + WALL, "toward which", "line 5"),
+        (HEAD + FORCE.replace("gap_mm = 2", "gap_mm = 999") + WALL, "gap_mm = 999 is out", "line 6"),
+        (HEAD + FORCE.replace("gap_mm = 2", 'direction = "y"') + WALL, "unknown key 'direction'", "line 6"),
+        (HEAD + ASIDE + WALL, "none in which", "line 7"),
+        (HEAD + ANGLE + CELL, "no column, row and chamber", "line 9"),
+        (HEAD + ANGLE + CELL.replace('"0 2"', '"0 2 *"').replace("1.3", "3"), "not a range of", "line 10"),
+        (HEAD + ANGLE + CELL.replace('"0 2"', '"0 9 *"'), "0 9 *", "line 9"),
+        (HEAD + "robust = 1\n" + ANGLE + WALL, "neither true nor false", "line 3"),
+        (HEAD + "orientation_deg = 400\n" + ANGLE + WALL, "out of bounds", "line 3"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_named_by_key_and_line(text, what, where):

@@ -26,6 +26,7 @@ FREE = [
     Freedom("material.membrane_poisson", 0.3, 0.49),
     Freedom("print.offset_xy_mm", 0.0, 0.2),
     Freedom("scale", 0.7, 1.5),
+    Freedom("grading.cells[* -1 *]", 0.5, 1.5),
     Freedom("chambers.cell_mm", 10.0, 15.0, also={"chambers.bladder_diameter_mm": 2.0}),
 ]
 ASKED = [

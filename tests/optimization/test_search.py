@@ -138,3 +138,25 @@ def test_without_a_sound_design_the_search_ends_with_its_budget():
 def test_pareto_keeps_equal_points_and_drops_dominated_ones():
     costs = np.array([[0.0, 1.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     assert pareto(costs).tolist() == [0, 1, 3]
+
+
+def test_a_margin_keeps_a_design_that_far_inside_its_bounds():
+    """At least 1.2 and at most 1.8 of a, with a margin that grows with b: the largest b, or none."""
+    _, plain = observer([lambda a, b: a, lambda a, b: b], TWO)
+
+    def with_margin(size):
+        def observe(designs):
+            return [
+                attrs.evolve(o, margins=np.array([size * (1 + o.design[1]), 0.0])) for o in plain(designs)
+            ]
+
+        return observe
+
+    asked = [target("between", low=1.2, high=1.8), target("small", goal="maximise")]
+    found = search_units(TWO, asked, with_margin(0.15), (0.1, 0.5), SearchSettings(30))
+    # 0.15 (1 + b) is half the gap, 0.3, at b = 1.
+    assert found.feasible
+    assert best(found).values == pytest.approx([1.5, 1.0], abs=0.02)
+    found = search_units(TWO, asked, with_margin(0.35), (0.1, 0.5), SearchSettings(30))
+    assert not found.feasible
+    assert best(found).design[0] == pytest.approx(1.5, abs=0.05)

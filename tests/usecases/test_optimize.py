@@ -4,17 +4,18 @@ refusals."""
 import json
 import shutil
 
+import attrs
 import numpy as np
 import pytest
 
 from mu_addon.errors import InputError
-from mu_addon.optimization.evaluation import Evaluated, Evaluator
-from mu_addon.optimization.robustness import Verified
+from mu_addon.optimization.evaluation import Evaluated, Evaluator, evaluate
+from mu_addon.optimization.robustness import Verified, verified
 from mu_addon.optimization.search import Found, Observed
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.optimize import run as optimize_run
-from mu_addon.usecases.optimize.job import job_from, mechanics_of, read_job
+from mu_addon.usecases.optimize.job import Job, job_from, mechanics_of, read_job
 from mu_addon.usecases.optimize.run import USE_CASE, console_summary
 from mu_addon.usecases.optimize.words import changes, outcome, reasons, verdict
 from mu_addon.usecases.optimize.worker import Task, run_task
@@ -109,6 +110,43 @@ def test_a_worker_finds_what_the_run_does(job):
     assert json.loads(json.dumps(row))["gradient"] == own.plain()["gradient"]
 
 
+@pytest.mark.slow
+def test_a_robust_search_judges_by_the_finer_mesh_and_within_its_uncertainty(tmp_path):
+    job = Job(job_from_text("robust = true\n" + TEXT))
+    run = optimize_run._Run(job, tmp_path, RunContext(Progress([]), folder=tmp_path), 0.3)
+    mechanics, _ = mechanics_of(job.design, None)
+    uncertainty = job.design.uncertainty
+    run.evaluator = Evaluator(job.design.targets, job.design.freedoms, mechanics, uncertainty=uncertainty)
+    run.mesh_change = run.change_by_mesh(job.design.unit)
+    [observed] = run.observe([job.design.start])
+    raw = run.rows[0][1]
+    finer, _ = mechanics_of(job.design, None, job.design.check_refine)
+    fine = evaluate(job.design.unit, job.design.targets, (), finer).values
+    judged = [i for i, t in enumerate(job.design.targets) if t.quantity is not None]
+    # Of the start it is exact.
+    np.testing.assert_allclose(observed.values[judged], fine[judged], rtol=1e-9)
+    for i in judged:
+        expected = (fine[i] - raw.values[i]) ** 2 + raw.by_print[i] ** 2 + raw.by_resin[i] ** 2
+        assert observed.margins[i] == pytest.approx(2.0 * expected**0.5, rel=1e-6)
+    # A modulus 10 % higher bends the unit less by about as much, a first-order error.
+    assert raw.by_resin[judged[0]] == pytest.approx(0.1 * abs(raw.values[judged[0]]), rel=0.25)
+    assert (raw.by_print[judged] >= 0).all()
+    assert raw.by_print[judged[0]] > 0
+
+
+@pytest.mark.slow
+def test_a_unit_straight_under_its_weight_is_asked_for_by_an_angle_at_rest():
+    text = "orientation_deg = 90\n" + TEXT.replace("pressure_kPa = 10", "pressure_kPa = 0")
+    design = job_from_text(text)
+    [found] = Evaluator(design.targets, design.freedoms, mechanics_of(design, None)[0]).of([design.unit])
+    hanging = attrs.evolve(design, orientation_deg=0.0)
+    [other] = Evaluator(design.targets, design.freedoms, mechanics_of(hanging, None)[0]).of([design.unit])
+    # Level, with the side of more lattice up, it sags away from it; hanging its weight bends it less.
+    assert found.values[0] < -0.5
+    assert abs(other.values[0]) < 0.3 * abs(found.values[0])
+    assert np.isfinite(found.gradient[0]).all()
+
+
 def test_its_folder_holds_all_that_a_run_needs(job, tmp_path):
     for name, text in job.texts().items():
         (tmp_path / name).write_text(text)
@@ -186,3 +224,27 @@ def test_what_was_kept_of_a_unit_is_what_was_found(job):
     np.testing.assert_array_equal(again.values, found.values)
     np.testing.assert_array_equal(again.gradient, found.gradient)
     assert (again.why, again.model_a) == ("", 3)
+
+
+@pytest.mark.slow
+def test_what_is_proposed_is_simulated_strut_by_strut_where_that_is_asked_for():
+    """On the printed body the angle and the strain have other values; along a sensor's path there is none."""
+    text = TEXT.replace('preset = "mu-1.0x"', 'preset = "mu-1.0x"\ncheck_fidelity = "resolved"')
+    text += '[[freedom]]\nparameter = "chambers.count"\nfixed = 3\n'
+    text += '[[target]]\nkind = "sensor_slope"\npath = "alpha1"\npressures_kPa = [5]\nlow = 0\n'
+    design = job_from_text(text)
+    assert design.check_struts
+    assert not job_from_text(TEXT).check_struts
+    unit = design.unit
+    coarse, _ = mechanics_of(design, None)
+    struts, _ = mechanics_of(design, None, 0.5, with_struts=True)
+    assert struts.settings.resolved
+    found = evaluate(unit, design.targets, (), coarse).values
+    checked = verified(unit, found, design.targets, coarse, design.uncertainty, None, struts)
+    assert checked.struts_why == ""
+    angle, mass, slope = checked.with_struts
+    # Another mechanics, not another unit.
+    assert 0.5 < angle / checked.values[0] < 2.0
+    assert abs(angle - checked.values[0]) > 0.01
+    assert mass == pytest.approx(checked.values[1], rel=1e-9)
+    assert np.isnan(slope)

@@ -8,16 +8,18 @@ import bpy
 
 from ...optimization.freedoms import parameters
 from ..jobs.panel import job_state, start_button
+from ..results import thumbnails
 from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.wording import in_panel
 from ..unit.fields import label
 from . import state as optimization
-from .properties import ASKED, AT_PRESSURE, FREE, OF_PATH, YES, present
+from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, OF_PATH, YES, present
 
 JOB = "optimize_"
 _KNOWN = parameters()
 UNITS = {"angle": "deg", "stiffness": "N/mm", "air_volume": "ml", "mass": "g", "print_time": "h"}
 UNITS |= {"deviation": "mm", "sensor_slope": "1/deg"}
+UNITS |= {"tip_force": "N", "tip_position": "mm", "workspace": "mm"}
 
 
 class MU_PT_optimize(UnitPanel, bpy.types.Panel):
@@ -35,6 +37,11 @@ class MU_PT_optimize(UnitPanel, bpy.types.Panel):
         else:
             _targets(layout, props)
             _freedoms(layout, root, props)
+            layout.prop(props, "robust")
+            row = layout.row()
+            row.prop(props, "has_gravity")
+            if props.has_gravity:
+                row.prop(props, "orientation_deg")
             column = layout.column(align=True)
             column.prop(props, "evaluations")
             column.prop(props, "refine")
@@ -70,20 +77,23 @@ def _targets(layout, props) -> None:
         row.prop(target, "kind", text="")
         _remove(row, "targets", index)
         column = box.column(align=True)
-        if target.kind in AT_PRESSURE:
+        curve = target.ask == "curve" and target.kind not in YES
+        if target.kind in AT_PRESSURE and not curve:
             column.prop(target, "pressure_kPa")
-        elif target.kind in OF_PATH:
+        if target.kind in OF_PATH:
             column.prop(target, "path")
+        if target.kind in AT_TWO:
             column.prop(target, "pressures_kPa")
-        elif target.kind == "stiffness":
-            column.prop(target, "direction")
+        own = {"stiffness": "direction", "tip_position": "toward", "tip_force": "gap_mm"}.get(target.kind)
+        if own:
+            column.prop(target, own)
         if target.kind in YES:
             continue
         column.prop(target, "ask")
         unit = UNITS.get(target.kind, "")
         for name in ASKED[target.ask]:
             title = target.bl_rna.properties[name].name
-            column.prop(target, name, text=f"{title} ({unit})" if unit else title)
+            column.prop(target, name, text=f"{title} ({unit})" if unit and name != "points" else title)
 
 
 def _freedoms(layout, root, props) -> None:
@@ -95,8 +105,9 @@ def _freedoms(layout, root, props) -> None:
         row.prop(freedom, "parameter", text="")
         _remove(row, "freedoms", index)
         column = box.column(align=True)
-        column.prop(freedom, "low")
-        column.prop(freedom, "high")
+        column.prop(freedom, "how", text="")
+        for name in {"range": ("low", "high"), "values": ("values",), "fixed": ("value",)}[freedom.how]:
+            column.prop(freedom, name)
         d = FREE[freedom.parameter]
         words = f"now {present(root, freedom.parameter):.4g} {d.unit}".rstrip()
         scaled = d.unit == "mm" and root.mu_unit.scale != 1.0 and not d.fixed
@@ -129,6 +140,9 @@ def _proposed(layout, proposed) -> None:
     row.operator("mu.optimize_add", text="", icon="DUPLICATE").number = proposed.number
     if not body:
         return
+    icon = thumbnails.icon_of(proposed.file.with_suffix(".png"))
+    if icon is not None:
+        body.template_icon(icon, scale=6.0)
     column = body.column(align=True)
     if proposed.applied:
         wrapped(column, "The unit has its parameters", "INFO")

@@ -33,6 +33,9 @@ AROUND = 0.25
 
 KINDS = [
     ("angle", "Angle", "Bending angle under a pressure, in degrees"),
+    ("tip_force", "Tip Force", "Force on a wall beside the tip under a pressure, in N"),
+    ("tip_position", "Tip Position", "Displacement of the tip under a pressure, in mm"),
+    ("workspace", "Workspace", "Length of the tip's path over two pressures and rest, in mm"),
     ("stiffness", "Stiffness", "Force that moves the tip by 1 mm, the unit at rest, in N/mm"),
     ("stretch", "Stretch", "Largest principal stretch of the wall under a pressure"),
     ("safety", "Safety", "The resin's elongation at break over the wall's strain under a pressure"),
@@ -44,13 +47,14 @@ KINDS = [
     ("walls_apart", "Walls Apart", "No wall passes through another under a pressure"),
     ("printable", "Printable", "No error in the print check of what is proposed"),
 ]
-AT_PRESSURE = ("angle", "stretch", "safety", "air_volume", "walls_apart")
+AT_PRESSURE = ("angle", "tip_force", "tip_position", "stretch", "safety", "air_volume", "walls_apart")
 OF_PATH = ("deviation", "sensor_slope")
+AT_TWO = (*OF_PATH, "workspace")
 YES = ("walls_apart", "printable")
-"""Kinds of targets that are read at one pressure, that are of a path at two, that are a yes or a no."""
+"""Kinds of targets that are read at one pressure, that are of a path, read at two, that are a yes or a no."""
 ASKED = {"low": ("low",), "high": ("high",), "range": ("low", "high"), "value": ("value", "tolerance")}
-ASKED |= {"minimise": (), "maximise": ()}
-"""Numbers that each way of asking needs."""
+ASKED |= {"curve": ("points", "tolerance"), "minimise": (), "maximise": ()}
+"""What each way of asking needs."""
 
 
 class MU_PG_target(bpy.types.PropertyGroup):
@@ -79,6 +83,24 @@ class MU_PG_target(bpy.types.PropertyGroup):
     direction: EnumProperty(
         name="Along", description="Direction of the force", items=[(axis, axis.upper(), "") for axis in "xyz"]
     )
+    toward: EnumProperty(
+        name="Along",
+        description="Direction of the displacement",
+        items=[("y", "Y", "Toward which the unit bends"), ("z", "Z", "Along the axis")],
+    )
+    gap_mm: FloatProperty(
+        name="Gap (mm)",
+        description="From the tip as drawn to the wall",
+        default=0.0,
+        min=0.0,
+        max=200.0,
+        precision=2,
+    )
+    points: StringProperty(
+        name="Curve",
+        description="Pressure in kPa and value of each point, as -15: -10, 30: 16",
+        default="-15: -10, 30: 16",
+    )
     path: StringProperty(name="Path", description="Sensor path, alpha1 and on", default="alpha4")
     ask: EnumProperty(
         name="Shall Be",
@@ -88,6 +110,7 @@ class MU_PG_target(bpy.types.PropertyGroup):
             ("high", "At Most", "Not more than a bound"),
             ("range", "Between", "Within two bounds"),
             ("value", "Equal to", "A value within a tolerance"),
+            ("curve", "On a Curve", "Values at several pressures, each within a tolerance"),
             ("minimise", "As Small as Possible", "An objective: several of them give a Pareto front"),
             ("maximise", "As Large as Possible", "An objective: several of them give a Pareto front"),
         ],
@@ -119,6 +142,7 @@ def _first_range(freedom, context) -> None:
     if not low < high:
         low, high = d.low, d.high
     freedom.low, freedom.high = float(f"{low:.4g}"), float(f"{high:.4g}")
+    freedom.value, freedom.values = now, ", ".join(f"{v:.4g}" for v in (low, now, high))
 
 
 def present(root, name: str) -> float:
@@ -144,6 +168,23 @@ class MU_PG_freedom(bpy.types.PropertyGroup):
         items=[(name, title(name, d), sentence(d.text)) for name, d in FREE.items()],
         default="chambers.wall_mm",
         update=_first_range,
+    )
+    how: EnumProperty(
+        name="May Be",
+        description="How the parameter may change",
+        items=[
+            ("range", "Between", "Any value between two"),
+            ("values", "One of", "One of some values"),
+            ("fixed", "Fixed at", "One value, which the search leaves"),
+        ],
+    )
+    values: StringProperty(
+        name="Values",
+        description="The values, in the parameter's unit at scale 1, as 0.7, 0.9, 1.1",
+        default="",
+    )
+    value: FloatProperty(
+        name="Value", description="In the parameter's unit at scale 1", default=0.9, precision=3
     )
     low: FloatProperty(
         name="From", description="Lowest value, in the parameter's unit at scale 1", default=0.7, precision=3
@@ -177,6 +218,25 @@ class MU_PG_optimize(bpy.types.PropertyGroup):
     )
     targets: CollectionProperty(type=MU_PG_target, description="What the unit shall do")
     freedoms: CollectionProperty(type=MU_PG_freedom, description="What may change")
+    robust: BoolProperty(
+        name="Robust",
+        description="Ask for units that meet the targets within the uncertainty of mesh, print and resin",
+        default=False,
+    )
+    has_gravity: BoolProperty(
+        name="Own Weight",
+        description="The unit bears its weight; then an angle may be asked for at 0 kPa",
+        default=False,
+    )
+    orientation_deg: FloatProperty(
+        name="Turned by (deg)",
+        description="0: hanging, tip down; 90: level",
+        default=90.0,
+        min=-360.0,
+        max=360.0,
+        precision=1,
+        step=100,
+    )
     evaluations: IntProperty(
         name="Units at Most",
         description="How many units are simulated at most, those on the finer mesh not counted",

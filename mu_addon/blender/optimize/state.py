@@ -21,7 +21,7 @@ from ..simulate import effects
 from ..simulate import study_folder as studies
 from ..unit.fields import exact
 from ..unit.properties import shape_hash, to_unit
-from .properties import ASKED, AT_PRESSURE, FREE, OF_PATH, YES
+from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, OF_PATH, YES
 
 if TYPE_CHECKING:
     from ...usecases.optimize.job import Job
@@ -100,26 +100,55 @@ OPTIMIZATION = JobKind(
 def target_table(target: Any) -> dict[str, Any]:
     """A target of the panel as its [[target]] table."""
     table: dict[str, Any] = {"kind": target.kind}
-    if target.kind in AT_PRESSURE:
-        table["pressure_kPa"] = exact(target.pressure_kPa)
-    elif target.kind in OF_PATH:
-        table |= {"path": target.path, "pressures_kPa": [exact(p) for p in target.pressures_kPa]}
-    elif target.kind == "stiffness":
+    if target.kind in OF_PATH:
+        table["path"] = target.path
+    if target.kind in AT_TWO:
+        table["pressures_kPa"] = [exact(p) for p in target.pressures_kPa]
+    if target.kind == "stiffness":
         table["direction"] = target.direction
+    elif target.kind == "tip_position":
+        table["direction"] = target.toward
+    elif target.kind == "tip_force":
+        table["gap_mm"] = exact(target.gap_mm)
+    curve = target.ask == "curve" and target.kind not in YES
+    if target.kind in AT_PRESSURE and not curve:
+        table["pressure_kPa"] = exact(target.pressure_kPa)
     if target.kind in YES:
         return table
+    if curve:
+        points = [_numbers(pair, ":") for pair in target.points.split(",")]
+        return table | {"points": points, "tolerance": exact(target.tolerance)}
     keys = ASKED[target.ask]
     asked = {key: exact(getattr(target, key)) for key in keys}
     return table | (asked if keys else {"objective": target.ask})
 
 
+def _numbers(text: str, between: str) -> list[Any]:
+    """Numbers of a text, whole ones as such; a part that is none stays text, which the core refuses."""
+    found: list[Any] = []
+    for part in text.split(between):
+        try:
+            found.append(int(part) if part.strip().lstrip("+-").isdecimal() else float(part))
+        except ValueError:
+            found.append(part.strip())
+    return found
+
+
 def freedom_table(freedom: Any) -> dict[str, Any]:
     """A freedom of the panel as its [[freedom]] table; what a rule ties to it follows."""
     section, _, name = freedom.parameter.rpartition(".")
-    low, high = exact(freedom.low), exact(freedom.high)
-    if FREE[freedom.parameter].type is int:
-        low, high = round(low), round(high)
-    table = {"parameter": freedom.parameter, "low": low, "high": high}
+    whole = FREE[freedom.parameter].type is int
+
+    def number(value: float) -> float:
+        return round(value) if whole else exact(value)
+
+    table: dict[str, Any] = {"parameter": freedom.parameter}
+    if freedom.how == "fixed":
+        return table | {"fixed": number(freedom.value)}
+    if freedom.how == "values":
+        table["values"] = _numbers(freedom.values, ",")
+    else:
+        table |= {"low": number(freedom.low), "high": number(freedom.high)}
     follows = {f"{section}.{key}": factor for key, factor in tied({name: 1.0}).items() if key != name}
     return table | ({"also": follows} if follows else {})
 
@@ -127,12 +156,14 @@ def freedom_table(freedom: Any) -> dict[str, Any]:
 def document(root: Any) -> dict[str, Any]:
     """What design.toml says of the panel's targets and freedoms."""
     s = root.mu_optimize
-    return {
+    weight = {"orientation_deg": exact(s.orientation_deg)} if s.has_gravity else {}
+    return weight | {
         "format": 1,
         "unit": UNIT,
         "evaluations": s.evaluations,
         "refine": exact(s.refine),
         "check_refine": exact(s.check_refine),
+        "robust": s.robust,
         "target": [target_table(t) for t in s.targets],
         "freedom": [freedom_table(f) for f in s.freedoms],
     }
@@ -161,14 +192,16 @@ def write_inputs(root: Any, folder: Path) -> None:
     """Write what the unit's optimisation is asked to do into a folder; raises InputError, OutputError."""
     from ...usecases.optimize.job import LAYOUT
 
-    texts = job_of(root).texts()
+    job = job_of(root)
+    texts = job.texts()
     model = root.mu_unit.study.effects
     if model:
-        if effects.inputs(root).get("orientation_deg", 0.0) != 0.0:
+        turned = effects.inputs(root).get("orientation_deg", 0.0)
+        if turned != (job.design.orientation_deg or 0.0):
             raise InputError(
-                "the search takes gravity for a unit that hangs",
-                "Simulate, Gravity",
-                "set it to 0, or remove the effects",
+                f"the unit is turned by {turned:g} degrees in Simulate and otherwise here",
+                "Optimize, Own Weight",
+                "turn it alike in both",
             )
         texts[MODEL] = model
     write_run(folder, LAYOUT, texts)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,8 @@ import numpy as np
 from ...design.lattice import lattice_of
 from ...design.parameters import Unit
 from ...design.profile import cavity_polygon, outer_polygon
-from ...report.charts import BY_LENGTH, CHOSEN, INK, QUIET, canvas
+from ...files import write_bytes
+from ...report.charts import BY_LENGTH, CHOSEN, INK, QUIET, canvas, styled
 from .results import Optimised
 
 Array = np.ndarray[Any, Any]
@@ -76,22 +79,41 @@ def thumbnail(unit: Unit, widest_mm: float, tallest_mm: float) -> str:
 
     widest_mm, tallest_mm: size of the largest unit to be shown beside it.
     """
-    d = unit.dimensions
     with canvas(1.15, 1.15 * tallest_mm / widest_mm) as (drawn, svg):
-        axes = drawn.add_axes((0.0, 0.0, 1.0, 1.0))
-        (_, _), (y0, y1), (z0, z1) = d.bounds
-        (envelope,) = axes.fill([y0, y1, y1, y0], [z0, z0, z1, z1], color="#dfe6ee", linewidth=0)
-        for strut in axes.fill(*_strut_outlines(unit), color="#8a97a8", linewidth=0):
-            strut.set_clip_path(envelope)
-        for polygon, color in ((outer_polygon(d, ALONG), "#c98a3a"), (cavity_polygon(d, ALONG), "#ffffff")):
-            for sign in (1, -1):
-                axes.fill(sign * polygon[:, 0], polygon[:, 1], color=color, linewidth=0)
-        middle = 0.5 * (y0 + y1)
-        axes.set_xlim(middle - 0.52 * widest_mm, middle + 0.52 * widest_mm)
-        axes.set_ylim(-0.02 * tallest_mm, 1.02 * tallest_mm)
-        axes.set_aspect("equal")
-        axes.axis("off")
+        _half_section(drawn, unit, widest_mm, tallest_mm)
     return svg()
+
+
+def picture(unit: Unit, path: Path) -> None:
+    """Write a unit's half section as a square PNG of 256 pixels, as a panel shows it; raises OutputError."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    size = 1.05 * max(sizes([unit]))
+    stream = io.BytesIO()
+    with styled(2.56, 2.56) as drawn:
+        FigureCanvasAgg(drawn)
+        _half_section(drawn, unit, size, size)
+        drawn.savefig(stream, format="png", dpi=100, transparent=True, metadata={"Software": None})
+    write_bytes(path, stream.getvalue())
+
+
+def _half_section(drawn: Any, unit: Unit, widest_mm: float, tallest_mm: float) -> None:
+    """Draw a unit over a whole figure, so many mm wide and tall."""
+    d = unit.dimensions
+    axes = drawn.add_axes((0.0, 0.0, 1.0, 1.0))
+    (_, _), (y0, y1), (z0, z1) = d.bounds
+    (envelope,) = axes.fill([y0, y1, y1, y0], [z0, z0, z1, z1], color="#dfe6ee", linewidth=0)
+    for strut in axes.fill(*_strut_outlines(unit), color="#8a97a8", linewidth=0):
+        strut.set_clip_path(envelope)
+    for polygon, color in ((outer_polygon(d, ALONG), "#c98a3a"), (cavity_polygon(d, ALONG), "#ffffff")):
+        for sign in (1, -1):
+            # The edge hides the seam between the halves.
+            axes.fill(sign * polygon[:, 0], polygon[:, 1], color=color, linewidth=0.3)
+    middle = 0.5 * (y0 + y1)
+    axes.set_xlim(middle - 0.52 * widest_mm, middle + 0.52 * widest_mm)
+    axes.set_ylim(-0.02 * tallest_mm, 1.02 * tallest_mm)
+    axes.set_aspect("equal")
+    axes.axis("off")
 
 
 def _strut_outlines(unit: Unit) -> list[Array]:

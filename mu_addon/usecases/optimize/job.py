@@ -12,16 +12,21 @@ from ...errors import InputError
 from ...evidence.extended import ExtendedModel, load_model
 from ...fem.unit import materials_of
 from ...materials.library import parse_material
+from ...meshing.settings import RESOLVED
 from ...optimization.design_file import HEADER, RESIN, UNIT, Design, parse_design, read_design
 from ...optimization.unit_body import Mechanics
 from ...reading import file_text
 from ...run.folder import FolderLayout
 from ..simulate_and_place.extended_unit import extend
+from ..simulate_and_place.named_effects import NamedEffects
 
 DESIGN, MODEL = "design.toml", "model.toml"
 TABLE, REPORT = "designs.csv", "report.html"
 LAYOUT = FolderLayout(
-    DESIGN, HEADER, results=(TABLE, REPORT, "proposed-*.toml"), optional=(UNIT, RESIN, MODEL)
+    DESIGN,
+    HEADER,
+    results=(TABLE, REPORT, "proposed-*.toml", "proposed-*.png"),
+    optional=(UNIT, RESIN, MODEL),
 )
 # No file of inputs is longer, in bytes.
 _LONGEST = 1_000_000
@@ -80,18 +85,23 @@ def design_of(texts: Mapping[str, str]) -> Design:
 
 
 def mechanics_of(
-    design: Design, model: ExtendedModel | None, refine: float | None = None
+    design: Design, model: ExtendedModel | None, refine: float | None = None, with_struts: bool = False
 ) -> tuple[Mechanics, list[str]]:
     """How the design's units are simulated, and what of the model is left out, in words.
 
-    refine: of the mesh, by default the search's. Raises InputError where the unit cannot have the model.
+    refine: of the mesh, by default the search's; with_struts: as printed, strut by strut. Raises InputError
+    where the unit cannot have the model.
     """
     settings = design.settings if refine is None else attrs.evolve(design.settings, refine=refine)
+    if with_struts:
+        settings = attrs.evolve(settings, fidelity=RESOLVED)
     if model is None:
-        return Mechanics(settings), []
-    first = extend(design.unit, model)
-    effects = first.effects
-    left_out = list(first.left_out)
+        effects, left_out = _with_weight(NamedEffects(), design), []
+        if not effects:
+            return Mechanics(settings), []
+    else:
+        first = extend(design.unit, model)
+        effects, left_out = _with_weight(first.effects, design), list(first.left_out)
     if effects.in_time:
         left_out.append(
             "effects in time (viscoelasticity, lag, leak, softening): targets are of the unit at rest under "
@@ -99,7 +109,7 @@ def mechanics_of(
         )
 
     def printed(unit: Unit) -> Unit:
-        return extend(unit, model).unit
+        return unit if model is None else extend(unit, model).unit
 
     return Mechanics(
         settings,
@@ -107,5 +117,14 @@ def mechanics_of(
         materials=lambda unit, mesh: effects.materials(materials_of(unit, mesh), mesh),
         model=lambda unit, mesh: effects.model(unit, mesh, threads=1),
         load=effects.load,
-        newton=None if design.settings.resolved else effects.newton,
+        newton=None if settings.resolved else effects.newton,
     ), left_out
+
+
+def _with_weight(effects: NamedEffects, design: Design) -> NamedEffects:
+    """The effects and the unit's weight as the design turns it, by default of the resin's density."""
+    if design.orientation_deg is None:
+        return effects
+    values = {name: dict(given) for name, given in effects.values.items()}
+    values.setdefault("gravity", {"density_kg_m3": 1000.0 * design.material.density_g_per_ml})
+    return NamedEffects(values, design.orientation_deg, effects.where)

@@ -101,29 +101,34 @@ def _state(p: Proposal) -> str:
 
 
 def _targets(found: Optimised) -> str:
-    html = ""
+    html, d = "", found.design
     for p in found.proposals:
         rows = []
         for i, t in enumerate(found.design.targets):
             c = p.checked
+            struts = [] if not d.check_struts else [_printed_value(c.with_struts[i])]
             if t.quantity is None:
                 verdict = _verdict(c.met[i], c.robust[i])
-                rows.append(([t.name, t.words, c.print_worst, "", "", "", "", verdict], False))
+                rows.append(
+                    ([t.name, t.words, c.print_worst, "", "", "", "", *("" for _ in struts), verdict], False)
+                )
                 continue
             cells = [f"{v:.3g}" for v in (c.by_mesh[i], c.by_print[i], c.by_resin[i])]
             values = [number(float(f"{v:.5g}")) for v in (p.values[i], c.values[i])]
             verdict = _verdict(c.met[i], c.robust[i]) if t.goal is None else "objective"
             name = f"{t.name} [{t.unit}]" if t.unit else t.name
-            rows.append(([name, t.words, *values, *cells, verdict], False))
+            rows.append(([name, t.words, *values, *cells, *struts, verdict], False))
         head = [
             ("target", ""), ("asked", ""), ("found", "n"), ("on a finer mesh", "n"), ("± mesh", "n"),
-            ("± print", "n"), ("± resin", "n"), ("verdict", ""),
+            ("± print", "n"), ("± resin", "n"), *([("strut by strut", "n")] if d.check_struts else []),
+            ("verdict", ""),
         ]  # fmt: skip
         caption = f"Unit {p.place}" + (f": {p.checked.why}" if p.checked.why else "")
         html += table(caption, head, rows)
+        if p.checked.struts_why:
+            html += note([f"Strut by strut it fails: {p.checked.struts_why}."])
         if p.checked.print_findings:
             html += note(p.checked.print_findings)
-    d = found.design
     words = (
         "Standard errors: the mesh's is the difference to a mesh of refinement "
         f"{d.check_refine:g}; a print's surfaces are off by {d.print_tolerance_mm:g} mm, all moduli by "
@@ -131,6 +136,10 @@ def _targets(found: Optimised) -> str:
         "together."
     )
     return f"<p>{escape(words)}</p>{html}" if html else ""
+
+
+def _printed_value(value: float) -> str:
+    return "" if np.isnan(value) else number(float(f"{value:.5g}"))
 
 
 def _verdict(met: bool, robust: bool) -> str:

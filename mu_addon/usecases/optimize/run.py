@@ -14,12 +14,14 @@ from ...design.parameters import Unit, write_unit
 from ...design.printing.printer import load_printer
 from ...errors import InputError, OutputError
 from ...files import write_csv
-from ...optimization.evaluation import Evaluated, Evaluator
+from ...optimization.evaluation import Evaluated, Evaluator, evaluate
 from ...optimization.robustness import Verified, verified
 from ...optimization.search import Found, Observed, Values, search_units
+from ...optimization.uncertainty import SURE
 from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.usecase import UseCase
+from . import charts
 from .job import LAYOUT, MODEL, REPORT, TABLE, Job, mechanics_of, read_job
 from .report import write_report
 from .results import Optimised, Proposal
@@ -27,6 +29,11 @@ from .words import changes, outcome, reasons, verdict
 from .worker import several
 
 Array = np.ndarray[Any, Any]
+
+FIRST_PART = 0.6
+"""Share of a robust search's units that are judged by the change of the start by the finer mesh."""
+LARGEST_CHANGE = 0.5
+"""Share of a value that a finer mesh is taken to change it by at most."""
 
 MOST_CHECKED = 6
 """Units of a front that are simulated again on a finer mesh, its ends and some evenly between."""
@@ -52,14 +59,13 @@ def optimise(job: Job, folder: Path, context: RunContext) -> Optimised:
         Cache(folder / "cache"),
         origin,
         several(job, progress.warning),
+        uncertainty=design.uncertainty if design.robust else None,
     )
     run.evaluator = evaluator
     start = Observed(design.start, np.empty(0), np.empty((0, 0)), False)
     try:
         with progress.stage("search"):
-            found = search_units(
-                design.freedoms, design.targets, run.observe, design.start, run.settings, run.step
-            )
+            found = run.robust_search() if design.robust else run.search()
     finally:
         with suppress(OutputError):
             run.write(())
@@ -90,6 +96,7 @@ class _Run:
     refine: float
     evaluator: Evaluator = attrs.field(init=False)
     rows: list[tuple[Values, Evaluated | None]] = attrs.field(factory=list)
+    mesh_change: Array | None = None
 
     @property
     def settings(self) -> Any:
@@ -107,8 +114,72 @@ class _Run:
                 [(t.kind, t.quantity) for t in design.targets],
                 [(f.name, f.low, f.high, tuple(f.also.items())) for f in design.freedoms if not f.discrete],
                 design.settings,
+                (design.orientation_deg, design.material.density_g_per_ml),
+                design.uncertainty if design.robust else None,
             )
         )
+
+    def search(self, share: float = 1.0, known: Sequence[Observed] = ()) -> Found:
+        """The search with a share of the evaluations, from designs known before where there are any."""
+        design, settings = self.job.design, self.settings
+        settings = attrs.evolve(settings, evaluations=max(1, round(share * settings.evaluations)))
+        return search_units(
+            design.freedoms, design.targets, self.observe, design.start, settings, self.step, known
+        )
+
+    def robust_search(self) -> Found:
+        """A search that judges by the finer mesh: by what the start changes there, then by its best unit."""
+        design = self.job.design
+        self.mesh_change = self.change_by_mesh(design.unit)
+        found = self.search(FIRST_PART)
+        best = found.observed[found.proposed[len(found.proposed) // 2]]
+        if not best.sound:
+            return self.search(1.0, self._known())
+        self.mesh_change = self.change_by_mesh(design.unit_of(best.design))
+        return self.search(1.0, self._known())
+
+    def _known(self) -> list[Observed]:
+        return [self._observed(values, found) for values, found in self.rows]
+
+    def change_by_mesh(self, unit: Unit) -> Array:
+        """Share (q,) by which each value of a unit changes from the search's mesh to the finer one.
+
+        0 where it fails on either.
+        """
+        design = self.job.design
+        name = key("change by mesh 1", unit.hash(), self.asked, design.check_refine, self._model_text)
+        cache = self.evaluator.cache
+        kept = None if cache is None else cache.get("mesh", name)
+        if kept is not None:
+            return np.asarray(kept["change"])
+        finer, _ = mechanics_of(design, self.job.model, design.check_refine)
+        [coarse] = self.evaluator.of([unit])
+        fine = evaluate(unit, design.targets, (), finer).values - coarse.values
+        share = np.divide(fine, coarse.values, out=np.zeros_like(fine), where=coarse.values != 0)
+        change = np.clip(np.nan_to_num(share), -LARGEST_CHANGE, LARGEST_CHANGE)
+        if cache is not None:
+            cache.put("mesh", name, {"change": change})
+        return change
+
+    @property
+    def _model_text(self) -> str:
+        return "" if self.job.model is None else self.job.model.text()
+
+    def _observed(self, values: Values, found: Evaluated | None) -> Observed:
+        """A computed unit as the search takes it; where it shall be robust, as expected on the finer mesh.
+
+        None: one that breaks a rule of units.
+        """
+        if found is None:
+            design = self.job.design
+            none = len(design.targets), sum(not f.discrete for f in design.freedoms)
+            return Observed(values, np.full(none[0], np.nan), np.full(none, np.nan), False)
+        if self.mesh_change is None:
+            return Observed(values, found.values, found.gradient, found.sound)
+        by_mesh, factor = self.mesh_change * found.values, 1.0 + self.mesh_change
+        error = np.sqrt(by_mesh**2 + found.by_print**2 + found.by_resin**2)
+        slopes = factor[:, None] * found.gradient
+        return Observed(values, factor * found.values, slopes, found.sound, SURE * np.nan_to_num(error))
 
     def observe(self, designs: Sequence[Values]) -> list[Observed]:
         """Designs as the search takes them; one that breaks a rule of units is not computed."""
@@ -121,14 +192,10 @@ class _Run:
                 units.append(None)
         found = iter(self.evaluator.of([u for u in units if u is not None]))
         observed = []
-        none = len(design.targets), sum(not f.discrete for f in design.freedoms)
         for values, unit in zip(designs, units, strict=True):
             result = None if unit is None else next(found)
             self.rows.append((values, result))
-            if result is None:
-                observed.append(Observed(values, np.full(none[0], np.nan), np.full(none, np.nan), False))
-            else:
-                observed.append(Observed(values, result.values, result.gradient, result.sound))
+            observed.append(self._observed(values, result))
         self.write(())
         return observed
 
@@ -143,6 +210,11 @@ class _Run:
         chosen = _spread(found.proposed, MOST_CHECKED)
         sound = [n for n in chosen if found.observed[n].sound]
         finer, _ = mechanics_of(design, self.job.model, design.check_refine)
+        struts = (
+            mechanics_of(design, self.job.model, design.check_refine, True)[0]
+            if design.check_struts
+            else None
+        )
         printer = load_printer(design.printer) if any(t.kind == "printable" for t in design.targets) else None
         proposals = []
         with progress.stage("check of what is proposed"):
@@ -152,9 +224,9 @@ class _Run:
                 result = self.rows[number][1]
                 assert result is not None
                 name = key(
-                    "verified 1", attrs.evolve(unit, name="unit").hash(), self.asked, design.check_refine,
+                    "verified 2", attrs.evolve(unit, name="unit").hash(), self.asked, design.check_refine,
                     design.print_tolerance_mm, design.modulus_tolerance, design.printer if printer else "",
-                    "" if self.job.model is None else self.job.model.text(),
+                    self._model_text, design.check_struts,
                     [(t.value, t.tolerance, t.low, t.high, t.goal) for t in design.targets],
                 )  # fmt: skip
                 checked = self._kept(name)
@@ -164,12 +236,13 @@ class _Run:
                         result.values,
                         design.targets,
                         finer,
-                        design.print_tolerance_mm,
-                        design.modulus_tolerance,
+                        design.uncertainty,
                         printer,
+                        struts,
                     )
                     self._keep(name, checked)
                 write_unit(unit, self.folder / f"proposed-{place}.toml")
+                charts.picture(unit, self.folder / f"proposed-{place}.png")
                 proposals.append(
                     Proposal(
                         place,
@@ -194,9 +267,9 @@ class _Run:
         found = None if self.evaluator.cache is None else self.evaluator.cache.get("verified", name)
         if found is None:
             return None
-        why, worst = (str(found.pop(k)) for k in ("why", "print_worst"))
+        why, worst, struts_why = (str(found.pop(k)) for k in ("why", "print_worst", "struts_why"))
         findings = tuple(map(str, found.pop("print_findings")))
-        return Verified(**found, why=why, print_worst=worst, print_findings=findings)
+        return Verified(**found, why=why, print_worst=worst, print_findings=findings, struts_why=struts_why)
 
     def write(self, proposed: Sequence[int]) -> None:
         """designs.csv: a row for every design, whatever became of it."""
@@ -264,6 +337,7 @@ def _judged(found: Optimised, proposal: Proposal) -> list[dict[str, Any]]:
             "objective": t.goal is not None,
             "met": bool(checked.met[i]),
             "robust": bool(checked.robust[i]),
+            "with_struts": None if np.isnan(checked.with_struts[i]) else float(checked.with_struts[i]),
         }
         for i, t in enumerate(found.design.targets)
     ]

@@ -27,10 +27,11 @@ def outcome(found: Found, targets: Sequence[Target]) -> str:
     if not best.sound:
         return f"None of {count} units could be simulated: widen the freedoms, or lower the pressures."
     judged = [t for t in targets if t.quantity is not None]
+    margins = np.zeros_like(best.values) if best.margins is None else best.margins
     missed = [
-        f"{t.name} is {v:.4g} instead of {t.words}"
-        for t, v in zip(judged, best.values, strict=True)
-        if not t.met(v)
+        f"{t.name} is {v:.4g}{f' ± {margin:.2g}' if margin else ''} instead of {t.words}"
+        for t, v, margin in zip(judged, best.values, margins, strict=True)
+        if not t.met(v, margin)
     ]
     words = f"No unit of {count} meets every target. The nearest misses: {'; '.join(missed)}."
     if found.in_the_way:

@@ -51,7 +51,10 @@ def _prepared(files: tuple[tuple[str, str], ...]) -> tuple[Design, Mechanics]:
 def run_task(task: Task) -> dict[str, Any]:
     """What `Evaluated.plain` gives of a task's unit, with status "done"; raises InputError."""
     design, mechanics = _prepared(task.files)
-    found = evaluate(from_toml(task.unit), design.targets, design.freedoms, mechanics)
+    uncertainty = design.uncertainty if design.robust else None
+    found = evaluate(
+        from_toml(task.unit), design.targets, design.freedoms, mechanics, uncertainty=uncertainty
+    )
     return {"status": "done", **found.plain()}
 
 

@@ -15,6 +15,7 @@ from mu_addon.blender.unit.properties import shape_hash, to_unit
 from mu_addon.design.parameters import write_unit
 from mu_addon.evidence.extended import ExtendedModel, Fitted
 from mu_addon.optimization.targets import KINDS as KNOWN
+from mu_addon.usecases.optimize.charts import picture
 from mu_addon.usecases.optimize.job import mechanics_of, read_job
 
 from .acting import add, refused
@@ -52,6 +53,7 @@ def finished(root, **changed):
     chambers = attrs.evolve(unit.chambers, wall_mm=0.712345678)
     proposed = attrs.evolve(unit, name="proposed-1", chambers=chambers)
     write_unit(proposed, folder / "proposed-1.toml")
+    picture(proposed, folder / "proposed-1.png")
     common = {"standard_error": 0.5, "objective": False}
     targets = [
         {"name": "angle at 30 kPa", "asked": "at least 20 deg", "unit": "deg", "value": 18.25,
@@ -88,17 +90,36 @@ def test_properties_are_written_as_the_file_that_the_core_reads(tmp_path):
     target(root, "stiffness", direction="z", ask="maximise")
     target(root, "mass", ask="minimise")
     target(root, "deviation", path="alpha2", pressures_kPa=(-15.0, 30.0), ask="minimise")
+    target(root, "tip_force", gap_mm=1.5, ask="low", low=0.2)
+    target(root, "tip_position", toward="z", ask="high", high=2.0)
+    target(root, "workspace", pressures_kPa=(-10.0, 20.0), ask="maximise")
+    target(root, "stretch", ask="curve", points="10: 1.2, 20.5: 1.4", tolerance=0.1)
+    target(root, "angle", pressure_kPa=0.0, ask="value", value=0.0, tolerance=0.5)
     target(root, "printable")
     assert "may change first" in refused(bpy.ops.mu.optimize)
     free(root, "chambers.wall_mm", low=0.65, high=1.4)
     free(root, "lattice.cells_x", low=3.0, high=5.0)
     free(root, "chambers.cell_mm", low=12.0, high=13.0)
+    free(root, "chambers.neck_diameter_mm", how="values", values="11, 12.5, 13")
+    free(root, "chambers.bladder_share", how="fixed", value=0.55)
     root.mu_optimize.evaluations = 7
+    root.mu_optimize.robust = root.mu_optimize.has_gravity = True
 
     optimization.write_inputs(root, tmp_path / "run")
     design = read_job(tmp_path / "run").design
-    assert shape_hash(design.unit) == shape_hash(to_unit(root.mu_unit))
-    angle, vacuum, safety, air, stiffness, mass, deviation, printable = design.targets
+    unit = to_unit(root.mu_unit)
+    assert shape_hash(design.unit) == shape_hash(
+        attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, bladder_share=0.55))
+    )
+    angle, vacuum, safety, air, stiffness, mass, deviation, *added, printable = design.targets
+    force, place, path, *curve, rest = added
+    assert (force.quantity.gap_mm, force.quantity.pressure_kPa, force.low) == (1.5, 30.0, 0.2)
+    assert (place.quantity.direction, path.quantity.pressures_kPa) == ("z", (-10.0, 20.0))
+    assert [(t.quantity.pressure_kPa, t.value, t.tolerance) for t in curve] == [
+        (10, 1.2, 0.1),
+        (20.5, 1.4, 0.1),
+    ]
+    assert (rest.quantity.pressure_kPa, design.orientation_deg, design.robust) == (0.0, 90.0, True)
     assert (angle.quantity.pressure_kPa, angle.value, angle.tolerance) == (30.0, 19.2, 0.3)
     assert (vacuum.name, vacuum.high) == ("angle at -10 kPa", -8.0)
     assert safety.low == 4.0
@@ -107,7 +128,9 @@ def test_properties_are_written_as_the_file_that_the_core_reads(tmp_path):
     assert mass.goal == "minimise"
     assert deviation.quantity.path == "alpha2"
     assert printable.kind == "printable"
-    wall, cells, cell = design.freedoms
+    wall, cells, cell, neck = design.freedoms
+    assert neck.values == (11, 12.5, 13)
+    assert design.unit.chambers.bladder_share == 0.55
     assert (wall.low, wall.high) == (0.65, 1.4)
     assert cells.values == (3, 4, 5)
     assert cell.also == {"chambers.bladder_diameter_mm": 2.0}, "the bladder is two cells wide"
@@ -149,7 +172,11 @@ def test_named_effects_of_the_unit_are_optimised_with_it(tmp_path):
         "clogged_chamber.share_lost": 0.5, "gravity.density_kg_m3": 1100.0,
     }  # fmt: skip
     root.mu_unit.study.orientation_deg = 90.0
-    assert "a unit that hangs" in refused(bpy.ops.mu.optimize)
+    assert "turned by 90 degrees in Simulate" in refused(bpy.ops.mu.optimize)
+    root.mu_optimize.has_gravity = True
+    root.mu_optimize.orientation_deg = 90.0
+    optimization.write_inputs(root, tmp_path / "level")
+    assert read_job(tmp_path / "level").design.orientation_deg == 90.0
 
 
 def test_a_file_is_searched_from_this_unit_or_from_its_own(tmp_path):
@@ -196,6 +223,7 @@ def test_a_proposed_unit_is_applied_undone_and_added_beside(tmp_path):
     assert not unit_object.behind(root)
     assert "The unit has its parameters" in drawn()
     assert "other parameters" not in drawn()
+    assert "a picture" in drawn()
     bpy.ops.ed.undo()
     root = unit_object.active_root(bpy.context)
     assert to_unit(root.mu_unit).chambers.wall_mm == 0.9

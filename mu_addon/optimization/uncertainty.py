@@ -1,0 +1,50 @@
+"""What differs from print to print, and how far it moves what is asked of a unit, to first order."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..design.parameters import Unit
+from .freedoms import Freedom
+
+Array = np.ndarray[Any, Any]
+
+SURE = 2.0
+"""A unit is robust where it meets a target this many standard errors either way."""
+
+
+@attrs.frozen
+class Uncertainty:
+    """Standard errors of a print.
+
+    print_mm: of every printed surface; modulus_share: of all moduli together, as a share.
+    """
+
+    print_mm: float
+    modulus_share: float
+
+    def freedoms(self, unit: Unit) -> list[Freedom]:
+        """What differs from print to print, as freedoms: the surfaces' offset, and all moduli together."""
+        m = unit.material
+        return [
+            Freedom("print.offset_xy_mm", -0.3, 0.5, also={"print.offset_z_mm": 1.0}, unit="mm"),
+            Freedom(
+                "material.membrane_modulus_kPa",
+                10.0,
+                1e6,
+                also={"material.lattice_modulus_kPa": m.lattice_modulus_kPa / m.membrane_modulus_kPa},
+                unit="kPa",
+            ),
+        ]
+
+    def errors(self, unit: Unit, slopes: Array) -> tuple[Array, Array]:
+        """Standard errors (q,) of quantities by print and by resin, of their slopes (q, 2) by `freedoms`.
+
+        A slope that is nan is not known, and counts as 0.
+        """
+        by_print, by_modulus = np.abs(np.nan_to_num(slopes)).T
+        modulus = unit.material.membrane_modulus_kPa
+        return self.print_mm * by_print, self.modulus_share * modulus * by_modulus

@@ -1,0 +1,108 @@
+"""Tip force, position and workspace, with weight and without: slopes against full solutions, and what they
+mean."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from mu_addon.design.parameters import load_preset
+from mu_addon.evidence.unit_effects import Body
+from mu_addon.evidence.unit_run import Run, run
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.optimization.freedoms import Freedom, changed_unit
+from mu_addon.optimization.gradient import gradients
+from mu_addon.optimization.quantities import Angle, TipForce, TipPosition, Workspace
+from mu_addon.optimization.structure import solve
+from mu_addon.optimization.unit_body import Mechanics, UnitBody
+from mu_addon.usecases.simulate_and_place.named_effects import NamedEffects
+
+UNIT = load_preset("mu-1.0x")
+COARSE = MeshSettings(refine=0.3)
+FREE = [
+    Freedom("chambers.wall_mm", 0.6, 1.4),
+    Freedom("material.lattice_modulus_kPa", 5.0, 60.0),
+    Freedom("scale", 0.7, 1.5),
+]
+LEVEL = NamedEffects({"gravity": {"density_kg_m3": 1010.0}}, 90.0)
+WITHOUT_WEIGHT = [
+    TipForce("touching", 15.0),
+    TipForce("farther", 20.0, 2.0),
+    TipPosition("aside", 20.0),
+    TipPosition("along", -8.0, "z"),
+    Workspace("path", (-8.0, 20.0)),
+]
+WITH_WEIGHT = [
+    Angle("at rest", 0.0),
+    TipPosition("at rest, aside", 0.0),
+    TipForce("force", 15.0, 1.0),
+    Workspace("path", (10.0, 20.0)),
+]
+
+
+@cache
+def solved(level):
+    """The unit solved without its weight, or lying level with it: body, what is asked, states, values."""
+    asked = WITH_WEIGHT if level else WITHOUT_WEIGHT
+    body = UnitBody(UNIT, Mechanics(COARSE, load=LEVEL.load) if level else Mechanics(COARSE))
+    states, _ = solve(body.structure, {c for q in asked for c in q.conditions})
+    return body, asked, states, {q.name: q.value(body.structure, states) for q in asked}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("level", [False, True])
+def test_slopes_are_those_of_full_solutions_on_morphed_meshes(level):
+    body, asked, states, values = solved(level)
+    found = gradients(body.structure, states, asked, body.pairs(FREE))
+    for f, freedom in enumerate(FREE):
+        value = freedom.value_of(UNIT)
+        sides = []
+        for end in (1.0005 * value, 0.9995 * value):
+            other = body.moved(changed_unit(UNIT, [freedom], [end]))
+            moved, _ = solve(other, {c for q in asked for c in q.conditions})
+            sides.append([q.value(other, moved) for q in asked])
+        differences = (np.array(sides[0]) - sides[1]) / (1e-3 * value)
+        floor = 0.01 * np.abs(list(values.values())) / (freedom.high - freedom.low)
+        errors = np.abs(found[:, f] - differences) / np.maximum(np.abs(differences), floor)
+        assert errors.max() < 1e-5, freedom.name
+
+
+@pytest.mark.slow
+def test_a_larger_unit_presses_with_the_square_of_its_size():
+    body, asked, states, values = solved(level=False)
+    found = gradients(body.structure, states, asked, body.pairs(FREE[2:]))[:, 0]
+    # The wall's own stiffness does not grow with the unit.
+    assert found[0] == pytest.approx(2 * values["touching"], rel=1e-4)
+    assert found[4] == pytest.approx(values["path"], rel=1e-5)
+
+
+@pytest.mark.slow
+def test_the_tip_force_is_that_which_a_blocked_force_is_predicted_by():
+    values = solved(level=False)[3]
+    held = Body(UNIT, COARSE, gap_mm=0.0)
+    reading = run(Run(held, (0.0, 15.0), (), "", 0.0, False)).values[0]
+    assert reading[0] == pytest.approx(0.0, abs=1e-9)
+    assert values["touching"] == pytest.approx(reading[1], rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_wall_farther_away_is_pressed_less():
+    body, _, _, _ = solved(level=False)
+    forces = []
+    for gap in (0.0, 2.0, 20.0):
+        asked = TipForce("force", 15.0, gap)
+        states, _ = solve(body.structure, asked.conditions)
+        forces.append(asked.value(body.structure, states))
+    # Out of reach it would have to be pulled.
+    assert forces[0] > forces[1] > 0.0 > forces[2]
+
+
+@pytest.mark.slow
+def test_the_path_to_one_place_is_the_way_there():
+    body, _, _, _ = solved(level=False)
+    places = [TipPosition(axis, 20.0, axis) for axis in "yz"]
+    path = Workspace("path", (20.0,))
+    states, _ = solve(body.structure, path.conditions)
+    rest = [TipPosition(axis, 0.0, axis).value(body.structure, states) for axis in "yz"]
+    way = np.hypot(*(p.value(body.structure, states) - r for p, r in zip(places, rest, strict=True)))
+    assert path.value(body.structure, states) == pytest.approx(way, rel=1e-12)
