@@ -307,6 +307,8 @@ def test_a_pipe_in_a_folder_of_results(tmp_path: Path) -> None:
         (["design", "--unit", "", "--out", "OUT"], "empty"),
         (["simulate", "--preset", "mu-1.0x", "--model", "EMPTY", "--out", "OUT"], "no verdict"),
         (["simulate", "--preset", "mu-1.0x", "--model", "LATIN", "--out", "OUT"], "UTF-8"),
+        (["calibrate", "x" * 5000, "--out", "OUT"], "too long"),
+        (["resume", "x" * 5000], "no study"),
     ],
 )
 def test_options_that_mean_nothing(
