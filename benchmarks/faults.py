@@ -3,6 +3,7 @@
     python benchmarks/faults.py                 # all, 50 kills
     python benchmarks/faults.py --kills 5 disk  # some of them
     python benchmarks/faults.py --every 4 calls # a quarter of the calls that can fail
+    python benchmarks/faults.py --every 4 --first 2 blocks # the second quarter of blocks of memory
     python benchmarks/faults.py --seed 7 kills  # at other moments
 
 The study is the main job on a coarse mesh. Whatever is done to it, the same command must then find the same
@@ -390,12 +391,12 @@ def two_at_once(work, reference):
     )
 
 
-def calls(work, reference, every):
+def calls(work, reference, every, first):
     """Each call that changes a file of a `place` of three chambers fails, by turns once and for good."""
-    yield place_with(work / "calls", "calls that change a file", failing, OutputError.status, every)
+    yield place_with(work / "calls", "calls that change a file", failing, OutputError.status, every, first)
 
 
-def blocks(work, reference, every):
+def blocks(work, reference, every, first):
     """Each block of 64 kB and more that numpy asks for in that `place` is refused, likewise."""
     yield place_with(
         work / "blocks",
@@ -403,10 +404,11 @@ def blocks(work, reference, every):
         lambda _, at, for_good: short_of_memory(at, for_good),
         MuError.status,
         every,
+        first,
     )
 
 
-def place_with(work, what, layer, expected, every):
+def place_with(work, what, layer, expected, every, first):
     """A whole `place` with a fault at each place of it; what has been computed comes from memory."""
     work.mkdir()
     met = []
@@ -416,7 +418,7 @@ def place_with(work, what, layer, expected, every):
         return layer(*where)
 
     with pytest.MonkeyPatch.context() as patch:
-        wrong = inject_each(placement(patch), work, counted, expected, PARTIAL, every)
+        wrong = inject_each(placement(patch), work, counted, expected, PARTIAL, every, first)
     return (
         f"{len(met) - 1} times one of the {what} of a whole `place` fails",
         "; ".join(wrong) or f"exit 0 or {expected} with what to do, no half file; then same digits",
@@ -447,11 +449,13 @@ def main():
     parser.add_argument(
         "--every", type=int, default=1, help="of the calls and blocks that can fail only each N-th fails"
     )
+    parser.add_argument("--first", type=int, default=1, help="the first call or block that fails")
     parser.add_argument("--reference", type=Path, help="a folder of this study, finished, to compare with")
     given = parser.parse_args()
     SEED[0] = given.seed
-    counts = {"kills": given.kills, "crashes": given.crashes, "full_disks": given.disks}
-    counts |= {"calls": given.every, "blocks": given.every}
+    places = given.every, given.first
+    counts = {"kills": (given.kills,), "crashes": (given.crashes,), "full_disks": (given.disks,)}
+    counts |= {"calls": places, "blocks": places}
     print(circumstances(), f"Seed {given.seed}.")
     with tempfile.TemporaryDirectory() as name:
         work = Path(name)
@@ -465,8 +469,7 @@ def main():
         reference = digits(work / "reference")
         print("| fault | what came of it |\n| --- | --- |")
         for fault in given.faults or FAULTS:
-            more = (counts[fault],) if fault in counts else ()
-            for what, outcome in FAULTS[fault](work, reference, *more):
+            for what, outcome in FAULTS[fault](work, reference, *counts.get(fault, ())):
                 print(f"| {what} | {outcome} |", flush=True)
 
 

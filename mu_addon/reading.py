@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import errno
 import json
+import os
 import re
 import stat
 import tomllib
@@ -34,7 +35,25 @@ csv.field_size_limit(_LONGEST)
 def file_bytes(path: str | Path, most: int = _LONGEST) -> bytes:
     """What a regular file holds; raises OSError, also for pipes and devices and beyond `most` bytes."""
     require_readable(path, most)
-    return Path(path).read_bytes()
+    with open(path, "rb", opener=_without_waiting) as stream:
+        # Another file may have taken its place by now; the system's own are said to hold nothing.
+        found = os.fstat(stream.fileno())
+        size = found.st_size
+        data = stream.read(min(size, most) + 1) if stat.S_ISREG(found.st_mode) else None
+        if data is None:
+            raise OSError(errno.EINVAL, "that is no regular file", str(path))
+        if len(data) > size:
+            parts = [data]
+            while sum(map(len, parts)) <= most and (more := stream.read(1 << 20)):
+                parts.append(more)
+            data = b"".join(parts)
+    if len(data) > most:
+        raise OSError(errno.EFBIG, f"it holds more than the {_size(most)} that are read", str(path))
+    return data
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def require_readable(path: str | Path, most: int = _LONGEST) -> None:

@@ -30,10 +30,10 @@ class _Parser(argparse.ArgumentParser):
     """Says what is wrong in one line, and where help is."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
-        self.exit(
-            2,
-            (f"error: {message}\n  what to do: `{self.prog} --help` lists the commands and options\n"),
-        )
+        from ..run.progress import printable
+
+        help_ = f"`{self.prog} --help` lists the commands and options"
+        self.exit(2, printable(f"error: {message}\n  what to do: {help_}\n", sys.stderr))
 
 
 def parser() -> argparse.ArgumentParser:

@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 
 from ..errors import MeshingError
+from ..run.supervisor import write_stack_at_crash
 from .gmsh_libraries import SYSTEM_LIBRARIES, install_libraries, missing_libraries
 from .mesh import Array, boundary_faces
 
@@ -127,6 +128,7 @@ def gmsh_model(gmsh: Any) -> Iterator[Any]:
     if ours:
         # Personal option files and signal handlers would change results and Ctrl-C.
         gmsh.initialize(readConfigFiles=False, interruptible=False)
+        write_stack_at_crash()
     before = {name: gmsh.option.getNumber(name) for name in _OPTIONS}
     current = gmsh.model.getCurrent()
     try:

@@ -22,6 +22,8 @@ from .processes import end_with_input
 CRASHED = 71
 """Exit status of a command whose process was ended by a signal, or by a library without a word."""
 _PASSED_ON = ("SIGINT", "SIGTERM", "SIGTSTP")
+_stack_to: list[int] = []
+"""Where a worker that crashes writes Python's stack: the end of the pipe to who watches."""
 
 
 class Crash(NamedTuple):
@@ -121,8 +123,21 @@ def _become_worker(alive: int, status_write: int) -> None:
     # A terminal may stop whoever writes from another group than its own.
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
     _end_with(alive)
-    with suppress(OSError, ValueError):
-        faulthandler.enable(status_write, all_threads=False)
+    _stack_to[:] = [status_write]
+    write_stack_at_crash()
+
+
+def write_stack_at_crash() -> None:
+    """Have this process, if it is a worker, write Python's stack where it crashes.
+
+    To be called again after a library that takes over the signals of crashes, as gmsh does.
+    """
+    for descriptor in _stack_to:
+        # Once enabled it takes no signal back.
+        faulthandler.disable()
+        with suppress(OSError, ValueError):
+            # All threads: the one that crashes may be a library's own, which has no stack of Python's.
+            faulthandler.enable(descriptor, all_threads=True)
 
 
 def _end_with(alive: int) -> None:

@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 import attrs
 
+from .formats import without_colour
+
 # So many bytes without a format are enough to say what is wrong with them; the latest are looked at.
 _COMPLAINT_BYTES, _LATEST_BYTES = 400, 4096
 # A text's share of characters that can be printed; half of all bytes can, in noise a third.
@@ -45,6 +47,8 @@ class Counters:
     """Bytes of stretches longer than any line or frame, that nothing ended."""
     cut_bytes: int = 0
     """Bytes of lines cut by the beginning, by a pulled cable or by the end."""
+    coloured: int = 0
+    """Lines that were read with colour codes (ANSI escape sequences) in them, which were left out."""
 
 
 class Reject(NamedTuple):
@@ -66,6 +70,11 @@ class Accounts:
         """Count a line or frame that was read."""
         self.counters.read_bytes += len(piece)
 
+    def read_line(self, piece: bytes) -> None:
+        """Count a line of text that was read, and whether it had colour codes."""
+        self.counters.coloured += without_colour(piece) is not piece
+        self.read(piece)
+
     def reject(self, piece: bytes, why: str) -> None:
         """Count and keep a line or frame that could not be read: malformed, or with a wrong crc."""
         self.counters.rejected_bytes += len(piece)
@@ -84,7 +93,7 @@ class Accounts:
         """Count lines, without their ends, of no known format."""
         for line in lines:
             self._unrecognised = (self._unrecognised + line + b"\n")[-_LATEST_BYTES:]
-            if line.strip():
+            if without_colour(line).strip():
                 self.reject(line + b"\n", "malformed")
             else:
                 self.read(line + b"\n")
@@ -110,7 +119,7 @@ class Accounts:
         unread = self.counters.bytes - self.counters.read_bytes
         if unread < _COMPLAINT_BYTES or 20 * self.counters.read_bytes > self.counters.bytes:
             return None
-        seen = self._unrecognised + buffered[-_LATEST_BYTES:]
+        seen = without_colour(self._unrecognised + buffered[-_LATEST_BYTES:])
         shown = sum(32 <= byte < 127 or byte in b"\t\r\n" for byte in seen)
         if shown < _TEXT * len(seen):
             return (

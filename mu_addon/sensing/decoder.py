@@ -251,10 +251,10 @@ class Decoder:
             line = text_of(piece) if len(piece) <= _LONGEST_LINE else None
             self._line += 1
             if line == "":
-                self._accounts.read(piece)
+                self._accounts.read_line(piece)
             elif line is not None and self._take_line(line, piece, first):
                 self._bad_in_a_row = 0
-                self._accounts.read(piece)
+                self._accounts.read_line(piece)
             elif first:
                 # It may be the rest of one.
                 self._accounts.cut(piece)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 from .framing import END, payload_of
@@ -18,6 +19,9 @@ TEXT_READERS: dict[str, Callable[[str], Pairs | list[float] | None]] = {
     "csv": row_of,
 }
 FORMATS = ("frames", *TEXT_READERS)
+
+# Select Graphic Rendition of ECMA-48, as device logs have it around a line or a label.
+_COLOUR_CODES = re.compile(rb"\x1b\[[0-9;:]*m")
 
 
 def format_of(data: bytes, whole: bool, enough: int, last: str | None) -> str | None:
@@ -46,10 +50,19 @@ def whole_lines(data: bytes, whole: bool) -> list[str | None]:
     return [line for line in lines if line != ""]
 
 
+def without_colour(piece: bytes) -> bytes:
+    r"""Bytes without their colour codes (ANSI escape sequences SGR); others, which move a cursor, stay.
+
+    >>> without_colour(b"\x1b[1;32mlight\x1b[0m: 512")
+    b'light: 512'
+    """
+    return _COLOUR_CODES.sub(b"", piece) if b"\x1b" in piece else piece
+
+
 def text_of(piece: bytes) -> str | None:
-    """A line as text without blanks around it, or None if it is none."""
+    """A line as text without colour codes, and without blanks around it, or None if it is none."""
     try:
-        line = piece.decode().strip()
+        line = without_colour(piece).decode().strip()
     except UnicodeDecodeError:
         return None
     return line if line.replace("\t", " ").isprintable() else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
@@ -38,7 +39,8 @@ MODULES = {
 
 def use_case_of(folder: Path) -> UseCase[Any]:
     """The use case that a folder's inputs belong to; raises InputError where there is none."""
-    there = [module for name, module in MODULES.items() if (folder / name).is_file()]
+    # Not the Path's own question, which raises for a name that the system refuses.
+    there = [module for name, module in MODULES.items() if os.path.isfile(folder / name)]
     cases: list[UseCase[Any]] = [import_module(module, __package__).USE_CASE for module in there]
     if cases:
         # One whose first line is another's is read all the same: its reader says best what is wrong with it.

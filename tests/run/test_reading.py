@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from mu_addon import reading
 from mu_addon.cli.main import main
 from mu_addon.design.gripper import load_gripper, read_gripper
 from mu_addon.design.gripper import to_toml as gripper_text
@@ -29,7 +30,7 @@ from mu_addon.materials.library import read_material
 from mu_addon.measured.folder import read_folder
 from mu_addon.measured.kinds import KINDS
 from mu_addon.measured.table import read_table
-from mu_addon.reading import MOST_ROWS, file_text, parse_json, parse_toml
+from mu_addon.reading import MOST_ROWS, file_bytes, file_text, parse_json, parse_toml
 from mu_addon.run.folder import FolderLayout, claim
 from mu_addon.sensing.calibration import read_calibration
 from mu_addon.sensing.recording import read_recording
@@ -271,6 +272,28 @@ def test_files_that_are_none(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such pipes")
+def test_what_the_system_says_is_empty_is_read_to_its_limit() -> None:
+    maps = Path("/proc/self/maps")
+    if not maps.exists():
+        pytest.skip("no such files here")
+    assert len(file_bytes(maps)) > maps.stat().st_size == 0
+    with pytest.raises(OSError, match="more than"):
+        file_bytes(maps, 10)
+
+
+def test_a_pipe_that_takes_a_files_place_is_not_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "unit.toml"
+
+    def swap(*_: object) -> None:
+        os.mkfifo(path)
+
+    monkeypatch.setattr(reading, "require_readable", swap)
+    with pytest.raises(OSError, match="no regular file"):
+        file_bytes(path)
+
+
 def test_a_pipe_in_a_folder_of_results(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "state-x.npz")
     assert read_npz(tmp_path / "state-x.npz") is None
@@ -294,6 +317,8 @@ def test_a_pipe_in_a_folder_of_results(tmp_path: Path) -> None:
         (["design", "--unit", "", "--out", "OUT"], "empty"),
         (["simulate", "--preset", "mu-1.0x", "--model", "EMPTY", "--out", "OUT"], "no verdict"),
         (["simulate", "--preset", "mu-1.0x", "--model", "LATIN", "--out", "OUT"], "UTF-8"),
+        (["calibrate", "x" * 5000, "--out", "OUT"], "too long"),
+        (["resume", "x" * 5000], "no study"),
     ],
 )
 def test_options_that_mean_nothing(
@@ -314,6 +339,9 @@ def test_escapes_in_a_file_are_spelt_out(tmp_path: Path) -> None:
     assert told.returncode == 2
     assert b"\x1b" not in told.stderr
     assert b"\\x1b" in told.stderr
+    told = subprocess.run([*run[:2], "design", "a\x1b[2J"], capture_output=True, check=False)
+    assert told.returncode == 2
+    assert b"\x1b" not in told.stderr
     told = subprocess.run([*run, "--json", "--out", str(tmp_path / "o")], capture_output=True, check=False)
     assert b"\x1b" not in told.stdout
     assert "owned" in json.loads(told.stdout.splitlines()[-1])["what"]

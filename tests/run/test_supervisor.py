@@ -37,6 +37,15 @@ def work():
         ctypes.string_at(0)
     if how == "aborts":
         os.abort()
+    if how == "aborts in a thread of a library":
+        libc, thread = ctypes.CDLL(None), ctypes.c_ulong()
+        libc.pthread_create(ctypes.byref(thread), None, ctypes.cast(libc.abort, ctypes.c_void_p), None)
+        time.sleep(3600)
+    if how == "reads nothing after gmsh":
+        import gmsh
+        from mu_addon.meshing.lattice import gmsh_model
+        with gmsh_model(gmsh):
+            ctypes.string_at(0)
     if how == "ends itself":
         # As a library does: nothing of Python's runs any more.
         ctypes.CDLL(None)._exit(3)
@@ -69,7 +78,13 @@ def start(how, *more):
         text=True,
         start_new_session=True,
     )
-    return process, int(process.stdout.readline())
+    # Byte by byte: what a buffer held of the next line `communicate` would not find.
+    line = b""
+    while not line.endswith(b"\n"):
+        byte = os.read(process.stdout.fileno(), 1)
+        assert byte, process.stderr.read()
+        line += byte
+    return process, int(line)
 
 
 def alive(pid):
@@ -105,6 +120,8 @@ def test_a_status_is_handed_on(how, status):
     [
         ("reads nothing", f"crash {int(signal.SIGSEGV)} 0 MB stack"),
         ("aborts", f"crash {int(signal.SIGABRT)} 0 MB stack"),
+        ("aborts in a thread of a library", f"crash {int(signal.SIGABRT)} 0 MB stack"),
+        ("reads nothing after gmsh", f"crash {int(signal.SIGSEGV)} 0 MB stack"),
         ("ends itself", "crash 0 3 MB -"),
     ],
 )

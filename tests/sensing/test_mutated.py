@@ -29,6 +29,7 @@ from .mutations import FORMATS, NASTY, decoded, sound
 from .test_session import _Scripted
 
 ROOT = Path(__file__).parents[2]
+needs_terminals = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo terminals")
 
 
 def fed(data: bytes, size: int = 64) -> tuple[Decoder, list[Samples]]:
@@ -207,16 +208,44 @@ def test_what_a_port_calls_itself_moves_no_cursor() -> None:
     assert out.getvalue() == "connected: /dev/ttyACM0 (\\x1b]0;owned\\x07\\x9b2J\\u202eboard)\n"
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo terminals")
-def test_a_damaged_stream_through_a_terminal(tmp_path: Path) -> None:
+COLOURED = {
+    "around a label": b"\x1b[32mlight\x1b[0m: %d\t\x1b[1;38;5;208mdark\x1b[m: 1\r\n",
+    "around a line": b"\x1b[0;32mlight:%d dark:1\x1b[0m\r\n",
+    "after a line": b"light:%d,dark:1\n\x1b[0m",
+    "in JSON": b'{"\x1b[36mlight\x1b[39m": \x1b[33m%d\x1b[39m, "dark": 1}\n',
+    "in CSV": b"\x1b[38:2::255:0:0m%d\x1b[0m,1\n",
+}
+
+
+@pytest.mark.parametrize("line", COLOURED.values(), ids=list(COLOURED))
+def test_colours_are_left_out(line: bytes, tmp_path: Path) -> None:
+    data = b"".join(line % k for k in range(100))
+    decoder, groups = fed(data, 7)
+    # The very first line is not trusted.
+    assert set(range(1, 100)) <= set(column(groups, groups[0].layout.channels[0]))
+    assert decoder.counters.coloured >= 98
+    assert decoder.counters.rejected_bytes == 0
+    # Other sequences may move a cursor: what they part need not belong together.
+    decoder, _ = fed(data + b"light:1\x1b[5C2,dark:1\n")
+    assert decoder.counters.rejected_bytes + decoder.counters.cut_bytes >= 24
+    shown = console_summary(run_session(_Scripted(data), tmp_path / "r", about={}))
+    assert any("colour codes" in words and words.isprintable() for words in shown)
+
+
+def test_coloured_text_of_no_format_is_not_noise() -> None:
+    decoder, _ = fed(b"\x1b[32mhello\x1b[0m \x1b[31mthere\x1b[0m\n" * 60)
+    assert decoder.counters.rejected_bytes > 1500
+    decoder = Decoder()
+    decoder.feed(b"\x1b[32mhello\x1b[0m \x1b[31mthere\x1b[0m\n" * 60, 0.0)
+    assert decoder.complaint is not None
+    assert "text" in decoder.complaint[0]
+
+
+def recorded(data: bytes, folder: Path) -> tuple[dict[str, Any], str]:
+    """The last status of `record` of bytes sent through a pseudo terminal, and what it showed."""
     master, slave = os.openpty()
     tty.setraw(slave)
-    folder = tmp_path / "out"
     run = [sys.executable, str(ROOT / "headless/run.py"), "record", "--port", os.ttyname(slave)]
-    lines = [b"\n", *(b"seq:%d,light:%d\n" % (k % 256, k) for k in range(300))]
-    for place, nasty in enumerate(NASTY):
-        lines.insert(20 + 10 * place, nasty + b"\n")
-    data = b"".join(lines)
     with subprocess.Popen([*run, "--out", str(folder)], stdout=subprocess.PIPE, text=True) as process:
         until = time.monotonic() + 60
 
@@ -238,9 +267,32 @@ def test_a_damaged_stream_through_a_terminal(tmp_path: Path) -> None:
     os.close(master)
     os.close(slave)
     assert process.returncode == 0, shown
-    (recording,) = read_recording(folder)
+    return status(), shown
+
+
+@needs_terminals
+def test_a_coloured_device_through_a_terminal(tmp_path: Path) -> None:
+    lines = [b"\x1b[2J\x1b[31mlight sensor 1.2\x1b[0m\r\n"]
+    lines += [b"\x1b[32mlight\x1b[0m: %d\tdark: 3\r\n" % k for k in range(300)]
+    last, shown = recorded(b"".join(lines), tmp_path / "out")
+    (recording,) = read_recording(tmp_path / "out")
+    np.testing.assert_array_equal(recording.columns["light"], np.arange(300))
+    assert list(recording.columns)[3:] == ["light", "dark"]
+    assert last["coloured"] == 300
+    assert last["read_bytes"] + last["cut_bytes"] == last["bytes"] == sum(map(len, lines))
+    assert "left out of 300 lines" in shown
+    assert "\x1b" not in shown
+
+
+@needs_terminals
+def test_a_damaged_stream_through_a_terminal(tmp_path: Path) -> None:
+    lines = [b"\n", *(b"seq:%d,light:%d\n" % (k % 256, k) for k in range(300))]
+    for place, nasty in enumerate(NASTY):
+        lines.insert(20 + 10 * place, nasty + b"\n")
+    data = b"".join(lines)
+    last, shown = recorded(data, tmp_path / "out")
+    (recording,) = read_recording(tmp_path / "out")
     assert set(range(300)) <= set(recording.columns["light"])
-    last = status()
     assert last["bytes"] == len(data)
     accounted = last["read_bytes"] + last["rejected_bytes"] + last["cut_bytes"] + last["overlong"]
     assert accounted == len(data)

@@ -145,19 +145,20 @@ def inject_each(
     expected: int,
     partial: Sequence[str] = (),
     step: int = 1,
+    first: int = 1,
 ) -> list[str]:
     """Have a run fail at its first place, then at the next, until none is left; what was wrong afterwards.
 
     layer: has the n-th place in a folder fail, and all later ones, too, where told so: in every second run.
-    expected, partial: see `faults`. step: only each step-th place fails. Once all works again, the same run
-    must come to the same results.
+    expected, partial: see `faults`. step: only each step-th place fails, from the `first` on. Once all works
+    again, the same run must come to the same results.
     """
     status, messages = ran(run, work / "reference")
     assert status == 0, messages[-1]
     reference = results(work / "reference")
     wrong: list[str] = []
     seen: set[str] = set()
-    for at in range(1, 5000, step):
+    for at in range(first, 5000, step):
         folder = work / f"at-{at}"
         with layer(folder, at, at // step % 2 == 0) as met:
             status, messages = ran(run, folder)

@@ -164,20 +164,31 @@ def _widest_ball(solid: Any, way: Opening, step: float) -> tuple[Points, float]:
     reach = 8.0
     x, y, _ = frame_along(way.along)
 
-    def radius(at: Points) -> float:
-        hits = (solid.ray_cast(at.tolist(), end) for end in (at + reach * rays).tolist())
-        return reach * min((hit[0].distance for hit in hits if hit), default=1.0)
+    def radius(at: Points, above: float) -> float:
+        """Of the widest ball about a point, or, where that is no more than `above`, anything up to it."""
+        least, start = 1.0, at.tolist()
+        for end in (at + reach * rays).tolist():
+            hit = solid.ray_cast(start, end)
+            if hit and hit[0].distance < least:
+                least = hit[0].distance
+                if reach * least <= above:
+                    break
+        return float(reach * least)
 
-    best, size = way.place, radius(way.place)
+    best, size = way.place, radius(way.place, 0.0)
     shift = 0.5 * step
     while shift > 0.02 * step:
         around = [best + shift * side for side in (x, -x, y, -y, x + y, x - y, y - x, -x - y)]
-        around = [at for at in around if np.linalg.norm(at - way.place) < 1.5 * step and _free(solid, at)]
-        sizes = [radius(at) for at in around]
-        if sizes and max(sizes) > size:
-            best, size = around[int(np.argmax(sizes))], max(sizes)
-        else:
+        wider = size
+        for at in around:
+            if np.linalg.norm(at - way.place) < 1.5 * step:
+                # The line that tells inside from outside goes through the whole part, so it comes last.
+                found = radius(at, wider)
+                if found > wider and _free(solid, at):
+                    best, wider = at, found
+        if wider == size:
             shift *= 0.5
+        size = wider
     return best, size
 
 

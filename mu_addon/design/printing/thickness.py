@@ -68,15 +68,13 @@ def cast_rays(solid: Any, surface: Samples, side: int, reach: float) -> RayHits:
     inside is never wider than this.
     """
     direction = side * surface.normals
-    first = surface.points + START * direction
-    last = surface.points + (START + reach) * direction
-    n = len(first)
-    share, normal = np.full(n, np.inf), np.zeros((n, 3))
-    cast = solid.ray_cast
-    for k, (a, b) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
-        for hit in cast(a, b):
-            share[k], normal[k] = hit.distance, hit.normal
-            break
+    first = (surface.points + START * direction).tolist()
+    last = (surface.points + (START + reach) * direction).tolist()
+    hits = [hit[0] if hit else None for hit in map(solid.ray_cast, first, last)]
+    met = np.array([hit is not None for hit in hits], bool)
+    share, normal = np.full(len(hits), np.inf), np.zeros((len(hits), 3))
+    share[met] = [hit.distance for hit in hits if hit is not None]
+    normal[met] = np.array([hit.normal for hit in hits if hit is not None]).reshape(-1, 3)
     distance = START + reach * share
     at = surface.points + np.where(np.isfinite(distance), distance, 0.0)[:, None] * direction
     return RayHits(distance, at, np.einsum("ij,ij->i", normal, surface.normals))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import os
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
@@ -160,7 +161,8 @@ def _sweeps(job: Job) -> Sweeps:
     held: list[tuple[str, CalibrationSweep]] = []
     name, level = job.channel, _level(job.dark)
     for folder in job.data:
-        if (folder / INDEX).exists():
+        # Also for a name that the system refuses, which a Path raises.
+        if os.path.exists(folder / INDEX):
             recordings = read_recording(folder)
             if not recordings:
                 raise InputError("the recording contains no samples", str(folder), "choose another recording")

@@ -177,10 +177,11 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     losses = _losses(summary) or ["nothing lost" if summary["bytes"] else "nothing came"]
     if summary["cut_bytes"]:
         losses.append(f"{summary['cut_bytes']} bytes cut at the start, the end or while unplugged")
-    kept = summary["rejected_bytes"] or summary["overlong"]
+    kept, coloured = summary["rejected_bytes"] or summary["overlong"], summary["coloured"]
     return [
         f"{rows} samples in {seconds:.1f} s, format {summary['format'] or 'not found'}",
         ", ".join(losses),
+        *([f"colour codes (ANSI escape sequences) left out of {coloured} lines"] if coloured else []),
         *summary["complaint"],
         *([f"what could not be read is in {REJECTS}"] if kept else []),
     ]
