@@ -200,7 +200,8 @@ class Effect:
     mechanism, reveals: in words, of `LIBRARY` and `SHOWN_BY` where not given. whose: the one specimen or
     experiment that has it, "specimen B"; empty where all have. among: what differs in it, "specimen",
     each with a parameter of its own; spread: their standard deviation, in the parameters' unit, with its 95 %
-    interval. Raises InputError for a name not in `LIBRARY`.
+    interval. refines: a law with more freedom than another one of its name, fitted only in that one's place.
+    Raises InputError for a name not in `LIBRARY`.
     """
 
     name: str
@@ -211,6 +212,7 @@ class Effect:
     whose: str = ""
     among: str = ""
     spread: tuple[float, float, float] = (math.nan, math.nan, math.nan)
+    refines: bool = False
 
     @mechanism.default
     def _of_library(self) -> str:

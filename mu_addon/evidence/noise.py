@@ -193,14 +193,13 @@ def _rounded(source: Source, series: Sequence[Series]) -> Source:
     A reading is off by up to half a step, evenly. Where it stays for several samples so does the error: it is
     slow, for as long as readings stay on average.
     """
-    for s in series:
-        off = s.step / math.sqrt(12.0)
-        slow = off if s.stays > STAYS and not math.isnan(s.sample_s) else 0.0
-        time_s = source.time_s
-        if slow > source.slow:
-            time_s = min(s.stays, 0.5 * float(s.count.sum())) * s.sample_s
-        source = Source(max(source.white, off), max(source.slow, slow), time_s)
-    return source
+    white = max(source.white, *(s.step / math.sqrt(12.0) for s in series))
+    staying = [s for s in series if s.stays > STAYS and not math.isnan(s.sample_s)]
+    slow = max((s.step / math.sqrt(12.0) for s in staying), default=0.0)
+    if slow <= source.slow:
+        return attrs.evolve(source, white=white)
+    time_s = max(min(s.stays, 0.5 * float(s.count.sum())) * s.sample_s for s in staying)
+    return Source(white, slow, time_s)
 
 
 # Series that suffice for three numbers; the search begins with fewer.

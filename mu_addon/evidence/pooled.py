@@ -20,6 +20,7 @@ from .selection import (
     Cause,
     Selection,
     at_a_bound,
+    sudden,
 )
 
 Array = np.ndarray[Any, Any]
@@ -121,8 +122,8 @@ def select_pooled(
 
     Unchanged where there is none. The false-positive probability is that of a spread at its bound of 0 (half
     a chi squared of one degree), times the number of effects and groupings that were tried. What every second
-    quarter of the records tells of each owner must predict the other quarters. Rivals are other effects, or
-    groupings, whose likelihood is as good.
+    quarter of the records tells of each owner must predict the other quarters. A step change must not explain
+    more. Rivals are other effects, or groupings, whose likelihood is as good.
     """
     from scipy.stats import chi2
 
@@ -142,7 +143,7 @@ def select_pooled(
     if p >= FALSE_ALARM_RATE or at_a_bound(best) or not _predicts(fitter, found.base, best):
         return found
     table = tuple(strict_table(fitter, best))
-    if structure(table):
+    if structure(table) or sudden(found.table_base, found.base, best):
         return found
     rivals = tuple(f.effects[0].title for g, f in fits[1:] if gain - g < RIVAL_DELTA_CHI2)
     cause = Cause(best.effects[0], p, found.base.chi2 - best.chi2, rivals)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..measured import Experiment
-from .resolution import dwell, quantum
+from .resolution import quantum, stretch
 from .simulator import Composite
 
 Array = np.ndarray[Any, Any]
@@ -29,8 +29,8 @@ class Series:
     experiment: its number in the record. group: name that series of the same noise share. row: of the
     prediction (channels, n). time_s (b,): mean times of the b blocks in s, nan where the record has no clock;
     count (b,): samples in each block; sample_s: median time between samples in s, or nan. step: in which its
-    readings come, in the channel's unit, 0 where they come in none; stays: how many of them, in the median,
-    follow one another unchanged (`resolution`).
+    readings come, in the channel's unit, 0 where they come in none; stays: how many follow one another
+    unchanged, around a reading (`resolution.stretch`).
     """
 
     experiment: int
@@ -215,7 +215,7 @@ def _series(i: int, e: Experiment, row: int, channel: str, blocks: int) -> tuple
         "count": count[kept],
         "sample_s": sample,
         "step": quantum(values),
-        "stays": dwell(values),
+        "stays": stretch(values),
         "seen": seen,
         "first": first,
         "kept": kept,

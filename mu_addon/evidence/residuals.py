@@ -150,7 +150,7 @@ def _plain_tests(fitter: Fitter, fit: Fit) -> list[Dependence]:
     record, r = fitter.record, fit.residual
     return [
         *_steps(fitter, fit),
-        *_spectrum(record, r),
+        *_spectrum(fitter, fit),
         *_cycles_alike(record, r),
         *_repeats_alike(record, r),
         *_outliers(record, r),
@@ -404,33 +404,62 @@ def _phase(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Depende
     return [Dependence("phase_of_cycle", worst[2], p, worst[1], worst[3])]
 
 
-def _spectrum(record: Record, r: Array) -> list[Dependence]:
-    """Power of the whitened residual by bands of frequency, series of a group and of one clock together."""
+def _spectrum(fitter: Fitter, fit: Fit) -> list[Dependence]:
+    """Power of the whitened residual by bands of frequency, series of a group and of one clock together.
+
+    Readings in steps are off by a sawtooth where what is read rises steadily: a tone. Where it stays between
+    two steps they go to and fro by a whole one. A band is expected to hold both beside the noise.
+    """
     from scipy.stats import chi2
 
-    bands: dict[tuple[str, float], list[tuple[Array, Array]]] = {}
-    for s in _clocked(record):
-        x = r[s.at]
+    bands: dict[tuple[str, float], list[tuple[Array, Array, Array]]] = {}
+    for s in _clocked(fitter.record):
+        x = fit.residual[s.at]
         if len(x) < 32:
             continue
-        power = np.abs(np.fft.rfft(x - x.mean())[1:-1]) ** 2 / len(x)
         f = np.fft.rfftfreq(len(x))[1:-1] / (s.sample_s * float(np.median(s.count)))
-        bands.setdefault((s.group, s.sample_s), []).append((f, power))
+        saw, flips = _rounding(fitter, fit, s)
+        rounded = _power(fitter.whitening.series(s, saw)) + flips / fitter.sources[s.group].white ** 2
+        bands.setdefault((s.group, s.sample_s), []).append((f, _power(x), rounded))
     tests: list[tuple[float, str, float, int]] = []
     for (group, _), members in bands.items():
-        f = np.concatenate([m[0] for m in members])
-        power = np.concatenate([m[1] for m in members])
+        f, power, rounded = (np.concatenate(column) for column in zip(*members, strict=True))
         edges = np.quantile(f, np.linspace(0.0, 1.0, BANDS + 1))
         for low, high in pairwise(edges):
             inside = (f >= low) & (f <= high)
             # Twice a periodogram's ordinate is chi squared of two degrees.
             value, dof = 2.0 * float(power[inside].sum()), 2 * int(inside.sum())
             if dof:
+                value /= 1.0 + 2.0 * float(rounded[inside].sum()) / dof
                 tests.append((float(chi2.sf(value, dof)), f"{group}, {low:.3g} to {high:.3g} Hz", value, dof))
     if not tests:
         return []
     p, where, value, dof = min(tests)
     return [Dependence("frequency", value, min(1.0, p * len(tests)), where, dof)]
+
+
+def _power(x: Array) -> Array:
+    """The periodogram of a whitened series (b,), its ends left out."""
+    return np.asarray(np.abs(np.fft.rfft(x - x.mean())[1:-1]) ** 2 / len(x))
+
+
+# Change from sample to sample, in steps of a display, below which what is read stays.
+STILL = 0.1
+
+
+def _rounding(fitter: Fitter, fit: Fit, series: Series) -> tuple[Array, float]:
+    """What rounding to a channel's steps changes in a fit's prediction of a series (b,), in its unit.
+
+    With it the variance of readings that go to and fro between two steps, over all of the series.
+    """
+    if not series.step:
+        return np.zeros(series.at.stop - series.at.start), 0.0
+    e = fitter.record.experiments[series.experiment]
+    read = e[series.channel]
+    exact = fitter.simulator.predict(e, fit.values)[series.row] - read[np.isfinite(read)][0]
+    still = float(np.mean(np.abs(np.diff(exact)) < STILL * series.step))
+    saw = series.step * np.round(exact / series.step) - exact
+    return series.mean(saw), still * (0.5 * series.step) ** 2
 
 
 def _cycles_alike(record: Record, r: Array) -> list[Dependence]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -16,11 +16,17 @@ Array = np.ndarray[Any, Any]
 
 # Digits behind the point that a gauge may have; what has more was not read off a display.
 DIGITS = 9
+# Of a step, by which written readings may lie off a multiple of it; readings without steps lie anywhere. And
+# levels over readings: where nearly every reading has a level of its own there is no step to see.
+OFF_LEVEL, MOST_LEVELS = 0.05, 0.95
 # A reading is set aside if it is so many deviations from all that its neighbours predict.
 WRONG = 8.0
 # Of a record so few readings may be wrong: what happens more often is no accident.
 MOST_WRONG = 0.02
 FEWEST = 9
+# Readings around one of which the median is what it should be off by; a change is as fast as another one from
+# this share of it on, and so many times more readings of such changes must be right.
+AROUND_ONE, ALIKE, TIMES_MORE = 9, 0.7, 10
 # Readings that stay so many samples before each change come in steps coarser than their noise.
 STAYS = 2.0
 # A noisy channel that reads its largest or smallest value so often in a row is at the end of its range.
@@ -34,19 +40,46 @@ MOST_CLIPPED = 0.6
 def quantum(values: Array) -> float:
     """The step in which readings (n,) come, in their unit; 0 where they show none.
 
-    The largest number of which all of them and all of their differences are whole multiples, with `DIGITS`
-    digits at most.
+    The largest number of which all of them and all of their differences are whole multiples: with `DIGITS`
+    digits at most, or any, as a converter's share of its range or a force over a section is.
 
     >>> quantum(np.array([50.0, 49.5, 48.5]))
     0.5
     """
     seen = np.unique(values[np.isfinite(values)])
+    return max(_decimal(seen), _any_step(seen, values))
+
+
+def _decimal(seen: Array) -> float:
     for digits in range(DIGITS + 1):
         scaled = seen * 10.0**digits
         whole = np.round(scaled)
         if np.abs(scaled - whole).max(initial=0.0) < 1e-6 and np.abs(whole).max(initial=0.0) < 2**53:
             steps = np.diff(whole).astype(np.int64)
             return float(np.gcd.reduce(steps) if len(steps) else 1) / 10.0**digits
+    return 0.0
+
+
+def _any_step(seen: Array, values: Array) -> float:
+    """The least difference of readings, or up to a fourth of it, that all differences are multiples of."""
+    if len(seen) < FEWEST:
+        return 0.0
+    away = seen - seen[0]
+    # Written digits end somewhere: what differs by no more is one reading.
+    apart = np.diff(seen)
+    written = 1e-6 * float(away[-1])
+    apart = apart[apart > written]
+    if not len(apart) or len(seen) > MOST_LEVELS * np.count_nonzero(np.isfinite(values)):
+        return 0.0
+    for share in range(1, 5):
+        step = float(apart.min()) / share
+        # From near levels to far ones, so that an error of the step does not grow into another count.
+        for reach in np.geomspace(8.0 * step, max(8.0 * step, float(away[-1])), 8):
+            near = away <= reach
+            counts = np.round(away[near] / step)
+            step = float(counts @ away[near] / max(counts @ counts, 1.0)) or step
+        if np.abs(away / step - np.round(away / step)).max() < OFF_LEVEL:
+            return step
     return 0.0
 
 
@@ -58,6 +91,17 @@ def dwell(values: Array) -> float:
     seen = values[np.isfinite(values)]
     ends = np.concatenate([[0], 1 + np.flatnonzero(np.diff(seen)), [len(seen)]])
     return float(np.median(np.diff(ends))) if len(seen) else 1.0
+
+
+def stretch(values: Array) -> float:
+    """How many readings (n,) the run is long in which a reading lies, on average over readings.
+
+    Long where a part of a record is held, however fast the rest of it changes.
+    """
+    seen = values[np.isfinite(values)]
+    ends = np.concatenate([[0], 1 + np.flatnonzero(np.diff(seen)), [len(seen)]])
+    runs = np.diff(ends)
+    return float(runs @ runs / len(seen)) if len(seen) else 1.0
 
 
 def between_steps(time_s: Array, values: Array) -> Array:
@@ -161,25 +205,83 @@ def without_wrong_readings(
     found, words = [], []
     for e in experiments:
         columns = dict(e.columns)
-        if simulator.knows(e) and "time_s" in columns:
-            for channel in simulator.channels(e):
-                clipped = clipped_readings(e["time_s"], e[channel])
-                if clipped.any():
-                    columns[channel] = np.where(clipped, math.nan, e[channel])
-                    first = e["time_s"][clipped][0]
-                    words.append(
-                        f"{e.name}, {channel}: {np.count_nonzero(clipped)} of {len(e)} readings are at the "
-                        f"end of the channel's range or beside it, first at {first:.4g} s, and do not count"
-                    )
-                wrong = wrong_readings(e["time_s"], columns[channel])
-                if wrong.any():
-                    columns[channel] = np.where(wrong, math.nan, columns[channel])
-                    at = ", ".join(f"{t:.4g} s" for t in e["time_s"][wrong][:5])
-                    more = " and others" if np.count_nonzero(wrong) > 5 else ""
-                    words.append(
-                        f"{e.name}, {channel}: {np.count_nonzero(wrong)} of {len(e)} readings stand alone, "
-                        f"away from those before and after them (at {at}{more}), and do not count"
-                    )
+        for channel in _timed_channels(e, simulator):
+            clipped = clipped_readings(e["time_s"], e[channel])
+            if clipped.any():
+                columns[channel] = np.where(clipped, math.nan, e[channel])
+                first = e["time_s"][clipped][0]
+                words.append(
+                    f"{e.name}, {channel}: {np.count_nonzero(clipped)} of {len(e)} readings are at the "
+                    f"end of the channel's range or beside it, first at {first:.4g} s, and do not count"
+                )
+            _set_aside(e, channel, columns, wrong_readings(e["time_s"], columns[channel]), words)
         changed = any(columns[c] is not e.columns[c] for c in columns)
         found.append(attrs.evolve(e, columns=columns) if changed else e)
     return found, words
+
+
+def unpredicted_readings(values: Array, predicted: Array) -> Array:
+    """Which readings (n,) lie away from their prediction (n,) as those around them do not: (n,) bool.
+
+    By `WRONG` deviations from the median of what `AROUND_ONE` readings are off, one or two together. A clock
+    or a lag that the prediction lacks does that wherever the prediction changes fast: what it could do counts
+    only where ten times as many readings, of changes as fast, are not off.
+    """
+    found = np.zeros(len(values), bool)
+    known = np.flatnonzero(np.isfinite(values) & np.isfinite(predicted))
+    if len(known) < AROUND_ONE:
+        return found
+    off, plain = (values - predicted)[known], predicted[known]
+    beside = np.lib.stride_tricks.sliding_window_view
+    away = np.abs(off - np.median(beside(np.pad(off, AROUND_ONE // 2, "reflect"), AROUND_ONE), axis=1))
+    size = float(np.median(away)) / 0.6745
+    size = max(size, quantum(values) / math.sqrt(12.0), 1e-9 * float(np.ptp(values[known])))
+    alone = away > WRONG * size
+    alone[:2] = alone[-2:] = False
+    fast = np.ptp(beside(np.pad(plain, 1, "edge"), 3), axis=1)
+    for i in np.flatnonzero(alone & (away <= fast)):
+        alike = fast >= ALIKE * fast[i]
+        if np.count_nonzero(alike & ~alone) < TIMES_MORE * np.count_nonzero(alike & alone):
+            return found
+    if np.count_nonzero(alone) <= max(1, MOST_WRONG * len(off)):
+        found[known[alone]] = True
+    return found
+
+
+def without_unpredicted_readings(
+    experiments: Sequence[Experiment], simulator: Composite, values: Mapping[str, float]
+) -> tuple[list[Experiment], list[str]]:
+    """The experiments without readings that stand alone in what a fit of these values leaves, and which.
+
+    Where what is read changes fast from sample to sample, only what is predicted shows that one is wrong.
+    """
+    found: list[Experiment] = []
+    words: list[str] = []
+    for e in experiments:
+        columns = dict(e.columns)
+        channels = _timed_channels(e, simulator)
+        for row, channel in enumerate(channels):
+            wrong = unpredicted_readings(e[channel], simulator.predict(e, values)[row])
+            _set_aside(e, channel, columns, wrong, words)
+        changed = any(columns[c] is not e.columns[c] for c in columns)
+        found.append(attrs.evolve(e, columns=columns) if changed else e)
+    return found, words
+
+
+def _timed_channels(experiment: Experiment, simulator: Composite) -> tuple[str, ...]:
+    known = simulator.knows(experiment) and "time_s" in experiment.columns
+    return simulator.channels(experiment) if known else ()
+
+
+def _set_aside(
+    e: Experiment, channel: str, columns: dict[str, Array], wrong: Array, words: list[str]
+) -> None:
+    if not wrong.any():
+        return
+    columns[channel] = np.where(wrong, math.nan, columns[channel])
+    at = ", ".join(f"{t:.4g} s" for t in e["time_s"][wrong][:5])
+    more = " and others" if np.count_nonzero(wrong) > 5 else ""
+    words.append(
+        f"{e.name}, {channel}: {np.count_nonzero(wrong)} of {len(e)} readings stand alone, "
+        f"away from those before and after them (at {at}{more}), and do not count"
+    )

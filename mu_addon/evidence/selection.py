@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import combinations
 from typing import Any
 
 import attrs
 import numpy as np
 
-from .effect import Effect
+from .effect import Effect, Parameter
 from .fit import PRIOR, Fit, Fitter, logarithmic
 from .record import KNOWN
 from .residuals import Dependence, dependence_table, strict_table, structure
@@ -27,6 +28,8 @@ SEEDS = 4
 DRAWS = 20000
 # Faults of one camera, of which it has one at most: two of them imitate many pairs of physical effects.
 CAMERA = frozenset(("camera_scale", "camera_tilt", "lens_distortion"))
+# Between the titles of two effects that are one rival together.
+TOGETHER = " with "
 # What the model's own mesh does: there in every set of data, seen or not.
 NUMERICS = "mesh_error"
 # An effect rests on one experiment alone where this share of what is known of it comes from there.
@@ -34,6 +37,9 @@ ALONE = 0.9
 # Chi squared that an effect must take from a fit's residual, to first order, to be fitted beside it: a small
 # part of what `FALSE_ALARM_RATE` asks for.
 PROMISING = 4.0
+# Share of an effect's amplitude by which another right law of its mechanism may differ from the library's:
+# what gains no more beside it is not named.
+LAW = 0.05
 # Share of a misfit that one effect must take to be named though structure is left, and how many times as
 # much any other one in its place must leave.
 MAINLY, APART = 0.99, 10.0
@@ -100,11 +106,12 @@ def select(
     pool.sort(key=cost)
     singles = tuple(pool)
     chosen, ps, doubted, p_best = base, [], "", 1.0
+    taken = 0.0
     levels: list[list[Fit]] = []
     for level in range(min(MOST_EFFECTS, len(effects))):
         if level:
             pool = _extended(fitter, effects, levels[-1][:1], progress)
-        if not pool:
+        if not pool or _of_the_law(chosen, pool[0], taken):
             break
         p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
         p_best = p if level == 0 else p_best
@@ -116,20 +123,76 @@ def select(
             more = _extended(fitter, effects, list(seeds.values()), progress)
             pool = sorted([*pool, *more], key=cost)
             p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
-        if p >= FALSE_ALARM_RATE:
+        if p >= FALSE_ALARM_RATE or _of_the_law(chosen, pool[0], taken):
             break
         if loss(fitter, chosen, pool[0]) <= 0.0:
             doubted = f"{pool[0].names[-1]} fits, but its leave-one-out prediction fails"
             break
-        chosen = pool[0]
+        pool[0] = chosen = refined(fitter, pool[0], progress)
+        singles = singles if level else tuple(pool)
+        taken = base.chi2 - chosen.chi2
         ps.append(p)
         levels.append(pool)
-    doubted = doubted or sudden(table_base, base, chosen)
+    doubted = doubted or sudden(table_base, base, chosen) or _too_large(chosen)
     causes = causes_of(fitter, effects, chosen, ps, levels)
+    if len(causes) == 1 and CAMERA.intersection(chosen.names):
+        pairs = pairs_for(fitter, seen, base, chosen, progress)
+        causes = (attrs.evolve(causes[0], rivals=(*causes[0].rivals, *pairs)),)
     table = tuple(strict_table(fitter, chosen))
     if chosen is base and not doubted and not structure(table):
         table_base = table
     return Selection(base, chosen, causes, singles, table_base, table, p_best, doubted)
+
+
+def pairs_for(
+    fitter: Fitter,
+    seen: Sequence[Sensitivity],
+    base: Fit,
+    chosen: Fit,
+    progress: Callable[[str], None] = lambda _: None,
+) -> tuple[str, ...]:
+    """Pairs of effects that explain the data as well as a camera's fault alone does, as "one with the other".
+
+    A camera's fault changes what each channel shows in proportion, which two physical effects can do together
+    where neither does anything alone. Those `SEEDS` pairs are fitted that take most to first order.
+    """
+    physical = [s for s in seen if s.worth_a_fit and s.effect.name not in CAMERA]
+    columns = {id(s): s.column[: len(base.residual)] for s in physical}
+    promised = []
+    for one, other in combinations(physical, 2):
+        if one.effect.name != other.effect.name:
+            q = np.linalg.qr(np.stack([columns[id(one)], columns[id(other)]], axis=1))[0]
+            promised.append((float(np.sum((q.T @ base.residual) ** 2)), one.effect, other.effect))
+    promised.sort(key=lambda pair: -pair[0])
+    found: dict[str, None] = {}
+    for _, *pair in promised[:SEEDS]:
+        progress(" and ".join(e.name for e in pair))
+        starts = [{**base.values, **a, **b} for a in pair[0].starts() for b in pair[1].starts()]
+        if fitter.best(pair, starts).chi2 - chosen.chi2 < RIVAL_DELTA_CHI2:
+            found[TOGETHER.join(e.title for e in pair)] = None
+    return tuple(found)
+
+
+def _of_the_law(less: Fit, more: Fit, taken: float) -> bool:
+    """Whether an effect gains as little beside others as an error of their own law would be."""
+    return more.names[-1] != NUMERICS and less.chi2 - more.chi2 < LAW**2 * taken
+
+
+def refined(fitter: Fitter, fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Fit:
+    """A fit with a law of more freedom in place of one of its effects' where that fits better; else itself.
+
+    Better by `RIVAL_DELTA_CHI2`: the mechanism is the same, and its law is chosen by the data.
+    """
+    for law in fitter.simulator.refinements:
+        for i, e in enumerate(fit.effects):
+            if e.name != law.name or e.whose or e.refines or set(e.kinds) != set(law.kinds):
+                continue
+            progress(e.name)
+            others = [*fit.effects[:i], law, *fit.effects[i + 1 :]]
+            other = fitter.best(others, [{**fit.values, **s} for s in law.starts()])
+            if fit.chi2 - other.chi2 > RIVAL_DELTA_CHI2:
+                fit = other
+    return fit
 
 
 def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) -> Selection:
@@ -229,13 +292,22 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
 
 def at_a_bound(fit: Fit) -> bool:
     """Whether a fitted value of an effect lies at a bound that is not its null."""
-    for e in fit.effects:
-        for key, p in zip(e.keys, e.parameters, strict=True):
-            near = 1e-3 * (p.high - p.low)
-            value = fit.values[key]
-            if any(abs(value - b) < near and b != p.null for b in (p.low, p.high)):
-                return True
-    return False
+    return any(
+        _bounded(p, fit.values[key]) for e in fit.effects for key, p in zip(e.keys, e.parameters, strict=True)
+    )
+
+
+def _bounded(p: Parameter, value: float) -> bool:
+    near = 1e-3 * (p.high - p.low)
+    return any(abs(value - b) < near and b != p.null for b in (p.low, p.high))
+
+
+def _too_large(chosen: Fit) -> str:
+    """Which effect would have to be larger than it can be, in words; empty where none would."""
+    for e in chosen.effects:
+        if _bounded(e.parameters[0], chosen.values[e.keys[0]]):
+            return f"{e.name} would have to be larger than its bound allows"
+    return ""
 
 
 def sudden(table: Sequence[Dependence], base: Fit, chosen: Fit, margin: float = 0.0) -> str:

@@ -54,10 +54,11 @@ class Composite:
     """Simulators of several kinds of experiment as one; they share parameters by name, and cache predictions.
 
     simulators: by kind. An effect whose parameters differ from kind to kind counts as several effects of one
-    name. known: values, by "effect.parameter", of effects that an earlier diagnosis named: they are in every
-    prediction, and none of these effects is offered again; unseen: those of them that no kind here has.
-    remembered: most predictions kept, the oldest are dropped; calls: predictions that were computed. Raises
-    InputError where two simulators give a parameter another unit, null or disjoint bounds.
+    name; those that refine another one's law stand apart in `refinements`. known: values, by
+    "effect.parameter", of effects that an earlier diagnosis named: they are in every prediction, and none of
+    these effects is offered again; unseen: those of them that no kind here has. remembered: most predictions
+    kept, the oldest are dropped; calls: predictions that were computed. Raises InputError where two
+    simulators give a parameter another unit, null or disjoint bounds.
     """
 
     def __init__(
@@ -94,7 +95,9 @@ class Composite:
         }
         # Another law of a mechanism that is in the model already would have it twice.
         there = {(k.partition(".")[0], kind) for kind, names in self._knows.items() for k in names & {*known}}
-        self.effects = tuple(e for e in effects.values() if not {(e.name, kind) for kind in e.kinds} & there)
+        offered = [e for e in effects.values() if not {(e.name, kind) for kind in e.kinds} & there]
+        self.effects = tuple(e for e in offered if not e.refines)
+        self.refinements = tuple(e for e in offered if e.refines)
         # An effect's values are passed on whole, with what was stated of it besides its parameters.
         for kind, names in self._knows.items():
             names |= {k for k in known if (k.partition(".")[0], kind) in there}

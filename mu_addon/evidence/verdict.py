@@ -12,7 +12,7 @@ import numpy as np
 from ..measured import Experiment
 from .drive import denoised_drives
 from .effect import Effect
-from .fit import Fitter
+from .fit import Fit, Fitter
 from .gain import Gain, gain
 from .next_experiment import Proposal, propose_experiment
 from .noise import Source, estimate, span
@@ -20,8 +20,8 @@ from .owned import select_owned
 from .plausibility import require_plausible
 from .pooled import select_pooled
 from .record import Record, record
-from .resolution import without_wrong_readings
-from .selection import Cause, Selection, interval, mainly, one_more, reselected, select, share_taken
+from .resolution import without_unpredicted_readings, without_wrong_readings
+from .selection import TOGETHER, Cause, Selection, interval, mainly, one_more, reselected, select, share_taken
 from .sensitivity import (
     ABSORBED,
     SEEN,
@@ -80,7 +80,8 @@ class Verdict:
         """Names of the effects named and their rivals; empty unless the verdict is `named` or `ambiguous`."""
         if self.kind not in ("named", "ambiguous"):
             return frozenset()
-        return frozenset(self.names) | {r for c in self.selection.causes for r in c.rivals}
+        rivals = {r for c in self.selection.causes for title in c.rivals for r in title.split(TOGETHER)}
+        return frozenset(self.names) | rivals
 
     def _share(self, cause: Cause) -> float:
         """Share of the base model's misfit that is lost where one of several causes is taken away."""
@@ -179,14 +180,13 @@ def diagnose(
     """
     experiments, set_aside = without_wrong_readings(experiments, simulator)
     experiments, again = denoised_drives(experiments, simulator)
-    measured = record([e for e in experiments if e.role == "fit"], simulator)
-    if again:
-        other = {e.name: e for e in again}
-        measured = attrs.evolve(measured, again=tuple(other[e.name] for e in measured.experiments))
     progress("noise")
-    sources = noise_of(measured, simulator)
-    fitter = Fitter(measured, simulator, sources)
-    base = fitter.fit()
+    measured, fitter, base = _base(experiments, again, simulator)
+    experiments, more = without_unpredicted_readings(experiments, simulator, base.values)
+    if more:
+        set_aside = [*set_aside, *more]
+        measured, fitter, base = _base(experiments, again, simulator)
+    sources = fitter.sources
     require_plausible(fitter, base)
     progress("sensitivities")
     curved = {p.name: base.values[p.name] for p in fitter.curved}
@@ -233,6 +233,18 @@ def diagnose(
         tuple(set_aside),
         share_taken(fitter, chosen.base, chosen.chosen),
     )
+
+
+def _base(
+    experiments: Sequence[Experiment], again: Sequence[Experiment] | None, simulator: Composite
+) -> tuple[Record, Fitter, Fit]:
+    """The record of what is fitted, a fitter with its noise, and the fit without effects."""
+    measured = record([e for e in experiments if e.role == "fit"], simulator)
+    if again:
+        other = {e.name: e for e in again}
+        measured = attrs.evolve(measured, again=tuple(other[e.name] for e in measured.experiments))
+    fitter = Fitter(measured, simulator, noise_of(measured, simulator))
+    return measured, fitter, fitter.fit()
 
 
 def _among(effect: Effect) -> dict[str, Any] | None:

@@ -32,6 +32,23 @@ def test_laminar_leak_follows_its_closed_form(initial_kPa):
     np.testing.assert_allclose(rise, k * TIME / 2, rtol=1e-6, atol=1e-8)
 
 
+def test_flow_through_a_hole_is_choked_first():
+    """Choked, gas leaves in proportion to its pressure, as long as that is above 1.89 atmospheres."""
+    h, gamma = 0.04, 1.4
+    P = (chamber_pressure(TIME, 700.0, hole_per_s=h) + ATMOSPHERE_kPa) / ATMOSPHERE_kPa
+
+    def through(ratio):
+        return np.sqrt(2 / (gamma - 1) * (ratio ** (2 / gamma) - ratio ** ((gamma + 1) / gamma)))
+
+    choked = P > 1.9
+    assert 100 < np.count_nonzero(choked) < 500
+    np.testing.assert_allclose(P[choked], P[0] * np.exp(-h * through(0.528282) * TIME[choked]), rtol=1e-5)
+    free = (P < 1.85) & (P > 1.05)
+    slope = np.gradient(P, TIME)[free]
+    np.testing.assert_allclose(slope, -h * P[free] * through(1 / P[free]), rtol=2e-3)
+    assert chamber_pressure(TIME, -60.0, hole_per_s=h)[-1] > -20.0
+
+
 def test_great_inertia_makes_it_an_orifice():
     """x = sqrt(P^2 - P0^2)/(P0 sqrt(2 b)): P = P0 cosh(c0 - k t/sqrt(2 b))."""
     k, b = 0.2, 1e8

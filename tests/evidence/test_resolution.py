@@ -17,6 +17,9 @@ from mu_addon.evidence.resolution import (
     divided,
     dwell,
     quantum,
+    stretch,
+    unpredicted_readings,
+    without_unpredicted_readings,
     wrong_readings,
 )
 from mu_addon.evidence.simulator import Composite
@@ -37,6 +40,53 @@ def test_what_was_not_read_off_a_display_has_no_step():
     rng = np.random.default_rng(0)
     assert quantum(rng.normal(size=100)) == 0.0
     assert quantum(np.full(9, math.pi)) == 0.0
+
+
+@given(st.floats(1e-4, 10.0), st.integers(0, 1000))
+@settings(max_examples=40, deadline=None)
+def test_a_converter_s_step_need_not_be_decimal(step, seed):
+    """Readings written with eight digits, and as forces over a section."""
+    rng = np.random.default_rng(seed)
+    levels = np.round(40.0 * np.sin(np.linspace(0.0, 6.0, 240)) + 0.3 * rng.normal(size=240))
+    written = np.array([float(f"{v:.8g}") for v in step * levels])
+    assert quantum(written) == pytest.approx(step, rel=1e-4)
+    assert quantum(written / 37.13) == pytest.approx(step / 37.13, rel=1e-4)
+
+
+def test_a_part_that_is_held_shows_in_the_run_of_a_reading():
+    """Ten quick steps and one reading that stays: most readings lie in a run of 200."""
+    read = np.concatenate([np.arange(10.0), np.full(200, 9.0)])
+    assert dwell(read) == 1.0
+    assert 180.0 < stretch(read) < 201.0
+    assert stretch(np.random.default_rng(0).normal(size=50)) == 1.0
+
+
+def test_a_wrong_reading_of_a_fast_motion_shows_in_what_is_not_predicted():
+    """Angles go by 10 degrees a sample, so that by its neighbours alone nothing is wrong."""
+    t = np.arange(0.0, 100.0, 0.5)
+    angle = 40.0 * np.sin(2.0 * np.pi * t / 8.0)
+    volts = 2.0 * np.exp(-0.01 * angle) + 0.003 * np.random.default_rng(0).normal(size=len(t))
+    volts[57] += 0.05
+    volts[100:102] += 0.08, 0.1
+    columns = {"time_s": t, "angle_deg": angle, "voltage_V": volts}
+    e = bench.experiment("waveguide_bending", columns, "fast")
+    simulator = Composite(bench_simulators([e]))
+    assert not wrong_readings(t, volts).any()
+    values = {"straight_V": 2.0, "loss_per_deg": 0.01}
+    (found,), words = without_unpredicted_readings([e], simulator, values)
+    assert np.flatnonzero(np.isnan(found["voltage_V"])).tolist() == [57, 100, 101]
+    assert "28.5 s" in words[0]
+
+
+def test_what_a_late_clock_does_at_every_step_is_no_wrong_reading():
+    """A camera that is a frame behind is off for one frame wherever the prediction steps."""
+    predicted = np.repeat([0.0, 10.0, 4.0, 12.0], 60)
+    read = np.roll(predicted, 1)
+    read[0] = 0.0
+    read = read + 0.01 * np.random.default_rng(0).normal(size=len(read))
+    assert not unpredicted_readings(read, predicted).any()
+    read[100] += 1.0
+    assert not unpredicted_readings(read, read - 0.0).any()
 
 
 def test_a_hold_after_a_ramp_is_no_display_that_stands():

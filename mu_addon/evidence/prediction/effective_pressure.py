@@ -15,6 +15,8 @@ Array = np.ndarray[Any, Any]
 
 # Relaxation of the second law of viscoelasticity goes on for so many decades of time.
 DECADES = 4
+# Times of the third law of viscoelasticity, evenly by their logarithms.
+TIMES = 7
 # Pressure in kPa to whose energy that of Mullins softening is relative, as a value beside the effect's own.
 REFERENCE = "mullins_softening.reference_kPa"
 
@@ -36,7 +38,7 @@ def remembered(
 ) -> Array:
     """Pressure (n,) in kPa at which the unit without memory would stand, of p (n,) in kPa in its chambers.
 
-    t (n,): times in s. values: by "effect.parameter", of viscoelasticity (either law), hysteresis without a
+    t (n,): times in s. values: by "effect.parameter", of viscoelasticity (any law), hysteresis without a
     rate and Mullins softening, applied in this order. reference_kPa: whose square the energy of softening is
     relative to, where values do not say; before_kPa: the largest absolute pressure before t begins.
     """
@@ -46,6 +48,8 @@ def remembered(
         p = (1.0 - share) * p + share * first_order_lag(t, p, time)
     if share := get("viscoelasticity.per_decade", 0.0):
         p = (1.0 - DECADES * share) * p + share * decades_lag(t, p, get("viscoelasticity.onset_s", 1.0))
+    if share := get("viscoelasticity.spread_share", 0.0):
+        p = (1.0 - share) * p + share * spread_lag(t, p, values, 1.0 / (1.0 - share))
     if share := get("rate_independent_hysteresis.share", 0.0):
         slips = get("rate_independent_hysteresis.threshold_kPa", 2.0)
         p = (1.0 - share) * p + share * play_operator(p, slips)
@@ -69,17 +73,33 @@ def first_order_lag(t: Array, p: Array, time_s: float) -> Array:
         a, b0, b1 = lag_weights(h.mean(), time_s)
         found, _ = lfilter([b1, b0], [1.0, -a], p, zi=[(1.0 - b1) * p[0]])
         return np.asarray(found)
+    from scipy.linalg.lapack import dtbtrs
+
     a, b0, b1 = lag_weights(h, time_s)
-    driven = b0 * p[:-1] + b1 * p[1:]
-    x = [float(p[0])]
-    for ai, di in zip(a.tolist(), driven.tolist(), strict=True):
-        x.append(ai * x[-1] + di)
-    return np.array(x)
+    driven = np.concatenate([p[:1], b0 * p[:-1] + b1 * p[1:]])
+    # x_k - a x_(k-1) = what drives it: a band with ones on its diagonal.
+    band = np.zeros((2, len(p)))
+    band[1, :-1] = -a
+    found, _ = dtbtrs(band, driven[:, None], uplo="L", diag="U")
+    return np.asarray(found[:, 0])
 
 
 def decades_lag(t: Array, p: Array, onset_s: float) -> Array:
     """Sum (n,) of `first_order_lag` of p (n,) by times onset_s, ten times that, ..., over `DECADES`."""
     return np.asarray(sum(first_order_lag(t, p, onset_s * 10.0**k) for k in range(DECADES)))
+
+
+def spread_lag(t: Array, p: Array, values: Mapping[str, float], longer: float = 1.0) -> Array:
+    """Mean (n,) of `first_order_lag` of p (n,) by `TIMES` times around viscoelasticity's middle one.
+
+    values: by "effect.parameter": the middle in s, and over how many decades the times spread. longer: factor
+    on all of them.
+    """
+    middle, decades = (
+        values.get(f"viscoelasticity.{k}", d) for k, d in (("middle_s", 1.0), ("decades", 2.0))
+    )
+    times = longer * middle * 10.0 ** (decades * np.linspace(-0.5, 0.5, TIMES))
+    return np.asarray(sum(first_order_lag(t, p, time) for time in times.tolist()) / TIMES)
 
 
 def lag_weights(h: Any, time_s: float) -> tuple[Any, Any, Any]:

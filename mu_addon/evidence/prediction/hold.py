@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -23,6 +23,8 @@ KIND = "pressure_hold"
 ROOM_K = 296.0
 AIR_GAMMA = 1.4
 SUPPLY_K = 5.0
+# Pressure outside over that inside below which flow through a hole grows no more.
+CHOKED = (2 / (AIR_GAMMA + 1)) ** (AIR_GAMMA / (AIR_GAMMA - 1))
 # Creep is spread over these decades after its onset.
 DECADES = 6
 # The readings of this time tell where a hold begins, to within this share of the absolute pressure.
@@ -34,11 +36,23 @@ EFFECTS = (
         (
             Parameter("loss_per_s", "1/s", 0.0, 0.2, 0.0, (3e-4, 0.03), "share of a small overpressure lost"),
             Parameter(
-                "inertia", "", 0.0, 30.0, 0.0, (0.0, 1.0), "of the flow, after Forchheimer; 0 is laminar"
+                "inertia",
+                "",
+                0.0,
+                3000.0,
+                0.0,
+                (0.0, 1.0, 100.0),
+                "of the flow, after Forchheimer; 0 is laminar, a hole has hundreds",
             ),
         ),
         (KIND,),
         "gas flows out through pores or cracks, by the difference of the squared absolute pressures",
+    ),
+    Effect(
+        "leak",
+        (Parameter("hole_per_s", "1/s", 0.0, 0.2, 0.0, (3e-4, 0.01), "flow through a hole, as below"),),
+        (KIND,),
+        "gas flows out through a hole, choked where the pressure inside is 1.9 times that outside",
     ),
     Effect(
         "viscoelasticity",
@@ -123,6 +137,7 @@ class ChamberPressure:
             initial,
             loss_per_s=get("leak.loss_per_s", 0.0),
             inertia=get("leak.inertia", 0.0),
+            hole_per_s=get("leak.hole_per_s", 0.0),
             creep_per_kPa=1e-3 * get("viscoelasticity.creep_per_MPa", 0.0),
             onset_s=get("viscoelasticity.onset_s", 1.0),
             growth_per_kPa=1e-3 * get("viscoelasticity.growth_per_MPa", 0.0),
@@ -171,6 +186,7 @@ def chamber_pressure(
     *,
     loss_per_s: float = 0.0,
     inertia: float = 0.0,
+    hole_per_s: float = 0.0,
     creep_per_kPa: float = 0.0,
     onset_s: float = 1.0,
     growth_per_kPa: float = 0.0,
@@ -186,18 +202,19 @@ def chamber_pressure(
     onset s; cooling_K, cooling_s: excess temperature of the gas at the start and
     its time constant; compliance_per_kPa: C in 1/kPa. With P absolute, P0 the atmosphere, V and T relative to
     the start: P V = P_i m T. Gas is lost by P_i dm/dt = -k P0 x, where x + b x^2 = (P^2 - P0^2)/(2 P0^2), so
-    that a small overpressure falls by exp(-k t), and a large b makes it the flow of an orifice. The volume is
+    that a small overpressure falls by exp(-k t), and a large b makes it nearly the flow of an orifice.
+    hole_per_s: h in 1/s of such a flow itself, P_i dm/dt = -h P0 f(P/P0) (`_through_a_hole`). The volume is
     V = 1 + C (p - p_i) + sum over decades d of c x_d, where x_d follows p with the time onset 10^d,
     + g p log10(1 + t/s).
     """
     from scipy.interpolate import CubicSpline
 
     end = float(time_s[-1])
-    if not (loss_per_s or creep_per_kPa or growth_per_kPa or cooling_K) or end <= 0:
+    if not (loss_per_s or hole_per_s or creep_per_kPa or growth_per_kPa or cooling_K) or end <= 0:
         return np.full(len(time_s), float(initial_kPa))
     start = initial_kPa + ATMOSPHERE_kPa
     # Runge and Kutta's method is stable below 2.8 steps a time constant; four steps are accurate.
-    steps = int(np.clip(4 * end * loss_per_s * start / ATMOSPHERE_kPa, 200, 20000))
+    steps = int(np.clip(4 * end * max(loss_per_s, hole_per_s) * start / ATMOSPHERE_kPa, 200, 20000))
     t = np.linspace(0.0, end, 2 * steps + 1)
     warm = np.ones_like(t)
     if cooling_K:
@@ -213,14 +230,31 @@ def chamber_pressure(
         elif growth_per_kPa:
             grown = growth_per_kPa * p * np.log10(1.0 + t / begins_s)
         gas = np.ones_like(t)
-        if loss_per_s:
-            gas = _lost(t, warm, grown, start, loss_per_s, inertia, compliance_per_kPa)
+        flow = partial(_seeping, loss_per_s, inertia)
+        if hole_per_s:
+            flow = partial(_through_a_hole, hole_per_s)
+        if loss_per_s or hole_per_s:
+            gas = _lost(t, warm, grown, start, flow, compliance_per_kPa)
         p = _pressure(start, gas * warm, grown, compliance_per_kPa) - ATMOSPHERE_kPa
         if not (creep_per_kPa or growth_per_kPa) or np.abs(p - before).max() < 1e-8 * start:
             break
     found = np.full(len(time_s), p[0])
     found[time_s > 0] = CubicSpline(t, p)(time_s[time_s > 0])
     return found
+
+
+def _seeping(loss: float, inertia: float, P: float) -> float:
+    """Laminar flow in 1/s at a pressure in atmospheres, with inertia after Forchheimer."""
+    drive = P * P - 1
+    return loss * drive / (1 + math.sqrt(1 + 2 * inertia * abs(drive)))
+
+
+def _through_a_hole(hole: float, P: float) -> float:
+    """Isentropic flow in 1/s through a hole at a pressure in atmospheres (Saint-Venant and Wantzel)."""
+    high, low = max(P, 1.0), min(P, 1.0)
+    ratio = max(low / high, CHOKED)
+    inner = ratio ** (2 / AIR_GAMMA) - ratio ** ((AIR_GAMMA + 1) / AIR_GAMMA)
+    return math.copysign(hole * high * math.sqrt(max(2 / (AIR_GAMMA - 1) * inner, 0.0)), P - 1)
 
 
 def _pressure(start: float, gas: Any, grown: Any, compliance: float) -> Any:
@@ -234,10 +268,18 @@ def _pressure(start: float, gas: Any, grown: Any, compliance: float) -> Any:
 
 
 def _lost(
-    t: Array, warm: Array, grown: Array, start: float, loss: float, inertia: float, compliance: float
+    t: Array,
+    warm: Array,
+    grown: Array,
+    start: float,
+    flow: Callable[[float], float],
+    compliance: float,
 ) -> Array:
-    """Share of the gas (2 n + 1,) left at times of which every second is a step."""
-    rate = loss * ATMOSPHERE_kPa / start
+    """Share of the gas (2 n + 1,) left at times of which every second is a step.
+
+    flow: rate in 1/s, of the gas of the chamber at one atmosphere, at a pressure in atmospheres.
+    """
+    rate = ATMOSPHERE_kPa / start
     # In a rigid chamber the pressure, in atmospheres, is this times the gas.
     per_gas = (start / ATMOSPHERE_kPa * warm / (1 + grown)).tolist()
     W, G = warm.tolist(), grown.tolist()
@@ -246,8 +288,7 @@ def _lost(
         P = gas * per_gas[i]
         if compliance:
             P = float(_pressure(start, gas * W[i], G[i], compliance)) / ATMOSPHERE_kPa
-        drive = P * P - 1
-        return -rate * drive / (1 + math.sqrt(1 + 2 * inertia * abs(drive)))
+        return -rate * flow(P)
 
     h = float(t[2] - t[0])
     gas, found = 1.0, [1.0]

@@ -13,8 +13,8 @@ from ...errors import ConvergenceError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
 from .drift import drift, drifts, largest_reading
-from .effective_pressure import decades_lag, first_order_lag
-from .unit import REFERENCE_C, RELAXING, TIMED
+from .effective_pressure import decades_lag, first_order_lag, spread_lag
+from .unit import REFERENCE_C, RELAXING, SPREADING, TIMED
 from .yielding import elastic_strain, yielding
 
 Array = np.ndarray[Any, Any]
@@ -36,6 +36,11 @@ FARTHEST = 0.5
 FILTER = Parameter("time_s", "s", 0.0, 2.0, 0.0, (0.05, 0.5), "amplifiers average over 1 ms to 1 s")
 FRAME = Parameter("mm_per_N", "mm/N", 0.0, 0.1, 0.0, (0.005,), "steel 1e-5, printed plates 0.1")
 _TIMED = {e.name: e.parameters for e in TIMED}
+# Another law of Mullins softening, by the largest strain so far, tried where the first is found.
+BY_PEAK = (
+    Parameter("by_peak", "", 0.0, 5.0, 0.0, (0.3,), "b of Beatty and Krishnaswamy 2000, over strain^power"),
+    Parameter("power", "", 0.2, 2.0, 0.5, (0.5, 1.0), "one half in Beatty and Krishnaswamy 2000"),
+)
 # Gauss-Legendre points on 0..1 for the energy: exact for laws up to degree 15.
 _AT, _WEIGHT = np.polynomial.legendre.leggauss(8)
 _AT, _WEIGHT = (_AT + 1) / 2, _WEIGHT / 2
@@ -46,7 +51,17 @@ def machine(kind: str) -> tuple[Effect, ...]:
     in_time = ("viscoelasticity", "mullins_softening", "fatigue_drift", "temperature_drift")
     return (
         *(Effect(name, _TIMED[name], (kind,)) for name in in_time),
-        Effect(RELAXING.name, RELAXING.parameters, (kind,), RELAXING.mechanism),
+        *(
+            Effect(e.name, e.parameters, (kind,), e.mechanism, refines=e.refines)
+            for e in (RELAXING, SPREADING)
+        ),
+        Effect(
+            "mullins_softening",
+            BY_PEAK,
+            (kind,),
+            "loading softens all later loading below its largest strain",
+            refines=True,
+        ),
         yielding(kind),
         Effect(
             "anisotropy",
@@ -251,6 +266,10 @@ def _remembering(
         most = np.maximum(np.maximum.accumulate(energy), before)
         width = values.get("mullins_softening.energy_share", 0.3) * (float(most.max()) or 1.0)
         stress = stress * (1 - softening * erf((most - energy) / width))
+    if rate := values.get("mullins_softening.by_peak", 0.0):
+        size = np.abs(strain)
+        below = np.maximum(np.maximum.accumulate(size), past.strain) - size
+        stress = stress * np.exp(-rate * below ** values.get("mullins_softening.power", 0.5))
     if (share := values.get("viscoelasticity.share", 0.0)) and "time_s" in experiment.columns:
         # Relaxing from equilibrium: sigma = sigma_0 - share of what the dashpot has given way.
         stress = stress - share * first_order_lag(
@@ -259,6 +278,8 @@ def _remembering(
     if (share := values.get("viscoelasticity.per_decade", 0.0)) and "time_s" in experiment.columns:
         onset = values.get("viscoelasticity.onset_s", 1.0)
         stress = stress - share * decades_lag(experiment["time_s"], stress, onset)
+    if (share := values.get("viscoelasticity.spread_share", 0.0)) and "time_s" in experiment.columns:
+        stress = stress - share * spread_lag(experiment["time_s"], stress, values)
     return stress
 
 

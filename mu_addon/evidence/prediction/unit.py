@@ -304,6 +304,21 @@ RELAXING = Effect(
 )
 
 
+# A third one with a parameter more, tried where one of the two is found: relaxation times evenly by their
+# logarithms over some decades, which is near a stretched exponential and a Prony series of any length.
+SPREADING = Effect(
+    "viscoelasticity",
+    (
+        Parameter("spread_share", "", 0.0, 0.9, 0.0, (0.15,), "share of the modulus that relaxes in all"),
+        Parameter("middle_s", "s", 0.02, 1000.0, 1.0, (0.5, 10.0), "middle of the relaxation times"),
+        Parameter("decades", "", 0.0, 8.0, 0.0, (2.0,), "over which they spread"),
+    ),
+    (KIND,),
+    "all moduli relax with time, by times spread over some decades",
+    refines=True,
+)
+
+
 class UnitPressure:
     """Predicts unit_pressure experiments from responses of the unit, one for each scale and orientation.
 
@@ -344,7 +359,7 @@ class UnitPressure:
         most = GAUGE_SHARE * largest_reading("pressure_kPa", self.kind, experiments)
         gauge = drifts("pressure_drift", "kPa", most, self.kind, experiments)
         camera = camera_effects(self.channels_known, self.kind, experiments)
-        self.effects = (*TIMED, RELAXING, *static.values(), *gauge, *camera)
+        self.effects = (*TIMED, RELAXING, SPREADING, *static.values(), *gauge, *camera)
         self._sizes = {e.name: e.keys[0] for e in static.values()}
         self.reference_kPa = max(float(np.abs(r.pressures_kPa).max()) for r in self._responses)
 

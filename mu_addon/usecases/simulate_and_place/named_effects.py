@@ -14,7 +14,7 @@ from ...design.toml_text import nearest
 from ...errors import InputError
 from ...evidence.effect import LIBRARY, Parameter
 from ...evidence.prediction.effective_pressure import in_the_chambers, remembered
-from ...evidence.prediction.unit import RELAXING, TIMED
+from ...evidence.prediction.unit import RELAXING, SPREADING, TIMED
 from ...evidence.unit_effects import EFFECTS, SMOOTH, Body
 from ...fem.newton_settings import NewtonSettings
 
@@ -209,7 +209,7 @@ def _laws(name: str) -> tuple[tuple[Parameter, ...], ...]:
         return ((EFFECTS[name].parameter,),)
     own = IN_TIME[name].parameters
     if name == "viscoelasticity":
-        return own, RELAXING.parameters
+        return own, RELAXING.parameters, SPREADING.parameters
     # With the pressure that the energy of softening was relative to, which a diagnosis of units states.
     return ((*own, REFERENCE),) if name == "mullins_softening" else (own,)
 
@@ -227,6 +227,11 @@ def _in_words(name: str, given: Mapping[str, float]) -> str:
     """An effect in words, its size included."""
     if name == "viscoelasticity" and "share" in given:
         return f"all moduli relax by {given['share']:.1%}, with a time constant of {given['time_s']:.3g} s"
+    if name == "viscoelasticity" and "spread_share" in given:
+        return (
+            f"all moduli relax by {given['spread_share']:.1%}, by times over {given['decades']:.2g} decades "
+            f"around {given['middle_s']:.3g} s"
+        )
     if name == "viscoelasticity":
         share, onset = given["per_decade"], given["onset_s"]
         return f"all moduli relax by {share:.1%} in each decade of time after {onset:.3g} s"

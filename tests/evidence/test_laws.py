@@ -1,0 +1,100 @@
+"""Laws of one mechanism: those with more freedom take another one's place, and none is a second cause."""
+
+import attrs
+import numpy as np
+import pytest
+
+from benchmarks.evidence.second_code.judging import simulator_of
+from benchmarks.evidence.second_code.recording import write
+from benchmarks.evidence.second_code.sets import Order, made
+from mu_addon.evidence.prediction.coupon import CouponStress
+from mu_addon.evidence.prediction.effective_pressure import first_order_lag, spread_lag
+from mu_addon.evidence.selection import LAW, _of_the_law
+from mu_addon.evidence.simulator import Composite
+from mu_addon.evidence.verdict import diagnose
+from mu_addon.measured import read_folder
+from tests.evidence import bench
+
+
+def stepped(t, p, time_s):
+    """A lag by the exact solution from sample to sample."""
+    x = [p[0]]
+    for k, h in enumerate(np.diff(t)):
+        a = np.exp(-h / time_s)
+        slope = (p[k + 1] - p[k]) / h
+        x.append(a * (x[-1] - p[k] + slope * time_s) + p[k + 1] - slope * time_s)
+    return np.array(x)
+
+
+@pytest.mark.parametrize("time_s", [0.02, 1.0, 400.0])
+def test_a_lag_on_an_uneven_clock_is_the_solution_from_sample_to_sample(time_s):
+    rng = np.random.default_rng(0)
+    t = np.cumsum(rng.uniform(0.05, 2.0, 300))
+    p = rng.normal(size=300)
+    np.testing.assert_allclose(first_order_lag(t, p, time_s), stepped(t, p, time_s), atol=1e-10)
+
+
+def test_times_that_spread_over_no_decade_are_one_time():
+    t = np.linspace(0.0, 30.0, 200)
+    p = np.sin(t)
+    values = {"viscoelasticity.middle_s": 3.0, "viscoelasticity.decades": 0.0}
+    np.testing.assert_allclose(spread_lag(t, p, values), first_order_lag(t, p, 3.0), atol=1e-12)
+    wide = spread_lag(t, p, {**values, "viscoelasticity.decades": 2.0})
+    each = [first_order_lag(t, p, 3.0 * 10.0**k) for k in np.linspace(-1.0, 1.0, 7)]
+    np.testing.assert_allclose(wide, np.mean(each, axis=0), atol=1e-12)
+
+
+def test_softening_by_the_largest_strain_acts_on_unloading_alone():
+    strain = np.concatenate([np.linspace(0.0, 0.4, 50), np.linspace(0.4, 0.0, 50)])
+    e = bench.experiment("coupon", {"time_s": np.arange(100.0), "strain": strain, "stress_kPa": 0 * strain})
+    model = CouponStress([e])
+    plain = model.predict(e, {})[0]
+    found = model.predict(e, {"mullins_softening.by_peak": 0.5, "mullins_softening.power": 0.5})[0]
+    np.testing.assert_array_equal(found[:50], plain[:50])
+    back = plain[50:] * np.exp(-0.5 * np.sqrt(0.4 - strain[50:]))
+    np.testing.assert_allclose(found[50:], back, atol=1e-9)
+
+
+def test_a_law_that_refines_is_offered_apart():
+    e = bench.experiment(
+        "coupon", {"time_s": np.arange(9.0), "strain": np.linspace(0, 0.1, 9), "stress_kPa": np.ones(9)}
+    )
+    simulator = Composite({"coupon": CouponStress([e])})
+    assert {r.name for r in simulator.refinements} == {"viscoelasticity", "mullins_softening"}
+    assert not any(effect.refines for effect in simulator.effects)
+
+
+def judged(tmp_path, faults, noise="white", level=0.0015, kind="coupon", seed=5):
+    write(tmp_path / "measured", made(Order("single", kind, faults, noise, level, seed)))
+    experiments = read_folder(tmp_path / "measured").experiments
+    return diagnose(experiments, simulator_of(experiments))
+
+
+def test_a_stretched_exponential_is_viscoelasticity_and_nothing_beside_it(tmp_path):
+    """Before, a lag of the load cell and Mullins' softening made up for what one law missed."""
+    hidden = {"share": 0.13, "time_s": 8.0, "beta": 0.5}
+    verdict = judged(tmp_path, {"viscoelasticity": hidden}, "uneven", 0.0017)
+    assert (verdict.kind, verdict.names) == ("named", ("viscoelasticity",))
+    assert "viscoelasticity.spread_share" in verdict.intervals
+
+
+def test_nothing_is_named_of_readings_in_coarse_steps(tmp_path):
+    """Forces in steps of four times their noise: on a ramp rounding is a tone, on a hold an offset."""
+    for seed in (5, 6, 7):
+        verdict = judged(tmp_path / str(seed), {}, "quantised", 0.004, "lattice_compression", seed)
+        assert verdict.kind == "none", (seed, verdict.selection.left)
+
+
+@attrs.frozen
+class Found:
+    chi2: float
+    names: tuple[str, ...]
+
+
+def test_what_a_law_s_own_error_would_gain_is_no_second_cause():
+    first, taken = Found(1000.0, ("leak",)), 4e5
+    little = LAW**2 * taken
+    assert _of_the_law(first, Found(1000.0 - 0.9 * little, ("leak", "pressure_drift")), taken)
+    assert not _of_the_law(first, Found(1000.0 - 1.1 * little, ("leak", "pressure_drift")), taken)
+    # Every mesh has an error, however large the cause beside it.
+    assert not _of_the_law(first, Found(999.0, ("leak", "mesh_error")), taken)
