@@ -11,7 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 
+from ...design.parameters import Unit
+from ...design.section_picture import section_pixels
 from ...errors import MuError, OutputError
 from ...files import write_text
 from ..preview import nodes
@@ -23,6 +26,7 @@ NAME = "Monolithic Units"
 FILE, UNITS_FILE = "mu-nodes.blend", "mu-units.blend"
 UNITS_CATALOGUE = "2d1c1c0e-8d0f-4b5e-9a55-6f6c2f0f4a10"
 CATALOGUES = "blender_assets.cats.txt"
+_PIXELS = 128
 
 
 def write() -> Path:
@@ -62,13 +66,23 @@ def write_units(target: Path) -> None:
             root.asset_data.description = (
                 f"Monolithic Unit, {unit.chambers.count} chambers, scale {unit.scale:g}"
             )
-        _write(target, set(roots))
+            _picture(root, unit)
+        # The groups that units use lie in the file as well, and are assets of the other one.
+        with nodes.no_assets():
+            _write(target, set(roots))
     finally:
         for root in roots:
             unit_object.delete(root)
         for obj in selected:
             obj.select_set(True)
         context.view_layer.objects.active = active
+
+
+def _picture(root: Any, unit: Unit) -> None:
+    """Give a unit its half section as the picture that the asset browser shows."""
+    preview = root.preview_ensure()
+    preview.image_size = (_PIXELS, _PIXELS)
+    preview.image_pixels_float.foreach_set(section_pixels(unit, _PIXELS).astype(np.float32).ravel())
 
 
 def _write(target: Path, data: set[Any]) -> None:

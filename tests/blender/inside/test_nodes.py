@@ -16,6 +16,7 @@ from mu_addon.blender.shared.compat import modifier_input, set_modifier_input
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.parameters import load_preset, preset_names
+from mu_addon.design.section_picture import section_pixels
 
 from .acting import add
 
@@ -207,8 +208,11 @@ def test_presets_and_groups_become_an_asset_library_of_the_users():
     ]
     with bpy.data.libraries.load(str(folder / "mu-units.blend"), assets_only=True) as (there, here):
         assert set(there.objects) == set(preset_names())
+        assert not there.node_groups, "those that units use are assets of the other file alone"
         here.objects = ["mu-0.75x"]
     dropped = bpy.data.objects["mu-0.75x"]
+    pixels = np.array(dropped.preview.image_pixels_float[:])
+    assert np.allclose(pixels, section_pixels(load_preset("mu-0.75x"), 128).ravel(), atol=0.01)
     assert dropped.asset_data.catalog_id == library.UNITS_CATALOGUE
     bpy.context.collection.objects.link(dropped)
     bpy.context.view_layer.objects.active = dropped
@@ -218,10 +222,10 @@ def test_presets_and_groups_become_an_asset_library_of_the_users():
     with bpy.data.libraries.load(str(folder / "mu-nodes.blend"), assets_only=True) as (there, here):
         assert set(there.node_groups) == set(nodes.GROUPS)
         here.node_groups = ["MU Tubes"]
-    tree = bpy.data.node_groups["MU Tubes"]
+    [tree] = here.node_groups
     assert tree.asset_data.catalog_id == nodes.CATALOGUE
     obj = drawn([(0, 0, 0), (0, 0, 40)])
-    assert nodes.skin(obj, "MU Tubes").node_group == tree
+    assert nodes.skin(obj, "MU Tubes").node_group.name == "MU Tubes"
     assert len(skinned(obj)) == 16
     assert bpy.ops.mu.assets_remove() == {"FINISHED"}
     assert "Monolithic Units" not in names()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import ModuleType
 
 import bpy
@@ -29,6 +31,21 @@ def group(name: str):
     if found.get("mu_version") != module.VERSION:
         _build(found, module)
     return found
+
+
+@contextmanager
+def no_assets() -> Iterator[None]:
+    """Take the marks of assets off this file's groups for a while, as to write a file of other assets."""
+    marked = [g for g in map(bpy.data.node_groups.get, GROUPS) if g is not None and g.asset_data is not None]
+    kept = [(tree, tree.asset_data.description, tree.asset_data.catalog_id) for tree in marked]
+    for tree in marked:
+        tree.asset_clear()
+    try:
+        yield
+    finally:
+        for tree, description, catalogue in kept:
+            tree.asset_mark()
+            tree.asset_data.description, tree.asset_data.catalog_id = description, catalogue
 
 
 def _build(tree, module: ModuleType) -> None:

@@ -1,0 +1,87 @@
+"""How the cost of both models grows with the lattice's cells, from the mesh to a load step.
+
+    python -m benchmarks.resolved.growth [--cells 3x4x3 3x4x6 3x4x20 5x4x20] [--refine 1] [--models ...]
+
+Cells across x, across y and along the unit, which has one chamber a cell. A half of `mu-1.0x` with so many,
+without contact. Seconds are of processor time of one thread; a load step is from rest to -1 kPa, memory the
+process's largest so far, so list sizes from small to large.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import time
+from collections.abc import Callable
+from typing import Any
+
+import attrs
+
+from mu_addon.design.parameters import Unit, load_preset
+from mu_addon.errors import MuError
+from mu_addon.fem.equilibrium import Equilibrium
+from mu_addon.meshing.settings import FIDELITIES, MeshSettings
+from mu_addon.resolved.unit import mesh_of
+from mu_addon.usecases.simulate_and_place.job import Job, grasp
+
+from .running import print_heading, print_row
+
+STEP_KPA = -1.0
+
+
+def unit_of(cells: str) -> Unit:
+    """The preset with cells given as "3x4x6": across x, across y, along."""
+    across_x, across_y, along = map(int, cells.split("x"))
+    preset = load_preset("mu-1.0x")
+    lattice = attrs.evolve(preset.lattice, cells_x=across_x, cells_y_plus=across_y - 2)
+    chambers = attrs.evolve(preset.chambers, count=along)
+    return attrs.evolve(preset, lattice=lattice, chambers=chambers)
+
+
+def seconds(call: Callable[[], Any]) -> tuple[float, Any]:
+    """Processor seconds of a call, and what it returns."""
+    start = time.process_time()
+    found = call()
+    return time.process_time() - start, found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cells", nargs="*", default=["3x4x3", "3x4x6", "3x4x20", "5x4x20"])
+    parser.add_argument("--refine", type=float, default=1.0)
+    parser.add_argument("--models", nargs="*", choices=FIDELITIES, default=FIDELITIES)
+    options = parser.parse_args()
+    os.environ["OMP_NUM_THREADS"] = "1"
+    columns = ["mesh", "order and analysis", "tangent", "factorisation", "solution", "load step"]
+    print_heading(["model", "cells", "unknowns", *(f"{name} s" for name in columns), "factorisations", "GB"])
+    for name in options.models:
+        for cells in options.cells:
+            try:
+                print_row([name, cells, *costs(unit_of(cells), name, options.refine)])
+            except MuError as why:
+                print_row([name, cells, why])
+
+
+def costs(unit: Unit, fidelity: str, refine: float) -> list[str]:
+    """Cells of a row of the table: unknowns, seconds, factorisations of the load step, gigabytes."""
+    settings = MeshSettings(fidelity=fidelity, refine=refine)
+    job = Job(unit, grasp(), settings, stages=("design", "simulate"), mesh_check=False)
+    meshed, mesh = seconds(lambda: mesh_of(unit, settings))
+    model = job.model(mesh, threads=1)
+    equilibrium = Equilibrium(model, job.materials(mesh), job.newton)
+    assembled, values = seconds(lambda: equilibrium.rest_tangent)
+    once, _ = seconds(lambda: model.factor.factor(values))
+    factorised, _ = seconds(lambda: model.factor.factor(values))
+    right = model.residual(mesh.nodes * 0.0, STEP_KPA * 1e-3, equilibrium.parameters).ravel()[model.free]
+    solved, _ = seconds(lambda: model.factor.solve(right))
+    rest = equilibrium.at_zero_pressure()
+    stepped, state = seconds(lambda: equilibrium.reach(STEP_KPA * 1e-3, [rest]))
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    times = [meshed, once - factorised, assembled, factorised, solved, stepped]
+    shown = [f"{t:.2f}" for t in times]
+    return [str(len(model.free)), *shown, str(state.factorisations), f"{memory:.1f}"]
+
+
+if __name__ == "__main__":
+    main()

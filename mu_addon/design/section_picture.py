@@ -1,0 +1,65 @@
+"""A small picture of a unit's half section, by numpy alone: Blender's window waits for it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .lattice import lattice_of
+from .parameters import Unit
+from .profile import cavity_polygon, outer_polygon
+
+Array = np.ndarray[Any, Any]
+
+# Red, green, blue and opacity.
+ENVELOPE, STRUT = (0.50, 0.56, 0.64, 0.35), (0.62, 0.67, 0.73, 1.0)
+WALL, CAVITY = (0.79, 0.54, 0.23, 1.0), (0.16, 0.29, 0.36, 1.0)
+_MARGIN = 1.06
+_PER_ARC = 8
+
+
+def section_pixels(unit: Unit, size: int = 128) -> Array:
+    """Pixels (size, size, 4) of the half section x = 0, from 0 to 1, rows from the bottom up; clear outside.
+
+    The struts shown are those within half a cell of the section, projected onto it.
+    """
+    d = unit.dimensions
+    (_, _), (y0, y1), (z0, z1) = d.bounds
+    widest = _MARGIN * max(y1 - y0, z1 - z0)
+    along = (np.arange(size) + 0.5) / size - 0.5
+    y = (0.5 * (y0 + y1) + widest * along)[None, :] + np.zeros((size, 1))
+    z = (0.5 * (z0 + z1) + widest * along)[:, None] + np.zeros((1, size))
+    pixels = np.zeros((size, size, 4))
+    inside = (y >= y0) & (y <= y1) & (z >= z0) & (z <= z1)
+    pixels[inside] = ENVELOPE
+    pixels[inside & _on_strut(unit, y, z)] = STRUT
+    for polygon, color in ((outer_polygon(d, _PER_ARC), WALL), (cavity_polygon(d, _PER_ARC), CAVITY)):
+        pixels[_within(polygon, np.abs(y), z)] = color
+    return pixels
+
+
+def _on_strut(unit: Unit, y: Array, z: Array) -> Array:
+    """Which points lie on a strut beside the section, seen along x."""
+    d = unit.dimensions
+    lattice = lattice_of(d)
+    x = lattice.nodes[lattice.struts][..., 0]
+    rows = np.flatnonzero((x.min(axis=1) > -1e-6) & (x.max(axis=1) < 0.51 * d.cell))
+    at = np.stack([y, z], axis=-1)
+    found = np.zeros(y.shape, bool)
+    for row, (first, last) in zip(rows, lattice.nodes[lattice.struts[rows]][:, :, 1:], strict=True):
+        way = last - first
+        share = np.clip((at - first) @ way / max(float(way @ way), 1e-12), 0.0, 1.0)
+        away = np.linalg.norm(at - first - share[..., None] * way, axis=-1)
+        found |= away <= lattice.radii(np.array([0.5]), np.array([row]))[0, 0]
+    return found
+
+
+def _within(polygon: Array, r: Array, z: Array) -> Array:
+    """Which points lie in a closed polygon (n, 2), by how often a line along r crosses it."""
+    inside = np.zeros(r.shape, bool)
+    for (r0, z0), (r1, z1) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        if z0 != z1:
+            crosses = (z >= min(z0, z1)) & (z < max(z0, z1))
+            inside ^= crosses & (r < r0 + (z - z0) * (r1 - r0) / (z1 - z0))
+    return inside
