@@ -261,6 +261,13 @@ def without_unpredicted_readings(
         columns = dict(e.columns)
         channels = _timed_channels(e, simulator)
         for row, channel in enumerate(channels):
+            copied = next(
+                (c for c in channels[:row] if np.array_equal(e[c], e[channel], equal_nan=True)), None
+            )
+            if copied is not None:
+                # It counts no second time, and stays the same so that the record sees it.
+                columns[channel] = columns[copied]
+                continue
             wrong = unpredicted_readings(e[channel], simulator.predict(e, values)[row])
             _set_aside(e, channel, columns, wrong, words)
         changed = any(columns[c] is not e.columns[c] for c in columns)

@@ -6,7 +6,7 @@ import textwrap
 
 from ...run.child import CANCELLED, DONE, FAILED, RUNNING, WAITING
 from ...run.progress import spell
-from ..shared.panels import alert, large_button, wrapped
+from ..shared.panels import CHARACTERS, alert, large_button, wrapped
 from ..shared.wording import in_panel
 
 
@@ -65,7 +65,9 @@ def _running(layout, child, prefix: str) -> None:
     fraction, text = whole(child)
     layout.progress(factor=fraction, text=text)
     details = [str(child.progress.get("detail", "")), child.estimate.why and f"Longer: {child.estimate.why}"]
-    layout.label(text=next((text for text in reversed(details) if text), ""))
+    latest = textwrap.wrap(next((text for text in reversed(details) if text), ""), CHARACTERS)
+    # Always two lines, so that what is below them stays where it is.
+    wrapped(layout, "\n".join([*latest, "", ""][:2]))
     for warning in child.warnings[-2:]:
         wrapped(layout, in_panel(warning), "ERROR")
 
