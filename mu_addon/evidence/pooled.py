@@ -122,8 +122,9 @@ def select_pooled(
 
     Unchanged where there is none. The false-positive probability is that of a spread at its bound of 0 (half
     a chi squared of one degree), times the number of effects and groupings that were tried. What every second
-    quarter of the records tells of each owner must predict the other quarters. A step change must not explain
-    more. Rivals are other effects, or groupings, whose likelihood is as good.
+    quarter of the records tells of each owner must predict the other quarters. Neither a step
+    change nor an effect of one size for all may explain more. Rivals are other effects, or groupings, whose
+    likelihood is as good.
     """
     from scipy.stats import chi2
 
@@ -144,6 +145,9 @@ def select_pooled(
         return found
     table = tuple(strict_table(fitter, best))
     if structure(table) or sudden(found.table_base, found.base, best):
+        return found
+    # Smooth structure may pass for slow noise; then what all owners share explains more than what differs.
+    if any(single.chi2 < best.chi2 for single in found.singles):
         return found
     rivals = tuple(f.effects[0].title for g, f in fits[1:] if gain - g < RIVAL_DELTA_CHI2)
     cause = Cause(best.effects[0], p, found.base.chi2 - best.chi2, rivals)

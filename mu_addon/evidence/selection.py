@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -156,31 +156,21 @@ def pairs_for(
     A camera's fault changes what each channel shows in proportion, which two physical effects can do together
     where neither does anything alone. Those `SEEDS` pairs are fitted that take most to first order.
     """
-    found: dict[str, None] = {}
-    for pair in promising_pairs([s for s in seen if s.effect.name not in CAMERA], base):
-        progress(" and ".join(e.name for e in pair))
-        if _of_two(fitter, base, pair).chi2 - chosen.chi2 < RIVAL_DELTA_CHI2:
-            found[TOGETHER.join(e.title for e in pair)] = None
-    return tuple(found)
-
-
-def promising_pairs(seen: Sequence[Sensitivity], base: Fit) -> list[tuple[Effect, Effect]]:
-    """The `SEEDS` pairs of effects that take most of a fit's residual to first order, best first."""
-    usable = [s for s in seen if s.worth_a_fit]
-    columns = {id(s): s.column[: len(base.residual)] for s in usable}
-    found = []
-    for one, other in combinations(usable, 2):
+    physical = [s for s in seen if s.worth_a_fit and s.effect.name not in CAMERA]
+    columns = {id(s): s.column[: len(base.residual)] for s in physical}
+    promised = []
+    for one, other in combinations(physical, 2):
         if one.effect.name != other.effect.name:
             q = np.linalg.qr(np.stack([columns[id(one)], columns[id(other)]], axis=1))[0]
-            found.append((float(np.sum((q.T @ base.residual) ** 2)), one.effect, other.effect))
-    found.sort(key=lambda pair: -pair[0])
-    return [(one, other) for _, one, other in found[:SEEDS]]
-
-
-def _of_two(fitter: Fitter, base: Fit, pair: Sequence[Effect]) -> Fit:
-    """The best fit of a pair of effects."""
-    starts = [{**base.values, **a, **b} for a in pair[0].starts() for b in pair[1].starts()]
-    return fitter.best(pair, starts)
+            promised.append((float(np.sum((q.T @ base.residual) ** 2)), one.effect, other.effect))
+    promised.sort(key=lambda pair: -pair[0])
+    found: dict[str, None] = {}
+    for _, *pair in promised[:SEEDS]:
+        progress(" and ".join(e.name for e in pair))
+        starts = [{**base.values, **a, **b} for a in pair[0].starts() for b in pair[1].starts()]
+        if fitter.best(pair, starts).chi2 - chosen.chi2 < RIVAL_DELTA_CHI2:
+            found[TOGETHER.join(e.title for e in pair)] = None
+    return tuple(found)
 
 
 def _of_the_law(less: Fit, more: Fit, taken: float) -> bool:
@@ -275,73 +265,29 @@ def share_taken(fitter: Fitter, base: Fit, fit: Fit) -> float:
     return 1.0 - max(fit.chi2 - noise, 0.0) / max(base.chi2 - noise, 1.0)
 
 
-def mainly(fitter: Fitter, found: Selection, seen: Sequence[Sensitivity]) -> Selection | None:
-    """A selection of one or two effects that take nearly all of a misfit, though structure is left; or None.
+def mainly(fitter: Fitter, found: Selection) -> Selection | None:
+    """A selection of the one effect that takes nearly all of a misfit, though structure is left; None else.
 
-    Their laws may be others than the library's. They must take `MAINLY` of the misfit, leave a tenth of what
-    any other effect leaves in the place of one of them, predict left-out experiments better, rest on no
-    single experiment, have no value at a bound but its null, and do better than a step change. Two must each
-    be significant, too, and leave a tenth of what any pair leaves that promises as much to first order.
+    Its law may be another than the library's. It must take `MAINLY` of the misfit, leave a tenth of what any
+    other effect leaves in its place, predict left-out experiments better, rest on no single experiment, have
+    no value at a bound but its null, and do better than a step change.
     """
     if not found.singles:
         return None
     best, base = found.singles[0], found.base
+    left = 1.0 - share_taken(fitter, base, best)
     others = [f for f in found.singles if f.names != best.names]
-    if not _takes_nearly_all(fitter, base, best, others) or not _sound(fitter, base, best):
-        return _mainly_two(fitter, found, seen)
+    rival = min((1.0 - share_taken(fitter, base, f) for f in others), default=1.0)
+    if left > 1.0 - MAINLY or rival < APART * max(left, 1e-6) or at_a_bound(best):
+        return None
+    shares = _share_by_experiment(fitter, best)
+    if (len(shares) > 1 and max(shares.values()) > ALONE) or loss(fitter, base, best) <= 0.0:
+        return None
     if sudden(found.table_base, base, best):
         return None
     cause = Cause(best.effects[0], found.p_best, base.chi2 - best.chi2, ())
     table = tuple(strict_table(fitter, best))
     return attrs.evolve(found, chosen=best, causes=(cause,), table=table, doubted="")
-
-
-def _mainly_two(fitter: Fitter, found: Selection, seen: Sequence[Sensitivity]) -> Selection | None:
-    """As `mainly`, of two effects among the chosen ones."""
-    base, effects = found.base, found.chosen.effects
-    tried = [fitter.best(list(pair), [found.chosen.values]) for pair in combinations(effects, 2)]
-    best = min(tried, key=cost, default=None)
-    if best is None or not _takes_nearly_all(fitter, base, best, found.singles):
-        return None
-    usable = {s.effect.keys: s.effect for s in seen if s.worth_a_fit}.values()
-    causes = []
-    for e in best.effects:
-        [other] = [o for o in best.effects if o is not e]
-        less = fitter.best([other], [best.values])
-        # The last effect is the one that is judged.
-        own = fitter.fit((other, e), best.values)
-        p = false_alarm_probability(fitter, less, seen, gain_of(fitter, less, own))
-        if p >= FALSE_ALARM_RATE or not _sound(fitter, less, own):
-            return None
-        instead = [a for a in usable if a.name not in best.names]
-        rivals = (fitter.best([other, a], [{**best.values, **s} for s in a.starts()]) for a in instead)
-        if not all(_takes_nearly_all(fitter, base, best, [rival]) for rival in rivals):
-            return None
-        causes.append(Cause(e, p, less.chi2 - best.chi2, ()))
-    if sudden(found.table_base, base, best):
-        return None
-    apart = [pair for pair in promising_pairs(seen, base) if not {e.name for e in pair} & set(best.names)]
-    if not _takes_nearly_all(fitter, base, best, (_of_two(fitter, base, pair) for pair in apart)):
-        return None
-    table = tuple(strict_table(fitter, best))
-    ordered = tuple(sorted(causes, key=lambda c: -c.loss))
-    return attrs.evolve(found, chosen=best, causes=ordered, table=table, doubted="")
-
-
-def _takes_nearly_all(fitter: Fitter, base: Fit, best: Fit, rivals: Iterable[Fit]) -> bool:
-    """Whether a fit takes `MAINLY` of the misfit and each rival leaves `APART` times as much."""
-    left = 1.0 - share_taken(fitter, base, best)
-    if left > 1.0 - MAINLY:
-        return False
-    return all(1.0 - share_taken(fitter, base, f) >= APART * max(left, 1e-6) for f in rivals)
-
-
-def _sound(fitter: Fitter, less: Fit, more: Fit) -> bool:
-    """Whether no value of a fit is at a bound and its last effect predicts what it was not fitted to."""
-    if at_a_bound(more):
-        return False
-    shares = _share_by_experiment(fitter, more)
-    return (len(shares) <= 1 or max(shares.values()) <= ALONE) and loss(fitter, less, more) > 0.0
 
 
 def at_a_bound(fit: Fit) -> bool:

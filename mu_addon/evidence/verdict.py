@@ -211,7 +211,7 @@ def diagnose(
             if _kind(fitter, chosen) == "unexplained" and not owned:
                 chosen, seen = select_owned(fitter, seen, chosen, progress)
     kind = _kind(fitter, chosen)
-    if kind == "unexplained" and (most := mainly(fitter, chosen, seen)) is not None:
+    if kind == "unexplained" and (most := mainly(fitter, chosen)) is not None:
         kind, chosen = "named", most
     progress("gain")
     gained = gain(fitter, chosen.base, chosen.chosen, [e for e in experiments if e.role == "held_out"])

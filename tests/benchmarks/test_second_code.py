@@ -144,3 +144,12 @@ def test_what_no_specimen_can_have_is_a_refusal_and_no_verdict(monkeypatch):
 
     monkeypatch.setattr("benchmarks.evidence.second_code.judging.diagnose", refuse)
     assert judged(order("clean", 12, 4))["outcome"] == "refused"
+
+
+@pytest.mark.slow
+def test_specimens_that_differ_do_not_stand_for_what_all_of_them_do():
+    """Blocks that creep and stiffen: their moduli's spread took a quarter of the misfit and was named."""
+    row = judged(order("two", 5, 991))
+    assert row["truth"] == ["viscoelasticity", "strain_stiffening"]
+    assert "batch_variation" not in row["names"]
+    assert row["outcome"] in ("exact", "in_set", "unexplained")

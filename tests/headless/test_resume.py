@@ -59,8 +59,10 @@ def test_killed_at_any_stage_it_goes_on_to_the_same_digits(whole, with_light, tm
     with np.load(tmp_path / "delta.npz") as a, np.load(reference / "delta.npz") as b:
         assert a.files == b.files
         assert all(np.array_equal(a[name], b[name]) for name in a.files)
-    # What was finished was not computed again.
+    # What was finished was not computed again; a candidate is, once its anchors are kept after its motion.
     for name, written in kept.items():
+        if name.startswith("whole-") and name.replace("whole-", "sweep-") not in kept:
+            continue
         assert (tmp_path / "cache" / name).stat().st_mtime_ns == written, name
 
 
