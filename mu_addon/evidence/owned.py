@@ -132,7 +132,8 @@ def select_owned(
             continue
         tried = [f.effects[-1] for f in pool[:MOST_FITS]]
         level = [f for f in [*pool, *rivals] if len(f.effects) == 1]
-        causes = causes_of(fitter, tried, best, [*(c.p_value for c in found.causes), p], [level])
+        known = [*(c.p_value for c in found.causes), p]
+        causes = causes_of(fitter, tried, found.base, best, known, [level])
         chosen = attrs.evolve(
             found, chosen=best, causes=causes, table=table, singles=singles, doubted="", p_best=p
         )

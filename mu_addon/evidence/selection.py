@@ -134,7 +134,7 @@ def select(
         ps.append(p)
         levels.append(pool)
     doubted = doubted or sudden(table_base, base, chosen) or _too_large(chosen)
-    causes = causes_of(fitter, effects, chosen, ps, levels)
+    causes = causes_of(fitter, effects, base, chosen, ps, levels)
     if len(causes) == 1 and CAMERA.intersection(chosen.names):
         pairs = pairs_for(fitter, seen, base, chosen, progress)
         causes = (attrs.evolve(causes[0], rivals=(*causes[0].rivals, *pairs)),)
@@ -220,7 +220,7 @@ def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) ->
     table_base = tuple(dependence_table(fitter, base))
     doubted = doubted or sudden(table_base, base, chosen)
     effects = [f.effects[0] for f in singles]
-    causes = causes_of(fitter, effects, chosen, ps, [singles])
+    causes = causes_of(fitter, effects, base, chosen, ps, [singles])
     table = tuple(strict_table(fitter, chosen))
     return Selection(base, chosen, causes, singles, table_base, table, found.p_best, doubted)
 
@@ -255,7 +255,7 @@ def one_more(
     table = tuple(strict_table(fitter, best))
     if structure(table) or sudden(found.table_base, found.base, best):
         return found
-    causes = causes_of(fitter, effects, best, [*(c.p_value for c in found.causes), p], [pool])
+    causes = causes_of(fitter, effects, found.base, best, [*(c.p_value for c in found.causes), p], [pool])
     return attrs.evolve(found, chosen=best, causes=causes, table=table)
 
 
@@ -499,11 +499,15 @@ def _folds(fitter: Fitter, fit: Fit) -> list[Array]:
 def causes_of(
     fitter: Fitter,
     effects: Sequence[Effect],
+    base: Fit,
     chosen: Fit,
     ps: Sequence[float],
     levels: Sequence[Sequence[Fit]],
 ) -> tuple[Cause, ...]:
-    """The chosen effects, the most needed first, each with what would do in its place."""
+    """The chosen effects, the most needed first, each with what would do in its place.
+
+    Beside others also what leaves no more than an error of their law would (`LAW`).
+    """
     found = []
     for e in chosen.effects:
         others = [o for o in chosen.effects if o.name != e.name]
@@ -514,9 +518,11 @@ def causes_of(
                 for a in effects
                 if a.name not in chosen.names
             ]
+        less = fitter.best(others, [chosen.values])
+        near = max(RIVAL_DELTA_CHI2, LAW**2 * (base.chi2 - less.chi2))
         rivals: dict[str, float] = {}
         for f in tried:
-            if f.chi2 - chosen.chi2 < RIVAL_DELTA_CHI2:
+            if f.chi2 - chosen.chi2 < near:
                 name = f.effects[-1].title
                 rivals[name] = min(f.chi2, rivals.get(name, f.chi2))
         if NUMERICS not in rivals:
@@ -524,7 +530,6 @@ def causes_of(
             rivals |= _by_numerics(
                 fitter, effects, chosen, [f for f in tried if f.effects[-1].title not in rivals]
             )
-        less = fitter.best(others, [chosen.values])
         p = max(ps)
         found.append(Cause(e, p, less.chi2 - chosen.chi2, tuple(sorted(rivals, key=lambda n: rivals[n]))))
     return tuple(sorted(found, key=lambda c: -c.loss))
