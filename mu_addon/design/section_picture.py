@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .lattice import lattice_of
+from .lattice import Lattice, lattice_of
 from .parameters import Unit
 from .profile import cavity_polygon, outer_polygon
 
@@ -39,12 +39,16 @@ def section_pixels(unit: Unit, size: int = 128) -> Array:
     return pixels
 
 
+def struts_beside_section(lattice: Lattice) -> Array:
+    """Rows of the struts within half a cell of the section x = 0, on its +x side."""
+    x = lattice.nodes[lattice.struts][..., 0]
+    return np.flatnonzero((x.min(axis=1) > -1e-6) & (x.max(axis=1) < 0.51 * lattice.cell))
+
+
 def _on_strut(unit: Unit, y: Array, z: Array) -> Array:
     """Which points lie on a strut beside the section, seen along x."""
-    d = unit.dimensions
-    lattice = lattice_of(d)
-    x = lattice.nodes[lattice.struts][..., 0]
-    rows = np.flatnonzero((x.min(axis=1) > -1e-6) & (x.max(axis=1) < 0.51 * d.cell))
+    lattice = lattice_of(unit.dimensions)
+    rows = struts_beside_section(lattice)
     at = np.stack([y, z], axis=-1)
     found = np.zeros(y.shape, bool)
     for row, (first, last) in zip(rows, lattice.nodes[lattice.struts[rows]][:, :, 1:], strict=True):

@@ -12,6 +12,7 @@ import numpy as np
 from ...design.lattice import lattice_of
 from ...design.parameters import Unit
 from ...design.profile import cavity_polygon, outer_polygon
+from ...design.section_picture import struts_beside_section
 from ...files import write_bytes
 from ...report.charts import BY_LENGTH, CHOSEN, INK, QUIET, canvas, styled
 from .results import Optimised
@@ -118,10 +119,8 @@ def _half_section(drawn: Any, unit: Unit, widest_mm: float, tallest_mm: float) -
 
 def _strut_outlines(unit: Unit) -> list[Array]:
     """Outlines of the struts beside the sagittal plane: y and z in mm of each in turn."""
-    d = unit.dimensions
-    lattice = lattice_of(d)
-    x = lattice.nodes[lattice.struts][..., 0]
-    rows = np.flatnonzero((x.min(axis=1) > -1e-6) & (x.max(axis=1) < 0.51 * d.cell))
+    lattice = lattice_of(unit.dimensions)
+    rows = struts_beside_section(lattice)
     first, last = (lattice.nodes[lattice.struts[rows, end]][:, None, 1:] for end in (0, 1))
     along = last - first
     length = np.linalg.norm(along, axis=2, keepdims=True)
