@@ -13,7 +13,12 @@ import numpy as np
 from ..design.parameters import Unit
 from ..design.strut_cell import relative_density, strut_cell
 from ..errors import InputError
-from ..fem.newton_settings import CONTACT_NEWTON, RESOLVED_NEWTON, NewtonSettings
+from ..fem.newton_settings import (
+    CONTACT_NEWTON,
+    RESOLVED_CONTACT_NEWTON,
+    RESOLVED_NEWTON,
+    NewtonSettings,
+)
 from ..measured.pose import Direction, X, down
 from ..meshing.mesh import LATTICE, MEMBRANE
 from ..meshing.settings import CELL_MM, MeshSettings
@@ -53,7 +58,8 @@ class Body:
     lattice: a law for the lattice in place of the unit's moduli. orientation_deg, orientation_axis: see
     `pose.down`. gap_mm: from the tip at rest to the load cell that holds it, None where it is free. drawn:
     the unit whose mesh is moved to this one's dimensions, since another mesh would bring noise as large as a
-    small effect. device: Warp's, of a model.
+    small effect. self_contact: whether walls and struts of a resolved unit keep apart. device: Warp's, of a
+    model.
     """
 
     unit: Unit
@@ -65,6 +71,7 @@ class Body:
     orientation_axis: Direction = X
     gap_mm: float | None = None
     drawn: Unit | None = None
+    self_contact: bool = False
     device: str = "cpu"
 
     def meshed(self, cache: Path | None = None) -> Mesh:
@@ -95,6 +102,8 @@ class Body:
     def newton(self, effect: UnitEffect | None = None) -> NewtonSettings:
         """Settings of Newton's method for a run of this body, with an effect or none."""
         own = effect.newton if effect else SMOOTH
+        if self.self_contact:
+            return RESOLVED_CONTACT_NEWTON
         return RESOLVED_NEWTON if self.mesh.resolved and own != CONTACT_NEWTON else own
 
     def materials(self, mesh: Mesh) -> Materials:

@@ -18,7 +18,7 @@ from ..fem.lattice_law import LatticeLaw
 from ..measured import Experiment
 from ..measured.pose import Direction, X
 from ..meshing.mesh import AXES
-from ..meshing.settings import RESOLVED, MeshSettings
+from ..meshing.settings import RESOLVED, MeshSettings, require_self_contact_resolvable
 from ..resolved.unit import mesh_of
 from ..run.cache import Cache
 from ..run.pool import each
@@ -68,8 +68,8 @@ class UnitSettings:
     mesh: the model's; finer: what mesh_error compares it with. pressures: how many, about; margin: how far
     beyond the measured ones, as a share of their range. effects: names of those to run. distal: chambers
     behind a clog. lattice: a law for the lattice in place of the unit's moduli. farthest_mm: of a marker
-    from the unit, at scale 1. discrepancy: of the response, as in `UnitResponse`. workers: processes, one
-    a core by default.
+    from the unit, at scale 1. discrepancy: of the response, as in `UnitResponse`. self_contact: whether
+    walls and struts of a resolved unit keep apart. workers: processes, one a core by default.
     """
 
     mesh: MeshSettings = COARSE
@@ -81,14 +81,18 @@ class UnitSettings:
     lattice: LatticeLaw | None = None
     farthest_mm: float = 4.0
     discrepancy: float = DISCREPANCY
+    self_contact: bool = False
     workers: int = attrs.field(factory=cores)
 
     @classmethod
-    def of(cls, fidelity: str) -> UnitSettings:
+    def of(cls, fidelity: str, self_contact: bool = False) -> UnitSettings:
         """The settings by which a unit is simulated homogenised or resolved (`MeshSettings.fidelity`)."""
-        return cls(mesh=STRUTS, finer=STRUTS_FINE) if fidelity == RESOLVED else cls()
+        if fidelity == RESOLVED:
+            return cls(mesh=STRUTS, finer=STRUTS_FINE, self_contact=self_contact)
+        return cls(self_contact=self_contact)
 
     def __attrs_post_init__(self) -> None:
+        require_self_contact_resolvable(self.mesh, self.self_contact)
         for name in self.effects:
             if name not in KNOWN:
                 raise InputError(
@@ -270,7 +274,15 @@ class _Plan:
         reduced = similar(scaled)
         enlarged = scale / reduced.scale
         gap = None if gap_mm is None else gap_mm / enlarged
-        body = Body(reduced, settings.mesh, settings.finer, settings.distal, settings.lattice, gap_mm=gap)
+        body = Body(
+            reduced,
+            settings.mesh,
+            settings.finer,
+            settings.distal,
+            settings.lattice,
+            gap_mm=gap,
+            self_contact=settings.self_contact,
+        )
         markers = attached(mesh, here, settings.farthest_mm * scale)
         measured = {c for e in here for c, values in e.columns.items() if np.isfinite(values).any()}
         known = [ANGLE, VOLUME, *(f"marker{m.number}_{a}_mm" for m in markers for a in AXES)]

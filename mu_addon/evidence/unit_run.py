@@ -17,6 +17,7 @@ from ..fem.held_tip import HeldTip
 from ..fem.kinematics import TipSection
 from ..fem.state import State
 from ..fem.trajectory import branches
+from ..fem.unit import self_contact_of
 from ..measured.pose import X
 from .markers import material_points
 from .prediction.flat_obstacle import NAME as CONTACT
@@ -89,6 +90,8 @@ class Run:
             parts += [effect.name, self.size]
             parts += [body.distal if effect.name == "clogged_chamber" else 0]
             parts += [_turned(body) if effect.has_gravity else 0.0]
+        if body.self_contact:
+            parts += ["self-contact"]
         if body.gap_mm is not None:
             parts += ["held", body.gap_mm]
         if self.outline:
@@ -124,6 +127,8 @@ def run(case: Run, cache: Path | None = None) -> Result:
             materials = effect.materials(materials, mesh, case.size)
         if effect and effect.model:
             model = effect.model(body, mesh, case.size)
+        if body.self_contact:
+            model.self_contact = self_contact_of(body.unit, mesh)
         if effect and effect.load:
             model.load = effect.load(body, mesh, case.size)
         equilibrium = Equilibrium(model, materials, body.newton(effect), explains=not case.effect)

@@ -54,3 +54,8 @@ RESOLVED_OBSTACLE_NEWTON: NewtonSettings = attrs.evolve(CONTACT_NEWTON, max_step
 SELF_CONTACT_NEWTON = NewtonSettings(
     keep_factor=0.8, max_factorisations=80, max_iterations=200, max_backtracks=12, predictor_tolerance=3.0
 )
+
+RESOLVED_CONTACT_NEWTON: NewtonSettings = attrs.evolve(
+    SELF_CONTACT_NEWTON, max_step_MPa=0.005, follow_snaps=True
+)
+"""For a body strut by strut whose walls and struts touch."""

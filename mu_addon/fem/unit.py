@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ..design.parameters import Unit
     from ..meshing.mesh import Mesh
     from .lattice_law import LatticeLaw
+    from .self_contact import SelfContact
 
 Array = np.ndarray[Any, Any]
 
@@ -30,6 +31,9 @@ Array = np.ndarray[Any, Any]
 _SKIN_STEPS = 4
 # Of a graded strut's diameter, logarithmic, in which depths below its surface are looked up.
 _FACTOR = 0.02
+# Of self-contact: the gap over the wall's thickness, and the barrier's stiffness over the resin's modulus;
+# docs/mechanics.md says what they move.
+_GAP_SHARE, _BARRIER_SHARE = 1 / 9, 0.04
 
 
 def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> Materials:
@@ -116,3 +120,11 @@ def _lattice_layers(unit: Unit, mesh: Mesh, elements: Array, law: LatticeLaw | N
     d = unit.printed
     moduli = relative_moduli(d, element_factors(d, mesh)[elements])
     return tuple(attrs.evolve(f, weight=f.weight * law_weight(f.law, moduli)) for f in layers)
+
+
+def self_contact_of(unit: Unit, mesh: Mesh) -> SelfContact:
+    """What keeps walls and struts of a unit's resolved mesh apart. Raises InputError."""
+    from .self_contact import SelfContact
+
+    resin_MPa = in_MPa(unit.material.membrane_modulus_kPa)
+    return SelfContact(mesh, _GAP_SHARE * unit.printed.wall, _BARRIER_SHARE * resin_MPa)

@@ -70,3 +70,13 @@ class MeshSettings:
             # As files were written before there was another.
             del found["fidelity"]
         return found
+
+
+def require_self_contact_resolvable(mesh: MeshSettings, self_contact: bool) -> None:
+    """Raise InputError where self-contact is asked for without walls and struts."""
+    if self_contact and not mesh.resolved:
+        raise InputError(
+            "self-contact needs walls and struts as they are printed",
+            "--self-contact",
+            "give --fidelity resolved, too, or leave it out",
+        )

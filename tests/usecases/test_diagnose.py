@@ -22,7 +22,7 @@ from mu_addon.measured import read_folder
 from mu_addon.run.context import RunContext, run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.diagnose import run as diagnosing
-from mu_addon.usecases.diagnose.job import Job
+from mu_addon.usecases.diagnose.job import Job, read_job
 from mu_addon.usecases.diagnose.remedies import TO_DO, what_to_do
 from mu_addon.usecases.diagnose.run import USE_CASE, console_summary
 from mu_addon.usecases.simulate_and_place.extended_unit import read_extended
@@ -250,6 +250,20 @@ RELAXES = {"viscoelasticity.share": 0.25, "viscoelasticity.time_s": 4.0}
 def analytic_unit(monkeypatch):
     """The response of the unit is that of the data's, in closed form."""
     monkeypatch.setattr(unit_fem, "unit_responses", lambda *_, **__: [analytic.response()])
+
+
+def test_a_diagnosis_goes_on_with_walls_that_touch_as_it_began(tmp_path):
+    measured = read_folder(ROOT / "assets" / "examples" / "paper-bending")
+    with pytest.raises(InputError, match="self-contact needs walls and struts"):
+        Job(measured, self_contact=True)
+    jobs = [Job(measured, fidelity="resolved", self_contact=apart) for apart in (False, True)]
+    assert [job.unit_settings.self_contact for job in jobs] == [False, True]
+    assert jobs[0].texts()["diagnose.toml"] != jobs[1].texts()["diagnose.toml"]
+    for name, text in jobs[1].texts().items():
+        (tmp_path / name).write_text(text)
+    again = read_job(tmp_path)
+    assert (again.fidelity, again.self_contact) == ("resolved", True)
+    assert again.texts() == jobs[1].texts()
 
 
 def test_what_was_found_before_stays_and_a_new_cause_is_added(tmp_path, analytic_unit):

@@ -67,6 +67,13 @@ mesh = { order = 2, refine = 0.5, fidelity = "homogenised" }
     ]
 
 
+def test_studies_of_printed_struts_may_have_walls_that_touch():
+    made = sweep_orders.sweep_order(study(range_of(), fidelity="resolved", self_contact=True)).job.plan
+    simulate = made.inputs.tables["simulate"]
+    assert simulate["self_contact"] is True
+    assert simulate["mesh"]["fidelity"] == "resolved"
+
+
 def test_how_many_studies_at_a_time_decides_no_key_and_a_step_more_does():
     walls = range_of()
     keys = [

@@ -20,7 +20,7 @@ from ...evidence.simulator import Composite
 from ...evidence.unit_fem import UnitSettings
 from ...files import write_csv, write_text
 from ...measured import Experiment, Measured, read_folder
-from ...meshing.settings import FIDELITIES, HOMOGENISED
+from ...meshing.settings import FIDELITIES, HOMOGENISED, MeshSettings, require_self_contact_resolvable
 from ...report.html import facts_table, note, page, table
 from ...run.context import RunContext
 from ...run.folder import FolderLayout
@@ -89,13 +89,17 @@ class Job:
 
     measured: laid out as for `diagnose`; what would be measured may hold any numbers. unit: the preset
     without one. noise: standard deviation of a reading, by quantity. fidelity: whether the unit is simulated
-    homogenised or resolved.
+    homogenised or resolved; self_contact: whether walls and struts of a resolved one keep apart.
     """
 
     measured: Measured
     unit: Unit | None = None
     noise: Mapping[str, float] = attrs.field(factory=lambda: dict(NOISE))
     fidelity: str = attrs.field(default=HOMOGENISED, validator=attrs.validators.in_(FIDELITIES))
+    self_contact: bool = False
+
+    def __attrs_post_init__(self) -> None:
+        require_self_contact_resolvable(MeshSettings(fidelity=self.fidelity), self.self_contact)
 
     @property
     def subject(self) -> Unit | None:
@@ -109,6 +113,7 @@ class Job:
             "experiments_sha256": experiments_digest(self.measured),
             **self.noise,
             "fidelity": None if self.fidelity == HOMOGENISED else self.fidelity,
+            "self_contact": self.self_contact or None,
             "data": described(self.measured),
             "run": {"data": str(self.measured.folder.resolve())},
         }
@@ -124,7 +129,13 @@ def read_job(folder: Path) -> Job:
     require_same_data(measured, values.get("data"), described(measured))
     unit = folder / UNIT
     noise = noise_of([f"{name}={values[name]}" for name in NOISE if name in values])
-    return Job(measured, read_unit(unit) if unit.is_file() else None, noise, fidelity_in(values, path))
+    return Job(
+        measured,
+        read_unit(unit) if unit.is_file() else None,
+        noise,
+        fidelity_in(values, path),
+        values.get("self_contact") is True,
+    )
 
 
 def design_experiments(job: Job, folder: Path, context: RunContext) -> Plan:
@@ -133,7 +144,7 @@ def design_experiments(job: Job, folder: Path, context: RunContext) -> Plan:
     Raises InputError, OutputError.
     """
     measured, progress = job.measured, context.progress
-    settings = UnitSettings.of(job.fidelity)
+    settings = UnitSettings.of(job.fidelity, job.self_contact)
     simulators, remarks = simulators_of(
         measured.experiments, job.subject, folder / "cache", progress, settings
     )

@@ -16,7 +16,7 @@ from ...evidence.extended import ExtendedModel, load_model
 from ...measured import Experiment, Measured, read_folder
 from ...measured.folder import FILE
 from ...measured.kinds import OF_A_UNIT
-from ...meshing.settings import FIDELITIES, HOMOGENISED
+from ...meshing.settings import FIDELITIES, HOMOGENISED, MeshSettings, require_self_contact_resolvable
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, named_path, read_inputs
 from ...toml_writer import toml_text
@@ -41,9 +41,10 @@ class Job:
     """Inputs of a diagnosis.
 
     unit: what unit_pressure experiments and blocks of counted cells are of, whatever its scale; the preset
-    `PRESET` without one. fidelity: whether it is simulated homogenised or resolved. settings: how it is
-    simulated, where not as its fidelity has it. known: what an earlier diagnosis found, None without one: its
-    effects are in the model from the start and stay; moduli and zeros are fitted anew.
+    `PRESET` without one. fidelity: whether it is simulated homogenised or resolved; self_contact: whether
+    walls and struts of a resolved one keep apart. settings: how it is simulated, where not as these have it.
+    known: what an earlier diagnosis found, None without one: its effects are in the model from the start and
+    stay; moduli and zeros are fitted anew.
     """
 
     measured: Measured
@@ -51,8 +52,10 @@ class Job:
     settings: UnitSettings | None = None
     fidelity: str = attrs.field(default=HOMOGENISED, validator=attrs.validators.in_(FIDELITIES))
     known: ExtendedModel | None = None
+    self_contact: bool = False
 
     def __attrs_post_init__(self) -> None:
+        require_self_contact_resolvable(MeshSettings(fidelity=self.fidelity), self.self_contact)
         if not any(e.role == "fit" for e in self.measured.experiments):
             raise InputError(
                 "every experiment is held out",
@@ -70,7 +73,7 @@ class Job:
         """How the unit is simulated."""
         from ...evidence.unit_fem import UnitSettings
 
-        return self.settings or UnitSettings.of(self.fidelity)
+        return self.settings or UnitSettings.of(self.fidelity, self.self_contact)
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; diagnose.toml is the first."""
@@ -80,6 +83,7 @@ class Job:
             "program_sha256": _program(),
             "settings": None if self.settings is None else repr(self.settings),
             "fidelity": None if self.fidelity == HOMOGENISED else self.fidelity,
+            "self_contact": self.self_contact or None,
             "data": described(self.measured),
             "run": {"data": str(self.measured.folder.resolve())},
         }
@@ -102,6 +106,7 @@ def read_job(folder: Path) -> Job:
         measured,
         read_unit(unit) if unit.is_file() else None,
         fidelity=fidelity_in(values, path),
+        self_contact=values.get("self_contact") is True,
         known=load_model(known) if known.is_file() else None,
     )
 

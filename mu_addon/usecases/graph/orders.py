@@ -243,7 +243,10 @@ def diagnose_order(call: Call) -> Order:
     design, measured = call.inputs["unit"], call.inputs["data"]
     assert isinstance(measured, Measured)
     unit = None if design is None else design.unit
-    return Order(DIAGNOSE, DiagnoseJob(measured, unit, fidelity=call.settings["fidelity"]))
+    s = call.settings
+    return Order(
+        DIAGNOSE, DiagnoseJob(measured, unit, fidelity=s["fidelity"], self_contact=s["self_contact"])
+    )
 
 
 def law_of(call: Call, done: Finished) -> Outputs:

@@ -9,8 +9,8 @@ from ...design.rigid_body import FRICTION, RigidBody
 from ...design.solid import QUALITY
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
-from ...meshing.settings import FIDELITIES, HOMOGENISED
 from ...placement.inclusion import RULES
+from .fidelity import FIDELITY, SELF_CONTACT
 from .loading import of_orders
 from .parts import refuse_body
 
@@ -19,13 +19,6 @@ BOTH = "both"
 # As the use cases name them, which are not loaded for a look at their nodes; a test compares them.
 SPECIMENS = ("slide", "stick")
 FORMATS = ("stl", "3mf", "3mf-beams", "step", "txt")
-_FIDELITY = setting(
-    "fidelity",
-    HOMOGENISED,
-    "the printed body with its struts, or a continuum in place of the lattice",
-    choices=tuple(FIDELITIES),
-)
-_SELF_CONTACT = setting("self_contact", False, "keep walls and struts of a resolved unit apart")
 _QUALITY = setting("quality", "interactive", "how fine the facets are", choices=tuple(QUALITY))
 
 
@@ -90,8 +83,8 @@ def study_nodes() -> tuple[Definition, ...]:
                 setting("times", 13, "time samples of the protocol", low=2, high=1001),
                 setting("order", 2, "order of the elements: 1 for a look only", low=1, high=2),
                 setting("refine", 1.0, "what divides every element size", low=0.2, high=8.0),
-                _FIDELITY,
-                _SELF_CONTACT,
+                FIDELITY,
+                SELF_CONTACT,
                 setting(
                     "orientation_deg", 0.0, "direction of gravity about x", unit="deg", low=-360, high=360
                 ),
@@ -260,8 +253,8 @@ def study_nodes() -> tuple[Definition, ...]:
                 setting("friction", 0.5, "coefficient of friction", low=0, high=5),
                 setting("coarse", False, "a coarser mesh, longer time steps, one inclusion rule"),
                 setting("rank_paths", True, "rank the paths of a finger's sensor"),
-                _FIDELITY,
-                _SELF_CONTACT,
+                FIDELITY,
+                SELF_CONTACT,
             ),
             order=of_orders("grip_order"),
             read=lambda call, done: {"grasp": done},

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, setting
-from ...meshing.settings import FIDELITIES, HOMOGENISED
+from .fidelity import FIDELITY, SELF_CONTACT
 from .loading import of_orders
 from .parts import described
 
@@ -116,9 +116,8 @@ def sweep_nodes() -> tuple[Definition, ...]:
                 setting("times", 7, "time samples of the protocol", low=2, high=1001),
                 setting("order", 2, "order of the elements: 1 for a look only", low=1, high=2),
                 setting("refine", 0.5, "what divides every element size", low=0.2, high=8.0),
-                setting(
-                    "fidelity", HOMOGENISED, "strut by strut, or as a continuum", choices=tuple(FIDELITIES)
-                ),
+                FIDELITY,
+                SELF_CONTACT,
                 setting("minimize", "", "columns of the table to make small, for Pareto fronts"),
                 setting("maximize", "", "columns of the table to make large"),
                 setting("memory_MB", 4000, "one study takes no more", unit="MB", low=300, high=1_000_000),

@@ -59,7 +59,8 @@ def _plan_of(call: Call) -> Plan:
     mesh = {"order": s["order"], "refine": s["refine"], "fidelity": s["fidelity"]}
     tables: dict[str, dict[str, Any]] = {
         "design": {},
-        "simulate": {"times": s["times"], "mesh": mesh},
+        "simulate": {"times": s["times"], "mesh": mesh}
+        | ({"self_contact": True} if s["self_contact"] else {}),
         "place": {},
     }
     tables = {stage: tables[stage] for stage in STAGES[: STAGES.index(s["stages"]) + 1]}

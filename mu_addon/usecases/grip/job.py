@@ -10,13 +10,12 @@ from ...design.gripper import Gripper, read_gripper, to_toml
 from ...design.parameters import to_toml as unit_toml
 from ...design.solid import QUALITY
 from ...errors import InputError
-from ...meshing.settings import MeshSettings
+from ...meshing.settings import MeshSettings, require_self_contact_resolvable
 from ...placement.inclusion import PRINTED, RULES
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...sensing.optics import Optics
 from ...toml_writer import toml_text
-from ..simulate_and_place.job import require_self_contact_resolvable
 from .grasp import Cube, Grip
 from .phases import Phases, read_phases, shipped_phases
 

@@ -25,14 +25,14 @@ from ...fem.model import Model
 from ...fem.newton_settings import CONTACT_NEWTON
 from ...fem.time_stepping import simulate_in_time
 from ...fem.trajectory import Trajectory, simulate
-from ...fem.unit import materials_of
+from ...fem.unit import materials_of, self_contact_of
 from ...meshing.mesh import Mesh
 from ...placement.batch import CandidateBatch
 from ...placement.candidates import candidate_paths, evaluation, moved_points, roi, with_sensor
 from ...placement.inclusion import PRINTED, sensor_share
 from ...resolved.candidates import PrintedWaveguides
 from ..simulate_and_place.job import grasp as grasp_protocol
-from ..simulate_and_place.job import in_time_newton, self_contact_of
+from ..simulate_and_place.job import in_time_newton
 from .grasp import Cube, Grip, obstacle_of
 
 Array = np.ndarray[Any, Any]

@@ -15,20 +15,19 @@ from ...design.anchors import windows
 from ...design.assets import asset_root
 from ...design.body import Body, envelope, read_body, require_path_inside
 from ...design.parameters import Unit, read_unit, to_toml
-from ...design.quantity import in_MPa
 from ...design.rigid_body import FRICTION, RigidBody, mirrored, read_rigid_bodies, require_beside, to_obj
 from ...design.solid import QUALITY
 from ...errors import InputError
 from ...fem.newton_settings import (
     CONTACT_NEWTON,
+    RESOLVED_CONTACT_NEWTON,
     RESOLVED_NEWTON,
     RESOLVED_OBSTACLE_NEWTON,
-    SELF_CONTACT_NEWTON,
     NewtonSettings,
 )
 from ...fem.protocol import Protocol, read_protocol
 from ...fem.solver import SolverChoice
-from ...meshing.settings import MeshSettings
+from ...meshing.settings import MeshSettings, require_self_contact_resolvable
 from ...placement.graph import Limits
 from ...placement.inclusion import PRINTED, RULES
 from ...run.folder import claim, keep_inputs
@@ -43,17 +42,10 @@ if TYPE_CHECKING:
     # The inputs of a study are made without the solver: Blender's window waits for them.
     from ...fem.materials import Materials
     from ...fem.model import Model
-    from ...fem.self_contact import SelfContact
     from ...homogenize.effective import Effective
     from ...meshing.mesh import Mesh
 
 GRASP = "protocols/grasp.csv"
-# Of self-contact: the gap over the wall's thickness, and the barrier's stiffness over the resin's modulus;
-# docs/mechanics.md says what they move.
-GAP_SHARE, BARRIER_SHARE = 1 / 9, 0.04
-RESOLVED_CONTACT_NEWTON: NewtonSettings = attrs.evolve(
-    SELF_CONTACT_NEWTON, max_step_MPa=0.005, follow_snaps=True
-)
 LATTICE_LAW = FILES["lattice"]
 
 
@@ -262,6 +254,8 @@ class Job:
 
             model.obstacles = obstacles_of(self.obstacles, self.unit, mesh)
         if self.self_contact:
+            from ...fem.unit import self_contact_of
+
             model.self_contact = self_contact_of(self.unit, mesh)
         return model
 
@@ -340,24 +334,6 @@ class Job:
     def protocol_text(self) -> str:
         """protocol.csv: corner points of the pressure protocol."""
         return protocol_text(self.protocol)
-
-
-def self_contact_of(unit: Unit, mesh: Mesh) -> SelfContact:
-    """What keeps walls and struts of a unit's resolved mesh apart. Raises InputError."""
-    from ...fem.self_contact import SelfContact
-
-    resin_MPa = in_MPa(unit.material.membrane_modulus_kPa)
-    return SelfContact(mesh, GAP_SHARE * unit.printed.wall, BARRIER_SHARE * resin_MPa)
-
-
-def require_self_contact_resolvable(mesh: MeshSettings, self_contact: bool) -> None:
-    """Raise InputError where self-contact is asked for without walls and struts."""
-    if self_contact and not mesh.resolved:
-        raise InputError(
-            "self-contact needs walls and struts as they are printed",
-            "--self-contact",
-            "give --fidelity resolved, too, or leave it out",
-        )
 
 
 def in_time_newton(resolved: bool, self_contact: bool) -> NewtonSettings:
