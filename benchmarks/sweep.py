@@ -50,10 +50,10 @@ def beside(sweeper, equilibrium, times, pressure, wanted):
 
     def submit(state):
         if state.pressure_MPa in wanted:
-            sweeper.submit(state, 0)
+            sweeper.submit((state,), 0)
 
     found = simulate(equilibrium, times, pressure, submit)
-    return dict(sweeper.solve([(s, 0) for s in found.states if s.pressure_MPa in wanted]))
+    return dict(sweeper.solve([((s,), 0) for s in found.states if s.pressure_MPa in wanted]))
 
 
 def seconds(call):
@@ -101,7 +101,7 @@ def main():
             took, _ = seconds(lambda s=sweeper: beside(s, equilibrium(), times, pressure, wanted))
         row(f"{name} paths at {len(few)} pressures, beside Model A: beyond it", took - baseline_s)
         with closing(CandidatePool(setting, given.workers)) as sweeper:
-            took, found = seconds(lambda s=sweeper: dict(s.solve([(state, 0) for state in states])))
+            took, found = seconds(lambda s=sweeper: dict(s.solve([((state,), 0) for state in states])))
         row(f"{name} paths at every pressure, after Model A, the processes' start included", took)
         swept[name] = found
     took, _ = seconds(

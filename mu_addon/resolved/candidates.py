@@ -49,16 +49,21 @@ class PrintedWaveguides:
     settings: NewtonSettings
     body: Body | None = None
 
-    def state(self, number: int, state: State) -> State:
-        """A candidate's state, on its own mesh, at the pressure of one of Model A's.
+    def states(self, number: int, way: Sequence[State]) -> list[State]:
+        """A candidate's state, on its own mesh, at the pressure of the last of some states of Model A.
 
-        The mesh of a candidate begins with the nodes of the unit's. Raises ConvergenceError, and InputError
-        for a candidate that cannot be printed.
+        way: Model A's states on one side of rest, in order of pressure. Where no start near the last one
+        leads to a state the candidate is followed from rest, and there is a state for each of `way`. The
+        mesh of a candidate begins with the nodes of the unit's. Raises ConvergenceError, and InputError for a
+        candidate that cannot be printed.
         """
-        path = self.paths[number]
+        path, last = self.paths[number], way[-1]
         equilibrium = self._equilibrium(path)
-        start = started(self.mesh, equilibrium.model.mesh, path, state.u)
-        return _solved(equilibrium, eased(equilibrium, start, state.u), state.pressure_MPa)
+        start = eased(equilibrium, started(self.mesh, equilibrium.model.mesh, path, last.u), last.u)
+        near = _near(equilibrium, start, last.pressure_MPa)
+        if near is not None:
+            return [near]
+        return equilibrium.path([state.pressure_MPa for state in way], equilibrium.at_zero_pressure())
 
     def alone(self, number: int, pressures_MPa: Array) -> Array:
         """Anchors (s, p, 3) in mm of one candidate along its whole path through pressures (s,), from rest.
@@ -106,12 +111,12 @@ class PrintedWaveguides:
         return Equilibrium(self.model_of(mesh), self.materials_of(mesh), self.settings, explains=False)
 
 
-def _solved(equilibrium: Equilibrium, start: Array, pressure: float) -> State:
-    """The state at a pressure in MPa near a start (m, 3) in mm, or by its own path from rest."""
+def _near(equilibrium: Equilibrium, start: Array, pressure: float) -> State | None:
+    """The state at a pressure in MPa near a start (m, 3) in mm, or None where there is none to be found."""
     touch = equilibrium.model.self_contact
     # What has passed through itself can only come back the way it went.
     if touch is None or not touch.intersects(start):
         for method in (equilibrium.newton, equilibrium.settled):
             with contextlib.suppress(ConvergenceError):
                 return method(start, pressure)
-    return equilibrium.reach(pressure, [equilibrium.at_zero_pressure()])
+    return None

@@ -99,5 +99,5 @@ def test_it_predicts_what_a_printed_waveguide_does():
         Model,
         RESOLVED_NEWTON,
     )
-    solved = np.subtract(*candidates.points([candidates.state(0, state), state]))
+    solved = np.subtract(*candidates.points([*candidates.states(0, [state]), state]))
     assert np.linalg.norm(predicted[0] - solved) < 0.2 * np.linalg.norm(solved)

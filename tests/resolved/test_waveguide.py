@@ -164,7 +164,7 @@ def test_a_candidate_is_found_from_model_a_s_state_as_along_its_own_path(mesh):
     state = still.reach(-0.004, [still.at_zero_pressure()])
     anchors = anchor_points(SMALL)
     candidates = PrintedWaveguides(SMALL, mesh, (anchors,), anchors, materials, Model, RESOLVED_NEWTON)
-    moved = candidates.points([candidates.state(0, state)])[0]
+    moved = candidates.points(candidates.states(0, [state]))[0]
     alone = candidates.alone(0, np.array([-0.004]))[0]
     assert np.abs(moved - alone).max() < 1e-6
     without = candidates.points([state])[0]

@@ -12,6 +12,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.fem.protocol import Protocol
 from mu_addon.files import write_npz
 from mu_addon.meshing.settings import MeshSettings
+from mu_addon.resolved.candidates import PrintedWaveguides
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place import study as module
@@ -261,3 +262,30 @@ def test_a_printed_candidate_that_is_lost_is_solved_alone(tmp_path):
     assert ran(job, tmp_path)["J_hat_mm"] == found
     assert kept[1].exists()
     assert {path.name: path.stat().st_mtime_ns for path in kept[::2]} == before
+
+
+@pytest.mark.slow
+def test_a_candidate_that_is_followed_from_rest_is_kept_at_every_pressure_on_its_way(tmp_path, monkeypatch):
+    unit = load_preset("mu-1.0x")
+    job = Job(
+        unit=attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3)),
+        protocol=Protocol(np.arange(4.0), np.array([0.0, 1.0, 2.0, 3.0])),
+        mesh=MeshSettings(refine=0.4, fidelity="resolved"),
+        times=4,
+        mesh_check=False,
+        workers=1,
+    )
+    by_start = ran(job, tmp_path / "starts")["J_hat_mm"]["printed"]
+    monkeypatch.setattr("mu_addon.resolved.candidates._near", lambda *_: None)
+    asked = []
+    states = PrintedWaveguides.states
+
+    def spied(self, number, way):
+        asked.append([round(state.pressure_kPa, 9) for state in way])
+        return states(self, number, way)
+
+    monkeypatch.setattr(PrintedWaveguides, "states", spied)
+    from_rest = ran(job, tmp_path / "paths")["J_hat_mm"]["printed"]
+    assert asked == [[1.0, 2.0, 3.0]]
+    assert len(sorted((tmp_path / "paths" / "cache").glob("sweep-*"))) == 3
+    assert from_rest == {name: pytest.approx(value, rel=1e-4) for name, value in by_start.items()}

@@ -83,14 +83,19 @@ class PrintedEvaluator:
         )
         self._setting = setting
 
-    def __call__(self, state: State, part: int) -> Moved:
-        """What the jobs of a part do at a state of Model A. Raises ConvergenceError."""
-        jobs = self._setting.parts[part]
-        states = {job: self._candidates.state(job, state) for job in jobs}
-        own = [self._candidates.of_unit(job, states[job]) for job in self._setting.whole_of(part)]
-        apart = [(u - state.u).astype(np.float32) for u in own]
-        moved = self._candidates.points([states[job] for job in jobs])
-        return Moved(moved, np.array(apart, np.float32).reshape(-1, *state.u.shape))
+    def __call__(self, way: Sequence[State], part: int) -> list[Moved]:
+        """What the one job of a part does at the last of some states of Model A, or at each of them.
+
+        At each where it had to be followed from rest, see `PrintedWaveguides.states`. ConvergenceError.
+        """
+        (job,) = self._setting.parts[part]
+        found = []
+        states = self._candidates.states(job, way)
+        for state, own in zip(way[-len(states) :], states, strict=True):
+            whole = [self._candidates.of_unit(job, own) - state.u] if self._setting.whole_of(part) else []
+            shape = -1, *state.u.shape
+            found.append(Moved(self._candidates.points([own]), np.array(whole, np.float32).reshape(shape)))
+        return found
 
     def alone(self, job: int, pressures_MPa: Array) -> Array:
         """Anchors (s, p, 3) in mm that a job moves along its path from rest. Raises ConvergenceError."""
@@ -119,11 +124,13 @@ class Evaluator:
         self._sweep = CandidateBatch(model, s.materials, monitored, shares, s.sensor_MPa, newton)
         self._whole = s.whole
 
-    def __call__(self, state: State, part: int = 0) -> Moved:
-        """What all jobs, the one part, do at a state of Model A. Raises ConvergenceError."""
+    def __call__(self, way: Sequence[State], part: int = 0) -> list[Moved]:
+        """What all jobs, the one part, do at the last of some states of Model A. Raises ConvergenceError."""
+        state = way[-1]
         states = self._sweep.states(state)
         apart = [(states[job].u - state.u).astype(np.float32) for job in self._whole]
-        return Moved(self._sweep.points(states), np.array(apart, np.float32).reshape(-1, *state.u.shape))
+        whole = np.array(apart, np.float32).reshape(-1, *state.u.shape)
+        return [Moved(self._sweep.points(states), whole)]
 
     def alone(self, job: int, pressures_MPa: Array) -> Array:
         """Anchors (s, p, 3) in mm that a job moves along its path from rest. Raises ConvergenceError."""
@@ -142,9 +149,9 @@ def _start(setting: CandidateProblem) -> None:
     _evaluator = evaluator_of(setting, threads=1)
 
 
-def _work(state: State, part: int) -> Moved:
+def _work(way: Sequence[State], part: int) -> list[Moved]:
     assert _evaluator is not None
-    return _evaluator(state, part)
+    return _evaluator(way, part)
 
 
 def _work_alone(job: int, pressures_MPa: Array) -> Array:
@@ -164,12 +171,13 @@ class CandidatePool:
         self.setting, self.workers = setting, workers
         self._alone: Evaluator | PrintedEvaluator | None = None
         self._pool = Pool(workers, "candidates", _start, (setting,))
-        self._submitted: dict[tuple[float, int], Future[Moved]] = {}
+        self._submitted: dict[tuple[float, int], Future[list[Moved]]] = {}
 
-    def submit(self, state: State, part: int) -> None:
-        """Have a process solve the jobs of a part at a state; needs two workers or more."""
-        if (state.pressure_MPa, part) not in self._submitted:
-            self._submitted[state.pressure_MPa, part] = self._pool.submit(_work, state, part)
+    def submit(self, way: Sequence[State], part: int) -> None:
+        """Have a process solve a task of `solve`; needs two workers or more."""
+        name = way[-1].pressure_MPa, part
+        if name not in self._submitted:
+            self._submitted[name] = self._pool.submit(_work, way, part)
 
     def alone(self, tasks: Sequence[tuple[int, Array]]) -> list[Array]:
         """Anchors (s, p, 3) in mm that jobs, by number, move along their paths through pressures (s,)."""
@@ -192,19 +200,21 @@ class CandidatePool:
         for done in as_completed(waiting):
             yield waiting[done], self._pool.result(done)
 
-    def solve(self, tasks: Sequence[tuple[State, int]]) -> Iterator[tuple[int, Moved]]:
-        """Number of each task, a state and a part, as it is done, and what the part's jobs do there.
+    def solve(self, tasks: Sequence[tuple[Sequence[State], int]]) -> Iterator[tuple[int, list[Moved]]]:
+        """Number of each task as it is done, and what its part's jobs do.
 
-        The same for any `workers`. Raises the first ConvergenceError of any.
+        A task: Model A's states on one side of rest, in order of pressure, and a part. Its jobs are solved at
+        the last of these, and maybe at all of them on their way there. The same for any `workers`. Raises the
+        first ConvergenceError of any.
         """
         if self.workers == 1:
-            for number, (state, part) in enumerate(tasks):
+            for number, (way, part) in enumerate(tasks):
                 self._alone = self._alone or evaluator_of(self.setting, threads=1)
-                yield number, self._alone(state, part)
+                yield number, self._alone(way, part)
             return
         for task in tasks:
             self.submit(*task)
-        numbers = {self._submitted[s.pressure_MPa, part]: n for n, (s, part) in enumerate(tasks)}
+        numbers = {self._submitted[way[-1].pressure_MPa, part]: n for n, (way, part) in enumerate(tasks)}
         for done in as_completed(numbers):
             yield numbers[done], self._pool.result(done)
 

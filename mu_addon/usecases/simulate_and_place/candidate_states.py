@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -73,6 +73,7 @@ class CandidateSolver:
         distinct = in_MPa(np.unique(pressure_kPa))
         # What is solved whatever comes of it; the rest only where these do not tell enough.
         self._certain = {float(distinct[i]) for pair in self._rounds(distinct)[:2] for i in pair}
+        self._passed: list[State] = []
         self.solved_kPa: list[float] = []
         self.error = 0.0
         self.path_difference_mm = 0.0
@@ -91,10 +92,12 @@ class CandidateSolver:
 
     def reached(self, state: State) -> None:
         """Start on a state that Model A has just reached, beside Model A's next one."""
+        self._passed.append(state)
         if any(abs(state.pressure_MPa - p) < 1e-12 for p in self._certain):
+            way = _way(self._passed, state)
             for part in self._parts:
                 if not self._is_kept(state, part):
-                    self._sweeper.submit(state, part)
+                    self._sweeper.submit(way, part)
 
     @property
     def _parts(self) -> range:
@@ -121,9 +124,10 @@ class CandidateSolver:
         still = np.array([self._anchors + monitor.displacement(s.u) for s in trajectory.states])
         known: dict[int, Array] = {}
         for pair in order:
-            share = partial(_in_share, on_progress, len(known) / loaded, len(pair) / loaded)
-            found = self._solved(trajectory, pair, share)
-            known |= {number: points - still[number] for number, points in found.items()}
+            for numbers in self._together(distinct, pair):
+                share = partial(_in_share, on_progress, len(known) / loaded, len(numbers) / loaded)
+                found = self._solved(trajectory, numbers, share)
+                known |= {number: points - still[number] for number, points in found.items()}
             self.error = 0.0
             if len(known) < loaded:
                 without_last = {n: d for n, d in known.items() if n != pair[-1]}
@@ -141,6 +145,15 @@ class CandidateSolver:
             evaluation(self._mesh, candidate, rule, self._radius, moved[:, i], baseline, self._job.stations)
             for i, (candidate, rule) in enumerate(self._jobs)
         ]
+
+    def _together(self, distinct: Array, pair: list[int]) -> list[list[int]]:
+        """A pair of pressures, by number, in the groups that are solved one after the other.
+
+        A printed candidate may be followed from rest to a pressure, and then needs no other on that side.
+        """
+        if self._mesh.resolved and len(pair) == 2 and np.prod(distinct[pair]) > 0:
+            return sorted(([n] for n in pair), key=lambda n: -abs(distinct[n[0]]))
+        return [pair]
 
     def _follows_its_path(self, distinct: Array, known: dict[int, Array], still: Array) -> bool:
         """Whether the job that deviates most is, where it does, what its whole path from rest leads to.
@@ -203,15 +216,18 @@ class CandidateSolver:
                     points[row, list(setting.parts[part])] = kept["moved_mm"]
         total = len(numbers) * len(self._parts)
         done = total - len(missing)
-        tasks = [(trajectory.states[numbers[row]], part) for row, part in missing]
+        ways = {row: _way(trajectory.states, trajectory.states[numbers[row]]) for row, _ in missing}
+        tasks = [(ways[row], part) for row, part in missing]
         on_progress(done / total)
-        for task, moved in self._sweeper.solve(tasks):
+        for task, found in self._sweeper.solve(tasks):
             row, part = missing[task]
-            name = self._name(*tasks[task])
-            if setting.whole_of(part):
-                self._cache.put("whole", name, {"difference_mm": moved.whole})
-            self._cache.put("sweep", name, {"moved_mm": moved.anchors})
-            points[row, list(setting.parts[part])] = moved.anchors
+            # The state that was asked for is kept last: with it are all on the way there.
+            for state, moved in zip(ways[row][-len(found) :], found, strict=True):
+                name = self._name(state, part)
+                if setting.whole_of(part):
+                    self._cache.put("whole", name, {"difference_mm": moved.whole})
+                self._cache.put("sweep", name, {"moved_mm": moved.anchors})
+            points[row, list(setting.parts[part])] = found[-1].anchors
             done += 1
             on_progress(done / total)
         return dict(zip(numbers, points, strict=True))
@@ -238,6 +254,12 @@ class CandidateSolver:
     def close(self) -> None:
         """End the processes."""
         self._sweeper.close()
+
+
+def _way(states: Sequence[State], to: State) -> tuple[State, ...]:
+    """Of some states those between rest and one of them, in order of pressure, and that one last."""
+    pressures = np.array([state.pressure_MPa for state in states])
+    return (*(states[n] for n in _outward(pressures, to.pressure_MPa)[:-1]), to)
 
 
 def _in_share(on_progress: Callable[[float], None], done: float, share: float, of_share: float) -> None:
