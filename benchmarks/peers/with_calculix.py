@@ -56,22 +56,22 @@ def write_input(problem, path, controls=CONTROLS):
         if controls:
             out.write(f"*CONTROLS, PARAMETERS=FIELD\n{controls}\n")
         out.write("*DLOAD\n")
-        for element, face in zip(*_faces_of(mesh), strict=True):
+        for element, face in zip(*faces_of(mesh, mesh.cavity_corners), strict=True):
             out.write(f"{element + 1}, P{face}, {problem.pressures_MPa[-1] * STRESS:.15g}\n")
         out.write("*NODE PRINT, NSET=ALL, FREQUENCY=1000\nU\n*END STEP\n")
 
 
-def _faces_of(mesh):
-    """Element and CalculiX's number, (f,) each, of the faces of the cavity."""
+def faces_of(mesh, triangles):
+    """Element and CalculiX's number, (f,) each, of faces of the mesh by their corners (f, 3)."""
     faces = np.sort(mesh.tets[:, :4][:, TET_FACES].reshape(-1, 3), axis=1)
     count = len(mesh.nodes)
 
-    def keys(triangles):
-        return (triangles[:, 0].astype(np.int64) * count + triangles[:, 1]) * count + triangles[:, 2]
+    def keys(sorted_):
+        return (sorted_[:, 0].astype(np.int64) * count + sorted_[:, 1]) * count + sorted_[:, 2]
 
     of_all = keys(faces)
     order = np.argsort(of_all)
-    at = order[np.searchsorted(of_all[order], keys(np.sort(mesh.cavity_corners, axis=1)))]
+    at = order[np.searchsorted(of_all[order], keys(np.sort(triangles, axis=1)))]
     # TET_FACES lists the face opposite to each corner in turn.
     number = np.empty(4, int)
     number[_FACE_OPPOSITE - 1] = np.arange(1, 5)

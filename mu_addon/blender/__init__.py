@@ -45,6 +45,7 @@ _MODULES = (
     "printing.operators",
     "steps.operators",
     "body.operators",
+    "grading.operators",
     "obstacles.operators",
     "gripper.operators",
     "assets.operators",

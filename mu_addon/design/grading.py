@@ -201,8 +201,32 @@ class Field:
             _hats(np.array([0.0, self.half_x * u]), np.abs(p[:, 0])),
         )
 
+    @property
+    def cell_centres(self) -> Array:
+        """Centres (columns, rows, chambers, 3) in mm of the cells at x >= 0, ordered as `cell_factors`."""
+        places = (
+            np.arange(self.half_x + 1),
+            np.arange(-self.y_minus, self.y_plus + 1),
+            np.arange(self.count) + 0.5,
+        )
+        return np.stack(np.meshgrid(*places, indexing="ij"), axis=-1) * self.cell
+
+    def cells_of_factors(self, factors: ArrayLike) -> str:
+        """The text of `cells` that gives each cell its own factor, to two digits; (columns, rows, chambers).
+
+        Out of bounds they are taken to the nearest bound.
+
+        >>> Field(Grading(), 10.0, 2, 0, 0, 1).cells_of_factors([[[1.0, 1.0], [0.8, 1.0]]])
+        '0 1 1: 0.8'
+        """
+        table = np.round(np.clip(np.asarray(factors, float), LEAST, MOST), 2)
+        return cells_text(
+            CellFactor(i, j - self.y_minus, k + 1, float(table[i, j, k]))
+            for i, j, k in np.argwhere(table != 1.0).tolist()
+        )
+
     @cached_property
-    def _table(self) -> Array:
+    def cell_factors(self) -> Array:
         """Product of the entries in each cell: columns from the bending plane, rows from -y, chambers."""
         table = np.ones((self.half_x + 1, self.y_minus + self.y_plus + 1, self.count))
         for i, j, k, factor in self.grading.entries:
@@ -217,7 +241,7 @@ class Field:
         )
 
     def _of_cells(self, p: Array) -> Array:
-        return self._interpolated(self._table, p)
+        return self._interpolated(self.cell_factors, p)
 
     def _interpolated(self, table: Array, p: Array) -> Array:
         """Values of cells, at their centres, linear along each axis between them; (n,) at points (n, 3)."""

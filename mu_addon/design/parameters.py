@@ -452,14 +452,12 @@ class Unit:
             seat_wall=w.seat_wall_mm,
             cable=w.cable_mm,
             inclusion_radius=w.inclusion_radius_mm,
-            grading=self._field,
+            grading=self.grading_field if self.grading.names else None,
         )
 
     @property
-    def _field(self) -> Field | None:
-        """The grading over the unit's own envelope, None where struts are alike everywhere."""
-        if not self.grading.names:
-            return None
+    def grading_field(self) -> Field:
+        """The grading over the unit's own envelope."""
         t = self.lattice
         u = self.scale * self.chambers.cell_mm
         return Field(self.grading, u, self.chambers.count, t.cells_x // 2, t.cells_y_minus, t.cells_y_plus)

@@ -28,9 +28,11 @@ LEGEND = "mu_legend"
 """Marks the objects of a legend in the scene, see `results.legend_object`."""
 TWIN = "mu_twin"
 """Marks the objects that move as the real unit does, see `sensor.twin`."""
+PAINTED = "mu_painted"
+"""Marks the object on which factors of the struts are painted, see `grading.state`."""
 GRIPPER = "mu_grip"
 """Marks the cube of a gripper and what plays its grasp, see `gripper.object`."""
-MARKS = (PART, MOTION, EVIDENCE, CHECK, LAYER, LEGEND, TWIN, GRIPPER)
+MARKS = (PART, MOTION, EVIDENCE, CHECK, LAYER, LEGEND, TWIN, PAINTED, GRIPPER)
 OWNER = "mu_of"
 """On each: UUID of the unit or gripper that it belongs to."""
 

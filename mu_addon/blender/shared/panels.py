@@ -134,8 +134,11 @@ def parameters(layout, root, place: str) -> None:
         _folded(layout, root, place, folded)
 
 
-def folded_section(layout, root, section: str, title: str, hint: str) -> None:
-    """A fold with a section that has a place of its own; its head is red while one of its fields is."""
+def folded_section(layout, root, section: str, title: str, hint: str):
+    """A fold with a section that has a place of its own; its head is red while one of its fields is.
+
+    Returns the fold's layout, or None while it is closed.
+    """
     header, body = layout.panel(f"MU_{section}", default_closed=True)
     found = broken(root)
     header.alert = found is not None and any(place[0] == section for place in found.fits)
@@ -143,6 +146,7 @@ def folded_section(layout, root, section: str, title: str, hint: str) -> None:
     if body:
         wrapped(body, hint, "INFO")
         parameters(body, root, section)
+    return body
 
 
 def _folded(layout, root, place: str, fields: Sequence[tuple[str, Description]]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..body import panel as body_panel
+from ..grading import panel as grading_panel
 from ..gripper import object as gripper_object
 from ..shared.operators import NO_UNIT, linked
 from ..shared.panels import CHARACTERS, TabPanel, UnitPanel, folded_section, parameters, wrapped
@@ -84,7 +85,9 @@ class MU_PT_lattice(UnitPanel, bpy.types.Panel):
     def show(self, layout, context, root):
         envelope = root.mu_unit.envelope
         parameters(layout, root, "lattice")
-        folded_section(layout, root, "grading", "Grading", GRADED)
+        graded = folded_section(layout, root, "grading", "Grading", GRADED)
+        if graded:
+            grading_panel.draw(graded, root)
         if envelope is not None:
             wrapped(layout, f"The lattice fills {envelope.name}; counts of cells are not used", "INFO")
         body_panel.draw(layout, root)

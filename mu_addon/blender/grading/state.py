@@ -1,0 +1,58 @@
+"""The object that is painted on: a cube in each cell, whose weights are factors on its struts' diameters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...design.grading import LEAST, MOST, Field
+from ..preview.materials import material
+from ..shared import displays
+
+# Edge of a cube over that of its cell: small enough to see and paint the cells behind it.
+_SHARE = 0.5
+_CORNERS = np.array(list(np.ndindex(2, 2, 2))) - 0.5
+_FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+
+
+def painted_on(root: Any) -> Any | None:
+    """The object that a unit's factors are painted on, or None."""
+    return next((child for child in root.children if child.get(displays.PAINTED)), None)
+
+
+def begin(root: Any, field: Field) -> Any:
+    """An object with a cube in each cell at x >= 0, its weights those of the unit's present cells."""
+    centres = field.cell_centres.reshape(-1, 3)
+    corners = centres[:, None] + _SHARE * field.cell * _CORNERS
+    mesh = bpy.data.meshes.new("Strut Factors")
+    faces = (len(_CORNERS) * np.arange(len(centres))[:, None, None] + _FACES).reshape(-1, 4)
+    mesh.from_pydata(corners.reshape(-1, 3).tolist(), [], faces.tolist())
+    mesh.materials.append(material("MU Lattice"))
+    obj = displays.lock(displays.add(root, displays.PAINTED, "struts", mesh))
+    group = obj.vertex_groups.new(name="Strut Factor")
+    weights = weights_of(field.cell_factors.ravel())
+    for number, weight in enumerate(np.repeat(weights, len(_CORNERS)).tolist()):
+        group.add([number], weight, "REPLACE")
+    return obj
+
+
+def factors_on(obj: Any, field: Field) -> np.ndarray[Any, Any]:
+    """Factors (columns, rows, chambers) of an object of `begin`: by the mean weight of each cell's cube."""
+    painted = np.zeros(len(obj.data.vertices))
+    for vertex in obj.data.vertices:
+        for element in vertex.groups:
+            painted[vertex.index] = element.weight
+    shape = field.cell_factors.shape
+    return factors_of(painted.reshape(*shape, len(_CORNERS)).mean(axis=-1))
+
+
+def weights_of(factors: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Weights from 0 to 1 of factors: by their logarithm, 0.5 where struts stay as they are."""
+    return np.clip(np.log(factors / LEAST) / np.log(MOST / LEAST), 0.0, 1.0)
+
+
+def factors_of(weights: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Factors of weights from 0 to 1."""
+    return np.asarray(LEAST * (MOST / LEAST) ** weights)
