@@ -31,7 +31,7 @@ from mu_addon.fem.self_contact import SelfContact
 from mu_addon.meshing.mesh import MEMBRANE, Mesh, boundary_faces, edges_of, oriented, second_order
 
 C1, C2, KAPPA = 0.055, 0.005, 2.0  # MPa
-PRESSURES_kPa = np.arange(5.0, 60.1, 5.0)
+STEP_kPa = 5.0
 # Where the peer puts the cylinder, and beyond which |x| in mm its surface is held.
 STRETCH, SHIFT, HELD = (1.0, 1.5, 1.5), (0.0, 9.0, 3.0), 20.0
 GAP_mm, STIFFNESS_MPa = 0.05, 0.0144
@@ -96,8 +96,8 @@ def _among(rows, others):
     return np.array([tuple(row) in found for row in np.sort(rows, axis=1).tolist()])
 
 
-def ours(given, contact):
-    """Displacements (n, 3) in mm at each pressure, as far as they are reached."""
+def ours(given, contact, top_kPa):
+    """The state at the last pressure that is reached."""
     model = Model(given.mesh, threads=1)
     model.self_contact = SelfContact(given.mesh, GAP_mm, STIFFNESS_MPa) if contact else None
     every = np.arange(len(given.mesh.tets))
@@ -105,7 +105,7 @@ def ours(given, contact):
     equilibrium = Equilibrium(model, materials, SELF_CONTACT_NEWTON, explains=False)
     states = [equilibrium.at_zero_pressure()]
     print(f"{len(model.free)} unknowns", flush=True)
-    for pressure in PRESSURES_kPa:
+    for pressure in np.arange(STEP_kPa, top_kPa + 0.1, STEP_kPa):
         begun = time.process_time()
         try:
             states.append(equilibrium.reach(pressure / 1000, states))
@@ -117,7 +117,7 @@ def ours(given, contact):
             touch = model.self_contact.touch(u)
             text = f", {touch.force_N:.3f} N, gap {touch.gap_mm:.4f} mm"
         print(f"{pressure:5.1f} kPa {said(given, u)}{text}, {time.process_time() - begun:.1f} s", flush=True)
-    return [state.u for state in states[1:]]
+    return states[-1]
 
 
 def said(given, u):
@@ -167,7 +167,7 @@ def write_input(given, contact, pressure_kPa, path):
             out.write("*SURFACE INTERACTION, NAME=TOUCH\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n")
             out.write(f"{PENALTY}, 1.e-6\n")
             out.write("*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE\nGRIPPER, CYLINDER\n")
-        out.write("*STEP, NLGEOM, INC=1000\n*STATIC\n0.05, 1., 1.e-5, 0.1\n*DLOAD\n")
+        out.write("*STEP, NLGEOM, INC=1000\n*STATIC\n0.05, 1., 1.e-6, 0.05\n*DLOAD\n")
         for element, face in zip(*faces_of(mesh, mesh.cavity_corners), strict=True):
             out.write(f"{element + 1}, P{face}, {pressure_kPa / 1000:.15g}\n")
         out.write("*NODE PRINT, NSET=ALL, FREQUENCY=1000\nU\n*END STEP\n")
@@ -178,20 +178,21 @@ def main():
     parser.add_argument("folder", type=Path, help="gripper_bellows of the peer's repository")
     parser.add_argument("--order", type=int, choices=(1, 2), default=1)
     parser.add_argument("--no-cylinder", action="store_true", help="nothing to touch")
+    parser.add_argument("--top", type=float, default=60.0, metavar="KPA", help="the last pressure")
     parser.add_argument("--calculix", action="store_true", help="the last pressure by ccx, too")
     chosen = parser.parse_args()
     contact = not chosen.no_cylinder
     given = bodies(chosen.folder, contact, chosen.order)
-    found = ours(given, contact)
+    found = ours(given, contact, chosen.top)
     if not chosen.calculix:
         return
     if shutil.which("ccx") is None:
         parser.error("ccx is not on the path; on Debian: apt-get install calculix-ccx")
     with tempfile.TemporaryDirectory() as folder:
-        theirs = calculix(given, contact, PRESSURES_kPa[len(found) - 1], Path(folder))
-    print(f"CalculiX, {PRESSURES_kPa[len(found) - 1]:g} kPa: {said(given, theirs)}")
-    away = np.linalg.norm(theirs - found[-1], axis=1)
-    largest = np.linalg.norm(found[-1], axis=1).max()
+        theirs = calculix(given, contact, found.pressure_kPa, Path(folder))
+    print(f"CalculiX, {found.pressure_kPa:g} kPa: {said(given, theirs)}")
+    away = np.linalg.norm(theirs - found.u, axis=1)
+    largest = np.linalg.norm(found.u, axis=1).max()
     print(f"largest difference {away.max():.4f} mm of {largest:.2f} mm, {away.max() / largest:.1e}")
 
 
