@@ -131,6 +131,29 @@ def test_what_is_no_stl_is_refused(content):
         read_surface(content, "part.stl")
 
 
+@pytest.mark.parametrize("text", [False, True])
+def test_more_triangles_than_can_be_checked_are_refused_before_they_are_read(text, monkeypatch):
+    monkeypatch.setattr("mu_addon.usecases.check_print.run.MOST_TRIANGLES", 3)
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.5]])
+    content = stl_bytes(corners, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]))
+    if text:
+        content = b"solid part\n" + 4 * (b"facet\n" + 3 * b"vertex 0 0 x\n" + b"endfacet\n")
+    with pytest.raises(InputError, match="holds 4 triangles"):
+        read_surface(content, "part.stl")
+
+
+def test_a_corner_cut_short_is_no_stl():
+    facet = b"facet normal 0 0 0\n" + 3 * b"vertex 0 1 2\n" + b"endfacet\n"
+    with pytest.raises(InputError, match="truncated"):
+        read_surface(b"solid part\n" + facet + b"vertex 1 2", "part.stl")
+
+
+def test_a_coordinate_beyond_a_kilometre_is_refused():
+    far = stl_bytes(np.array([[0, 0, 0], [1, 0, 0], [0, 2e30, 0]]), np.array([[0, 1, 2]]))
+    with pytest.raises(InputError, match="beyond 1e\\+06 mm"):
+        read_surface(far, "part.stl")
+
+
 def test_the_shipped_printer_names_a_source_for_every_limit(tmp_path):
     printer = load_printer("form-4")
     assert set(printer.limits) == set(MEANING)

@@ -19,7 +19,7 @@ from ..surface import Triangles, Vertices, stl_bytes, stl_surface, volume
 from ..waveguide import waveguide
 from . import faces
 from .building import build_findings
-from .crossing import crossings
+from .crossing import MOST_CROSSINGS, crossings
 from .drain import chambers, distance_field
 from .finding import NOWHERE, Finding, Severity, at_least, clustered, none_of
 from .leaks import drainage_findings
@@ -168,7 +168,8 @@ def _faces(vertices: Vertices, triangles: Triangles) -> tuple[list[Finding], Tri
     found.append(none_of("flipped faces", int(over.sum()), clustered(middles[over]), words, "flip them"))
     triangles = np.where(over[:, None], triangles[:, ::-1], triangles)
     cut = crossings(vertices, triangles)
-    words = ("edge passes through another triangle", "edges pass through other triangles")
+    more = " or more" if len(cut) == MOST_CROSSINGS else ""
+    words = ("edge passes through another triangle", f"edges{more} pass through other triangles")
     remedy = "unite the parts before export"
     found.append(none_of("self-intersection", len(cut), clustered(cut), words, remedy))
     if count:
