@@ -102,6 +102,15 @@ def test_wrong_input_is_refused_in_words(tmp_path, capsys, options, words):
     assert words in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(("extent", "turned"), [((30, 150, 20), True), ((150, 30, 20), False)])
+def test_it_is_said_that_a_part_must_be_turned_to_fit(tmp_path, capsys, extent, turned):
+    """As long as the platform is wide, and longer than it is deep: 200 x 125 mm."""
+    (tmp_path / "part.stl").write_bytes(stl_bytes(*printable(shapes.box([0, 0, 0], list(extent)))))
+    words = ["--stl", str(tmp_path / "part.stl"), "--out", str(tmp_path / "out"), "--no-report"]
+    assert main(["check", *words]) == 0
+    assert ("only if it is turned by 90 degrees" in capsys.readouterr().out) == turned
+
+
 def test_text_stl_is_read_like_binary():
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.5]])
     triangles = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])

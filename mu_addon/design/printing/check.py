@@ -260,8 +260,10 @@ def _room(vertices: Vertices, printer: Printer, up: Array) -> Finding:
         remedy = "turn the part by 90 degrees about the build direction"
     if tiny:
         what += "; the whole part is smaller than 5 mm: the file may be in metres or inches"
-    elif bad and share / INCH < 1.0:
-        what += "; it would fit if its coordinates were inches"
+    elif bad and 3.0 < share < INCH:
+        what += (
+            "; it would fit at 1/25.4 of its size: it may have been scaled from inches though it was in mm"
+        )
     return Finding(
         "build volume",
         "error" if bad else "pass",

@@ -174,13 +174,22 @@ def summary(found: PrintCheck) -> dict[str, Any]:
     count = {s: sum(f.severity == s for f in found.findings) for s in ("error", "warning", "pass")}
     best = {"orientation": attrs.asdict(found.builds[0])} if found.builds else {}
     faults = [f"{f.check}: {f.what}" for f in found.findings if f.is_fault]
-    return {"verdict": found.worst, "count": count, "figures": found.figures, "faults": faults, **best}
+    notes = [f"{f.check}: {f.what}" for f in found.findings if not f.is_fault and f.remedy]
+    return {
+        "verdict": found.worst,
+        "count": count,
+        "figures": found.figures,
+        "faults": faults,
+        "notes": notes,
+        **best,
+    }
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
     """What a check found, in a few lines of text, of its `summary`."""
     count = summary["count"]
     lines = [f"{count['pass']} checks passed, {count['warning']} warnings, {count['error']} errors"]
+    lines += summary.get("notes", [])
     if "orientation" in summary:
         best = summary["orientation"]
         towards = ", ".join(f"{x:.2f}" for x in best["direction"])
