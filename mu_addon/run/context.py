@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import signal
 import sys
@@ -16,7 +17,7 @@ from typing import Any
 import attrs
 
 from ..errors import InputError, MuError, OutputError
-from ..files import plain, write_json, write_text
+from ..files import output_error, plain, write_json, write_text
 from ..reading import file_bytes, parse_json
 from .lock import FolderLock
 from .progress import Progress, log_file
@@ -26,6 +27,8 @@ DONE, UNEXPECTED, TERMINATED = 0, 70, 143
 SUMMARY = "summary.json"
 # What libraries say that were refused memory, in other errors than MemoryError: Warp, the loader, C++.
 _REFUSED = ("Failed to allocate", "failed to map segment", "Cannot allocate memory", "bad_alloc")
+# What a disk refuses to whoever writes.
+_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 # Bytes that the summary of a run that goes on takes up: room for its last one where the disk is full by then.
 RESERVED = 1 << 14
 
@@ -206,6 +209,9 @@ def _failure(context: RunContext, error: Exception) -> MuError:
         return MuError(what, sys.executable, "install the packages that README.md names")
     if isinstance(error, MemoryError) or any(words in str(error) for words in _REFUSED):
         return _out_of_memory(context)
+    if isinstance(error, OSError) and error.errno in _DISK:
+        # Of a library that writes by its own means.
+        return output_error(error, Path(error.filename or context.folder or "a file"))
     _log_traceback(context, error)
     return _unexpected(context, error)
 

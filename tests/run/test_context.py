@@ -152,6 +152,12 @@ def test_stopped_from_outside(tmp_path, number, status):
     assert (tmp_path / "mesh.txt").read_text() == "kept"
 
 
+def test_a_full_disk_that_a_library_meets():
+    with run_to_end(Progress()) as context:
+        raise OSError(errno.ENOSPC, "No space left on device", "/home/x/.cache/kernels.o")
+    assert context.status == 5
+
+
 def test_ctrl_c_that_a_library_makes_another_error_of():
     """numpy does, where it comes in the middle of its import."""
     with run_to_end(Progress()) as context:
