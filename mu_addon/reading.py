@@ -21,8 +21,9 @@ from .errors import InputError
 # No file of text that is read here is longer, in bytes, and no table has more rows. What is made of a text
 # takes up to some thirty times its length in memory, which these limits keep below 2 GB.
 _LONGEST, MOST_ROWS = 1 << 26, 1_000_000
-# No TOML or JSON document is longer, in characters: far more than any that the program writes.
-_LONGEST_DOCUMENT = 1 << 24
+# No document is longer, in characters: far more than any that the program writes. What is made of TOML
+# takes up to a hundred times its length in memory, of JSON a quarter of that.
+_LONGEST_TOML, _LONGEST_JSON = 1 << 22, 1 << 24
 # No table of this program lies deeper in others, and no whole number is larger (TOML's own are of 64 bits).
 _DEEPEST, _LARGEST = 64, 1 << 63
 # The parser takes time by the square of a dotted key's length.
@@ -92,10 +93,10 @@ def require_rows(count: int, where: str) -> None:
         )
 
 
-def _require_length(text: str | bytes, origin: str, remedy: str) -> None:
+def _require_length(text: str | bytes, most: int, origin: str, remedy: str) -> None:
     """Raise InputError for a document that would exhaust the memory when it is parsed."""
-    if len(text) > _LONGEST_DOCUMENT:
-        words = f"its {_size(len(text))} are more than the {_size(_LONGEST_DOCUMENT)} that are read"
+    if len(text) > most:
+        words = f"its {_size(len(text))} are more than the {_size(most)} that are read"
         raise InputError(words, origin, remedy)
 
 
@@ -106,7 +107,7 @@ def unreadable(error: OSError | UnicodeDecodeError) -> str:
 
 def parse_toml(text: str, origin: str, remedy: str = "correct that line") -> dict[str, Any]:
     """Tables and values of TOML text; raises InputError, with the line where it is known."""
-    _require_length(text, origin or "TOML text", remedy)
+    _require_length(text, _LONGEST_TOML, origin or "TOML text", "check that it is the right file")
     if _DOTTED.search(text):
         raise InputError(f"tables lie more than {_DEEPEST} deep in each other", origin or "TOML text", remedy)
     try:
@@ -124,7 +125,7 @@ def parse_toml(text: str, origin: str, remedy: str = "correct that line") -> dic
 
 def parse_json(text: str | bytes, origin: str, remedy: str = "let the program write it again") -> Any:
     """The value of JSON text; raises InputError."""
-    _require_length(text, origin, remedy)
+    _require_length(text, _LONGEST_JSON, origin, remedy)
     try:
         value = json.loads(text)
     except (RecursionError, ValueError, OverflowError) as error:

@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..reading import require_readable
 from . import shapes
 from .dimensions import Dimensions
-from .printing.crossing import crossings
+from .printing.crossing import MOST_CROSSINGS, crossings
 from .profile import outer_polygon
 from .surface import Triangles, Vertices, volume, weld
 
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 MOST_TRIANGLES = 60_000
 """A finer body would take minutes to examine and to mesh, and say no more: the mesh is coarser by far."""
-MOST_BYTES = 100_000_000
-"""Of a body's file: several times what so many triangles take as text."""
+MOST_BYTES = 1 << 25
+"""Of a body's file: twice what so many triangles take as text. What is read of it takes 1.3 GB at most."""
 MOST_MM = 1_000_000.0
 """Of a coordinate: what lies farther away has other units, or is damaged."""
 QUANTUM_MM = 1e-5
@@ -195,7 +195,8 @@ def flaws(body: Body) -> list[Flaw]:
     if len(crossing):
         found.append(
             Flaw(
-                f"the surface intersects itself in {len(crossing)} places",
+                f"the surface intersects itself in {len(crossing)} places"
+                + (" or more" if len(crossing) == MOST_CROSSINGS else ""),
                 "unite the parts, or move them apart",
                 crossing,
             )

@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import sys
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import attrs
 import warp as wp
 
+from .kernel_cache import own_cache, usable_cache
 from .laws.tensors import add_dyad, add_swapped, mat33
 
 vec3 = wp.vec3d
@@ -19,20 +21,27 @@ wp.config.log_level = wp.LOG_WARNING
 wp.config.enable_backward = False
 
 
+@cache
 def start_warp() -> None:
-    """Start Warp without its notice that this machine has no NVIDIA driver, which is no fault of a run's.
+    """Start Warp with a cache that can be used, without its notice that this machine has no NVIDIA driver.
 
-    The notice is written by native code straight to the process's standard error.
+    That is no fault of a run's, and is written by native code straight to the process's standard error.
     """
     sys.stderr.flush()
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(nowhere, 2)
-        wp.init()
+        try:
+            wp.init()
+        except OSError:
+            # The folder of its cache cannot be made.
+            wp.config.kernel_cache_dir = str(own_cache())
+            wp.init()
     finally:
         os.dup2(kept, 2)
         os.close(kept)
         os.close(nowhere)
+    wp.config.kernel_cache_dir = str(usable_cache(Path(wp.config.kernel_cache_dir)))
 
 
 start_warp()

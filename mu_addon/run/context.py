@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import signal
 import sys
@@ -16,15 +17,18 @@ from typing import Any
 import attrs
 
 from ..errors import InputError, MuError, OutputError
-from ..files import plain, write_json, write_text
+from ..files import output_error, plain, write_json, write_text
 from ..reading import file_bytes, parse_json
 from .lock import FolderLock
 from .progress import Progress, log_file
+from .supervisor import INTERRUPTED
 
-DONE, UNEXPECTED, INTERRUPTED, TERMINATED = 0, 70, 130, 143
+DONE, UNEXPECTED, TERMINATED = 0, 70, 143
 SUMMARY = "summary.json"
 # What libraries say that were refused memory, in other errors than MemoryError: Warp, the loader, C++.
 _REFUSED = ("Failed to allocate", "failed to map segment", "Cannot allocate memory", "bad_alloc")
+# What a disk refuses to whoever writes.
+_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 # Bytes that the summary of a run that goes on takes up: room for its last one where the disk is full by then.
 RESERVED = 1 << 14
 
@@ -178,28 +182,38 @@ def run_to_end(progress: Progress) -> Iterator[RunContext]:
     """
     context = RunContext(progress)
     # Blender replaces Python's handler of Ctrl-C, and leaves SIGTERM to kill the process where it stands.
-    with _signals_raise():
+    with _signals_raise() as asked:
         try:
             yield context
             _write_summary(context, {"status": "complete"})
             progress.result({"folder": context.folder, "summary": context.summary})
         except KeyboardInterrupt:
-            _stop(context, _Interrupted("stopped by Ctrl-C", remedy=_where_results_are(context)))
-        except MuError as error:
-            _stop(context, error)
-        except ModuleNotFoundError as error:
-            what = f"the package {error.name} is not installed"
-            _stop(context, MuError(what, sys.executable, "install the packages that README.md names"))
-        except MemoryError:
-            _stop(context, _out_of_memory(context))
-        except Exception as error:  # noqa: BLE001 - the last resort: told, logged and turned into exit status 70
-            if any(words in str(error) for words in _REFUSED):
-                _stop(context, _out_of_memory(context))
-            else:
-                _log_traceback(context, error)
-                _stop(context, _unexpected(context, error))
+            _stop(context, _interrupted(context))
+        except Exception as error:  # noqa: BLE001 - the last resort: told, logged and turned into a status
+            # A library that Ctrl-C meets while it is loaded makes an ImportError of it.
+            _stop(context, _interrupted(context) if asked else _failure(context, error))
         finally:
             context.unlock()
+
+
+def _interrupted(context: RunContext) -> MuError:
+    return _Interrupted("stopped by Ctrl-C", remedy=_where_results_are(context))
+
+
+def _failure(context: RunContext, error: Exception) -> MuError:
+    """What stopped a run, in words; the stack of a fault of this program goes to log.ndjson."""
+    if isinstance(error, MuError):
+        return error
+    if isinstance(error, ModuleNotFoundError):
+        what = f"the package {error.name} is not installed"
+        return MuError(what, sys.executable, "install the packages that README.md names")
+    if isinstance(error, MemoryError) or any(words in str(error) for words in _REFUSED):
+        return _out_of_memory(context)
+    if isinstance(error, OSError) and error.errno in _DISK:
+        # Of a library that writes by its own means.
+        return output_error(error, Path(error.filename or context.folder or "a file"))
+    _log_traceback(context, error)
+    return _unexpected(context, error)
 
 
 def _out_of_memory(context: RunContext) -> MuError:
@@ -275,17 +289,23 @@ def _log_traceback(context: RunContext, error: Exception) -> None:
 
 
 @contextmanager
-def _signals_raise() -> Iterator[None]:
-    """While the body runs, Ctrl-C raises KeyboardInterrupt and SIGTERM _Terminated."""
+def _signals_raise() -> Iterator[list[int]]:
+    """While the body runs, Ctrl-C raises KeyboardInterrupt and SIGTERM _Terminated; yields each Ctrl-C."""
+    asked: list[int] = []
     if not _may_set_signals():
-        yield
+        yield asked
         return
+
+    def interrupted(number: int, frame: FrameType | None) -> None:
+        asked.append(number)
+        raise KeyboardInterrupt
+
     before = {
-        signal.SIGINT: signal.signal(signal.SIGINT, signal.default_int_handler),
+        signal.SIGINT: signal.signal(signal.SIGINT, interrupted),
         signal.SIGTERM: signal.signal(signal.SIGTERM, _raise_terminated),
     }
     try:
-        yield
+        yield asked
     finally:
         for number, handler in before.items():
             # None: a handler that Python did not set and cannot put back.

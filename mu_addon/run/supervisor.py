@@ -21,6 +21,8 @@ from .processes import end_with_input
 
 CRASHED = 71
 """Exit status of a command whose process was ended by a signal, or by a library without a word."""
+INTERRUPTED = 130
+"""Exit status after Ctrl-C."""
 _PASSED_ON = ("SIGINT", "SIGTERM", "SIGTSTP")
 _stack_to: list[int] = []
 """Where a worker that crashes writes Python's stack: the end of the pipe to who watches."""
@@ -111,6 +113,9 @@ def _outcome(report: bytes, ended: int, usage: Any, tell: Callable[[Crash], obje
     """What a worker said, else that it crashed."""
     if report.startswith(b"status "):
         return int(report.split()[1])
+    if ended == INTERRUPTED:
+        # By Ctrl-C before its run began, which it has said.
+        return ended
     # Kilobytes, but on macOS, where they are bytes.
     memory = usage.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
     tell(Crash(max(-ended, 0), max(ended, 0), memory, report.decode("utf-8", "replace")))

@@ -14,6 +14,8 @@ from .samples import Layout
 # A name that is new must come this often within so many lines; more, if its line lacks nothing else.
 _NEW_WITHIN, _MORE_WITHIN = 12, 64
 _MOST_NEW = 1000
+# Of so many lines a name that most of them lack is a rare one; of fewer it may be the right one.
+_SURE = 8
 
 
 def channels_of(found: Iterable[object]) -> list[str]:
@@ -31,6 +33,11 @@ class ChannelNames:
     def forget_new(self) -> None:
         """Begin anew with names that are to become channels."""
         self._new = {}
+
+    def is_unsure(self, lines: Sequence[Pairs]) -> bool:
+        """Whether first lines are too few, and agree too little, to tell a damaged name from a right one."""
+        names = Counter(name for line in lines for name in channels_of(line))
+        return len(lines) < _SURE and any(2 * times < max(names.values()) for times in names.values())
 
     def learn(self, lines: Sequence[Pairs], layout: Layout | None) -> Layout | None:
         """The layout that most lines agree on, lest a damaged one that comes first should set it.
@@ -57,20 +64,28 @@ class ChannelNames:
         Those that keep coming do. number: of the line that holds them.
         """
         if layout is None:
-            return {name for name in names if name in self._doubtful}, None
+            doubtful = {name for name in names if name in self._doubtful}
+            self._doubtful -= {name for name in doubtful if self._keeps_coming(name, number, _NEW_WITHIN)}
+            return doubtful & self._doubtful, None
         known = set(layout.channels)
         unknown = [name for name in names if name not in known]
         within = _NEW_WITHIN + 3 * len(known) if known - set(names) else _MORE_WITHIN
         strange = set()
         for name in unknown:
-            came = self._new.setdefault(name, deque(maxlen=ENOUGH))
-            came.append(number)
-            if len(came) == ENOUGH and came[-1] - came[0] <= within:
+            if self._keeps_coming(name, number, within):
                 layout = attrs.evolve(layout, channels=(*layout.channels, name))
-                del self._new[name]
             else:
                 strange.add(name)
         if len(self._new) > _MOST_NEW:
             old = number - _MORE_WITHIN
             self._new = {name: came for name, came in self._new.items() if came[-1] > old}
         return strange, layout
+
+    def _keeps_coming(self, name: str, number: int, within: int) -> bool:
+        """Whether a new name, on line `number` again, has come ENOUGH times `within` so many lines."""
+        came = self._new.setdefault(name, deque(maxlen=ENOUGH))
+        came.append(number)
+        if len(came) < ENOUGH or came[-1] - came[0] > within:
+            return False
+        del self._new[name]
+        return True

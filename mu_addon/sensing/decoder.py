@@ -160,6 +160,9 @@ class Decoder:
         found = format_of(bytes(self._buffer), not self._first, enough, self._last_format)
         if found is None:
             return
+        new = self.layout is None or found != self._last_format
+        if new and enough == ENOUGH and self._names.is_unsure(self._named_lines(found)):
+            return
         if found != self._last_format:
             self._flush_pending()
             self._timeline.restart()
@@ -174,12 +177,21 @@ class Decoder:
         self._names.trust()
         if found not in TEXT_READERS:
             return
-        lines = whole_lines(bytes(self._buffer), not self._first)
-        read = [values for line in lines if line and (values := TEXT_READERS[found](line))]
         if found == "csv":
-            self._csv.learn([row for row in read if isinstance(row, list)])
+            self._csv.learn([row for row in self._read_lines(found) if isinstance(row, list)])
         else:
-            self.layout = self._names.learn([pairs for pairs in read if isinstance(pairs, dict)], self.layout)
+            self.layout = self._names.learn(self._named_lines(found), self.layout)
+
+    def _read_lines(self, format_: str) -> list[Pairs | list[float]]:
+        """What the buffer's lines hold in a format of text."""
+        lines = whole_lines(bytes(self._buffer), not self._first)
+        return [values for line in lines if line and (values := TEXT_READERS[format_](line))]
+
+    def _named_lines(self, format_: str) -> list[Pairs]:
+        """The buffer's lines of values by name; none in a format without names."""
+        if format_ not in TEXT_READERS:
+            return []
+        return [pairs for pairs in self._read_lines(format_) if isinstance(pairs, dict)]
 
     # Frames.
 

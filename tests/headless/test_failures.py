@@ -3,6 +3,7 @@
 import json
 import resource
 import subprocess
+import sys
 
 import pytest
 
@@ -19,8 +20,6 @@ def test_help_names_every_command():
 
 
 def test_help_loads_nothing_heavy():
-    import sys
-
     words = [sys.executable, "-X", "importtime", *command("place", "--help")[1:]]
     loaded = subprocess.run(words, capture_output=True, text=True).stderr
     for package in ("warp", "gmsh", "scipy", "matplotlib", "manifold3d"):
@@ -34,6 +33,31 @@ def test_presets_are_listed():
         "mu-1.5x",
         "gripper",
     ]
+
+
+AT_IMPORT = """
+import os, runpy, signal, sys
+wanted, sys.argv[:] = sys.argv[1], sys.argv[2:]
+
+def heard(event, arguments):
+    if event == "import" and arguments[0] == wanted:
+        os.kill(os.getpid(), signal.SIGINT)
+
+sys.addaudithook(heard)
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+
+
+@pytest.mark.parametrize("command_name", ["presets", "check"])
+@pytest.mark.parametrize("module", ["subprocess", "mu_addon.cli.watched", "mu_addon.run.context", "numpy"])
+def test_ctrl_c_before_the_run_has_begun(tmp_path, command_name, module):
+    """In this process or the one that works, while modules are loaded."""
+    words = [] if command_name == "presets" else ["--preset", "mu-1.0x", "--out", str(tmp_path)]
+    line = [sys.executable, "-c", AT_IMPORT, module, *command(command_name, *words)[1:]]
+    done = subprocess.run(line, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    assert done.returncode == 130
+    assert "error: stopped by Ctrl-C" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize("words", [("presets",), ("place", "--preset", "mu-1.0x", "--out", "out")])

@@ -152,6 +152,22 @@ def test_stopped_from_outside(tmp_path, number, status):
     assert (tmp_path / "mesh.txt").read_text() == "kept"
 
 
+def test_a_full_disk_that_a_library_meets():
+    with run_to_end(Progress()) as context:
+        raise OSError(errno.ENOSPC, "No space left on device", "/home/x/.cache/kernels.o")
+    assert context.status == 5
+
+
+def test_ctrl_c_that_a_library_makes_another_error_of():
+    """numpy does, where it comes in the middle of its import."""
+    with run_to_end(Progress()) as context:
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+        except KeyboardInterrupt as error:
+            raise ImportError("do not import numpy from its source directory") from error
+    assert context.status == 130
+
+
 def test_a_second_ctrl_c_cuts_short_what_takes_long(tmp_path):
     process = start("patience", tmp_path)
     for word in ("ready", "saving"):

@@ -32,6 +32,21 @@ ROOT = Path(__file__).parents[2]
 needs_terminals = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo terminals")
 
 
+def test_first_labels_damaged_in_two_ways_do_not_hold_back_the_right_one():
+    """Of three lines each has another name for the same channel; all that follow have the right one."""
+    lines = [b"light:%d,dark:%d\n" % (k, k % 7) for k in range(200)]
+    stream = [b"\n", lines[0], b"lght:1,dark:1\n", b"lighT:2,dark:2\n", *lines[3:]]
+    for sizes in ([1] * 300, [40, 5000, 5000]):
+        decoder, groups, data, at = Decoder(), [], b"".join(stream), 0.0
+        for size in [*sizes, len(data)]:
+            groups += decoder.feed(data[:size], at)
+            data, at = data[size:], at + 0.002
+        groups += decoder.finish(at)
+        kept = [group for group in groups if group.layout.channels == ("light", "dark")]
+        assert [light for group in kept for light in group.values[:, 0].tolist()] == [0, *range(3, 200)]
+        assert decoder.counters.malformed == 2
+
+
 def fed(data: bytes, size: int = 64) -> tuple[Decoder, list[Samples]]:
     decoder, groups = Decoder(), []
     for k in range(0, len(data), size):

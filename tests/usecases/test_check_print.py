@@ -102,6 +102,15 @@ def test_wrong_input_is_refused_in_words(tmp_path, capsys, options, words):
     assert words in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(("extent", "turned"), [((30, 150, 20), True), ((150, 30, 20), False)])
+def test_it_is_said_that_a_part_must_be_turned_to_fit(tmp_path, capsys, extent, turned):
+    """As long as the platform is wide, and longer than it is deep: 200 x 125 mm."""
+    (tmp_path / "part.stl").write_bytes(stl_bytes(*printable(shapes.box([0, 0, 0], list(extent)))))
+    words = ["--stl", str(tmp_path / "part.stl"), "--out", str(tmp_path / "out"), "--no-report"]
+    assert main(["check", *words]) == 0
+    assert ("only if it is turned by 90 degrees" in capsys.readouterr().out) == turned
+
+
 def test_text_stl_is_read_like_binary():
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.5]])
     triangles = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
@@ -129,6 +138,29 @@ def test_text_stl_is_read_like_binary():
 def test_what_is_no_stl_is_refused(content):
     with pytest.raises(InputError):
         read_surface(content, "part.stl")
+
+
+@pytest.mark.parametrize("text", [False, True])
+def test_more_triangles_than_can_be_checked_are_refused_before_they_are_read(text, monkeypatch):
+    monkeypatch.setattr("mu_addon.usecases.check_print.run.MOST_TRIANGLES", 3)
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.5]])
+    content = stl_bytes(corners, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]))
+    if text:
+        content = b"solid part\n" + 4 * (b"facet\n" + 3 * b"vertex 0 0 x\n" + b"endfacet\n")
+    with pytest.raises(InputError, match="holds 4 triangles"):
+        read_surface(content, "part.stl")
+
+
+def test_a_corner_cut_short_is_no_stl():
+    facet = b"facet normal 0 0 0\n" + 3 * b"vertex 0 1 2\n" + b"endfacet\n"
+    with pytest.raises(InputError, match="truncated"):
+        read_surface(b"solid part\n" + facet + b"vertex 1 2", "part.stl")
+
+
+def test_a_coordinate_beyond_a_kilometre_is_refused():
+    far = stl_bytes(np.array([[0, 0, 0], [1, 0, 0], [0, 2e30, 0]]), np.array([[0, 1, 2]]))
+    with pytest.raises(InputError, match="beyond 1e\\+06 mm"):
+        read_surface(far, "part.stl")
 
 
 def test_the_shipped_printer_names_a_source_for_every_limit(tmp_path):

@@ -19,7 +19,7 @@ from ..surface import Triangles, Vertices, stl_bytes, stl_surface, volume
 from ..waveguide import waveguide
 from . import faces
 from .building import build_findings
-from .crossing import crossings
+from .crossing import MOST_CROSSINGS, crossings
 from .drain import chambers, distance_field
 from .finding import NOWHERE, Finding, Severity, at_least, clustered, none_of
 from .leaks import drainage_findings
@@ -168,7 +168,8 @@ def _faces(vertices: Vertices, triangles: Triangles) -> tuple[list[Finding], Tri
     found.append(none_of("flipped faces", int(over.sum()), clustered(middles[over]), words, "flip them"))
     triangles = np.where(over[:, None], triangles[:, ::-1], triangles)
     cut = crossings(vertices, triangles)
-    words = ("edge passes through another triangle", "edges pass through other triangles")
+    more = " or more" if len(cut) == MOST_CROSSINGS else ""
+    words = ("edge passes through another triangle", f"edges{more} pass through other triangles")
     remedy = "unite the parts before export"
     found.append(none_of("self-intersection", len(cut), clustered(cut), words, remedy))
     if count:
@@ -259,8 +260,10 @@ def _room(vertices: Vertices, printer: Printer, up: Array) -> Finding:
         remedy = "turn the part by 90 degrees about the build direction"
     if tiny:
         what += "; the whole part is smaller than 5 mm: the file may be in metres or inches"
-    elif bad and share / INCH < 1.0:
-        what += "; it would fit if its coordinates were inches"
+    elif bad and 3.0 < share < INCH:
+        what += (
+            "; it would fit at 1/25.4 of its size: it may have been scaled from inches though it was in mm"
+        )
     return Finding(
         "build volume",
         "error" if bad else "pass",

@@ -2,34 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..surface import Triangles, Vertices
-from .finding import Points
+from .finding import NOWHERE, Points
 
 DEPTH = 2e-3
 """Passing through by less (mm) is rounding: vertices lie on a grid of 1e-4 mm, and layers are 0.1 mm."""
+
+MOST_CROSSINGS = 20_000
+"""Points at most: of triangles without order each passes through most others."""
 
 _ROUNDING = 1e-6
 """Height (mm) above a plane that is no more than rounding, of coordinates up to a kilometre."""
 _AT_ONCE = 1_000_000
 _PAIRS_AT_ONCE = 200_000
+# A box that is wider than so many cells goes into a coarser grid.
+_CELLS_ACROSS = 8.0
 
 
 def crossings(vertices: Vertices, triangles: Triangles) -> Points:
     """Points (k, 3) in mm where an edge of one triangle passes through the interior of another.
 
     vertices (n, 3) in mm, triangles (m, 3). Triangles with a common edge are not tested against each other;
-    overlap within one plane is not found, nor penetration by less than DEPTH mm.
+    overlap within one plane is not found, nor penetration by less than DEPTH mm. After MOST_CROSSINGS points
+    no more are sought.
     """
-    pairs = near_pairs(vertices[triangles])
     normals, depth = _planes(vertices[triangles])
     level = np.einsum("mj,mj->m", normals, vertices[triangles[:, 0]])
-    found = []
-    for part in np.array_split(pairs, len(pairs) // _PAIRS_AT_ONCE + 1):
+    found = [NOWHERE]
+    for part in _gathered(_near(vertices[triangles])):
         for one, other in (part.T, part[:, ::-1].T):
             # Most pairs touch and go no farther: the one lies on one side of the other's plane.
             low, high = _heights(vertices, triangles, one, normals[other], level[other])
@@ -41,7 +47,22 @@ def crossings(vertices: Vertices, triangles: Triangles) -> Points:
             one, other = one[across], other[across]
             shared = (triangles[one][:, :, None] == triangles[other][:, None, :]).sum(axis=(1, 2))
             found.append(_through(vertices, triangles, one[shared < 2], other[shared < 2]))
-    return np.concatenate(found)
+        if sum(map(len, found)) >= MOST_CROSSINGS:
+            break
+    return np.concatenate(found)[:MOST_CROSSINGS]
+
+
+def _gathered(parts: Iterable[NDArray[np.int64]]) -> Iterator[NDArray[np.int64]]:
+    """Pairs (p, 2) of all parts, some _PAIRS_AT_ONCE at a time."""
+    waiting: list[NDArray[np.int64]] = []
+    for part in parts:
+        for piece in np.array_split(part, len(part) // _PAIRS_AT_ONCE + 1):
+            waiting.append(piece)
+            if sum(map(len, waiting)) >= _PAIRS_AT_ONCE:
+                yield np.concatenate(waiting)
+                waiting = []
+    if waiting:
+        yield np.concatenate(waiting)
 
 
 def _heights(
@@ -64,33 +85,63 @@ def _heights(
 def near_pairs(corners: NDArray[np.float64]) -> NDArray[np.int64]:
     """Pairs (p, 2) of numbers of triangles, corners (m, 3, 3) in mm, whose bounding boxes overlap, each once.
 
-    Found by hashing the boxes into cells of a grid.
+    Found by hashing the boxes into cells of a grid, and those far larger than most into coarser grids.
     """
+    return np.concatenate([np.empty((0, 2), np.int64), *_near(corners)])
+
+
+def _near(corners: NDArray[np.float64]) -> Iterator[NDArray[np.int64]]:
+    """`near_pairs`, some at a time."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     if not len(corners):
-        return np.empty((0, 2), np.int64)
-    size = 1.5 * float(np.median((high - low).max(axis=1))) or 1.0
+        return
     origin = low.min(axis=0)
-    first = np.floor((low - origin) / size).astype(np.int64)
-    last = np.floor((high - origin) / size).astype(np.int64)
+    extent = (high - low).max(axis=1)
+    size = 1.5 * float(np.median(extent)) or 1.0
+    # Cells are counted in whole numbers of 64 bits.
+    size = max(size, float((high - origin).max()) * 2.0**-40)
+    level = np.ceil(np.log2(np.maximum(extent / (_CELLS_ACROSS * size), 1.0)) / 2.0).astype(np.int64)
+    for n in np.unique(level):
+        here = np.flatnonzero(level <= n)
+        cells = size * 4.0**n
+        first = np.floor((low[here] - origin) / cells).astype(np.int64)
+        last = np.floor((high[here] - origin) / cells).astype(np.int64)
+        for pairs in _sharing(first, last, level[here] == n):
+            a, b = here[pairs].T
+            touch = ((low[a] <= high[b]) & (low[b] <= high[a])).all(axis=1)
+            yield np.stack([a[touch], b[touch]], axis=1)
+
+
+def _sharing(
+    first: NDArray[np.int64], last: NDArray[np.int64], own: NDArray[np.bool_]
+) -> Iterator[NDArray[np.int64]]:
+    """Pairs (p, 2) of boxes of cells first..last (m, 3) that share a cell, each once; one is `own` (m,)."""
     owner, cell = _covered(first, last)
-    shape = last.max(axis=0) + 1
-    code = (cell[:, 0] * shape[1] + cell[:, 1]) * shape[2] + cell[:, 2]
-    order = np.argsort(code, kind="stable")
+    code = _codes(cell)
+    # In a cell its own boxes come first, each before all that it is paired with.
+    order = np.lexsort((~own[owner], code)) if not own.all() else np.argsort(code, kind="stable")
     owner, cell, code = owner[order], cell[order], code[order]
     begins = np.packbits(first[owner] == cell, axis=1, bitorder="little")[:, 0]
     end = np.searchsorted(code, code, side="right")
-    partners = end - 1 - np.arange(len(code))
-    pairs = []
+    partners = np.where(own[owner], end - 1 - np.arange(len(code)), 0)
     for part in _slices(partners):
         one = np.repeat(np.arange(part.start, part.stop), partners[part])
         two = one + 1 + _counted(partners[part])
         # A pair meets in every cell both cover; it counts in the one where their common box begins.
         once = (begins[one] | begins[two]) == 7
-        a, b = owner[one[once]], owner[two[once]]
-        touch = ((low[a] <= high[b]) & (low[b] <= high[a])).all(axis=1)
-        pairs.append(np.stack([a[touch], b[touch]], axis=1))
-    return np.concatenate(pairs)
+        yield np.stack([owner[one[once]], owner[two[once]]], axis=1)
+
+
+def _codes(cell: NDArray[np.int64]) -> NDArray[np.int64]:
+    """A number (c,) for each of the cells (c, 3), equal only for equal cells."""
+    shape = cell.max(axis=0).astype(float) + 1.0
+    if shape.prod() < 2.0**62:
+        return (cell[:, 0] * int(shape[1]) + cell[:, 1]) * int(shape[2]) + cell[:, 2]
+    code = np.zeros(len(cell), np.int64)
+    for k in range(3):
+        ranks = np.unique(cell[:, k], return_inverse=True)[1].reshape(-1)
+        code = np.unique(code * (int(ranks.max()) + 1) + ranks, return_inverse=True)[1].reshape(-1)
+    return code
 
 
 def _planes(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -118,8 +118,9 @@ def turned(vertices: Vertices, triangles: Triangles) -> NDArray[np.bool_]:
     links = coo_matrix(links + links.T).tocsr()
     group = connected_components(links, directed=False)[1]
     parity = np.zeros(len(size), bool)
-    for g in np.unique(group[np.unique(patch[a[~agree]])]):
-        members = np.flatnonzero(group == g)
+    for members in _members(group):
+        if len(members) == 1:
+            continue
         root = members[size[members].argmax()]
         walk, before = breadth_first_order(links, root, directed=False)
         for node in walk[1:]:

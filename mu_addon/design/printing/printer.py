@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 
 from ...errors import InputError
-from ...reading import file_text
+from ...reading import file_text, unreadable
 from ...toml_writer import Commented, toml_text
 from ..assets import asset_file, asset_names
 from ..toml_text import parse, place
@@ -105,7 +105,8 @@ def read_printer(path: str | Path) -> Printer:
     try:
         text = file_text(path)
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read the printer's limits: {error}", str(path), "check the name") from error
+        why = unreadable(error)
+        raise InputError(f"cannot read the printer's limits: {why}", str(path), "check the name") from error
     of_limit = ("value", "source", "assumed", "measured")
     keys = {"": ("format", "name", "title"), **dict.fromkeys(MEANING, of_limit)}
     document = parse(text, keys, str(path))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..surface import Triangles, Vertices, bad_edges, volume
 from . import faces
-from .crossing import crossings
+from .crossing import MOST_CROSSINGS, crossings
 
 GAP_MM = 0.02
 """Vertices of open edges that are no farther apart are one: a fifth of a layer, less than a printer makes."""
@@ -261,7 +261,8 @@ def _remaining(vertices: Vertices, triangles: Triangles) -> list[str]:
     if against := int((agree & (count == 2)).sum()):
         found.append(f"{against} edges whose faces cannot all be turned alike: the surface has one side")
     if cut := len(crossings(vertices, triangles)):
-        found.append(f"{cut} edges that pass through other triangles: unite the parts")
+        more = " or more" if cut == MOST_CROSSINGS else ""
+        found.append(f"{cut}{more} edges that pass through other triangles: unite the parts")
     if not len(triangles):
         found.append("no triangle")
     return found

@@ -15,8 +15,8 @@ from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, digest, named_path, read_inputs, require_digest, structured
 from ...toml_writer import toml_text
 
-# No STL is longer, in bytes: some 40 million triangles.
-_LONGEST = 1 << 31
+# No STL is longer, in bytes: as text what MOST_TRIANGLES of `run` take.
+_LONGEST = 1 << 28
 # Of layers to draw: how many at most, and no part is so tall, in mm.
 MOST_LAYERS, _FARTHEST = 60, 1e5
 

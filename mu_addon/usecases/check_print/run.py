@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import attrs
 import numpy as np
 
+from ...design.body import MOST_MM
 from ...design.gates import GateError
 from ...design.printing.check import PrintCheck, check
 from ...design.printing.repair import Repair, repaired
@@ -19,6 +21,13 @@ from ...run.context import RunContext
 from ...run.usecase import UseCase
 from .job import LAYOUT, Job, read_job
 from .report import write_report
+
+MOST_TRIANGLES = 1_000_000
+"""Of an STL file: nine units in one piece have 620 000. Each takes some 4 kB to check."""
+# The first word of a text STL lies within so many bytes.
+_HEAD = 1000
+_VERTEX = re.compile(rb"(?<!\S)vertex(?!\S)")
+_CORNER = re.compile(_VERTEX.pattern + rb"\s+(\S+)\s+(\S+)\s+(\S+)")
 
 
 def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
@@ -96,27 +105,37 @@ def nominal_of(job: Job) -> tuple[Vertices, Triangles] | None:
 
 def read_surface(content: bytes, name: str) -> tuple[Vertices, Triangles]:
     """Surface of a binary or text STL, equal corners merged; raises InputError."""
+    again = "export the part again"
     if len(content) == 84:
-        raise InputError("the STL file holds no triangles", name, "export the part again")
-    try:
-        vertices, triangles = stl_surface(content)
-    except InputError:
-        vertices, triangles = _text_stl(content, name)
+        raise InputError("the STL file holds no triangles", name, again)
+    binary = len(content) == 84 + 50 * (count := int.from_bytes(content[80:84], "little"))
+    if not binary:
+        count = content.count(b"vertex") // 3
+    if count > MOST_TRIANGLES:
+        raise InputError(
+            f"the STL file holds {count} triangles",
+            name,
+            f"simplify it to {MOST_TRIANGLES} at most, or check its parts one by one",
+        )
+    vertices, triangles = stl_surface(content) if binary else _text_stl(content, name)
     if not len(triangles):
-        raise InputError("the STL file holds no triangles", name, "export the part again")
+        raise InputError("the STL file holds no triangles", name, again)
     if not np.isfinite(vertices).all():
-        raise InputError("the STL file holds numbers that are not finite", name, "export the part again")
+        raise InputError("the STL file holds numbers that are not finite", name, again)
+    if (farthest := float(np.abs(vertices).max())) > MOST_MM:
+        raise InputError(f"a coordinate of {farthest:.3g} mm lies beyond {MOST_MM:g} mm", name, again)
     return vertices, triangles
 
 
 def _text_stl(content: bytes, name: str) -> tuple[Vertices, Triangles]:
-    words = content.split()
     try:
-        if not words or words[0] != b"solid":
+        if content[:_HEAD].split()[:1] != [b"solid"]:
             raise ValueError("no STL")
-        at = np.flatnonzero(np.array(words) == b"vertex")
-        corners = np.array([[float(word) for word in words[k + 1 : k + 4]] for k in at.tolist()])
-        vertices, index = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+        words = (float(word) for corner in _CORNER.finditer(content) for word in corner.groups())
+        corners = np.fromiter(words, float).reshape(-1, 3)
+        if len(corners) != sum(1 for _ in _VERTEX.finditer(content)):
+            raise ValueError("a corner without its three numbers")
+        vertices, index = np.unique(corners, axis=0, return_inverse=True)
         return vertices, np.ravel(index).reshape(-1, 3).astype(np.int64)
     except ValueError as error:
         raise InputError(
@@ -155,13 +174,22 @@ def summary(found: PrintCheck) -> dict[str, Any]:
     count = {s: sum(f.severity == s for f in found.findings) for s in ("error", "warning", "pass")}
     best = {"orientation": attrs.asdict(found.builds[0])} if found.builds else {}
     faults = [f"{f.check}: {f.what}" for f in found.findings if f.is_fault]
-    return {"verdict": found.worst, "count": count, "figures": found.figures, "faults": faults, **best}
+    notes = [f"{f.check}: {f.what}" for f in found.findings if not f.is_fault and f.remedy]
+    return {
+        "verdict": found.worst,
+        "count": count,
+        "figures": found.figures,
+        "faults": faults,
+        "notes": notes,
+        **best,
+    }
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
     """What a check found, in a few lines of text, of its `summary`."""
     count = summary["count"]
     lines = [f"{count['pass']} checks passed, {count['warning']} warnings, {count['error']} errors"]
+    lines += summary.get("notes", [])
     if "orientation" in summary:
         best = summary["orientation"]
         towards = ", ".join(f"{x:.2f}" for x in best["direction"])

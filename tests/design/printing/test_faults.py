@@ -158,6 +158,16 @@ def test_inches_for_millimetres(factor, words):
     assert "inches" in alone["build volume"].what
 
 
+def test_a_part_a_little_too_tall_is_not_taken_for_inches():
+    (found,) = (
+        f
+        for f in check(*parts.arrays(shapes.box([0, 0, 0], [40, 40, 204])), load_printer()).findings
+        if f.check == "build volume"
+    )
+    assert found.severity == "error"
+    assert "inches" not in found.what
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["mu-0.75x", "mu-1.0x", "mu-1.5x"])
 def test_the_presets_have_no_errors(name):

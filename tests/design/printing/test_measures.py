@@ -7,10 +7,12 @@ from hypothesis import strategies as st
 
 from mu_addon.design import shapes
 from mu_addon.design.printing import drain, faces, layers
-from mu_addon.design.printing.crossing import crossings, near_pairs
+from mu_addon.design.printing.check import check
+from mu_addon.design.printing.crossing import MOST_CROSSINGS, crossings, near_pairs
 from mu_addon.design.printing.finding import clustered
 from mu_addon.design.printing.neck import necks
 from mu_addon.design.printing.orientation import Build, directions, fits, ranked, tilted
+from mu_addon.design.printing.printer import load_printer
 from mu_addon.design.printing.thickness import cast_rays, samples
 from mu_addon.design.printing.voxels import frame_along, voxel_rows
 
@@ -284,6 +286,29 @@ def test_near_pairs_are_those_whose_boxes_overlap(seed):
     found = [tuple(sorted(pair)) for pair in near_pairs(corners).tolist()]
     assert len(found) == len(set(found))
     assert set(found) == expected
+
+
+@settings(max_examples=20)
+@given(st.integers(0, 10_000))
+def test_near_pairs_among_triangles_of_all_sizes(seed):
+    """From a hundredth of a micrometre to a kilometre: too many cells for one grid, and for its numbers."""
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** rng.uniform(-5, 6, (80, 1, 1))
+    corners = rng.uniform(0, 1, (80, 1, 3)) * 10.0 ** rng.integers(-3, 7) + size * rng.uniform(
+        0, 1, (80, 3, 3)
+    )
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    meet = ((low[:, None] <= high[None]) & (low[None] <= high[:, None])).all(axis=2)
+    found = [tuple(sorted(pair)) for pair in near_pairs(corners).tolist()]
+    assert sorted(found) == [(a, b) for a, b in np.argwhere(meet).tolist() if a < b]
+
+
+def test_of_triangles_without_order_not_all_crossings_are_sought():
+    rng = np.random.default_rng(1)
+    soup = rng.uniform(0, 100, (9000, 3)), np.arange(9000).reshape(-1, 3)
+    assert len(crossings(*soup)) == MOST_CROSSINGS
+    (found,) = (f for f in check(*soup, load_printer()).findings if f.check == "self-intersection")
+    assert found.what == f"{MOST_CROSSINGS} edges or more pass through other triangles"
 
 
 def test_crossing_bodies_cross_along_a_known_curve():
