@@ -13,7 +13,7 @@ from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.wording import in_panel
 from ..unit.fields import label
 from . import state as optimization
-from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, OF_PATH, YES, present
+from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, OF_PATH, YES, asks_curve, present
 
 JOB = "optimize_"
 _KNOWN = parameters()
@@ -77,8 +77,7 @@ def _targets(layout, props) -> None:
         row.prop(target, "kind", text="")
         _remove(row, "targets", index)
         column = box.column(align=True)
-        curve = target.ask == "curve" and target.kind not in YES
-        if target.kind in AT_PRESSURE and not curve:
+        if target.kind in AT_PRESSURE and not asks_curve(target):
             column.prop(target, "pressure_kPa")
         if target.kind in OF_PATH:
             column.prop(target, "path")

@@ -131,6 +131,11 @@ class MU_PG_target(bpy.types.PropertyGroup):
     )
 
 
+def asks_curve(target) -> bool:
+    """Whether a target is asked for as a curve over pressure; one that is a yes or a no never is."""
+    return bool(target.ask == "curve" and target.kind not in YES)
+
+
 def _first_range(freedom, context) -> None:
     """Let a parameter's first range lie around the unit's present value, within the parameter's bounds."""
     d = FREE[freedom.parameter]

@@ -21,7 +21,7 @@ from ..simulate import effects
 from ..simulate import study_folder as studies
 from ..unit.fields import exact
 from ..unit.properties import shape_hash, to_unit
-from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, OF_PATH, YES
+from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, OF_PATH, YES, asks_curve
 
 if TYPE_CHECKING:
     from ...usecases.optimize.job import Job
@@ -110,7 +110,7 @@ def target_table(target: Any) -> dict[str, Any]:
         table["direction"] = target.toward
     elif target.kind == "tip_force":
         table["gap_mm"] = exact(target.gap_mm)
-    curve = target.ask == "curve" and target.kind not in YES
+    curve = asks_curve(target)
     if target.kind in AT_PRESSURE and not curve:
         table["pressure_kPa"] = exact(target.pressure_kPa)
     if target.kind in YES:
