@@ -117,8 +117,8 @@ class MU_PG_target(bpy.types.PropertyGroup):
     )
     value: FloatProperty(name="Value", description="In the quantity's unit", default=20.0, precision=3)
     tolerance: FloatProperty(
-        name="Tolerance",
-        description="The value is met within it",
+        name="Within",
+        description="Tolerance: how far the value may be from what is asked",
         default=1.0,
         min=1e-6,
         precision=3,
