@@ -209,7 +209,7 @@ def test_what_the_print_check_refuses_is_in_the_outcome():
     good = Verified(zero, zero, zero, zero, yes, yes)
     refused = Verified(zero, zero, zero, zero, np.array([True, False]), np.array([True, False]), "", "error")
     assert verdict([]) == ""
-    assert verdict([good]) == "Of 1 proposed, 1 meet all of it on a finer mesh, 1 robustly."
+    assert verdict([good]) == "Met in full on a finer mesh: 1 of 1 proposed, robustly 1."
     words = verdict([good, refused])
     assert words.startswith("Of 2 proposed, 1 meet all")
     assert words.endswith("refuses 1.")

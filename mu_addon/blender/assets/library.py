@@ -7,6 +7,8 @@ belong to no data of Blender's, so that no asset can hold them: they are chosen 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +29,8 @@ FILE, UNITS_FILE = "mu-nodes.blend", "mu-units.blend"
 UNITS_CATALOGUE = "2d1c1c0e-8d0f-4b5e-9a55-6f6c2f0f4a10"
 CATALOGUES = "blender_assets.cats.txt"
 _PIXELS = 128
+_OWN = ", your own"
+"""After the title of a user's preset that is called as one of the extension's."""
 
 
 def write() -> Path:
@@ -49,18 +53,50 @@ def write() -> Path:
 
 def write_units(target: Path) -> None:
     """Write every preset as an object that is an asset. Raises OutputError."""
+    titles = _titles()
+    with _set_aside(set(titles.values())):
+        _write_units(target, titles)
+
+
+def _titles() -> dict[str, str]:
+    """What every preset is called in the asset browser, by its name."""
+    titles: dict[str, str] = {}
+    for name in presets.names():
+        title = name.removeprefix(presets.USER)
+        titles[name] = f"{title}{_OWN}" if title in titles.values() else title
+    return titles
+
+
+@contextmanager
+def _set_aside(names: set[str]) -> Iterator[None]:
+    """Objects and meshes of this file that have one of these names have another one meanwhile.
+
+    Names are unique in a file: beside a unit called as its preset the preset would be "mu-1.0x.001".
+    """
+    data = [d for kind in (bpy.data.objects, bpy.data.meshes) for d in kind if d.library is None]
+    named = [(d, d.name) for d in data if d.name in names]
+    try:
+        for d, name in named:
+            d.name = f"{name} aside"
+        yield
+    finally:
+        for d, name in named:
+            d.name = name
+
+
+def _write_units(target: Path, titles: dict[str, str]) -> None:
     context = bpy.context
     active, selected = context.view_layer.objects.active, list(context.selected_objects)
     roots = []
     try:
-        for name in presets.names():
+        for name, title in titles.items():
             try:
                 unit = presets.load(name)
             except MuError:
                 continue  # a file of the user's that is no preset any more; loading it says why
             root = unit_object.create(context, unit)
             roots.append(root)
-            root.name = name.removeprefix(presets.USER)
+            root.name = root.data.name = title
             root.asset_mark()
             root.asset_data.catalog_id = UNITS_CATALOGUE
             root.asset_data.description = (

@@ -1,4 +1,8 @@
-"""Jobs in the header of every 3D view: the one that runs, how many wait, and a notice when one has ended."""
+"""Jobs in the header of every 3D view: the one that runs, how many wait, and a notice when one has ended.
+
+They stand at its end. Where the view is too narrow for Blender's own buttons and the bar, the bar is shorter
+and stands before them: what stands at the end would be out of sight.
+"""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -13,10 +17,13 @@ from ..shared.operators import reports_errors
 from . import start_child
 from .panel import shortened, whole
 
-WIDTH = 14
-"""Width of the bar in the interface's units: what it says changes, its place does not."""
-STAGE_LETTERS, NOTICE_LETTERS = 14, 48
-"""What fits: the name of a stage beside its number and the time left; a notice in the bar and a bit more."""
+WIDTH, SHORT = 14, 6
+"""Width of the bar in the interface's units, and in a narrow view: its words change, its place does not."""
+STAGE_LETTERS, NOTICE_LETTERS, SHORT_LETTERS = 14, 48, 26
+"""What fits: the name of a stage beside its number and the time left; a notice in the bar and a bit more, and
+in a narrow view."""
+WIDE = 1400
+"""Pixels, at an interface of scale 1, from which on a view is wide enough for the whole bar."""
 
 
 def listed() -> list[str]:
@@ -96,15 +103,30 @@ _seen: set[str] = set()
 
 
 def draw(self, context) -> None:
-    """Cancel, queue and bar; or the notice of the job that ended last."""
+    """At the header's end: Cancel, queue and bar; or the notice of the job that ended last."""
+    if not _narrow(context):
+        _jobs(self.layout, short=False)
+
+
+def draw_first(self, context) -> None:
+    """The same before the header's first button, in a view too narrow for both."""
+    if _narrow(context):
+        _jobs(self.layout, short=True)
+
+
+def _narrow(context) -> bool:
+    return bool(context.region.width < WIDE * context.preferences.system.ui_scale)
+
+
+def _jobs(layout, short: bool) -> None:
     keys = listed()
     _seen.difference_update(keys)
     if keys:
-        _running(self.layout, keys)
+        _running(layout, keys, short)
         return
     ended = _notices()
     if ended:
-        _notice(self.layout, ended[-1])
+        _notice(layout, ended[-1], short)
 
 
 def _notices() -> list[str]:
@@ -112,17 +134,21 @@ def _notices() -> list[str]:
     return [key for key in start_child.ended() if key not in _seen]
 
 
-def _running(layout, keys: list[str]) -> None:
+def _running(layout, keys: list[str], short: bool) -> None:
     row = layout.row(align=True)
     # First in a row of fixed width: it stays under the mouse whatever the bar says.
     row.operator("mu.job_cancel", text="", icon="CANCEL").key = keys[0]
     more = row.row(align=True)
-    more.ui_units_x = 3
+    more.ui_units_x = 2 if short else 3
     waiting = sum(start_child.child_of(key).state == WAITING for key in keys)
     more.menu("MU_MT_jobs", text=f"+{waiting}" if waiting else "Jobs")
-    fraction, text = whole(start_child.child_of(keys[0]), STAGE_LETTERS)
+    child = start_child.child_of(keys[0])
+    fraction, text = whole(child, STAGE_LETTERS)
+    left = child.estimate.seconds_left
+    if short:
+        text = "..." if child.stopping or left is None else spell(left)
     bar = row.row(align=True)
-    bar.ui_units_x = WIDTH
+    bar.ui_units_x = SHORT if short else WIDTH
     # The job's name and all of its words are in the tooltip of Cancel and in the menu.
     bar.progress(factor=fraction, text=f"{fraction:.0%}, {text}")
 
@@ -137,14 +163,14 @@ def _words(key: str) -> str:
     return f"Failed: {title}, {(child.error or {}).get('what', 'without a message')}"
 
 
-def _notice(layout, key: str) -> None:
+def _notice(layout, key: str, short: bool) -> None:
     row = layout.row(align=True)
     row.operator("mu.job_dismiss", text="", icon="X")
     words = row.row(align=True)
-    words.ui_units_x = WIDTH + 4
+    words.ui_units_x = 2 * SHORT if short else WIDTH + 4
     icon = {DONE: "CHECKMARK", CANCELLED: "CANCEL"}.get(start_child.child_of(key).state, "ERROR")
     words.alert = icon == "ERROR"
-    words.label(text=shortened(_words(key), NOTICE_LETTERS), icon=icon)
+    words.label(text=shortened(_words(key), SHORT_LETTERS if short else NOTICE_LETTERS), icon=icon)
 
 
 CLASSES = (MU_OT_job_cancel, MU_OT_job_dismiss, MU_MT_jobs)
@@ -156,10 +182,12 @@ def register() -> None:
     """Operators, the menu, and the bar in the header of the 3D view."""
     _register_classes()
     bpy.types.VIEW3D_HT_header.append(draw)
+    bpy.types.VIEW3D_HT_header.prepend(draw_first)
 
 
 def unregister() -> None:
     """Take them out again."""
+    bpy.types.VIEW3D_HT_header.remove(draw_first)
     bpy.types.VIEW3D_HT_header.remove(draw)
     _unregister_classes()
     _seen.clear()

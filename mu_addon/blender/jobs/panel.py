@@ -9,6 +9,9 @@ from ...run.progress import spell
 from ..shared.panels import CHARACTERS, alert, large_button, wrapped
 from ..shared.wording import in_panel
 
+STAGE_LETTERS = 20
+"""What fits into a panel's bar beside number and time left: a longer stage is numbered alone."""
+
 
 def start_button(layout, child, operator: str, icon: str) -> None:
     """The button that starts a job, unless its child runs or waits."""
@@ -62,7 +65,7 @@ def _running(layout, child, prefix: str) -> None:
     row = layout.row()
     row.label(text=f"running for {spell(child.seconds)}" if child.state == RUNNING else "not started yet")
     row.operator(f"mu.{prefix}cancel", icon="CANCEL")
-    fraction, text = whole(child)
+    fraction, text = whole(child, STAGE_LETTERS)
     layout.progress(factor=fraction, text=text)
     details = [str(child.progress.get("detail", "")), child.estimate.why and f"Longer: {child.estimate.why}"]
     latest = textwrap.wrap(next((text for text in reversed(details) if text), ""), CHARACTERS)

@@ -29,6 +29,11 @@ class MU_PG_obstacle(bpy.types.PropertyGroup):
     """An object as an obstacle of a unit."""
 
     unit: StringProperty(name="Unit", description="UUID of the unit that may touch it", options={"HIDDEN"})
+    mm: FloatProperty(
+        name="Millimetre",
+        description="Length of a millimetre in the scene that the object's size is right for; 0: not known",
+        options={"HIDDEN"},
+    )
     friction: FloatProperty(
         name="Friction",
         description="Coefficient of Coulomb friction between unit and obstacle; 0: none. The default is "

@@ -13,13 +13,19 @@ from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.wording import in_panel
 from ..unit.fields import label
 from . import state as optimization
-from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, OF_PATH, YES, present
+from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, OF_PATH, YES, asks_curve, present
 
 JOB = "optimize_"
 _KNOWN = parameters()
 UNITS = {"angle": "deg", "stiffness": "N/mm", "air_volume": "ml", "mass": "g", "print_time": "h"}
 UNITS |= {"deviation": "mm", "sensor_slope": "1/deg"}
 UNITS |= {"tip_force": "N", "tip_position": "mm", "workspace": "mm"}
+BARELY = "QUESTION"
+"""Sign of a target that is met, but within two standard errors of being missed."""
+LABELS = 0.4
+"""Share of a field's width that its name takes."""
+FRONT_SIZE = 11.0
+"""Side of the picture of the front, in heights of a button."""
 
 
 class MU_PT_optimize(UnitPanel, bpy.types.Panel):
@@ -37,15 +43,8 @@ class MU_PT_optimize(UnitPanel, bpy.types.Panel):
         else:
             _targets(layout, props)
             _freedoms(layout, root, props)
-            layout.prop(props, "robust")
-            row = layout.row()
-            row.prop(props, "has_gravity")
-            if props.has_gravity:
-                row.prop(props, "orientation_deg")
-            column = layout.column(align=True)
-            column.prop(props, "evaluations")
-            column.prop(props, "refine")
-            column.prop(props, "check_refine")
+            layout.prop(props, "evaluations")
+            _more(layout, props)
         if root.mu_unit.study.effects:
             wrapped(layout, "With the named effects that the panel Simulate lists", "LIGHT")
         child = optimization.OPTIMIZATION.child(root)
@@ -54,6 +53,22 @@ class MU_PT_optimize(UnitPanel, bpy.types.Panel):
         found = optimization.findings(root)
         if found is not None and found.outcome:
             _results(layout, found)
+
+
+def _more(layout, props) -> None:
+    """A fold with what is seldom changed."""
+    header, body = layout.panel("MU_optimize_more", default_closed=True)
+    header.label(text="More")
+    if not body:
+        return
+    body.prop(props, "robust")
+    row = body.row()
+    row.prop(props, "has_gravity")
+    if props.has_gravity:
+        row.prop(props, "orientation_deg")
+    column = body.column(align=True)
+    column.prop(props, "refine")
+    column.prop(props, "check_refine")
 
 
 def _head(layout, text: str, what: str):
@@ -71,14 +86,15 @@ def _remove(row, what: str, index: int) -> None:
 def _targets(layout, props) -> None:
     """A box a target: the quantity, where it is read, and what is asked of it."""
     _head(layout, "The Unit Shall Have", "targets")
+    if not props.targets:
+        wrapped(layout, "Press + to say what is asked for: an angle at a pressure, say", "INFO")
     for index, target in enumerate(props.targets):
         box = layout.box()
         row = box.row(align=True)
         row.prop(target, "kind", text="")
         _remove(row, "targets", index)
         column = box.column(align=True)
-        curve = target.ask == "curve" and target.kind not in YES
-        if target.kind in AT_PRESSURE and not curve:
+        if target.kind in AT_PRESSURE and not asks_curve(target):
             column.prop(target, "pressure_kPa")
         if target.kind in OF_PATH:
             column.prop(target, "path")
@@ -90,15 +106,15 @@ def _targets(layout, props) -> None:
         if target.kind in YES:
             continue
         column.prop(target, "ask")
-        unit = UNITS.get(target.kind, "")
         for name in ASKED[target.ask]:
-            title = target.bl_rna.properties[name].name
-            column.prop(target, name, text=f"{title} ({unit})" if unit and name != "points" else title)
+            column.prop(target, name, text=asked_title(target, name))
 
 
 def _freedoms(layout, root, props) -> None:
     """A box a parameter that may change: which, from where to where, and what it is now."""
     _head(layout, "By Changing", "freedoms")
+    if not props.freedoms:
+        wrapped(layout, "Press + for each parameter that the search may change", "INFO")
     for index, freedom in enumerate(props.freedoms):
         box = layout.box()
         row = box.row(align=True)
@@ -106,12 +122,25 @@ def _freedoms(layout, root, props) -> None:
         _remove(row, "freedoms", index)
         column = box.column(align=True)
         column.prop(freedom, "how", text="")
-        for name in {"range": ("low", "high"), "values": ("values",), "fixed": ("value",)}[freedom.how]:
-            column.prop(freedom, name)
         d = FREE[freedom.parameter]
+        for name in {"range": ("low", "high"), "values": ("values",), "fixed": ("value",)}[freedom.how]:
+            title = freedom.bl_rna.properties[name].name
+            column.prop(freedom, name, text=f"{title} ({d.unit})" if d.unit else title)
         words = f"now {present(root, freedom.parameter):.4g} {d.unit}".rstrip()
         scaled = d.unit == "mm" and root.mu_unit.scale != 1.0 and not d.fixed
-        column.label(text=f"{words} at scale 1" if scaled else words)
+        # Below the fields, as their own words are beside them.
+        below = column.split(factor=LABELS)
+        below.label(text="")
+        below.label(text=f"{words} at scale 1" if scaled else words)
+
+
+def asked_title(target, name: str) -> str:
+    """What stands beside a field of a target: its name and unit, for a curve the units of a pair."""
+    unit = UNITS.get(target.kind, "")
+    if name == "points":
+        return f"kPa: {unit or 'value'}"
+    title = target.bl_rna.properties[name].name
+    return f"{title} ({unit})" if unit else str(title)
 
 
 def _results(layout, found) -> None:
@@ -124,8 +153,13 @@ def _results(layout, found) -> None:
     row = box.row(align=True)
     row.operator("mu.optimize_open", text="Report", icon="URL").what = "report"
     row.operator("mu.optimize_open", text="Folder", icon="FILE_FOLDER").what = "folder"
+    icon = thumbnails.icon_of(found.folder / optimization.FRONT)
+    if icon is not None:
+        layout.template_icon(icon, scale=FRONT_SIZE)
     for proposed in found.proposed:
         _proposed(layout, proposed)
+    if any(target_icon(t) == BARELY for proposed in found.proposed for t in proposed.targets):
+        wrapped(layout, "Question mark: met, but the value's error may hide that it is not", "INFO")
 
 
 def _proposed(layout, proposed) -> None:
@@ -176,7 +210,7 @@ def target_icon(target) -> str:
     """Met for all values within two standard errors, met, or missed; an objective has none of these."""
     if target["objective"]:
         return "DRIVER_DISTANCE"
-    return "CHECKMARK" if target["robust"] else "QUESTION" if target["met"] else "ERROR"
+    return "CHECKMARK" if target["robust"] else BARELY if target["met"] else "ERROR"
 
 
 CLASSES = (MU_PT_optimize,)

@@ -117,8 +117,8 @@ class MU_PG_target(bpy.types.PropertyGroup):
     )
     value: FloatProperty(name="Value", description="In the quantity's unit", default=20.0, precision=3)
     tolerance: FloatProperty(
-        name="Tolerance",
-        description="The value is met within it",
+        name="Within",
+        description="Tolerance: how far the value may be from what is asked",
         default=1.0,
         min=1e-6,
         precision=3,
@@ -129,6 +129,11 @@ class MU_PG_target(bpy.types.PropertyGroup):
     high: FloatProperty(
         name="High", description="Upper bound, in the quantity's unit", default=30.0, precision=3
     )
+
+
+def asks_curve(target) -> bool:
+    """Whether a target is asked for as a curve over pressure; one that is a yes or a no never is."""
+    return bool(target.ask == "curve" and target.kind not in YES)
 
 
 def _first_range(freedom, context) -> None:

@@ -8,6 +8,7 @@ Undo and redo bring back states from before the mending; the same look follows t
 from __future__ import annotations
 
 import uuid
+from collections.abc import Iterator
 from typing import Any
 
 import bpy
@@ -36,21 +37,23 @@ def look() -> None:
         return
     _looking = True
     try:
-        roots, shown = [], []
+        roots, shown, touched = [], [], []
         # In a scene of thousands of objects most are neither: what tells them is asked for first.
         for obj in bpy.data.objects:
             if obj.get(displays.OWNER):
                 found = shown
             elif obj.type == "MESH" and displays.uuid_of(obj):
                 found = roots
+            elif obj.mu_obstacle.unit:
+                found = touched
             else:
                 continue
             if displays.editable(obj):
                 found.append(obj)
         copies = _separate(roots)
         _follow(shown)
+        _true_sizes(roots, touched)
         for root in roots:
-            _true_size(root)
             if root in copies or _damaged(root):
                 _rebuild(root)
     finally:
@@ -117,11 +120,37 @@ def _follow(shown: list[Any]) -> None:
             obj.hide_set(hidden)
 
 
-def _true_size(root: Any) -> None:
-    """Keep a root's true size when the scene's unit of length changes; an unlocked one is the user's."""
+def _true_sizes(roots: list[Any], touched: list[Any]) -> None:
+    """Keep true sizes and places when the scene's unit of length changes, of roots and of obstacles.
+
+    A root's scale says which unit its size is right for, an obstacle's own property does; both are undone
+    with the object. An unlocked root is the user's.
+    """
     wanted = scene_units.mm(bpy.context.scene)
-    if all(root.lock_scale) and any(abs(s - wanted) > 1e-6 * wanted for s in root.scale):
+    moved = set()
+    for root in roots:
+        if not all(root.lock_scale) or all(abs(s - wanted) <= 1e-6 * wanted for s in root.scale):
+            continue
+        if root.parent is None:
+            root.location *= wanted / root.scale.x
         root.scale = (wanted,) * 3
+        moved.add(root)
+    for obj in touched:
+        own = obj.mu_obstacle.mm
+        if own and abs(own - wanted) <= 1e-6 * wanted:
+            continue
+        # A file of an older extension does not say for which unit: that of the scene, as it is found.
+        if own and not moved & set(_above(obj)):
+            obj.location *= wanted / own
+            obj.scale *= wanted / own
+        obj.mu_obstacle.mm = wanted
+
+
+def _above(obj: Any) -> Iterator[Any]:
+    """An object's parents."""
+    while obj.parent is not None:
+        obj = obj.parent
+        yield obj
 
 
 def _damaged(root: Any) -> bool:
@@ -178,6 +207,9 @@ def _after_import(imported: Any) -> None:
     for obj in objects:
         if displays.editable(obj) and displays.uuid_of(obj):
             own(obj)
+            if all(obj.lock_scale):
+                # Its place is for who brings it in to choose: only its size is that of the other file.
+                obj.scale = (scene_units.mm(bpy.context.scene),) * 3
     older_files.renew()
     look()
     live_update.catch_up()

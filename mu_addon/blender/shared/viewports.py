@@ -38,6 +38,16 @@ def frame(objects: Iterable[Any]) -> None:
         space.clip_end = max(space.clip_end, 10.0 * view.view_distance)
 
 
+def scale(factor: float) -> None:
+    """Have every 3D view see places that many times as far from the scene's origin, and as large."""
+    for area in areas():
+        space = area.spaces.active
+        view = space.region_3d
+        view.view_location *= factor
+        view.view_distance *= factor
+        space.clip_start, space.clip_end = space.clip_start * factor, space.clip_end * factor
+
+
 def frame_selected(context: Any) -> None:
     """Bring what is selected into the 3D view: a scene may be metres wide, and a unit is 75 mm tall."""
     if bpy.app.background:

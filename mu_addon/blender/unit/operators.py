@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from ...design.parameters import Unit
 from ...design.quantity import describe
 from ...errors import InputError
-from ..scene import landing
+from ..scene import gestures, landing
 from ..shared import scene_units, viewports
 from ..shared.operators import NO_UNIT, UnitOperator, reports_errors
 from . import object as unit_object
@@ -18,6 +18,19 @@ from .broken import broken
 from .fields import exact, tooltip
 
 _SCALE = next(d for d in describe(Unit) if d.name == "scale")
+
+
+def _use_millimetres(context) -> None:
+    """Give the scene millimetres; what is ours, the cursor and the views keep their true sizes and places."""
+    before = scene_units.mm(context.scene)
+    scene_units.use_millimetres(context.scene)
+    factor = scene_units.mm(context.scene) / before
+    if abs(factor - 1.0) < 1e-6:
+        return
+    context.scene.cursor.location *= factor
+    viewports.scale(factor)
+    # Here, so that one undo takes all of it back.
+    gestures.look()
 
 
 _items: list[tuple[str, str, str]] = []
@@ -70,7 +83,7 @@ class MU_OT_add(bpy.types.Operator):
         if exact(self.scale) != core.scale:
             core = attrs.evolve(core, scale=max(exact(self.scale), _SCALE.low))
         if self.millimetres:
-            scene_units.use_millimetres(context.scene)
+            _use_millimetres(context)
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         root = unit_object.create(context, core)
@@ -144,14 +157,14 @@ class MU_OT_delete(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_millimetres(bpy.types.Operator):
-    """Set the scene's unit so that one Blender unit is a millimetre; nothing changes in the viewport"""
+    """Make one Blender unit a millimetre; units, grippers, obstacles and the view keep their true sizes"""
 
     bl_idname = "mu.millimetres"
     bl_label = "Use Millimetres"
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
-        scene_units.use_millimetres(context.scene)
+        _use_millimetres(context)
         return {"FINISHED"}
 
 

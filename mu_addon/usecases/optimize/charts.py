@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,27 +26,46 @@ STATIONS = np.linspace(0.0, 1.0, 7)
 
 def front(found: Optimised, first: int, second: int) -> str:
     """SVG of all computed designs by two judged targets (numbers); proposals are numbered squares."""
+    with canvas(4.6, 3.5) as (drawn, svg):
+        _front(drawn, found, first, second)
+    return svg()
+
+
+def front_picture(found: Optimised, first: int, second: int, path: Path) -> None:
+    """Write the same as a square PNG of 512 pixels, as a panel shows it; raises OutputError."""
+    _write_png(path, 3.6, 512, False, lambda drawn: _front(drawn, found, first, second))
+
+
+def compared(found: Optimised) -> tuple[int, int] | None:
+    """Numbers of the two judged targets that a front is drawn of, objectives first; None without two."""
+    if not any(o.sound for o in found.search.observed):
+        return None
+    targets = [t for t in found.design.targets if t.quantity is not None]
+    goals = [i for i, t in enumerate(targets) if t.goal is not None]
+    first, second, *_ = [*goals, *(i for i in range(len(targets)) if i not in goals), -1, -1]
+    return None if second < 0 else (first, second)
+
+
+def _front(drawn: Any, found: Optimised, first: int, second: int) -> None:
     targets = [t for t in found.design.targets if t.quantity is not None]
     sound = [o for o in found.search.observed if o.sound]
     values = np.array([[o.values[first], o.values[second]] for o in sound])
     meets = np.array([all(t.met(v) for t, v in zip(targets, o.values, strict=True)) for o in sound])
-    with canvas(4.6, 3.5) as (drawn, svg):
-        axes = drawn.add_axes((0.15, 0.14, 0.81, 0.82))
-        if (~meets).any():
-            axes.plot(*values[~meets].T, "o", color=QUIET, markersize=3.5, alpha=0.8, label="misses a target")
-        if meets.any():
-            axes.plot(*values[meets].T, "o", color=BY_LENGTH[0], markersize=4, label="meets all")
-        for row, p in enumerate(found.proposals):
-            x, y = p.observed.values[first], p.observed.values[second]
-            axes.plot(x, y, "s", color=CHOSEN, markersize=6.5, label="" if row else "proposed")
-            axes.annotate(str(p.place), (x, y), (5, 5), textcoords="offset points", fontsize=8, color=INK)
-        for target, line in ((targets[first], axes.axvline), (targets[second], axes.axhline)):
-            for bound in (target.low, target.high, target.value):
-                if not np.isnan(bound):
-                    line(bound, color=INK, linewidth=0.8, linestyle="--")
-        axes.set(xlabel=_axis(targets[first]), ylabel=_axis(targets[second]))
-        axes.legend(fontsize=7, frameon=False)
-    return svg()
+    axes = drawn.add_axes((0.15, 0.14, 0.81, 0.82))
+    if (~meets).any():
+        axes.plot(*values[~meets].T, "o", color=QUIET, markersize=3.5, alpha=0.8, label="misses a target")
+    if meets.any():
+        axes.plot(*values[meets].T, "o", color=BY_LENGTH[0], markersize=4, label="meets all")
+    for row, p in enumerate(found.proposals):
+        x, y = p.observed.values[first], p.observed.values[second]
+        axes.plot(x, y, "s", color=CHOSEN, markersize=6.5, label="" if row else "proposed")
+        axes.annotate(str(p.place), (x, y), (5, 5), textcoords="offset points", fontsize=8, color=INK)
+    for target, line in ((targets[first], axes.axvline), (targets[second], axes.axhline)):
+        for bound in (target.low, target.high, target.value):
+            if not np.isnan(bound):
+                line(bound, color=INK, linewidth=0.8, linestyle="--")
+    axes.set(xlabel=_axis(targets[first]), ylabel=_axis(targets[second]))
+    axes.legend(fontsize=7, frameon=False)
 
 
 def course(found: Optimised) -> str:
@@ -87,14 +106,20 @@ def thumbnail(unit: Unit, widest_mm: float, tallest_mm: float) -> str:
 
 def picture(unit: Unit, path: Path) -> None:
     """Write a unit's half section as a square PNG of 256 pixels, as a panel shows it; raises OutputError."""
+    size = 1.05 * max(sizes([unit]))
+    _write_png(path, 2.56, 256, True, lambda drawn: _half_section(drawn, unit, size, size))
+
+
+def _write_png(path: Path, inches: float, pixels: int, clear: bool, draw: Callable[[Any], None]) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    size = 1.05 * max(sizes([unit]))
     stream = io.BytesIO()
-    with styled(2.56, 2.56) as drawn:
+    with styled(inches, inches) as drawn:
         FigureCanvasAgg(drawn)
-        _half_section(drawn, unit, size, size)
-        drawn.savefig(stream, format="png", dpi=100, transparent=True, metadata={"Software": None})
+        draw(drawn)
+        drawn.savefig(
+            stream, format="png", dpi=pixels / inches, transparent=clear, metadata={"Software": None}
+        )
     write_bytes(path, stream.getvalue())
 
 

@@ -21,11 +21,11 @@ from ..simulate_and_place.extended_unit import extend
 from ..simulate_and_place.named_effects import NamedEffects
 
 DESIGN, MODEL = "design.toml", "model.toml"
-TABLE, REPORT = "designs.csv", "report.html"
+TABLE, REPORT, FRONT = "designs.csv", "report.html", "front.png"
 LAYOUT = FolderLayout(
     DESIGN,
     HEADER,
-    results=(TABLE, REPORT, "proposed-*.toml", "proposed-*.png"),
+    results=(TABLE, REPORT, FRONT, "proposed-*.toml", "proposed-*.png"),
     optional=(UNIT, RESIN, MODEL),
 )
 # No file of inputs is longer, in bytes.

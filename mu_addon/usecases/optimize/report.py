@@ -55,11 +55,9 @@ def _front(found: Optimised) -> str:
     if not any(o.sound for o in found.search.observed):
         return ""
     targets = [t for t in found.design.targets if t.quantity is not None]
-    goals = [i for i, t in enumerate(targets) if t.goal is not None]
-    rest = [i for i in range(len(targets)) if i not in goals]
-    shown = (goals + rest)[:2]
+    shown = charts.compared(found)
     html = ""
-    if len(shown) == 2:
+    if shown is not None:
         alt = f"{targets[shown[1]].name} against {targets[shown[0]].name} of all units computed."
         words = "All units computed; squares are proposed. Dashed lines are what is asked."
         html += figure(charts.front(found, *shown), words, alt)

@@ -22,7 +22,7 @@ from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.usecase import UseCase
 from . import charts
-from .job import LAYOUT, MODEL, REPORT, TABLE, Job, mechanics_of, read_job
+from .job import FRONT, LAYOUT, MODEL, REPORT, TABLE, Job, mechanics_of, read_job
 from .report import write_report
 from .results import Optimised, Proposal
 from .words import changes, outcome, reasons, verdict
@@ -81,6 +81,11 @@ def optimise(job: Job, folder: Path, context: RunContext) -> Optimised:
         tuple(left_out),
     )
     run.write(tuple(p.number for p in proposals))
+    pair = charts.compared(result)
+    if pair is not None:
+        charts.front_picture(result, *pair, folder / FRONT)
+    else:
+        (folder / FRONT).unlink(missing_ok=True)
     context.summary |= summary(result)
     context.report = lambda _: write_report(result, folder / REPORT, progress)
     return result

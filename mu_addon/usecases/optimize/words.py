@@ -48,7 +48,7 @@ def verdict(checked: Sequence[Verified]) -> str:
     met = sum(bool(c.met.all()) and not c.why for c in checked)
     robust = sum(c.is_robust for c in checked)
     printed = sum(c.print_worst == "error" for c in checked)
-    words = f"Of {len(checked)} proposed, {met} meet all of it on a finer mesh, {robust} robustly."
+    words = f"Met in full on a finer mesh: {met} of {len(checked)} proposed, robustly {robust}."
     return words + (f" The print check refuses {printed}." if printed else "")
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from mu_addon.blender.gripper import object as gripper_object
 from mu_addon.blender.jobs import start_child
+from mu_addon.blender.obstacles import state as obstacles
 from mu_addon.blender.shared import displays
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate.job import SIMULATION
@@ -436,3 +437,41 @@ def test_a_gripper_is_one_thing_too(tmp_path):
     bpy.ops.object.delete()
     bpy.context.view_layer.update()
     assert {o.name for o in bpy.data.objects} == {copy.name, copy.children[0].name}
+
+
+def test_millimetres_keep_true_sizes_and_places_of_what_belongs_to_a_study():
+    """In a scene of metres everything stands in metres; in millimetres the same numbers are 1000 times."""
+    units = bpy.context.scene.unit_settings
+    units.system, units.scale_length = "METRIC", 1.0
+    bpy.context.scene.cursor.location = (0.05, 0.02, 0.0)
+    first, second = add(millimetres=False), add(millimetres=False)
+    bpy.context.view_layer.objects.active = first
+    assert bpy.ops.mu.obstacle_box(gap=5.0) == {"FINISHED"}
+    box = bpy.data.objects["Obstacle"]
+    tied = bpy.data.objects.new("Tied", box.data.copy())
+    bpy.context.collection.objects.link(tied)
+    tied.parent, tied.location.y = first, 60.0
+    tied.mu_obstacle.unit = first.mu_unit.uuid
+    bpy.ops.mu.gripper_add()
+    gripper = bpy.context.object
+    cube = next(child for child in gripper.children if child.get("mu_grip") == "cube")
+    bpy.context.view_layer.update()
+    every = [first, second, box, tied, gripper, cube]
+    before = [np.array(corners(obj)) for obj in every]
+    frames = [np.array(first.matrix_world.inverted() @ obj.matrix_world) for obj in every]
+    met = obstacles.placed(first, box).body.vertices
+    bpy.context.view_layer.objects.active = first
+    assert bpy.ops.mu.millimetres() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    for obj, old, frame in zip(every, before, frames, strict=True):
+        assert np.allclose(np.array(corners(obj)), 1000.0 * old, rtol=1e-5, atol=1e-3), obj.name
+        now = np.array(first.matrix_world.inverted() @ obj.matrix_world)
+        assert np.allclose(now, frame, rtol=1e-5, atol=1e-3), obj.name
+    assert np.allclose(bpy.context.scene.cursor.location, (50.0, 20.0, 0.0), rtol=1e-5)
+    assert np.allclose(obstacles.placed(first, box).body.vertices, met, atol=1e-4)
+    # By Blender's own field, too, and again and again: each look mends once.
+    units.scale_length = 1.0
+    for _ in range(3):
+        bpy.context.view_layer.update()
+    for obj, old in zip(every, before, strict=True):
+        assert np.allclose(np.array(corners(obj)), old, rtol=1e-5, atol=1e-6), obj.name

@@ -25,14 +25,22 @@ def started(root, how, monkeypatch):
     return SIMULATION.start(root, SIMULATION.folder_of(root), lambda folder: None)
 
 
-def said():
-    """Words of the header, and the factor of its bar."""
+def said(width=1600):
+    """Words of the header of a view so many pixels wide: one half of it says something, the other nothing."""
+    shown = [_said(draw, width) for draw in (header.draw, header.draw_first)]
+    assert "" in shown
+    return "".join(shown)
+
+
+def _said(draw, width):
     texts, layout = [], MagicMock()
     layout.row.return_value = layout
     layout.label.side_effect = lambda text="", **_: texts.append(text)
     layout.progress.side_effect = lambda factor, text: texts.append(text)
     layout.menu.side_effect = lambda name, text="", **_: texts.append(text)
-    header.draw(MagicMock(layout=layout), bpy.context)
+    system = SimpleNamespace(ui_scale=1.0)
+    context = SimpleNamespace(region=SimpleNamespace(width=width), preferences=SimpleNamespace(system=system))
+    draw(MagicMock(layout=layout), context)
     return " ".join(texts)
 
 
@@ -52,6 +60,9 @@ def test_one_runs_the_others_wait_and_each_ends_with_a_notice(monkeypatch):
     assert "Model A (3 of 8)" in said()
     assert "mu-1.0x: simulation: " in told("job_cancel", key=SIMULATION.key(first))
     assert "+1" in said()
+    assert "Model A" not in said(1100)
+    assert "%" in said(1100)
+    assert "+1" in said(1100)
     assert bpy.ops.mu.job_cancel() == {"FINISHED"}
     assert "stopping" in said()
     ended(one)
@@ -83,6 +94,7 @@ def test_a_failed_one_says_what_in_the_header(monkeypatch):
     ended(child)
     assert "Failed: mu-1.0x: simulation" in said()
     assert len(said()) <= header.NOTICE_LETTERS
+    assert len(said(1100)) <= header.SHORT_LETTERS
     assert child.error["what"] in told("job_dismiss")
 
 

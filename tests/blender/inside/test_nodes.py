@@ -275,3 +275,20 @@ def test_the_sample_scene():
             depth = space.region_3d.view_distance - z
             seen.append(max(abs(x) / (half * depth), abs(y) / (0.6 * half * depth)))
     assert 0.5 < max(seen) <= 1.0
+
+
+def test_an_asset_is_called_as_its_preset_beside_a_unit_of_that_name():
+    root = add(preset="mu-1.0x")
+    root.data.name = "mu-1.0x"
+    assert bpy.ops.mu.preset_save(name="mu-1.0x") == {"FINISHED"}
+    before = {o.name: o.data.name for o in bpy.data.objects if o.type == "MESH"}
+    assert root.name in before
+    try:
+        assert bpy.ops.mu.assets() == {"FINISHED"}
+        file = library.user_folder("assets") / library.UNITS_FILE
+        with bpy.data.libraries.load(str(file), assets_only=True) as (there, _):
+            assert set(there.objects) == {*preset_names(), "mu-1.0x, your own"}
+        assert {o.name: o.data.name for o in bpy.data.objects if o.type == "MESH"} == before
+    finally:
+        bpy.ops.mu.assets_remove()
+        bpy.ops.mu.preset_remove(name="user:mu-1.0x")

@@ -250,6 +250,40 @@ def test_a_proposed_unit_is_applied_undone_and_added_beside(tmp_path):
     assert beside.location.x - old.location.x >= old.dimensions.x, "none stands in the other"
 
 
+def test_the_panel_says_how_to_begin_what_is_entered_and_what_a_sign_means(tmp_path):
+    root = add()
+    root.mu_unit.study.folder = str(tmp_path)
+    assert "Press + to say what is asked for" in drawn()
+    first = target(root, "angle", ask="curve")
+    assert "Press + for each parameter" in drawn()
+    free(root, "chambers.wall_mm")
+    assert "Press +" not in drawn()
+    assert panels.asked_title(first, "points") == "kPa: deg"
+    assert panels.asked_title(first, "tolerance") == "Within (deg)"
+    first.kind = "stretch"
+    assert panels.asked_title(first, "points") == "kPa: value"
+    finished(root)
+    assert "Question mark: met" not in drawn()
+    summary = optimization.folder_of(root) / "summary.json"
+    said = json.loads(summary.read_text())
+    said["proposed"][0]["targets"][0]["met"] = True
+    summary.write_text(json.dumps(said))
+    assert "Question mark: met" in drawn()
+    pictures = drawn().count("a picture")
+    picture(to_unit(root.mu_unit), optimization.folder_of(root) / optimization.FRONT)
+    assert drawn().count("a picture") == pictures + 1
+
+
+def test_a_coarser_mesh_and_fewer_units_are_expected_to_take_less():
+    props = add().mu_optimize
+    props.evaluations, props.refine, props.check_refine = 24, 0.5, 0.75
+    usual = dict(optimization.plan_of(bpy.context.object))
+    props.evaluations, props.refine, props.check_refine = 3, 0.25, 0.375
+    quick = dict(optimization.plan_of(bpy.context.object))
+    assert quick["search"] * 32 == pytest.approx(usual["search"])
+    assert quick["check of what is proposed"] * 8 == pytest.approx(usual["check of what is proposed"])
+
+
 def test_a_search_that_fails_and_one_that_is_stopped(tmp_path):
     root = add()
     root.mu_unit.study.folder = str(tmp_path)
