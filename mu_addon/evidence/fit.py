@@ -9,6 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..errors import MuError
 from .effect import Effect, Parameter
 from .noise import Source, Whitening, estimate
 from .record import Record
@@ -179,6 +180,10 @@ class Fitter:
         """Prediction (N,) in the record's units, not whitened, for values by key; nulls where missing."""
         return self.record.predict(self.simulator, values)
 
+    def possible(self, values: Mapping[str, float]) -> Array | None:
+        """As `predict`; None where the model has no finite prediction (`Record.possible`)."""
+        return self.record.possible(self.simulator, values)
+
     def fit(
         self,
         effects: Sequence[Effect] = (),
@@ -190,7 +195,8 @@ class Fitter:
         start: values by key; where one is missing, the first start of its parameter, else its null. fixed:
         values by key that are held; holding one costs its deviation from prior knowledge. Values are in the
         parameters' units. Damped Gauss-Newton steps (Levenberg and Marquardt) within the bounds, with
-        finite-difference derivatives and at most `ITERATIONS` steps.
+        finite-difference derivatives and at most `ITERATIONS` steps. Values without a prediction
+        (`possible`) count as infinitely bad; raises what the prediction does where the start is one.
         """
         start, fixed = start or {}, dict(fixed or {})
         free: list[tuple[str, Parameter]] = [(p.name, p) for p in self.curved]
@@ -228,9 +234,14 @@ class Fitter:
             shifted = np.empty((len(f), len(x)), order="F")
             for i in range(len(x)):
                 h = step[i] if x[i] + step[i] <= high[i] else -step[i]
-                moved = x.copy()
-                moved[i] += h
-                shifted[:, i] = (self.predict(at(moved)) - f) / h
+                shifted[:, i] = 0.0
+                # Beside values that have no prediction the other side may have one.
+                for side in (h, -h):
+                    moved = x.copy()
+                    moved[i] += side
+                    if (f_moved := self.possible(at(moved))) is not None:
+                        shifted[:, i] = (f_moved - f) / side
+                        break
             jacobian = np.zeros((len(r), len(x)), order="F")
             jacobian[: len(f)] = self.project(shifted)
             for row, (i, p) in enumerate(known):
@@ -239,10 +250,11 @@ class Fitter:
             gained, accepted = 0.0, False
             for _ in range(8):
                 new = np.clip(x + _step(gram, gradient, damping, x, low, high), low, high)
-                f_new = self.predict(at(new))
-                r_new = np.concatenate([self.project(measured - f_new), prior(new)])
-                chi2_new = float(r_new @ r_new)
-                if chi2_new <= chi2:
+                f_new, chi2_new = self.possible(at(new)), math.inf
+                if f_new is not None:
+                    r_new = np.concatenate([self.project(measured - f_new), prior(new)])
+                    chi2_new = float(r_new @ r_new)
+                if f_new is not None and chi2_new <= chi2:
                     gained, accepted = chi2 - chi2_new, True
                     x, f, r, chi2 = new, f_new, r_new, chi2_new
                     damping = max(damping / 10.0, 1e-9)
@@ -275,8 +287,28 @@ class Fitter:
         return Fit(effects, values, chi2, residual, keys, jacobian[:n], covariance, jacobian[n:])
 
     def best(self, effects: Sequence[Effect], starts: Sequence[Mapping[str, float]]) -> Fit:
-        """The fit of least chi squared among those from each of the starts (see `fit`), one or more."""
-        return min((self.fit(effects, s) for s in starts), key=lambda found: found.chi2)
+        """The fit of least chi squared among those from each of the starts (see `fit`), one or more.
+
+        One of infinite chi squared where no start has a prediction; `Composite.refused` then says why.
+        """
+        found, why = [], ""
+        for start in starts:
+            try:
+                found.append(self.fit(effects, start))
+            except MuError as error:
+                why = error.what
+        if found:
+            return min(found, key=lambda fit: fit.chi2)
+        self.simulator.refused[" with ".join(e.title for e in effects)] = why
+        return _impossible(effects, starts[0], len(self.record))
+
+
+def _impossible(effects: Sequence[Effect], values: Mapping[str, float], n: int) -> Fit:
+    """A fit of n values by a model that has no prediction."""
+    keys = tuple(key for e in effects for key in e.keys)
+    k, residual = len(keys), np.full(n, math.inf)
+    nothing = np.zeros((n, k)), np.full((k, k), math.inf), np.zeros((0, k))
+    return Fit(tuple(effects), dict(values), math.inf, residual, keys, *nothing)
 
 
 def _step(gram: Array, gradient: Array, damping: float, x: Array, low: Array, high: Array) -> Array:

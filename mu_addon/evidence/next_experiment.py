@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..errors import InputError
+from ..errors import MuError
 from ..measured import Experiment
 from .fit import Fit, Fitter
 from .noise import Whitening
@@ -60,7 +60,7 @@ def propose_experiment(
     for e in options:
         try:
             expected = _divergence(fitter, e, [fits[n].values for n in names if n in fits])
-        except InputError:
+        except MuError:
             continue
         if expected > 0.0 and (best is None or expected > best.expected):
             best = Proposal(f"{e.name}: {cause.effect.reveals}", names, expected)

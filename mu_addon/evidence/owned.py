@@ -23,6 +23,7 @@ from .selection import (
     gain_of,
     loss,
     promise,
+    ranked,
     sudden,
 )
 from .sensitivity import Sensitivity, sensitivities
@@ -154,4 +155,4 @@ def _pool(fitter: Fitter, seed: Fit, effects: Sequence[Effect], progress: Callab
         if promises > PROMISING:
             progress(" and ".join((*seed.names, e.name)))
             found.append(fitter.best([*seed.effects, e], [{**seed.values, **s} for s in e.starts()]))
-    return sorted(found, key=cost)
+    return ranked(found)

@@ -180,7 +180,9 @@ def _fitted(fitter: Fitter, base: Fit, effect: Effect) -> tuple[float, Fit] | No
         effect = attrs.evolve(effect, parameters=each, spread=(spread.value, spread.low95, spread.high95))
         guess = dict(zip(effect.keys, (spread.values + p.null).tolist(), strict=True))
         bounded = {k: min(max(v, p.low), p.high) for k, v in guess.items()}
-        fit = fitter.fit([effect], {**fit.values, **bounded})
+        fit = fitter.best([effect], [{**fit.values, **bounded}])
+        if not math.isfinite(fit.chi2):
+            return None
         if abs(spread.value - before) < SETTLED * spread.value:
             break
         before = spread.value

@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, MuError
 from ..measured import Experiment
 from .resolution import quantum, stretch
 from .simulator import Composite
@@ -109,6 +109,18 @@ class Record:
         for s, rows, at in self._together:
             found[at] = s.mean(known[s.experiment][rows])
         return found
+
+    def possible(self, simulator: Composite, values: Mapping[str, float]) -> Array | None:
+        """As `predict`; None where the model has no prediction, or one that is not finite.
+
+        A law beyond its range, or a body without equilibrium: such values cannot be those of what was
+        measured.
+        """
+        try:
+            found = self.predict(simulator, values)
+        except MuError:
+            return None
+        return found if np.isfinite(found).all() else None
 
     @cached_property
     def _together(self) -> list[tuple[Series, list[int], Array]]:

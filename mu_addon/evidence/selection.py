@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import combinations
 from typing import Any
 
 import attrs
 import numpy as np
 
+from ..errors import MuError
 from .effect import Effect, Parameter
 from .fit import PRIOR, Fit, Fitter, logarithmic
 from .record import KNOWN
@@ -103,7 +104,7 @@ def select(
     for e in effects:
         progress(e.name)
         pool.append(fitter.best([e], [{**base.values, **s} for s in e.starts()]))
-    pool.sort(key=cost)
+    pool = ranked(pool)
     singles = tuple(pool)
     chosen, ps, doubted, p_best = base, [], "", 1.0
     taken = 0.0
@@ -121,7 +122,7 @@ def select(
             physical = [f for f in levels[-1] if not CAMERA.intersection(f.names)]
             seeds = {id(f): f for f in (*levels[-1][1:SEEDS], *physical[:SEEDS])}
             more = _extended(fitter, effects, list(seeds.values()), progress)
-            pool = sorted([*pool, *more], key=cost)
+            pool = ranked([*pool, *more])
             p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
         if p >= FALSE_ALARM_RATE or _of_the_law(chosen, pool[0], taken):
             break
@@ -207,7 +208,7 @@ def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) ->
     ps = [c.p_value for c in found.causes]
     doubted = found.doubted
     for e in chosen.effects:
-        less = fitter.fit([o for o in chosen.effects if o is not e], chosen.values)
+        less = fitter.best([o for o in chosen.effects if o is not e], [chosen.values])
         own = attrs.evolve(chosen, effects=(*less.effects, e))
         p = false_alarm_probability(
             fitter, less, seen, less.chi2 - chosen.chi2 - _by_gauges(fitter, less, own)
@@ -331,6 +332,11 @@ def cost(fit: Fit) -> float:
     return fit.chi2 + 2.0 * len(fit.keys)
 
 
+def ranked(fits: Iterable[Fit]) -> list[Fit]:
+    """Fits by `cost`, best first, without those of models that have no prediction."""
+    return sorted((f for f in fits if math.isfinite(f.chi2)), key=cost)
+
+
 def _extended(
     fitter: Fitter, effects: Sequence[Effect], seeds: Sequence[Fit], progress: Callable[[str], None]
 ) -> list[Fit]:
@@ -344,7 +350,7 @@ def _extended(
                 continue
             progress(" and ".join((*seed.names, e.name)))
             found[every] = fitter.best([*seed.effects, e], [{**seed.values, **s} for s in e.starts()])
-    return sorted(found.values(), key=cost)
+    return ranked(found.values())
 
 
 def _promises(fitter: Fitter, fit: Fit, effect: Effect) -> bool:
@@ -359,7 +365,11 @@ def promise(fitter: Fitter, fit: Fit, effect: Effect) -> float:
     size = effect.parameters[0]
     plain = fitter.predict(fit.values)
     moved = [*effect.starts(), *({**s, effect.keys[0]: size.null + size.step} for s in effect.shapes())]
-    u = np.stack([fitter.predict({**fit.values, **m}) - plain for m in moved], axis=1)
+    tried = (fitter.possible({**fit.values, **m}) for m in moved)
+    changes = [found - plain for found in tried if found is not None]
+    if not changes:
+        return 0.0
+    u = np.stack(changes, axis=1)
     u = fitter.project(u)
     q = np.linalg.qr(fit.jacobian)[0]
     before = np.linalg.norm(u, axis=0)
@@ -432,10 +442,12 @@ def _by_gauges(fitter: Fitter, less: Fit, more: Fit) -> float:
     On data that the model without it made, driven by other readings of the same noise; taken twice, since
     that is one draw, and of readings that were quieter before.
     """
-    other = fitter.driven_again(less)
+    other = fitter.driven_again(less) if math.isfinite(less.chi2) else None
     if other is None:
         return 0.0
-    without = other.fit(less.effects, less.values)
+    without = other.best(less.effects, [less.values])
+    if not math.isfinite(without.chi2):
+        return math.inf
     starts = [more.values, *({**less.values, **s} for s in more.effects[-1].starts())]
     return 2.0 * max(without.chi2 - other.best(more.effects, starts).chi2, 0.0)
 
@@ -518,6 +530,7 @@ def causes_of(
                 for a in effects
                 if a.name not in chosen.names
             ]
+            tried = ranked(tried)
         less = fitter.best(others, [chosen.values])
         near = max(RIVAL_DELTA_CHI2, LAW**2 * (base.chi2 - less.chi2))
         rivals: dict[str, float] = {}
@@ -583,7 +596,11 @@ def interval(fitter: Fitter, fit: Fit, key: str, rise: float = 3.84) -> tuple[fl
             if (limit - at) * sign <= 0.0:
                 at, value = limit, abs(limit - centre) / scale
             fixed = {key: math.exp(at) if log else at}
-            risen = fitter.fit(fit.effects, fit.values, fixed).chi2 - fit.chi2
+            try:
+                risen = fitter.fit(fit.effects, fit.values, fixed).chi2 - fit.chi2
+            except MuError:
+                # Without a prediction it cannot be the value.
+                risen = math.inf
             if abs(risen - rise) < 0.2 or (risen < rise and at == limit):
                 break
             inner, outer = (value, outer) if risen < rise else (inner, value)

@@ -57,7 +57,8 @@ def signatures(
         for shape in e.shapes():
             moved = {**values, **shape, e.keys[0]: size.null + size.step}
             columns.append((record.predict(simulator, moved) - base) / size.step)
-        columns += [record.predict(simulator, {**values, **start}) - base for start in e.starts()]
+        tried = (record.possible(simulator, {**values, **start}) for start in e.starts())
+        columns += [found - base for found in tried if found is not None]
     return np.stack([c for c in columns if c.any()], axis=1) if columns else np.zeros((len(base), 0))
 
 
@@ -190,11 +191,8 @@ def _secant(fitter: Fitter, values: Mapping[str, float], effect: Effect) -> Arra
     A wall that a unit does not reach is at first no nearer for being moved.
     """
     size, plain = effect.parameters[0], fitter.predict(values)
-    slopes = [
-        (fitter.predict({**values, effect.keys[0]: start}) - plain) / (start - size.null)
-        for start in size.starts
-        if start != size.null
-    ]
+    tried = {s: fitter.possible({**values, effect.keys[0]: s}) for s in size.starts if s != size.null}
+    slopes = [(found - plain) / (s - size.null) for s, found in tried.items() if found is not None]
     return max(slopes, key=lambda slope: float(np.linalg.norm(slope)), default=np.zeros_like(plain))
 
 

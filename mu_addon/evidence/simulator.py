@@ -57,8 +57,9 @@ class Composite:
     name; those that refine another one's law stand apart in `refinements`. known: values, by
     "effect.parameter", of effects that an earlier diagnosis named: they are in every prediction, and none of
     these effects is offered again; unseen: those of them that no kind here has. remembered: most predictions
-    kept, the oldest are dropped; calls: predictions that were computed. Raises InputError where two
-    simulators give a parameter another unit, null or disjoint bounds.
+    kept, the oldest are dropped; calls: predictions that were computed; refused: why models that a fit asked
+    for have no prediction, by the titles of their effects. Raises InputError where two simulators give a
+    parameter another unit, null or disjoint bounds.
     """
 
     def __init__(
@@ -72,6 +73,7 @@ class Composite:
         self._known = dict(known)
         self._kept: OrderedDict[Any, tuple[Experiment, Array]] = OrderedDict()
         self.calls = 0
+        self.refused: dict[str, str] = {}
         nuisances: dict[str, Parameter] = {}
         effects: dict[tuple[str, ...], Effect] = {}
         for kind, simulator in self._simulators.items():

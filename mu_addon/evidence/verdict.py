@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import attrs
@@ -50,8 +51,9 @@ class Verdict:
     kind: one of `KINDS` (none, named, ambiguous, unidentifiable, unexplained). experiments: all of them,
     their drives freed of gauge noise (`drive.denoised_drives`). sources: noise by group of series. intervals:
     95 % bounds by key, in the parameters' units. identifiability: effects that these data cannot show, with
-    the reason. set_aside: readings that do not count, in words (`resolution.wrong_readings`). share_taken: of
-    the base model's misfit by the chosen one; a verdict `named` may leave structure (`selection.mainly`).
+    the reason. set_aside: readings that do not count, in words (`resolution.wrong_readings`). refused: why
+    models that were tried have no prediction, by the titles of their effects. share_taken: of the base
+    model's misfit by the chosen one; a verdict `named` may leave structure (`selection.mainly`).
     `as_json` is the content of verdict.json.
     """
 
@@ -66,6 +68,7 @@ class Verdict:
     intervals: dict[str, tuple[float, float]]
     experiments: tuple[Experiment, ...]
     set_aside: tuple[str, ...] = ()
+    refused: Mapping[str, str] = MappingProxyType({})
     share_taken: float = 0.0
 
     @property
@@ -231,6 +234,7 @@ def diagnose(
         bounds,
         tuple(experiments),
         tuple(set_aside),
+        dict(simulator.refused),
         share_taken(fitter, chosen.base, chosen.chosen),
     )
 

@@ -160,6 +160,34 @@ def test_a_soft_frame_in_series_with_a_stiff_specimen_that_softens_and_yields():
 
 
 @pytest.mark.parametrize(
+    "hidden",
+    [
+        # What remains of yielding is pressed together, where this law is several times as steep.
+        {
+            "tension_compression_asymmetry.excess": 2.64,
+            "rate_independent_hysteresis.per_strain": 200.0,
+            "rate_independent_hysteresis.hardening": 0.9,
+        },
+        # The slope of such softening has no bound where loading turns.
+        {"mullins_softening.by_peak": 3.6, "mullins_softening.power": 0.5},
+        # Without the frame the specimen would pull itself through.
+        {"strain_stiffening.c2_over_c1": 2.0},
+    ],
+    ids=["yielding", "softening", "stiff"],
+)
+def test_a_frame_in_series_whatever_the_specimen_remembers(hidden):
+    """At its own strain the specimen alone bears what was found."""
+    strain = np.concatenate([np.linspace(0, 0.3, 40), np.linspace(0.3, 0, 40), np.linspace(0, 0.5, 70)])
+    strain = np.concatenate([strain, np.linspace(0.5, 0, 70)])
+    e = coupon(strain, section_mm=(10.8, 2.7), length_mm=25.9)
+    values = {"coupon_modulus_kPa": 16000.0, "frame_compliance.mm_per_N": 0.1} | hidden
+    found = SIMULATOR.predict(e, values)[0]
+    own = strain - 0.1 * found * 1e-3 * 10.8 * 2.7 / 25.9
+    alone = SIMULATOR.predict(coupon(own), values | {"frame_compliance.mm_per_N": 0.0})[0]
+    np.testing.assert_allclose(found, alone, rtol=1e-7, atol=1e-7 * found.max())
+
+
+@pytest.mark.parametrize(
     ("key", "value", "start"),
     [
         ("strain_stiffening.c2_over_c1", 0.08, 0.02),

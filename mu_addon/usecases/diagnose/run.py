@@ -96,6 +96,10 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | No
     notes += _bounds_met(verdict, simulator)
     notes += _noisy_gauges(measured, verdict)
     notes += verdict.set_aside
+    notes += [
+        f"{titles} could not be computed, and was not compared: {why}"
+        for titles, why in verdict.refused.items()
+    ]
     remarks = [*(f"{r.what} ({_place(r.where)})" for r in measured.remarks), *notes]
     unknown = dict.fromkeys(e.kind for e in measured.experiments if not simulator.knows(e))
     remarks += [f"there is no model for {kind}: its experiments were left out" for kind in unknown]

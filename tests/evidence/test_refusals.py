@@ -1,0 +1,70 @@
+"""Models that have no prediction for some values: a diagnosis goes on, and says so."""
+
+import numpy as np
+import pytest
+
+from mu_addon.errors import ConvergenceError
+from mu_addon.evidence.simulator import Composite
+from mu_addon.evidence.verdict import diagnose
+from tests.evidence.stand_ins import Moduli, made
+
+STRAIN = np.linspace(0.0, 0.1, 24)
+
+
+class Buckling(Moduli):
+    """Blocks that have no equilibrium once the frame is softer than `softest`."""
+
+    def __init__(self, softest):
+        self.softest = softest
+
+    def predict(self, experiment, values):
+        if values.get("frame_compliance.share", 0.0) > self.softest:
+            raise ConvergenceError("no equilibrium of the block", experiment.name)
+        return super().predict(experiment, values)
+
+
+def blocks(**hidden):
+    """Blocks of four scales as the stand-in's mechanics have them, with noise of 0.002 kPa."""
+    rng = np.random.default_rng(1)
+    values = {"modulus_kPa": 20.0} | {k.replace("__", "."): v for k, v in hidden.items()}
+    found = []
+    for scale in (0.75, 1.0, 1.5, 2.0):
+        columns = {"time_s": 400.0 * STRAIN, "strain": STRAIN}
+        stress = Moduli().predict(made("", "lattice_compression", columns, scale=scale), values)[0]
+        columns["stress_kPa"] = stress + 0.002 * rng.normal(size=len(STRAIN))
+        found.append(made(f"{scale:g}x", "lattice_compression", columns, scale=scale))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("softest", "refused"),
+    # The fits of a frame's share begin at 0.3.
+    [(0.05, {"frame_compliance": "no equilibrium of the block"}), (0.31, {})],
+    ids=["at no start", "on the way"],
+)
+def test_a_rival_without_prediction_does_not_end_a_diagnosis(softest, refused):
+    found = diagnose(blocks(overcure__offset_mm=0.1), Composite({"lattice_compression": Buckling(softest)}))
+    assert "overcure" in found.names
+    assert found.refused == refused
+    assert np.isfinite(list(found.intervals.values())).all()
+    computed = {f.effects[0].name for f in found.selection.singles}
+    assert ("frame_compliance" in computed) == (not refused)
+
+
+def test_a_base_model_without_prediction_is_an_error():
+    class Never(Moduli):
+        def predict(self, experiment, values):
+            raise ConvergenceError("no equilibrium of the block", experiment.name)
+
+    with pytest.raises(ConvergenceError, match="no equilibrium"):
+        diagnose(blocks(), Composite({"lattice_compression": Never()}))
+
+
+def test_a_size_is_not_followed_to_where_nothing_can_be_computed():
+    """The truth lies beyond what has a prediction: the fit ends below it, and no verdict rests on it."""
+    softest = 0.35
+    simulator = Composite({"lattice_compression": Buckling(softest)})
+    found = diagnose(blocks(frame_compliance__share=0.6), simulator)
+    fits = {f.effects[0].name: f for f in found.selection.singles}
+    assert fits["frame_compliance"].values["frame_compliance.share"] <= softest
+    assert found.kind != "named" or found.names != ("frame_compliance",)
