@@ -41,6 +41,9 @@ PROMISING = 4.0
 # Share of an effect's amplitude by which another right law of its mechanism may differ from the library's:
 # what gains no more beside it is not named.
 LAW = 0.05
+# Rivals of a cause that are fitted by all laws of their mechanisms: so many, that take this share of
+# what the cause takes by their first law.
+NEAREST, WORTH_LAWS = 2, 0.5
 # Share of a misfit that one effect must take to be named though structure is left, and how many times as
 # much any other one in its place must leave.
 MAINLY, APART = 0.99, 10.0
@@ -124,6 +127,12 @@ def select(
             more = _extended(fitter, effects, list(seeds.values()), progress)
             pool = ranked([*pool, *more])
             p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
+        if level == 0 and p >= FALSE_ALARM_RATE:
+            pair = _hidden_pair(fitter, effects, seen, base, pool, progress)
+            if pair is not None:
+                p_best, chosen = pair
+                ps, levels = [p_best, p_best], [pool, [chosen]]
+            break
         if p >= FALSE_ALARM_RATE or _of_the_law(chosen, pool[0], taken):
             break
         if loss(fitter, chosen, pool[0]) <= 0.0:
@@ -174,6 +183,36 @@ def pairs_for(
     return tuple(found)
 
 
+def _hidden_pair(
+    fitter: Fitter,
+    effects: Sequence[Effect],
+    seen: Sequence[Sensitivity],
+    base: Fit,
+    singles: Sequence[Fit],
+    progress: Callable[[str], None],
+) -> tuple[float, Fit] | None:
+    """The two effects that a record shows where neither alone does better than slow noise; None without.
+
+    Sought where one alone gains by the noise with every cause set aside, and not by the noise that
+    is left if none is. The chance that noise does as well is that of the best of all pairs.
+    """
+    from scipy.stats import chi2
+
+    raw = base.chi2 - singles[0].chi2 - _by_gauges(fitter, base, singles[0])
+    if false_alarm_probability(fitter, base, seen, raw) >= FALSE_ALARM_RATE:
+        return None
+    pool = _extended(fitter, effects, list(singles[:SEEDS]), progress)
+    if not pool:
+        return None
+    best = refined(fitter, pool[0], progress)
+    more = len(best.keys) - len(base.keys)
+    pairs = len(effects) * (len(effects) - 1) / 2
+    p = min(1.0, pairs * float(chi2.sf(max(gain_of(fitter, base, best), 0.0), more)))
+    if p >= FALSE_ALARM_RATE or loss(fitter, base, best) <= 0.0:
+        return None
+    return p, best
+
+
 def _of_the_law(less: Fit, more: Fit, taken: float) -> bool:
     """Whether an effect gains as little beside others as an error of their own law would be."""
     return more.names[-1] != NUMERICS and less.chi2 - more.chi2 < LAW**2 * taken
@@ -182,11 +221,12 @@ def _of_the_law(less: Fit, more: Fit, taken: float) -> bool:
 def refined(fitter: Fitter, fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Fit:
     """A fit with a law of more freedom in place of one of its effects' where that fits better; else itself.
 
-    Better by `RIVAL_DELTA_CHI2`: the mechanism is the same, and its law is chosen by the data.
+    Better by `RIVAL_DELTA_CHI2`: the mechanism is the same, and its law is chosen by the data, anew with
+    every effect that comes beside it.
     """
     for law in fitter.simulator.refinements:
         for i, e in enumerate(fit.effects):
-            if e.name != law.name or e.whose or e.refines or set(e.kinds) != set(law.kinds):
+            if e.name != law.name or e.whose or e.keys == law.keys or set(e.kinds) != set(law.kinds):
                 continue
             progress(e.name)
             others = [*fit.effects[:i], law, *fit.effects[i + 1 :]]
@@ -530,9 +570,9 @@ def causes_of(
                 for a in effects
                 if a.name not in chosen.names
             ]
-            tried = ranked(tried)
         less = fitter.best(others, [chosen.values])
         near = max(RIVAL_DELTA_CHI2, LAW**2 * (base.chi2 - less.chi2))
+        tried = _with_their_laws(fitter, chosen, less, tried)
         rivals: dict[str, float] = {}
         for f in tried:
             if f.chi2 - chosen.chi2 < near:
@@ -546,6 +586,23 @@ def causes_of(
         p = max(ps)
         found.append(Cause(e, p, less.chi2 - chosen.chi2, tuple(sorted(rivals, key=lambda n: rivals[n]))))
     return tuple(sorted(found, key=lambda c: -c.loss))
+
+
+def _with_their_laws(fitter: Fitter, chosen: Fit, less: Fit, rivals: Sequence[Fit]) -> list[Fit]:
+    """Rivals of one cause, the nearest of them with laws of more freedom where those fit better.
+
+    The cause's own law was chosen so. `WORTH_LAWS` of what it takes must be taken by a rival before.
+    """
+    found = ranked(rivals)
+    reach = chosen.chi2 + (1.0 - WORTH_LAWS) * (less.chi2 - chosen.chi2)
+    names: dict[str, int] = {}
+    for i, f in enumerate(found):
+        name = f.effects[-1].name
+        if name not in names and len(names) < NEAREST and f.chi2 < reach:
+            names[name] = i
+    for i in names.values():
+        found[i] = refined(fitter, found[i])
+    return found
 
 
 def _by_numerics(

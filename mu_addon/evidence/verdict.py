@@ -195,6 +195,16 @@ def diagnose(
     curved = {p.name: base.values[p.name] for p in fitter.curved}
     seen = at_bounds(fitter, curved, sensitivities(fitter, curved))
     chosen = select(fitter, seen, progress)
+    if chosen.causes and _kind(fitter, chosen) == "unexplained":
+        # Beside a large misfit readings that stand alone are not seen.
+        experiments, more = without_unpredicted_readings(experiments, simulator, chosen.chosen.values)
+        if more:
+            set_aside = [*set_aside, *more]
+            measured, fitter, base = _base(experiments, again, simulator)
+            sources = fitter.sources
+            curved = {p.name: base.values[p.name] for p in fitter.curved}
+            seen = at_bounds(fitter, curved, sensitivities(fitter, curved))
+            chosen = reselected(fitter, seen, chosen)
     if _kind(fitter, chosen) == "unexplained":
         chosen, seen = select_owned(fitter, seen, chosen, progress)
     if _kind(fitter, chosen) == "unexplained":

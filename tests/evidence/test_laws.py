@@ -9,6 +9,7 @@ from benchmarks.evidence.second_code.recording import write
 from benchmarks.evidence.second_code.sets import Order, made
 from mu_addon.evidence.prediction.coupon import CouponStress
 from mu_addon.evidence.prediction.effective_pressure import first_order_lag, spread_lag
+from mu_addon.evidence.prediction.specimen import turns
 from mu_addon.evidence.selection import LAW, _of_the_law
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
@@ -45,7 +46,7 @@ def test_times_that_spread_over_no_decade_are_one_time():
 
 
 def test_softening_by_the_largest_strain_acts_on_unloading_alone():
-    strain = np.concatenate([np.linspace(0.0, 0.4, 50), np.linspace(0.4, 0.0, 50)])
+    strain = np.concatenate([np.linspace(0.0, 0.4, 50), np.linspace(0.4, 0.0, 51)[1:]])
     e = bench.experiment("coupon", {"time_s": np.arange(100.0), "strain": strain, "stress_kPa": 0 * strain})
     model = CouponStress([e])
     plain = model.predict(e, {})[0]
@@ -55,13 +56,89 @@ def test_softening_by_the_largest_strain_acts_on_unloading_alone():
     np.testing.assert_allclose(found[50:], back, atol=1e-9)
 
 
+def test_softening_that_ends_goes_by_the_way_below_the_largest_strain_over_it():
+    strain = np.concatenate([np.linspace(0.0, 0.4, 50), np.linspace(0.4, 0.0, 51)[1:]])
+    e = bench.experiment("coupon", {"strain": strain, "stress_kPa": 0 * strain})
+    model = CouponStress([e])
+    plain = model.predict(e, {})[0]
+    values = {"mullins_softening.lost": 0.3, "mullins_softening.width": 0.2, "mullins_softening.shape": 1.5}
+    found = model.predict(e, values)[0]
+    np.testing.assert_array_equal(found[:50], plain[:50])
+    way = (0.4 - strain[50:]) / (0.2 * 0.4)
+    np.testing.assert_allclose(found[50:], plain[50:] * (0.7 + 0.3 * np.exp(-(way**1.5))), atol=1e-9)
+
+
+def test_a_turn_between_two_samples_is_where_straight_lines_meet():
+    rng = np.random.default_rng(0)
+    t = np.sort(rng.uniform(0.0, 10.0, 60))
+    x = np.interp(t, [0.0, 3.3, 5.0, 8.0, 10.0], [0.0, 1.0, 0.2, 1.5, 0.0])
+    found = turns(t, x)
+    changed = np.flatnonzero(found != x)
+    np.testing.assert_allclose(found[changed], [1.0, 1.5], rtol=1e-9)
+    assert (t[changed - 1] < [3.3, 8.0]).all()
+    assert (t[changed] > [3.3, 8.0]).all()
+
+
+def test_a_round_turn_stays_as_it_was_sampled():
+    t = np.linspace(0.0, 10.0, 41)
+    np.testing.assert_array_equal(turns(t, np.sin(t)), np.sin(t))
+
+
+def test_softening_knows_the_largest_strain_though_no_sample_was_there():
+    """Between samples 0.5 s apart the machine turned at 0.4: the same instants of a finer record."""
+    fine = np.linspace(0.0, 20.0, 2001)
+    way = np.interp(fine, [0.0, 10.13, 20.0], [0.0, 0.4, 0.0])
+
+    def made_of(rows):
+        columns = {"time_s": fine[rows], "strain": way[rows], "stress_kPa": 0 * way[rows]}
+        return bench.experiment("coupon", columns)
+
+    values = {"mullins_softening.by_peak": 0.5, "mullins_softening.power": 0.5}
+    rows = slice(0, None, 50)
+    coarse, whole = (CouponStress([e]).predict(e, values)[0] for e in map(made_of, (rows, slice(None))))
+    np.testing.assert_allclose(coarse, whole[rows], rtol=1e-6, atol=1e-9)
+
+
 def test_a_law_that_refines_is_offered_apart():
     e = bench.experiment(
         "coupon", {"time_s": np.arange(9.0), "strain": np.linspace(0, 0.1, 9), "stress_kPa": np.ones(9)}
     )
     simulator = Composite({"coupon": CouponStress([e])})
-    assert {r.name for r in simulator.refinements} == {"viscoelasticity", "mullins_softening"}
+    assert {r.name for r in simulator.refinements} == {
+        "viscoelasticity",
+        "mullins_softening",
+        "strain_stiffening",
+    }
     assert not any(effect.refines for effect in simulator.effects)
+
+
+@pytest.mark.parametrize(
+    ("kind", "faults"),
+    [
+        # A lamp's loss by a law that ends, in a room whose light grows.
+        (
+            "waveguide_bending",
+            {"led_drift": {"share": 0.0425, "time_s": 284.0}, "ambient_light": {"share": 0.0597}},
+        ),
+        # A tanh of the way below the largest strain, and a warm block of its own.
+        (
+            "lattice_compression",
+            {"mullins_softening": {"rate": 0.71, "tanh": 1.0}, "temperature_drift": {"rate": 0.0081}},
+        ),
+    ],
+    ids=["light", "softening"],
+)
+def test_two_effects_by_other_laws_are_both_named(tmp_path, kind, faults):
+    """Before, a law's own error was left as structure, so that both were only what partly explains it."""
+    verdict = judged(tmp_path, faults, kind=kind, seed=6)
+    assert (verdict.kind, set(verdict.names)) == ("named", set(faults))
+
+
+def test_two_effects_that_pass_for_slow_noise_one_by_one_are_found_together(tmp_path):
+    """Before, the verdict was none: a slow noise as long as the records took it all."""
+    faults = {"led_drift": {"share": 0.0425, "time_s": 284.0}, "ambient_light": {"share": 0.0597}}
+    verdict = judged(tmp_path, faults, kind="waveguide_bending", seed=5)
+    assert (verdict.kind, set(verdict.names)) == ("named", set(faults))
 
 
 def judged(tmp_path, faults, noise="white", level=0.0015, kind="coupon", seed=5):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import InputError
-from mu_addon.evidence.prediction.coupon import CouponStress, yeoh
+from mu_addon.evidence.prediction.coupon import CouponStress, ogden, yeoh
 from mu_addon.evidence.prediction.effective_pressure import first_order_lag
 from mu_addon.evidence.prediction.specimen import recorded
-from mu_addon.fem.laws import Yeoh
+from mu_addon.fem.laws import Ogden, Yeoh
 from mu_addon.materials import incompressible
 
 from .bench import experiment, measured, recovered
@@ -39,6 +39,42 @@ def test_closed_form_is_the_law_of_the_finite_elements(mode):
     stretch = np.linspace(0.6, 2.0, 29)
     law = incompressible(Yeoh, np.array([0.3, 0.05, 0.0, 1.0]), mode, stretch)
     np.testing.assert_allclose(yeoh(0.3, 0.05, mode, stretch), law, rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("mode", ["uniaxial", "equibiaxial", "pure_shear"])
+def test_a_term_of_ogden_s_is_the_law_of_the_finite_elements(mode):
+    """Of modulus E = 3 mu: mu_1 alpha_1 = 2 mu."""
+    stretch = np.linspace(0.6, 2.0, 29)
+    parameters = np.array([2 * 0.2 / 5.5, 5.5, 0.0, 1.0, 0.0, 1.0, 1.0])
+    law = incompressible(Ogden, parameters, mode, stretch)
+    np.testing.assert_allclose(ogden(0.6, 5.5, mode, stretch), law, rtol=1e-11, atol=1e-13)
+    a = 1 + STRAIN
+    found = predict(
+        coupon(mode=mode), strain_stiffening__by_stretch=0.5, strain_stiffening__stretch_power=5.5
+    )
+    plain = predict(coupon(mode=mode))
+    np.testing.assert_allclose(found - plain, ogden(500.0, 5.5, mode, a), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("form", "factor"),
+    [
+        (1.0, lambda x: 1 + 0.3 * x),
+        (0.0, lambda x: np.exp(0.3 * x)),
+        (-1.0, lambda x: 1 / (1 - 0.3 * x)),
+    ],
+    ids=["Yeoh", "Demiray", "Gent"],
+)
+def test_one_law_of_the_invariant_has_three_known_ones_in_it(form, factor):
+    e = coupon(np.linspace(-0.2, 0.6, 50))
+    a = 1 + e["strain"]
+    found = predict(e, strain_stiffening__by_invariant=0.3, strain_stiffening__form=form)
+    np.testing.assert_allclose(found, predict(e) * factor(a**2 + 2 / a - 3), rtol=1e-9, atol=1e-9)
+
+
+def test_beyond_gent_s_limit_a_law_stays_finite():
+    found = predict(coupon(), strain_stiffening__by_invariant=3.0, strain_stiffening__form=-2.0)
+    assert np.isfinite(found).all()
 
 
 def test_a_stretch_of_nothing_is_refused():

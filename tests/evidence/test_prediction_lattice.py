@@ -103,6 +103,19 @@ def test_directions():
     assert modulus(block(), **values) == pytest.approx(60.0)
 
 
+def test_stiffness_changes_with_a_power_of_strain():
+    """1/(1 - a (10 e)^r); at r = 1 the law of cells that close."""
+    e = block()
+    plain = LatticeStress().predict(e, {})[0]
+    found = LatticeStress().predict(e, {"strain_stiffening.at_tenth": -0.2, "strain_stiffening.order": 2.0})[
+        0
+    ]
+    np.testing.assert_allclose(found, plain / (1 + 0.2 * (10 * e["strain"]) ** 2), rtol=1e-9, atol=1e-12)
+    first = LatticeStress().predict(e, {"strain_stiffening.at_tenth": 0.1, "strain_stiffening.order": 1.0})[0]
+    closing = LatticeStress().predict(e, {"strain_stiffening.closing": 1.0})[0]
+    np.testing.assert_allclose(first, closing, rtol=1e-9, atol=1e-12)
+
+
 def test_cells_that_close():
     """E e/(1 - e/e_d): the tangent doubles where (1 - e/e_d)^2 is a half."""
     e = block()

@@ -42,6 +42,16 @@ def test_room_light_adds():
     np.testing.assert_allclose(predict(ambient_light__ambient_V=0.2) - predict(), 0.2, rtol=1e-12)
 
 
+def test_light_that_settles_does_so_in_proportion():
+    ratio = predict(led_drift__settled=-0.1, led_drift__settling_s=90.0) / predict()
+    np.testing.assert_allclose(ratio, np.exp(-0.1 * (1 - np.exp(-TIME / 90.0))), rtol=1e-12)
+
+
+def test_room_light_that_grows_adds_more():
+    found = predict(ambient_light__at_first_V=0.2, ambient_light__per_hour=3.0) - predict()
+    np.testing.assert_allclose(found, 0.2 * (1 + 3.0 * TIME / 3600.0), rtol=1e-9)
+
+
 def test_excess_loss_is_its_share_at_a_right_angle():
     e = experiment(
         "waveguide_bending", {"time_s": np.array([0.0, 1.0]), "angle_deg": np.array([90.0, -90.0])}

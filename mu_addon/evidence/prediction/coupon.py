@@ -37,8 +37,24 @@ STRAIN_STIFFENING = Effect(
     (KIND,),
 )
 
+# W' = c1 (1 + q s (I1 - 3))^(1/q): Yeoh's two terms at q = 1, Fung's and Demiray's exponential at 0, Gent's
+# limit of I1 at -1; Knowles, Int. J. Fracture 13 (1977) 611.
+POWER = (
+    Parameter(
+        "by_invariant", "", -0.03, 3.0, 0.0, (0.05, 0.3), "slope of W' over c1; Gent's: 1 over his limit"
+    ),
+    Parameter("form", "", -2.0, 2.0, 1.0, (1.0, -1.0), "1 Yeoh 1993, 0 Demiray 1972, -1 Gent 1996"),
+)
+# A term of Ogden's beside the neo-Hookean one: Ogden, Proc. R. Soc. A 326 (1972) 565.
+OGDEN = (
+    Parameter("by_stretch", "", 0.0, 5.0, 0.0, (0.2,), "modulus of the term over the neo-Hookean one's"),
+    Parameter("stretch_power", "", 2.5, 20.0, 6.0, (6.0,), "Ogden 1972: 5.0 of rubber"),
+)
+
 EFFECTS = (
     STRAIN_STIFFENING,
+    Effect("strain_stiffening", POWER, (KIND,), refines=True),
+    Effect("strain_stiffening", OGDEN, (KIND,), refines=True),
     Effect(
         "tension_compression_asymmetry",
         (Parameter("excess", "", -0.8, 4.0, 0.0, (0.3,), "stiffness in compression over tension, less 1"),),
@@ -82,11 +98,17 @@ class CouponStress:
         c2 = c1 * values.get("strain_stiffening.c2_over_c1", 0.0)
         excess = values.get("tension_compression_asymmetry.excess", 0.0)
         mode = experiment.mode or "uniaxial"
+        slope, form = (values.get(f"strain_stiffening.{p.name}", p.null) for p in POWER)
+        share, power = (values.get(f"strain_stiffening.{p.name}", p.null) for p in OGDEN)
 
         off = values.get(DISCREPANCY.name, 0.0) / self._largest
 
         def law(strain: Array) -> Array:
             stress = yeoh(c1, c2, mode, 1 + strain)
+            if slope:
+                stress = stress * _stiffer(slope, form, mode, 1 + strain)
+            if share:
+                stress = stress + share * ogden(6 * c1, power, mode, 1 + strain)
             if off:
                 stress = stress * (1.0 + off * strain)
             return stress * np.where(strain < 0, 1 + excess, 1.0) if excess else stress
@@ -104,11 +126,36 @@ def yeoh(c1: float, c2: float, mode: str, stretch: Array) -> Array:
     """
     if not (stretch > 0).all():
         raise InputError("a stretch is not positive", mode, "stretch is length over initial length")
+    return np.asarray(2 * (c1 + 2 * c2 * (_first(mode, stretch) - 3)) * (stretch - stretch ** -_ACROSS[mode]))
+
+
+def ogden(modulus: float, power: float, mode: str, stretch: Array) -> Array:
+    """Nominal stress (n,) of an incompressible solid of one term of Ogden's, in the unit of its modulus E.
+
+    stretch (n,), mode: as of `yeoh`. P = 2 E/(3 a) (x^(a - 1) - x^(-m a - 1)) of power a, where x^-m is the
+    stretch of the free side: m = 1/2, 2, 1 in the three modes.
+    """
+    across = 0.5 * (_ACROSS[mode] - 1.0)
+    return np.asarray(2 * modulus / (3 * power) * (stretch ** (power - 1) - stretch ** (-across * power - 1)))
+
+
+# What the stretch is brought to beside itself in the neo-Hookean stress x - x^-m.
+_ACROSS = {"uniaxial": 2.0, "equibiaxial": 5.0, "pure_shear": 3.0}
+
+
+def _first(mode: str, stretch: Array) -> Array:
+    """First invariant (n,) of an incompressible solid."""
     square = stretch**2
     if mode == "uniaxial":
-        first, m = square + 2 / stretch, 2
-    elif mode == "equibiaxial":
-        first, m = 2 * square + square**-2, 5
-    else:
-        first, m = square + 1 + 1 / square, 3
-    return np.asarray(2 * (c1 + 2 * c2 * (first - 3)) * (stretch - stretch ** float(-m)))
+        return np.asarray(square + 2 / stretch)
+    if mode == "equibiaxial":
+        return np.asarray(2 * square + square**-2)
+    return np.asarray(square + 1 + 1 / square)
+
+
+def _stiffer(slope: float, form: float, mode: str, stretch: Array) -> Array:
+    """W' over c1 (n,), see `POWER`; held where it would be without bound."""
+    x = slope * (_first(mode, stretch) - 3)
+    if abs(form) < 1e-6:
+        return np.asarray(np.exp(np.minimum(x, 20.0)))
+    return np.asarray(np.exp(np.minimum(np.log1p(np.maximum(form * x, -0.98)) / form, 20.0)))

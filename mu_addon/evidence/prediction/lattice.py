@@ -69,6 +69,18 @@ EFFECTS = (
         (KIND,),
         "cells close or struts buckle, so the stiffness changes with strain",
     ),
+    Effect(
+        "strain_stiffening",
+        (
+            Parameter(
+                "at_tenth", "", -20.0, 0.95, 0.0, (-0.1, 0.1), "change of 1 over the stiffness at 10 %"
+            ),
+            Parameter("order", "", 0.3, 6.0, 1.0, (1.0, 2.0), "1 where cells close, 2 where struts buckle"),
+        ),
+        (KIND,),
+        "cells close or struts buckle, so the stiffness changes with strain",
+        refines=True,
+    ),
     *machine(KIND),
 )
 
@@ -228,11 +240,17 @@ class LatticeStress:
         scaling = self._scaling(experiment)
         modulus *= scaling.stiffness(experiment.scale, offset, excess)
         closing = values.get("strain_stiffening.closing", 0.0)
+        at_tenth = values.get("strain_stiffening.at_tenth", 0.0)
+        order = values.get("strain_stiffening.order", 1.0)
 
         def law(strain: Array) -> Array:
             stress = modulus * self._curve(strain)
             # Slope 1 at first; a strain near 1/closing would be beyond the last gap between struts.
-            return stress / np.maximum(1 - closing * strain, 0.02) if closing else stress
+            if closing:
+                stress = stress / np.maximum(1 - closing * strain, 0.02)
+            if at_tenth:
+                stress = stress / np.maximum(1 - at_tenth * (10.0 * np.abs(strain)) ** order, 0.02)
+            return stress
 
         found = [recorded(experiment, law, values, self._histories.get(experiment.name, NEW))]
         if "mass_g" in self.channels(experiment):

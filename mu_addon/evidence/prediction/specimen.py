@@ -31,6 +31,8 @@ FEWEST = 20
 ZERO_SHARE = 0.01
 # Iterations for the frame's share.
 _MOST = 200
+# Of the change of slope at a turn, by which slopes beside it may differ from straight lines'.
+STRAIGHT = 0.2
 # Strain up to which a preload is looked for.
 FARTHEST = 0.5
 FILTER = Parameter("time_s", "s", 0.0, 2.0, 0.0, (0.05, 0.5), "amplifiers average over 1 ms to 1 s")
@@ -40,6 +42,12 @@ _TIMED = {e.name: e.parameters for e in TIMED}
 BY_PEAK = (
     Parameter("by_peak", "", 0.0, 5.0, 0.0, (0.3,), "b of Beatty and Krishnaswamy 2000, over strain^power"),
     Parameter("power", "", 0.2, 2.0, 0.5, (0.5, 1.0), "one half in Beatty and Krishnaswamy 2000"),
+)
+# And one that ends, by the way below the largest strain over that strain.
+BY_SHARE = (
+    Parameter("lost", "", 0.0, 0.95, 0.0, (0.2,), "most that softening takes of the stress"),
+    Parameter("width", "", 0.02, 5.0, 0.4, (0.3,), "of the largest strain: m of Dorfmann and Ogden 2004"),
+    Parameter("shape", "", 0.2, 3.0, 1.0, (1.0,), "Weibull's, of the spread of chains that give way"),
 )
 # Gauss-Legendre points on 0..1 for the energy: exact for laws up to degree 15.
 _AT, _WEIGHT = np.polynomial.legendre.leggauss(8)
@@ -60,6 +68,13 @@ def machine(kind: str) -> tuple[Effect, ...]:
             BY_PEAK,
             (kind,),
             "loading softens all later loading below its largest strain",
+            refines=True,
+        ),
+        Effect(
+            "mullins_softening",
+            BY_SHARE,
+            (kind,),
+            "loading softens all later loading below its largest strain, by a share that ends",
             refines=True,
         ),
         yielding(kind),
@@ -274,9 +289,12 @@ def _remembering(
         width = values.get("mullins_softening.energy_share", 0.3) * (float(most.max()) or 1.0)
         stress = stress * (1 - softening * erf((most - energy) / width))
     if rate := values.get("mullins_softening.by_peak", 0.0):
-        size = np.abs(strain)
-        below = np.maximum(np.maximum.accumulate(size), past.strain) - size
+        below, _ = _below(experiment, strain, past)
         stress = stress * np.exp(-rate * below ** values.get("mullins_softening.power", 0.5))
+    if lost := values.get("mullins_softening.lost", 0.0):
+        below, most = _below(experiment, strain, past)
+        way = below / np.maximum(values.get("mullins_softening.width", 0.4) * most, 1e-12)
+        stress = stress * (1 + lost * np.expm1(-(way ** values.get("mullins_softening.shape", 1.0))))
     if (share := values.get("viscoelasticity.share", 0.0)) and "time_s" in experiment.columns:
         # Relaxing from equilibrium: sigma = sigma_0 - share of what the dashpot has given way.
         stress = stress - share * first_order_lag(
@@ -288,6 +306,36 @@ def _remembering(
     if (share := values.get("viscoelasticity.spread_share", 0.0)) and "time_s" in experiment.columns:
         stress = stress - share * spread_lag(experiment["time_s"], stress, values)
     return stress
+
+
+def _below(experiment: Experiment, strain: Array, past: StrainHistory) -> tuple[Array, Array]:
+    """By how much (n,) strains (n,) are below the largest so far in size, and that (n,)."""
+    size = np.abs(strain)
+    so_far = size
+    if "time_s" in experiment.columns and len(strain) > 5:
+        so_far = np.maximum(size, turns(experiment["time_s"], size))
+    most = np.maximum(np.maximum.accumulate(so_far), past.strain)
+    return most - size, most
+
+
+def turns(t: Array, x: Array) -> Array:
+    """The largest value (n,) since the sample before, where x turns downward between two samples.
+
+    t (n,), x (n,): times and samples. A machine goes straight to where it turns and straight back, seldom at
+    a sample: lines through the samples on either side meet there. x itself elsewhere, and where x is round.
+    """
+    found = x.copy()
+    step = np.diff(t)
+    slope = np.diff(x) / step
+    # Five steps: two on the way up, that of the turn, two on the way down.
+    before, up, down, after = slope[:-4], slope[1:-3], slope[3:-1], slope[4:]
+    first, last, h = x[2:-3], x[3:-2], step[2:-2]
+    bend = up - down
+    straight = np.maximum(np.abs(before - up), np.abs(after - down)) < STRAIGHT * bend
+    at = np.divide(last - down * h - first, bend, out=np.zeros_like(h), where=straight)
+    turned = straight & (up > 0) & (down < 0) & (at > 0) & (at < h)
+    found[3:-2][turned] = (first + up * at)[turned]
+    return np.maximum(found, x)
 
 
 def _energy(law: Law, strain: Array) -> Array:

@@ -25,9 +25,32 @@ EFFECTS = (
         (KIND,),
     ),
     Effect(
+        "led_drift",
+        (
+            Parameter(
+                "settled", "", -2.0, 2.0, 0.0, (-0.05,), "logarithm of what the warm-up leaves of light"
+            ),
+            Parameter("settling_s", "s", 1.0, 1e4, 100.0, (20.0, 200.0), "warming of lamp and driver"),
+        ),
+        (KIND,),
+        refines=True,
+    ),
+    Effect(
         "ambient_light",
         (Parameter("ambient_V", "V", 0.0, 5.0, 0.0, (0.05,), "photodiodes see the room"),),
         (KIND,),
+    ),
+    Effect(
+        "ambient_light",
+        (
+            Parameter("at_first_V", "V", 0.0, 5.0, 0.0, (0.05,), "photodiodes see the room"),
+            Parameter(
+                "per_hour", "1/h", -10.0, 10.0, 0.0, (-1.0, 1.0), "daylight, a room's lamps that warm up"
+            ),
+        ),
+        (KIND,),
+        "ambient light adds to the signal, more or less of it while it records",
+        refines=True,
     ),
     Effect(
         "optical_nonlinearity",
@@ -67,9 +90,13 @@ class WaveguideVoltage:
             angle = angle + np.sign(angle) * excess * beyond**2 / 90.0
         exponent = -get(LOSS.name, LOSS.null) * angle
         exponent = exponent + get("led_drift.per_hour", 0.0) * (time - time[0]) / 3600.0
+        if settled := get("led_drift.settled", 0.0):
+            exponent = exponent - settled * np.expm1(-(time - time[0]) / get("led_drift.settling_s", 100.0))
         # Far from the data a fit may try losses that no float holds.
         voltage = get(STRAIGHT.name, STRAIGHT.null) * np.exp(np.clip(exponent, -100.0, 100.0))
-        return (voltage + get("ambient_light.ambient_V", 0.0))[None]
+        ambient = get("ambient_light.at_first_V", 0.0)
+        ambient = ambient * (1.0 + get("ambient_light.per_hour", 0.0) * (time - time[0]) / 3600.0)
+        return (voltage + get("ambient_light.ambient_V", 0.0) + ambient)[None]
 
 
 def _angle(time: Array, angle: Array, delay_s: float) -> Array:
