@@ -86,7 +86,7 @@ def shot(name):
     file = FOLDER / f"blender-{name}.png"
     crop = f"{SIZE[0]}x{SIZE[1] - TITLE}+0+{TITLE}"
     command = ["import", "-window", "root", "-crop", crop, "+repage", "+dither", "-colors", str(COLOURS)]
-    subprocess.run([*command, "-strip", str(file)], check=True)
+    subprocess.run([*command, "-strip", f"PNG8:{file}"], check=True)
     print("picture", name, flush=True)
 
 
@@ -114,6 +114,8 @@ def new(*panels, file="", sidebar=True):
     with bpy.context.temp_override(window=window, area=area):
         bpy.ops.screen.screen_full_area(use_hide_panels=False)
     yield 2.0
+    # What was done last would stand over the sensor's plot.
+    parts()[1].spaces.active.show_region_hud = False
     if sidebar:
         parts()[1].spaces.active.show_region_ui = True
         yield 3.0
@@ -281,8 +283,81 @@ def assets():
     area.ui_type = "ASSETS"
     yield 3.0
     area.spaces.active.params.asset_library_reference = "Monolithic Units"
-    yield 3.0
+    # Its pictures are read one by one, behind the window.
+    yield 15.0
     shot("assets")
+
+
+def optimize():
+    yield from new("MU_PT_optimize")
+    yield from added(path="")
+    props = root().mu_optimize
+    for number, wanted in enumerate(
+        ({"kind": "angle", "ask": "maximise"}, {"kind": "mass", "ask": "minimise"}, {"kind": "printable"})
+    ):
+        assert called(bpy.ops.mu.optimize_list, what="targets") == {"FINISHED"}
+        for name, value in wanted.items():
+            setattr(props.targets[number], name, value)
+    for _ in range(2):
+        assert called(bpy.ops.mu.optimize_list, what="freedoms") == {"FINISHED"}
+    props.freedoms[1].how, props.freedoms[1].values = "values", "11.5, 12.5, 13.5"
+    props.evaluations, props.refine, props.check_refine = 8, 0.35, 0.4
+    seen_from(20)
+    yield from scrolled(6)
+    shot("optimize")
+    assert called(bpy.ops.mu.optimize) == {"FINISHED"}
+    child = OPTIMIZATION.child(root())
+    while child.state in ("running", "waiting"):
+        yield 1.0
+    assert child.state == "done", child.error
+    assert called(bpy.ops.mu.optimize_dismiss) == {"FINISHED"}
+    assert called(bpy.ops.mu.job_dismiss) == {"FINISHED"}
+    assert called(bpy.ops.mu.optimize_add, number=1) == {"FINISHED"}
+    both = unit_object.roots()
+    for one in both:
+        one.mu_unit.cut = True
+    unit_object.make_active(bpy.context, next(one for one in both if one.mu_optimize.targets))
+    yield 3.0
+    seen_from(50, both, 1.1)
+    yield from scrolled(24)
+    shot("optimize-found")
+
+
+def sensor_live():
+    import numpy as np
+
+    calibration = module("sensing.calibration")
+    yield from new("MU_PT_sensor")
+    yield from added(preset="mu-0.75x", path="alpha4")
+    study = root().mu_unit.study
+    study.command, study.detail = "simulate", "quick"
+    assert called(bpy.ops.mu.simulate) == {"FINISHED"}
+    child = SIMULATION.child(root())
+    while child.state in ("running", "waiting"):
+        yield 1.0
+    assert child.state == "done", child.error
+    assert called(bpy.ops.mu.job_dismiss) == {"FINISHED"}
+    # Three sweeps of the simulated sensor: its own law, with its noise.
+    angle, random = 22.5 * (1.0 - np.cos(np.linspace(0.0, 2.0 * np.pi, 200))), np.random.default_rng(0)
+    volts = 2.4 * np.exp(-0.006 * angle) - 0.02 + 0.004 * random.normal(size=(3, 200))
+    sweeps = [
+        calibration.CalibrationSweep(np.linspace(0.0, 8.0, 200) + 10 * k, angle, v)
+        for k, v in enumerate(volts)
+    ]
+    file = sensor.calibration_file(root())
+    file.parent.mkdir(parents=True, exist_ok=True)
+    calibration.write_calibration(file, calibration.calibrate(sweeps, "light_V", "dark_V"))
+    root().mu_sensor.source = "simulated"
+    assert called(bpy.ops.mu.sensor_connect) == {"FINISHED"}
+    assert called(bpy.ops.mu.sensor_twin) == {"FINISHED"}
+    seen_from(10, [root(), *root().children], 1.9)
+    parts()[1].spaces.active.region_3d.view_location.z -= 18.0
+    yield 12.0
+    while twin.status(root())[0] != "live" or sensor.of(root()).reading.angle_deg < 2.0:
+        yield 0.05
+    shot("sensor-live")
+    assert called(bpy.ops.mu.sensor_disconnect) == {"FINISHED"}
+    yield 3.0
 
 
 def track():
@@ -313,7 +388,8 @@ def track():
 
 PICTURES = {
     "add": add, "steps": steps, "print": print_part, "print-check": print_check, "simulate": simulate,
-    "obstacle": obstacle, "gripper": gripper, "apply": apply, "assets": assets, "track": track,
+    "obstacle": obstacle, "gripper": gripper, "apply": apply, "assets": assets, "optimize": optimize,
+    "sensor-live": sensor_live, "track": track,
 }  # fmt: skip
 
 
@@ -341,6 +417,8 @@ else:
     unit_object, printing = module("blender.unit.object"), module("blender.printing.state")
     gripper_object, viewports = module("blender.gripper.object"), module("blender.shared.viewports")
     SIMULATION = module("blender.simulate.job").SIMULATION
+    OPTIMIZATION = module("blender.optimize.state").OPTIMIZATION
+    sensor, twin = module("blender.sensor.state"), module("blender.sensor.twin")
     tracking, MarkerSettings = (
         module("blender.track.state"),
         module("usecases.track_video.run").MarkerSettings,

@@ -51,7 +51,8 @@ def _front(drawn: Any, found: Optimised, first: int, second: int) -> None:
     sound = [o for o in found.search.observed if o.sound]
     values = np.array([[o.values[first], o.values[second]] for o in sound])
     meets = np.array([all(t.met(v) for t, v in zip(targets, o.values, strict=True)) for o in sound])
-    axes = drawn.add_axes((0.15, 0.14, 0.81, 0.82))
+    left = 0.69 / drawn.get_figwidth()  # inches, for numbers of four digits and the axis' name
+    axes = drawn.add_axes((left, 0.14, 0.96 - left, 0.82))
     if (~meets).any():
         axes.plot(*values[~meets].T, "o", color=QUIET, markersize=3.5, alpha=0.8, label="misses a target")
     if meets.any():
