@@ -20,7 +20,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from benchmarks.peers.with_calculix import faces_of, read_displacements
+from benchmarks.peers.with_calculix import CONTROLS, STRESS, faces_of, read_displacements
 from mu_addon.errors import ConvergenceError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.laws import MooneyRivlin
@@ -35,8 +35,8 @@ STEP_kPa = 5.0
 # Where the peer puts the cylinder, and beyond which |x| in mm its surface is held.
 STRETCH, SHIFT, HELD = (1.0, 1.5, 1.5), (0.0, 9.0, 3.0), 20.0
 GAP_mm, STIFFNESS_MPa = 0.05, 0.0144
-# CalculiX's contact in MPa a mm: half the gap above at the pressures that arise.
-PENALTY = 1.0
+# CalculiX's contact in MPa a mm.
+PENALTY = 5.0
 
 
 @attrs.frozen(eq=False)
@@ -152,7 +152,9 @@ def write_input(given, contact, pressure_kPa, path):
             delimiter=",",
         )
         out.write("*MATERIAL, NAME=RESIN\n*HYPERELASTIC, MOONEY-RIVLIN\n")
-        out.write(f"{C1},{C2},{2 / KAPPA}\n*SOLID SECTION, ELSET=EVERY, MATERIAL=RESIN\n")
+        out.write(
+            f"{C1 * STRESS},{C2 * STRESS},{2 / (KAPPA * STRESS)}\n*SOLID SECTION, ELSET=EVERY, MATERIAL=RESIN\n"
+        )
         out.write("*NSET, NSET=HELD\n" + "".join(f"{node + 1},\n" for node in mesh.base))
         out.write("*BOUNDARY\nHELD, 1, 3\n")
         if contact:
@@ -165,11 +167,13 @@ def write_input(given, contact, pressure_kPa, path):
                 out.write(f"*SURFACE, NAME={name}, TYPE=ELEMENT\n")
                 out.writelines(f"{e + 1}, S{f}\n" for e, f in zip(element[rows], face[rows], strict=True))
             out.write("*SURFACE INTERACTION, NAME=TOUCH\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n")
-            out.write(f"{PENALTY}, 1.e-6\n")
+            out.write(f"{PENALTY * STRESS}, 1.\n")
             out.write("*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE\nGRIPPER, CYLINDER\n")
-        out.write("*STEP, NLGEOM, INC=1000\n*STATIC\n0.05, 1., 1.e-6, 0.05\n*DLOAD\n")
+        out.write("*STEP, NLGEOM, INC=1000\n*STATIC\n0.05, 1., 1.e-6, 0.05\n")
+        out.write(f"*CONTROLS, PARAMETERS=FIELD\n{CONTROLS}\n")
+        out.write("*DLOAD\n")
         for element, face in zip(*faces_of(mesh, mesh.cavity_corners), strict=True):
-            out.write(f"{element + 1}, P{face}, {pressure_kPa / 1000:.15g}\n")
+            out.write(f"{element + 1}, P{face}, {pressure_kPa / 1000 * STRESS:.15g}\n")
         out.write("*NODE PRINT, NSET=ALL, FREQUENCY=1000\nU\n*END STEP\n")
 
 

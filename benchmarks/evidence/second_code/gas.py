@@ -65,9 +65,6 @@ def _chamber(t: Array, level: float, faults: dict[str, dict[str, float]], number
             k2 = share * _flow(pressure(mass + h * k1, s), faults, s)
             mass += 0.5 * h * (k1 + k2)
             before = s
-            f = get("outside_regulator")
-            if f and pressure(mass, s) < start * (1.0 - f["band"]):
-                mass += f["band"] * 0.8
         found.append(pressure(mass, s) - AIR_kPa)
     read = np.array(found)
     if f := get("pressure_drift"):

@@ -26,15 +26,7 @@ def coupons(rng: Rng, faults: dict[str, dict[str, float]], noise: str) -> list[T
     top = float(rng.uniform(0.3, 0.55))
     section, length = (float(rng.uniform(4, 12)), float(rng.uniform(2, 4))), float(rng.uniform(25, 40))
     bulk = float(np.exp(rng.uniform(math.log(200.0), math.log(2000.0))))
-    plan = [
-        ("first loops", "A", [(0.6 * top, 20), (0, 20), (top, 35), (0, 35)], 23.0, "z"),
-        ("slow", "B", [(top, 300), (0, 300)], 23.0, "z"),
-        ("held", "C", [(0.7 * top, 3), (0.7 * top, 120), (0.2 * top, 3), (0.2 * top, 60)], 23.0, "z"),
-        ("first loops again", "A", [(0.6 * top, 20), (0, 20), (top, 35), (0, 35)], 23.0, "z"),
-        ("warm", "D", [(top, 35), (0, 35)], 37.0, "z"),
-        ("across", "E", [(top, 35), (0, 35)], 23.0, "x"),
-        ("pressed", "F", [(-0.2, 30), (0, 30)], 23.0, "z"),
-    ]
+    plan = [*_plan(top), ("pressed", "F", [(-0.2, 30), (0, 30)], 23.0, "z")]
     law = _hyperelastic(modulus, bulk, faults)
     scale = float(np.abs(law(np.array([top])))[0])
     return _tests(rng, "coupon", plan, law, scale, section, length, faults, noise)
@@ -45,18 +37,22 @@ def blocks(rng: Rng, faults: dict[str, dict[str, float]], noise: str) -> list[Tr
     modulus = float(np.exp(rng.uniform(math.log(8.0), math.log(60.0))))
     top = float(rng.uniform(0.12, 0.2))
     side = float(rng.uniform(25, 45))
-    plan = [
+    plan = [*_plan(top), ("1.3 times as tall", "F", [(top, 50), (0, 50)], 23.0, "z")]
+    law = _cellular(modulus, faults)
+    scale = float(law(np.array([top]))[0])
+    return _tests(rng, "lattice_compression", plan, law, scale, (side, side), side, faults, noise)
+
+
+def _plan(top: float) -> list[Any]:
+    """What both are put through: name, specimen, strains and seconds, temperature in C, direction."""
+    return [
         ("first loops", "A", [(0.6 * top, 20), (0, 20), (top, 35), (0, 35)], 23.0, "z"),
         ("slow", "B", [(top, 300), (0, 300)], 23.0, "z"),
         ("held", "C", [(0.7 * top, 3), (0.7 * top, 120), (0.2 * top, 3), (0.2 * top, 60)], 23.0, "z"),
         ("first loops again", "A", [(0.6 * top, 20), (0, 20), (top, 35), (0, 35)], 23.0, "z"),
         ("warm", "D", [(top, 35), (0, 35)], 37.0, "z"),
         ("across", "E", [(top, 35), (0, 35)], 23.0, "x"),
-        ("1.3 times as tall", "F", [(top, 50), (0, 50)], 23.0, "z"),
     ]
-    law = _cellular(modulus, faults)
-    scale = float(law(np.array([top]))[0])
-    return _tests(rng, "lattice_compression", plan, law, scale, (side, side), side, faults, noise)
 
 
 def _hyperelastic(

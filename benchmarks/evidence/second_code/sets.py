@@ -86,7 +86,6 @@ OUTSIDE: dict[str, dict[str, dict[str, Any]]] = {
     },
     "pressure_hold": {
         "outside_room": {"kelvin": (0.6, 3.0), "period_s": (60.0, 200.0)},
-        "outside_regulator": {"band": (0.005, 0.02)},
         "outside_bumped": {"kPa": (1.0, 4.0), "at": (0.3, 0.8)},
         "outside_tilt": {"kPa": (1.0, 4.0), "at": (0.3, 0.8)},
         "outside_valve": {"rate": (2e-3, 1e-2), "opens_kPa": (60.0, 140.0)},
