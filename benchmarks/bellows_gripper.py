@@ -152,9 +152,8 @@ def write_input(given, contact, pressure_kPa, path):
             delimiter=",",
         )
         out.write("*MATERIAL, NAME=RESIN\n*HYPERELASTIC, MOONEY-RIVLIN\n")
-        out.write(
-            f"{C1 * STRESS},{C2 * STRESS},{2 / (KAPPA * STRESS)}\n*SOLID SECTION, ELSET=EVERY, MATERIAL=RESIN\n"
-        )
+        out.write(f"{C1 * STRESS},{C2 * STRESS},{2 / (KAPPA * STRESS)}\n")
+        out.write("*SOLID SECTION, ELSET=EVERY, MATERIAL=RESIN\n")
         out.write("*NSET, NSET=HELD\n" + "".join(f"{node + 1},\n" for node in mesh.base))
         out.write("*BOUNDARY\nHELD, 1, 3\n")
         if contact:
