@@ -202,6 +202,23 @@ def steps():
     shot("muted")
 
 
+def paint():
+    yield from new("MU_PT_lattice")
+    yield from added(path="")
+    assert called(bpy.ops.mu.paint_struts) == {"FINISHED"}
+    seen_from(20)
+    yield 2.0
+    over_view(0.45, 0.75)
+    yield 1.0
+    event("LEFTMOUSE", "PRESS")
+    for k in range(12):
+        over_view(0.45, 0.75 - 0.04 * k)
+        yield 0.2
+    event("LEFTMOUSE", "RELEASE")
+    yield 3.0
+    shot("paint")
+
+
 def print_part():
     yield from new("MU_PT_print", "MU_PT_print_files")
     yield from added(preset="mu-0.75x")
@@ -387,7 +404,7 @@ def track():
 
 
 PICTURES = {
-    "add": add, "steps": steps, "print": print_part, "print-check": print_check, "simulate": simulate,
+    "add": add, "steps": steps, "paint": paint, "print": print_part, "print-check": print_check, "simulate": simulate,
     "obstacle": obstacle, "gripper": gripper, "apply": apply, "assets": assets, "optimize": optimize,
     "sensor-live": sensor_live, "track": track,
 }  # fmt: skip
