@@ -254,9 +254,9 @@ def _factor(experiment: Experiment, values: Mapping[str, float], past: StrainHis
 def _seated(experiment: Experiment, law: Law, values: Mapping[str, float]) -> Law:
     """The law between faces that close, strain counted from the preload."""
     gap = values.get("seating.gap_mm", 0.0)
-    if not gap:
-        return law
     toe = gap / (experiment.length_mm or LENGTH_mm * experiment.scale)
+    if not toe:
+        return law
 
     def closing(strain: Array) -> Array:
         return law(np.sign(strain) * (np.abs(strain) + toe * np.expm1(-np.abs(strain) / toe)))

@@ -51,10 +51,11 @@ def elastic_strain(strain: Array, values: Mapping[str, float]) -> Array:
     if not per_strain:
         return strain
     hardening = values.get(f"{NAME}.hardening", _HARDENING)
-    mean, yields = 1.0 / per_strain, (1.0 - hardening) / per_strain
 
     def first(e: float) -> float:
-        return hardening * e + math.copysign(yields * math.expm1(-abs(e) / mean), e)
+        # Of a mean strain m beyond all numbers it is e itself, and m alone would be infinite.
+        x = abs(e) * per_strain
+        return hardening * e + (1.0 - hardening) * e * (-math.expm1(-x) / x if x else 1.0)
 
     found = []
     # Where the way turned, in pairs of strain and elastic strain, as far as the material remembers.

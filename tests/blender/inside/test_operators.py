@@ -23,7 +23,8 @@ def test_add_makes_a_unit():
     bpy.context.scene.cursor.location = (1.0, 2.0, 3.0)
     root = add()
     assert to_unit(root.mu_unit) == load_preset("mu-1.0x")
-    assert root.location[:] == (1.0, 2.0, 3.0)
+    # The cursor stays where it is, a metre away, as the scene's unit becomes a millimetre.
+    assert root.location[:] == (1000.0, 2000.0, 3000.0)
     assert bpy.context.object == root
     assert bpy.context.selected_objects == [root]
     units = bpy.context.scene.unit_settings

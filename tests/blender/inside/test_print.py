@@ -124,8 +124,8 @@ def test_a_check_from_start_to_markers(tmp_path):
 
 def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
     bpy.context.preferences.edit.use_global_undo = True
-    bpy.context.scene.cursor.location = (100, 0, 0)
     root = add()
+    root.location = (100, 0, 0)
     bpy.context.view_layer.update()
     places = [[1, 2, 3], [4, 5, 6]]
     build = {
