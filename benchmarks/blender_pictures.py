@@ -404,7 +404,8 @@ def track():
 
 
 PICTURES = {
-    "add": add, "steps": steps, "paint": paint, "print": print_part, "print-check": print_check, "simulate": simulate,
+    "add": add, "steps": steps, "paint": paint, "print": print_part, "print-check": print_check,
+    "simulate": simulate,
     "obstacle": obstacle, "gripper": gripper, "apply": apply, "assets": assets, "optimize": optimize,
     "sensor-live": sensor_live, "track": track,
 }  # fmt: skip
