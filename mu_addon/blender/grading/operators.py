@@ -67,10 +67,6 @@ class MU_OT_paint_struts_apply(_WhilePainting, bpy.types.Operator):
     def execute(self, context):
         root = unit_object.active_root(context)
         obj, field = state.painted_on(root), to_unit(root.mu_unit).grading_field
-        if len(obj.data.vertices) != 8 * field.cell_factors.size:
-            raise InputError(
-                "the unit has other cells now than were painted", obj.name, "discard, and paint again"
-            )
         text = field.cells_of_factors(state.factors_on(obj, field))
         _leave(context, root)
         root.mu_unit.grading.cells = text

@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from ...design.grading import LEAST, MOST, Field
+from ...errors import InputError
 from ..preview.materials import material
 from ..shared import displays
 
@@ -33,13 +34,20 @@ def begin(root: Any, field: Field) -> Any:
     obj = displays.lock(displays.add(root, displays.PAINTED, "struts", mesh))
     group = obj.vertex_groups.new(name="Strut Factor")
     weights = weights_of(field.cell_factors.ravel())
-    for number, weight in enumerate(np.repeat(weights, len(_CORNERS)).tolist()):
-        group.add([number], weight, "REPLACE")
+    for cell, weight in enumerate(weights.tolist()):
+        group.add(list(range(len(_CORNERS) * cell, len(_CORNERS) * (cell + 1))), weight, "REPLACE")
     return obj
 
 
 def factors_on(obj: Any, field: Field) -> np.ndarray[Any, Any]:
-    """Factors (columns, rows, chambers) of an object of `begin`: by the mean weight of each cell's cube."""
+    """Factors (columns, rows, chambers) of an object of `begin`: by the mean weight of each cell's cube.
+
+    Raises InputError where the unit has other cells now.
+    """
+    if len(obj.data.vertices) != len(_CORNERS) * field.cell_factors.size:
+        raise InputError(
+            "the unit has other cells now than were painted", obj.name, "discard, and paint again"
+        )
     painted = np.zeros(len(obj.data.vertices))
     for vertex in obj.data.vertices:
         for element in vertex.groups:
