@@ -170,6 +170,12 @@ def _rough(measured: Record, group: str) -> Source:
     return Source(max(float(np.ptp(values)), 1e-9) / 100.0, 1e-6, 1.0)
 
 
+def _seen(fitter: Fitter, base: Fit) -> list[Sensitivity]:
+    """What each effect of the library does to the data beside the base model's values."""
+    curved = {p.name: base.values[p.name] for p in fitter.curved}
+    return at_bounds(fitter, curved, sensitivities(fitter, curved))
+
+
 def diagnose(
     experiments: Sequence[Experiment], simulator: Composite, progress: Callable[[str], None] = lambda _: None
 ) -> Verdict:
@@ -192,8 +198,7 @@ def diagnose(
     sources = fitter.sources
     require_plausible(fitter, base)
     progress("sensitivities")
-    curved = {p.name: base.values[p.name] for p in fitter.curved}
-    seen = at_bounds(fitter, curved, sensitivities(fitter, curved))
+    seen = _seen(fitter, base)
     chosen = select(fitter, seen, progress)
     if chosen.causes and _kind(fitter, chosen) == "unexplained":
         # Beside a large misfit readings that stand alone are not seen.
@@ -202,8 +207,7 @@ def diagnose(
             set_aside = [*set_aside, *more]
             measured, fitter, base = _base(experiments, again, simulator)
             sources = fitter.sources
-            curved = {p.name: base.values[p.name] for p in fitter.curved}
-            seen = at_bounds(fitter, curved, sensitivities(fitter, curved))
+            seen = _seen(fitter, base)
             chosen = reselected(fitter, seen, chosen)
     if _kind(fitter, chosen) == "unexplained":
         chosen, seen = select_owned(fitter, seen, chosen, progress)
@@ -219,7 +223,7 @@ def diagnose(
             sources, fitter = renewed, Fitter(measured, simulator, renewed)
             chosen = reselected(fitter, seen, chosen)
             if chosen.left:
-                seen = at_bounds(fitter, curved, sensitivities(fitter, curved))
+                seen = _seen(fitter, base)
                 chosen = one_more(fitter, seen, chosen, progress)
             if _kind(fitter, chosen) == "unexplained" and not owned:
                 chosen, seen = select_owned(fitter, seen, chosen, progress)
