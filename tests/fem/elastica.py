@@ -3,10 +3,10 @@
 Lengths are in radii of the ring, pressures in D / radius^3, forces per unit of width in D / radius^2, with D
 the wall's bending stiffness per unit of width; the ring's line keeps its length. A quarter, over the arc s
 from the middle A of a long side, on the y axis, to the end B on the x axis: x' = cos(theta),
-y' = sin(theta), theta' = kappa. The force on what lies before s has F_x' = p y', F_y' = -p x'; symmetry about
-B leaves F_x = p y, and (kappa - kappa_0)' = F_x sin(theta) - F_y cos(theta), where kappa_0 is the curvature as
-drawn. Where sides are apart F_y(A) = 0; where they touch at A, y(A) = -half_gap; sides that lie flat over
-0 <= x <= flat leave that line without curvature.
+y' = sin(theta), theta' = kappa. The force on what lies before s has F_x' = p y', F_y' = -p x'; symmetry
+about B leaves F_x = p y, and (kappa - kappa_0)' = F_x sin(theta) - F_y cos(theta), where kappa_0 is the
+curvature as drawn. Where sides are apart F_y(A) = 0; where they touch at A, y(A) = -half_gap; sides that lie
+flat over 0 <= x <= flat leave that line without curvature.
 
 Published: a perfect ring buckles at 3, its sides meet at 5.247 and lie flat from 10.34 on (J. E. Flaherty,
 J. B. Keller and S. I. Rubinow, SIAM J. Appl. Math. 23 (1972) 446).
@@ -45,7 +45,7 @@ class Ring:
         """The ring at another pressure, sought from this one.
 
         half_gap: between sides that touch, None where they are apart; flat: whether they touch along a line.
-        drawn: the share a of the radius in 1 + a cos(2 phi), phi from B, of a ring that is no circle as drawn.
+        drawn: the share a of the radius in 1 + a cos(2 phi), phi from B, where the ring as drawn is oval.
         """
 
         def slopes(s, v, unknown=(0.0,)):
