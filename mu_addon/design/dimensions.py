@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import lattices
 from .grading import Field
+from .wall_factors import factor_at
 
 
 @attrs.frozen
@@ -16,9 +17,10 @@ class Dimensions:
 
     cell: the lattice cell U, which is also the pitch of the chambers; count: of chambers. R and r: outer
     radii of the profile at a bladder's apex and at a neck; a and b: half-lengths of their parabola arcs, a
-    + b = U/2. wall: along the surface normal. Counts of cells and `row` are whole numbers, see
-    `parameters.Envelope`. grading: of the struts, None for struts alike everywhere; strut_growth: by how much
-    printing thickens them, which no grading multiplies.
+    + b = U/2. wall: along the surface normal, wall_factors: of single chambers, () where all are alike;
+    wall_growth: by how much printing thickens the wall, which no factor multiplies. Counts of cells and `row`
+    are whole numbers, see `parameters.Envelope`. grading: of the struts, None for struts alike everywhere;
+    strut_growth: by how much printing thickens them, which no grading multiplies.
 
     >>> from mu_addon.design import load_preset
     >>> d = load_preset("mu-1.5x").dimensions
@@ -61,6 +63,27 @@ class Dimensions:
     inclusion_radius: float
     grading: Field | None = None
     strut_growth: float = 0.0
+    wall_factors: tuple[float, ...] = ()
+    wall_growth: float = 0.0
+
+    def wall_at(self, z: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Wall in mm along the normal of the outer profile at heights z in mm (any shape), and its slope."""
+        at = np.asarray(z, float)
+        if not self.wall_factors:
+            return np.full(at.shape, self.wall), np.zeros(at.shape)
+        factor, slope = factor_at(self.wall_factors, self.cell, at)
+        drawn = self.wall - self.wall_growth
+        return drawn * factor + self.wall_growth, drawn * slope
+
+    @property
+    def thinnest_wall(self) -> float:
+        """Thickness in mm of the thinnest chamber's wall."""
+        return (self.wall - self.wall_growth) * min(self.wall_factors, default=1.0) + self.wall_growth
+
+    @property
+    def thickest_wall(self) -> float:
+        """Thickness in mm of the thickest chamber's wall."""
+        return (self.wall - self.wall_growth) * max(self.wall_factors, default=1.0) + self.wall_growth
 
     def strut_factors(self, points: ArrayLike) -> NDArray[np.float64]:
         """Factors (n,) of the grading at points (n, 3) in mm; 1 without one."""

@@ -18,8 +18,9 @@ from .assets import asset_file, asset_names
 from .dimensions import Dimensions
 from .grading import Field, Grading
 from .printed import as_printed
-from .quantity import PAPER, Description, choice, describe, in_MPa, quantity
+from .quantity import PAPER, Description, choice, describe, in_MPa, quantity, text_quantity
 from .wall import Wall, require_used
+from .wall_factors import canonical_text, factors_by_chamber, parsed
 
 FORMAT = 1
 
@@ -59,6 +60,13 @@ class Chambers:
         6.0,
         "membrane thickness along the surface normal",
         "assumed: the paper prints none; thinner walls (0.8 mm) touch at 20 kPa of vacuum",
+    )
+    wall_factors: str = text_quantity(
+        "",
+        canonical_text,
+        'factors on the wall of single chambers, as "chamber: factor; ...", chambers counted from 1 at the '
+        "inlet; between two apices the wall goes smoothly from one to the other",
+        "assumed: the paper's chambers are alike",
     )
     base_cap_mm: float = quantity(
         1.5,
@@ -100,6 +108,12 @@ class Chambers:
         "wall of the inlet boss",
         "assumed: the paper prints none; the minimum strut",
     )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters in use: `wall_factors` is none where chambers are alike."""
+        fields = (f.name for f in attrs.fields(Chambers))
+        return tuple(name for name in fields if name != "wall_factors" or self.wall_factors)
 
 
 @attrs.frozen
@@ -427,6 +441,7 @@ class Unit:
             a=a,
             b=half_pitch - a,
             wall=s * c.wall_mm,
+            wall_factors=factors_by_chamber(parsed(c.wall_factors), c.count),
             base_cap=s * c.base_cap_mm,
             tip_cap=s * c.tip_cap_mm,
             inlet_radius=s * c.inlet_diameter_mm / 2.0,

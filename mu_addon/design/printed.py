@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .dimensions import Dimensions
 from .profile import outer_radius, outer_slope
@@ -35,14 +35,15 @@ def as_printed(d: Dimensions, offset_xy: float, offset_z: float) -> Dimensions:
     # At the joint the profile must rise by |D n|/n_r; a joint moved by s raises it there by o_xy + slope s/2.
     rise = _outward(normal, offset)[0] * np.hypot(1.0, steepest)
     moved = 2.0 * (rise - offset_xy) / steepest
-    strut = 2.0 * _round_the_struts(d, offset)
+    strut, wall = 2.0 * _round_the_struts(d, offset), 2.0 * _over_the_profile(d, offset)
     return attrs.evolve(
         d,
         R=d.R + offset_xy,
         r=d.r + offset_xy,
         a=d.a + moved,
         b=d.b - moved,
-        wall=d.wall + 2.0 * _over_the_profile(d, offset),
+        wall=d.wall + wall,
+        wall_growth=d.wall_growth + wall,
         base_cap=d.base_cap + 2.0 * offset_z,
         tip_cap=d.tip_cap + 2.0 * offset_z,
         inlet_radius=d.inlet_radius - offset_xy,
@@ -79,15 +80,15 @@ def _over_the_profile(d: Dimensions, offset: Array) -> float:
     return float(np.average(_outward(normals, offset), weights=outer_radius(d, z) * stretch))
 
 
-def skin_stiffening(wall: float, depth: float, factor: float) -> float:
+def skin_stiffening(wall: ArrayLike, depth: float, factor: float) -> Array:
     """Modulus of a wall with a stiffer skin on both faces over its core's: Voigt's mean over the thickness.
 
-    wall, depth: thickness of the wall and of one skin, in mm; factor: modulus of skin over core. The skin's
-    share is min(1, 2 depth/wall). Exact for stretch along the wall; in bending, where the faces count most,
-    a stiffer skin is underestimated.
+    wall, depth: thickness of the wall (any shape) and of one skin, in mm; factor: modulus of skin over core.
+    The skin's share is min(1, 2 depth/wall). Exact for stretch along the wall; in bending, where the faces
+    count most, a stiffer skin is underestimated.
 
-    >>> skin_stiffening(wall=1.0, depth=0.1, factor=2.0)
+    >>> float(skin_stiffening(wall=1.0, depth=0.1, factor=2.0))
     1.2
     """
-    share = min(1.0, 2.0 * depth / wall)
-    return 1.0 + share * (factor - 1.0)
+    share = np.minimum(1.0, 2.0 * depth / np.asarray(wall, float))
+    return np.asarray(1.0 + share * (factor - 1.0))

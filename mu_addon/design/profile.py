@@ -1,9 +1,9 @@
-"""The actuator's profile: parabola arcs for bladders and necks, and the cavity inside a constant wall.
+"""The actuator's profile: parabola arcs for bladders and necks, and the cavity inside the wall.
 
 One period of length U = 2 (a + b): a bladder arc of half-length a about its apex (radius R), a neck arc
 of half-length b about its minimum (radius r); equal slopes where they meet give the joint radius
 (R b + r a)/(a + b). The cavity is the offset of that curve by the wall along its normal, cut flat by the
-two end caps.
+two end caps; the wall may differ from chamber to chamber (`wall_factors`).
 """
 
 from __future__ import annotations
@@ -169,15 +169,29 @@ def _outer(d: Dimensions, s: Array) -> tuple[Array, Array, Array]:
 
 
 def _inner(d: Dimensions, s: Array) -> tuple[Array, Array, Array]:
-    """Offset point (radius, z) of the outer point at height s, and dz/ds = 1 - wall * curvature."""
+    """Offset point (radius, z) of the outer point at height s, and dz/ds."""
     radius, slope, bend = _outer(d, s)
+    wall, change = d.wall_at(s)
     length = np.sqrt(1.0 + slope**2)
-    return radius - d.wall / length, s + d.wall * slope / length, 1.0 + d.wall * bend / length**3
+    # 1 - wall * curvature, and what a wall that changes along the profile adds.
+    stretch = 1.0 + wall * bend / length**3 + change * slope / length
+    return radius - wall / length, s + wall * slope / length, stretch
+
+
+def _inner_tangent(d: Dimensions, s: Array) -> Array:
+    """Directions (n, 2) of the cavity's profile, (dr, dz) for dz = 1, at the offsets of heights s (n,)."""
+    _, slope, bend = _outer(d, s)
+    wall, change = d.wall_at(s)
+    length = np.sqrt(1.0 + slope**2)
+    along = 1.0 + wall * bend / length**3
+    # A wall that does not change leaves the cavity parallel to the profile.
+    leans = (slope * along - change / length) / (along + change * slope / length) if change.any() else slope
+    return np.stack([leans, np.ones_like(leans)], axis=1)
 
 
 def _foot(d: Dimensions, z: Array) -> Array:
     """Height s on the outer profile whose offset lies at z, by bisection: dz/ds > 0 where the wall fits."""
-    low, high = z - d.wall, z + d.wall
+    low, high = z - d.thickest_wall, z + d.thickest_wall
     for _ in range(60):
         middle = (low + high) / 2.0
         beyond = _inner(d, middle)[1] > z
@@ -231,9 +245,8 @@ def _offset_arcs(d: Dimensions, splits: int) -> list[Array]:
     for low, high in _spans(d, splits):
         s = np.array([low, (low + high) / 2.0, high])
         radius, z, _ = _inner(d, s)
-        slope = _outer(d, s)[1]
         start, middle, end = np.stack([radius, z], axis=1)
-        tangents = np.array([[slope[0], 1.0], [slope[2], 1.0]])
+        tangents = _inner_tangent(d, s[[0, 2]])
         # B(1/2) = (start + end)/2 + 3/8 (p t0 - q t1): two equations for the two pole lengths p and q.
         p, q = np.linalg.solve(
             0.375 * np.stack([tangents[0], -tangents[1]], axis=1), middle - (start + end) / 2.0
@@ -247,7 +260,9 @@ def _splits(d: Dimensions) -> int:
     t = np.linspace(0.0, 1.0, 17)[1:-1]
     splits = 1
     while splits < 64:
-        first = np.array(_offset_arcs(d, splits)[: 2 * splits])  # the other quarters are mirror images
+        arcs = _offset_arcs(d, splits)
+        # Of chambers that are alike the other quarters are mirror images.
+        first = np.array(arcs if d.wall_factors else arcs[: 2 * splits])
         points = _bezier(first, t)
         s = _foot(d, points[..., 1])
         off = np.abs(points[..., 0] - _inner(d, s)[0]) / np.sqrt(1.0 + _outer(d, s)[1] ** 2)

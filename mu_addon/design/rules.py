@@ -80,7 +80,7 @@ def _printed_breach(d: Dimensions, offset_xy: float, offset_z: float) -> tuple[s
     if thinnest + 2.0 * least <= 0.0:
         return "struts left when printed", f"leave no material of struts of {thinnest:.4g} mm"
     for part, thickness in {
-        "walls": d.wall,
+        "walls": d.thinnest_wall,
         "end caps": min(d.base_cap, d.tip_cap),
         "the inlet's walls": d.inlet_wall,
         "the waveguide": d.waveguide_section - d.well_depth,
@@ -101,9 +101,9 @@ def _printed_breach(d: Dimensions, offset_xy: float, offset_z: float) -> tuple[s
     p = as_printed(d, offset_xy, offset_z)
     if min(p.a, p.b) <= 0.0:
         return "bladder and neck when printed", "leave no necks between the bladders"
-    if p.inlet_radius >= p.r - p.wall:
-        return "a cavity when printed", f"close the necks, {2.0 * (d.r - d.wall):.4g} mm wide inside"
-    if p.wall >= p.apex_curvature_radius:
+    if p.inlet_radius >= p.r - p.thickest_wall:
+        return "a cavity when printed", f"close the necks, {2.0 * (d.r - d.thickest_wall):.4g} mm wide inside"
+    if p.thickest_wall >= p.apex_curvature_radius:
         return "a cavity when printed", "fold the cavity at the apices"
     if max(p.base_cap, p.tip_cap) >= p.cell / 2.0:
         return "a cavity when printed", "fill an end chamber up to its apex"
@@ -181,13 +181,15 @@ def _wall(d: Dimensions) -> None:
         "a bore through every neck": (d.r, "no bore is left through the necks"),
     }
     rule, (limit, why) = min(limits.items(), key=lambda item: item[1][0])
-    if d.wall >= limit:
+    if d.thickest_wall >= limit:
         fits = min(limit, d.r - d.inlet_radius) if d.inlet_radius < d.r else limit
+        factor = d.thickest_wall / d.wall
+        of = f", {factor:g} times wall_mm in its thickest chamber," if factor > 1.0 else ""
         _refuse(
             rule,
-            f"a wall of {d.wall / s:g} mm is too thick: {why} from {limit / s:.4g} mm on",
+            f"a wall of {d.thickest_wall / s:g} mm{of} is too thick: {why} from {limit / s:.4g} mm on",
             "[chambers] wall_mm",
-            f"the largest wall that fits is {_below(fits / s):g} mm",
+            f"the largest wall that fits is {_below(fits / s / factor):g} mm",
         )
 
 
@@ -201,7 +203,7 @@ def _ends(d: Dimensions) -> None:
                 f"[chambers] {key}",
                 f"the largest cap that fits is {_below(half / s):g} mm",
             )
-    bore = d.r - d.wall
+    bore = d.r - float(d.wall_at(0.0)[0])
     if d.inlet_radius >= bore:
         _refuse(
             "inlet within the neck's bore",

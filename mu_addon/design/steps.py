@@ -349,7 +349,8 @@ _PROFILE = (
     "chambers.neck_diameter_mm",
     "chambers.bladder_share",
 )
-_CHAMBERS = ("chambers.wall_mm", "chambers.base_cap_mm", "chambers.tip_cap_mm")
+_WALL = ("chambers.wall_mm", "chambers.wall_factors")
+_CHAMBERS = (*_WALL, "chambers.base_cap_mm", "chambers.tip_cap_mm")
 _STRUTS = ("lattice.junction_diameter_mm", "lattice.midspan_diameter_mm")
 _GRADING = _all_of(Grading)
 _PITCH = ("chambers.count", "chambers.cell_mm")
@@ -456,7 +457,7 @@ STEPS: dict[str, Step] = {
             _wells,
             ("path",),
             _WELLS,
-            (*_PROFILE, *_STRUTS, *_GRADING, "chambers.wall_mm"),
+            (*_PROFILE, *_STRUTS, *_GRADING, *_WALL),
             muting="a bar without wells is not sensitive to the bending direction",
             mute=_without_wells,
         ),

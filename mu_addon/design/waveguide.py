@@ -302,7 +302,7 @@ def _check_path(d: Dimensions, nodes: Array) -> None:
     t = np.linspace(0.0, 1.0, 25)[:, None]
     for start, end in pairwise(nodes):
         at = start + t * (end - start)
-        inside = np.hypot(at[:, 0], at[:, 1]) < outer_radius(d, at[:, 2]) - d.wall
+        inside = np.hypot(at[:, 0], at[:, 1]) < outer_radius(d, at[:, 2]) - d.wall_at(at[:, 2])[0]
         if inside.any():
             x, y, z = (float(c) for c in at[inside][0])
             raise InputError(

@@ -48,14 +48,17 @@ def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> M
     if mesh.resolved:
         return _of_resin(unit, mesh)
     m, p = unit.material, unit.print
-    stiffer = skin_stiffening(unit.printed.wall, p.skin_depth_mm, p.skin_factor)
+    stiffer = float(skin_stiffening(unit.printed.wall, p.skin_depth_mm, p.skin_factor))
     membrane_MPa = in_MPa(stiffer * m.membrane_modulus_kPa)
     inside = mesh.region == LATTICE
+    # A thinner wall is skin for a larger share.
+    relative = skin_stiffening(_walls(unit, mesh), p.skin_depth_mm, p.skin_factor) / stiffer
     if unit.wall.names or lattice is not None or unit.grading.names:
         wall = wall_layers(unit.wall, np.flatnonzero(~inside), membrane_MPa, m.membrane_poisson)
+        wall = tuple(attrs.evolve(f, weight=f.weight * relative[f.elements]) for f in wall)
         return Materials((*wall, *_lattice_layers(unit, mesh, np.flatnonzero(inside), lattice)))
     return Materials.neo_hooke(
-        np.where(inside, m.lattice_modulus_MPa, membrane_MPa),
+        np.where(inside, m.lattice_modulus_MPa, membrane_MPa * relative),
         np.where(inside, m.lattice_poisson, m.membrane_poisson),
     )
 
@@ -72,10 +75,15 @@ def _of_resin(unit: Unit, mesh: Mesh) -> Materials:
     return Materials(tuple(Layer(f.law, f.elements, f.parameters, f.weight * stiffer) for f in layers))
 
 
+def _walls(unit: Unit, mesh: Mesh) -> Array:
+    """Thickness (m,) in mm of the printed wall at the height of each element."""
+    return unit.printed.wall_at(mesh.nodes[mesh.tets[:, :4], 2].mean(axis=1))[0]
+
+
 def _skin_stiffening(unit: Unit, mesh: Mesh) -> Array:
     """Modulus (m,) of each element of a resolved mesh over the core's, by the skin's share of its volume."""
     p, d = unit.print, unit.printed
-    found = np.full(len(mesh.tets), skin_stiffening(d.wall, p.skin_depth_mm, p.skin_factor))
+    found = skin_stiffening(_walls(unit, mesh), p.skin_depth_mm, p.skin_factor)
     if p.skin_depth_mm == 0.0 or p.skin_factor == 1.0:
         return found
     struts = np.flatnonzero(mesh.region == LATTICE)
@@ -127,4 +135,4 @@ def self_contact_of(unit: Unit, mesh: Mesh) -> SelfContact:
     from .self_contact import SelfContact
 
     resin_MPa = in_MPa(unit.material.membrane_modulus_kPa)
-    return SelfContact(mesh, _GAP_SHARE * unit.printed.wall, _BARRIER_SHARE * resin_MPa)
+    return SelfContact(mesh, _GAP_SHARE * unit.printed.thinnest_wall, _BARRIER_SHARE * resin_MPa)

@@ -64,7 +64,8 @@ class Meridian:
             # end's edge: a straight one would cross a neck's profile under a thick cap.
             edge = outer_radius(d, np.array([end, cut]))
             rim = under_profile(d, np.array([cut]), np.array([1.0]))[0, 0]
-            widths = min(max(d.wall, 0.5 * abs(cap)), 0.5 * edge[0]), edge[1] - rim
+            wall = float(d.wall_at(end)[0])
+            widths = min(max(wall, 0.5 * abs(cap)), 0.5 * edge[0]), edge[1] - rim
             width = widths[0] + share * (widths[1] - widths[0])
             flank = np.column_stack([profile[:, 0] - width, end + share * cap])
             axis = flank * [0.0, 1.0]
@@ -79,13 +80,13 @@ def under_profile(d: Dimensions, p: Array, q: Array) -> Array:
     p (n,): heights on the profile in mm; q (n,) or a number: 0 on the profile, 1 on the cavity.
     """
     slope = outer_slope(d, p)
-    depth = q * d.wall / np.hypot(1.0, slope)
+    depth = q * d.wall_at(p)[0] / np.hypot(1.0, slope)
     return np.column_stack([outer_radius(d, p) - depth, p + depth * slope])
 
 
 def _foot(d: Dimensions, z: float) -> float:
     """Height on the profile whose normal meets the cavity at height z, by bisection."""
-    low, high = z - d.wall, z + d.wall
+    low, high = z - d.thickest_wall, z + d.thickest_wall
     for _ in range(60):
         middle = 0.5 * (low + high)
         below = under_profile(d, np.array([middle]), np.array([1.0]))[0, 1] < z

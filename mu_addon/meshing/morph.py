@@ -115,7 +115,7 @@ def morphed(mesh: Mesh, drawn: Unit, other: Unit, settings: MeshSettings) -> Mes
 def _shrunk(d: Dimensions, cell: float) -> Dimensions:
     """Dimensions with every length of the membrane and its envelope scaled to another cell in mm."""
     by = cell / d.cell
-    lengths = ("R", "r", "a", "b", "wall", "base_cap", "tip_cap")
+    lengths = ("R", "r", "a", "b", "wall", "wall_growth", "base_cap", "tip_cap")
     return attrs.evolve(d, cell=cell, **{name: by * getattr(d, name) for name in lengths})
 
 

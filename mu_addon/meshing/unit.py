@@ -239,7 +239,7 @@ def _from_surfaces(
         settings.envelope_mm * size,
         inside=(profile, cavity),
         classify=lambda points: region_at(d, points),
-        epsilon_mm=d.wall / 5,
+        epsilon_mm=d.thinnest_wall / 5,
         order=settings.order,
         symmetry=symmetry,
         cache=cache,

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import attrs
 
-from ..design.grading import LEAST, MOST, CellFactor, cells_text, parsed
+from ..design import grading, wall_factors
+from ..design.grading import CellFactor
 from ..design.parameters import SECTIONS, Unit
 from ..design.quantity import Description, describe
 from ..design.toml_text import nearest
@@ -20,16 +21,73 @@ SCALE = "scale"
 UNSEEN = ("lattice.junction_diameter_mm", "lattice.midspan_diameter_mm", "lattice.kind")
 
 
-# Of the text of single cells' factors one entry: "grading.cells[0 2 *]".
-CELLS = "grading.cells"
-_CELLS = re.compile(re.escape(CELLS) + r"\[(.+)\]")
+@attrs.frozen
+class FactorList:
+    """A parameter that is a text of factors by place, any of which may be free: "grading.cells[0 2 *]".
+
+    key: of a [[freedom]] table, names the place; place: how a place is written, and an example. factors: of
+    a text, by the text of their place; text: the other way round; both raise InputError.
+    """
+
+    name: str
+    key: str
+    place: tuple[str, str]
+    low: float
+    high: float
+    factors: Callable[[str], dict[str, float]]
+    text: Callable[[Mapping[str, float]], str]
+
+    def canonical(self, place: str) -> str:
+        """The one text of all that name the same place; raises InputError."""
+        # Any factor but 1, which would be no entry.
+        [found] = self.factors(f"{place}: 1.5")
+        return found
+
+    def of(self, unit: Unit) -> dict[str, float]:
+        """Factors of the unit by their place."""
+        section, _, name = self.name.partition(".")
+        return self.factors(getattr(getattr(unit, section), name))
 
 
-def _entry(cells: str) -> CellFactor:
-    """An entry of cells by their indices as text; raises InputError."""
-    # Any factor but 1, which would be no entry.
-    [entry] = parsed(f"{cells}: 1.5")
-    return entry
+def _cells_by_place(text: str) -> dict[str, float]:
+    entries = grading.parsed(text)
+    return {grading.cells_text([e._replace(factor=1.5)]).rpartition(":")[0]: e.factor for e in entries}
+
+
+def _text_of_cells(factors: Mapping[str, float]) -> str:
+    [*entries] = (
+        CellFactor(*grading.parsed(f"{place}: 1.5")[0][:3], factor) for place, factor in factors.items()
+    )
+    return grading.cells_text(entries)
+
+
+FACTOR_LISTS = (
+    FactorList(
+        "grading.cells",
+        "cells",
+        ("column, row and chamber", "0 2 *"),
+        grading.LEAST,
+        grading.MOST,
+        _cells_by_place,
+        _text_of_cells,
+    ),
+    FactorList(
+        "chambers.wall_factors",
+        "chamber",
+        ("chamber, counted from 1 at the inlet", "2"),
+        wall_factors.LEAST,
+        wall_factors.MOST,
+        lambda text: {str(chamber): factor for chamber, factor in wall_factors.parsed(text).items()},
+        lambda factors: wall_factors.text_of({int(chamber): f for chamber, f in factors.items()}),
+    ),
+)
+
+
+def _entry(name: str) -> tuple[FactorList, str] | None:
+    """The list and the place that a name such as "grading.cells[0 2 *]" is of; None for another name."""
+    match = re.fullmatch(r"([^\[]+)\[(.+)\]", name)
+    lists = [known for known in FACTOR_LISTS if match is not None and match[1] == known.name]
+    return (lists[0], match[2]) if match is not None and lists else None
 
 
 @attrs.frozen
@@ -37,7 +95,7 @@ class Freedom:
     """One parameter of the unit, by its dotted name, that may change.
 
     "grading.cells[0 2 *]" is the factor on the struts of these cells: column, row and chamber as
-    `design.grading` has them.
+    `design.grading` has them; "chambers.wall_factors[2]" that on a chamber's wall.
 
     low, high: bounds of a continuous one, or of whole numbers; values: those of a discrete one; also: factors
     by the names of parameters that follow it, as the bladder's diameter follows the cell.
@@ -77,9 +135,9 @@ def parameters() -> dict[str, Description]:
 
 def parameter_of(unit: Unit, name: str) -> Any:
     """Value of a unit's parameter by its dotted name."""
-    if place := _CELLS.fullmatch(name):
-        entries = {entry[:3]: entry.factor for entry in unit.grading.entries}
-        return entries.get(_entry(place[1])[:3], 1.0)
+    if entry := _entry(name):
+        listed, place = entry
+        return listed.of(unit).get(listed.canonical(place), 1.0)
     found: Any = unit
     for part in name.split("."):
         found = getattr(found, part)
@@ -93,22 +151,23 @@ def changed_unit(unit: Unit, freedoms: Sequence[Freedom], values: Sequence[Any])
     """
     sections: dict[str, dict[str, Any]] = {}
     head: dict[str, Any] = {}
-    cells: dict[tuple[int | None, ...], CellFactor] = {}
+    entries: dict[str, dict[str, float]] = {}
     for freedom, value in zip(freedoms, values, strict=True):
         for name, factor in ((freedom.name, None), *freedom.also.items()):
             own = value if factor is None else factor * value
-            if place := _CELLS.fullmatch(name):
-                entry = _entry(place[1])
-                cells[entry[:3]] = CellFactor(*entry[:3], float(own))
+            if entry := _entry(name):
+                listed, place = entry
+                entries.setdefault(listed.name, {})[listed.canonical(place)] = float(own)
                 continue
             section, _, key = name.rpartition(".")
             if section:
                 sections.setdefault(section, {})[key] = own
             else:
                 head[key] = own
-    if cells:
-        kept = {entry[:3]: entry for entry in unit.grading.entries}
-        sections.setdefault("grading", {})["cells"] = cells_text((kept | cells).values())
+    for listed in FACTOR_LISTS:
+        if listed.name in entries:
+            section, _, key = listed.name.partition(".")
+            sections.setdefault(section, {})[key] = listed.text(listed.of(unit) | entries[listed.name])
     changed = {section: attrs.evolve(getattr(unit, section), **own) for section, own in sections.items()}
     return attrs.evolve(unit, **head, **changed)
 
@@ -172,8 +231,9 @@ def _freedom(table: Mapping[str, Any], where: str) -> Freedom | None:
     name, d = _parameter(table, where)
     if "fixed" in table:
         return None
-    if name == CELLS and "cells" in table:
-        return _of_cells(table, where)
+    for listed in FACTOR_LISTS:
+        if name == listed.name and listed.key in table:
+            return _of_factor(listed, table, where)
     _require_keys(table, ("parameter", "low", "high", "values", "also"), where)
     also = _also(table.get("also", {}), where)
     if "values" in table:
@@ -209,25 +269,28 @@ def _freedom(table: Mapping[str, Any], where: str) -> Freedom | None:
     return Freedom(name, float(low), float(high), also=also, unit=d.unit)
 
 
-def _of_cells(table: Mapping[str, Any], where: str) -> Freedom:
-    """The factor on the struts of the cells that a table names; raises InputError."""
-    _require_keys(table, ("parameter", "cells", "low", "high"), where)
-    cells, low, high = (table.get(key) for key in ("cells", "low", "high"))
+def _of_factor(listed: FactorList, table: Mapping[str, Any], where: str) -> Freedom:
+    """The factor at the place that a table names; raises InputError."""
+    _require_keys(table, ("parameter", listed.key, "low", "high"), where)
+    given, low, high = (table.get(key) for key in (listed.key, "low", "high"))
+    place = str(given) if isinstance(given, str | int) and not isinstance(given, bool) else "?"
+    what, example = listed.place
     try:
-        entry = _entry(cells if isinstance(cells, str) and ";" not in cells else "?")
+        place = listed.canonical(place if ";" not in place else "?")
     except InputError as error:
         raise InputError(
-            f"cells = {cells!r} is no column, row and chamber", f"{where}, cells", 'write cells = "0 2 *"'
+            f"{listed.key} = {given!r} is no {what}",
+            f"{where}, {listed.key}",
+            f'write {listed.key} = "{example}"',
         ) from error
     good = all(isinstance(v, int | float) and not isinstance(v, bool) for v in (low, high))
-    if not good or not LEAST <= low < high <= MOST:  # type: ignore[operator]
+    if not good or not listed.low <= low < high <= listed.high:  # type: ignore[operator]
         raise InputError(
-            f"low = {low!r} and high = {high!r} of cells {cells!r} are not a range of factors",
+            f"low = {low!r} and high = {high!r} of {listed.key} {place} are not a range of factors",
             f"{where}, low",
-            f"choose from {LEAST:g} to {MOST:g}",
+            f"choose from {listed.low:g} to {listed.high:g}",
         )
-    name = cells_text([entry]).rpartition(":")[0]
-    return Freedom(f"{CELLS}[{name}]", float(low), float(high))  # type: ignore[arg-type]
+    return Freedom(f"{listed.name}[{place}]", float(low), float(high))  # type: ignore[arg-type]
 
 
 def _also(given: Any, where: str) -> dict[str, float]:
@@ -246,11 +309,11 @@ def _also(given: Any, where: str) -> dict[str, float]:
 
 def _require_start(freedom: Freedom, unit: Unit, where: str) -> None:
     """Raise InputError where a value is none that the parameter may have."""
-    if _CELLS.fullmatch(freedom.name):
+    if entry := _entry(freedom.name):
         try:
             changed_unit(unit, [freedom], [freedom.low])
         except InputError as error:
-            raise InputError(error.what, f"{where}, cells", error.remedy) from error
+            raise InputError(error.what, f"{where}, {entry[0].key}", error.remedy) from error
         return
     d = parameters()[freedom.name]
     for value in freedom.values:

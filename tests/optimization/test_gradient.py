@@ -27,6 +27,7 @@ FREE = [
     Freedom("print.offset_xy_mm", 0.0, 0.2),
     Freedom("scale", 0.7, 1.5),
     Freedom("grading.cells[* -1 *]", 0.5, 1.5),
+    Freedom("chambers.wall_factors[2]", 0.6, 1.5),
     Freedom("chambers.cell_mm", 10.0, 15.0, also={"chambers.bladder_diameter_mm": 2.0}),
 ]
 ASKED = [
