@@ -51,8 +51,10 @@ def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> M
     stiffer = float(skin_stiffening(unit.printed.wall, p.skin_depth_mm, p.skin_factor))
     membrane_MPa = in_MPa(stiffer * m.membrane_modulus_kPa)
     inside = mesh.region == LATTICE
-    # A thinner wall is skin for a larger share.
-    relative = skin_stiffening(_walls(unit, mesh), p.skin_depth_mm, p.skin_factor) / stiffer
+    relative = np.ones(len(mesh.tets))
+    if unit.printed.wall_factors:
+        # A thinner wall is skin for a larger share.
+        relative = skin_stiffening(_walls(unit, mesh), p.skin_depth_mm, p.skin_factor) / stiffer
     if unit.wall.names or lattice is not None or unit.grading.names:
         wall = wall_layers(unit.wall, np.flatnonzero(~inside), membrane_MPa, m.membrane_poisson)
         wall = tuple(attrs.evolve(f, weight=f.weight * relative[f.elements]) for f in wall)
