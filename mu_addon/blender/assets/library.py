@@ -15,7 +15,6 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...design.parameters import Unit
 from ...design.section_picture import section_pixels
 from ...errors import MuError, OutputError
 from ...files import write_text
@@ -23,6 +22,7 @@ from ..preview import nodes
 from ..shared.compat import user_folder
 from ..unit import object as unit_object
 from ..unit import presets
+from .group_pictures import group_pixels
 
 NAME = "Monolithic Units"
 FILE, UNITS_FILE = "mu-nodes.blend", "mu-units.blend"
@@ -36,15 +36,19 @@ _OWN = ", your own"
 def write() -> Path:
     """Write presets, node groups and catalogues into the user's folder; returns it. Raises OutputError."""
     folder = user_folder("assets")
-    before = set(bpy.data.node_groups)
+    before, materials = set(bpy.data.node_groups), set(bpy.data.materials)
     groups = {nodes.group(name) for name in nodes.GROUPS}
     try:
+        for group in groups:
+            _picture(group, group_pixels(group.name, _PIXELS))
         _write(folder / FILE, groups)
         write_units(folder / UNITS_FILE)
     finally:
         # What this file does not use is not left in it.
         for tree in set(bpy.data.node_groups) - before:
             bpy.data.node_groups.remove(tree)
+        for material in set(bpy.data.materials) - materials:
+            bpy.data.materials.remove(material)
     named = {nodes.CATALOGUE: NAME, UNITS_CATALOGUE: f"{NAME}/Presets"}
     lines = [f"{uuid}:{path}:{path.replace(' ', '-').replace('/', '-')}" for uuid, path in named.items()]
     write_text(folder / CATALOGUES, "\n".join(["VERSION 1", "", *lines, ""]))
@@ -102,7 +106,7 @@ def _write_units(target: Path, titles: dict[str, str]) -> None:
             root.asset_data.description = (
                 f"Monolithic Unit, {unit.chambers.count} chambers, scale {unit.scale:g}"
             )
-            _picture(root, unit)
+            _picture(root, section_pixels(unit, _PIXELS))
         # The groups that units use lie in the file as well, and are assets of the other one.
         with nodes.no_assets():
             _write(target, set(roots))
@@ -114,11 +118,11 @@ def _write_units(target: Path, titles: dict[str, str]) -> None:
         context.view_layer.objects.active = active
 
 
-def _picture(root: Any, unit: Unit) -> None:
-    """Give a unit its half section as the picture that the asset browser shows."""
-    preview = root.preview_ensure()
+def _picture(data: Any, pixels: np.ndarray[Any, Any]) -> None:
+    """Give an asset the picture (_PIXELS, _PIXELS, 4) that the asset browser shows."""
+    preview = data.preview_ensure()
     preview.image_size = (_PIXELS, _PIXELS)
-    preview.image_pixels_float.foreach_set(section_pixels(unit, _PIXELS).astype(np.float32).ravel())
+    preview.image_pixels_float.foreach_set(pixels.astype(np.float32).ravel())
 
 
 def _write(target: Path, data: set[Any]) -> None:

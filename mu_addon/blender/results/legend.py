@@ -47,7 +47,8 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
     found = [f"{field.label} [{field.unit}]" if field.unit else field.label]
     other = studies.run_by_key(root, root.mu_unit.study.against)
     if field.name == motion_parts.DIFFERENCE and other is not None:
-        found.append(f"to the run {other.title}")
+        itself = other.folder == motion.folder.parent
+        found.append("the run compared with itself" if itself else f"to the run {other.title}")
     found.append(f"{np.clip(time, motion.time_s[0], motion.time_s[-1]):.2f} s, {pressure + 0.0:.1f} kPa")
     for contact in studies.contact_forces(root):
         force = float(np.interp(time, contact.time_s, contact.force_N))

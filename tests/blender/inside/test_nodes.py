@@ -7,6 +7,8 @@ import pytest
 from mathutils import Vector
 
 from mu_addon.blender.assets import library
+from mu_addon.blender.assets.group_pictures import group_pixels
+from mu_addon.blender.assets.surface_picture import surface_pixels
 from mu_addon.blender.evidence import state as evidence
 from mu_addon.blender.gripper import object as gripper_object
 from mu_addon.blender.node_tree import state as trees
@@ -188,6 +190,43 @@ def test_a_group_of_an_older_version_in_a_file_is_upgraded(tmp_path):
     assert len(skinned(obj)) == 10
 
 
+@pytest.mark.parametrize(
+    "group", ["MU Tubes", "MU Balls", "MU Labelled Tube", "MU Waveguide", "MU Colour Field"]
+)
+def test_every_group_has_a_picture_of_what_it_makes(group):
+    assert group in nodes.GROUPS
+    assert len(nodes.GROUPS) == 5
+    before = len(bpy.data.objects), len(bpy.data.meshes)
+    pixels = group_pixels(group, 64)
+    assert (len(bpy.data.objects), len(bpy.data.meshes)) == before
+    there = pixels[..., 3] > 0.0
+    assert 0.03 < there.mean() < 0.8
+    # It fills the picture one way, and keeps off its border.
+    assert max(np.ptp(rows) for rows in np.nonzero(there)) > 50
+    border = np.concatenate([there[0], there[-1], there[:, 0], there[:, -1]])
+    assert not border.any()
+    assert len(np.unique(pixels[there], axis=0)) > 3, "it is shaded or coloured"
+
+
+def test_a_surface_is_lit_and_the_nearer_triangle_hides_the_other():
+    # Seen from the front (+x): a red triangle before a larger green one, which it hides in part.
+    near, far = (
+        np.array([[5, -2, -2], [5, 2, -2], [5, 0, 2]]),
+        np.array([[-5, -9, -9], [-5, 9, -9], [-5, 0, 9]]),
+    )
+    points, triangles = np.vstack([far, near]).astype(float), np.array([[3, 4, 5], [0, 1, 2]])
+    red_and_green = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    pixels = surface_pixels(points, triangles, red_and_green, 96)
+    behind = surface_pixels(points, triangles[1:], red_and_green[1:], 96)
+    red, green = (pixels[..., k] > 0.0 for k in (0, 1))
+    assert red.any()
+    assert not (red & green).any()
+    assert np.array_equal(red | green, behind[..., 1] > 0.0), "red lies wholly before green"
+    # Turned round, triangles look the same.
+    turned = surface_pixels(points, triangles[:, ::-1], red_and_green, 96)
+    assert np.array_equal(turned, pixels)
+
+
 def test_presets_and_groups_become_an_asset_library_of_the_users():
 
     def names():
@@ -198,6 +237,7 @@ def test_presets_and_groups_become_an_asset_library_of_the_users():
     libraries = bpy.context.preferences.filepaths.asset_libraries
     assert [entry.name for entry in libraries].count("Monolithic Units") == 1
     assert len(bpy.data.node_groups) == 0, "groups that this file does not use were left in it"
+    assert not [m.name for m in bpy.data.materials if m.name.startswith("MU ")], "nor their materials"
     assert not [o for o in bpy.data.objects if o.mu_unit.uuid], "nor are the presets' units"
     folder = library.user_folder("assets")
     assert nodes.CATALOGUE in (folder / "blender_assets.cats.txt").read_text()
@@ -224,6 +264,11 @@ def test_presets_and_groups_become_an_asset_library_of_the_users():
         here.node_groups = ["MU Tubes"]
     [tree] = here.node_groups
     assert tree.asset_data.catalog_id == nodes.CATALOGUE
+    pixels = np.array(tree.preview.image_pixels_float[:]).reshape(128, 128, 4)
+    assert set(np.unique(pixels[..., 3])) == {0.0, 1.0}, "a tube, and nothing beside it"
+    seen = pixels[pixels[..., 3] > 0.0]
+    assert 0.05 < len(seen) / 128**2 < 0.5
+    assert np.ptp(seen[:, 0]) > 0.2, "it is shaded"
     obj = drawn([(0, 0, 0), (0, 0, 40)])
     assert nodes.skin(obj, "MU Tubes").node_group.name == "MU Tubes"
     assert len(skinned(obj)) == 16
