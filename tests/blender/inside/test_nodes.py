@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
-from mu_addon.blender.assets import library
+from mu_addon.blender.assets import dropped, library
 from mu_addon.blender.assets.group_pictures import group_pixels
 from mu_addon.blender.assets.surface_picture import surface_pixels
 from mu_addon.blender.evidence import state as evidence
@@ -17,10 +17,13 @@ from mu_addon.blender.preview import nodes
 from mu_addon.blender.shared.compat import modifier_input, set_modifier_input
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
+from mu_addon.design.assets import asset_names
 from mu_addon.design.parameters import load_preset, preset_names
+from mu_addon.design.printing.printer import load_printer
 from mu_addon.design.section_picture import section_pixels
+from mu_addon.materials import load_material, material_names
 
-from .acting import add
+from .acting import add, refused
 
 
 def edge(length, radius=None):
@@ -227,6 +230,45 @@ def test_a_surface_is_lit_and_the_nearer_triangle_hides_the_other():
     assert np.array_equal(turned, pixels)
 
 
+def test_a_resin_and_a_printer_dropped_on_a_unit_become_its_parameters():
+    assert bpy.ops.mu.assets() == {"FINISHED"}
+    file = str(library.user_folder("assets") / library.MADE_FILE)
+    with bpy.data.libraries.load(file, assets_only=True) as (there, here):
+        assert (there.materials, there.objects) == (
+            [load_material(name).name for name in material_names()],
+            [load_printer(name).title for name in asset_names("printers")],
+        )
+        here.materials, here.objects = there.materials[:1], there.objects[:1]
+    [resin], [box] = here.materials, here.objects
+    for made in (resin, box):
+        pixels = np.array(made.preview.image_pixels_float[:]).reshape(128, 128, 4)
+        assert 0.1 < (pixels[..., 3] > 0.5).mean() < 0.9
+    far, near = add(), add()
+    far.location, near.location = (0.0, 300.0, 0.0), (0.0, 0.0, 0.0)
+    for root in (far, near):
+        root.mu_print.printer = "own"
+    before = to_unit(near.mu_unit)
+    # As Blender's drop does: a material into the slot that is under the mouse.
+    near.material_slots[1].material = resin
+    dropped.take()
+    want = load_material(material_names()[0]).in_unit(before)
+    assert to_unit(near.mu_unit).material == want.material != before.material
+    assert to_unit(near.mu_unit).wall == want.wall
+    assert to_unit(far.mu_unit).material == before.material
+    assert near.material_slots[1].material.name == "MU Section"
+    assert dropped.waiting() is None
+    box.asset_clear()  # as it is after a drop
+    box.location = (10.0, 20.0, 0.0)
+    bpy.context.collection.objects.link(box)
+    bpy.context.view_layer.update()
+    dropped.take()
+    assert (near.mu_print.printer, far.mu_print.printer) == (asset_names("printers")[0], "own")
+    assert not [o for o in bpy.data.objects if o.get(dropped.PRINTER)]
+    assert bpy.context.object == near
+    assert dropped.waiting() is None
+    assert "no resin and no printer" in refused(bpy.ops.mu.take_asset, unit=near.mu_unit.uuid, asset="Cube")
+
+
 def test_presets_and_groups_become_an_asset_library_of_the_users():
 
     def names():
@@ -244,6 +286,7 @@ def test_presets_and_groups_become_an_asset_library_of_the_users():
     assert sorted(p.name for p in folder.iterdir()) == [
         "blender_assets.cats.txt",
         "mu-nodes.blend",
+        "mu-resins-and-printers.blend",
         "mu-units.blend",
     ]
     with bpy.data.libraries.load(str(folder / "mu-units.blend"), assets_only=True) as (there, here):
