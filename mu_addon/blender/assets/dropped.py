@@ -73,6 +73,9 @@ def _take_resin(root: Any, resin: Any) -> None:
 def _restore_slots(root: Any) -> None:
     """Take resins out of a unit's slots, which have the colours of its parts."""
     usual = drawing.SLOTS if root.data == root.mu_unit.preview else ()
+    # Struts have their colour from nodes: over them Blender makes a slot more.
+    while usual and len(root.data.materials) > len(usual) and root.data.materials[-1].get(RESIN):
+        root.data.materials.pop()
     for number, slot in enumerate(root.material_slots):
         if slot.material is not None and slot.material.get(RESIN):
             slot.link = "DATA"
@@ -84,11 +87,15 @@ def _restore_slots(root: Any) -> None:
 
 def _take_printer(root: Any, box: Any) -> None:
     root.mu_print.printer = box[PRINTER]
+    _remove(box)
+    unit_object.make_active(bpy.context, root)
+
+
+def _remove(box: Any) -> None:
     mesh = box.data
     bpy.data.objects.remove(box)
     if not mesh.users:
         bpy.data.meshes.remove(mesh)
-    unit_object.make_active(bpy.context, root)
 
 
 def waiting() -> tuple[str, str] | None:
@@ -124,13 +131,42 @@ def _later() -> None:
         take()
 
 
+_restoring = False
+"""Whether undo or redo is at work: what they bring back was dropped before."""
+
+
+@persistent
+def _begin_restoring(*_: Any) -> None:
+    global _restoring
+    _restoring = True
+
+
+@persistent
+def _restored(*_: Any) -> None:
+    """Take away what undo has brought back from between a drop and its taking: the drop is undone, too."""
+    global _restoring
+    while (found := waiting()) is not None:
+        root, box = unit_object.by_uuid(found[0]), bpy.context.scene.objects.get(found[1])
+        if box is not None and box.get(PRINTER):
+            _remove(box)
+        else:
+            _restore_slots(root)
+    _restoring = False
+
+
 @persistent
 def _updated(*_: Any) -> None:
+    if _restoring:
+        return
     if waiting() is not None and not bpy.app.timers.is_registered(_later):
         bpy.app.timers.register(_later, first_interval=0.0)
 
 
-_HANDLERS = {"depsgraph_update_post": _updated}
+_HANDLERS = {
+    "depsgraph_update_post": _updated,
+    **dict.fromkeys(("undo_pre", "redo_pre"), _begin_restoring),
+    **dict.fromkeys(("undo_post", "redo_post"), _restored),
+}
 _register, _unregister = bpy.utils.register_classes_factory((MU_OT_take_asset,))
 
 

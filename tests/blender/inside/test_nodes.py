@@ -257,6 +257,17 @@ def test_a_resin_and_a_printer_dropped_on_a_unit_become_its_parameters():
     assert to_unit(far.mu_unit).material == before.material
     assert near.material_slots[1].material.name == "MU Section"
     assert dropped.waiting() is None
+    # What undo brings back from between a drop and its taking is taken away, not taken again.
+    near.data.materials.append(resin)
+    assert dropped.waiting() == (near.mu_unit.uuid, resin.name)
+    now = to_unit(near.mu_unit)
+    near.mu_unit.material.membrane_modulus_kPa = 2000.0
+    for function in bpy.app.handlers.undo_post:
+        function(bpy.context.scene)
+    assert dropped.waiting() is None
+    assert len(near.data.materials) == 5
+    assert to_unit(near.mu_unit).material.membrane_modulus_kPa == 2000.0
+    near.mu_unit.material.membrane_modulus_kPa = now.material.membrane_modulus_kPa
     box.asset_clear()  # as it is after a drop
     box.location = (10.0, 20.0, 0.0)
     bpy.context.collection.objects.link(box)
