@@ -5,6 +5,7 @@ The runs are of known bending, written without a solver.
 
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -138,6 +139,21 @@ def test_a_run_that_is_compared_with_itself_shows_no_difference(home):
     words = legend.lines(root, motion_parts.motion_of(root), bpy.context.scene)
     assert "the run compared with itself" in words
     assert "compared with: tick" in refused(bpy.ops.mu.field_show, field="run_difference_mm")
+
+
+def test_a_name_above_a_motion_stays_below_the_headers():
+    view = SimpleNamespace(type="WINDOW", x=0, y=100, width=800, height=600)
+    upper = SimpleNamespace(type="HEADER", y=674, height=26)
+    tools = SimpleNamespace(type="TOOL_HEADER", y=648, height=26)
+    lower = SimpleNamespace(type="HEADER", y=100, height=26)
+    hidden = SimpleNamespace(type="TOOL_HEADER", y=600, height=1)
+    area = SimpleNamespace(regions=[view, upper, tools, hidden])
+    assert legend.below_headers(area, view) == 548.0
+    area.regions = [view, lower]
+    assert legend.below_headers(area, view) == 600.0
+    assert legend.name_height(590.0, 50.0, 530.0) == 530.0
+    assert legend.name_height(400.0, 50.0, 530.0) == 400.0
+    assert legend.name_height(900.0, 700.0, 530.0) == 900.0, "the body is out of sight, and so is its name"
 
 
 def test_candidates_are_seen_on_the_unit_at_rest_alone(home):
