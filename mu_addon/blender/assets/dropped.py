@@ -8,7 +8,6 @@ for, in one undo step, and they go.
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
-import json
 from typing import Any
 
 import bpy
@@ -18,6 +17,7 @@ from bpy.props import StringProperty
 from ...design.parameters import SECTIONS
 from ...design.quantity import describe
 from ...errors import InputError
+from ...reading import parse_json
 from ..preview import materials
 from ..shared import displays, handlers, updates
 from ..shared.operators import linked, reports_errors
@@ -59,7 +59,7 @@ class MU_OT_take_asset(bpy.types.Operator):
 
 
 def _take_resin(root: Any, resin: Any) -> None:
-    given = json.loads(resin[RESIN])
+    given = parse_json(resin[RESIN], f"{resin.name}, {RESIN}")
     with updates.paused():
         for section in SECTIONS:
             group, values = getattr(root.mu_unit, section.section), given.get(section.section, {})
