@@ -49,6 +49,7 @@ _MODULES = (
     "obstacles.operators",
     "gripper.operators",
     "assets.operators",
+    "assets.dropped",
     "evidence.operators",
     "import_data.operators",
     "track.operators",

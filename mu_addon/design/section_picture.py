@@ -12,8 +12,9 @@ from .profile import cavity_polygon, outer_polygon
 
 Array = np.ndarray[Any, Any]
 
-# Red, green, blue and opacity.
-ENVELOPE, STRUT = (0.50, 0.56, 0.64, 0.35), (0.62, 0.67, 0.73, 1.0)
+# Red, green, blue and opacity. All are opaque: Blender's asset browser adds the colour of a translucent pixel
+# whole to what is behind it, which made the envelope as light as its struts.
+ENVELOPE, STRUT = (0.25, 0.28, 0.33, 1.0), (0.74, 0.79, 0.85, 1.0)
 WALL, CAVITY = (0.79, 0.54, 0.23, 1.0), (0.16, 0.29, 0.36, 1.0)
 _MARGIN = 1.06
 _PER_ARC = 8

@@ -1,8 +1,8 @@
 """Presets and node groups as an asset library of the user's, written by the Blender that will read it.
 
 One that came in the archive would be of one Blender's format and nodes; this one fits the Blender at hand.
-A preset is an object: dropped into a scene it is a unit of its own. Resins and printers are numbers that
-belong to no data of Blender's, so that no asset can hold them: they are chosen in the panels.
+A preset is an object: dropped into a scene it is a unit of its own. A resin is a material, a printer a box
+of its build volume: dropped on a unit they become its parameters, see `dropped`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...design.parameters import Unit
 from ...design.section_picture import section_pixels
 from ...errors import MuError, OutputError
 from ...files import write_text
@@ -23,9 +22,15 @@ from ..preview import nodes
 from ..shared.compat import user_folder
 from ..unit import object as unit_object
 from ..unit import presets
+from .group_pictures import group_pixels
+from .resins_and_printers import names_of_all, pixels_of, printers, resins
 
 NAME = "Monolithic Units"
-FILE, UNITS_FILE = "mu-nodes.blend", "mu-units.blend"
+FILE, UNITS_FILE, MADE_FILE = "mu-nodes.blend", "mu-units.blend", "mu-resins-and-printers.blend"
+RESINS_CATALOGUE, PRINTERS_CATALOGUE = (
+    "b0c2a1de-52c3-4f0f-9c0e-1f1f5a7a3e10",
+    "c7f6b5aa-0d52-4a0b-8f57-6e2c1f3b9d42",
+)
 UNITS_CATALOGUE = "2d1c1c0e-8d0f-4b5e-9a55-6f6c2f0f4a10"
 CATALOGUES = "blender_assets.cats.txt"
 _PIXELS = 128
@@ -36,16 +41,22 @@ _OWN = ", your own"
 def write() -> Path:
     """Write presets, node groups and catalogues into the user's folder; returns it. Raises OutputError."""
     folder = user_folder("assets")
-    before = set(bpy.data.node_groups)
+    before, materials = set(bpy.data.node_groups), set(bpy.data.materials)
     groups = {nodes.group(name) for name in nodes.GROUPS}
     try:
+        for group in groups:
+            _picture(group, group_pixels(group.name, _PIXELS))
         _write(folder / FILE, groups)
         write_units(folder / UNITS_FILE)
+        write_resins_and_printers(folder / MADE_FILE)
     finally:
         # What this file does not use is not left in it.
         for tree in set(bpy.data.node_groups) - before:
             bpy.data.node_groups.remove(tree)
+        for material in set(bpy.data.materials) - materials:
+            bpy.data.materials.remove(material)
     named = {nodes.CATALOGUE: NAME, UNITS_CATALOGUE: f"{NAME}/Presets"}
+    named |= {RESINS_CATALOGUE: f"{NAME}/Resins", PRINTERS_CATALOGUE: f"{NAME}/Printers"}
     lines = [f"{uuid}:{path}:{path.replace(' ', '-').replace('/', '-')}" for uuid, path in named.items()]
     write_text(folder / CATALOGUES, "\n".join(["VERSION 1", "", *lines, ""]))
     return folder
@@ -69,11 +80,16 @@ def _titles() -> dict[str, str]:
 
 @contextmanager
 def _set_aside(names: set[str]) -> Iterator[None]:
-    """Objects and meshes of this file that have one of these names have another one meanwhile.
+    """Objects, meshes and materials of this file that have one of these names have another one meanwhile.
 
     Names are unique in a file: beside a unit called as its preset the preset would be "mu-1.0x.001".
     """
-    data = [d for kind in (bpy.data.objects, bpy.data.meshes) for d in kind if d.library is None]
+    data = [
+        d
+        for kind in (bpy.data.objects, bpy.data.meshes, bpy.data.materials)
+        for d in kind
+        if d.library is None
+    ]
     named = [(d, d.name) for d in data if d.name in names]
     try:
         for d, name in named:
@@ -102,7 +118,7 @@ def _write_units(target: Path, titles: dict[str, str]) -> None:
             root.asset_data.description = (
                 f"Monolithic Unit, {unit.chambers.count} chambers, scale {unit.scale:g}"
             )
-            _picture(root, unit)
+            _picture(root, section_pixels(unit, _PIXELS))
         # The groups that units use lie in the file as well, and are assets of the other one.
         with nodes.no_assets():
             _write(target, set(roots))
@@ -114,11 +130,30 @@ def _write_units(target: Path, titles: dict[str, str]) -> None:
         context.view_layer.objects.active = active
 
 
-def _picture(root: Any, unit: Unit) -> None:
-    """Give a unit its half section as the picture that the asset browser shows."""
-    preview = root.preview_ensure()
+def write_resins_and_printers(target: Path) -> None:
+    """Write every shipped resin and printer as an asset. Raises OutputError."""
+    with _set_aside(names_of_all()):
+        catalogues = {RESINS_CATALOGUE: resins(), PRINTERS_CATALOGUE: printers()}
+        made = [data for group in catalogues.values() for data in group]
+        try:
+            for catalogue, group in catalogues.items():
+                for data in group:
+                    data.asset_data.catalog_id = catalogue
+                    _picture(data, pixels_of(data, _PIXELS))
+            _write(target, set(made))
+        finally:
+            for data in made:
+                if isinstance(data, bpy.types.Material):
+                    bpy.data.materials.remove(data)
+                else:
+                    bpy.data.meshes.remove(data.data)
+
+
+def _picture(data: Any, pixels: np.ndarray[Any, Any]) -> None:
+    """Give an asset the picture (_PIXELS, _PIXELS, 4) that the asset browser shows."""
+    preview = data.preview_ensure()
     preview.image_size = (_PIXELS, _PIXELS)
-    preview.image_pixels_float.foreach_set(section_pixels(unit, _PIXELS).astype(np.float32).ravel())
+    preview.image_pixels_float.foreach_set(pixels.astype(np.float32).ravel())
 
 
 def _write(target: Path, data: set[Any]) -> None:
@@ -150,5 +185,5 @@ def remove() -> None:
     entry = listed()
     if entry is not None:
         bpy.context.preferences.filepaths.asset_libraries.remove(entry)
-    for name in (FILE, UNITS_FILE, CATALOGUES):
+    for name in (FILE, UNITS_FILE, MADE_FILE, CATALOGUES):
         (user_folder("assets") / name).unlink(missing_ok=True)

@@ -11,7 +11,7 @@ from . import library, sample
 
 
 class MU_OT_assets(bpy.types.Operator):
-    """Put presets and node groups into the asset browser of every file: a library in your own folder"""
+    """Put presets, resins, printers and node groups into the asset browser: a library in your own folder"""
 
     bl_idname = "mu.assets"
     bl_label = "Add to Asset Browser"
@@ -20,12 +20,14 @@ class MU_OT_assets(bpy.types.Operator):
     @reports_errors
     def execute(self, context):
         folder = library.add()
-        self.report({"INFO"}, f"Presets and node groups are in the library {library.NAME}: {folder}")
+        self.report(
+            {"INFO"}, f"Presets, resins, printers and node groups are in the library {library.NAME}: {folder}"
+        )
         return {"FINISHED"}
 
 
 class MU_OT_assets_remove(bpy.types.Operator):
-    """Take presets and node groups out of the asset browser again; files that use them keep theirs"""
+    """Take what this extension put there out of the asset browser again; files that use it keep theirs"""
 
     bl_idname = "mu.assets_remove"
     bl_label = "Remove from Asset Browser"

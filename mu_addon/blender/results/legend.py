@@ -47,7 +47,8 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
     found = [f"{field.label} [{field.unit}]" if field.unit else field.label]
     other = studies.run_by_key(root, root.mu_unit.study.against)
     if field.name == motion_parts.DIFFERENCE and other is not None:
-        found.append(f"to the run {other.title}")
+        itself = other.folder == motion.folder.parent
+        found.append("the run compared with itself" if itself else f"to the run {other.title}")
     found.append(f"{np.clip(time, motion.time_s[0], motion.time_s[-1]):.2f} s, {pressure + 0.0:.1f} kPa")
     for contact in studies.contact_forces(root):
         force = float(np.interp(time, contact.time_s, contact.force_N))
@@ -123,13 +124,39 @@ def _names(context: Any, root: Any, motion: Any, size: int) -> None:
     middle = float(motion.mesh.nodes[:, 1].mean())
     for name, what in motion_parts.shown(root):
         part = motion_parts.one(root, name, what)
-        at = part.matrix_world @ Vector((0.0, middle, 1.32 * top))
-        place = location_3d_to_region_2d(context.region, context.region_data, at)
+        place, base = (
+            location_3d_to_region_2d(
+                context.region, context.region_data, part.matrix_world @ Vector((0.0, middle, z))
+            )
+            for z in (1.32 * top, 0.0)
+        )
         if place is not None:
+            y = place.y
+            if base is not None:
+                y = name_height(y, base.y, below_headers(context.area, context.region) - 1.5 * size)
             text = "Model A" if name == MODEL_A else path_symbol(name)
             text += ", print" if what == motion_parts.PRINT else ""
             blf.size(0, size)
-            write(text, place.x - blf.dimensions(0, text)[0] / 2, place.y, size)
+            write(text, place.x - blf.dimensions(0, text)[0] / 2, y, size)
+
+
+def name_height(above: float, base: float, limit: float) -> float:
+    """Where a name stands that belongs `above` what has its foot at `base`: no higher than `limit`.
+
+    All in pixels. Where the foot is out of sight above that limit, too, the name is with it.
+    """
+    return min(above, limit) if base < limit else above
+
+
+def below_headers(area: Any, region: Any) -> float:
+    """Height in pixels of a viewport up to the headers that lie over its upper end."""
+    middle = region.y + region.height / 2
+    lowest = [
+        other.y
+        for other in area.regions
+        if other.type in ("HEADER", "TOOL_HEADER") and other.height > 1 and other.y > middle
+    ]
+    return float(min([*lowest, region.y + region.height]) - region.y)
 
 
 def cross(x: float, y: float, side: float, colour: tuple[float, ...]) -> None:

@@ -164,7 +164,8 @@ def arrange(root: Any) -> None:
 def _see(root: Any) -> None:
     """Have a unit show its result where there is one in its place, else its design."""
     there = bool(displays.on_unit(root))
-    if there and root.mu_unit.show != unit_object.RESULT:
+    # Candidates lie on the unit at rest: while they are seen, so is that.
+    if there and root.mu_unit.show != unit_object.RESULT and not root.mu_unit.candidates:
         root.mu_unit.show = unit_object.RESULT
     elif not there and root.mu_unit.show == unit_object.RESULT:
         root.mu_unit.show = "preview"
@@ -425,6 +426,9 @@ def _write(root: Any, scene: Any) -> None:
             if name == root.mu_motion.field:
                 field_colours.write_colours(root, part.data, now)
         if root.mu_motion.field not in found.fields:
+            left = part.data.attributes.get(root.mu_motion.field)
+            if left is not None:  # of the run that was shown before
+                part.data.attributes.remove(left)
             field_colours.write_colours(root, part.data, None)
         part.data.update()
 
@@ -457,7 +461,11 @@ def _job_ended(_key: str) -> None:
 
 def _chosen(root: Any) -> None:
     """The result is to be seen: where none is in the unit's place yet, that of Model A."""
-    if updates.are_paused() or root.mu_unit.show != unit_object.RESULT or displays.on_unit(root):
+    if updates.are_paused() or root.mu_unit.show != unit_object.RESULT:
+        return
+    # They lie on the unit at rest; shown again, they bring that back.
+    root.mu_unit.candidates = False
+    if displays.on_unit(root):
         return
     if motion_of(root) is None:
         root.mu_motion.trouble = "No motion to show: simulate this unit first"

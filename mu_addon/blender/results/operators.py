@@ -77,6 +77,8 @@ class MU_OT_motion(MotionOperator, bpy.types.Operator):
         if not self.on:
             motion_parts.hide(root, self.name, self.what)
             return {"FINISHED"}
+        if root.mu_motion.on_unit:
+            root.mu_unit.candidates = False
         motion_parts.show(root, self.name, self.what)
         if self.timeline:
             context.scene.frame_end = motion_parts.last_frame(motion, context.scene)

@@ -37,6 +37,13 @@ def _redraw(settings, context):
     viewports.redraw()
 
 
+def _on_unit(settings, context):
+    if settings.on_unit:
+        # They would lie beside it as soon as it bends.
+        settings.id_data.mu_unit.candidates = False
+    motion_parts.arrange(settings.id_data)
+
+
 def _apart(settings, context):
     motion_parts.arrange(settings.id_data)
 
@@ -84,7 +91,7 @@ class MU_PG_motion(bpy.types.PropertyGroup):
         name="On the Unit",
         description="Show the first motion in the unit's own place instead of beside the design",
         default=True,
-        update=_apart,
+        update=_on_unit,
     )
     marker: BoolProperty(
         name="Largest Value",

@@ -38,6 +38,9 @@ def apart(root: Any, motion: Motion, name: str, region: str, cut: bool) -> Any |
     if other is None:
         _words[root.mu_unit.uuid] = "Compare with another run first, one with a motion"
         return None
+    if other.folder == motion.folder:
+        _words[root.mu_unit.uuid] = "The shown run is the one that it is compared with: tick another one"
+        return None
     key = motion.folder, other.folder, f"{name}|{region}", cut
     kept = _apart.get(key)
     if kept is None or kept[0] is not motion or kept[1] is not other:

@@ -16,6 +16,7 @@ from bpy.app.handlers import persistent
 
 from ...design.anchors import windows
 from ..gripper import object as gripper_object
+from ..preview.nodes import unit as unit_group
 from ..shared import displays, handlers, scene_units, updates
 from ..unit import broken, drawing, live_update
 from ..unit import object as unit_object
@@ -159,10 +160,12 @@ def _damaged(root: Any) -> bool:
         return False
     if root.mu_gripper.uuid:
         return gripper_object.part(root, "cube") is None and not root.mu_gripper.trouble
-    props = root.mu_unit
+    props, skin = root.mu_unit, bpy.data.node_groups.get(unit_group.NAME)
     if props.trouble or not props.built or props.preview is None:
         return False
     if props.preview.get("mu_points") != len(props.preview.vertices):
+        return True
+    if skin is None or not any(m.type == "NODES" and m.node_group == skin for m in root.modifiers):
         return True
     if not props.candidates:
         return False

@@ -29,15 +29,38 @@ def use_millimetres(scene: Any) -> None:
     units.system, units.scale_length, units.length_unit = "METRIC", 0.001, "MILLIMETERS"
 
 
+SHOWN = {
+    "KILOMETERS": (1e6, " km"),
+    "METERS": (1e3, " m"),
+    "CENTIMETERS": (10.0, " cm"),
+    "MICROMETERS": (1e-3, " µm"),
+    "MILES": (1609344.0, " mi"),
+    "FEET": (304.8, "'"),
+    "INCHES": (25.4, '"'),
+    "THOU": (0.0254, " thou"),
+}
+"""Units of length that a scene's fields may be shown in: mm in one, and its sign as fields have it."""
+
+
+def shown_unit(scene: Any) -> tuple[float, str]:
+    """The unit of length that fields of a scene show: mm in one of it, and its sign.
+
+    Where Blender chooses by the value (*Adaptive*), millimetres, or inches in an imperial scene.
+    """
+    units = scene.unit_settings
+    if units.system == "NONE":
+        return 1.0, ""
+    return SHOWN.get(units.length_unit, SHOWN["INCHES"] if units.system == "IMPERIAL" else (1.0, " mm"))
+
+
 def length(scene: Any, value_mm: float, digits: int = 4) -> str:
-    """A length in mm, in inches in a scene of such, a plain number in one without units."""
-    system = scene.unit_settings.system
-    if system == "IMPERIAL":
-        return f"{value_mm / 25.4:.{digits}g} in"
-    return f"{value_mm:.{digits}g}" + (" mm" if system == "METRIC" else "")
+    """A length in the unit that the scene's fields show, a plain number in a scene without units."""
+    in_mm, sign = shown_unit(scene)
+    value = float(f"{value_mm / in_mm:.{digits}g}")
+    return f"{np.format_float_positional(value, trim='-')}{sign}"
 
 
 def size(scene: Any, values_mm: Sequence[float]) -> str:
     """Lengths of a body's sides as `length` has one, the unit said once: "37.5 x 50 x 81 mm"."""
-    *first, last = (length(scene, value, digits=3) for value in values_mm)
-    return " x ".join([*(text.partition(" ")[0] for text in first), last])
+    sign = shown_unit(scene)[1]
+    return " x ".join(length(scene, value, digits=3).removesuffix(sign) for value in values_mm) + sign

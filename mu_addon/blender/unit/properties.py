@@ -35,6 +35,13 @@ def _changed(group, context):
     PARAMETERS_CHANGED.send(group.id_data)
 
 
+def _candidates_changed(unit, context):
+    if unit.candidates and unit.show == "result":
+        # They lie on the unit at rest: beside one that is bent they would lie beside its lattice.
+        unit.show = "preview"
+    PARAMETERS_CHANGED.send(unit.id_data)
+
+
 def _generated(section: type):
     annotations = generated_fields(section, _changed)
     name = f"MU_PG_{section.section}"
@@ -195,8 +202,9 @@ class MU_PG_unit(bpy.types.PropertyGroup):
         ),
         "candidates": BoolProperty(
             name="Show Candidates",
-            description="Draw every candidate path on the lattice, to compare and to choose one by a click",
-            update=_changed,
+            description="Draw every candidate path on the lattice of the unit at rest, to compare and to "
+            "choose one by a click. Result hides them, since there the unit is bent",
+            update=_candidates_changed,
         ),
         "show": EnumProperty(
             name="Show",

@@ -173,6 +173,7 @@ def test_x_deletes_all_of_it_and_nothing_else(study):
     root = add(preset="mu-0.75x")
     root.mu_unit.study.folder = str(study)
     root.mu_unit.candidates = True
+    root.mu_motion.on_unit = False  # beside the unit at rest, so that candidates stay
     show(name="alpha4")
     bpy.ops.mu.motion_legend()
     second = add(preset="mu-0.75x")
@@ -266,7 +267,12 @@ def test_a_part_deleted_by_force_comes_back():
     assert bpy.ops.mu.rebuild() == {"FINISHED"}
     assert np.allclose(size(root)[2], TALL, atol=1e-3)
     root.modifiers.clear()
-    assert bpy.ops.mu.rebuild() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert len(root.modifiers) == 1, "it came back by itself"
+    assert np.allclose(size(root)[2], TALL, atol=1e-3)
+    bpy.data.node_groups.remove(root.modifiers[0].node_group)
+    bpy.context.view_layer.update()
+    assert len([m for m in root.modifiers if m.node_group is not None]) == 1
     assert np.allclose(size(root)[2], TALL, atol=1e-3)
 
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
-from mu_addon.blender.assets import library
+from mu_addon.blender.assets import dropped, library
+from mu_addon.blender.assets.group_pictures import group_pixels
+from mu_addon.blender.assets.surface_picture import surface_pixels
 from mu_addon.blender.evidence import state as evidence
 from mu_addon.blender.gripper import object as gripper_object
 from mu_addon.blender.node_tree import state as trees
@@ -15,10 +17,13 @@ from mu_addon.blender.preview import nodes
 from mu_addon.blender.shared.compat import modifier_input, set_modifier_input
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
+from mu_addon.design.assets import asset_names
 from mu_addon.design.parameters import load_preset, preset_names
+from mu_addon.design.printing.printer import load_printer
 from mu_addon.design.section_picture import section_pixels
+from mu_addon.materials import load_material, material_names
 
-from .acting import add
+from .acting import add, refused
 
 
 def edge(length, radius=None):
@@ -188,6 +193,93 @@ def test_a_group_of_an_older_version_in_a_file_is_upgraded(tmp_path):
     assert len(skinned(obj)) == 10
 
 
+@pytest.mark.parametrize(
+    "group", ["MU Tubes", "MU Balls", "MU Labelled Tube", "MU Waveguide", "MU Colour Field"]
+)
+def test_every_group_has_a_picture_of_what_it_makes(group):
+    assert group in nodes.GROUPS
+    assert len(nodes.GROUPS) == 5
+    before = len(bpy.data.objects), len(bpy.data.meshes)
+    pixels = group_pixels(group, 64)
+    assert (len(bpy.data.objects), len(bpy.data.meshes)) == before
+    there = pixels[..., 3] > 0.0
+    assert 0.03 < there.mean() < 0.8
+    # It fills the picture one way, and keeps off its border.
+    assert max(np.ptp(rows) for rows in np.nonzero(there)) > 50
+    border = np.concatenate([there[0], there[-1], there[:, 0], there[:, -1]])
+    assert not border.any()
+    assert len(np.unique(pixels[there], axis=0)) > 3, "it is shaded or coloured"
+
+
+def test_a_surface_is_lit_and_the_nearer_triangle_hides_the_other():
+    # Seen from the front (+x): a red triangle before a larger green one, which it hides in part.
+    near, far = (
+        np.array([[5, -2, -2], [5, 2, -2], [5, 0, 2]]),
+        np.array([[-5, -9, -9], [-5, 9, -9], [-5, 0, 9]]),
+    )
+    points, triangles = np.vstack([far, near]).astype(float), np.array([[3, 4, 5], [0, 1, 2]])
+    red_and_green = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    pixels = surface_pixels(points, triangles, red_and_green, 96)
+    behind = surface_pixels(points, triangles[1:], red_and_green[1:], 96)
+    red, green = (pixels[..., k] > 0.0 for k in (0, 1))
+    assert red.any()
+    assert not (red & green).any()
+    assert np.array_equal(red | green, behind[..., 1] > 0.0), "red lies wholly before green"
+    # Turned round, triangles look the same.
+    turned = surface_pixels(points, triangles[:, ::-1], red_and_green, 96)
+    assert np.array_equal(turned, pixels)
+
+
+def test_a_resin_and_a_printer_dropped_on_a_unit_become_its_parameters():
+    assert bpy.ops.mu.assets() == {"FINISHED"}
+    file = str(library.user_folder("assets") / library.MADE_FILE)
+    with bpy.data.libraries.load(file, assets_only=True) as (there, here):
+        assert (there.materials, there.objects) == (
+            [load_material(name).name for name in material_names()],
+            [load_printer(name).title for name in asset_names("printers")],
+        )
+        here.materials, here.objects = there.materials[:1], there.objects[:1]
+    [resin], [box] = here.materials, here.objects
+    for made in (resin, box):
+        pixels = np.array(made.preview.image_pixels_float[:]).reshape(128, 128, 4)
+        assert 0.1 < (pixels[..., 3] > 0.5).mean() < 0.9
+    far, near = add(), add()
+    far.location, near.location = (0.0, 300.0, 0.0), (0.0, 0.0, 0.0)
+    for root in (far, near):
+        root.mu_print.printer = "own"
+    before = to_unit(near.mu_unit)
+    # As Blender's drop does: a material into the slot that is under the mouse.
+    near.material_slots[1].material = resin
+    dropped.take()
+    want = load_material(material_names()[0]).in_unit(before)
+    assert to_unit(near.mu_unit).material == want.material != before.material
+    assert to_unit(near.mu_unit).wall == want.wall
+    assert to_unit(far.mu_unit).material == before.material
+    assert near.material_slots[1].material.name == "MU Section"
+    assert dropped.waiting() is None
+    # What undo brings back from between a drop and its taking is taken away, not taken again.
+    near.data.materials.append(resin)
+    assert dropped.waiting() == (near.mu_unit.uuid, resin.name)
+    now = to_unit(near.mu_unit)
+    near.mu_unit.material.membrane_modulus_kPa = 2000.0
+    for function in bpy.app.handlers.undo_post:
+        function(bpy.context.scene)
+    assert dropped.waiting() is None
+    assert len(near.data.materials) == 5
+    assert to_unit(near.mu_unit).material.membrane_modulus_kPa == 2000.0
+    near.mu_unit.material.membrane_modulus_kPa = now.material.membrane_modulus_kPa
+    box.asset_clear()  # as it is after a drop
+    box.location = (10.0, 20.0, 0.0)
+    bpy.context.collection.objects.link(box)
+    bpy.context.view_layer.update()
+    dropped.take()
+    assert (near.mu_print.printer, far.mu_print.printer) == (asset_names("printers")[0], "own")
+    assert not [o for o in bpy.data.objects if o.get(dropped.PRINTER)]
+    assert bpy.context.object == near
+    assert dropped.waiting() is None
+    assert "no resin and no printer" in refused(bpy.ops.mu.take_asset, unit=near.mu_unit.uuid, asset="Cube")
+
+
 def test_presets_and_groups_become_an_asset_library_of_the_users():
 
     def names():
@@ -198,12 +290,14 @@ def test_presets_and_groups_become_an_asset_library_of_the_users():
     libraries = bpy.context.preferences.filepaths.asset_libraries
     assert [entry.name for entry in libraries].count("Monolithic Units") == 1
     assert len(bpy.data.node_groups) == 0, "groups that this file does not use were left in it"
+    assert not [m.name for m in bpy.data.materials if m.name.startswith("MU ")], "nor their materials"
     assert not [o for o in bpy.data.objects if o.mu_unit.uuid], "nor are the presets' units"
     folder = library.user_folder("assets")
     assert nodes.CATALOGUE in (folder / "blender_assets.cats.txt").read_text()
     assert sorted(p.name for p in folder.iterdir()) == [
         "blender_assets.cats.txt",
         "mu-nodes.blend",
+        "mu-resins-and-printers.blend",
         "mu-units.blend",
     ]
     with bpy.data.libraries.load(str(folder / "mu-units.blend"), assets_only=True) as (there, here):
@@ -224,6 +318,11 @@ def test_presets_and_groups_become_an_asset_library_of_the_users():
         here.node_groups = ["MU Tubes"]
     [tree] = here.node_groups
     assert tree.asset_data.catalog_id == nodes.CATALOGUE
+    pixels = np.array(tree.preview.image_pixels_float[:]).reshape(128, 128, 4)
+    assert set(np.unique(pixels[..., 3])) == {0.0, 1.0}, "a tube, and nothing beside it"
+    seen = pixels[pixels[..., 3] > 0.0]
+    assert 0.05 < len(seen) / 128**2 < 0.5
+    assert np.ptp(seen[:, 0]) > 0.2, "it is shaded"
     obj = drawn([(0, 0, 0), (0, 0, 40)])
     assert nodes.skin(obj, "MU Tubes").node_group.name == "MU Tubes"
     assert len(skinned(obj)) == 16

@@ -4,11 +4,12 @@ import json
 
 import bpy
 import numpy as np
+import pytest
 
 from mu_addon.blender.unit import figures
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.broken import broken
-from mu_addon.blender.unit.fields import field
+from mu_addon.blender.unit.fields import field, shown_value
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.anchors import window
 from mu_addon.design.parameters import Chambers, Waveguide, load_preset
@@ -122,6 +123,27 @@ def test_fields_show_true_lengths_and_tied_ones_change_as_one():
     assert to_unit(root.mu_unit).chambers.cell_mm == 13.0
 
 
+@pytest.mark.parametrize(
+    ("system", "shown", "text"),
+    [
+        ("METRIC", "METERS", "0.001874 m"),
+        ("METRIC", "CENTIMETERS", "0.1874 cm"),
+        ("METRIC", "MICROMETERS", "1874 µm"),
+        ("METRIC", "ADAPTIVE", "1.874 mm"),
+        ("IMPERIAL", "INCHES", '0.0737795"'),
+        ("IMPERIAL", "FEET", "0.00614829'"),
+        ("NONE", None, "1.874"),
+    ],
+)
+def test_the_value_that_fits_is_in_the_unit_of_the_fields(system, shown, text):
+    root, units = add(millimetres=False), bpy.context.scene.unit_settings
+    units.system = system
+    if shown is not None:
+        units.length_unit = shown
+    wall = next(d for d in describe(Chambers) if d.name == "wall_mm")
+    assert shown_value(root.mu_unit.chambers, wall, 1.874) == text
+
+
 def test_a_broken_rule_stands_in_its_field_with_a_value_that_fits():
     root = add()
     chambers = root.mu_unit.chambers
@@ -162,7 +184,8 @@ def test_the_head_says_what_a_unit_comes_to():
     root.mu_unit.scale = 2.0
     assert figures.lines(root, 38)[0][0] == "Size 75 x 100 x 162 mm"
     bpy.context.scene.unit_settings.system = "IMPERIAL"
-    assert figures.lines(root, 38)[0][0] == "Size 2.95 x 3.94 x 6.38 in"
+    bpy.context.scene.unit_settings.length_unit = "INCHES"
+    assert figures.lines(root, 38)[0][0] == 'Size 2.95 x 3.94 x 6.38"'
     bpy.ops.mu.millimetres()
     root.mu_unit.scale = 1.0
     bpy.ops.mu.solid()

@@ -5,12 +5,13 @@ The runs are of known bending, written without a solver.
 
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
 
+from mu_addon.blender.results import legend, panel, places, probe, run_panel, runs
 from mu_addon.blender.results import motion as motion_parts
-from mu_addon.blender.results import panel, places, probe, run_panel, runs
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.unit import object as unit_object
 
@@ -124,6 +125,61 @@ def test_two_runs_side_by_side_and_as_a_difference_on_the_unit(home):
     assert places.largest(root).value == 0.0, "both are written of the same bending"
     assert bpy.ops.mu.run_compare(key=quick) == {"FINISHED"}
     assert root.mu_unit.study.against == ""
+
+
+def test_a_run_that_is_compared_with_itself_shows_no_difference(home):
+    root = started(home)
+    _, _, thick = keys(root)
+    assert bpy.ops.mu.run_compare(key=thick) == {"FINISHED"}
+    assert bpy.ops.mu.field_show(field="run_difference_mm") == {"FINISHED"}
+    assert all("run_difference_mm" in part.data.attributes for part in motion_parts.parts(root))
+    assert bpy.ops.mu.run_show(key=thick) == {"FINISHED"}
+    assert not any("run_difference_mm" in part.data.attributes for part in motion_parts.parts(root))
+    assert "compared with: tick another one" in drawn(PANELS)
+    words = legend.lines(root, motion_parts.motion_of(root), bpy.context.scene)
+    assert "the run compared with itself" in words
+    assert "compared with: tick" in refused(bpy.ops.mu.field_show, field="run_difference_mm")
+
+
+def test_a_name_above_a_motion_stays_below_the_headers():
+    view = SimpleNamespace(type="WINDOW", x=0, y=100, width=800, height=600)
+    upper = SimpleNamespace(type="HEADER", y=674, height=26)
+    tools = SimpleNamespace(type="TOOL_HEADER", y=648, height=26)
+    lower = SimpleNamespace(type="HEADER", y=100, height=26)
+    hidden = SimpleNamespace(type="TOOL_HEADER", y=600, height=1)
+    area = SimpleNamespace(regions=[view, upper, tools, hidden])
+    assert legend.below_headers(area, view) == 548.0
+    area.regions = [view, lower]
+    assert legend.below_headers(area, view) == 600.0
+    assert legend.name_height(590.0, 50.0, 530.0) == 530.0
+    assert legend.name_height(400.0, 50.0, 530.0) == 400.0
+    assert legend.name_height(900.0, 700.0, 530.0) == 900.0, "the body is out of sight, and so is its name"
+
+
+def test_candidates_are_seen_on_the_unit_at_rest_alone(home):
+    root = started(home)
+    root.mu_unit.candidates = True
+    assert bpy.ops.mu.motion() == {"FINISHED"}
+    assert unit_object.shows_result(root)
+    assert not root.mu_unit.candidates
+    assert unit_object.candidate(root, "alpha1") is None
+    # Asked for beside a result they bring back the unit at rest, and Result takes them away again.
+    root.mu_unit.candidates = True
+    assert not unit_object.shows_result(root)
+    assert unit_object.candidate(root, "alpha1") is not None
+    root.mu_unit.show = unit_object.RESULT
+    assert unit_object.shows_result(root)
+    assert unit_object.candidate(root, "alpha1") is None
+    # A run that comes in meanwhile leaves them where they are.
+    root.mu_unit.candidates = True
+    root.mu_unit.chambers.wall_mm = 1.1
+    assert root.mu_unit.show == "preview"
+    assert unit_object.candidate(root, "alpha1") is not None
+    # Motions beside the design bend nothing in its place.
+    root.mu_motion.on_unit = False
+    assert root.mu_unit.candidates
+    root.mu_motion.on_unit = True
+    assert not root.mu_unit.candidates
 
 
 def test_deleting_a_run_frees_its_folder_and_takes_away_what_it_shows(home):

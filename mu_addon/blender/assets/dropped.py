@@ -1,0 +1,184 @@
+"""Resins and printers from the asset browser: what is dropped on a unit becomes its parameters.
+
+A resin is a material: dropped, Blender puts it into a slot of the unit's mesh. A printer is a box of its
+build volume: dropped, Blender adds it to the scene, and the nearest unit is meant. A moment later, from a
+timer, since no operator may be called while Blender tells of a change, the unit takes over what they stand
+for, in one undo step, and they go.
+"""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+from bpy.props import StringProperty
+
+from ...design.parameters import SECTIONS
+from ...design.quantity import describe
+from ...errors import InputError
+from ...reading import parse_json
+from ..preview import materials
+from ..shared import displays, handlers, updates
+from ..shared.operators import linked, reports_errors
+from ..unit import drawing
+from ..unit import object as unit_object
+
+RESIN, PRINTER = "mu_resin", "mu_printer"
+"""On a material: its parameters as JSON, by section and name. On an object: the name of a shipped printer."""
+
+
+class MU_OT_take_asset(bpy.types.Operator):
+    """Give a unit the resin or printer that was dropped on it"""
+
+    bl_idname = "mu.take_asset"
+    bl_label = "Use Dropped Asset"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    unit: StringProperty(name="Unit", description="UUID of the unit", options={"HIDDEN"})
+    asset: StringProperty(name="Asset", description="Name of the material or object", options={"HIDDEN"})
+
+    @reports_errors
+    def execute(self, context):
+        root = unit_object.by_uuid(self.unit)
+        resin, box = bpy.data.materials.get(self.asset), bpy.data.objects.get(self.asset)
+        if root is None or linked(root):
+            raise InputError("there is no unit to take it", self.asset, "drop it on a unit of this file")
+        if resin is not None and resin.get(RESIN):
+            _take_resin(root, resin)
+            words = f"{root.name} is of {resin.name}: its wall's modulus, Poisson's ratio and law"
+        elif box is not None and box.get(PRINTER):
+            words = f"{root.name} is printed by {box.name}"
+            _take_printer(root, box)
+        else:
+            raise InputError(
+                f"{self.asset!r} is no resin and no printer", "assets", "drop one of this extension"
+            )
+        self.report({"INFO"}, words)
+        return {"FINISHED"}
+
+
+def _take_resin(root: Any, resin: Any) -> None:
+    given = parse_json(resin[RESIN], f"{resin.name}, {RESIN}")
+    with updates.paused():
+        for section in SECTIONS:
+            group, values = getattr(root.mu_unit, section.section), given.get(section.section, {})
+            for d in describe(section):
+                if d.name in values:
+                    setattr(group, d.name, values[d.name])
+    _restore_slots(root)
+    unit_object.rebuild(root)
+
+
+def _restore_slots(root: Any) -> None:
+    """Take resins out of a unit's slots, which have the colours of its parts."""
+    usual = drawing.SLOTS if root.data == root.mu_unit.preview else ()
+    # Struts have their colour from nodes: over them Blender makes a slot more.
+    while usual and len(root.data.materials) > len(usual) and root.data.materials[-1].get(RESIN):
+        root.data.materials.pop()
+    for number, slot in enumerate(root.material_slots):
+        if slot.material is not None and slot.material.get(RESIN):
+            slot.link = "DATA"
+            own = root.data.materials[number]
+            if own is None or own.get(RESIN):
+                name = usual[number] if number < len(usual) else "MU Solid"
+                root.data.materials[number] = materials.material(name)
+
+
+def _take_printer(root: Any, box: Any) -> None:
+    root.mu_print.printer = box[PRINTER]
+    _remove(box)
+    unit_object.make_active(bpy.context, root)
+
+
+def _remove(box: Any) -> None:
+    mesh = box.data
+    bpy.data.objects.remove(box)
+    if not mesh.users:
+        bpy.data.meshes.remove(mesh)
+
+
+def waiting() -> tuple[str, str] | None:
+    """UUID of a unit and name of the asset that was dropped on it, or None."""
+    resins = {m for m in bpy.data.materials if m.get(RESIN) and m.users}
+    boxes = [o for o in bpy.context.scene.objects if o.get(PRINTER) and not o.asset_data]
+    if not resins and not boxes:
+        return None
+    roots = [root for root in unit_object.roots() if root.type == "MESH" and displays.editable(root)]
+    for root in roots:
+        for slot in root.material_slots:
+            if slot.material in resins:
+                return root.mu_unit.uuid, slot.material.name
+    for box in boxes:
+        if roots:
+            at = box.matrix_world.translation
+            nearest = min(roots, key=lambda root, at=at: (root.matrix_world.translation - at).length)
+            return nearest.mu_unit.uuid, box.name
+    return None
+
+
+def take() -> None:
+    """Have a unit take what was dropped on it, with one undo step."""
+    found = waiting()
+    if found is not None and bpy.context.mode == "OBJECT":
+        unit, asset = found
+        bpy.ops.mu.take_asset("EXEC_DEFAULT", True, unit=unit, asset=asset)
+
+
+def _later() -> None:
+    windows = bpy.context.window_manager.windows
+    with bpy.context.temp_override(window=windows[0]) if windows else bpy.context.temp_override():
+        take()
+
+
+_restoring = False
+"""Whether undo or redo is at work: what they bring back was dropped before."""
+
+
+@persistent
+def _begin_restoring(*_: Any) -> None:
+    global _restoring
+    _restoring = True
+
+
+@persistent
+def _restored(*_: Any) -> None:
+    """Take away what undo has brought back from between a drop and its taking: the drop is undone, too."""
+    global _restoring
+    while (found := waiting()) is not None:
+        root, box = unit_object.by_uuid(found[0]), bpy.context.scene.objects.get(found[1])
+        if box is not None and box.get(PRINTER):
+            _remove(box)
+        else:
+            _restore_slots(root)
+    _restoring = False
+
+
+@persistent
+def _updated(*_: Any) -> None:
+    if _restoring:
+        return
+    if waiting() is not None and not bpy.app.timers.is_registered(_later):
+        bpy.app.timers.register(_later, first_interval=0.0)
+
+
+_HANDLERS = {
+    "depsgraph_update_post": _updated,
+    **dict.fromkeys(("undo_pre", "redo_pre"), _begin_restoring),
+    **dict.fromkeys(("undo_post", "redo_post"), _restored),
+}
+_register, _unregister = bpy.utils.register_classes_factory((MU_OT_take_asset,))
+
+
+def register() -> None:
+    """The operator, and a look after each change."""
+    _register()
+    handlers.add(_HANDLERS)
+
+
+def unregister() -> None:
+    """Take them out."""
+    handlers.remove(_HANDLERS)
+    if bpy.app.timers.is_registered(_later):
+        bpy.app.timers.unregister(_later)
+    _unregister()

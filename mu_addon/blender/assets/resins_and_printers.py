@@ -1,0 +1,92 @@
+"""The shipped resins and printers as assets: what they are in a file, and their pictures."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import attrs
+import bpy
+import numpy as np
+
+from ...design.assets import asset_names
+from ...design.parameters import Unit
+from ...design.printing.printer import load_printer
+from ..preview import materials
+from ..shared import scene_units
+from .dropped import PRINTER, RESIN
+from .surface_picture import surface_pixels
+
+Array = np.ndarray[Any, Any]
+
+_CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (0.0, 1.0)])
+_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+
+
+def names_of_all() -> set[str]:
+    """What the shipped resins and printers are called in a file."""
+    return {load_printer(name).title for name in asset_names("printers")} | {r.name for r in _resins()}
+
+
+def _resins() -> list[Any]:
+    """The shipped resins; none without the solver's packages, which reading a law loads."""
+    try:
+        from ...materials import load_material, material_names
+    except (ImportError, OSError, RuntimeError):
+        return []
+    return [load_material(name) for name in material_names()]
+
+
+def resins() -> list[Any]:
+    """A new material for every shipped resin, with what it makes of a unit's parameters."""
+    made = []
+    for resin in _resins():
+        found = bpy.data.materials.new(resin.name)
+        found.diffuse_color = materials.COLOURS["MU Membrane"]
+        unit = resin.in_unit(Unit())
+        of_wall = ("membrane_modulus_kPa", "membrane_poisson")
+        material = {name: getattr(unit.material, name) for name in of_wall}
+        found[RESIN] = json.dumps({"material": material, "wall": attrs.asdict(unit.wall)})
+        found.asset_mark()
+        found.asset_data.description = f"Resin of a unit's wall: {resin.about}"
+        made.append(found)
+    return made
+
+
+def printers() -> list[Any]:
+    """A new object for every shipped printer: its build volume, as a wire box in true size."""
+    made = []
+    for name in asset_names("printers"):
+        printer = load_printer(name)
+        size = np.array([printer[f"build_{axis}_mm"] for axis in "xyz"])
+        mesh = bpy.data.meshes.new(printer.title)
+        mesh.from_pydata((_CORNERS * size).tolist(), [], _FACES)
+        box = bpy.data.objects.new(printer.title, mesh)
+        box.scale = (scene_units.mm(bpy.context.scene),) * 3
+        box.display_type = "WIRE"
+        box[PRINTER] = name
+        box.asset_mark()
+        box.asset_data.description = f"Printer: {printer.title}"
+        made.append(box)
+    return made
+
+
+def pixels_of(made: Any, size: int) -> Array:
+    """Pixels (size, size, 4): a ball of a resin, a printer's build volume; rows from below."""
+    if isinstance(made, bpy.types.Material):
+        points, triangles = _ball()
+        colour = made.diffuse_color[:3]
+    else:
+        points = np.array([vertex.co[:] for vertex in made.data.vertices])
+        quads = np.array(_FACES)
+        triangles = np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
+        colour = materials.COLOURS["MU Layer"][:3]
+    return surface_pixels(points, triangles, np.broadcast_to(colour, (len(triangles), 3)), size)
+
+
+def _ball() -> tuple[Array, Array]:
+    turn, rise = np.meshgrid(np.linspace(0, 2 * np.pi, 33), np.linspace(-np.pi / 2, np.pi / 2, 17))
+    points = np.stack([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)], axis=-1)
+    first = (np.arange(16)[:, None] * 33 + np.arange(32)).ravel()
+    triangles = [np.stack([first, first + 1, first + 34]), np.stack([first, first + 34, first + 33])]
+    return points.reshape(-1, 3), np.concatenate(triangles, axis=1).T
