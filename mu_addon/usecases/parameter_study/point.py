@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -26,6 +27,9 @@ from ...run.versions import package_versions
 
 # Seconds between two looks at a study's memory.
 LOOK_S = 0.05
+
+STOPPED = threading.Event()
+"""Set where a sweep ends whose points are threads of this process: their studies then end at once."""
 
 
 @attrs.frozen
@@ -126,6 +130,8 @@ def _watch(child: Child, task: Task) -> tuple[float, dict[str, str] | None]:
 
 
 def _too_much(child: Child, task: Task, peak_MB: float) -> dict[str, str] | None:
+    if STOPPED.is_set():
+        return {"what": "the sweep was stopped", "what_to_do": "run it again"}
     if peak_MB > task.memory_MB:
         return {
             "what": f"the study took more than the {task.memory_MB} MB of memory that are allowed",
