@@ -16,7 +16,7 @@ import attrs
 
 from ...errors import InputError, MuError
 from ...run.pool import each
-from .point import STOPPED
+from .point import stop_points
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -74,7 +74,6 @@ class Cluster:
         self._local: Any = None
         if scheduler is None:
             # Threads are enough: each task is a process of its own already.
-            STOPPED.clear()
             self._local = distributed.LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
@@ -118,12 +117,14 @@ class Cluster:
         """Leave the scheduler, and end the workers that were started here, with what they are at."""
         _quieten()
         if self._local is not None:
-            STOPPED.set()
+            stop_points()
         with suppress(Exception):
             self.client.close(timeout=2)
         if self._local is not None:
             with suppress(Exception):
                 self._local.close(timeout=2)
+            # Those that began in the meantime, in the place of the stopped.
+            stop_points()
 
     def results(
         self, tasks: Sequence[Task], work: Work, warn: Callable[[str], None]
