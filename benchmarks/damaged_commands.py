@@ -4,8 +4,8 @@
     python benchmarks/damaged_commands.py --files 50 --seed 7 chain graph
 
 A file costs some milliseconds: each command runs in a fork of this process, which has loaded what commands
-need, and is ended after two seconds of the processor's, still at work. What a real process does is tried with
-a few.
+need, and is ended after some seconds of the processor's, still at work. What a real process does is tried
+with a few.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -34,13 +35,14 @@ from circumstances import circumstances  # noqa: E402
 from mu_addon.cli import main as command_line  # noqa: E402
 from mu_addon.design.parameters import load_preset, to_toml  # noqa: E402
 from mu_addon.design.surface import stl_bytes  # noqa: E402
+from mu_addon.usecases.resume import MODULES  # noqa: E402
 from tests.design.printing import parts  # noqa: E402
 from tests.run.test_mutated_files import CORPUS, INDEX, RECORDING, mutated  # noqa: E402
 from tests.run.test_reading import MODEL  # noqa: E402
 
 ASSETS, DATA = ROOT / "assets", ROOT / "tests" / "data"
 COARSE = ["--refine", "0.3", "--order", "1", "--times", "3", "--no-report"]
-SECONDS = 2.0
+SECONDS = [2.0]
 """Of the processor that a command may take: refusals take less."""
 HUNG_S = 120.0
 WELL = {0, 1, 2, 3, 4, 5, 6}
@@ -148,7 +150,7 @@ def forked(words, told):
         null = os.open(os.devnull, os.O_RDONLY)
         for descriptor, to in ((null, 0), (out, 1), (out, 2)):
             os.dup2(descriptor, to)
-        signal.setitimer(signal.ITIMER_PROF, SECONDS)
+        signal.setitimer(signal.ITIMER_PROF, SECONDS[0])
         status = 99
         try:
             status = command_line.main(words)
@@ -242,8 +244,12 @@ def main():
     parser.add_argument("--files", type=int, default=200)
     parser.add_argument("--processes", type=int, default=5)
     parser.add_argument("--seed", type=int, default=20)
+    parser.add_argument("--seconds", type=float, default=SECONDS[0], help="of the processor's, for a file")
     parser.add_argument("--keep", type=Path, help="folder for the files of what goes wrong")
     given = parser.parse_args()
+    SECONDS[0] = given.seconds
+    for module in MODULES.values():
+        import_module(module, "mu_addon.usecases")
     print(circumstances(), f"Seed {given.seed}.\n")
     print("| kind | computed | refused | at work | in processes | MB at most | wrong |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
