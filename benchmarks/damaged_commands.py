@@ -175,7 +175,7 @@ def process(words, told):
     """The same of a real process."""
 
     def limit():
-        resource.setrlimit(resource.RLIMIT_CPU, (20, 20))
+        resource.setrlimit(resource.RLIMIT_CPU, (20, 40))
 
     with open(told, "wb") as out:
         line = [sys.executable, str(ROOT / "headless" / "run.py"), *words]
