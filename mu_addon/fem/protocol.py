@@ -16,6 +16,8 @@ from ..reading import file_text, require_rows
 Array = np.ndarray[Any, Any]
 
 COLUMNS = ("time_s", "pressure_kPa")
+LEAST_KPA, MOST_KPA = -101.325, 1000.0
+"""Gauge pressures that a protocol may have: from none at all, to twenty times what a unit is built for."""
 # Far longer than any protocol of a million corner points needs to be, in bytes.
 _LONGEST = 1 << 25
 
@@ -55,8 +57,9 @@ class ProtocolText:
     def values(self, names: Sequence[str]) -> Array:
         """Values (c, k) of k columns of numbers, the first of them time; needs their names in the heading.
 
-        Raises InputError naming file and line where a value is missing or not a finite number, time does not
-        increase, or there are fewer than two rows.
+        Raises InputError naming file and line where a value is missing or not a finite number, a pressure (a
+        column whose name ends with kPa) is none that can be, time does not increase, or there are fewer than
+        two rows.
         """
         columns = [self.names.index(name) for name in names]
         found: list[list[float]] = []
@@ -68,6 +71,13 @@ class ProtocolText:
                 raise InputError("a value is missing or not a number", where, "give numbers only") from None
             if not np.isfinite(row).all():
                 raise InputError("a value is not finite", where, "give finite numbers only")
+            for name, value in zip(names, row, strict=True):
+                if name.endswith("kPa") and not LEAST_KPA <= value <= MOST_KPA:
+                    raise InputError(
+                        f"a pressure of {value:g} kPa",
+                        where,
+                        f"give gauge pressures in kPa, from {LEAST_KPA:g} to {MOST_KPA:g}",
+                    )
             if found and row[0] <= found[-1][0]:
                 raise InputError("time does not increase", where, "sort the rows and remove repeated times")
             found.append(row)
@@ -107,8 +117,9 @@ def _cells(line: str, where: str) -> tuple[str, ...]:
 def read_protocol(path: Path) -> Protocol:
     """Read a protocol: columns time_s and pressure_kPa, `#` comments allowed.
 
-    Raises InputError naming file and line where the file is unreadable, a value is missing or not a
-    finite number, time does not increase, or the protocol does not start at atmospheric pressure.
+    Raises InputError naming file and line where the file is unreadable, a value is missing or not a finite
+    number, a pressure is none that can be, time does not increase, or the protocol does not start at
+    atmospheric pressure.
     """
     text = read_protocol_text(path, COLUMNS)
     number, line = text.heading

@@ -1,6 +1,7 @@
 """Warp's cache of kernels: cut short, emptied, on a disk that is read-only or full."""
 
 import os
+import random
 import shutil
 import subprocess
 import sys
@@ -8,7 +9,7 @@ import sys
 import pytest
 
 from mu_addon.fem import kernel_cache
-from mu_addon.fem.kernel_cache import entries, is_whole, usable_cache
+from mu_addon.fem.kernel_cache import entries, is_whole, seal, usable_cache
 
 # Compiles a kernel of its own, or takes it from the cache.
 COMPILE = """
@@ -78,6 +79,57 @@ def test_warp_makes_it_anew(made, tmp_path):
     compiled(tmp_path, cache)
     (entry,) = entries(next(cache.iterdir()))
     assert is_whole(entry)
+
+
+@pytest.mark.parametrize("suffix", [".meta", ".o", ".cpp", "sha256.json"])
+@pytest.mark.parametrize("seed", range(10))
+def test_one_flipped_bit_is_found(made, tmp_path, suffix, seed):
+    """In object code as well, of which Warp has no doubt."""
+    cache = shutil.copytree(made, tmp_path / "cache")
+    (entry,) = entries(next(cache.iterdir()))
+
+    def flipped(content):
+        bit = random.Random(seed).randrange(8 * len(content))
+        changed = bytearray(content)
+        changed[bit // 8] ^= 1 << bit % 8
+        return bytes(changed)
+
+    damage(cache, suffix, flipped)
+    assert not is_whole(entry)
+    assert usable_cache(entry.parent) == entry.parent
+    assert not entry.exists()
+
+
+def test_object_code_with_flipped_bits_is_not_run(made, tmp_path):
+    cache = shutil.copytree(made, tmp_path / "cache")
+    damage(cache, ".o", lambda b: b[:64] + bytes(~x & 255 for x in b[64:512]) + b[512:])
+    compiled(tmp_path, cache)
+    (entry,) = entries(next(cache.iterdir()))
+    assert is_whole(entry)
+
+
+def test_an_entry_is_sealed_once(made, tmp_path):
+    """What was added since gets its digest; what changed since does not get another."""
+    cache = shutil.copytree(made, tmp_path / "cache")
+    (entry,) = entries(next(cache.iterdir()))
+    before = (entry / "sha256.json").read_bytes()
+    seal(entry.parent)
+    assert (entry / "sha256.json").read_bytes() == before
+    (entry / "other.o").write_bytes(next(entry.glob("*.o")).read_bytes())
+    seal(entry.parent)
+    assert is_whole(entry)
+    damage(cache, "other.o", lambda b: b[:200] + bytes([b[200] ^ 1]) + b[201:])
+    seal(entry.parent)
+    assert not is_whole(entry)
+
+
+def test_entries_made_before_there_were_seals_are_sealed(made, tmp_path):
+    cache = shutil.copytree(made, tmp_path / "cache")
+    (entry,) = entries(next(cache.iterdir()))
+    (entry / "sha256.json").unlink()
+    assert is_whole(entry)
+    assert usable_cache(entry.parent) == entry.parent
+    assert (entry / "sha256.json").exists()
 
 
 def test_what_another_process_builds_is_left_alone(tmp_path):

@@ -113,6 +113,7 @@ def test_impossible_geometry_names_the_largest_wall(tmp_path):
         ("time_s,pressure_kPa\n0,0\n1,5\n1,6\n", ("line 4", "time does not increase")),
         ("time_s,pressure_Pa\n0,0\n1,5\n", ("pressure_kPa", "line 1")),
         ("time_s,pressure_kPa\n0,0\n1,nan\n", ("line 3", "not finite")),
+        ("time_s,pressure_kPa\n0,0\n1,-20000\n", ("line 3", "a pressure of -20000 kPa", "-101.325")),
         ("time_s,pressure_kPa\n0,5\n1,6\n", ("0 kPa",)),
         ("", ("empty",)),
     ],

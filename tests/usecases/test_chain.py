@@ -86,6 +86,7 @@ def test_wrong_inputs_are_named(folder, old, new, words):
         ("time_s,pressure_1_kPa\n0,0\n1,1\n", "of 2 units"),
         (PROTOCOL + "1,0,0\n", "time does not increase"),
         (PROTOCOL + "3,0,nan\n", "not finite"),
+        (PROTOCOL + "3,0,99999999999999999999\n", "a pressure of 1e\\+20 kPa"),
         (PROTOCOL + "3,0\n", "missing or not a number"),
         ("time_s,pressure_1_kPa,pressure_2_kPa\n0,0,0\n", "fewer than two rows"),
     ],

@@ -16,7 +16,7 @@ from mu_addon.design.surface import bad_edges, genus, stl_bytes, stl_surface, vo
 from mu_addon.errors import InputError
 from mu_addon.usecases.check_print.job import Job
 from mu_addon.usecases.check_print.report import direction_name
-from mu_addon.usecases.check_print.run import nominal_of, read_surface
+from mu_addon.usecases.check_print.run import console_summary, nominal_of, read_surface
 
 
 def bottle(bore):
@@ -61,7 +61,13 @@ def test_a_limit_that_was_measured_decides(tmp_path):
     assert found["drain"]["severity"] == "warning"
     assert found["drain"]["limit"] == 4.5
     assert not found["drain"]["assumed"]
-    assert "measured" in (out / "report.html").read_text()
+    assert "Measured: narrowest opening that drains a chamber." in (out / "report.html").read_text()
+    for name in ("check.json", "summary.json"):
+        limits = json.loads((out / name).read_text())["limits"]
+        assert limits["measured"] == ["drain_diameter_mm"]
+        assert sum(map(len, limits.values())) == len(MEANING)
+    words = console_summary(json.loads((out / "summary.json").read_text()))
+    assert "measured limits: drain_diameter_mm" in words
     assert read_printer(out / "printer.toml").limits["drain_diameter_mm"].measured
 
 

@@ -280,7 +280,7 @@ def test_specimens_weigh_what_they_should(printed):
     rows = {row["name"]: row for row in manifest["specimens"]}
     own = [name for name in rows if not name.startswith("limit-")]
     assert own == ["gauge", "cube-0.75x", "cube-1x", "cube-1.5x", "strut", "wall", "beam", "waveguide"]
-    assert len(rows) - len(own) == 12
+    assert len(rows) - len(own) == 13
     for scale in (0.75, 1.0, 1.5):
         row = rows[f"cube-{scale:g}x"]
         assert row["size_mm"] == pytest.approx([37.5 * scale] * 3)
@@ -303,11 +303,14 @@ def filled(folder, path, **measured):
 
 def test_limits_that_were_measured_take_the_place_of_those_that_were_not(printed, tmp_path):
     printer = load_printer()
-    sheet = filled(printed[0], tmp_path / "limits.csv", wall_mm="0.42", bridge_mm="15")
+    sheet = filled(
+        printed[0], tmp_path / "limits.csv", wall_mm="0.42", bridge_mm="15", density_g_per_ml="1.03"
+    )
     found = printer.with_limits(measured_limits(sheet))
     changed = {name for name in printer.limits if found.limits[name] != printer.limits[name]}
-    assert changed == {"wall_mm", "bridge_mm"}
+    assert changed == {"wall_mm", "bridge_mm", "density_g_per_ml"}
     assert found["wall_mm"] == 0.42
+    assert found["density_g_per_ml"] == 1.03
     assert found.limits["wall_mm"].standing == "measured"
     assert not found.limits["wall_mm"].assumed
     assert found.limits["gap_mm"].standing == "assumed"
@@ -323,6 +326,7 @@ def test_limits_that_were_measured_take_the_place_of_those_that_were_not(printed
         ({"wall_mm": "thin"}, "wall_mm measured as 'thin'; the part has 0.24 to 0.9"),
         ({"wall_mm": "0.1"}, "wall_mm measured as '0.1'"),
         ({"wall_mm": "nan"}, "wall_mm measured as 'nan'"),
+        ({"density_g_per_ml": "8.24"}, "density_g_per_ml measured as '8.24'"),
     ],
 )
 def test_a_sheet_of_limits_that_says_nothing_sensible_is_refused(printed, tmp_path, measured, message):

@@ -20,6 +20,7 @@ from mu_addon.run.child import RUNNING, Child
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.parameter_study import cluster as cluster_module
+from mu_addon.usecases.parameter_study import point as point_module
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.parameter_study.point import Task, run_point, version
 from mu_addon.usecases.parameter_study.run import USE_CASE, Job
@@ -236,6 +237,37 @@ def test_child_runs_of_the_command_line_end_with_their_parent_and_tell_their_err
         time.sleep(0.05)
     assert "this folder contains no study" in child.error["what"]
     assert child.error["status"] == 2
+
+
+def test_a_sweep_that_stops_ends_its_studies_at_once_and_says_nothing_of_dask(monkeypatch, capfd):
+    children = []
+
+    class Kept(Child):
+        def begin(self):
+            super().begin()
+            children.append(self)
+
+    monkeypatch.setattr(point_module, "Child", Kept)
+    cluster = cluster_module.Cluster(None, 1)
+    tasks = [task("garbage"), task("hang", minutes=600.0)]
+    results = cluster.results(tasks, run_point, lambda words: None)
+    assert next(results)[1]["status"] == "done"
+    end = time.monotonic() + PATIENCE_S
+    while len(children) < 2:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    results.close()
+    cluster.close()
+    while children[1].state == RUNNING:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    assert not _alive(children[1].pid)
+    assert "distributed" not in "".join(capfd.readouterr())
+    # The next sweep of the same process is another.
+    again = cluster_module.Cluster(None, 1)
+    (row,) = dict(again.results([task("garbage")], run_point, lambda words: None)).values()
+    again.close()
+    assert row["status"] == "done"
 
 
 def test_a_real_study_is_swept(tmp_path):

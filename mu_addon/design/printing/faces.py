@@ -96,8 +96,7 @@ def turned(vertices: Vertices, triangles: Triangles) -> NDArray[np.bool_]:
 
     vertices (n, 3) in mm. Triangles belong together where exactly two share an edge.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import breadth_first_order, connected_components
+    from scipy.sparse.csgraph import connected_components
 
     m = len(triangles)
     e = edges(triangles)
@@ -115,19 +114,31 @@ def turned(vertices: Vertices, triangles: Triangles) -> NDArray[np.bool_]:
     area = np.linalg.norm(_area_vectors(vertices, triangles), axis=1)
     size = np.bincount(patch, area)
     links = _graph(patch[a[~agree]], patch[b[~agree]], len(size))
-    links = coo_matrix(links + links.T).tocsr()
+    return np.asarray(_against_the_larger(links, size)[patch])
+
+
+def _against_the_larger(links: Any, size: NDArray[Any]) -> NDArray[np.bool_]:
+    """Which patches (n,) face against the larger part, by size (n,), of the patches that they are linked to.
+
+    links: between patches that face each other's way, as a sparse matrix (n, n).
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+    n = len(size)
+    links = coo_matrix(links + links.T)
     group = connected_components(links, directed=False)[1]
-    parity = np.zeros(len(size), bool)
-    for members in _members(group):
-        if len(members) == 1:
-            continue
-        root = members[size[members].argmax()]
-        walk, before = breadth_first_order(links, root, directed=False)
-        for node in walk[1:]:
-            parity[node] = not parity[before[node]]
-        if size[members][parity[members]].sum() > 0.5 * size[members].sum():
-            parity[members] = ~parity[members]
-    return np.asarray(parity[patch])
+    # The largest patch of each group, and one walk through all of them from a node that is linked to these.
+    largest_last = np.lexsort((-np.arange(n), size, group))
+    roots = largest_last[np.cumsum(np.bincount(group)) - 1]
+    starts, ends = np.concatenate([links.row, np.full(len(roots), n)]), np.concatenate([links.col, roots])
+    walk, before = breadth_first_order(_graph(starts, ends, n + 1), n)
+    against = [True] * (n + 1)
+    for node, last in zip(walk[1:].tolist(), before[walk[1:]].tolist(), strict=True):
+        against[node] = not against[last]
+    parity = np.array(against[:n])
+    swap = np.bincount(group, size * parity) > 0.5 * np.bincount(group, size)
+    return np.asarray(parity ^ swap[group])
 
 
 def pieces(vertices: Vertices, triangles: Triangles) -> Pieces:
@@ -144,24 +155,42 @@ def pieces(vertices: Vertices, triangles: Triangles) -> Pieces:
     same = e.of_side[np.argsort(e.of_side, kind="stable")]
     linked = same[1:] == same[:-1]
     label = connected_components(_graph(order[1:][linked], order[:-1][linked], m), directed=False)[1]
-    shells = [_shell(vertices, triangles, members) for members in _members(label)]
+    shells = _shells(vertices, triangles, label)
     shells.sort(key=lambda shell: -abs(shell.volume))
+    around = Surroundings(vertices, triangles, shells)
     found = Pieces([], [], [], [])
     for number, shell in enumerate(shells):
         if number == 0 and shell.volume > 0.0:
             found.bodies.append(shell)
             continue
-        around = 0.0
-        if number < MOST_SHELLS:
-            mine = np.zeros(m, bool)
-            mine[shell.triangles] = True
-            point = vertices[triangles[shell.triangles[0]]].mean(axis=0)
-            around = winding(point, vertices[triangles[~mine]])
+        turns = sum(around.turns(number)) if number < MOST_SHELLS else 0.0
         if shell.volume < 0.0:
-            (found.voids if around > 0.5 else found.inside_out).append(shell)
+            (found.voids if turns > 0.5 else found.inside_out).append(shell)
         else:
-            (found.nested if around > 0.5 else found.bodies).append(shell)
+            (found.nested if turns > 0.5 else found.bodies).append(shell)
     return found
+
+
+class Surroundings:
+    """The closed shells around each of some shells of a surface; those whose box does not hold it are not."""
+
+    def __init__(self, vertices: Vertices, triangles: Triangles, shells: list[Shell]) -> None:
+        self._vertices, self._triangles, self._shells = vertices, triangles, shells
+        self._at = np.array([vertices[triangles[s.triangles[0]]].mean(axis=0) for s in shells]).reshape(-1, 3)
+        self._low, self._high = np.empty_like(self._at), np.empty_like(self._at)
+        if shells:
+            begins = np.cumsum([0, *(len(s.triangles) for s in shells[:-1])])
+            corners = vertices[triangles[np.concatenate([s.triangles for s in shells])]]
+            self._low = np.minimum.reduceat(corners.min(axis=1), begins)
+            self._high = np.maximum.reduceat(corners.max(axis=1), begins)
+
+    def turns(self, number: int) -> list[float]:
+        """Winding numbers, around a point of the shell of that number, of the others that may hold it."""
+        at = self._at[number]
+        holds = ((self._low <= at) & (at <= self._high)).all(axis=1)
+        holds[number] = False
+        others = (self._shells[k].triangles for k in np.flatnonzero(holds))
+        return [winding(at, self._vertices[self._triangles[members]]) for members in others]
 
 
 def winding(point: Points, corners: Points) -> float:
@@ -181,20 +210,25 @@ def winding(point: Points, corners: Points) -> float:
     return float(np.arctan2(top, below).sum() / (2.0 * np.pi))
 
 
-def _shell(vertices: Vertices, triangles: Triangles, members: NDArray[np.int64]) -> Shell:
-    p, q, r = vertices[triangles[members].T]
+def _shells(vertices: Vertices, triangles: Triangles, label: NDArray[np.integer]) -> list[Shell]:
+    """The shells of a surface, of which each triangle has a label (m,) from 0 on."""
+    members = members_of(label)
+    p, q, r = (vertices[corner] for corner in triangles.T)
     # Volumes of tetrahedra over a point of the shell, not over a far origin: small shells keep their digits.
-    base = p[0]
-    share = np.einsum("ij,ij->i", p - base, np.cross(q - base, r - base)) / 6.0
-    volume = float(share.sum())
-    if abs(volume) > 1e-12:
-        centroid = base + (share @ (p + q + r - 3.0 * base)) / (4.0 * volume)
-    else:
-        centroid = vertices[triangles[members]].mean(axis=(0, 1))
-    return Shell(members, volume, centroid)
+    base = p[[part[0] for part in members]]
+    of = base[label]
+    share = np.einsum("ij,ij->i", p - of, np.cross(q - of, r - of)) / 6.0
+    volumes = np.bincount(label, share)
+    moments = [np.bincount(label, share * (p + q + r - 3.0 * of)[:, k]) for k in range(3)]
+    middles = [np.bincount(label, (p + q + r)[:, k]) / (3.0 * np.bincount(label)) for k in range(3)]
+    flat = np.abs(volumes) <= 1e-12
+    centroids = base + np.stack(moments, axis=1) / np.where(flat, 1.0, 4.0 * volumes)[:, None]
+    centroids[flat] = np.stack(middles, axis=1)[flat]
+    return [Shell(*shell) for shell in zip(members, volumes.tolist(), centroids, strict=True)]
 
 
-def _members(label: NDArray[np.integer]) -> list[NDArray[np.int64]]:
+def members_of(label: NDArray[np.integer]) -> list[NDArray[np.int64]]:
+    """Which (k,) have each label, of labels (m,) from 0 on."""
     order = np.argsort(label, kind="stable")
     return np.split(order, np.cumsum(np.bincount(label))[:-1])
 

@@ -21,21 +21,24 @@ _FOOT, _APART, _HIGH, _DEEP, _SOLID = 2.0, 4.0, 10.0, 10.0, 3.0
 # Legs under a cup, in mm, so that it stands off the platform.
 _LEG = 6.0
 _FACETS = 32
+# Side in mm of the cube that is weighed, and what its density may be, over that of the printer's file.
+_WEIGHED = 20.0
+_DENSITIES = (0.7, 1.3)
 
 
 @attrs.frozen(eq=False)
 class LimitPart:
     """A part with a row of features for one limit, named as in `printer.MEANING`.
 
-    sizes (n,): of the features, in the limit's unit, ascending from the part's notched corner along x. judge:
-    when a feature counts as made. best: whether the limit is the smallest or the largest size that is made.
-    make: the surface.
+    sizes (n,): of the features, in the limit's unit, ascending from the part's notched corner along x; of the
+    cube that is weighed, the least and the largest density that can be. best: whether the limit is the
+    smallest or the largest size that is made. how: what to find out, in words. make: the surface.
     """
 
     limit: str
     sizes: tuple[float, ...]
-    judge: str
     best: str
+    how: str
     make: Callable[[], tuple[Vertices, Triangles]]
 
     @property
@@ -45,20 +48,15 @@ class LimitPart:
 
     @property
     def measure(self) -> str:
-        """What to find out, in words."""
-        sizes = ", ".join(f"{size:g}" for size in self.sizes)
-        return (
-            f"{MEANING[self.limit]}: write the {self.best} of {sizes}, in this order from the notched "
-            f"corner, into limits.csv at which {self.judge}"
-        )
+        """What to find out, in words, and where to write it."""
+        return f"{MEANING[self.limit]}: write {self.how} into limits.csv"
 
 
 def limit_parts(printer: Printer, strut_mm: float) -> list[LimitPart]:
     """A part for every limit of a printer that a print can show.
 
     strut_mm: length of the unit's struts, half a cell's diagonal. Without a part are the build volume, the
-    layer, its time and the supports, which are settings and not limits, and the density, which any weighed
-    part tells.
+    layer, its time and the supports, which are settings and not limits.
     """
     rows: dict[str, tuple[Callable[[float], Any], str, str]] = {
         "solid_mm": (_held_wall, "the wall between its posts is whole and straight", "smallest"),
@@ -89,9 +87,22 @@ def limit_parts(printer: Printer, strut_mm: float) -> list[LimitPart]:
     found = []
     for name, (feature, judge, best) in rows.items():
         sizes = tuple(float(f"{ratio * printer[name]:.2g}") for ratio in RATIOS)
-        make = _row(sizes, feature, on_foot=name != "cup_ml")
-        found.append(LimitPart(name, sizes, judge, best, make))
+        row = ", ".join(f"{size:g}" for size in sizes)
+        how = f"the {best} of {row}, in this order from the notched corner, at which {judge},"
+        found.append(LimitPart(name, sizes, best, how, _row(sizes, feature, on_foot=name != "cup_ml")))
+    name = "density_g_per_ml"
+    sizes = tuple(float(f"{ratio * printer[name]:.2g}") for ratio in _DENSITIES)
+    how = (
+        f"the printed cube's mass in g over its volume in ml, {_WEIGHED**3 / 1e3:g} as drawn, better that of "
+        "the water which it displaces,"
+    )
+    found.append(LimitPart(name, sizes, "mass over volume", how, _weighed))
     return found
+
+
+def _weighed() -> tuple[Vertices, Triangles]:
+    """A solid cube."""
+    return printable(shapes.box([0.0] * 3, [_WEIGHED] * 3))
 
 
 def _row(

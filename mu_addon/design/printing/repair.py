@@ -19,6 +19,12 @@ from .crossing import MOST_CROSSINGS, crossings
 GAP_MM = 0.02
 """Vertices of open edges that are no farther apart are one: a fifth of a layer, less than a printer makes."""
 
+MOST_NEAR = 50_000_000
+"""Pairs of vertices of open edges within a gap's width; where there are more, in dust, no gap is closed."""
+
+MOST_IN_GROUP = 1000
+"""Vertices of open edges that can become one: where a gap ends there are a few."""
+
 
 @attrs.frozen
 class Change:
@@ -148,8 +154,9 @@ def _without_doubled(triangles: Triangles) -> tuple[Triangles, int]:
     # How many triangles of no such set each edge has.
     others = np.bincount(e.of_side, np.tile(~several, 3), len(e.ends))
     kept = np.ones(m, bool)
-    for g in np.flatnonzero(count > 1).tolist():
-        members = np.flatnonzero(group == g)
+    for members in faces.members_of(group):
+        if len(members) == 1:
+            continue
         beside = others[e.of_side[members[0] + m * np.arange(3)]]
         if (beside == 2).all():
             kept[members] = False
@@ -175,7 +182,14 @@ def _closed_gaps(
     rim = np.unique(e.ends[np.bincount(e.of_side) == 1])
     if not len(rim):
         return vertices, index, 0, 0.0
-    pairs = cKDTree(vertices[rim]).query_pairs(gap_mm, output_type="ndarray")
+    # Counted before they are listed, which may take more memory than there is: first those within a cube of
+    # half that size, at once, then all.
+    cells = np.floor((vertices[rim] - vertices[rim].min(axis=0)) / (0.5 * gap_mm))
+    together = np.unique(cells, axis=0, return_counts=True)[1].astype(float)
+    tree = cKDTree(vertices[rim])
+    if (together**2).sum() > MOST_NEAR or tree.count_neighbors(tree, gap_mm) > MOST_NEAR:
+        return vertices, index, 0, 0.0
+    pairs = tree.query_pairs(gap_mm, output_type="ndarray")
     if not len(pairs):
         return vertices, index, 0, 0.0
     graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(rim),) * 2)
@@ -183,9 +197,11 @@ def _closed_gaps(
     linked = {tuple(pair) for pair in e.ends.tolist()}
     points = vertices.copy()
     merged, move = 0, 0.0
-    for g in np.flatnonzero(np.bincount(group) > 1).tolist():
-        members = rim[group == g]
+    for one in faces.members_of(group):
+        members = rim[one]
         here = vertices[members]
+        if len(one) == 1 or len(one) > MOST_IN_GROUP or np.ptp(here, axis=0).max() > gap_mm:
+            continue
         wide = float(np.linalg.norm(here[:, None] - here[None], axis=2).max())
         joined = any((a, b) in linked for a in members.tolist() for b in members.tolist() if a < b)
         if wide > gap_mm or joined:
@@ -202,8 +218,10 @@ def _single_holes(triangles: Triangles) -> Triangles:
     """Triangles (k, 3) that fill the holes which three open edges bound, turned like their neighbours."""
     e = faces.edges(triangles)
     count = np.bincount(e.of_side)
-    open_sides = np.flatnonzero(count[e.of_side] == 1)
     m = len(triangles)
+    is_open = count[e.of_side] == 1
+    # A triangle on its own is no hole, though three open edges bound it.
+    open_sides = np.flatnonzero(is_open & ~np.tile(is_open.reshape(3, m).all(axis=0), 3))
     a = triangles[open_sides % m, open_sides // m]
     b = triangles[open_sides % m, (open_sides // m + 1) % 3]
     onward: dict[int, list[int]] = {}
@@ -233,12 +251,8 @@ def _inside_out(vertices: Vertices, triangles: Triangles) -> list[NDArray[np.int
     shells = [*found.bodies, *found.voids, *found.nested, *found.inside_out]
     if not found.inside_out or len(shells) > faces.MOST_SHELLS:
         return []
-    deep = []
-    for shell in shells:
-        at = vertices[triangles[shell.triangles[0]]].mean(axis=0)
-        others = (other for other in shells if other is not shell)
-        around = (faces.winding(at, vertices[triangles[other.triangles]]) for other in others)
-        deep.append(sum(abs(turns) > 0.5 for turns in around))
+    around = faces.Surroundings(vertices, triangles, shells)
+    deep = [sum(abs(turns) > 0.5 for turns in around.turns(number)) for number in range(len(shells))]
     wrong = [(shell.volume < 0.0) != bool(depth % 2) for shell, depth in zip(shells, deep, strict=True)]
     every = all(wrong)
     return [

@@ -85,8 +85,10 @@ def report(
             "Print the parts of `specimens` named limit-..., and give what they show by --limits."
         )
     ]
+    measured = [MEANING[name] for name, limit in job.printer.limits.items() if limit.measured]
+    notes = [*(notes if assumed else []), *([f"Measured: {', '.join(measured)}."] if measured else [])]
     lead = f'<div class="lead"><div>{_headline(job, found)}</div>{picture_figure(picture)}</div>'
-    return page(f"Print check: {job.name}", job.printer.title, note(notes if assumed else []), lead, sections)
+    return page(f"Print check: {job.name}", job.printer.title, note(notes), lead, sections)
 
 
 def _headline(job: Job, found: PrintCheck) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from ...design.body import MOST_MM
 from ...design.gates import GateError
 from ...design.printing.check import PrintCheck, check
+from ...design.printing.printer import MEANING, Printer
 from ...design.printing.repair import Repair, repaired
 from ...design.solid import build_solid
 from ...design.surface import Triangles, Vertices, stl_bytes, stl_surface
@@ -52,7 +53,7 @@ def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
                 first = "not printable: " if finding.severity == "error" else ""
                 where = _where(finding.places)
                 progress.warning(f"{first}{finding.check}: {finding.what}", where, finding.remedy)
-        context.summary |= summary(found)
+        context.summary |= summary(found, job.printer)
         write_json(folder / "check.json", as_plain(job, found, mended))
 
     found = check(
@@ -67,7 +68,7 @@ def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
         verdict=verdict,
         share=progress.update,
     )
-    context.summary |= summary(found)
+    context.summary |= summary(found, job.printer)
     write_bytes(folder / "part.stl", stl_bytes(vertices, triangles))
     write_json(folder / "check.json", as_plain(job, found, mended))
     context.report = lambda _: write_report(job, vertices, triangles, found, folder, progress, mended)
@@ -164,13 +165,14 @@ def as_plain(job: Job, found: PrintCheck, mended: Repair | None = None) -> dict[
         "verdict": found.worst,
         "findings": [finding.plain() for finding in found.findings],
         "figures": found.figures,
+        "limits": standings(job.printer),
         "orientation": [attrs.asdict(build) for build in found.builds],
         **({} if mended is None else {"repair": mended.plain()}),
     }
 
 
-def summary(found: PrintCheck) -> dict[str, Any]:
-    """Key figures of a check for summary.json."""
+def summary(found: PrintCheck, printer: Printer) -> dict[str, Any]:
+    """Key figures of a check for summary.json, and which of the printer's limits rest on what."""
     count = {s: sum(f.severity == s for f in found.findings) for s in ("error", "warning", "pass")}
     best = {"orientation": attrs.asdict(found.builds[0])} if found.builds else {}
     faults = [f"{f.check}: {f.what}" for f in found.findings if f.is_fault]
@@ -181,8 +183,17 @@ def summary(found: PrintCheck) -> dict[str, Any]:
         "figures": found.figures,
         "faults": faults,
         "notes": notes,
+        "limits": standings(printer),
         **best,
     }
+
+
+def standings(printer: Printer) -> dict[str, list[str]]:
+    """Names of a printer's limits by what they rest on: measured, published or assumed."""
+    found: dict[str, list[str]] = {"measured": [], "published": [], "assumed": []}
+    for name, limit in printer.limits.items():
+        found[limit.standing].append(name)
+    return found
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
@@ -190,6 +201,9 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     count = summary["count"]
     lines = [f"{count['pass']} checks passed, {count['warning']} warnings, {count['error']} errors"]
     lines += summary.get("notes", [])
+    if measured := summary["limits"]["measured"]:
+        lines.append(f"measured limits: {', '.join(measured)}")
+    lines.append(f"assumed limits: {len(summary['limits']['assumed'])} of {len(MEANING)}, see report.html")
     if "orientation" in summary:
         best = summary["orientation"]
         towards = ", ".join(f"{x:.2f}" for x in best["direction"])

@@ -5,6 +5,7 @@ Where Dask is not installed, as in Blender, this machine's processes do them.
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import suppress
@@ -15,6 +16,7 @@ import attrs
 
 from ...errors import InputError, MuError
 from ...run.pool import each
+from .point import stop_points
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -112,12 +114,17 @@ class Cluster:
         return sum(self.client.nthreads().values())
 
     def close(self) -> None:
-        """Leave the scheduler, and end the workers that were started here."""
+        """Leave the scheduler, and end the workers that were started here, with what they are at."""
+        _quieten()
+        if self._local is not None:
+            stop_points()
         with suppress(Exception):
             self.client.close(timeout=2)
         if self._local is not None:
             with suppress(Exception):
                 self._local.close(timeout=2)
+            # Those that began in the meantime, in the place of the stopped.
+            stop_points()
 
     def results(
         self, tasks: Sequence[Task], work: Work, warn: Callable[[str], None]
@@ -195,6 +202,13 @@ class Cluster:
         if isinstance(error, MuError):
             return _lost(error.what, error.where, error.remedy)
         return _lost(f"{type(error).__name__}: {error}")
+
+
+def _quieten() -> None:
+    """Have Dask say nothing of what it meets while it ends: stacks of tasks that nobody waits for."""
+    for name in list(logging.root.manager.loggerDict):
+        if name.split(".")[0] == "distributed":
+            logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 def _lost(

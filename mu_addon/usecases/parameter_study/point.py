@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -26,6 +27,16 @@ from ...run.versions import package_versions
 
 # Seconds between two looks at a study's memory.
 LOOK_S = 0.05
+_STOPPED = {"what": "the sweep was stopped", "what_to_do": "run it again"}
+
+_under_way: set[threading.Event] = set()
+"""Of each point that a thread of this process is at: set, its study ends at once."""
+
+
+def stop_points() -> None:
+    """End the studies of the points that threads of this process are at."""
+    for stop in list(_under_way):
+        stop.set()
 
 
 @attrs.frozen
@@ -77,10 +88,13 @@ def run_point(task: Task) -> dict[str, Any]:
         line = [sys.executable, *task.module] if task.module else [*core_command(), "resume"]
         command = [*line, str(folder / "study"), "--json", "--no-report", "--workers", "1"]
         child = Child(command, folder / "words", _environment(task), ends_with_parent=True)
+        stop = threading.Event()
+        _under_way.add(stop)
         try:
-            peak_MB, stopped = _watch(child, task)
+            peak_MB, stopped = _watch(child, task, stop)
         finally:
             child.kill()
+            _under_way.discard(stop)
     row: dict[str, Any] = {
         "seconds": round(time.monotonic() - start, 3),
         "memory_MB": round(peak_MB),
@@ -111,13 +125,13 @@ def _environment(task: Task) -> dict[str, str]:
     return {**os.environ, **threads, **more}
 
 
-def _watch(child: Child, task: Task) -> tuple[float, dict[str, str] | None]:
+def _watch(child: Child, task: Task, stop: threading.Event) -> tuple[float, dict[str, str] | None]:
     """The most memory that a study took, in MB, and why it was stopped if it was."""
     peak = 0.0
     while child.state == RUNNING:
         child.poll()
         peak = max(peak, _memory_MB(child.pid))
-        over = _too_much(child, task, peak)
+        over = _STOPPED if stop.is_set() else _too_much(child, task, peak)
         if over is not None:
             child.kill()
             return peak, over

@@ -25,11 +25,13 @@ def mesh(limit):
     return trimesh.Trimesh(*surface(limit), process=True)
 
 
-def test_every_limit_has_a_part_but_settings_and_the_density():
+def test_every_limit_has_a_part_but_settings():
     settings = {"build_x_mm", "build_y_mm", "build_z_mm", "support_mm", "layer_mm", "layer_s"}
-    assert set(PARTS) == set(MEANING) - settings - {"density_g_per_ml"}
+    assert set(PARTS) == set(MEANING) - settings
     for name, part in PARTS.items():
         assert np.all(np.diff(part.sizes) > 0)
+        if name == "density_g_per_ml":
+            continue
         assert part.sizes[RATIOS.index(1.0)] == pytest.approx(PRINTER[name], rel=0.05)
         assert str(part.sizes[0]) in part.measure
 
@@ -57,6 +59,14 @@ def test_the_check_measures_the_finest_of_the_row(limit, finding):
     found = check(*surface(limit), PRINTER, stages=("thickness",))
     (value,) = (f.value for f in found.findings if f.check == finding)
     assert value == pytest.approx(PARTS[limit].sizes[0], rel=0.02)
+
+
+def test_the_cube_that_is_weighed_has_the_volume_that_it_says():
+    part = PARTS["density_g_per_ml"]
+    assert mesh("density_g_per_ml").volume / 1e3 == pytest.approx(8.0, rel=1e-6)
+    assert "8 as drawn" in part.measure
+    low, high = part.sizes
+    assert low < PRINTER["density_g_per_ml"] < high
 
 
 def test_pockets_drain_through_their_holes():

@@ -267,6 +267,55 @@ def test_pieces_are_told_by_what_encloses_them():
     assert found.inside_out == []
 
 
+def several(rng, count):
+    """Vertices and triangles of balls at random places, of random sizes, half of them inside out."""
+    points, corners, shell = [], [], []
+    for number in range(count):
+        vertices, triangles = arrays(shapes.ball(rng.uniform(0.3, 3.0), 12))
+        corners.append(triangles[:, ::-1] if rng.random() < 0.5 else triangles)
+        corners[-1] = corners[-1] + sum(map(len, points))
+        points.append(vertices + rng.uniform(-4, 4, 3))
+        shell += [number] * len(triangles)
+    return np.concatenate(points), np.concatenate(corners), np.array(shell)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_kind_of_each_of_many_shells_is_that_by_all_others(seed):
+    rng = np.random.default_rng(seed)
+    vertices, triangles, shell = several(rng, 40)
+    mixed = rng.permutation(len(triangles))
+    found = faces.pieces(vertices, triangles[mixed])
+    kinds = {"bodies": found.bodies, "voids": found.voids, "nested": found.nested, "over": found.inside_out}
+    seen = set()
+    for kind, members in kinds.items():
+        for piece in members:
+            (number,) = set(shell[mixed][piece.triangles].tolist())
+            seen.add(number)
+            own = vertices[triangles[shell == number]]
+            at = vertices[triangles[mixed][piece.triangles[0]]].mean(axis=0)
+            around = faces.winding(at, vertices[triangles[shell != number]])
+            outward = faces.winding(own.reshape(-1, 3).mean(axis=0), own) > 0.0
+            largest = abs(piece.volume) == max(abs(p.volume) for group in kinds.values() for p in group)
+            inside = around > 0.5 and not (largest and outward)
+            assert kind == (("nested" if inside else "bodies") if outward else "voids" if inside else "over")
+            assert piece.centroid == pytest.approx(own.reshape(-1, 3).mean(axis=0), abs=0.02)
+    assert seen == set(range(40))
+
+
+def test_of_each_of_many_shells_the_smaller_part_is_turned():
+    rng = np.random.default_rng(3)
+    vertices, triangles, shell = several(rng, 60)
+    flipped = np.zeros(len(triangles), bool)
+    for number in range(0, 60, 2):
+        members = np.flatnonzero(shell == number)
+        # Some patches, of a quarter of the triangles.
+        height = vertices[triangles[members]].mean(axis=1) @ rng.normal(size=3)
+        flipped[members[np.argsort(height)[: len(members) // 4]]] = True
+    broken = np.where(flipped[:, None], triangles[:, ::-1], triangles)
+    assert (faces.turned(vertices, broken) == flipped).all()
+    assert not faces.turned(vertices, triangles).any()
+
+
 def test_winding_counts_how_often_a_surface_goes_round():
     vertices, triangles = arrays(shapes.ball(2.0, 24))
     corners = vertices[triangles]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mu_addon.design import shapes
+from mu_addon.design.printing import repair
 from mu_addon.design.printing.repair import GAP_MM, repaired
 from mu_addon.design.surface import bad_edges, volume
 
@@ -114,3 +115,23 @@ def test_edges_of_three_faces_are_left_and_named(part):
     mended = repaired(points, np.concatenate([triangles, fin]))
     assert any("more than two faces" in what for what in mended.remains)
     assert len(mended.triangles) == len(triangles) + 1
+
+
+def test_triangles_on_their_own_are_no_holes(part):
+    """Three open edges bound each, and filled it would lie on itself."""
+    alone = np.arange(9).reshape(3, 3) + len(part[0])
+    points = np.concatenate([part[0], np.random.default_rng(2).uniform(8, 9, (9, 3))])
+    mended = repaired(points, np.concatenate([part[1], alone]))
+    assert mended.changes == []
+    assert "9 open edges" in mended.remains[0]
+
+
+def test_dust_is_left(monkeypatch):
+    """So many vertices in so little room belong together in no one way, and their pairs fill the memory."""
+    monkeypatch.setattr(repair, "MOST_NEAR", 1000)
+    rng = np.random.default_rng(6)
+    for width in (0.5 * GAP_MM, 10.0 * GAP_MM):
+        points = rng.uniform(0.0, width, (3000, 3))
+        mended = repaired(points, np.arange(3000).reshape(-1, 3))
+        assert mended.largest_move_mm == 0.0
+        assert "3000 open edges" in mended.remains[0]

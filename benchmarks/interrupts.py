@@ -1,0 +1,205 @@
+"""Ctrl-C at random moments of a sweep, an optimisation and a main job, and what their folders go on to.
+
+    python benchmarks/interrupts.py                            # all three, 12 times each
+    python benchmarks/interrupts.py --times 30 --seed 7 sweep
+
+Half of the signals go to the whole process group, as a terminal sends them, half to the command alone; every
+third comes twice, and every fourth within the first second. The command must end in words with status 130 (or
+with 0, where it was done), leave no process and no summary that says running, and, given again, make the same
+files as a run that nothing happened to.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
+
+from circumstances import circumstances  # noqa: E402
+
+SWEEP = """
+format = 1
+preset = "mu-1.0x"
+stages = "simulate"
+method = "sobol"
+points = 4
+seed = 1
+memory_MB = 1500
+minutes = 10
+minimize = ["mass_g"]
+
+[simulate]
+times = 3
+mesh = { order = 1, refine = 0.3 }
+
+[vary]
+"chambers.wall_mm" = { low = 0.9, high = 1.2 }
+"material.lattice_modulus_kPa" = { low = 15.0, high = 60.0, log = true }
+"""
+DESIGN = """
+format = 1
+preset = "mu-1.0x"
+evaluations = 6
+refine = 0.4
+
+[[target]]
+kind = "angle"
+pressure_kPa = 20
+low = 10
+
+[[target]]
+kind = "mass"
+objective = "minimise"
+
+[[freedom]]
+parameter = "chambers.wall_mm"
+low = 0.8
+high = 1.4
+
+[[freedom]]
+parameter = "material.lattice_modulus_kPa"
+low = 10
+high = 30
+"""
+PLACE = ["--preset", "mu-1.0x", "--refine", "0.4", "--order", "1", "--times", "7", "--stations", "11"]
+COMMANDS = {
+    "sweep": ["sweep", "sweep.toml"],
+    "optimize": ["optimize", "design.toml"],
+    "optimize, two workers": ["optimize", "design.toml", "--workers", "2"],
+    "place": ["place", *PLACE],
+}
+# What a run took is another thing than what it found.
+TOOK = ("seconds", "memory_MB", "worker")
+
+
+def start(work, words, out):
+    line = [sys.executable, str(ROOT / "headless" / "run.py"), *words, "--out", str(out)]
+    return subprocess.Popen(
+        line,
+        cwd=work,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        process_group=0,
+    )
+
+
+def found(folder):
+    """Text of each table, and arrays of the deviations, by name."""
+    files = {}
+    for path in sorted(folder.glob("*.csv")):
+        rows = [line.split(",") for line in path.read_text().splitlines() if not line.startswith("#")]
+        kept = [n for n, name in enumerate(rows[0]) if name not in TOOK]
+        files[path.name] = [[row[n] for n in kept if n < len(row)] for row in rows]
+    for path in sorted(folder.glob("*.toml")):
+        files[path.name] = path.read_text()
+    if (folder / "delta.npz").exists():
+        with np.load(folder / "delta.npz") as arrays:
+            files |= {name: arrays[name].tolist() for name in arrays.files}
+    return files
+
+
+def left_behind(folder):
+    """Processes whose command line names a folder."""
+    here = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            if str(folder).encode() in path.read_bytes():
+                here.append(int(path.parent.name))
+        except OSError:
+            continue
+    return here
+
+
+def interrupted(work, words, out, seconds, rng, number):
+    """Status and words of a run that Ctrl-C meets, seconds until it ended, and what is wrong."""
+    process = start(work, words, out)
+    time.sleep(rng.uniform(0.1, 1.0) if number % 4 == 0 else rng.uniform(0.0, seconds))
+    send = os.killpg if number % 2 else os.kill
+    sent = time.monotonic()
+    for again in range(2 if number % 3 == 0 else 1):
+        time.sleep(again * rng.uniform(0.05, 1.0))
+        try:
+            send(process.pid, signal.SIGINT)
+        except ProcessLookupError:
+            break
+    output, _ = process.communicate(timeout=600)
+    took = time.monotonic() - sent
+    wrong = []
+    if process.returncode not in (0, 130):
+        wrong.append(f"status {process.returncode}")
+    if process.returncode == 130 and "stopped by Ctrl-C" not in output:
+        wrong.append("no words")
+    if "Traceback" in output or "Exception" in output:
+        wrong.append("a stack")
+    summary = out / "summary.json"
+    if summary.exists() and json.loads(summary.read_text())["status"] == "running":
+        wrong.append("says running")
+    time.sleep(0.5)
+    if left_behind(out):
+        wrong.append("processes are left")
+    return process.returncode, output, took, wrong
+
+
+def one(work, name, times, seed):
+    """A row of the table for one command, then what went wrong with all that the command wrote."""
+    words, rng = COMMANDS[name], np.random.default_rng([seed, *name.encode()])
+    begun = time.monotonic()
+    process = start(work, words, work / "reference")
+    output, _ = process.communicate()
+    seconds = time.monotonic() - begun
+    assert process.returncode == 0, output
+    reference = found(work / "reference")
+    ends, slowest, faults = Counter(), 0.0, []
+    for number in range(times):
+        out = work / f"hit{number}"
+        status, output, took, wrong = interrupted(work, words, out, seconds, rng, number)
+        ends[status] += 1
+        slowest = max(slowest, took)
+        again = start(work, words, out)
+        more, _ = again.communicate()
+        if again.returncode != 0:
+            wrong.append(f"then status {again.returncode}")
+        elif found(out) != reference:
+            wrong.append("then other results")
+        if wrong:
+            faults.append(f"{number}: {', '.join(wrong)}\n{output}\n{more}")
+    statuses = ", ".join(f"{n} times {status}" for status, n in sorted(ends.items()))
+    print(f"| {name} | {seconds:.0f} s | {statuses} | {slowest:.1f} s | {len(faults)} |", flush=True)
+    return faults
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("commands", nargs="*", choices=[*COMMANDS, []], help=", ".join(COMMANDS))
+    parser.add_argument("--times", type=int, default=12)
+    parser.add_argument("--seed", type=int, default=20)
+    given = parser.parse_args()
+    print(circumstances(), f"Seed {given.seed}.\n")
+    print("| command | takes | ended with status | at most after | wrong |\n| --- | --- | --- | --- | --- |")
+    faults = []
+    for name in given.commands or COMMANDS:
+        with tempfile.TemporaryDirectory() as folder:
+            work = Path(folder)
+            (work / "sweep.toml").write_text(SWEEP)
+            (work / "design.toml").write_text(DESIGN)
+            faults += [f"{name} {fault}" for fault in one(work, name, given.times, given.seed)]
+    for fault in faults:
+        print(f"\n{fault}")
+
+
+if __name__ == "__main__":
+    main()
