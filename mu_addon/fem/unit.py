@@ -51,7 +51,7 @@ def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> M
     stiffer = float(skin_stiffening(unit.printed.wall, p.skin_depth_mm, p.skin_factor))
     membrane_MPa = in_MPa(stiffer * m.membrane_modulus_kPa)
     inside = mesh.region == LATTICE
-    relative = np.ones(len(mesh.tets))
+    relative = np.ones(len(mesh.region))
     if unit.printed.wall_factors:
         # A thinner wall is skin for a larger share.
         relative = skin_stiffening(_walls(unit, mesh), p.skin_depth_mm, p.skin_factor) / stiffer
