@@ -9,6 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..errors import MuError
 from ..measured import Experiment
 from .fit import Fit, Fitter
 from .record import KNOWN, Record, record
@@ -55,12 +56,14 @@ class Gain:
 
     fit and held_out are of one quantity: the first that an effect is about and that is clearly served better,
     an angle before markers. by_quantity: fitted and held-out errors of every group of series ("unit_pressure
-    angle"), None where nothing of it was held out.
+    angle"), None where nothing of it was held out. refused: why experiments that were held out are in none of
+    it, by their names: a model has no prediction for them.
     """
 
     fit: Errors
     held_out: Errors | None
     by_quantity: Mapping[str, tuple[Errors, Errors | None]] = attrs.field(factory=dict)
+    refused: Mapping[str, str] = attrs.field(factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """The entry "gain" of verdict.json."""
@@ -75,17 +78,32 @@ class Gain:
 def gain(fitter: Fitter, base: Fit, extended: Fit, held_out: Sequence[Experiment]) -> Gain:
     """Root mean square errors of the base and extended fits, on the record and on held-out experiments.
 
-    held_out: experiments that were not fitted; kinds without a simulator are ignored. See `Gain` and
-    `Errors`.
+    held_out: experiments that were not fitted; kinds without a simulator are ignored, and so are those that a
+    model cannot predict (`Gain.refused`). See `Gain` and `Errors`.
     """
     fitted = _errors(fitter, fitter.record, base, extended)
-    known = [e for e in held_out if fitter.simulator.knows(e)]
+    asked = [e for e in held_out if fitter.simulator.knows(e)]
+    refused = {e.name: why for e in asked if (why := _refusal(fitter, e, base, extended))}
+    known = [e for e in asked if e.name not in refused]
     unseen = _errors(fitter, record(known, fitter.simulator), base, extended) if known else {}
     every = {name: (errors, unseen.get(name)) for name, errors in fitted.items()}
     first = _best_served_group(base, extended, fitter.record)
     # What was held out may be of another kind altogether.
     held = unseen.get(first) or next(iter(unseen.values()), None)
-    return Gain(fitted[first], held, every)
+    return Gain(fitted[first], held, every, refused)
+
+
+def _refusal(fitter: Fitter, experiment: Experiment, base: Fit, extended: Fit) -> str:
+    """Why a model of the gain has no prediction for an experiment; "" where all have one."""
+    plain = {k: v for k, v in extended.values.items() if k in base.values}
+    stepped = [{**base.values, p.name: base.values[p.name] + p.step} for p in fitter.curved[:1]]
+    try:
+        found = [
+            fitter.simulator.predict(experiment, v) for v in (base.values, extended.values, plain, *stepped)
+        ]
+    except MuError as error:
+        return error.what
+    return "" if all(np.isfinite(f).any() for f in found) else "the model gives no number"
 
 
 # A gain of chi squared of four standard deviations.

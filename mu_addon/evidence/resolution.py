@@ -9,6 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..errors import MuError
 from ..measured import Experiment
 from .simulator import Composite
 
@@ -260,6 +261,14 @@ def without_unpredicted_readings(
     for e in experiments:
         columns = dict(e.columns)
         channels = _timed_channels(e, simulator)
+        try:
+            predicted = simulator.predict(e, values) if channels else np.empty((0, len(e)))
+        except MuError:
+            if e.role == "fit":
+                raise
+            # What was held out and has no prediction is told where its gain would be.
+            found.append(e)
+            continue
         for row, channel in enumerate(channels):
             copied = next(
                 (c for c in channels[:row] if np.array_equal(e[c], e[channel], equal_nan=True)), None
@@ -268,7 +277,7 @@ def without_unpredicted_readings(
                 # It counts no second time, and stays the same so that the record sees it.
                 columns[channel] = columns[copied]
                 continue
-            wrong = unpredicted_readings(e[channel], simulator.predict(e, values)[row])
+            wrong = unpredicted_readings(e[channel], predicted[row])
             _set_aside(e, channel, columns, wrong, words)
         changed = any(columns[c] is not e.columns[c] for c in columns)
         found.append(attrs.evolve(e, columns=columns) if changed else e)

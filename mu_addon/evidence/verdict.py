@@ -232,6 +232,10 @@ def diagnose(
         kind, chosen = "named", most
     progress("gain")
     gained = gain(fitter, chosen.base, chosen.chosen, [e for e in experiments if e.role == "held_out"])
+    set_aside += [
+        f"{name} was held out but cannot be predicted, and is not in the gain: {why}"
+        for name, why in gained.refused.items()
+    ]
     proposal = propose_experiment(fitter, chosen, seen)
     known = chosen.chosen if chosen.causes else chosen.base
     bounds = {k: interval(fitter, known, k) for k in known.keys}

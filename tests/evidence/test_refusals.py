@@ -1,5 +1,6 @@
 """Models that have no prediction for some values: a diagnosis goes on, and says so."""
 
+import attrs
 import numpy as np
 import pytest
 
@@ -68,3 +69,29 @@ def test_a_size_is_not_followed_to_where_nothing_can_be_computed():
     fits = {f.effects[0].name: f for f in found.selection.singles}
     assert fits["frame_compliance"].values["frame_compliance.share"] <= softest
     assert found.kind != "named" or found.names != ("frame_compliance",)
+
+
+@pytest.mark.parametrize("every", [True, False], ids=["all of them", "one of two"])
+def test_what_was_held_out_and_cannot_be_predicted_is_told_and_left_out(every):
+    class Short(Moduli):
+        """No prediction beyond a tenth of strain."""
+
+        def predict(self, experiment, values):
+            if experiment.columns["strain"].max() > 0.11:
+                raise ConvergenceError("the block has no equilibrium at 20 % of strain", experiment.name)
+            return super().predict(experiment, values)
+
+    fitted = blocks(overcure__offset_mm=0.1)
+    far = attrs.evolve(
+        fitted[0], name="far", role="held_out", columns={**fitted[0].columns, "strain": 2.0 * STRAIN}
+    )
+    held = [far] if every else [far, attrs.evolve(fitted[1], name="near", role="held_out")]
+    simulator = Composite({"lattice_compression": Short()})
+    found = diagnose([*fitted, *held], simulator)
+    alone = diagnose(fitted, Composite({"lattice_compression": Short()}))
+    assert (found.kind, found.names) == (alone.kind, alone.names)
+    assert found.gain.fit == alone.gain.fit
+    [told] = found.set_aside
+    assert "far was held out" in told
+    assert "no equilibrium at 20 %" in told
+    assert (found.gain.held_out is None) == every
