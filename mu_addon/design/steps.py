@@ -350,7 +350,7 @@ _PROFILE = (
     "chambers.bladder_share",
 )
 _WALL = ("chambers.wall_mm", "chambers.wall_factors")
-_CHAMBERS = (*_WALL, "chambers.base_cap_mm", "chambers.tip_cap_mm")
+_CHAMBERS = ("chambers.wall_mm", "chambers.base_cap_mm", "chambers.tip_cap_mm", "chambers.wall_factors")
 _STRUTS = ("lattice.junction_diameter_mm", "lattice.midspan_diameter_mm")
 _GRADING = _all_of(Grading)
 _PITCH = ("chambers.count", "chambers.cell_mm")

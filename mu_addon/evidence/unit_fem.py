@@ -37,6 +37,9 @@ Progress = Callable[[str, float], None]
 ANGLE, VOLUME, FORCE = "angle_deg", "volume_mm3", "force_N"
 # Kinds of a unit that bends freely.
 FREE = (KIND, step.KIND, pose.KIND)
+# Of the pressures' range: the most that a step to which its ends are rounded may be, so that what rounding
+# takes away lies well within the margin. Steps are 1 and 5 times powers of ten: few protocols end half way.
+ROUND = 0.03
 # Fewer pressures make no cubic spline.
 FEWEST = 4
 # Along the meridian as fine as the default: there a coarser mesh misses most.
@@ -113,16 +116,31 @@ def pressures(readings_kPa: Array, count: int, margin: float) -> tuple[float, ..
 
     margin: how far beyond the readings, as a share of their range. Raises InputError where all readings are
     0.
+
+    >>> pressures(np.array([0.02, 29.98]), 4, 0.05) == pressures(np.array([-0.02, 30.02]), 4, 0.05)
+    True
     """
     low, high = min(0.0, float(np.min(readings_kPa))), max(0.0, float(np.max(readings_kPa)))
     if low == high:
         raise InputError("the pressure is always 0", "unit_pressure", "add an experiment under pressure")
+    # A gauge's noise moves the ends of a protocol to either side of a round number: its runs stay the same.
+    whole = 10.0 ** math.floor(math.log10(ROUND * (high - low)))
+    step = 5.0 * whole if 5.0 * whole <= ROUND * (high - low) else whole
+    low, high = (step * round(end / step) for end in (low, high))
     beyond = margin * (high - low)
-    # Two digits, so that a longer record of the same protocol finds the same runs.
-    low, high = (float(f"{end:.2g}") for end in (low - beyond, high + beyond))
+    low, high = _outward(low, -beyond), _outward(high, beyond)
     below = int(np.clip(round((count - 1) * low / (low - high)), 1, count - 2))
     sides = np.linspace(low, 0.0, below + 1), np.linspace(0.0, high, count - below)
     return tuple(np.concatenate([sides[0][:-1], sides[1]]).tolist())
+
+
+def _outward(end: float, margin: float) -> float:
+    """The end and the margin together in two digits, so that a longer record finds the same runs.
+
+    In three where two would take most of the margin away, as 105 becomes 100.
+    """
+    found = float(f"{end + margin:.2g}")
+    return found if abs(found) > abs(end + margin / 2) else float(f"{end + margin:.3g}")
 
 
 def unit_responses(
