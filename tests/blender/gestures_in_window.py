@@ -306,7 +306,7 @@ def in_trees():
         if child.state not in ("running", "waiting"):
             break
         yield 0.5
-    assert child.state == "cancelled", child.error
+    assert child.state == "cancelled", (child.state, child.error)
 
 
 def while_running():
@@ -346,7 +346,7 @@ def while_running():
         if child.state != "running":
             break
         yield 0.5
-    assert child.state == "cancelled", child.error
+    assert child.state == "cancelled", (child.state, child.error)
 
 
 def session():

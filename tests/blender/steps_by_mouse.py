@@ -23,7 +23,8 @@ def shown():
 
 def session():
     yield 3.0
-    assert called(bpy.ops.mu.add) == {"FINISHED"}
+    # In metres a drag moves a length by 10 mm a step.
+    assert called(bpy.ops.mu.add, millimetres=True) == {"FINISHED"}
     assert called(bpy.ops.mu.path, name="alpha4") == {"FINISHED"}
     yield 4.0
     whole = shown()
