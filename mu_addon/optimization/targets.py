@@ -22,7 +22,7 @@ from .quantities import (
 )
 from .sensor import Disturbance, SensorSlope
 from .structure import Quantity
-from .whole import Mass, PrintTime
+from .whole import Mass, PrintTime, WallThickness
 
 Goal = Literal["minimise", "maximise"]
 
@@ -38,6 +38,7 @@ KINDS: dict[str, tuple[tuple[str, ...], str]] = {
     "air_volume": (("pressure_kPa",), "ml"),
     "mass": ((), "g"),
     "print_time": ((), "h"),
+    "wall_thickness": ((), "mm"),
     "deviation": (("pressures_kPa", "path"), "mm"),
     "sensor_slope": (("pressures_kPa", "path"), "1/deg"),
     "walls_apart": (("pressure_kPa",), ""),
@@ -136,7 +137,8 @@ def read_targets(
 ) -> list[Target]:
     """The targets of [[target]] tables; where: file and line of each.
 
-    A curve of points is a target a point. Raises InputError that names key and line.
+    A curve of points is a target a point. `printable` brings the printer's least wall as a bound, so that the
+    search keeps it. Raises InputError that names key and line.
     """
     found: list[Target] = []
     for table, place in zip(tables, where, strict=True):
@@ -146,12 +148,22 @@ def read_targets(
                     f"two targets are named {target.name!r}", f"{place}, name", "give one of them a name"
                 )
             found.append(target)
-    if not any(t.kind != "printable" for t in found):
+    found += [_of_printer(t, supplies) for t in found if t.kind == "printable"]
+    if not any(t.kind not in ("printable", "wall_thickness") for t in found):
         raise InputError(
             "no target is given", "[[target]]",
             'add [[target]] with kind = "angle", pressure_kPa = 30 and low = 40',
         )  # fmt: skip
     return found
+
+
+def _of_printer(printable: Target, supplies: Supplies) -> Target:
+    """The bound on the wall that the print check will judge by."""
+    least, name = supplies.printer["wall_mm"], f"{printable.name}: thinnest wall"
+    return Target(
+        name, "wall_thickness", "mm", WallThickness(name), tolerance=NARROW * least, low=least,
+        line=printable.line,
+    )  # fmt: skip
 
 
 def _targets(table: Mapping[str, Any], where: str, supplies: Supplies) -> list[Target]:
@@ -256,6 +268,8 @@ def _quantity(
         return Mass(name, supplies.density_g_per_ml, supplies.printer)
     if kind == "print_time":
         return PrintTime(name, supplies.printer)
+    if kind == "wall_thickness":
+        return WallThickness(name)
     if kind == "stiffness":
         direction = table.get("direction")
         if direction not in ("x", "y", "z"):

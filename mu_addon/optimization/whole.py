@@ -1,4 +1,4 @@
-"""Quantities of the drawn unit as a whole, which need no simulation: mass and time to print."""
+"""Quantities of the drawn unit as a whole, which need no simulation: mass, time to print, wall."""
 
 from __future__ import annotations
 
@@ -50,3 +50,16 @@ class PrintTime:
         """Of layers that are not rounded to whole ones."""
         heights = [s.about.dimensions.height + s.about.dimensions.inlet_length for s in (plus, minus)]
         return (heights[0] - heights[1]) / self.printer["layer_mm"] * self.printer["layer_s"] / 3600.0
+
+
+@attrs.frozen
+class WallThickness:
+    """Thickness in mm of the thinnest chamber's wall as drawn, which the print check compares with the
+    printer's limit."""
+
+    name: str
+    conditions: tuple[Condition, ...] = ()
+
+    def value(self, structure: Structure, states: States) -> float:
+        """In mm."""
+        return float(structure.about.dimensions.thinnest_wall)

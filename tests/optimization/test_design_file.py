@@ -35,7 +35,12 @@ def test_a_design_has_its_unit_targets_and_freedoms():
         + '[[freedom]]\nparameter = "chambers.count"\nlow = 5\nhigh = 7\n'
         + '[[freedom]]\nparameter = "chambers.neck_diameter_mm"\nfixed = 11.0\n'
     )
-    assert [t.words for t in found.targets] == ["at least 20 deg", "as small as possible", "yes"]
+    assert [t.words for t in found.targets] == [
+        "at least 20 deg",
+        "as small as possible",
+        "yes",
+        "at least 0.6 mm",
+    ]
     assert [f.name for f in found.freedoms] == ["chambers.wall_mm", "chambers.count"]
     assert found.freedoms[1].values == (5, 6, 7)
     assert found.unit.chambers.neck_diameter_mm == 11.0

@@ -18,7 +18,7 @@ from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, OF_PATH, YES, asks_cur
 JOB = "optimize_"
 _KNOWN = parameters()
 UNITS = {"angle": "deg", "stiffness": "N/mm", "air_volume": "ml", "mass": "g", "print_time": "h"}
-UNITS |= {"deviation": "mm", "sensor_slope": "1/deg"}
+UNITS |= {"deviation": "mm", "sensor_slope": "1/deg", "wall_thickness": "mm"}
 UNITS |= {"tip_force": "N", "tip_position": "mm", "workspace": "mm"}
 BARELY = "QUESTION"
 """Sign of a target that is met, but within two standard errors of being missed."""

@@ -42,6 +42,7 @@ KINDS = [
     ("air_volume", "Air", "Air in the chambers under a pressure, in ml"),
     ("mass", "Mass", "Mass without the waveguide, in g"),
     ("print_time", "Print Time", "Time of the print, upright, in h"),
+    ("wall_thickness", "Wall Thickness", "Thickness of the thinnest chamber's wall, in mm"),
     ("deviation", "J of a Path", "Mean deviation that the sensor along a path causes, in mm"),
     ("sensor_slope", "Slope of the Sensor", "Relative change of the light per degree, along a path"),
     ("walls_apart", "Walls Apart", "No wall passes through another under a pressure"),

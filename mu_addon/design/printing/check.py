@@ -32,6 +32,8 @@ from .walls import chamber_walls, narrowest, thinnest
 
 Array = NDArray[np.float64]
 
+FACETS = 0.002
+"""Share of a chamber's radius by which facets may make its wall thinner than drawn."""
 SPACING = 0.5
 """Distance in mm between the samples at which thickness and gaps are measured."""
 STEP = 0.25
@@ -133,7 +135,7 @@ def check(
             if "thickness" in stages:
                 lit = pockets.hold(surface.points + step * surface.normals)
                 other = pockets.hold(inward.at - step * surface.normals)
-                found += chamber_walls(surface, inward, lit & ~other, printer)
+                found += chamber_walls(surface, inward, lit & ~other, printer, _facets_mm(unit, printer))
     if "layers" in stages:
         with stage("layers"):
             built = voxel_rows(*seen, _step(STEP, vertices), printer["layer_mm"], frame_along(up))
@@ -330,6 +332,17 @@ def _drawing(unit: Unit, window: Window | None, printer: Printer) -> list[Findin
             ),
         ]
     return found
+
+
+def _facets_mm(unit: Unit | None, printer: Printer) -> float:
+    """By how much in mm facets may make a unit's wall thinner than drawn; 0 where it is drawn too thin.
+
+    Of 64 facets around, the least that a solid has, the middle of one is 0.0012 of the radius inside its
+    edges; facets along the profile add to it.
+    """
+    if unit is None or unit.dimensions.thinnest_wall < printer["wall_mm"] * (1.0 - 1e-9):
+        return 0.0
+    return FACETS * unit.dimensions.R
 
 
 def _thinnest_junctions(d: Dimensions) -> tuple[float, Array]:

@@ -45,11 +45,12 @@ def _measured(
     severity: Severity,
     adjective: str,
     remedy: str,
+    facets_mm: float = 0.0,
 ) -> Finding:
     limit = printer.limits[key]
     width = np.where(counts, rays.distance, np.inf)
     least = float(width.min(initial=np.inf))
-    bad = width < limit.value
+    bad = width < limit.value - facets_mm
     if not np.isfinite(least):
         words = "no wall is near the limit" if adjective == "thick" else "no gap is near the limit"
         return Finding(
@@ -61,7 +62,12 @@ def _measured(
         name,
         severity if bad.any() else "pass",
         f"{least:.3g} mm {adjective} at least"
-        + (f", in {len(places)} places below the limit" if bad.any() else ""),
+        + (f", in {len(places)} places below the limit" if bad.any() else "")
+        + (
+            ", of flat facets; no thinner than the limit as drawn"
+            if least < limit.value and not bad.any()
+            else ""
+        ),
         least,
         limit.value,
         "mm",
@@ -74,14 +80,23 @@ def _measured(
 
 
 def chamber_walls(
-    surface: Samples, inward: RayHits, between: NDArray[np.bool_], printer: Printer
+    surface: Samples,
+    inward: RayHits,
+    between: NDArray[np.bool_],
+    printer: Printer,
+    facets_mm: float = 0.0,
 ) -> list[Finding]:
     """Finding on the thinnest wall in mm between chambers and the outside; empty without such a wall.
 
-    inward: rays from samples into the solid; between (s,): marks those from a chamber that end outside any.
+    inward: rays from samples into the solid; between (s,): marks those from a chamber that end outside any;
+    facets_mm: by so much flat facets may be nearer than the curved wall that they stand for.
     """
     if not between.any():
         return []
     counts = between & (inward.cosine < -0.5)
     remedy = "thicken the wall"
-    return [_measured("chamber wall", surface, inward, counts, printer, "wall_mm", "error", "thick", remedy)]
+    return [
+        _measured(
+            "chamber wall", surface, inward, counts, printer, "wall_mm", "error", "thick", remedy, facets_mm
+        )
+    ]

@@ -2,6 +2,7 @@
 
 from functools import cache
 
+import attrs
 import numpy as np
 import pytest
 
@@ -64,6 +65,26 @@ def test_a_hole_is_a_second_way_out_of_a_part_that_nobody_knows():
     found = faults(parts.drilled(0.8), "chambers")
     assert found["leaks"].severity == "warning"
     assert off(found["leaks"], APEX) < 1.0
+
+
+def test_a_wall_drawn_at_the_limit_is_not_refused_for_its_facets():
+    """Drawn as thick as the limit it is thick enough; a little thinner, and as an STL alone, it is not."""
+    unit, solid = parts.small_unit(), parts.small_solid()
+
+    def found(limit, unit):
+        printer = load_printer()
+        printer = printer.with_limits({"wall_mm": attrs.evolve(printer.limits["wall_mm"], value=limit)})
+        surface = solid.vertices, solid.triangles
+        findings = check(*surface, printer, unit, stages=("thickness", "chambers")).findings
+        return next(f for f in findings if f.check == "chamber wall")
+
+    drawn = unit.dimensions.thinnest_wall
+    at_limit = found(drawn, unit)
+    assert at_limit.severity == "pass"
+    assert drawn - 0.002 * unit.dimensions.R < at_limit.value < drawn
+    assert "facets" in at_limit.what
+    assert found(drawn + 0.01, unit).severity == "error"
+    assert found(drawn, None).severity == "error"
 
 
 def test_a_thin_wall():
