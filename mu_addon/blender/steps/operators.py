@@ -65,7 +65,10 @@ class _OfStep(UnitOperator):
             if self.properties.is_property_set(name) or self._has_true(name):
                 value = getattr(self, name)
                 if self._has_true(name):
+                    # In a scene of metres a drag of one step is longer than most lengths: it ends at a bound.
+                    d = stack.description(section, name)
                     value = getattr(self, name + TRUE) / self._in_scene(props, section, name)
+                    value = min(max(value, d.low), d.high)
                 value = exact(value) if isinstance(value, float) else value
                 if value != getattr(getattr(unit, section), name):
                     given.setdefault(section, {})[name] = value

@@ -5,6 +5,7 @@ from collections import Counter
 
 import bpy
 import numpy as np
+import pytest
 
 from mu_addon.blender.preview import nodes
 from mu_addon.blender.steps import state as stack
@@ -81,6 +82,19 @@ def test_a_steps_redo_panel_shows_true_lengths():
     assert round(props.chambers.wall_mm, 4) == 1.0
     assert bpy.ops.mu.chambers(wall_mm=0.9) == {"FINISHED"}
     assert round(props.chambers.wall_mm, 4) == 0.9
+
+
+def test_a_length_dragged_beyond_its_bound_ends_there():
+    """In a scene of metres one step of a drag is 10 mm."""
+    root = add()
+    bpy.context.scene.unit_settings.scale_length = 1.0
+    assert bpy.ops.mu.chambers(wall_mm_true=-0.0091) == {"FINISHED"}
+    assert root.mu_unit.chambers.wall_mm == pytest.approx(stack.description("chambers", "wall_mm").low)
+    # What breaks a rule of units is refused in words that name it, and the unit stays.
+    assert "neck" in refused(bpy.ops.mu.profile, neck_diameter_mm_true=1.0).lower()
+    assert root.mu_unit.chambers.neck_diameter_mm == pytest.approx(12.5)
+    assert bpy.ops.mu.chambers(wall_mm_true=0.0009) == {"FINISHED"}
+    assert root.mu_unit.trouble == ""
 
 
 def test_muted_steps_are_left_out_and_not_printed(tmp_path):
