@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import attrs
@@ -199,6 +200,12 @@ class SelfContact:
         # Nodes nearer than that to the plane belong to faces that end on it.
         off = np.flatnonzero(np.abs(x) > self.gap_mm)
         return _Plane(column, self._nodes[off], np.asarray(self._surface.vertex_areas)[off], np.sign(x[off]))
+
+    def without_image(self) -> SelfContact:
+        """The same contact of a half body without that across its mirror planes."""
+        other = copy.copy(self)
+        other._planes, other._last = [], None
+        return other
 
     def energy_mJ(self, u: Array) -> float:
         """Energy in mJ at u (n, 3) in mm; infinite where a mirror plane is crossed."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import MeshingError
 from ..fem.elementwise import element_forces
+from ..fem.factor import IndefiniteError
 from ..fem.kinematics import Probe
 from ..fem.materials import Materials
 from ..fem.model import Model
@@ -42,8 +43,9 @@ def parities(model: Model) -> list[Parity]:
     """The responses of a whole body about a state of its model, which may be of one half.
 
     A load on one side of a half's mirror plane is half an even load and half an odd one; the tangents
-    of both are those of the half mesh, under different supports on the plane. Raises MeshingError for a
-    mesh with other mirror planes.
+    of both are those of the half mesh, under different supports on the plane. What touches its own image
+    goes along with it in an odd motion, so that the contact across the plane has no part in that tangent.
+    Raises MeshingError for a mesh with other mirror planes.
     """
     mesh = model.mesh
     if not mesh.symmetry:
@@ -54,6 +56,8 @@ def parities(model: Model) -> list[Parity]:
     held[mesh.symmetry_nodes("x"), 1:] = True
     whole = attrs.evolve(mesh, symmetry=())
     other = Model(whole, supports=held, device=model.device, threads=model.threads)
+    if model.self_contact is not None:
+        other.self_contact = model.self_contact.without_image()
     return [Parity(model, (1, 2), False), Parity(other, (0,), True)]
 
 
@@ -80,6 +84,45 @@ def loaded(trajectory: Trajectory, pressures_MPa: Array | None = None) -> list[S
     if pressures_MPa is None:
         return states
     return [s for s in states if np.isclose(s.pressure_MPa, pressures_MPa, rtol=1e-9).any()]
+
+
+def stable_part(
+    model: Model, materials: Materials, trajectory: Trajectory, sides: list[Parity] | None = None
+) -> Trajectory:
+    """A trajectory without the states from which a body would move away by itself, to either side too.
+
+    A half mesh follows motions that mirror themselves, and knows of no others. From either end of the
+    pressures states are left out until one is stable; those between are taken to be stable. sides:
+    `parities(model)`. Without states where all that are loaded are unstable.
+    """
+    sides = parities(model) if sides is None else sides
+    data = model.parameters(materials)
+
+    def stable(state: State) -> bool:
+        try:
+            for side in sides:
+                # The tangent first: where contact adds pairs, its pattern grows, and with it the factor.
+                tangent = side.model.tangent(state.u, state.pressure_MPa, data)
+                side.model.factor.factor(tangent)
+        except IndefiniteError:
+            return False
+        return True
+
+    out: set[int] = set()
+    for sign in (-1.0, 1.0):
+        outward = [i for i, s in enumerate(trajectory.states) if s.loaded and sign * s.pressure_MPa > 0]
+        for i in sorted(outward, key=lambda i: -sign * trajectory.states[i].pressure_MPa):
+            if stable(trajectory.states[i]):
+                break
+            out.add(i)
+    kept = [i for i in range(len(trajectory.states)) if i not in out]
+    holds = np.isin(trajectory.index, kept)
+    return Trajectory(
+        trajectory.time_s[holds],
+        trajectory.pressure_kPa[holds],
+        tuple(trajectory.states[i] for i in kept),
+        np.searchsorted(kept, trajectory.index[holds]),
+    )
 
 
 def representative_pressures(trajectory: Trajectory) -> Array:

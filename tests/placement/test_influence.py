@@ -8,11 +8,14 @@ from mu_addon.design.anchors import anchor_points
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MeshingError
 from mu_addon.fem.equilibrium import Equilibrium
+from mu_addon.fem.factor import IndefiniteError
 from mu_addon.fem.kinematics import probe
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import NewtonSettings
-from mu_addon.fem.trajectory import simulate
+from mu_addon.fem.self_contact import SelfContact
+from mu_addon.fem.state import State
+from mu_addon.fem.trajectory import Trajectory, simulate
 from mu_addon.meshing.mesh import LATTICE, mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
@@ -27,8 +30,11 @@ from mu_addon.placement.influence import (
     parities,
     representative_pressures,
     shares_of_time,
+    stable_part,
 )
 from mu_addon.placement.whole import whole_body
+
+from ..fem import bodies
 
 UNIT = load_preset("mu-1.0x")
 POINTS = anchor_points(UNIT)
@@ -201,3 +207,60 @@ def test_other_mirror_planes_are_refused(half):
     mesh = attrs.evolve(half[0], symmetry=("x", "y"))
     with pytest.raises(MeshingError, match="off the plane"):
         parities(attrs.make_class("Body", {"mesh": attrs.field()})(mesh))
+
+
+def test_what_is_unstable_out_of_its_plane_is_left_out():
+    """A column of 1 x 3 x 10 buckles sideways at a strain of pi^2/4800, which its half does not see."""
+    mesh = bodies.box((1, 2, 10), (0.5, 3.0, 10.0), symmetry=("x",), clamp=True)
+    model = Model(mesh, threads=1)
+    material = Materials.neo_hooke(np.ones(len(mesh.tets)), np.zeros(len(mesh.tets)))
+
+    def pressed(euler):
+        """Pressed to so many times the strain at which it buckles; the pressure only numbers the state."""
+        strain = euler * np.pi**2 / 4800.0
+        return State(-0.001 * euler, -strain * mesh.nodes * np.array([0.0, 0.0, 1.0]))
+
+    states = (pressed(1.3), pressed(1.1), pressed(0.9), pressed(0.5), State(0.0, np.zeros_like(mesh.nodes)))
+    order = np.array([4, 3, 2, 1, 0, 1, 4])
+    pressures = np.array([s.pressure_kPa for s in states])[order]
+    found = stable_part(model, material, Trajectory(np.arange(7.0), pressures, states, order))
+    assert found.states == states[2:]
+    assert found.time_s.tolist() == [0.0, 1.0, 2.0, 6.0]
+    assert [found.states[i].pressure_kPa for i in found.index] == found.pressure_kPa.tolist()
+    even, odd = parities(model)
+    data = model.parameters(material)
+    even.model.factor.factor(even.model.tangent(states[0].u, 0.0, data))
+    with pytest.raises(IndefiniteError):
+        odd.model.factor.factor(odd.model.tangent(states[0].u, 0.0, data))
+
+
+def test_an_odd_motion_feels_the_contact_within_a_half_and_none_across_its_plane():
+    """Second derivatives of the contact's energy along odd motions: the whole body's is twice the half's."""
+    pytest.importorskip("ipctk")
+    lower, upper = (bodies.box((2, 2, 1), (1.0, 1.0, 1.0), order=1) for _ in range(2))
+    # Vertices face the inside of facets, so that no pair is of two kinds at once.
+    above = upper.nodes * 0.4 + np.array([0.13, 0.31, 1.5])
+    nodes = np.vstack([lower.nodes, above]) + np.array([0.2, 0.0, 0.0])
+    mesh = bodies.make(nodes, np.vstack([lower.tets, upper.tets + len(lower.nodes)]), 1, symmetry=("x",))
+    whole = mirror(mesh, "x")
+    assert len(whole.nodes) == 2 * len(nodes)
+    model = Model(mesh, threads=1)
+    model.self_contact = SelfContact(mesh, 0.05, 0.1)
+    odd = parities(model)[1].model.self_contact
+    both = SelfContact(whole, 0.05, 0.1)
+    flip = np.array([-1.0, 1.0, 1.0])
+    raised = nodes[:, 2:] > 1.2
+
+    def along(contact, u, v):
+        return v.ravel() @ (contact.stiffness(u) @ v.ravel())
+
+    u = np.where(raised, [0.0, 0.0, -0.48], 0.0)
+    v = np.random.default_rng(0).standard_normal(nodes.shape)
+    expected = along(both, np.vstack([u, u * flip]), np.vstack([v, -v * flip]))
+    assert 2 * along(odd, u, v) == pytest.approx(expected, rel=1e-9)
+    assert abs(expected) > 1e-3
+    # Faces that near their images: along the plane's normal both go alike.
+    near = u + np.array([-0.19, 0.0, 0.0])
+    together = np.where(raised, 0.0, [1.0, 0.0, 0.0])
+    assert along(odd, near, together) == pytest.approx(along(odd, u, together))
+    assert along(model.self_contact, near, together) > along(odd, near, together) + 1e-3

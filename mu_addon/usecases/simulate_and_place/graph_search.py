@@ -7,20 +7,27 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import InputError
+from ...design.quantity import in_kPa
+from ...errors import ConvergenceError, InputError
 from ...fem.kinematics import Probe, probe
+from ...fem.materials import Materials
+from ...fem.model import Model
+from ...fem.trajectory import Trajectory
 from ...files import write_csv
 from ...placement.candidates import Candidate
 from ...placement.graph import Graph, lattice_graph
 from ...placement.inclusion import PRINTED
 from ...placement.influence import (
+    Parity,
     deviation_map,
     gradients_of,
     influence_map,
     loaded,
     mean_deviation,
+    parities,
     representative_pressures,
     shares_of_time,
+    stable_part,
 )
 from ...placement.response import Response, reduced_response
 from ...placement.search import SearchSettings, front, search_paths
@@ -43,19 +50,25 @@ PATHS = "paths.csv"
 MOST_PATHS = 200_000
 
 
-def sensitivity_map(study: Study) -> Array:
-    """dJ_hat (m,) in mm by each element's relative stiffening, from Model A on, as `sensitivity.vtu`."""
+def sensitivity_map(study: Study) -> Array | None:
+    """dJ_hat (m,) in mm by each element's relative stiffening, from Model A on, as `sensitivity.vtu`.
+
+    Over the pressures at which the unit is stable; None, and no file, where it is at none.
+    """
     assert study.mesh is not None
-    assert study.trajectory is not None
     with study.progress.stage("map"):
         model = study.job.model(study.mesh)
         monitor = probe(study.mesh, study.anchors)
         materials = study.job.materials(study.mesh)
-        chosen = representative_pressures(study.trajectory)
-        found = influence_map(model, materials, study.trajectory, monitor, chosen)
-        pressures = np.array([s.pressure_MPa for s in loaded(study.trajectory)])
-        gradients = gradients_of(study.trajectory, study.anchors, monitor, study.job.stations)
-        dJ = deviation_map(found.at(pressures), gradients, shares_of_time(study.trajectory))
+        sides = parities(model)
+        trajectory = _stable(study, model, materials, sides, "The sensitivity map leaves")
+        if not loaded(trajectory):
+            return None
+        chosen = representative_pressures(trajectory)
+        found = influence_map(model, materials, trajectory, monitor, chosen, sides)
+        pressures = np.array([s.pressure_MPa for s in loaded(trajectory)])
+        gradients = gradients_of(trajectory, study.anchors, monitor, study.job.stations)
+        dJ = deviation_map(found.at(pressures), gradients, shares_of_time(trajectory))
         modulus, _ = materials.small_strain(len(dJ))
         fields = {
             "dJ_by_relative_stiffening_mm": dJ,
@@ -66,6 +79,23 @@ def sensitivity_map(study: Study) -> Array:
         write_sensitivity(study.folder, study.mesh, dJ / modulus)
     study.context.summary["sensitivity"] = {"file": MAP, "largest_mm": float(dJ.max())}
     return dJ
+
+
+def _stable(
+    study: Study, model: Model, materials: Materials, sides: list[Parity], what_leaves: str
+) -> Trajectory:
+    """Model A's motion as far as it is stable; the study warns of the pressures that `what_leaves` out."""
+    assert study.trajectory is not None
+    found = stable_part(model, materials, study.trajectory, sides)
+    kept = {s.pressure_MPa for s in found.states}
+    out = [in_kPa(s.pressure_MPa) for s in study.trajectory.states if s.pressure_MPa not in kept]
+    if out:
+        study.warn(
+            f"{what_leaves} out {', '.join(f'{p:g}' for p in sorted(out))} kPa: there the unit is unstable "
+            "and would leave its bending plane by itself. Angles and J_hat there are those of a unit that is "
+            "kept in its plane."
+        )
+    return found
 
 
 def chains_within(job: Job) -> tuple[Graph, list[tuple[int, ...]]]:
@@ -171,20 +201,22 @@ def _is_printable(study: Study, points: Array) -> bool:
     return True
 
 
-def _response(study: Study, graph: Graph, rule: str, monitor: Probe) -> Response:
-    """The response that ranks paths: of bars between joints as printed, else of stiffened elements."""
+def _response(study: Study, stable: Trajectory, graph: Graph, rule: str, monitor: Probe) -> Response:
+    """The response that ranks paths: of bars between joints as printed, else of stiffened elements.
+
+    stable: Model A's motion as far as it is.
+    """
     assert study.mesh is not None
-    assert study.trajectory is not None
     job, unit = study.job, study.job.unit
     if rule == PRINTED:
-        mesh, trajectory = whole_body(study.mesh, study.trajectory)
+        mesh, trajectory = whole_body(study.mesh, stable)
         whole = probe(mesh, study.anchors)
         return bar_response(job.model(mesh), job.materials(mesh), unit.printed, trajectory, whole, graph)
     return reduced_response(
         job.model(study.mesh),
         job.materials(study.mesh),
         unit.material.sensor_modulus_MPa,
-        study.trajectory,
+        stable,
         monitor,
         graph,
         rule,
@@ -195,12 +227,19 @@ def _response(study: Study, graph: Graph, rule: str, monitor: Probe) -> Response
 def _predicted(study: Study, graph: Graph, chains: list[tuple[int, ...]], rule: str) -> Array:
     """Predicted J_hat (n,) in mm of every chain."""
     assert study.mesh is not None
-    assert study.trajectory is not None
     monitor = probe(study.mesh, study.anchors)
-    found = _response(study, graph, rule, monitor)
-    pressures = np.array([s.pressure_MPa for s in loaded(study.trajectory)])
-    gradients = gradients_of(study.trajectory, study.anchors, monitor, study.job.stations)
-    shares = shares_of_time(study.trajectory)
+    model, materials = study.job.model(study.mesh), study.job.materials(study.mesh)
+    stable = _stable(study, model, materials, parities(model), "The ranking of paths leaves")
+    if not loaded(stable):
+        raise ConvergenceError(
+            "the unit is unstable at every pressure of the protocol, so that its paths cannot be ranked",
+            "--paths graph",
+            "simulate smaller pressures, or leave out --paths graph",
+        )
+    found = _response(study, stable, graph, rule, monitor)
+    pressures = np.array([s.pressure_MPa for s in loaded(stable)])
+    gradients = gradients_of(stable, study.anchors, monitor, study.job.stations)
+    shares = shares_of_time(stable)
     # Not all displacements at once: there may be tens of thousands of paths.
     parts = [chains[i : i + 2000] for i in range(0, len(chains), 2000)]
     return np.concatenate(
