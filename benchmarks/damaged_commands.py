@@ -132,7 +132,7 @@ def kinds(study, placed):
 
     study, placed: folders of a finished `simulate`, whose inputs are damaged, and of a finished `place`.
     """
-    again = "resume", "FOLDER", "--no-report"
+    again = "resume", "FOLDER", "--no-report", "--workers", "1"
     resumed = {name: folder_with_one_damaged(placed, *again, only=only) for name, only in RESUMED.items()}
     resumed["study"] = folder_with_one_damaged(
         study, *again, only=lambda path: path.suffix == ".toml" or path.name == "protocol.csv"
