@@ -6,13 +6,19 @@
 A file costs some milliseconds: each command runs in a fork of this process, which has loaded what commands
 need, and is ended after some seconds of the processor's, still at work. What a real process does is tried
 with a few.
+
+Of a finished `place` of three chambers (kinds cache and JSON) one file is damaged, and it is resumed to its
+end, which must find the same files. Solid and rays come from this process's memory there, by what they are
+computed from: they are computed in every run and no file holds them.
 """
 
 from __future__ import annotations
 
 import argparse
+import io
 import json
 import os
+import pickle
 import random
 import resource
 import shutil
@@ -36,9 +42,13 @@ from mu_addon.cli import main as command_line  # noqa: E402
 from mu_addon.design.parameters import load_preset, to_toml  # noqa: E402
 from mu_addon.design.surface import stl_bytes  # noqa: E402
 from mu_addon.usecases.resume import MODULES  # noqa: E402
+from mu_addon.usecases.simulate_and_place import light  # noqa: E402
+from mu_addon.usecases.simulate_and_place import run as placing  # noqa: E402
+from mu_addon.usecases.simulate_and_place import study as placed_study  # noqa: E402
 from tests.design.printing import parts  # noqa: E402
 from tests.run.test_mutated_files import CORPUS, INDEX, RECORDING, mutated  # noqa: E402
 from tests.run.test_reading import MODEL  # noqa: E402
+from tests.usecases.fault_injection import PLACEMENT, ran, results  # noqa: E402
 
 ASSETS, DATA = ROOT / "assets", ROOT / "tests" / "data"
 COARSE = ["--refine", "0.3", "--order", "1", "--times", "3", "--no-report"]
@@ -112,17 +122,22 @@ FINGER = ASSETS / "examples" / "stronger-finger" / "design.toml"
 SIMULATE = ["simulate", "--preset", "mu-1.0x", *COARSE]
 
 
-def kinds(study):
-    """Makes the words of a command with one damaged file, by kind; study: a finished simulation's folder."""
-    inside = {
-        "cache": lambda path: path.suffix == ".npz",
-        "JSON": lambda path: path.suffix in (".json", ".ndjson"),
-        "study": lambda path: path.suffix == ".toml" or path.name == "protocol.csv",
-    }
-    resumed = {
-        name: folder_with_one_damaged(study, "resume", "FOLDER", "--no-report", only=only)
-        for name, only in inside.items()
-    }
+RESUMED = {
+    "cache": lambda path: path.suffix == ".npz",
+    "JSON": lambda path: path.suffix in (".json", ".ndjson"),
+}
+
+
+def kinds(study, placed):
+    """Makes the words of a command with one damaged file, by kind.
+
+    study, placed: folders of a finished `simulate`, whose inputs are damaged, and of a finished `place`.
+    """
+    again = "resume", "FOLDER", "--no-report", "--workers", "1"
+    resumed = {name: folder_with_one_damaged(placed, *again, only=only) for name, only in RESUMED.items()}
+    resumed["study"] = folder_with_one_damaged(
+        study, *again, only=lambda path: path.suffix == ".toml" or path.name == "protocol.csv"
+    )
     stl = stl_bytes(SOLID.vertices, SOLID.triangles)
     small = CORPUS["STL"][1](study)
     return resumed | {
@@ -140,6 +155,43 @@ def kinds(study):
         "lab CSV": one_file("lab.csv", LAB_FILE, "import", "FILE"),
         "recording": replay,
     }
+
+
+def remembered(module, name):
+    """Have a module's function answer from memory what it was asked before, by what it is given."""
+    function, kept = getattr(module, name), {}
+
+    def call(*given, **named):
+        # Those who are told how far it is are no part of what is computed.
+        asked = [value for value in (*given, *sorted(named.items())) if not holds_a_function(value)]
+        asked = pickle.dumps(asked)
+        if asked not in kept:
+            kept[asked] = function(*given, **named)
+        return kept[asked]
+
+    setattr(module, name, call)
+
+
+def holds_a_function(value):
+    return callable(value) or (isinstance(value, tuple) and any(map(callable, value)))
+
+
+def placed_in(folder):
+    """A finished `place` in a folder, computed by this process; what it finds by file."""
+    for module, name in ((placed_study, "build_solid"), (light, "fit_law"), (light, "traced_signal")):
+        remembered(module, name)
+    status, messages = ran(lambda at, context: placing.USE_CASE.start(PLACEMENT, at, context), folder)
+    assert status == 0, messages[-1]
+    return held(folder)
+
+
+def held(folder):
+    """What a folder's files hold, by name: of an archive its arrays, for not every bit of it is of these."""
+    found = results(folder)
+    for name in [name for name in found if name.endswith(".npz")]:
+        with np.load(io.BytesIO(found[name])) as arrays:
+            found[name] = {part: (values.dtype, values.tobytes()) for part, values in arrays.items()}
+    return found
 
 
 def forked(words, told):
@@ -202,8 +254,11 @@ def wrong_with(status, words):
     return ""
 
 
-def attack(work, make, count, seed, run):
-    """Ends by kind, the most memory in MB, and what went wrong, with the command's words and files."""
+def attack(work, make, count, seed, run, reference=None):
+    """Ends by kind, the most memory in MB, and what went wrong, with the command's words and files.
+
+    reference: what a folder that was damaged and computed must hold, by file.
+    """
     ends, most, faults = Counter(), 0.0, []
     for number in range(count):
         place = work / "here"
@@ -215,7 +270,12 @@ def attack(work, make, count, seed, run):
         said = (place / "told.txt").read_bytes().decode("utf-8", "replace")
         ends["at work" if status == -signal.SIGPROF else "computed" if status == 0 else "refused"] += 1
         most = max(most, memory)
-        if fault := wrong_with(status, said):
+        fault = wrong_with(status, said)
+        if not fault and status == 0 and reference is not None:
+            found = held(place / "folder")
+            other = [name for name in sorted({*found, *reference}) if found.get(name) != reference.get(name)]
+            fault = f"other results: {', '.join(other)}" if other else ""
+        if fault:
             faults.append(f"{number}: {fault}\n{said[-2000:]}")
             shutil.copytree(place, work / f"fault-{len(faults)}", dirs_exist_ok=True)
         shutil.rmtree(place)
@@ -260,13 +320,16 @@ def main():
         assert command_line.main([*SIMULATE, "--out", str(study)]) == 0
         assert json.loads((study / "summary.json").read_text())["status"] == "complete"
         assert np.isfinite(np.loadtxt(study / "angle.csv", delimiter=",", comments="#", skiprows=1)).all()
-        found = kinds(study)
+        placed = Path(name) / "placed"
+        reference = placed_in(placed)
+        found = kinds(study, placed)
         for kind in given.kinds or found:
             place = work / kind.replace(" ", "-")
             place.mkdir(parents=True, exist_ok=True)
-            ends, most, faults = attack(place, found[kind], given.files, f"{kind} {given.seed}", forked)
+            same = reference if kind in RESUMED else None
+            ends, most, faults = attack(place, found[kind], given.files, f"{kind} {given.seed}", forked, same)
             more, _, others = attack(
-                place, found[kind], given.processes, f"{kind} {given.seed} process", process
+                place, found[kind], given.processes, f"{kind} {given.seed} process", process, same
             )
             every += [f"{kind} {fault}" for fault in [*faults, *others]]
             shares = " | ".join(str(ends[end]) for end in ("computed", "refused", "at work"))

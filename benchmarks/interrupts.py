@@ -1,12 +1,13 @@
 """Ctrl-C at random moments of a sweep, an optimisation and a main job, and what their folders go on to.
 
-    python benchmarks/interrupts.py                            # all three, 12 times each
+    python benchmarks/interrupts.py                            # all of them, 12 times each
     python benchmarks/interrupts.py --times 30 --seed 7 sweep
+    python benchmarks/interrupts.py --kill "place, resolved"   # kill -9 instead
 
 Half of the signals go to the whole process group, as a terminal sends them, half to the command alone; every
 third comes twice, and every fourth within the first second. The command must end in words with status 130 (or
 with 0, where it was done), leave no process and no summary that says running, and, given again, make the same
-files as a run that nothing happened to.
+files as a run that nothing happened to. After kill -9, of which nobody can tell, the folder must do so, too.
 """
 
 from __future__ import annotations
@@ -22,12 +23,15 @@ import time
 from collections import Counter
 from pathlib import Path
 
+import attrs
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
 from circumstances import circumstances  # noqa: E402
+
+from mu_addon.design.parameters import load_preset, to_toml  # noqa: E402
 
 SWEEP = """
 format = 1
@@ -74,11 +78,16 @@ low = 10
 high = 30
 """
 PLACE = ["--preset", "mu-1.0x", "--refine", "0.4", "--order", "1", "--times", "7", "--stations", "11"]
+# The printed body of three chambers at one pressure: the least that has every stage.
+RESOLVED = ["--unit", "unit.toml", "--protocol", "protocol.csv", "--fidelity", "resolved", "--refine", "0.4"]
+RESOLVED += ["--times", "2", "--stations", "5", "--no-mesh-check"]
+PROTOCOL = "time_s,pressure_kPa\n0,0\n1,1\n"
 COMMANDS = {
     "sweep": ["sweep", "sweep.toml"],
     "optimize": ["optimize", "design.toml"],
     "optimize, two workers": ["optimize", "design.toml", "--workers", "2"],
     "place": ["place", *PLACE],
+    "place, resolved": ["place", *RESOLVED],
 }
 # What a run took is another thing than what it found.
 TOOK = ("seconds", "memory_MB", "worker")
@@ -124,8 +133,13 @@ def left_behind(folder):
     return here
 
 
-def interrupted(work, words, out, seconds, rng, number):
-    """Status and words of a run that Ctrl-C meets, seconds until it ended, and what is wrong."""
+def three_chambers():
+    unit = load_preset("mu-1.0x")
+    return to_toml(attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3)))
+
+
+def interrupted(work, words, out, seconds, rng, number, kind):
+    """Status and words of a run that a signal meets, seconds until it ended, and what is wrong."""
     process = start(work, words, out)
     time.sleep(rng.uniform(0.1, 1.0) if number % 4 == 0 else rng.uniform(0.0, seconds))
     send = os.killpg if number % 2 else os.kill
@@ -133,20 +147,20 @@ def interrupted(work, words, out, seconds, rng, number):
     for again in range(2 if number % 3 == 0 else 1):
         time.sleep(again * rng.uniform(0.05, 1.0))
         try:
-            send(process.pid, signal.SIGINT)
+            send(process.pid, kind)
         except ProcessLookupError:
             break
     output, _ = process.communicate(timeout=600)
     took = time.monotonic() - sent
     wrong = []
-    if process.returncode not in (0, 130):
+    if process.returncode not in (0, 130 if kind == signal.SIGINT else -kind):
         wrong.append(f"status {process.returncode}")
     if process.returncode == 130 and "stopped by Ctrl-C" not in output:
         wrong.append("no words")
     if "Traceback" in output or "Exception" in output:
         wrong.append("a stack")
     summary = out / "summary.json"
-    if summary.exists() and json.loads(summary.read_text())["status"] == "running":
+    if kind == signal.SIGINT and summary.exists() and json.loads(summary.read_text())["status"] == "running":
         wrong.append("says running")
     time.sleep(0.5)
     if left_behind(out):
@@ -154,7 +168,7 @@ def interrupted(work, words, out, seconds, rng, number):
     return process.returncode, output, took, wrong
 
 
-def one(work, name, times, seed):
+def one(work, name, times, seed, kind):
     """A row of the table for one command, then what went wrong with all that the command wrote."""
     words, rng = COMMANDS[name], np.random.default_rng([seed, *name.encode()])
     begun = time.monotonic()
@@ -166,7 +180,7 @@ def one(work, name, times, seed):
     ends, slowest, faults = Counter(), 0.0, []
     for number in range(times):
         out = work / f"hit{number}"
-        status, output, took, wrong = interrupted(work, words, out, seconds, rng, number)
+        status, output, took, wrong = interrupted(work, words, out, seconds, rng, number, kind)
         ends[status] += 1
         slowest = max(slowest, took)
         again = start(work, words, out)
@@ -187,6 +201,7 @@ def main():
     parser.add_argument("commands", nargs="*", choices=[*COMMANDS, []], help=", ".join(COMMANDS))
     parser.add_argument("--times", type=int, default=12)
     parser.add_argument("--seed", type=int, default=20)
+    parser.add_argument("--kill", action="store_true", help="kill -9 instead of Ctrl-C")
     given = parser.parse_args()
     print(circumstances(), f"Seed {given.seed}.\n")
     print("| command | takes | ended with status | at most after | wrong |\n| --- | --- | --- | --- | --- |")
@@ -196,7 +211,10 @@ def main():
             work = Path(folder)
             (work / "sweep.toml").write_text(SWEEP)
             (work / "design.toml").write_text(DESIGN)
-            faults += [f"{name} {fault}" for fault in one(work, name, given.times, given.seed)]
+            (work / "unit.toml").write_text(three_chambers())
+            (work / "protocol.csv").write_text(PROTOCOL)
+            kind = signal.SIGKILL if given.kill else signal.SIGINT
+            faults += [f"{name} {fault}" for fault in one(work, name, given.times, given.seed, kind)]
     for fault in faults:
         print(f"\n{fault}")
 

@@ -167,7 +167,12 @@ def _require_sense(value: Any, text: str | bytes, origin: str, remedy: str) -> N
 
 
 def _short(error: Exception) -> str:
-    return "brackets lie too deep in each other" if isinstance(error, RecursionError) else str(error)[:200]
+    if isinstance(error, RecursionError):
+        return "brackets lie too deep in each other"
+    # Python's own words are about one of its settings.
+    if "integer string conversion" in str(error):
+        return "it holds a whole number of thousands of digits"
+    return str(error)[:200]
 
 
 def _located(message: str, text: str) -> tuple[str, int | None]:

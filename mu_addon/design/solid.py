@@ -129,6 +129,12 @@ def build_solid(
     return Solid(vertices, triangles, gates, window, quality, bar, take_off)
 
 
+def chamber(unit: Unit) -> tuple[Vertices, Triangles]:
+    """The chamber of a unit as a closed surface, (n, 3) in mm and (m, 3), without the inlet."""
+    d, facets = unit.dimensions, QUALITY["interactive"]
+    return printable(shapes.revolved(cavity_polygon(d, facets.along_arc, None), facets.around_axis))
+
+
 def _drawn_offset(d: Dimensions, take_off: tuple[float, float]) -> NDArray[np.float64] | None:
     """Outward move (3,) of the drawing's surfaces that undoes a printer's; None for none. InputError."""
     xy, z = (float(value) for value in take_off)

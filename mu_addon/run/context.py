@@ -240,6 +240,13 @@ def _stop(context: RunContext, error: MuError) -> None:
     with suppress(MuError):
         _write_summary(context, partial)
     if context.report is not None:
+        if isinstance(error, _Interrupted) and context.wants_report:
+            # Some seconds go by before the last word.
+            with suppress(MuError):
+                context.progress.warning(
+                    "stopping: a report of what was found so far is written first",
+                    what_to_do="press Ctrl-C again to leave it out",
+                )
         # What takes long can be cut short by a second Ctrl-C; a failure here would only hide the first one.
         _set_signals(signal.default_int_handler)
         with suppress(Exception, KeyboardInterrupt):

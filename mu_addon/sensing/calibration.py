@@ -396,8 +396,11 @@ def read_calibration(path: Path) -> Calibration:
             float(table["error_deg"]),
             int(table["sweeps"]),
         )
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"the calibration is invalid: {error!r}", str(path), "calibrate again") from None
+    except KeyError as error:
+        what = f"the calibration is invalid: it lacks {error.args[0]}"
+        raise InputError(what, str(path), "calibrate again") from None
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"the calibration is invalid: {error}", str(path), "calibrate again") from None
     steps = np.diff(result.coefficients)
     sound = (
         len(result.knots) == len(result.coefficients) + _DEGREE + 1 >= 2 * (_DEGREE + 1)

@@ -9,11 +9,13 @@ import numpy as np
 from mathutils import Vector
 
 from ...design.printing.slices import Layers
+from ...design.solid import chamber
 from ...errors import InputError, MuError
 from ..body import state as bodies
 from ..preview import materials, skeletons
 from ..shared import displays
 from ..unit import object as unit_object
+from ..unit.properties import to_unit
 
 MATERIALS = ("MU Layer", "MU Enclosed")
 FACTS = ("height_mm", "whole_mm", "area_mm2", "enclosed_mm2")
@@ -61,7 +63,7 @@ def clear(root: Any) -> None:
 def _draw(root: Any, shown: Any) -> None:
     settings = root.mu_print
     try:
-        layers = _layers(root.mu_unit.solid, settings.up)
+        layers = _layers(root, settings.up)
     except MuError:
         shown.data.clear_geometry()
         raise
@@ -86,10 +88,14 @@ def _draw(root: Any, shown: Any) -> None:
         shown[name] = value
 
 
-def _layers(mesh: Any, up: Any) -> Layers:
+def _layers(root: Any, up: Any) -> Layers:
     if Vector(up).length < 1e-3:
         raise InputError("Up is not a direction", "Print", "give three numbers, such as 0 0 1")
+    mesh = root.mu_unit.solid
+    # An earlier solid may have had another chamber.
+    is_current = unit_object.solid_is_current(root)
     key = (
+        is_current,
         mesh.name,
         mesh["mu_unit_hash"],
         mesh["mu_path"],
@@ -100,5 +106,6 @@ def _layers(mesh: Any, up: Any) -> Layers:
     )
     if key not in _kept:
         _kept.clear()
-        _kept[key] = Layers(*bodies.arrays_in(mesh), tuple(up))
+        within = chamber(to_unit(root.mu_unit)) if is_current else None
+        _kept[key] = Layers(*bodies.arrays_in(mesh), tuple(up), within)
     return _kept[key]

@@ -25,13 +25,16 @@ class Slice:
 
     outlines: closed polygons (n, 2) in mm, in the plane of the section, counter-clockwise around material and
     clockwise around holes. area_mm2: of the material; enclosed_mm2: of the holes, which hold resin that can
-    leave only along the build, as a chamber's.
+    leave only along the build, as a chamber's. open_chamber: polygons, likewise, of a chamber that is no hole
+    of this section because its inlet opens it here; open_mm2: their area.
     """
 
     height_mm: float
     outlines: list[Array]
     area_mm2: float
     enclosed_mm2: float
+    open_chamber: list[Array]
+    open_mm2: float
 
 
 @attrs.frozen(eq=False)
@@ -55,54 +58,93 @@ def even_heights(vertices: Vertices, direction: ArrayLike, count: int) -> list[f
 
 
 def slices(
-    vertices: Vertices, triangles: Triangles, direction: ArrayLike, heights_mm: Sequence[float]
+    vertices: Vertices,
+    triangles: Triangles,
+    direction: ArrayLike,
+    heights_mm: Sequence[float],
+    chamber: tuple[Vertices, Triangles] | None = None,
 ) -> list[Slice]:
     """Sections of a closed surface, (n, 3) in mm and (m, 3), square to its build direction (3,).
 
-    Empty for a surface that encloses no volume.
+    chamber: the closed surface of a chamber within it, in the same frame. Empty for a surface that encloses
+    no volume.
     """
-    from manifold3d import Error, Manifold, Mesh64
-
-    built = vertices @ frame_along(np.asarray(direction, float)).T
-    solid = Manifold(Mesh64(built, triangles.astype(np.uint64)))
-    if solid.status() != Error.NoError or solid.is_empty():
+    frame = frame_along(np.asarray(direction, float))
+    built = vertices @ frame.T
+    solid = _closed(built, triangles)
+    if solid is None:
         return []
+    within = None if chamber is None else _closed(chamber[0] @ frame.T, chamber[1])
     low = built[:, 2].min()
     found = []
     for height in heights_mm:
         section = solid.slice(float(low + height))
         holes = -sum(min(signed_area(np.asarray(ring)), 0.0) for ring in section.to_polygons())
-        drawn = [np.asarray(ring) for ring in section.simplify(_SIMPLE_mm).to_polygons()]
-        found.append(Slice(float(height), drawn, float(section.area()), holes))
+        opened = None if within is None else within.slice(float(low + height)) - _filled(section)
+        found.append(
+            Slice(
+                float(height),
+                _outlines(section),
+                float(section.area()),
+                holes,
+                [] if opened is None else _outlines(opened),
+                0.0 if opened is None else float(opened.area()),
+            )
+        )
     return found
+
+
+def _closed(built: Vertices, triangles: Triangles) -> Any | None:
+    """The solid within a surface (n, 3), (m, 3); None where that encloses no volume."""
+    from manifold3d import Error, Manifold, Mesh64
+
+    solid = Manifold(Mesh64(built, triangles.astype(np.uint64)))
+    return None if solid.status() != Error.NoError or solid.is_empty() else solid
+
+
+def _filled(section: Any) -> Any:
+    """A section, a CrossSection, with its holes filled."""
+    from manifold3d import CrossSection, FillRule
+
+    rings = [np.asarray(ring) for ring in section.to_polygons()]
+    return CrossSection([ring for ring in rings if signed_area(ring) > 0.0], FillRule.NonZero)
+
+
+def _outlines(section: Any) -> list[Array]:
+    return [np.asarray(ring) for ring in section.simplify(_SIMPLE_mm).to_polygons()]
 
 
 class Layers:
     """A closed surface, vertices (n, 3) in mm and triangles (m, 3), whose sections are asked for one by one.
 
-    direction (3,): of the build, away from the platform. height_mm: of the whole part along it. Raises
+    direction (3,): of the build, away from the platform. height_mm: of the whole part along it. chamber: the
+    closed surface of a chamber within it, which counts as enclosed where its inlet opens it, too. Raises
     InputError for a surface that encloses no volume.
     """
 
-    def __init__(self, vertices: Vertices, triangles: Triangles, direction: ArrayLike) -> None:
-        from manifold3d import Error, Manifold, Mesh64
-
+    def __init__(
+        self,
+        vertices: Vertices,
+        triangles: Triangles,
+        direction: ArrayLike,
+        chamber: tuple[Vertices, Triangles] | None = None,
+    ) -> None:
         self.frame = frame_along(np.asarray(direction, float))
         built = vertices @ self.frame.T
         self._low, high = (float(z) for z in (built[:, 2].min(), built[:, 2].max()))
         self.height_mm = high - self._low
-        self._solid = Manifold(Mesh64(built, triangles.astype(np.uint64)))
-        if self._solid.status() != Error.NoError or self._solid.is_empty():
+        solid = _closed(built, triangles)
+        if solid is None:
             raise InputError("the surface encloses no volume", "layers", "build the solid again")
+        self._solid = solid
+        self._chamber = None if chamber is None else _closed(chamber[0] @ self.frame.T, chamber[1])
 
     def filled(self, height_mm: float) -> Filled:
         """The section at a height above the lowest point, as triangles in the part's own frame."""
-        from manifold3d import CrossSection, FillRule
-
         section = self._solid.slice(self._low + height_mm)
-        rings = [np.asarray(ring) for ring in section.to_polygons()]
-        outer = CrossSection([ring for ring in rings if signed_area(ring) > 0.0], FillRule.NonZero)
-        enclosed = outer - section
+        enclosed = _filled(section) - section
+        if self._chamber is not None:
+            enclosed += self._chamber.slice(self._low + height_mm) - section
         points, faces = [np.empty((0, 3))], []
         for region in (section, enclosed):
             flat, triangles = _triangulated(region)

@@ -15,6 +15,7 @@ from ...design.printing.orientation import Build, directions
 from ...design.printing.printer import MEANING
 from ...design.printing.repair import Repair
 from ...design.printing.slices import Slice, even_heights, signed_area, slices
+from ...design.solid import chamber
 from ...design.surface import Triangles, Vertices
 from ...files import write_bytes, write_text
 from ...report import charts as plots
@@ -212,12 +213,14 @@ def _limits(job: Job) -> str:
 def _layers(job: Job, vertices: Vertices, triangles: Triangles) -> str:
     """Pictures of layers: those that were asked for, or some evenly spaced."""
     heights = job.layers or even_heights(vertices, job.direction, LAYERS)
-    found = slices(vertices, triangles, job.direction, heights)
+    # A file's chamber may lie elsewhere than its unit's.
+    within = chamber(job.unit) if job.stl is None and job.unit is not None else None
+    found = slices(vertices, triangles, job.direction, heights, within)
     if not found:
         return "<p>The surface encloses no volume: it has no layers.</p>"
     caption = (
         "Layers by their height above the part's lowest point: material in grey, what a layer encloses in "
-        "blue, such as a chamber, with its area."
+        "blue, such as a chamber, with its area. A unit's chamber is blue where its inlet opens it, too."
     )
     return figure(layer_pictures(found), caption, "Sections of the part at several heights")
 
@@ -236,14 +239,18 @@ def layer_pictures(found: Sequence[Slice]) -> str:
     with plots.canvas(wide, tall) as (chart, svg):
         for k, section in enumerate(found):
             axes = chart.add_subplot(rows, across, k + 1)
+            blue = plots.BY_LENGTH[3]
+            for ring in section.open_chamber:
+                axes.add_patch(PathPatch(Outline(np.vstack([ring, ring[:1]]), closed=True), fc=blue, lw=0))
             # Holes last, filled: what stands in them is material again.
             for ring in sorted(section.outlines, key=lambda ring: abs(signed_area(ring)), reverse=True):
                 edge = Outline(np.vstack([ring, ring[:1]]), closed=True)
-                color = GREY if signed_area(ring) > 0 else plots.BY_LENGTH[3]
+                color = GREY if signed_area(ring) > 0 else blue
                 axes.add_patch(PathPatch(edge, facecolor=color, edgecolor=plots.INK, linewidth=0.3))
             title = f"{section.height_mm:.1f} mm"
-            if section.enclosed_mm2 >= 1.0:
-                title += f", {section.enclosed_mm2:.0f} mm²"
+            inside_mm2 = section.enclosed_mm2 + section.open_mm2
+            if inside_mm2 >= 1.0:
+                title += f", {inside_mm2:.0f} mm²"
             axes.set_title(title, fontsize=8)
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
             axes.axis("off")

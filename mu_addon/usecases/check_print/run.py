@@ -206,7 +206,8 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     lines.append(f"assumed limits: {len(summary['limits']['assumed'])} of {len(MEANING)}, see report.html")
     if "orientation" in summary:
         best = summary["orientation"]
-        towards = ", ".join(f"{x:.2f}" for x in best["direction"])
+        # Rounded first: no minus before a zero.
+        towards = ", ".join(f"{round(x, 2) + 0.0:.2f}" for x in best["direction"])
         lines.append(
             f"best build direction ({towards}): {best['islands']} islands, {best['support_mm2']:.0f} mm2 to "
             f"support, of it {best['inner_mm2']:.0f} mm2 in chambers, cups of {best['cup_ml']:.2g} ml"

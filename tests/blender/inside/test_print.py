@@ -19,6 +19,8 @@ from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.parameters import write_unit
 from mu_addon.design.printing.printer import printer_text
+from mu_addon.design.printing.slices import signed_area
+from mu_addon.design.profile import cavity_polygon
 from mu_addon.design.surface import bad_edges, stl_bytes, stl_surface
 from mu_addon.usecases.export.job import FORMATS, MANIFEST
 
@@ -464,6 +466,11 @@ def test_layers_follow_the_slider_the_direction_and_the_solid():
     # Along another direction the layer stands square to that.
     root.mu_print.up = (1.0, 0.0, 0.0)
     assert np.ptp(heights(0)) < 0.01
+    # Across the axis the inlet opens the chamber: it is blue all the same.
+    root.mu_print.layer = 0.5
+    assert layer.facts(shown)["enclosed_mm2"] == pytest.approx(
+        2 * signed_area(cavity_polygon(d, 64)), rel=0.02
+    )
     root.mu_print.layer = 1.0
     assert len(shown.data.polygons) > 0
     root.mu_unit.chambers.wall_mm = 1.2

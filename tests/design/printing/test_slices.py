@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 from mu_addon.design import shapes
-from mu_addon.design.printing.slices import even_heights, slices
-from mu_addon.design.solid import printable
+from mu_addon.design.printing.slices import Layers, even_heights, signed_area, slices
+from mu_addon.design.solid import chamber, printable
 
 from .parts import small_solid, small_unit
 
@@ -34,6 +34,34 @@ def test_the_build_direction_is_the_way_up():
     found = slices(vertices, triangles, (1.0, 0.0, 0.0), [1.0, 7.0])
     assert [s.area_mm2 for s in found] == pytest.approx([196.0, 196 - 100 - 2 * 4], rel=1e-3)
     assert even_heights(vertices, (1.0, 0.0, 0.0), 4) == pytest.approx([1.75, 5.25, 8.75, 12.25])
+
+
+def test_a_chamber_is_seen_where_its_inlet_opens_it():
+    """Along the bore's axis the bottle's chamber is no hole of the section, as it is beside the bore."""
+    room = printable(shapes.box([-5, -5, 2], [5, 5, 12]))
+    opened, enclosed = slices(*bottle(), (1.0, 0.0, 0.0), [7.0, 3.0], room)
+    assert (opened.enclosed_mm2, opened.open_mm2) == pytest.approx((0.0, 100.0), abs=1e-6)
+    assert (enclosed.enclosed_mm2, enclosed.open_mm2) == pytest.approx((100.0, 0.0), abs=1e-6)
+    layers = Layers(*bottle(), (1.0, 0.0, 0.0), room)
+    assert [layers.filled(z).enclosed_mm2 for z in (7.0, 3.0)] == pytest.approx([100.0, 100.0])
+    assert Layers(*bottle(), (1.0, 0.0, 0.0)).filled(7.0).enclosed_mm2 == 0.0
+
+
+@pytest.mark.parametrize("tilt", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.3), (0.0, 0.0, -1.0)])
+def test_a_units_chamber_is_the_room_in_its_solid(tilt):
+    solid = small_solid()
+    within = chamber(small_unit())
+    heights = even_heights(solid.vertices, tilt, 9)
+    for found in slices(solid.vertices, solid.triangles, tilt, heights, within):
+        # None of it where there is material, which is grey: its own area, and outlines that do not cross it.
+        (alone,) = slices(solid.vertices, solid.triangles, tilt, [found.height_mm])
+        assert found.area_mm2 == alone.area_mm2
+        assert sum(map(signed_area, found.open_chamber)) == pytest.approx(found.open_mm2, abs=0.05)
+    exact = trimesh.Trimesh(*within).volume
+    step = heights[1] - heights[0]
+    fine = slices(solid.vertices, solid.triangles, tilt, even_heights(solid.vertices, tilt, 90), within)
+    room = sum(s.enclosed_mm2 + s.open_mm2 for s in fine) * step / 10
+    assert room == pytest.approx(exact, rel=0.03)
 
 
 def test_layers_add_up_to_the_part():
