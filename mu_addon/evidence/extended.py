@@ -81,11 +81,14 @@ class ExtendedModel:
 def stacked(before: ExtendedModel, found: ExtendedModel) -> ExtendedModel:
     """A model with what was found before, and what a later diagnosis that started from it found.
 
-    Later values of nuisances, and a later response of the lattice, take the place of earlier ones.
+    A mechanism that is found in another kind of experiment, by parameters of its own, keeps the earlier ones
+    beside them. Later values of nuisances, and a later response of the lattice, take the place of earlier
+    ones.
     """
+    names = dict.fromkeys((*before.effects, *found.effects))
     return ExtendedModel(
         found.verdict,
-        {**before.effects, **found.effects},
+        {n: {**before.effects.get(n, {}), **found.effects.get(n, {})} for n in names},
         {**before.nuisances, **found.nuisances},
         found.lattice or before.lattice,
     )
@@ -112,11 +115,12 @@ def extended_model(verdict: Verdict, units: Mapping[str, str] = MappingProxyType
         low, high = verdict.intervals.get(key, (math.nan, math.nan))
         return Fitted(fit.values[key], fit.sd(key), low, high, unit)
 
-    effects = {
-        e.name: {p.name: fitted(k, p.unit) for k, p in zip(e.keys, e.parameters, strict=True)}
-        for e in fit.effects
-        if not (e.whose or e.among)
-    }
+    effects: dict[str, dict[str, Fitted]] = {}
+    for e in fit.effects:
+        if not (e.whose or e.among):
+            # Two kinds of experiments may have one mechanism by parameters of their own.
+            of_name = effects.setdefault(e.name, {})
+            of_name |= {p.name: fitted(k, p.unit) for k, p in zip(e.keys, e.parameters, strict=True)}
     nuisances = {k: fitted(k, units.get(k, "")) for k in fit.keys if "." not in k}
     return ExtendedModel(verdict.kind, effects, nuisances)
 

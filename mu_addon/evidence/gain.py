@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -95,12 +95,8 @@ def gain(fitter: Fitter, base: Fit, extended: Fit, held_out: Sequence[Experiment
 
 def _refusal(fitter: Fitter, experiment: Experiment, base: Fit, extended: Fit) -> str:
     """Why a model of the gain has no prediction for an experiment; "" where all have one."""
-    plain = {k: v for k, v in extended.values.items() if k in base.values}
-    stepped = [{**base.values, p.name: base.values[p.name] + p.step} for p in fitter.curved[:1]]
     try:
-        found = [
-            fitter.simulator.predict(experiment, v) for v in (base.values, extended.values, plain, *stepped)
-        ]
+        found = [fitter.simulator.predict(experiment, v) for v in (base.values, extended.values)]
     except MuError as error:
         return error.what
     return "" if all(np.isfinite(f).any() for f in found) else "the model gives no number"
@@ -132,7 +128,10 @@ def _errors(fitter: Fitter, judged: Record, base: Fit, extended: Fit) -> dict[st
     many = sum(len(e.keys) for e in extended.effects)
     nulls = None
     if extended.effects:
-        null_of = (_permuted(fitter, judged, base, extended), _black_box(fitter, judged, base, many))
+        null_of = (
+            _or_none(judged, lambda: _permuted(fitter, judged, base, extended)),
+            _or_none(judged, lambda: _black_box(fitter, judged, base, many)),
+        )
         nulls = [judged.values - null for null in null_of]
     found = {}
     for group in judged.groups:
@@ -147,6 +146,14 @@ def _errors(fitter: Fitter, judged: Record, base: Fit, extended: Fit) -> dict[st
         low, high = _bootstrap(members, rows.start, before[rows], after[rows])
         found[group] = Errors(*ends, unit, low, high, *(_rms(null[rows]) for null in nulls))
     return found
+
+
+def _or_none(judged: Record, null: Callable[[], Array]) -> Array:
+    """A null's prediction (N,) of a record; nan where no model has its values."""
+    try:
+        return null()
+    except MuError:
+        return np.full(len(judged), math.nan)
 
 
 def _rms(r: Array) -> float:

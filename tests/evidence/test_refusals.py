@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import ConvergenceError
+from mu_addon.evidence.effect import Parameter
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
 from tests.evidence.stand_ins import Moduli, made
@@ -95,3 +96,28 @@ def test_what_was_held_out_and_cannot_be_predicted_is_told_and_left_out(every):
     assert "far was held out" in told
     assert "no equilibrium at 20 %" in told
     assert (found.gain.held_out is None) == every
+
+
+def test_a_null_model_without_prediction_of_what_was_held_out_is_none():
+    """Corrections without a meaning may ask for values that no block can have: there is no such null then."""
+
+    class Fragile(Moduli):
+        """A second nuisance before the modulus; what was held out has no equilibrium if it is stiffer."""
+
+        nuisances = (Parameter("curvature", "", -1.0, 1.0, 0.0, (0.5,), "stand-in"), *Moduli.nuisances)
+
+        def predict(self, experiment, values):
+            # The base has 25.2 kPa; the null with permuted effects asks for 26.0.
+            if experiment.name == "far" and values.get("modulus_kPa", 20.0) > 25.5:
+                raise ConvergenceError("no equilibrium of the block", experiment.name)
+            curved = 40.0 * values.get("curvature", 0.0) * experiment["strain"][None] ** 2
+            return super().predict(experiment, values) + curved
+
+    fitted = blocks(overcure__offset_mm=0.1)
+    far = attrs.evolve(fitted[0], name="far", role="held_out")
+    found = diagnose([*fitted, far], Composite({"lattice_compression": Fragile()}))
+    assert "overcure" in found.names
+    assert np.isfinite([found.gain.held_out.before, found.gain.held_out.after]).all()
+    assert np.isfinite(found.gain.held_out.black_box)
+    assert np.isnan(found.gain.held_out.permuted)
+    assert not found.set_aside

@@ -9,7 +9,7 @@ import pytest
 
 from mu_addon.errors import InputError
 from mu_addon.evidence.effect import LIBRARY, Effect, Parameter
-from mu_addon.evidence.extended import extended_model, load_model
+from mu_addon.evidence.extended import ExtendedModel, Fitted, extended_model, load_model, stacked
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.record import KNOWN, record
@@ -255,3 +255,17 @@ def test_an_effect_of_other_parameters_elsewhere_is_another_of_its_name():
     assert shared.kinds == ("unit_pressure", "beam_deadweight")
     assert (shared.parameters[0].low, shared.parameters[0].high) == (0.0, 2500.0)
     assert len(both.effects) == len(one.effects) + 1
+
+
+def test_one_mechanism_found_in_two_kinds_keeps_both_sizes(tmp_path):
+    """A later diagnosis of another kind of experiment may find a mechanism by parameters of its own."""
+
+    def of(effects):
+        return ExtendedModel("named", effects, {})
+
+    share, rate = Fitted(0.3, 0.01, 0.28, 0.32), Fitted(0.02, 0.001, 0.018, 0.022, "1/s")
+    before = of({"leak": {"share": share}, "gravity": {"density_kg_m3": Fitted(1e3, 1.0, 998.0, 1002.0)}})
+    both = stacked(before, of({"leak": {"loss_per_s": rate}}))
+    assert both.effects == {**before.effects, "leak": {"share": share, "loss_per_s": rate}}
+    both.save(tmp_path / "model.toml")
+    assert load_model(tmp_path / "model.toml").of_effects == both.of_effects

@@ -461,3 +461,16 @@ def test_place_goes_on_where_the_unit_relaxes(tmp_path):
     held = (delta["time_s"] >= 1.0) & (delta["time_s"] <= 9.0)
     worst = delta["delta_volume_fraction_mm"].max(axis=(0, 2))
     assert (np.diff(worst[held]) > 0).all()
+
+
+def test_a_mechanism_found_in_two_kinds_acts_by_the_parameters_of_the_unit():
+    """A leak of a closed chamber, stated beside the unit's own, is told and does not take it away."""
+    share = {"conductance_ratio": Fitted(0.1, 0, 0, 0)}
+    alone = extend(UNIT, ExtendedModel("named", {"leak": share}, {}))
+    assert alone.effects.values["leak"]
+    both = extend(UNIT, ExtendedModel("named", {"leak": {**share, "loss_per_s": Fitted(0.02, 0, 0, 0)}}, {}))
+    assert both.effects == alone.effects
+    assert both.applied == alone.applied
+    (told,) = both.left_out
+    assert "loss_per_s 0.02" in told
+    assert "another kind of experiment" in told

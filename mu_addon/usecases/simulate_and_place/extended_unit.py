@@ -17,7 +17,7 @@ from ...evidence.prediction.lattice import SLENDER, ComputedCell
 from ...evidence.unit_effects import EFFECTS, Body
 from ...homogenize.effective import Effective
 from ..diagnose.words import readable
-from .named_effects import NAMES, NamedEffects, parameters_of
+from .named_effects import NAMES, NamedEffects, law_within
 
 Values = Mapping[str, Fitted]
 # A unit with a value in it, and what changed in words.
@@ -78,9 +78,12 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
     """
     applied: list[str] = []
     left_out: list[str] = []
-    beside = {n: v for n, v in model.effects.items() if n in NAMES and parameters_of(n, v) is not None}
-    for name, values in model.effects.items():
-        if name in beside:
+    laws = {n: law for n, v in model.effects.items() if n in NAMES and (law := law_within(n, v))}
+    beside = {n: {p.name: model.effects[n][p.name] for p in law} for n, law in laws.items()}
+    for name, given in model.effects.items():
+        # A mechanism may have been found in other kinds of experiments as well.
+        values = {p: fitted for p, fitted in given.items() if p not in beside.get(name, {})}
+        if not values:
             continue
         effect = EFFECTS.get(name)
         known = effect is not None and tuple(values) == (effect.parameter.name,)

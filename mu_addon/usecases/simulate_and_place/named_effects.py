@@ -219,6 +219,16 @@ def parameters_of(name: str, given: Iterable[str]) -> tuple[Parameter, ...] | No
     return next((law for law in _laws(name) if {p.name for p in law} == set(given)), None)
 
 
+def law_within(name: str, given: Iterable[str]) -> tuple[Parameter, ...] | None:
+    """The law of a unit's effect whose parameters are all among those given; None where none is.
+
+    Beside them may stand those of another kind of experiment; of several laws it is that of most parameters.
+    """
+    names = set(given)
+    whole = [law for law in _laws(name) if {p.name for p in law} <= names]
+    return max(whole, key=len, default=None)
+
+
 def _null(name: str) -> float:
     return _laws(name)[0][0].null
 
