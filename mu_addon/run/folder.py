@@ -81,7 +81,7 @@ def claim(folder: Path, layout: FolderLayout, inputs: Mapping[str, str]) -> None
     before = {name: _read(folder / name) for name in may if (folder / name).is_file()}
     if any(not _same(name, text, inputs.get(name)) for name, text in before.items()):
         _set_aside(folder, (*may, *layout.results, *ALWAYS))
-    keep_inputs(folder, inputs)
+    keep_inputs(folder, inputs, layout.inputs)
 
 
 def write_run(folder: Path, layout: FolderLayout, inputs: Mapping[str, str]) -> None:
@@ -118,10 +118,13 @@ def _document(text: str) -> dict[str, Any] | None:
         return None
 
 
-def keep_inputs(folder: Path, inputs: Mapping[str, str]) -> None:
-    """Write a run's inputs into its folder. Raises OutputError."""
-    for name, text in inputs.items():
-        write_text(folder / name, text)
+def keep_inputs(folder: Path, inputs: Mapping[str, str], known_by: str = "") -> None:
+    """Write a run's inputs into its folder, last the file that it is known by. Raises OutputError.
+
+    So a run that was stopped between two of them has not begun, and starts anew.
+    """
+    for name in sorted(inputs, key=lambda name: name == known_by):
+        write_text(folder / name, inputs[name])
 
 
 def require_space(folder: Path, needed: int) -> None:

@@ -380,7 +380,7 @@ def write_study(job: Job, folder: Path) -> None:
     try:
         texts, current = job.texts_in(folder, {"stages": list(job.stages)})
         if current:
-            keep_inputs(folder, {NAME: texts[NAME]})
+            keep_inputs(folder, texts, NAME)
         claim(folder, LAYOUT, texts)
     finally:
         lock.release()

@@ -755,7 +755,7 @@ def begin_study(job: Job, folder: Path, context: RunContext) -> None:
     texts, current = job.texts_in(folder)
     if current:
         # Further stages of the same inputs make study.toml longer, and nothing stale.
-        keep_inputs(folder, {NAME: texts[NAME]})
+        keep_inputs(folder, texts, NAME)
         context.summary = _earlier(folder) | context.summary
     begin(context, folder, LAYOUT, texts)
 
