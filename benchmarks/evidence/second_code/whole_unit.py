@@ -20,7 +20,6 @@ import attrs
 import numpy as np
 
 from mu_addon.design.parameters import Unit, load_preset, to_toml
-from mu_addon.fem.elements import triangle_shapes
 from mu_addon.files import write_text
 from mu_addon.meshing.mesh import AXES, LATTICE, Mesh
 from mu_addon.meshing.settings import MeshSettings
@@ -56,12 +55,17 @@ def small_unit(thicker: float = 1.0) -> Unit:
     return attrs.evolve(unit, name="mu-three-chambers", chambers=chambers)
 
 
-def pushed(x: Array, faces: Array, order: int) -> tuple[Array, Array, Array]:
+def pushed(x: Array, faces: Array) -> tuple[Array, Array, Array]:
     """Force of a unit pressure on the nodes of faces, its derivative, and their degrees of freedom.
 
-    x (n, 3) mm: where the nodes are; faces (f, a). Returns (f, a, 3), (f, 3a, 3a) and (f, 3a).
+    x (n, 3) mm: where the nodes are; faces (f, 6). Returns (f, 6, 3), (f, 18, 18) and (f, 18).
     """
-    shapes, slopes, weights = triangle_shapes(order)
+    import felupe
+
+    triangle, quadrature = felupe.QuadraticTriangle(), felupe.quadrature.Triangle(order=5)
+    shapes = np.array([triangle.function(point) for point in quadrature.points])
+    slopes = np.array([triangle.gradient(point) for point in quadrature.points])
+    weights = quadrature.weights
     at = x[faces]
     s, t = (np.einsum("qa,fai->qfi", slopes[:, :, d], at) for d in (0, 1))
     force = np.einsum("q,qa,qfi->fai", weights, shapes, np.cross(s, t))
@@ -136,7 +140,7 @@ class Felupe:
                 matrix = matrix + body.assemble.matrix(body.field)
             if not np.isfinite(vector).all():
                 return None
-            force, change, dofs = pushed(self.mesh.nodes + u, self.mesh.cavity, 2)
+            force, change, dofs = pushed(self.mesh.nodes + u, self.mesh.cavity)
             vector += p * np.bincount(dofs.ravel(), force.ravel(), minlength=size)
             rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
             columns = np.tile(dofs, (1, dofs.shape[1])).ravel()

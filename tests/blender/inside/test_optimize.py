@@ -111,7 +111,7 @@ def test_properties_are_written_as_the_file_that_the_core_reads(tmp_path):
     assert shape_hash(design.unit) == shape_hash(
         attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, bladder_share=0.55))
     )
-    angle, vacuum, safety, air, stiffness, mass, deviation, *added, printable = design.targets
+    angle, vacuum, safety, air, stiffness, mass, deviation, *added, printable, thinnest = design.targets
     force, place, path, *curve, rest = added
     assert (force.quantity.gap_mm, force.quantity.pressure_kPa, force.low) == (1.5, 30.0, 0.2)
     assert (place.quantity.direction, path.quantity.pressures_kPa) == ("z", (-10.0, 20.0))
@@ -128,6 +128,7 @@ def test_properties_are_written_as_the_file_that_the_core_reads(tmp_path):
     assert mass.goal == "minimise"
     assert deviation.quantity.path == "alpha2"
     assert printable.kind == "printable"
+    assert thinnest.kind == "wall_thickness", "the printer's limit, so that the search keeps it"
     wall, cells, cell, neck = design.freedoms
     assert neck.values == (11, 12.5, 13)
     assert design.unit.chambers.bladder_share == 0.55
