@@ -30,7 +30,10 @@ def test_what_makes_the_sets_knows_nothing_of_the_engine():
             continue
         for node in ast.walk(ast.parse(file.read_text())):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("mu_addon"):
-                assert (node.module or "").startswith(shared.get(file.stem, ("nothing",))), (file, node.module)
+                assert (node.module or "").startswith(shared.get(file.stem, ("nothing",))), (
+                    file,
+                    node.module,
+                )
 
 
 @pytest.mark.parametrize("law", LAWS, ids=[f"{kind} {name}" for kind, name, *_ in LAWS])

@@ -62,17 +62,24 @@ def pushed(x: Array, faces: Array) -> tuple[Array, Array, Array]:
     """
     import felupe
 
-    triangle, quadrature = felupe.QuadraticTriangle(), felupe.quadrature.Triangle(order=5)
-    shapes = np.array([triangle.function(point) for point in quadrature.points])
-    slopes = np.array([triangle.gradient(point) for point in quadrature.points])
+    quadrature = felupe.quadrature.Triangle(order=5)
     weights = quadrature.weights
+    # felupe's own derivatives of this triangle (11.3.0) are not those of its functions.
+    r, s = quadrature.points.T
+    corners, no, one = np.array([1.0 - r - s, r, s]), np.zeros_like(r), np.ones_like(r)
+    slope = np.array([[-one, -one], [one, no], [no, one]]).transpose(0, 2, 1)
+    i, j = np.array([[0, 1], [1, 2], [2, 0]]).T
+    shapes = np.concatenate([corners * (2.0 * corners - 1.0), 4.0 * corners[i] * corners[j]]).T
+    along = (4.0 * corners - 1.0)[:, :, None] * slope
+    between = 4.0 * (corners[i][:, :, None] * slope[j] + corners[j][:, :, None] * slope[i])
+    slopes = np.concatenate([along, between]).swapaxes(0, 1)
     at = x[faces]
-    s, t = (np.einsum("qa,fai->qfi", slopes[:, :, d], at) for d in (0, 1))
-    force = np.einsum("q,qa,qfi->fai", weights, shapes, np.cross(s, t))
+    along_r, along_s = (np.einsum("qa,fai->qfi", slopes[:, :, d], at) for d in (0, 1))
+    force = np.einsum("q,qa,qfi->fai", weights, shapes, np.cross(along_r, along_s))
     # Matrices of the cross products, columns of the identity crossed by each tangent.
-    turn_s, turn_t = (np.cross(np.eye(3), v[:, :, None, :]).swapaxes(-1, -2) for v in (s, t))
-    change = np.einsum("q,qa,qb,qfij->faibj", weights, shapes, slopes[:, :, 0], turn_t, optimize=True)
-    change -= np.einsum("q,qa,qb,qfij->faibj", weights, shapes, slopes[:, :, 1], turn_s, optimize=True)
+    turn_r, turn_s = (np.cross(np.eye(3), v[:, :, None, :]).swapaxes(-1, -2) for v in (along_r, along_s))
+    change = np.einsum("q,qa,qb,qfij->faibj", weights, shapes, slopes[:, :, 0], turn_s, optimize=True)
+    change -= np.einsum("q,qa,qb,qfij->faibj", weights, shapes, slopes[:, :, 1], turn_r, optimize=True)
     many = 3 * faces.shape[1]
     dofs = (3 * faces[:, :, None] + np.arange(3)).reshape(len(faces), many)
     return force, change.reshape(len(faces), many, many), dofs
