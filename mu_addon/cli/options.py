@@ -192,6 +192,18 @@ def add_self_contact(command: argparse.ArgumentParser) -> None:
     )
 
 
+def add_self_friction(command: argparse.ArgumentParser) -> None:
+    """How parts of a resolved unit slide on each other."""
+    command.add_argument(
+        "--self-friction",
+        type=float,
+        default=0.0,
+        metavar="MU",
+        help="Coulomb friction coefficient of walls and struts on each other, with --self-contact; the "
+        "motion is then solved in order of time (default: 0).",
+    )
+
+
 def add_simulation(command: argparse.ArgumentParser) -> None:
     """Protocol, mesh and material of a simulation."""
     command.add_argument(
@@ -212,6 +224,7 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
     )
     add_fidelity(command)
     add_self_contact(command)
+    add_self_friction(command)
     command.add_argument(
         "--lattice",
         metavar="FILE",

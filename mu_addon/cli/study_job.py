@@ -37,6 +37,7 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
             "effects": effects,
             "mesh": MeshSettings(order=options.order, refine=options.refine, fidelity=options.fidelity),
             "self_contact": options.self_contact,
+            "self_friction": options.self_friction,
             "times": options.times,
             "mesher": options.mesher,
             "solver": solver_of(options),

@@ -137,16 +137,16 @@ class Equilibrium:
         found: the equilibrium from a start with the bound held, and whether it is not the first. Raises
         ConvergenceError.
         """
-        obstacles = self.model.obstacles
-        for obstacle in obstacles:
-            obstacle.lag_from_memory()
+        contacts = self.model.remembering
+        for contact in contacts:
+            contact.lag_from_memory()
         for number in range(MOST_LAGS):
             state = found(state, number > 0)
-            lag_change = max((obstacle.lag_change(state.u) for obstacle in obstacles), default=0.0)
+            lag_change = max((contact.lag_change(state.u) for contact in contacts), default=0.0)
             if lag_change <= FRICTION_TOLERANCE:
                 return state
-            for obstacle in obstacles:
-                obstacle.update_lag(state.u)
+            for contact in contacts:
+                contact.update_lag(state.u)
         raise ConvergenceError(
             f"friction does not converge: it still changes by {lag_change:.1e} of its bound"
         )

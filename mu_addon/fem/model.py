@@ -284,8 +284,8 @@ class Model:
 
         It lies `m.dt_s` seconds after the one remembered before.
         """
-        for obstacle in self.obstacles:
-            obstacle.commit(u)
+        for contact in self.remembering:
+            contact.commit(u)
         self._place(u)
         for layer in m.layers:
             if layer.kernels.advance:
@@ -297,8 +297,8 @@ class Model:
         """Clear the history of materials and contacts, and move obstacles with a path to a time in s."""
         m.forget()
         self.move_obstacles(time_s)
-        for obstacle in self.obstacles:
-            obstacle.begin()
+        for contact in self.remembering:
+            contact.begin()
 
     def move_obstacles(self, time_s: float) -> None:
         """Put obstacles with a path where they are at a time in s."""
@@ -306,9 +306,15 @@ class Model:
             obstacle.move(time_s)
 
     @property
+    def remembering(self) -> tuple[Obstacle | SelfContact, ...]:
+        """Contacts whose friction may remember: obstacles, and self-contact where it has friction."""
+        own = self.self_contact
+        return self.obstacles if own is None or not own.friction else (*self.obstacles, own)
+
+    @property
     def has_friction(self) -> bool:
-        """Whether an obstacle has friction, so that a state depends on those before it."""
-        return any(obstacle.friction for obstacle in self.obstacles)
+        """Whether anything rubs, so that a state depends on those before it."""
+        return any(contact.friction for contact in self.remembering)
 
     def deepest_mm(self, u: Array) -> float:
         """Largest depth in mm of the surface inside any obstacle at u (n, 3) in mm, 0 without contact."""

@@ -14,6 +14,7 @@ from ..design.quantity import in_kPa
 from ..errors import InputError
 from ..meshing.mesh import AXES, LATTICE, Mesh
 from .outer_faces import free_boundary
+from .self_friction import SelfFriction
 from .self_intersection import facets_of
 
 Array = np.ndarray[Any, Any]
@@ -26,6 +27,8 @@ _ROOM = 2.0
 _ROUND = 2.5
 # Pairs of such neighbours, over the number of facets, up to which their facets may go.
 _SLIVERS = 0.05
+# Slip in gaps at which friction is full.
+_SLIP = 0.1
 # Share of the way to a mirror plane that a step may go, as ipctk has it for the way to a touch.
 _SHORT_OF_TOUCH = 0.8
 
@@ -56,7 +59,7 @@ class _Pairs:
 class Touch:
     """Where a body touches itself in one state.
 
-    pressure_kPa (n,): the contact's force at each node of the mesh over the undeformed area around it;
+    pressure_kPa (n,): the contact's normal force at each node of the mesh over the undeformed area around it;
     force_N: what all pieces press on each other with, mirror images included; gap_mm: the least distance,
     infinite where nothing is within the gap.
     """
@@ -99,19 +102,29 @@ class SelfContact:
     Faces of the base do not touch, nor do facets nearer than the gap to their own neighbourhood as drawn, as
     around the axis of a cap. Facets with a common node are not kept apart.
 
+    friction: Coulomb's coefficient, 0 without friction; see `SelfFriction`. A body with it has memory, as
+    beside an `Obstacle` with friction: `time_stepping.simulate_in_time` solves it. On a mirror plane a body
+    and its image slide alike, and nothing rubs.
+
     facets (t, 3): the triangles that touch, as node numbers. Raises InputError where ipctk is missing, and
     where pieces of the surface are nearer than the gap as drawn: a third of the wall's thickness is safe.
     """
 
-    def __init__(self, mesh: Mesh, gap_mm: float, stiffness_MPa: float) -> None:
+    def __init__(self, mesh: Mesh, gap_mm: float, stiffness_MPa: float, friction: float = 0.0) -> None:
         if not (0 < gap_mm < np.inf and 0 < stiffness_MPa < np.inf):
             raise InputError(
                 f"self-contact with a gap of {gap_mm:g} mm and a stiffness of {stiffness_MPa:g} MPa",
                 "self-contact",
                 "give both above 0: a third of the wall or less, and a tenth of its modulus",
             )
+        if not 0 <= friction < np.inf:
+            raise InputError(
+                f"a coefficient of friction of {friction:g}",
+                "self-contact",
+                "give a coefficient of 0 or more",
+            )
         self._ipctk = _ipctk()
-        self.gap_mm, self.stiffness_MPa = gap_mm, stiffness_MPa
+        self.gap_mm, self.stiffness_MPa, self.friction = gap_mm, stiffness_MPa, friction
         self._rest = mesh.nodes
         self._potential, self._wider = (
             self._ipctk.BarrierPotential(reach, stiffness_MPa, True) for reach in (gap_mm, _ROOM * gap_mm)
@@ -131,6 +144,10 @@ class SelfContact:
         # Half the time of ipctk's default, and as safe: it advances by what distance and speed allow.
         self._detection = self._ipctk.AdditiveCCD()
         self._last: _Pairs | None = None
+        self._rubbing: SelfFriction | None = None
+        if friction:
+            parts = self._ipctk, self._surface, self._potential
+            self._rubbing = SelfFriction(*parts, friction, _SLIP * gap_mm)
 
     def _collision_mesh(self, facets: Array) -> tuple[Any, Array]:
         nodes, triangles = np.unique(facets, return_inverse=True)
@@ -201,6 +218,53 @@ class SelfContact:
         off = np.flatnonzero(np.abs(x) > self.gap_mm)
         return _Plane(column, self._nodes[off], np.asarray(self._surface.vertex_areas)[off], np.sign(x[off]))
 
+    @property
+    def lost_mJ(self) -> float:
+        """What sliding has cost up to the last committed state, in mJ; of a half mesh its half."""
+        return 0.0 if self._rubbing is None else self._rubbing.lost_mJ
+
+    def begin(self, u: Array | None = None) -> None:
+        """Start friction's memory anew at displacement u (n, 3) in mm, else at rest."""
+        self._recall(np.zeros_like(self._rest) if u is None else u, 0.0)
+
+    def kept(self) -> dict[str, Array]:
+        """Friction's memory as arrays to store, besides the displacement; empty without friction."""
+        return {} if self._rubbing is None else {"lost_mJ": np.array(self._rubbing.lost_mJ)}
+
+    def restore(self, u: Array, kept: dict[str, Array]) -> None:
+        """Set the memory to what it was when `kept` was stored, u (n, 3) in mm being the state then."""
+        if self._rubbing is not None:
+            self._recall(u, float(kept["lost_mJ"]))
+
+    def _recall(self, u: Array, lost_mJ: float) -> None:
+        if self._rubbing is not None:
+            found = self._pairs(u)
+            self._rubbing.recall(found.places, found.near, lost_mJ)
+
+    def lag_from_memory(self) -> None:
+        """Take the normal forces that bound friction from the last committed state."""
+        if self._rubbing is not None:
+            self._rubbing.lag_from_memory()
+
+    def lag_change(self, u: Array) -> float:
+        """Change of friction's forces if the lag followed to u (n, 3) in mm, over the sum of their bounds."""
+        if self._rubbing is None:
+            return 0.0
+        found = self._pairs(u)
+        return self._rubbing.lag_change(found.places, found.near)
+
+    def update_lag(self, u: Array) -> None:
+        """Let the normal forces that bound friction follow to displacement u (n, 3) in mm."""
+        if self._rubbing is not None:
+            found = self._pairs(u)
+            self._rubbing.update_lag(found.places, found.near)
+
+    def commit(self, u: Array) -> None:
+        """Make a converged state u (n, 3) in mm part of friction's memory."""
+        if self._rubbing is not None:
+            found = self._pairs(u)
+            self._rubbing.commit(found.places, found.near)
+
     def without_image(self) -> SelfContact:
         """The same contact of a half body without that across its mirror planes."""
         other = copy.copy(self)
@@ -211,6 +275,8 @@ class SelfContact:
         """Energy in mJ at u (n, 3) in mm; infinite where a mirror plane is crossed."""
         found = self._pairs(u)
         energy = self._potential(found.near, self._surface, found.places) if len(found.near) else 0.0
+        if self._rubbing is not None:
+            energy += self._rubbing.energy_mJ(found.places)
         for plane in self._planes:
             # Half of what the whole body has there, as of everything else.
             energy += 0.5 * plane.area @ self._barrier(plane.distance(self._rest + u))[0]
@@ -221,6 +287,13 @@ class SelfContact:
 
         u: displacements (n, 3) in mm.
         """
+        forces = self._normal_forces(u)
+        if self._rubbing is not None:
+            forces += self._rubbing.gradient_N(self._places(u))
+        return self._nodes, forces
+
+    def _normal_forces(self, u: Array) -> Array:
+        """The barrier's derivative (j, 3) in N by the surface's nodes."""
         found = self._pairs(u)
         total = np.zeros_like(self._rest)
         if len(found.near):
@@ -229,7 +302,7 @@ class SelfContact:
         for plane in self._planes:
             slope = self._barrier(plane.distance(self._rest + u))[1]
             total[plane.nodes, plane.column] += plane.area * plane.side * slope
-        return self._nodes, total[self._nodes]
+        return np.asarray(total[self._nodes])
 
     def stiffness(self, u: Array, convex: bool = False) -> sparse.coo_matrix:
         """Second derivative (3 n, 3 n) in N/mm of the energy at u (n, 3) in mm, symmetric if not definite.
@@ -272,11 +345,10 @@ class SelfContact:
 
     def touch(self, u: Array) -> Touch:
         """Where the surface is within the gap of itself at u (n, 3) in mm, and how hard it presses there."""
-        nodes, forces = self.forces(u)
         area = np.asarray(self._surface.vertex_areas)
-        size = np.linalg.norm(forces, axis=1)
+        size = np.linalg.norm(self._normal_forces(u), axis=1)
         pressure = np.zeros(len(self._rest))
-        pressure[nodes] = in_kPa(size / area)
+        pressure[self._nodes] = in_kPa(size / area)
         # Both pieces of each contact feel its force.
         force = 2.0 ** len(self._planes) * float(size.sum()) / 2.0
         return Touch(pressure, force, self.least_gap_mm(u))
@@ -331,16 +403,25 @@ class SelfContact:
 
     def _hessian(self, potential: Any, near: Any, places: Array, convex: bool = False) -> sparse.coo_matrix:
         """Second derivative of a potential over pairs, by the surface's own unknowns (3 v, 3 v)."""
+        return potential.hessian(near, self._surface, places, self._projection(convex)).tocoo()
+
+    def _projection(self, convex: bool) -> Any:
         method = self._ipctk.PSDProjectionMethod
-        projected = method.CLAMP if convex else method.NONE
-        return potential.hessian(near, self._surface, places, projected).tocoo()
+        return method.CLAMP if convex else method.NONE
 
     def _entries(self, found: _Pairs, convex: bool) -> tuple[Array, Array, Array]:
         """Rows, columns and values (j,) of the pairs' second derivative, numbered by the mesh's nodes."""
-        if not len(found.near):
+        parts = []
+        if len(found.near):
+            parts.append(self._hessian(self._potential, found.near, found.places, convex))
+        if self._rubbing is not None and self._rubbing.rubs:
+            parts.append(self._rubbing.hessian(found.places, self._projection(convex)))
+        if not parts:
             return np.empty(0, int), np.empty(0, int), np.empty(0)
-        h = self._hessian(self._potential, found.near, found.places, convex)
-        return self._numbers[h.row], self._numbers[h.col], h.data
+        rows, columns, values = (
+            np.concatenate([getattr(h, name) for h in parts]) for name in ("row", "col", "data")
+        )
+        return self._numbers[rows], self._numbers[columns], values
 
     def _barrier(self, distance: Array) -> tuple[Array, Array, Array]:
         """Energy per area in N/mm at distances (k,) in mm, its slope in MPa and the slope's in MPa/mm."""

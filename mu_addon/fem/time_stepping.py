@@ -30,7 +30,7 @@ SNAPS_BELOW = 1 / 16
 class Instant:
     """A converged state, when it holds in s, and the rate (n, 3) in mm/s at which it was reached, if any.
 
-    contacts: what each of the model's obstacles remembers of it, see `Obstacle.kept`; history: what each law
+    contacts: what each of `Model.remembering` does, see `Obstacle.kept`; history: what each law
     with one does, see `MaterialData.kept`. Both are filled in to be stored.
     """
 
@@ -69,19 +69,19 @@ def simulate_in_time(
     equilibrium.model.forget(float(time[0]), equilibrium.parameters)
     last: Instant | None = None
     states = []
-    obstacles = equilibrium.model.obstacles
+    contacts = equilibrium.model.remembering
     for number, (t, p) in enumerate(zip(time, pressure, strict=True)):
         kept = load(number)
         if kept is None:
             last = _interval(equilibrium, last or _start(equilibrium, time[0]), t, p, max_step_s)
             memory = equilibrium.parameters.kept()
-            store(number, attrs.evolve(last, contacts=tuple(o.kept() for o in obstacles), history=memory))
+            store(number, attrs.evolve(last, contacts=tuple(c.kept() for c in contacts), history=memory))
         else:
             last = kept
             equilibrium.model.move_obstacles(t)
             equilibrium.parameters.restore(kept.history)
-            for obstacle, contact in zip(obstacles, kept.contacts, strict=True):
-                obstacle.restore(kept.state.u, contact)
+            for contact, remembered in zip(contacts, kept.contacts, strict=True):
+                contact.restore(kept.state.u, remembered)
         states.append(last.state)
         if on_state:
             on_state(last.state)

@@ -132,9 +132,9 @@ def _lattice_layers(unit: Unit, mesh: Mesh, elements: Array, law: LatticeLaw | N
     return tuple(attrs.evolve(f, weight=f.weight * law_weight(f.law, moduli)) for f in layers)
 
 
-def self_contact_of(unit: Unit, mesh: Mesh) -> SelfContact:
-    """What keeps walls and struts of a unit's resolved mesh apart. Raises InputError."""
+def self_contact_of(unit: Unit, mesh: Mesh, friction: float = 0.0) -> SelfContact:
+    """What keeps walls and struts of a unit's resolved mesh apart, and what rubs there. Raises InputError."""
     from .self_contact import SelfContact
 
     resin_MPa = in_MPa(unit.material.membrane_modulus_kPa)
-    return SelfContact(mesh, _GAP_SHARE * unit.printed.thinnest_wall, _BARRIER_SHARE * resin_MPa)
+    return SelfContact(mesh, _GAP_SHARE * unit.printed.thinnest_wall, _BARRIER_SHARE * resin_MPa, friction)

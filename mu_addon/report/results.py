@@ -273,6 +273,7 @@ class ReportData:
     stretch: Sequence[tuple[Any, ...]] = ()  # rows of STRETCH_COLUMNS
     stretched: PaintedStates | None = None
     self_contact: Sequence[tuple[str, ...]] = ()  # rows of SELF_CONTACT_COLUMNS
+    self_friction: Mapping[str, float] | None = None  # coefficient, and lost_mJ over the protocol
     touched: PaintedStates | None = None
     effects: Sequence[str] = ()  # that measured data named and the simulation has, in words
     pressure_kPa: Floats = attrs.field(factory=lambda: np.zeros(0))  # per converged state

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mu_addon.design.parameters import load_preset
+from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
 from mu_addon.files import write_npz
 from mu_addon.meshing.settings import MeshSettings
@@ -240,6 +241,48 @@ def test_a_study_says_where_walls_and_struts_touch(tmp_path):
     pressed = max(values["contact_pressure_kPa"][k].max() for values in motion.fields.values())
     assert pressed > 0.0
     assert pressed <= float(by_pressure[-10.0]["largest_contact_pressure_kPa"]) * 1.001
+
+
+@pytest.mark.parametrize(
+    ("changed", "where"),
+    [
+        ({"self_friction": -0.1}, "self_friction"),
+        ({"self_friction": True}, "self_friction"),
+        ({"self_friction": "0.3"}, "self_friction"),
+        ({"self_friction": 0.3, "self_contact": False}, "--self-friction"),
+        ({"self_friction": 0.3, "stages": ("design", "simulate", "place"), "paths": "graph"}, "graph"),
+    ],
+)
+def test_friction_of_walls_that_cannot_rub_is_refused(changed, where):
+    mesh = MeshSettings(fidelity="resolved")
+    given = {"self_contact": True, "stages": ("design", "simulate"), **changed}
+    with pytest.raises(InputError) as refused:
+        Job(unit=load_preset("mu-1.0x"), protocol=JOB.protocol, mesh=mesh, **given)
+    assert where in str(refused.value)
+
+
+@pytest.mark.slow
+def test_walls_that_rub_dissipate_and_a_second_run_says_the_same(tmp_path):
+    unit = load_preset("mu-1.0x")
+    unit = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3, wall_mm=0.5))
+    job = Job(
+        unit=unit,
+        protocol=Protocol(np.arange(3.0), np.array([0.0, -10.0, 0.0])),
+        mesh=MeshSettings(refine=0.4, fidelity="resolved"),
+        times=3,
+        stages=("design", "simulate"),
+        self_contact=True,
+        self_friction=0.3,
+        workers=1,
+    )
+    ran(job, tmp_path)
+    assert read_job(tmp_path).self_friction == 0.3
+    first = {name: (tmp_path / name).read_bytes() for name in ("angle.csv", "self_contact.csv")}
+    lost = json.loads((tmp_path / "summary.json").read_text())["self_friction"]["lost_mJ"]
+    assert lost > 0
+    ran(job, tmp_path)
+    assert first == {name: (tmp_path / name).read_bytes() for name in first}
+    assert json.loads((tmp_path / "summary.json").read_text())["self_friction"]["lost_mJ"] == lost
 
 
 @pytest.mark.slow

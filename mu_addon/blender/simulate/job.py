@@ -85,6 +85,8 @@ def job_of(root: Any) -> Job:
             extra |= {"rules": ("volume_fraction",), "mesh_check": False}
     elif settings.detail == "resolved":
         extra |= {"mesh": MeshSettings(fidelity=RESOLVED), "self_contact": settings.self_contact}
+        if settings.self_contact:
+            extra["self_friction"] = round(settings.self_friction, 6)
     body = bodies.envelope_in(root, unit)
     if body is not None:
         require_paths_inside(unit, body, stages, settings.paths)

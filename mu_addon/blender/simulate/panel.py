@@ -40,6 +40,8 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
         layout.prop(study, "detail")
         if study.detail == "resolved":
             layout.prop(study, "self_contact")
+            if study.self_contact:
+                layout.prop(study, "self_friction")
         layout.prop(study, "protocol")
         _effects(layout, root)
         child = SIMULATION.child(root)

@@ -101,6 +101,17 @@ class MU_PG_study(bpy.types.PropertyGroup):
         description="Keep walls and struts apart where they meet under vacuum, in several times the time. "
         "Without it they may cross, and the run says from which pressure on",
     )
+    self_friction: FloatProperty(
+        name="Friction",
+        description="Coulomb friction coefficient of walls and struts on each other. Above 0 the motion is "
+        "solved in order of time, every path for itself",
+        default=0.0,
+        min=0.0,
+        max=5.0,
+        soft_max=1.0,
+        step=5,
+        precision=2,
+    )
     solver: EnumProperty(
         name="Solver",
         description="What solves the linear systems; answers agree within its tolerance",

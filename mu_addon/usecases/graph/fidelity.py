@@ -12,3 +12,10 @@ FIDELITY = setting(
     choices=tuple(FIDELITIES),
 )
 SELF_CONTACT = setting("self_contact", False, "keep walls and struts of a resolved unit apart")
+SELF_FRICTION = setting(
+    "self_friction",
+    0.0,
+    "coefficient of friction of walls and struts on each other, with self-contact",
+    low=0,
+    high=5,
+)

@@ -79,6 +79,7 @@ def _simulated(call: Call) -> Job:
         mesh=MeshSettings(order=s["order"], refine=s["refine"], fidelity=s["fidelity"]),
         times=s["times"],
         self_contact=s["self_contact"],
+        self_friction=s["self_friction"],
         lattice=lattice,
         body=design.body,
         obstacles=obstacles,

@@ -10,7 +10,7 @@ from ...design.solid import QUALITY
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
 from ...placement.inclusion import RULES
-from .fidelity import FIDELITY, SELF_CONTACT
+from .fidelity import FIDELITY, SELF_CONTACT, SELF_FRICTION
 from .loading import of_orders
 from .parts import refuse_body
 
@@ -85,6 +85,7 @@ def study_nodes() -> tuple[Definition, ...]:
                 setting("refine", 1.0, "what divides every element size", low=0.2, high=8.0),
                 FIDELITY,
                 SELF_CONTACT,
+                SELF_FRICTION,
                 setting(
                     "orientation_deg", 0.0, "direction of gravity about x", unit="deg", low=-360, high=360
                 ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, setting
-from .fidelity import FIDELITY, SELF_CONTACT
+from .fidelity import FIDELITY, SELF_CONTACT, SELF_FRICTION
 from .loading import of_orders
 from .parts import described
 
@@ -118,6 +118,7 @@ def sweep_nodes() -> tuple[Definition, ...]:
                 setting("refine", 0.5, "what divides every element size", low=0.2, high=8.0),
                 FIDELITY,
                 SELF_CONTACT,
+                SELF_FRICTION,
                 setting("minimize", "", "columns of the table to make small, for Pareto fronts"),
                 setting("maximize", "", "columns of the table to make large"),
                 setting("memory_MB", 4000, "one study takes no more", unit="MB", low=300, high=1_000_000),

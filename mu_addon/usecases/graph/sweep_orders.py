@@ -60,7 +60,8 @@ def _plan_of(call: Call) -> Plan:
     tables: dict[str, dict[str, Any]] = {
         "design": {},
         "simulate": {"times": s["times"], "mesh": mesh}
-        | ({"self_contact": True} if s["self_contact"] else {}),
+        | ({"self_contact": True} if s["self_contact"] else {})
+        | ({"self_friction": s["self_friction"]} if s["self_friction"] else {}),
         "place": {},
     }
     tables = {stage: tables[stage] for stage in STAGES[: STAGES.index(s["stages"]) + 1]}

@@ -40,6 +40,8 @@ def evaluations(
     time, pressure = trajectory.time_s, trajectory.pressure_kPa
     setting = CandidateProblem(mesh, materials, points, tuple(jobs), radius, sensor, study=job)
     friction = [o.friction for o in job.obstacles]
+    if job.self_friction:
+        friction.append(job.self_friction)
     contact = job.newton, *PRESSURE_AND_HALVINGS[job.mesh.fidelity], DEPTH_mm, friction
     names = [
         key(

@@ -19,6 +19,7 @@ _SETTINGS = (
     ("mesher", "simulate", "mesher"),
     ("times", "simulate", "times"),
     ("self-contact", "simulate", "self_contact"),
+    ("self-friction", "simulate", "self_friction"),
     ("protocol", "simulate", "protocol_sha256"),
     ("obstacles", "simulate", "obstacles_sha256"),
     ("body", "design", "body_sha256"),

@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from ...meshing.mesh import Mesh
 
 GRASP = "protocols/grasp.csv"
+MOST_FRICTION = 5.0
 LATTICE_LAW = FILES["lattice"]
 
 
@@ -55,6 +56,11 @@ def _whole(low: int, high: int, what: str) -> Any:
             raise InputError(f"{what} is {value}", field.name, f"give a whole number from {low} to {high}")
 
     return check
+
+
+def _coefficient(_: object, field: attrs.Attribute[Any], value: float) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= MOST_FRICTION:
+        raise InputError(f"a friction coefficient of {value!r}", field.name, f"give 0 to {MOST_FRICTION:g}")
 
 
 def _rules(_: object, field: attrs.Attribute[Any], value: tuple[str, ...]) -> None:
@@ -98,6 +104,8 @@ class Job:
     effects: NamedEffects = attrs.field(factory=NamedEffects)
     # Whether walls and struts of a resolved unit keep apart, at a cost of several times the time.
     self_contact: bool = attrs.field(default=False, validator=attrs.validators.instance_of(bool))
+    # Coulomb's coefficient of walls and struts that slide on each other.
+    self_friction: float = attrs.field(default=0.0, validator=_coefficient)
     # How linear systems are solved: within their tolerance it decides nothing.
     solver: SolverChoice = attrs.field(factory=SolverChoice)
     # What is run of it: the first, the first two or all.
@@ -117,6 +125,7 @@ class Job:
                 "obstacles, paths",
                 "leave one of them out",
             )
+        self._require_self_friction()
         if self.unit.wall.has_memory and "place" in self.stages and self.paths == "graph":
             raise InputError(
                 "the search of the whole lattice knows a unit whose wall remembers nothing",
@@ -156,6 +165,23 @@ class Job:
                 f"none of the {self.times} samples of the protocol has a pressure other than 0",
                 "times",
                 "give more samples, or a protocol that leaves 0 kPa",
+            )
+
+    def _require_self_friction(self) -> None:
+        """Raise InputError for a friction that nothing feels, or that the search of the lattice would."""
+        if not self.self_friction:
+            return
+        if not self.self_contact:
+            raise InputError(
+                "walls and struts that do not touch do not rub",
+                "--self-friction",
+                "give --self-contact, too, or leave it out",
+            )
+        if "place" in self.stages and self.paths == "graph":
+            raise InputError(
+                "the search of the whole lattice does not support friction",
+                "--self-friction, --paths graph",
+                "leave one of them out",
             )
 
     def _require_resolvable(self) -> None:
@@ -205,6 +231,7 @@ class Job:
             "simulate": _named("protocol", self.protocol_text())
             | {"times": self.times, "mesher": self.mesher}
             | ({"self_contact": True} if self.self_contact else {})
+            | ({"self_friction": self.self_friction} if self.self_friction else {})
             | _named("lattice", self.lattice_text())
             | _named("obstacles", self.obstacles_text())
             | ({"friction": [o.friction for o in self.obstacles]} if self.obstacles else {})
@@ -256,7 +283,7 @@ class Job:
         if self.self_contact:
             from ...fem.unit import self_contact_of
 
-            model.self_contact = self_contact_of(self.unit, mesh)
+            model.self_contact = self_contact_of(self.unit, mesh, self.self_friction)
         return model
 
     @property
@@ -271,7 +298,7 @@ class Job:
     @property
     def in_time(self) -> bool:
         """Whether motion is solved instant by instant, since contact or the wall's law remembers."""
-        return bool(self.obstacles) or self.unit.wall.has_memory
+        return bool(self.obstacles) or self.unit.wall.has_memory or bool(self.self_friction)
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; study.toml is the first."""
@@ -441,7 +468,7 @@ OF_FILES = ("friction",)
 # Keys of each stage's table besides files and inner tables.
 SETTINGS = {
     "design": ("quality",),
-    "simulate": ("times", "mesher", "orientation_deg", "self_contact"),
+    "simulate": ("times", "mesher", "orientation_deg", "self_contact", "self_friction"),
     "place": ("stations", "rules", "mesh_check", "paths"),
 }
 

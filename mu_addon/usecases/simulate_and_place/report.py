@@ -299,7 +299,9 @@ def _motion(r: ReportData) -> str:
     html = ""
     if len(r.angle_deg):
         low, high = float(r.pressure_kPa.min()), float(r.pressure_kPa.max())
-        why = "friction causes hysteresis" if r.contact else "it depends on what was before"
+        why = (
+            "friction causes hysteresis" if r.contact or r.self_friction else "it depends on what was before"
+        )
         html += figure(
             plots.angle_against_pressure(r.pressure_kPa, r.angle_deg),
             "Bending angle of the tip relative to the base, without a sensor; each dot is a converged state"
@@ -358,6 +360,12 @@ def _self_contact(r: ReportData) -> str:
     columns = ["force [N]", "least gap [mm]", "largest contact pressure [kPa]", "x [mm]", "y [mm]", "z [mm]"]
     head = [("pressure [kPa]", "n"), *((name, "n") for name in columns)]
     rows = [([signed(row[0]), *row[1:4], *map(signed, row[4:])], False) for row in r.self_contact]
+    if r.self_friction:
+        mu, lost = r.self_friction["coefficient"], r.self_friction["lost_mJ"]
+        html += (
+            f"<p>They slide on each other with a coefficient of friction of {mu:g}, which dissipates "
+            f"{lost:.3g} mJ over the protocol.</p>"
+        )
     return html + table(
         "What walls and struts press on each other with, without a sensor, how near they come, and where at "
         "rest the pressure is largest; at a single node it depends on the mesh.",

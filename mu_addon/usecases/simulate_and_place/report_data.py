@@ -122,6 +122,7 @@ def report_data(
         stretch=tuple(study.stretch),
         stretched=_painted(study, "largest_stretch", 1.0, 0.01, "stretch"),
         self_contact=tuple(study.self_contact),
+        self_friction=study.context.summary.get("self_friction"),
         touched=_painted(study, CONTACT_PRESSURE, 0.0, 1.0, "contact pressure"),
         effects=tuple(_effect_words(job.effects)),
         pressure_kPa=moved_kPa,

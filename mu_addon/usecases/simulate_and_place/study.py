@@ -351,7 +351,9 @@ class Study:
 
     def _in_time_key(self, model: Model, time: Array, pressure: Array) -> str:
         job = self.job
-        parts = [(o.depth_mm, o.stiffness, o.stick_stiffness, o.friction) for o in model.obstacles]
+        parts: list[Any] = [(o.depth_mm, o.stiffness, o.stick_stiffness, o.friction) for o in model.obstacles]
+        if job.self_friction:
+            parts.append(job.self_friction)
         return key(
             model.mesh.hash(),
             job.materials(model.mesh).hash(),
@@ -391,7 +393,7 @@ class Study:
             return None
         contacts = [
             {part.partition(" ")[2]: a for part, a in found.items() if part.startswith(f"{number} ")}
-            for number in range(len(model.obstacles))
+            for number in range(len(model.remembering))
         ]
         memory = tuple(found[f"history {n}"] for n in range(len(found)) if f"history {n}" in found)
         return Instant(float(found["time_s"]), _state(found), found.get("rate"), tuple(contacts), memory)
@@ -485,6 +487,10 @@ class Study:
                 row[2:] = [f"{touch.gap_mm:.4f}", f"{touch.pressure_kPa[node]:.4g}", *place]
             self.self_contact.append(tuple(row))
         write_csv(self.folder / "self_contact.csv", list(SELF_CONTACT_COLUMNS), self.self_contact)
+        if self.job.self_friction:
+            # Of the whole unit, as the forces are.
+            lost = 2.0 ** len(model.mesh.symmetry) * model.self_contact.lost_mJ
+            self.context.summary["self_friction"] = {"coefficient": self.job.self_friction, "lost_mJ": lost}
         return [touch.pressure_kPa for touch in found]
 
     def _write_stretch(self, states: tuple[State, ...]) -> None:

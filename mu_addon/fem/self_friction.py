@@ -1,0 +1,91 @@
+"""Coulomb friction of a body's surface on itself: slip within a step, under a bound that lags."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, Any]
+
+
+class SelfFriction:
+    """What resists pieces of a surface that slide on each other, as a term of `SelfContact`.
+
+    coefficient: Coulomb's. slip_mm, e: friction grows with the slip s since the last committed state as
+    2 s/e - (s/e)^2, up to the coefficient times the barrier's force from a slip of e on (Li et al., ACM
+    Trans. Graph. 39 (2020) 49, of displacements in place of velocities). What sticks thus gives by less than
+    e in every step, also where its load does not change. Pairs of facets, their normals and forces are those
+    of an earlier iterate, as of `Obstacle`, so that energy, force and tangent belong together.
+
+    ipctk, surface, barrier: the library, its mesh of the surface and its potential of the normal forces. All
+    places are (v, 3) in mm of the surface's v nodes, by columns, pairs ipctk's. lost_mJ: what sliding has
+    cost up to the last committed state.
+    """
+
+    def __init__(self, ipctk: Any, surface: Any, barrier: Any, coefficient: float, slip_mm: float) -> None:
+        self.coefficient = coefficient
+        self._ipctk, self._surface, self._barrier = ipctk, surface, barrier
+        self._potential = ipctk.FrictionPotential(slip_mm)
+        self.lost_mJ = 0.0
+        self.recall(np.asfortranarray(surface.rest_positions), ipctk.NormalCollisions())
+
+    def recall(self, places: Array, pairs: Any, lost_mJ: float = 0.0) -> None:
+        """Make a state the last committed one, with what sliding has cost up to it, and the lag's."""
+        self._before, self._remembered, self.lost_mJ = places, self._lagged(places, pairs), lost_mJ
+        self.lag_from_memory()
+
+    def lag_from_memory(self) -> None:
+        """Take the pairs that rub, and what presses them, from the last committed state."""
+        self._lag = self._remembered
+
+    def update_lag(self, places: Array, pairs: Any) -> None:
+        """Let the pairs that rub, and what presses them, follow to other places."""
+        self._lag = self._lagged(places, pairs)
+
+    def lag_change(self, places: Array, pairs: Any) -> float:
+        """Change of friction's forces if the lag followed to some places, over the sum of their bounds."""
+        old, new = (self._gradient(lag, places) for lag in (self._lag, self._lagged(places, pairs)))
+        change = float(np.linalg.norm(new - old, axis=1).sum())
+        if not len(pairs):
+            return float(change > 0)
+        normal = self._barrier.gradient(pairs, self._surface, places).reshape(-1, 3)
+        return change / (self.coefficient * float(np.linalg.norm(normal, axis=1).sum()))
+
+    def commit(self, places: Array, pairs: Any) -> None:
+        """Make a converged state the last committed one; friction times slip is added to `lost_mJ`."""
+        lost = float((self._gradient(self._lag, places) * (places - self._before)).sum())
+        self.recall(places, pairs, self.lost_mJ + lost)
+
+    def energy_mJ(self, places: Array) -> float:
+        """What sliding costs in this step, in mJ, as the potential has it."""
+        if not len(self._lag):
+            return 0.0
+        return float(self._potential(self._lag, self._surface, self._slip(places)))
+
+    def gradient_N(self, places: Array) -> Array:
+        """The energy's derivative by the places, (v, 3) in N."""
+        return self._gradient(self._lag, places)
+
+    def hessian(self, places: Array, method: Any) -> Any:
+        """Second derivative in N/mm, sparse (3 v, 3 v), pair by pair as ipctk's projection method has it."""
+        return self._potential.hessian(self._lag, self._surface, self._slip(places), method).tocoo()
+
+    @property
+    def rubs(self) -> bool:
+        """Whether any pair was within the gap where the lag is from."""
+        return len(self._lag) > 0
+
+    def _slip(self, places: Array) -> Array:
+        return np.asfortranarray(places - self._before)
+
+    def _lagged(self, places: Array, pairs: Any) -> Any:
+        found = self._ipctk.TangentialCollisions()
+        found.build(self._surface, places, pairs, self._barrier, self.coefficient)
+        return found
+
+    def _gradient(self, lag: Any, places: Array) -> Array:
+        if not len(lag):
+            return np.zeros_like(places)
+        gradient: Array = self._potential.gradient(lag, self._surface, self._slip(places))
+        return gradient.reshape(-1, 3)
