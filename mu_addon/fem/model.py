@@ -313,7 +313,7 @@ class Model:
 
     @property
     def has_friction(self) -> bool:
-        """Whether anything rubs, so that a state depends on those before it."""
+        """Whether anything has friction, so that a state depends on those before it."""
         return any(contact.friction for contact in self.remembering)
 
     def deepest_mm(self, u: Array) -> float:

@@ -104,7 +104,7 @@ class SelfContact:
 
     friction: Coulomb's coefficient, 0 without friction; see `SelfFriction`. A body with it has memory, as
     beside an `Obstacle` with friction: `time_stepping.simulate_in_time` solves it. On a mirror plane a body
-    and its image slide alike, and nothing rubs.
+    and its image slide alike, and nothing slides.
 
     facets (t, 3): the triangles that touch, as node numbers. Raises InputError where ipctk is missing, and
     where pieces of the surface are nearer than the gap as drawn: a third of the wall's thickness is safe.
@@ -144,10 +144,10 @@ class SelfContact:
         # Half the time of ipctk's default, and as safe: it advances by what distance and speed allow.
         self._detection = self._ipctk.AdditiveCCD()
         self._last: _Pairs | None = None
-        self._rubbing: SelfFriction | None = None
+        self._friction: SelfFriction | None = None
         if friction:
             parts = self._ipctk, self._surface, self._potential
-            self._rubbing = SelfFriction(*parts, friction, _SLIP * gap_mm)
+            self._friction = SelfFriction(*parts, friction, _SLIP * gap_mm)
 
     def _collision_mesh(self, facets: Array) -> tuple[Any, Array]:
         nodes, triangles = np.unique(facets, return_inverse=True)
@@ -221,7 +221,7 @@ class SelfContact:
     @property
     def lost_mJ(self) -> float:
         """What sliding has cost up to the last committed state, in mJ; of a half mesh its half."""
-        return 0.0 if self._rubbing is None else self._rubbing.lost_mJ
+        return 0.0 if self._friction is None else self._friction.lost_mJ
 
     def begin(self, u: Array | None = None) -> None:
         """Start friction's memory anew at displacement u (n, 3) in mm, else at rest."""
@@ -229,41 +229,41 @@ class SelfContact:
 
     def kept(self) -> dict[str, Array]:
         """Friction's memory as arrays to store, besides the displacement; empty without friction."""
-        return {} if self._rubbing is None else {"lost_mJ": np.array(self._rubbing.lost_mJ)}
+        return {} if self._friction is None else {"lost_mJ": np.array(self._friction.lost_mJ)}
 
     def restore(self, u: Array, kept: dict[str, Array]) -> None:
         """Set the memory to what it was when `kept` was stored, u (n, 3) in mm being the state then."""
-        if self._rubbing is not None:
+        if self._friction is not None:
             self._recall(u, float(kept["lost_mJ"]))
 
     def _recall(self, u: Array, lost_mJ: float) -> None:
-        if self._rubbing is not None:
+        if self._friction is not None:
             found = self._pairs(u)
-            self._rubbing.recall(found.places, found.near, lost_mJ)
+            self._friction.recall(found.places, found.near, lost_mJ)
 
     def lag_from_memory(self) -> None:
         """Take the normal forces that bound friction from the last committed state."""
-        if self._rubbing is not None:
-            self._rubbing.lag_from_memory()
+        if self._friction is not None:
+            self._friction.lag_from_memory()
 
     def lag_change(self, u: Array) -> float:
         """Change of friction's forces if the lag followed to u (n, 3) in mm, over the sum of their bounds."""
-        if self._rubbing is None:
+        if self._friction is None:
             return 0.0
         found = self._pairs(u)
-        return self._rubbing.lag_change(found.places, found.near)
+        return self._friction.lag_change(found.places, found.near)
 
     def update_lag(self, u: Array) -> None:
         """Let the normal forces that bound friction follow to displacement u (n, 3) in mm."""
-        if self._rubbing is not None:
+        if self._friction is not None:
             found = self._pairs(u)
-            self._rubbing.update_lag(found.places, found.near)
+            self._friction.update_lag(found.places, found.near)
 
     def commit(self, u: Array) -> None:
         """Make a converged state u (n, 3) in mm part of friction's memory."""
-        if self._rubbing is not None:
+        if self._friction is not None:
             found = self._pairs(u)
-            self._rubbing.commit(found.places, found.near)
+            self._friction.commit(found.places, found.near)
 
     def without_image(self) -> SelfContact:
         """The same contact of a half body without that across its mirror planes."""
@@ -275,8 +275,8 @@ class SelfContact:
         """Energy in mJ at u (n, 3) in mm; infinite where a mirror plane is crossed."""
         found = self._pairs(u)
         energy = self._potential(found.near, self._surface, found.places) if len(found.near) else 0.0
-        if self._rubbing is not None:
-            energy += self._rubbing.energy_mJ(found.places)
+        if self._friction is not None:
+            energy += self._friction.energy_mJ(found.places)
         for plane in self._planes:
             # Half of what the whole body has there, as of everything else.
             energy += 0.5 * plane.area @ self._barrier(plane.distance(self._rest + u))[0]
@@ -288,8 +288,8 @@ class SelfContact:
         u: displacements (n, 3) in mm.
         """
         forces = self._normal_forces(u)
-        if self._rubbing is not None:
-            forces += self._rubbing.gradient_N(self._places(u))
+        if self._friction is not None:
+            forces += self._friction.gradient_N(self._places(u))
         return self._nodes, forces
 
     def _normal_forces(self, u: Array) -> Array:
@@ -414,8 +414,8 @@ class SelfContact:
         parts = []
         if len(found.near):
             parts.append(self._hessian(self._potential, found.near, found.places, convex))
-        if self._rubbing is not None and self._rubbing.rubs:
-            parts.append(self._rubbing.hessian(found.places, self._projection(convex)))
+        if self._friction is not None and self._friction.has_pairs:
+            parts.append(self._friction.hessian(found.places, self._projection(convex)))
         if not parts:
             return np.empty(0, int), np.empty(0, int), np.empty(0)
         rows, columns, values = (

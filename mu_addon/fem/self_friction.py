@@ -36,11 +36,11 @@ class SelfFriction:
         self.lag_from_memory()
 
     def lag_from_memory(self) -> None:
-        """Take the pairs that rub, and what presses them, from the last committed state."""
+        """Take the pairs that slide, and what presses them, from the last committed state."""
         self._lag = self._remembered
 
     def update_lag(self, places: Array, pairs: Any) -> None:
-        """Let the pairs that rub, and what presses them, follow to other places."""
+        """Let the pairs that slide, and what presses them, follow to other places."""
         self._lag = self._lagged(places, pairs)
 
     def lag_change(self, places: Array, pairs: Any) -> float:
@@ -72,7 +72,7 @@ class SelfFriction:
         return self._potential.hessian(self._lag, self._surface, self._slip(places), method).tocoo()
 
     @property
-    def rubs(self) -> bool:
+    def has_pairs(self) -> bool:
         """Whether any pair was within the gap where the lag is from."""
         return len(self._lag) > 0
 

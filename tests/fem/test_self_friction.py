@@ -32,7 +32,7 @@ def stacked(below=4, above=5, order=1):
     return bodies.make(nodes, np.vstack([first, second + len(one)]), order, base=(lambda p: p[2] == 0,))
 
 
-def rubbing(mesh, friction=MU, material=(E, NU)):
+def with_friction(mesh, friction=MU, material=(E, NU)):
     model = Model(mesh, threads=1)
     model.self_contact = SelfContact(mesh, D, K, friction)
     return Equilibrium(model, filled(mesh, *material), SELF_CONTACT_NEWTON, explains=False)
@@ -46,16 +46,16 @@ def moved(mesh, way):
 @pytest.mark.parametrize("order", [1, 2])
 def test_force_and_tangent_are_derivatives_of_the_energy(order):
     mesh = fork(order)
-    eq = rubbing(mesh, 0.1)
+    eq = with_friction(mesh, 0.1)
     contact, random = eq.model.self_contact, np.random.default_rng(0)
     before, lagged, u = (
         lean(mesh, by) + 1e-3 * random.standard_normal(mesh.nodes.shape) for by in (0.48, 0.49, 0.49)
     )
     contact.commit(before)
     contact.update_lag(lagged)
-    _, with_friction = contact.forces(u)
+    _, total = contact.forces(u)
     _, without = SelfContact(mesh, D, K).forces(u)
-    assert np.abs(with_friction - without).max() > 0.02 * np.abs(without).max()
+    assert np.abs(total - without).max() > 0.02 * np.abs(without).max()
     assert_consistent(eq.model, eq.parameters, u, random, 1e-5)
 
 
@@ -95,7 +95,7 @@ def test_slip_too_small_to_slide_is_held_by_less():
 
 def test_what_is_pushed_by_less_than_friction_stays_and_by_more_is_lost():
     mesh = stacked(3, 4)
-    eq = rubbing(mesh, material=(E, 0.0))
+    eq = with_friction(mesh, material=(E, 0.0))
     z = mesh.nodes[:, 2]
     faces = outer_faces(mesh).nodes
     top = faces[(z[faces] > z.max() - 1e-9).all(axis=1)]
@@ -122,17 +122,17 @@ def dragged(friction, way, steps):
     Contacts of the lid (steps + 1,), energies in mJ stored in the blocks and the lid, and lost by then.
     """
     mesh = stacked(3, 4)
-    eq = rubbing(mesh, friction)
+    eq = with_friction(mesh, friction)
     model = eq.model
     lid = Obstacle(mesh, Plane((0.0, 0.0, 2.03), (0.0, 0.0, -1.0)), 0.05, 0.002, friction=3.0)
-    rubs = model.self_contact
+    sliding = model.self_contact
     model.obstacles, model.self_contact = (lid,), SelfContact(mesh, D, K)
     start = moved(mesh, (0.0, 0.0, -0.47))
     lid.begin(start)
     state = eq.settled(start, 0.0)
-    model.self_contact = rubs
+    model.self_contact = sliding
     lid.begin(state.u)
-    rubs.begin(state.u)
+    sliding.begin(state.u)
     contacts, stored, lost = [], [], []
     for share in np.linspace(0.0, 1.0, steps + 1):
         lid.pose = Pose(shift=(share * way[0], share * way[1], share * way[2]))
@@ -140,7 +140,7 @@ def dragged(friction, way, steps):
         model.commit(state.u, eq.parameters)
         contacts.append(lid.contact(state.u))
         stored.append(model.potential(state.u, 0.0, eq.parameters))
-        lost.append(rubs.lost_mJ)
+        lost.append(sliding.lost_mJ)
     return contacts, np.array(stored), np.array(lost), model
 
 
@@ -164,7 +164,7 @@ def test_a_block_drawn_over_another_costs_what_the_lid_does():
 
 
 def test_a_body_with_friction_is_solved_in_time_only():
-    eq = rubbing(fork())
+    eq = with_friction(fork())
     with pytest.raises(InputError, match="history"):
         simulate(eq, np.array([0.0, 1.0]), np.array([0.0, 1.0]))
 

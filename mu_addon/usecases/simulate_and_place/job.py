@@ -173,7 +173,7 @@ class Job:
             return
         if not self.self_contact:
             raise InputError(
-                "walls and struts that do not touch do not rub",
+                "walls and struts that may pass through each other have no friction",
                 "--self-friction",
                 "give --self-contact, too, or leave it out",
             )
