@@ -112,3 +112,17 @@ def test_a_camera_that_is_set_up_anew_in_each_session_has_a_zero_of_each():
     each = np.array([verdict.selection.chosen.values[k] for k in cause.effect.keys])
     each = each.reshape(len(zeros), -1).mean(axis=1)
     np.testing.assert_allclose(each - each.mean(), np.array(zeros) - np.mean(zeros), atol=0.05)
+
+
+@pytest.mark.slow
+def test_leaks_of_several_chambers_are_each_their_own():
+    losses = np.array([4e-3, 1e-3, 0.0, 2e-3, 0.0])
+    verdict = judged(chambers(losses))
+    assert (verdict.kind, verdict.names) == ("named", ("leak",))
+    (cause,) = verdict.selection.causes
+    assert cause.effect.among == "specimen"
+    keys = [key for key, _ in sizes_of(cause.effect)]
+    each = np.array([verdict.selection.chosen.values[k] for k in keys])
+    np.testing.assert_allclose(each, losses, rtol=0.05, atol=1e-5)
+    # Of the tight ones the interval begins at none.
+    assert [verdict.intervals[k][0] > 0.0 for k in keys] == [True, True, False, True, False]
