@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -12,7 +12,7 @@ import numpy as np
 from ..measured import Experiment
 from .effect import OF, Effect, Parameter
 from .fit import Fit, Fitter
-from .owned import BATCH_EFFECT, OF_NONE, OF_THE_BENCH
+from .owned import BATCH_EFFECT, OF_EITHER, OF_NONE, OF_THE_BENCH
 from .residuals import strict_table, structure
 from .selection import (
     FALSE_ALARM_RATE,
@@ -25,12 +25,13 @@ from .selection import (
 
 Array = np.ndarray[Any, Any]
 
-# Of fewer owners a spread is not estimated: two that differ are one and another.
-FEWEST = 3
+# Of fewer owners a spread is not estimated: two that differ are one and another. What has one sign, a leak,
+# is counted from its null, so that two of them have a size.
+FEWEST, FEWEST_OF_ONE_SIGN = 3, 2
 # Rounds of spread, values and slopes about them, and the change of the spread that ends them.
 ROUNDS, SETTLED = 4, 0.02
-# Names of drifts have a course in time besides a size, and cannot be told apart by one number an owner.
-DRIFTS = "_drift"
+# Shapes (times of a drift, inertia of a leak) that a fit begins from: those that promise most.
+SHAPES = 2
 # Rise of -2 log L that a 95 % interval of one number allows.
 RISE = 3.84
 
@@ -39,80 +40,112 @@ RISE = 3.84
 class Spread:
     """Standard deviation of values between owners, in their parameter's unit, by restricted likelihood.
 
-    low95, high95: profile interval. gain: of -2 log L over no spread at all; of it `log_det` is paid for the
-    freedom of the values. values (j,): of each owner, drawn toward their common mean by as much as the data
-    leave them uncertain.
+    Of values of one sign it is that of the normal distribution whose positive half they have, their root mean
+    square. low95, high95: profile interval. gain: of -2 log L over no spread at all; what chi squared falls
+    more than that is paid for the freedom of the values. values (j,): of each owner, the most likely ones,
+    drawn toward their common mean (of one sign: toward 0) by as much as the data leave them uncertain.
     """
 
     value: float
     low95: float
     high95: float
     gain: float
-    log_det: float
+    paid: float
     values: Array
 
 
-def spread_of(slopes: Array, residual: Array, most: float) -> Spread:
+def spread_of(slopes: Array, residual: Array, most: float, one_sign: bool = False) -> Spread:
     """The spread of j owners' values that a residual shows.
 
     slopes (n, j): of the whitened prediction by the value of each owner, orthogonal to all that is fitted
     anyway; residual (n,): whitened, with every value at 0. Values are normal about 0 with a standard
     deviation s: the residual's covariance is I + s^2 Z Z^T, and -2 log L = log det(I + s^2 G)
     - s^2 b^T (I + s^2 G)^-1 b with G = Z^T Z, b = Z^T r (Harville, J. Am. Stat. Assoc. 72 (1977) 320).
-    most: largest standard deviation that is tried.
+    most: largest standard deviation that is tried. one_sign: no value is below 0; the likelihood is that
+    above times the probability of this by the values' posterior (the product of each one's own, which is
+    exact where owners share no data) over that before, 2^-j.
     """
+    from scipy.optimize import nnls
+    from scipy.special import log_ndtr
+
     gram, along = slopes.T @ slopes, slopes.T @ residual
     weight, directions = np.linalg.eigh(gram)
     weight = np.maximum(weight, 0.0)
-    c2 = (directions.T @ along) ** 2
+    c = directions.T @ along
     tried = np.concatenate([[0.0], np.geomspace(1e-5 * most, most, 2000)])
     grown = 1.0 + tried[:, None] ** 2 * weight
-    deviance = (np.log(grown) - tried[:, None] ** 2 * c2 / grown).sum(axis=1)
+    variance = tried[:, None] ** 2 / grown
+    deviance = (np.log(grown) - variance * c**2).sum(axis=1)
+    if one_sign:
+        # Each owner's posterior: mean over standard deviation, of every spread but 0.
+        apart = (variance[1:] * c) @ directions.T / np.sqrt(variance[1:] @ (directions.T**2))
+        deviance[1:] -= 2.0 * (math.log(2.0) + log_ndtr(apart)).sum(axis=1)
     best = int(np.argmin(deviance))
     within = tried[deviance <= deviance[best] + RISE]
-    s2 = tried[best] ** 2
-    values = directions @ (s2 / (1.0 + s2 * weight) * (directions.T @ along))
-    log_det = float(np.log(grown[best]).sum())
-    ends = float(within[0]), float(within[-1])
-    return Spread(float(tried[best]), *ends, float(-deviance[best]), log_det, values)
+    values = directions @ (variance[best] * c)
+    if one_sign and tried[best] > 0.0:
+        # Least squares of the data and of the values over s, none of these below 0.
+        root = np.linalg.cholesky(gram + np.eye(len(gram)) / tried[best] ** 2)
+        values = nnls(root.T, np.linalg.solve(root, along))[0]
+    fallen = 0.0
+    if tried[best] > 0.0:
+        fallen = float(2.0 * values @ along - values @ gram @ values - (values @ values) / tried[best] ** 2)
+    gain = float(-deviance[best])
+    return Spread(float(tried[best]), float(within[0]), float(within[-1]), gain, fallen - gain, values)
+
+
+def has_one_sign(p: Parameter) -> bool:
+    """Whether a size can lie on one side of its null only, as a leak's does."""
+    return p.null in (p.low, p.high)
 
 
 def pooled_effects(effects: Sequence[Effect], experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
     """Effects whose size may be another one in each specimen, session or experiment, before any is known.
 
-    Those of one size that may have either sign. What measures differs by session, where sessions are given,
-    and by experiment; what is printed by specimen, and so does the modulus. Each has one parameter an owner.
+    What measures differs by session, where sessions are given, and by experiment; what is printed by
+    specimen, and so does the modulus; a leak and what else comes with a specimen or its mounting by specimen
+    and by experiment. The size, the first parameter, is one of each owner; the shape, all others, is shared.
     """
     kinds = tuple(dict.fromkeys(e.kind for e in experiments))
     found = []
     for effect in (*effects, attrs.evolve(BATCH_EFFECT, kinds=kinds)):
-        p = effect.parameters[0]
-        one_number = len(effect.parameters) == 1 and p.low < p.null < p.high
-        if effect.name in OF_NONE or effect.name.endswith(DRIFTS) or not one_number:
+        size, *shape = effect.parameters
+        if effect.name in OF_NONE:
             continue
+        fewest = FEWEST_OF_ONE_SIGN if has_one_sign(size) else FEWEST
         own = [e for e in experiments if e.kind in effect.kinds]
         for among, owners in _groups(effect.name, own).items():
-            if len(owners) >= FEWEST:
-                each = tuple(_own(p, f"{among} {owner}") for owner in owners)
-                found.append(attrs.evolve(effect, parameters=each, among=among))
+            if len(owners) >= fewest:
+                each = (_own(size, f"{among} {owner}") for owner in owners)
+                found.append(attrs.evolve(effect, parameters=(*each, *shape), among=among))
     return tuple(found)
+
+
+def sizes_of(effect: Effect) -> tuple[tuple[str, Parameter], ...]:
+    """Keys and parameters of the owners' own sizes, of an effect of `pooled_effects`."""
+    pairs = zip(effect.keys, effect.parameters, strict=True)
+    return tuple((key, p) for key, p in pairs if OF in p.name)
 
 
 def _groups(name: str, experiments: Sequence[Experiment]) -> dict[str, tuple[str, ...]]:
     """Names of owners by what they are: specimens, or sessions and experiments for what measures."""
-    if name not in OF_THE_BENCH:
-        named = {"specimen": [e.specimen for e in experiments]}
-    else:
-        named = {"session": [e.session for e in experiments], "experiment": [e.name for e in experiments]}
+    named = {"specimen": [e.specimen for e in experiments]}
+    if name in OF_THE_BENCH:
+        named = {"session": [e.session for e in experiments]}
+    if name in OF_THE_BENCH or name in OF_EITHER:
+        named["experiment"] = [e.name for e in experiments]
     # Where a group has some without a name, nothing says whose they are.
     whole = {k: tuple(dict.fromkeys(v)) for k, v in named.items() if all(v)}
-    if len(set(whole.values())) < len(whole):
+    if any(len(whole[k]) == len(experiments) for k in whole if k != "experiment"):
+        # Each experiment is the only one of its owner.
         whole.pop("experiment", None)
     return whole
 
 
 def _own(p: Parameter, owner: str) -> Parameter:
-    return attrs.evolve(p, name=f"{p.name}{OF}{owner}")
+    """The size of one owner; its fit begins at the least start alone, not at every owner's every start."""
+    least = sorted(p.starts, key=lambda v: abs(v - p.null))[:1]
+    return attrs.evolve(p, name=f"{p.name}{OF}{owner}", starts=tuple(least))
 
 
 def select_pooled(
@@ -140,7 +173,8 @@ def select_pooled(
         return found
     fits.sort(key=lambda one: -one[0])
     gain, best = fits[0]
-    p = min(1.0, len(effects) * 0.5 * float(chi2.sf(max(gain, 0.0), 1)))
+    shape = len(best.effects[0].keys) - len(sizes_of(best.effects[0]))
+    p = min(1.0, len(effects) * 0.5 * float(chi2.sf(max(gain, 0.0), 1 + shape)))
     if p >= FALSE_ALARM_RATE or at_a_bound(best) or not _predicts(fitter, found.base, best):
         return found
     table = tuple(strict_table(fitter, best))
@@ -149,46 +183,92 @@ def select_pooled(
     # Smooth structure may pass for slow noise; then what all owners share explains more than what differs.
     if any(single.chi2 < best.chi2 for single in found.singles):
         return found
-    rivals = tuple(f.effects[0].title for g, f in fits[1:] if gain - g < RIVAL_DELTA_CHI2)
-    cause = Cause(best.effects[0], p, found.base.chi2 - best.chi2, rivals)
+    near = [f.effects[0] for g, f in fits[1:] if gain - g < RIVAL_DELTA_CHI2]
+    # Whatever differs among specimens can do so among their experiments, and another law is the same cause.
+    rivals = dict.fromkeys(
+        e.title for e in near if e.name != best.names[0] or len(sizes_of(e)) < len(sizes_of(best.effects[0]))
+    )
+    cause = Cause(best.effects[0], p, found.base.chi2 - best.chi2, tuple(rivals))
     return attrs.evolve(found, chosen=best, causes=(cause,), table=table, doubted="", p_best=p)
 
 
 def _fitted(fitter: Fitter, base: Fit, effect: Effect) -> tuple[float, Fit] | None:
     """Gain in -2 log L and fit of an effect whose owners differ; None where the data show none."""
-    fit, spread, before = base, None, math.nan
-    start = dict.fromkeys(effect.keys, effect.parameters[0].null)
-    for _ in range(ROUNDS):
-        values = {**fit.values, **{k: fit.values.get(k, start[k]) for k in effect.keys}}
-        at = fitter.predict(values)
-        slopes = np.empty((len(at), len(effect.keys)), order="F")
-        for i, (key, p) in enumerate(zip(effect.keys, effect.parameters, strict=True)):
-            slopes[:, i] = (fitter.predict({**values, key: values[key] + p.step}) - at) / p.step
-        off = np.array([values[k] - start[k] for k in effect.keys])
-        white = fitter.project(slopes)
-        fitted_anyway = base.jacobian if fit is base else fit.jacobian[:, : -len(effect.keys)]
-        q = _directions(fitted_anyway)
-        white -= q @ (q.T @ white)
-        # As it would be with all values at 0.
-        residual = fit.residual + white @ off
-        residual = residual - q @ (q.T @ residual)
-        p = effect.parameters[0]
-        spread = spread_of(white, residual, p.high - p.null)
-        if not spread.value > 0.0:
-            return None
-        each = tuple(attrs.evolve(own, spread=spread.value) for own in effect.parameters)
+    shapes = [{**base.values, **shape} for shape in _shapes(effect)]
+    begun = [(spread, values) for values in shapes if (spread := _spread(fitter, base, effect, values))]
+    begun.sort(key=lambda one: -one[0].gain)
+    found = [one for start in begun[:SHAPES] if (one := _settled(fitter, base, effect, *start))]
+    return max(found, key=lambda one: one[0], default=None)
+
+
+def _shapes(effect: Effect) -> list[dict[str, float]]:
+    """Combinations of the starts of what owners share, by key, with every size at its null."""
+    sizes = {key: p.null for key, p in sizes_of(effect)}
+    found: list[dict[str, float]] = []
+    for start in effect.starts():
+        if (shape := {**start, **sizes}) not in found:
+            found.append(shape)
+    return found
+
+
+def _settled(
+    fitter: Fitter, base: Fit, effect: Effect, spread: Spread, values: Mapping[str, float]
+) -> tuple[float, Fit] | None:
+    """Gain and fit with the spread, the values and the shape estimated in turn, from a first spread."""
+    sizes = sizes_of(effect)
+    own = {key for key, _ in sizes}
+    fit = base
+    for round_ in range(ROUNDS):
+        each = tuple(
+            attrs.evolve(p, spread=spread.value) if key in own else p
+            for key, p in zip(effect.keys, effect.parameters, strict=True)
+        )
         effect = attrs.evolve(effect, parameters=each, spread=(spread.value, spread.low95, spread.high95))
-        guess = dict(zip(effect.keys, (spread.values + p.null).tolist(), strict=True))
-        bounded = {k: min(max(v, p.low), p.high) for k, v in guess.items()}
-        fit = fitter.best([effect], [{**fit.values, **bounded}])
+        guess = {
+            key: min(max(p.null + v, p.low), p.high)
+            for (key, p), v in zip(sizes, spread.values.tolist(), strict=True)
+        }
+        fit = fitter.best([effect], [{**values, **guess}])
         if not math.isfinite(fit.chi2):
             return None
+        values, before = fit.values, spread.value
+        again = _spread(fitter, fit, effect, values) if round_ < ROUNDS - 1 else None
+        if again is None:
+            break
+        spread = again
         if abs(spread.value - before) < SETTLED * spread.value:
             break
-        before = spread.value
-    assert spread is not None
     # What it gained as fitted: the values may be at bounds, or the slopes have changed.
-    return base.chi2 - fit.chi2 - spread.log_det, fit
+    return base.chi2 - fit.chi2 - spread.paid, fit
+
+
+def _spread(fitter: Fitter, fit: Fit, effect: Effect, values: Mapping[str, float]) -> Spread | None:
+    """The spread that is seen about values of an effect's sizes and shape; None where there is none.
+
+    fit: without the effect, or with it at these values.
+    """
+    sizes = sizes_of(effect)
+    at = fitter.possible(values)
+    if at is None:
+        return None
+    slopes = np.empty((len(at), len(sizes)), order="F")
+    for i, (key, p) in enumerate(sizes):
+        step = p.step if p.low <= values[key] + p.step <= p.high else -p.step
+        moved = fitter.possible({**values, key: values[key] + step})
+        if moved is None:
+            return None
+        slopes[:, i] = (moved - at) / step
+    own = {key for key, _ in sizes}
+    q = _directions(fit.jacobian[:, [i for i, key in enumerate(fit.keys) if key not in own]])
+    white = fitter.project(slopes)
+    white -= q @ (q.T @ white)
+    # As it would be with all values at 0.
+    residual = fit.residual + white @ np.array([values[key] - p.null for key, p in sizes])
+    residual = residual - q @ (q.T @ residual)
+    p = sizes[0][1]
+    sign = -1.0 if has_one_sign(p) and p.null == p.high else 1.0
+    found = spread_of(sign * white, residual, max(p.high - p.null, p.null - p.low), has_one_sign(p))
+    return attrs.evolve(found, values=sign * found.values) if found.value > 0.0 else None
 
 
 def _directions(columns: Array) -> Array:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from mu_addon.evidence.extended import extended_model
-from mu_addon.evidence.pooled import pooled_effects, spread_of
+from mu_addon.evidence.pooled import pooled_effects, sizes_of, spread_of
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.simulator import Composite
@@ -53,9 +53,26 @@ def test_what_is_printed_differs_by_specimen_and_what_measures_by_session():
     titles = {e.title for e in pooled_effects(model.effects, made)}
     assert "pressure_offset among sessions" in titles
     assert "pressure_offset among experiments" in titles
-    # A leak has one sign.
-    assert not any(t.startswith(("leak", "pressure_drift")) for t in titles)
-    assert not pooled_effects(model.effects, made[:4][::2])
+    # A drift has a course that all share, and a leak may come with a specimen or with how it was held.
+    assert {"pressure_drift among sessions", "leak among specimens", "leak among experiments"} <= titles
+    assert not any(t.startswith("pressure_drift among specimens") for t in titles)
+    leak = next(e for e in pooled_effects(model.effects, made) if e.title == "leak among specimens")
+    assert [k for k, _ in sizes_of(leak)] == [f"leak.loss_per_s of specimen {x}" for x in "ABC"]
+    assert leak.keys[-1] == "leak.inertia"
+    # Two have a spread only where their sizes have one sign.
+    assert {e.name for e in pooled_effects(model.effects, made[:4][::2])} == {"leak", "viscoelasticity"}
+
+
+def test_a_spread_of_one_sign_is_that_of_values_above_their_null_alone():
+    rng = np.random.default_rng(3)
+    sizes = np.abs(rng.standard_normal(60)) * 2.0
+    own = np.repeat(np.eye(60), 9, axis=0)
+    residual = own @ sizes + rng.standard_normal(len(own))
+    found = spread_of(own, residual, 20.0, one_sign=True)
+    assert found.low95 < 2.0 < found.high95
+    assert (found.values >= 0.0).all()
+    other = spread_of(own, -residual, 20.0, one_sign=True)
+    assert other.gain < 0.1 * found.gain
 
 
 def test_moduli_that_all_differ_have_a_spread_and_none_of_them_is_named_alone():
@@ -95,3 +112,17 @@ def test_a_camera_that_is_set_up_anew_in_each_session_has_a_zero_of_each():
     each = np.array([verdict.selection.chosen.values[k] for k in cause.effect.keys])
     each = each.reshape(len(zeros), -1).mean(axis=1)
     np.testing.assert_allclose(each - each.mean(), np.array(zeros) - np.mean(zeros), atol=0.05)
+
+
+@pytest.mark.slow
+def test_leaks_of_several_chambers_are_each_their_own():
+    losses = np.array([4e-3, 1e-3, 0.0, 2e-3, 0.0])
+    verdict = judged(chambers(losses))
+    assert (verdict.kind, verdict.names) == ("named", ("leak",))
+    (cause,) = verdict.selection.causes
+    assert cause.effect.among == "specimen"
+    keys = [key for key, _ in sizes_of(cause.effect)]
+    each = np.array([verdict.selection.chosen.values[k] for k in keys])
+    np.testing.assert_allclose(each, losses, rtol=0.05, atol=1e-5)
+    # Of the tight ones the interval begins at none.
+    assert [verdict.intervals[k][0] > 0.0 for k in keys] == [True, True, False, True, False]
