@@ -133,7 +133,7 @@ def _lattice_layers(unit: Unit, mesh: Mesh, elements: Array, law: LatticeLaw | N
 
 
 def self_contact_of(unit: Unit, mesh: Mesh, friction: float = 0.0) -> SelfContact:
-    """What keeps walls and struts of a unit's resolved mesh apart, with friction where they slide. Raises InputError."""
+    """What keeps walls and struts of a resolved mesh apart, with friction between them. Raises InputError."""
     from .self_contact import SelfContact
 
     resin_MPa = in_MPa(unit.material.membrane_modulus_kPa)
