@@ -12,7 +12,7 @@ import numpy as np
 from ..measured import Experiment
 from .effect import OF, Effect, Parameter
 from .fit import Fit, Fitter
-from .owned import BATCH_EFFECT, OF_EITHER, OF_NONE, OF_THE_BENCH
+from .owned import BATCH_EFFECT, OF_NONE, OF_THE_BENCH
 from .residuals import strict_table, structure
 from .selection import (
     FALSE_ALARM_RATE,
@@ -25,9 +25,10 @@ from .selection import (
 
 Array = np.ndarray[Any, Any]
 
-# Of fewer owners a spread is not estimated: two that differ are one and another. What has one sign, a leak,
-# is counted from its null, so that two of them have a size.
-FEWEST, FEWEST_OF_ONE_SIGN = 3, 2
+# Of fewer owners a spread is not estimated: two that differ are one and another.
+FEWEST = 3
+# Names of drifts: of each experiment they would be another law of the same instrument.
+DRIFTS = "_drift"
 # Rounds of spread, values and slopes about them, and the change of the spread that ends them.
 ROUNDS, SETTLED = 4, 0.02
 # Shapes (times of a drift, inertia of a leak) that a fit begins from: those that promise most.
@@ -103,8 +104,9 @@ def pooled_effects(effects: Sequence[Effect], experiments: Sequence[Experiment])
     """Effects whose size may be another one in each specimen, session or experiment, before any is known.
 
     What measures differs by session, where sessions are given, and by experiment; what is printed by
-    specimen, and so does the modulus; a leak and what else comes with a specimen or its mounting by specimen
-    and by experiment. The size, the first parameter, is one of each owner; the shape, all others, is shared.
+    specimen, and so do the modulus and a leak. The size, the first parameter, is one an owner; the shape,
+    all others, is shared. By experiment only what has a size of either sign and no shape: experiments differ
+    in what was done, too, and a leak or a drift of each would pass for another law of the same unit.
     """
     kinds = tuple(dict.fromkeys(e.kind for e in experiments))
     found = []
@@ -112,10 +114,10 @@ def pooled_effects(effects: Sequence[Effect], experiments: Sequence[Experiment])
         size, *shape = effect.parameters
         if effect.name in OF_NONE:
             continue
-        fewest = FEWEST_OF_ONE_SIGN if has_one_sign(size) else FEWEST
         own = [e for e in experiments if e.kind in effect.kinds]
         for among, owners in _groups(effect.name, own).items():
-            if len(owners) >= fewest:
+            followed = shape or has_one_sign(size) or effect.name.endswith(DRIFTS)
+            if len(owners) >= FEWEST and not (among == "experiment" and followed):
                 each = (_own(size, f"{among} {owner}") for owner in owners)
                 found.append(attrs.evolve(effect, parameters=(*each, *shape), among=among))
     return tuple(found)
@@ -132,7 +134,6 @@ def _groups(name: str, experiments: Sequence[Experiment]) -> dict[str, tuple[str
     named = {"specimen": [e.specimen for e in experiments]}
     if name in OF_THE_BENCH:
         named = {"session": [e.session for e in experiments]}
-    if name in OF_THE_BENCH or name in OF_EITHER:
         named["experiment"] = [e.name for e in experiments]
     # Where a group has some without a name, nothing says whose they are.
     whole = {k: tuple(dict.fromkeys(v)) for k, v in named.items() if all(v)}
