@@ -215,20 +215,24 @@ def test_what_a_study_writes_is_less_than_the_room_it_asks_for(placed):
     assert written < asked
 
 
-@pytest.mark.slow
-def test_a_study_says_where_walls_and_struts_touch(tmp_path):
+def of_thin_walls(**given):
+    """Three chambers whose walls touch by -10 kPa."""
     unit = load_preset("mu-1.0x")
-    unit = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3, wall_mm=0.5))
-    job = Job(
-        unit=unit,
+    return Job(
+        unit=attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3, wall_mm=0.5)),
         protocol=Protocol(np.arange(3.0), np.array([0.0, -10.0, 0.0])),
         mesh=MeshSettings(refine=0.4, fidelity="resolved"),
         times=3,
         stages=("design", "simulate"),
         self_contact=True,
         workers=1,
+        **given,
     )
-    ran(job, tmp_path)
+
+
+@pytest.mark.slow
+def test_a_study_says_where_walls_and_struts_touch(tmp_path):
+    ran(of_thin_walls(), tmp_path)
     rows = read_rows(tmp_path / "self_contact.csv")
     by_pressure = {float(row["pressure_kPa"]): row for row in rows}
     assert sorted(by_pressure) == [-10.0, 0.0]
@@ -253,7 +257,7 @@ def test_a_study_says_where_walls_and_struts_touch(tmp_path):
         ({"self_friction": 0.3, "stages": ("design", "simulate", "place"), "paths": "graph"}, "graph"),
     ],
 )
-def test_friction_of_walls_that_cannot_rub_is_refused(changed, where):
+def test_friction_of_walls_that_cannot_slide_is_refused(changed, where):
     mesh = MeshSettings(fidelity="resolved")
     given = {"self_contact": True, "stages": ("design", "simulate"), **changed}
     with pytest.raises(InputError) as refused:
@@ -262,19 +266,8 @@ def test_friction_of_walls_that_cannot_rub_is_refused(changed, where):
 
 
 @pytest.mark.slow
-def test_walls_that_rub_dissipate_and_a_second_run_says_the_same(tmp_path):
-    unit = load_preset("mu-1.0x")
-    unit = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3, wall_mm=0.5))
-    job = Job(
-        unit=unit,
-        protocol=Protocol(np.arange(3.0), np.array([0.0, -10.0, 0.0])),
-        mesh=MeshSettings(refine=0.4, fidelity="resolved"),
-        times=3,
-        stages=("design", "simulate"),
-        self_contact=True,
-        self_friction=0.3,
-        workers=1,
-    )
+def test_walls_that_slide_dissipate_and_a_second_run_says_the_same(tmp_path):
+    job = of_thin_walls(self_friction=0.3)
     ran(job, tmp_path)
     assert read_job(tmp_path).self_friction == 0.3
     first = {name: (tmp_path / name).read_bytes() for name in ("angle.csv", "self_contact.csv")}
