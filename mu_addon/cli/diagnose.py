@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_fidelity, add_measured_folder, add_report, add_self_contact, add_unit, unit_if_named
+from .options import add_fidelity, add_measured_folder, add_report, add_unit, unit_if_named
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -24,7 +24,6 @@ def add(commands: Commands[Any]) -> None:
     add_measured_folder(command)
     add_unit(command, required=False)
     add_fidelity(command)
-    add_self_contact(command)
     command.add_argument(
         "--model",
         metavar="FILE",

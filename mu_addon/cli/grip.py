@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_fidelity, add_report, add_results, add_self_contact, require_out
+from .options import add_fidelity, add_report, add_results, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -68,7 +68,6 @@ def add(commands: Commands[Any]) -> None:
         help="Mesh refinement: element sizes are divided by F (default: 0.5).",
     )
     add_fidelity(command)
-    add_self_contact(command)
     command.add_argument(
         "--coarse",
         action="store_true",

@@ -170,7 +170,7 @@ class _Friction(argparse.Action):
 
 
 def add_fidelity(command: argparse.ArgumentParser) -> None:
-    """What is simulated of a unit's lattice."""
+    """What is simulated of a unit's lattice, and whether its parts feel each other, many times over."""
     from ..meshing.settings import FIDELITIES, HOMOGENISED
 
     command.add_argument(
@@ -180,16 +180,42 @@ def add_fidelity(command: argparse.ArgumentParser) -> None:
         help="What is simulated: the printed body with its struts, or a continuum in place of the lattice "
         "(default: homogenised).",
     )
-
-
-def add_self_contact(command: argparse.ArgumentParser) -> None:
-    """Whether the parts of a resolved unit feel each other."""
     command.add_argument(
         "--self-contact",
-        action="store_true",
+        action=argparse.BooleanOptionalAction,
+        default=False,
         help="Keep walls and struts of a resolved unit apart, at several times the cost (default: they may "
         "cross, and the run says from which pressure on).",
     )
+
+
+def add_fidelity_of_study(command: argparse.ArgumentParser) -> None:
+    """What is simulated of a unit's lattice, and whether its parts feel each other, once."""
+    from ..meshing.settings import FIDELITIES
+
+    command.add_argument(
+        "--fidelity",
+        choices=FIDELITIES,
+        help="What is simulated: the printed body with its struts, or, in a fraction of the time and for a "
+        "quick look, a continuum in place of the lattice (default: resolved; homogenised with --lattice, "
+        "--rule, --mesher or --order 1, which only that has).",
+    )
+    command.add_argument(
+        "--self-contact",
+        action=argparse.BooleanOptionalAction,
+        help="Keep walls and struts of a resolved unit apart; without it they may cross, and the run says "
+        "from which pressure on (default: they are kept apart).",
+    )
+
+
+def fidelity_of(options: argparse.Namespace) -> str:
+    """The fidelity that a study's options ask for, by `--fidelity` or by what only one of them has."""
+    from ..meshing.settings import HOMOGENISED, RESOLVED
+
+    if options.fidelity is not None:
+        return str(options.fidelity)
+    only = options.lattice or options.order == 1 or options.mesher != "auto" or getattr(options, "rule", None)
+    return HOMOGENISED if only else RESOLVED
 
 
 def add_self_friction(command: argparse.ArgumentParser) -> None:
@@ -222,8 +248,7 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
         metavar="F",
         help="Mesh refinement: every element size is divided by F (default: 1).",
     )
-    add_fidelity(command)
-    add_self_contact(command)
+    add_fidelity_of_study(command)
     add_self_friction(command)
     command.add_argument(
         "--lattice",

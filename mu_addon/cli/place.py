@@ -51,8 +51,8 @@ def add(commands: Commands[Any]) -> None:
     command.add_argument(
         "--rule",
         choices=("both", "intersect", "volume_fraction"),
-        default="both",
-        help="Inclusion rule: how the sensor stiffens the elements it intersects (default: both).",
+        help="Inclusion rule of a homogenised unit: how the sensor stiffens the elements it intersects "
+        "(default: both).",
     )
     command.add_argument(
         "--workers", type=int, default=2, metavar="N", help="Number of worker processes (default: 2)."

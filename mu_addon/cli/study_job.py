@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import modelled, solver_of, unit_of
+from .options import fidelity_of, modelled, solver_of, unit_of
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -25,6 +25,7 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
     from ..homogenize.effective import read_effective
     from ..meshing.settings import MeshSettings
     from ..placement.graph import Limits
+    from ..placement.inclusion import RULES
     from ..usecases.simulate_and_place.extended_unit import require_same_print
     from ..usecases.simulate_and_place.job import Job, body_for, obstacles_for, optics_of, protocol_of
 
@@ -33,10 +34,11 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
         unit = unit_of(options)
     else:
         unit, effects = modelled(options, context)
+        mesh = MeshSettings(order=options.order, refine=options.refine, fidelity=fidelity_of(options))
         extra = {
             "effects": effects,
-            "mesh": MeshSettings(order=options.order, refine=options.refine, fidelity=options.fidelity),
-            "self_contact": options.self_contact,
+            "mesh": mesh,
+            "self_contact": mesh.resolved if options.self_contact is None else options.self_contact,
             "self_friction": options.self_friction,
             "times": options.times,
             "mesher": options.mesher,
@@ -44,7 +46,7 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
             "lattice": None if options.lattice is None else read_effective(options.lattice),
         }
     if "place" in options.stages:
-        rules = ("intersect", "volume_fraction") if options.rule == "both" else (options.rule,)
+        rules = RULES if options.rule in (None, "both") else (options.rule,)
         extra |= {
             "stations": options.stations,
             "rules": rules,

@@ -57,6 +57,18 @@ def deformation_gradient(
     return F
 
 
+@wp.func
+def cofactors(F: mat33) -> mat33:
+    """det F F^-T, of singular matrices as well."""
+    a = vec3(F[0, 0], F[0, 1], F[0, 2])
+    b = vec3(F[1, 0], F[1, 1], F[1, 2])
+    c = vec3(F[2, 0], F[2, 1], F[2, 2])
+    bc = wp.cross(b, c)
+    ca = wp.cross(c, a)
+    ab = wp.cross(a, b)
+    return mat33(bc[0], bc[1], bc[2], ca[0], ca[1], ca[2], ab[0], ab[1], ab[2])
+
+
 @wp.kernel
 def mean_dilatation(
     first: int,
@@ -77,10 +89,15 @@ def mean_dilatation(
         F = deformation_gradient(u, tets, G, e, q)
         total += dV[e, q]
         swept += dV[e, q] * wp.determinant(F)
-        cofactor = (dV[e, q] * wp.determinant(F)) * wp.transpose(wp.inverse(F))
+        cofactor = dV[e, q] * cofactors(F)
         for a in range(tets.shape[1]):
             slope[e, a] = slope[e, a] + cofactor * G[e, q, a]
-    mean_J[e] = swept / total
+    # What a waveguide takes the place of has no volume, and no mean.
+    mean_J[e] = f64(1.0)
+    if total > f64(0.0):
+        mean_J[e] = swept / total
+    else:
+        total = f64(1.0)
     for a in range(tets.shape[1]):
         slope[e, a] = slope[e, a] / total
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 Array = np.ndarray[Any, Any]
 
 LEAST_STRAIN = 1e-5
-# With mean_dilatation, a bulk modulus up to this many shear moduli still acts point by point. Without it, a
+# With mean dilatation, a bulk modulus up to this many shear moduli still acts point by point. Without it, a
 # wall one element thick bends 40 % too easily: one face grows, the other shrinks, and the mean sees neither.
 # Chosen by the tables in docs/locking.md.
 POINTWISE_BULK = 5.0
@@ -109,8 +109,9 @@ class Model:
 
     mesh: tetrahedra of order 1 or 2 in mm. supports: degrees of freedom fixed besides, (n, 3) bool. device:
     "cpu" or a CUDA device of Warp. threads: on the CPU. mean_dilatation, against volumetric locking of
-    nearly incompressible bodies: the part of each bulk modulus above POINTWISE_BULK shear moduli acts on
-    the mean J of an element; every law must then split the volume off.
+    walls and struts one element thick, and of nearly incompressible bodies: the part of each bulk modulus
+    above POINTWISE_BULK shear moduli acts on the mean J of an element. True asks it of every law, which must
+    then split the volume off; None, of the laws that do so in a resolved mesh, and of none in another.
 
     Attributes to set: load, dead forces on the nodes (n, 3) in N, or None; obstacles, rigid bodies that it
     may touch; self_contact, what keeps its own surface apart, or None. With self-contact `pattern` grows
@@ -123,12 +124,13 @@ class Model:
         supports: Array | None = None,
         device: str = "cpu",
         threads: int = 2,
-        mean_dilatation: bool = False,
+        mean_dilatation: bool | None = None,
     ) -> None:
         self.mesh = mesh
         self.device = device
         self.threads = threads
         self.mean_dilatation = mean_dilatation
+        self._takes_means = mesh.resolved if mean_dilatation is None else mean_dilatation
         # Or "two levels" (iterative.TwoLevel): for quadratic meshes whose factor does not fit into memory; up
         # to 436k unknowns a load step is faster with the factor (docs/performance.md).
         self.solver = "factorisation" if device == "cpu" else "conjugate gradients"
@@ -154,7 +156,7 @@ class Model:
         )
         self._energy = wp.empty(m, dtype=wp.float64, device=device)
         self._smallest_J = wp.empty(m, dtype=wp.float64, device=device)
-        means = m if mean_dilatation else 0
+        means = m if self._takes_means else 0
         self._mean_J = wp.empty(means, dtype=wp.float64, device=device)
         self._mean_slope = wp.empty((means, k), dtype=wp.vec3d, device=device)
         self._face_volume = wp.zeros(f, dtype=wp.float64, device=device)
@@ -250,7 +252,7 @@ class Model:
                 )
             layers.append(
                 LayerData(
-                    kernels.law_kernels(law, self.mean_dilatation),
+                    kernels.law_kernels(law, self._takes_means and law.split_volume),
                     self._put(layer.elements, int),
                     self._put(layer.parameters, wp.float64),
                     self._put(self._mean_kappa(layer), wp.float64),
@@ -273,8 +275,8 @@ class Model:
         return MaterialData(tuple(layers), float(least))
 
     def _mean_kappa(self, layer: Layer) -> Array:
-        """Bulk modulus (k,) in MPa of a layer that acts on the mean J, 0 without mean_dilatation."""
-        if not self.mean_dilatation or layer.law.bulk is None:
+        """Bulk modulus (k,) in MPa of a layer that acts on the mean J, 0 where it acts point by point."""
+        if not (self._takes_means and layer.law.split_volume) or layer.law.bulk is None:
             return np.zeros(len(layer.elements))
         mu, kappa = layer.law.small_strain(layer.parameters).T
         return np.maximum(kappa - POINTWISE_BULK * mu, 0.0)
@@ -323,7 +325,7 @@ class Model:
     def _launch_layers(self, kind: str, m: MaterialData, outputs: list[Any]) -> None:
         """Run one kind of element kernel over every layer; the first to cover an element sets its output."""
         body = [self._u, self._tets, self._gradients, self._dV]
-        if self.mean_dilatation:
+        if self._takes_means:
             inputs = [*body, self._mean_J, self._mean_slope]
             self._launch(kernels.mean_dilatation, len(self.mesh.tets), inputs)
         for layer in m.layers:

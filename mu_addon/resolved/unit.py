@@ -39,7 +39,7 @@ class Sizes:
     radius; through_wall: elements across it. Of struts rings and layers as in `strut_mesh`.
     """
 
-    meridian_mm: float = 1.5
+    meridian_mm: float = 1.0
     hoop_mm: float = 2.0
     through_wall: int = 1
     rings: int = 1

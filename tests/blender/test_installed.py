@@ -87,6 +87,8 @@ COARSE = (
     "place",
     "--preset",
     "mu-0.75x",
+    "--fidelity",
+    "homogenised",
     "--refine",
     "0.5",
     "--times",

@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PATIENCE_S = 3600.0
 RUN = ROOT / "headless" / "run.py"
 # The main job, small: coarse elements, seven instants, two processes.
-COARSE = ("--refine", "0.5", "--times", "7", "--stations", "11")
+COARSE = ("--fidelity", "homogenised", "--refine", "0.5", "--times", "7", "--stations", "11")
 
 
 def command(*arguments):

@@ -15,7 +15,7 @@ from mu_addon.usecases.graph.templates import template
 
 from .processes import ROOT, assert_clear_failure, command, run
 
-COARSE = {"order": 1, "refine": 0.4, "times": 4}
+COARSE = {"order": 1, "refine": 0.4, "times": 4, "fidelity": "homogenised"}
 
 
 def two_walls():

@@ -19,7 +19,7 @@ _PHRASES = {
     r"export --compensate( \S+\.csv)?": "Compensate, in the panel Print",
     r"with --orientation": "with Gravity, in the panel Simulate",
     r"with --obstacle": "with Use as Obstacle",
-    r"with a finer mesh, --refine": "with Detail: Full",
+    r"with a finer mesh, --refine": "with Detail: Homogenised or Printed Struts",
 }
 """What is done otherwise here than on the command line."""
 

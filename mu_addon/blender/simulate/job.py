@@ -34,7 +34,7 @@ def plan_of(root: Any) -> list[tuple[str, float]]:
     names = ["solid", "mesh", "Model A"]
     if settings.command == "place":
         names += ["candidates"]
-        names += ["mesh check"] if settings.detail == "full" else []
+        names += ["mesh check"] if settings.detail != "quick" else []
         names += ["map", "light"]
         if settings.paths == "graph":
             names += [name for name in FULL_S if "path" in name]

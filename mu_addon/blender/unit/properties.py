@@ -82,11 +82,17 @@ class MU_PG_study(bpy.types.PropertyGroup):
         name="Detail",
         description="What is simulated, how fine its mesh is, and of which order its elements",
         items=[
-            ("full", "Full", "A continuum in place of the lattice, quadratic elements on the default mesh"),
             (
                 "resolved",
                 "Printed Struts",
-                "The printed body strut by strut; paths are ranked by the waveguide itself. Some minutes",
+                "The printed body strut by strut; paths are ranked by the waveguide itself. Minutes for the "
+                "motion, longer for the paths",
+            ),
+            (
+                "full",
+                "Homogenised",
+                "A continuum in place of the lattice, which knows no struts that buckle and no walls that "
+                "meet: a minute or two",
             ),
             (
                 "quick",
@@ -94,10 +100,11 @@ class MU_PG_study(bpy.types.PropertyGroup):
                 "Linear elements on a coarser mesh: they lock in thin walls, for a look only",
             ),
         ],
-        default="full",
+        default="resolved",
     )
     self_contact: BoolProperty(
         name="Self-Contact",
+        default=True,
         description="Keep walls and struts apart where they meet under vacuum, in several times the time. "
         "Without it they may cross, and the run says from which pressure on",
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 from ...errors import InputError
 from ...graph.definition import FOLDER, Call, Definition, Input, Output, Outputs, setting
 from ...measured import read_folder
-from .fidelity import FIDELITY, SELF_CONTACT
+from .fidelity import QUICK_FIDELITY, QUICK_SELF_CONTACT
 from .loading import of_orders
 
 DATA, NUMBERS = "Data", "Number"
@@ -74,7 +74,7 @@ def evidence_nodes() -> tuple[Definition, ...]:
                 Output("diagnosis", "diagnosis", "the verdict"),
                 Output("model", "model", "the extended model, for a node Simulate"),
             ),
-            (FIDELITY, SELF_CONTACT),
+            (QUICK_FIDELITY, QUICK_SELF_CONTACT),
             order=of_orders("diagnose_order"),
             read=lambda call, done: {"diagnosis": done, "model": done.folder / "model.toml"},
             muting="neither this nor what needs it is computed",

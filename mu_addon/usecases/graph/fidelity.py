@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from ...graph.definition import setting
-from ...meshing.settings import FIDELITIES, HOMOGENISED
+from ...meshing.settings import FIDELITIES, HOMOGENISED, RESOLVED
 
-FIDELITY = setting(
-    "fidelity",
-    HOMOGENISED,
-    "the printed body with its struts, or a continuum in place of the lattice",
-    choices=tuple(FIDELITIES),
-)
-SELF_CONTACT = setting("self_contact", False, "keep walls and struts of a resolved unit apart")
+_WHAT = "the printed body with its struts, or a continuum in place of the lattice"
+_APART = "keep walls and struts of a resolved unit apart"
+FIDELITY = setting("fidelity", RESOLVED, _WHAT, choices=tuple(FIDELITIES))
+SELF_CONTACT = setting("self_contact", True, _APART)
+# Of nodes that solve a unit tens of times, or in time.
+QUICK_FIDELITY = setting("fidelity", HOMOGENISED, _WHAT, choices=tuple(FIDELITIES))
+QUICK_SELF_CONTACT = setting("self_contact", False, _APART)
 SELF_FRICTION = setting(
     "self_friction",
     0.0,

@@ -73,12 +73,13 @@ def _simulated(call: Call) -> Job:
             require_same_print(unit, lattice, model)
     obstacles = tuple(body for _, body in call.inputs["obstacles"])
     require_beside(obstacles, unit.dimensions, design.body)
+    mesh = MeshSettings(order=s["order"], refine=s["refine"], fidelity=s["fidelity"])
     return Job(
         unit=unit,
         protocol=protocol_of(s["protocol"] or None),
-        mesh=MeshSettings(order=s["order"], refine=s["refine"], fidelity=s["fidelity"]),
+        mesh=mesh,
         times=s["times"],
-        self_contact=s["self_contact"],
+        self_contact=mesh.resolved and s["self_contact"],
         self_friction=s["self_friction"],
         lattice=lattice,
         body=design.body,

@@ -10,7 +10,7 @@ from ...design.solid import QUALITY
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
 from ...placement.inclusion import RULES
-from .fidelity import FIDELITY, SELF_CONTACT, SELF_FRICTION
+from .fidelity import FIDELITY, QUICK_FIDELITY, QUICK_SELF_CONTACT, SELF_CONTACT, SELF_FRICTION
 from .loading import of_orders
 from .parts import refuse_body
 
@@ -254,8 +254,8 @@ def study_nodes() -> tuple[Definition, ...]:
                 setting("friction", 0.5, "coefficient of friction", low=0, high=5),
                 setting("coarse", False, "a coarser mesh, longer time steps, one inclusion rule"),
                 setting("rank_paths", True, "rank the paths of a finger's sensor"),
-                FIDELITY,
-                SELF_CONTACT,
+                QUICK_FIDELITY,
+                QUICK_SELF_CONTACT,
             ),
             order=of_orders("grip_order"),
             read=lambda call, done: {"grasp": done},

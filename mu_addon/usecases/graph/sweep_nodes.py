@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, setting
-from .fidelity import FIDELITY, SELF_CONTACT, SELF_FRICTION
+from .fidelity import QUICK_FIDELITY, QUICK_SELF_CONTACT, SELF_FRICTION
 from .loading import of_orders
 from .parts import described
 
@@ -116,8 +116,8 @@ def sweep_nodes() -> tuple[Definition, ...]:
                 setting("times", 7, "time samples of the protocol", low=2, high=1001),
                 setting("order", 2, "order of the elements: 1 for a look only", low=1, high=2),
                 setting("refine", 0.5, "what divides every element size", low=0.2, high=8.0),
-                FIDELITY,
-                SELF_CONTACT,
+                QUICK_FIDELITY,
+                QUICK_SELF_CONTACT,
                 SELF_FRICTION,
                 setting("minimize", "", "columns of the table to make small, for Pareto fronts"),
                 setting("maximize", "", "columns of the table to make large"),

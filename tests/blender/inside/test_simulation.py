@@ -203,14 +203,14 @@ def test_a_quick_look_from_start_to_stale(tmp_path):
 def test_printed_struts_are_the_resolved_model_and_may_keep_apart():
     root = add()
     study = root.mu_unit.study
-    study.command, study.self_contact = "simulate", True
-    assert job_of(root).mesh.fidelity == "homogenised"
-    assert not job_of(root).self_contact, "it is of printed struts alone"
-    study.detail = "resolved"
+    study.command = "simulate"
     assert job_of(root).mesh.fidelity == "resolved"
     assert job_of(root).self_contact
     study.self_contact = False
     assert not job_of(root).self_contact
+    study.detail, study.self_contact = "full", True
+    assert job_of(root).mesh.fidelity == "homogenised"
+    assert not job_of(root).self_contact, "it is of printed struts alone"
 
 
 @pytest.mark.slow
