@@ -62,7 +62,10 @@ def fed(data: bytes, size: int = 64) -> tuple[Decoder, list[Samples]]:
 
 def test_a_damaged_label_among_three_first_lines_is_waited_upon():
     """One of the first three names other channels: with more lines it is seen to be the odd one."""
-    lines = [b"seq:0,lght:1000,dqpk:0\n", *(b"seq:%d,light:%d,dark:%d\n" % (k, k, 7 * k) for k in range(1, 60))]
+    lines = [
+        b"seq:0,lght:1000,dqpk:0\n",
+        *(b"seq:%d,light:%d,dark:%d\n" % (k, k, 7 * k) for k in range(1, 60)),
+    ]
     decoder, groups = fed(b"\n" + b"".join(lines), 4)
     kept = [group for group in groups if {"light", "dark"} <= set(group.layout.channels)]
     assert [number for group in kept for number in group.sequence.tolist()] == list(range(1, 60))
