@@ -61,7 +61,8 @@ FILES = {
 def write_report(study: Study, stopped: str = "") -> None:
     """Write report.html (and unit.png); `stopped` says why a study that is not complete stopped.
 
-    Pictures take most of the time: a run that was asked to stop leaves them out. A report that tells of more stages than were run now, from the same inputs, is left as it is.
+    Pictures take most of the time: a run that was asked to stop leaves them out. A report that tells of more
+    stages than were run now, from the same inputs, is left as it is.
     """
     from .report import write_html
 
