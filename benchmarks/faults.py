@@ -5,6 +5,7 @@
     python benchmarks/faults.py --every 4 calls # a quarter of the calls that can fail
     python benchmarks/faults.py --every 4 --first 2 blocks # the second quarter of blocks of memory
     python benchmarks/faults.py --seed 7 kills  # at other moments
+    python benchmarks/faults.py --small kills   # to three chambers at two pressures
 
 The study is the main job on a coarse mesh. Whatever is done to it, the same command must then find the same
 deviations, to the last digit, as a run that nothing happened to.
@@ -45,23 +46,28 @@ from mu_addon.usecases.simulate_and_place.run import run_stages  # noqa: E402
 from mu_addon.usecases.simulate_and_place.study import Study  # noqa: E402
 from tests.run.failing_files import failing  # noqa: E402
 from tests.run.failing_memory import short_of_memory  # noqa: E402
-from tests.usecases.fault_injection import PARTIAL, inject_each, placement  # noqa: E402
+from tests.usecases.fault_injection import PARTIAL, PLACEMENT, inject_each, placement  # noqa: E402
 
-JOB = Job(
-    load_preset("mu-1.0x"),
-    grasp(),
-    mesh=MeshSettings(refine=0.4, order=1),
-    times=7,
-    stations=11,
-    rules=("volume_fraction",),
-    mesh_check=False,
-)
+JOBS = {
+    False: Job(
+        load_preset("mu-1.0x"),
+        grasp(),
+        mesh=MeshSettings(refine=0.4, order=1),
+        times=7,
+        stations=11,
+        rules=("volume_fraction",),
+        mesh_check=False,
+    ),
+    # Two states of three chambers, for a busy machine.
+    True: PLACEMENT,
+}
+JOB = [JOBS[False]]
 SEED = [20]
 """Of what is drawn: moments, places, bytes."""
 
 
 def new(folder):
-    keep_inputs(folder, JOB.texts())
+    keep_inputs(folder, JOB[0].texts())
     return folder
 
 
@@ -203,7 +209,7 @@ def forked(folder):
     status = 70
     try:
         with run_to_end(Progress()) as context:
-            run_stages(Study.open(attrs.evolve(JOB, workers=1), folder, context))
+            run_stages(Study.open(attrs.evolve(JOB[0], workers=1), folder, context))
         status = context.status
     finally:
         os._exit(status)
@@ -442,6 +448,7 @@ FAULTS = {
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("faults", nargs="*", choices=[*FAULTS, []], help=", ".join(FAULTS))
+    parser.add_argument("--small", action="store_true", help="the study has three chambers and two pressures")
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--crashes", type=int, default=12)
     parser.add_argument("--disks", type=int, default=10)
@@ -452,7 +459,7 @@ def main():
     parser.add_argument("--first", type=int, default=1, help="the first call or block that fails")
     parser.add_argument("--reference", type=Path, help="a folder of this study, finished, to compare with")
     given = parser.parse_args()
-    SEED[0] = given.seed
+    SEED[0], JOB[0] = given.seed, JOBS[given.small]
     places = given.every, given.first
     counts = {"kills": (given.kills,), "crashes": (given.crashes,), "full_disks": (given.disks,)}
     counts |= {"calls": places, "blocks": places}

@@ -97,7 +97,9 @@ def stl_surface(content: bytes) -> tuple[Vertices, Triangles]:
     if len(content) != 84 + count * _STL.itemsize:
         raise InputError("the binary STL is truncated or malformed", "STL", "write the file again")
     corners = np.frombuffer(content, _STL, offset=84)["corners"].reshape(-1, 3)
-    vertices, index = _unique_rows(corners.astype(float))
+    # A damaged number may be a NaN that warns whoever converts it.
+    with np.errstate(invalid="ignore"):
+        vertices, index = _unique_rows(corners.astype(float))
     return vertices, index.reshape(-1, 3)
 
 

@@ -56,8 +56,9 @@ class RunContext:
     """What a run leaves: its exit status, and the `summary` that its body fills and its folder keeps.
 
     report: writes the report of what was found so far; its argument says why the run stops early, and is
-    empty where it does not. wants_report: whether it is written. console_summary: the lines that end the run
-    at a terminal, of its summary.
+    empty where it does not. wants_report: whether it is written. hurried: whether who asked the run to stop
+    waits for its end, and so for its report. console_summary: the lines that end the run at a terminal, of
+    its summary.
     """
 
     progress: Progress
@@ -66,6 +67,7 @@ class RunContext:
     status: int = DONE
     report: Callable[[str], None] | None = None
     wants_report: bool = True
+    hurried: bool = False
     console_summary: Callable[[dict[str, Any]], list[str]] = lambda summary: []
     _lock: FolderLock | None = None
 
@@ -240,8 +242,9 @@ def _stop(context: RunContext, error: MuError) -> None:
     with suppress(MuError):
         _write_summary(context, partial)
     if context.report is not None:
+        context.hurried = isinstance(error, (_Interrupted, _Terminated))
         if isinstance(error, _Interrupted) and context.wants_report:
-            # Some seconds go by before the last word.
+            # A second or more goes by before the last word.
             with suppress(MuError):
                 context.progress.warning(
                     "stopping: a report of what was found so far is written first",

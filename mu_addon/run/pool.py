@@ -11,7 +11,7 @@ from contextlib import closing, contextmanager
 from typing import Any, TypeVar
 
 from ..errors import MuError
-from .processes import ctrl_c_ignored, end_with_parent, one_thread_each
+from .processes import ctrl_c_held_back, end_with_parent, one_thread_each
 
 Task = TypeVar("Task")
 Found = TypeVar("Found")
@@ -41,7 +41,7 @@ class Pool:
             if self._pool is None:
                 context = multiprocessing.get_context("spawn")
                 self._pool = ProcessPoolExecutor(self.workers, context, _start, self._begin)
-            with ctrl_c_ignored(), self._errors():
+            with ctrl_c_held_back(), self._errors():
                 return self._pool.submit(work, *arguments)
 
     def result(self, future: Future[Found]) -> Found:

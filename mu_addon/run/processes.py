@@ -69,16 +69,31 @@ def one_thread_each() -> Iterator[None]:
 
 
 @contextmanager
-def ctrl_c_ignored() -> Iterator[None]:
-    """Children born inside inherit this: Ctrl-C reaches a terminal's every process, and one decides."""
+def ctrl_c_held_back() -> Iterator[None]:
+    """Ctrl-C waits until the body is done. Children born inside never get it: one process decides for all.
+
+    In a terminal it reaches every process. Ignored instead, one that came inside would be lost.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    came: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
+    # Children inherit what is blocked, not a handler. Python unblocks SIGINT when it starts its tracker of
+    # shared resources, which therefore has to be there before.
+    if hasattr(signal, "pthread_sigmask"):
+        from multiprocessing import resource_tracker
+
+        resource_tracker.ensure_running()
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
+        if hasattr(signal, "pthread_sigmask"):
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         signal.signal(signal.SIGINT, before if before is not None else signal.SIG_DFL)
+        if came:
+            signal.raise_signal(signal.SIGINT)
 
 
 def limit_memory(megabytes: int) -> None:

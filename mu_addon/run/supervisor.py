@@ -53,8 +53,10 @@ def supervised(
         return _alone(work, ends_with_input)
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
-    ends = *os.pipe(), *os.pipe()
-    alive, keep_alive, status_read, status_write = ends
+    # Linux closes what a process that ends has open from the highest number down. The group has to be told
+    # before the worker is gone, through which it is told.
+    ends = *os.pipe(), *os.pipe(), *os.pipe()
+    alive, keep_alive, group_alive, keep_group, status_read, status_write = ends
     passed_on = {getattr(signal, name) for name in _PASSED_ON}
     # Until each of the two has its own handlers, none of them may come.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, passed_on)
@@ -66,13 +68,13 @@ def supervised(
             os.close(end)
         return _alone(work, ends_with_input)
     if not worker:
-        os.close(keep_alive)
-        os.close(status_read)
-        _become_worker(alive, status_write)
+        for end in (keep_group, keep_alive, status_read):
+            os.close(end)
+        _become_worker(group_alive, alive, status_write)
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         return _report_status(work, status_write)
-    os.close(alive)
-    os.close(status_write)
+    for end in (group_alive, alive, status_write):
+        os.close(end)
     before = _pass_on_signals(worker)
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     if ends_with_input:
@@ -86,8 +88,8 @@ def supervised(
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        os.close(keep_alive)
-        os.close(status_read)
+        for end in (keep_group, keep_alive, status_read):
+            os.close(end)
 
 
 def _alone(work: Callable[[], int], ends_with_input: bool) -> int:
@@ -122,12 +124,12 @@ def _outcome(report: bytes, ended: int, usage: Any, tell: Callable[[Crash], obje
     return CRASHED
 
 
-def _become_worker(alive: int, status_write: int) -> None:
+def _become_worker(group_alive: int, alive: int, status_write: int) -> None:
     # A group of its own: what a terminal sends comes once, from who watches.
     os.setpgid(0, 0)
     # A terminal may stop whoever writes from another group than its own.
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
-    _end_with(alive)
+    _end_with(group_alive, alive)
     _stack_to[:] = [status_write]
     write_stack_at_crash()
 
@@ -145,17 +147,28 @@ def write_stack_at_crash() -> None:
             faulthandler.enable(descriptor, all_threads=True)
 
 
-def _end_with(alive: int) -> None:
-    """Kill this process once the other end of a pipe is closed, as it is when its holder ends."""
+def _end_with(group_alive: int, alive: int) -> None:
+    """Kill this process once the other end of a pipe is closed, as it is when its holder ends.
+
+    Processes of its own, its group, are ended with it: one that it was just starting would otherwise find
+    half of what it should do, and show a stack of Python's. They get SIGTERM, which the process that removes
+    shared resources after the others' end ignores.
+    """
     threading.Thread(target=_wait_for_end, args=(alive,), daemon=True).start()
     if sys.platform == "linux":
-        import fcntl
-
         # The thread waits for the interpreter, which a library may hold for minutes; the kernel does not.
         with suppress(OSError):
-            fcntl.fcntl(alive, fcntl.F_SETOWN, os.getpid())
-            fcntl.fcntl(alive, fcntl.F_SETSIG, signal.SIGKILL)
-            fcntl.fcntl(alive, fcntl.F_SETFL, fcntl.fcntl(alive, fcntl.F_GETFL) | os.O_ASYNC)
+            _signal_at_end(group_alive, -os.getpgrp(), signal.SIGTERM)
+            _signal_at_end(alive, os.getpid(), signal.SIGKILL)
+
+
+def _signal_at_end(pipe: int, to: int, number: int) -> None:
+    """Have the kernel send a signal to a process, or to a group by its negative, when a pipe's end closes."""
+    import fcntl
+
+    fcntl.fcntl(pipe, fcntl.F_SETOWN, to)
+    fcntl.fcntl(pipe, fcntl.F_SETSIG, number)
+    fcntl.fcntl(pipe, fcntl.F_SETFL, fcntl.fcntl(pipe, fcntl.F_GETFL) | os.O_ASYNC)
 
 
 def _wait_for_end(alive: int) -> None:

@@ -7,15 +7,13 @@ from collections.abc import Iterable, Sequence
 
 import attrs
 
-from .formats import ENOUGH
+from .formats import ENOUGH, SURE
 from .lines import CLOCKS, NUMBERS, Pairs
 from .samples import Layout
 
 # A name that is new must come this often within so many lines; more, if its line lacks nothing else.
 _NEW_WITHIN, _MORE_WITHIN = 12, 64
 _MOST_NEW = 1000
-# Of so many lines a name that most of them lack is a rare one; of fewer it may be the right one.
-_SURE = 8
 
 
 def channels_of(found: Iterable[object]) -> list[str]:
@@ -37,7 +35,7 @@ class ChannelNames:
     def is_unsure(self, lines: Sequence[Pairs]) -> bool:
         """Whether first lines are too few, and agree too little, to tell a damaged name from a right one."""
         names = Counter(name for line in lines for name in channels_of(line))
-        return len(lines) < _SURE and any(2 * times < max(names.values()) for times in names.values())
+        return len(lines) < SURE and any(2 * times <= max(names.values()) for times in names.values())
 
     def learn(self, lines: Sequence[Pairs], layout: Layout | None) -> Layout | None:
         """The layout that most lines agree on, lest a damaged one that comes first should set it.

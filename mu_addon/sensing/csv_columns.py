@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from .formats import ENOUGH
+from .formats import ENOUGH, SURE
 from .lines import Pairs, header_of, pairs_of_row, row_of
 
 
@@ -27,6 +27,12 @@ class CsvColumns:
         self._width, self._other_widths = 0, [0, 0]
         if rows:
             self._width = Counter(map(len, rows)).most_common(1)[0][0]
+
+    @staticmethod
+    def is_unsure(rows: Sequence[Sequence[float]]) -> bool:
+        """Whether first rows are too few, and agree too little, to tell how many columns there are."""
+        commonest = max(Counter(map(len, rows)).values(), default=0)
+        return len(rows) < SURE and 4 * commonest < 3 * len(rows)
 
     def take(self, line: str, piece: bytes, first: bool) -> Pairs | None:
         """Values by column of a line that is a row, nothing of a header, or None of one that is neither.

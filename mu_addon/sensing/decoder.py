@@ -161,7 +161,7 @@ class Decoder:
         if found is None:
             return
         new = self.layout is None or found != self._last_format
-        if new and enough == ENOUGH and self._names.is_unsure(self._named_lines(found)):
+        if new and enough == ENOUGH and self._is_unsure(found):
             return
         if found != self._last_format:
             self._flush_pending()
@@ -171,6 +171,12 @@ class Decoder:
         self.format = self._last_format = found
         self._learn(found)
 
+    def _is_unsure(self, found: str) -> bool:
+        """Whether the buffer's lines disagree on their channels and are few: what comes next will tell."""
+        if found == "csv":
+            return self._csv.is_unsure(self._rows())
+        return self._names.is_unsure(self._named_lines(found))
+
     def _learn(self, found: str) -> None:
         """What most of the latest lines agree on."""
         self._csv.learn([])
@@ -178,7 +184,7 @@ class Decoder:
         if found not in TEXT_READERS:
             return
         if found == "csv":
-            self._csv.learn([row for row in self._read_lines(found) if isinstance(row, list)])
+            self._csv.learn(self._rows())
         else:
             self.layout = self._names.learn(self._named_lines(found), self.layout)
 
@@ -186,6 +192,10 @@ class Decoder:
         """What the buffer's lines hold in a format of text."""
         lines = whole_lines(bytes(self._buffer), not self._first)
         return [values for line in lines if line and (values := TEXT_READERS[format_](line))]
+
+    def _rows(self) -> list[list[float]]:
+        """The buffer's rows of numbers."""
+        return [row for row in self._read_lines("csv") if isinstance(row, list)]
 
     def _named_lines(self, format_: str) -> list[Pairs]:
         """The buffer's lines of values by name; none in a format without names."""

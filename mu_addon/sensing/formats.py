@@ -10,6 +10,8 @@ from .lines import Pairs, json_of, pairs_of, row_of
 
 ENOUGH = 3
 """So many pieces or names make a format, a header or a channel believed."""
+SURE = 8
+"""Of so many first lines what most of them lack is rare or damaged; of fewer it may be what is right."""
 # The format is told by the latest lines: what a device says while it starts is soon past.
 _LATEST_LINES = 20
 

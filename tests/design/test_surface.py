@@ -81,3 +81,14 @@ def test_weld_order_does_not_depend_on_the_input_order():
         surface.weld(CORNERS, FACES, 1e-4), surface.weld(CORNERS[shuffle], renumbered, 1e-4), strict=True
     ):
         assert np.array_equal(one, other)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_signalling_nan_in_a_damaged_stl_is_read_without_a_warning():
+    """Whoever reads the file refuses it in words of its own."""
+    triangle = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    content = bytearray(surface.stl_bytes(triangle, np.array([[0, 1, 2]])))
+    content[84 + 12 : 84 + 16] = (0x7FA00000).to_bytes(4, "little")
+    vertices, triangles = surface.stl_surface(bytes(content))
+    assert np.isnan(vertices).sum() == 1
+    assert triangles.shape == (1, 3)

@@ -31,7 +31,7 @@ with run_to_end(progress) as ending:
         if how == "patience":
             print("saving", flush=True)
             time.sleep(60)
-        write_text(folder / "last_words.txt", stopped)
+        write_text(folder / "last_words.txt", f"{stopped}, hurried: {ending.hurried}")
 
     ending.report = last_words
     if how != "early":
@@ -96,7 +96,7 @@ def test_a_known_failure(tmp_path):
     assert summary["angle_deg"] == [1.0, 2.0]
     assert log[-1]["type"] == "error"
     assert (tmp_path / "mesh.txt").read_text() == "kept"
-    assert (tmp_path / "last_words.txt").read_text() == "no equilibrium"
+    assert (tmp_path / "last_words.txt").read_text() == "no equilibrium, hurried: False"
 
 
 def test_a_fault_of_ours(tmp_path):
@@ -150,6 +150,8 @@ def test_stopped_from_outside(tmp_path, number, status):
     assert summary["status"] == "partial"
     assert log[-1]["status"] == status
     assert (tmp_path / "mesh.txt").read_text() == "kept"
+    # Who asked for the end waits for it.
+    assert (tmp_path / "last_words.txt").read_text().endswith("hurried: True")
 
 
 def test_a_full_disk_that_a_library_meets():

@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from mu_addon.run.processes import ctrl_c_ignored
+from mu_addon.run.processes import ctrl_c_held_back
 
 WORK = "import sys, time; print('ready', flush=True); time.sleep(3600)"
 
@@ -23,7 +23,7 @@ def child():
 def test_a_child_born_inside_outlives_ctrl_c_and_one_born_outside_does_not():
     # A shell's background jobs are born deaf to Ctrl-C, and so would be their children.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    with ctrl_c_ignored():
+    with ctrl_c_held_back():
         inside = child()
     outside = child()
     try:
@@ -41,16 +41,28 @@ def test_a_child_born_inside_outlives_ctrl_c_and_one_born_outside_does_not():
 
 def test_the_parent_s_own_handler_is_back_afterwards():
     before = signal.getsignal(signal.SIGINT)
-    with ctrl_c_ignored():
-        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    with ctrl_c_held_back():
+        assert signal.getsignal(signal.SIGINT) is not before
     assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for one process")
+def test_ctrl_c_inside_is_not_lost_but_comes_afterwards():
+    came, before = [], signal.signal(signal.SIGINT, lambda number, frame: came.append("now"))
+    try:
+        with ctrl_c_held_back():
+            os.kill(os.getpid(), signal.SIGINT)
+            came.append("inside")
+        assert came == ["inside", "now"]
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_a_thread_that_may_not_set_signals_goes_on_without():
     done = []
 
     def work():
-        with ctrl_c_ignored():
+        with ctrl_c_held_back():
             done.append(True)
 
     thread = threading.Thread(target=work)

@@ -46,6 +46,12 @@ def work():
         from mu_addon.meshing.lattice import gmsh_model
         with gmsh_model(gmsh):
             ctypes.string_at(0)
+    if how == "starts another":
+        import subprocess
+
+        words = "import sys; print('born', flush=True); sys.stdin.read(); raise EOFError"
+        half = subprocess.Popen([sys.executable, "-c", words], stdin=subprocess.PIPE)
+        time.sleep(3600)
     if how == "ends itself":
         # As a library does: nothing of Python's runs any more.
         ctypes.CDLL(None)._exit(3)
@@ -173,6 +179,16 @@ def test_the_worker_ends_with_who_watches(how):
     process.kill()
     process.communicate(timeout=PATIENCE_S)
     wait_until_gone(worker)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the kernel ends a group with a pipe on Linux only")
+def test_a_process_that_the_worker_was_starting_shows_no_stack_after_a_kill():
+    """It waits for words that end half way when its parent is gone."""
+    process, _ = start("starts another")
+    assert process.stdout.readline() == "born\n"
+    process.kill()
+    _, errors = process.communicate(timeout=PATIENCE_S)
+    assert errors == ""
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc tells how a process is")

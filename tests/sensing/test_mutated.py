@@ -60,6 +60,28 @@ def fed(data: bytes, size: int = 64) -> tuple[Decoder, list[Samples]]:
     return decoder, groups
 
 
+def test_a_damaged_label_among_three_first_lines_is_waited_upon():
+    """One of the first three names other channels: with more lines it is seen to be the odd one."""
+    lines = [
+        b"seq:0,lght:1000,dqpk:0\n",
+        *(b"seq:%d,light:%d,dark:%d\n" % (k, k, 7 * k) for k in range(1, 60)),
+    ]
+    decoder, groups = fed(b"\n" + b"".join(lines), 4)
+    kept = [group for group in groups if {"light", "dark"} <= set(group.layout.channels)]
+    assert [number for group in kept for number in group.sequence.tolist()] == list(range(1, 60))
+    assert decoder.counters.malformed == 1
+
+
+def test_first_rows_of_two_widths_do_not_hold_back_the_right_ones():
+    """Two of the first four rows are joined with another: which width is right the next rows tell."""
+    rows = [b"%d,%d\n" % (1000 + k, 7 * k) for k in range(60)]
+    damaged = [b"\n", rows[0], b"1001,71002,14\n", b"1003,211004,28\n", *rows[5:]]
+    decoder, groups = fed(b"".join(damaged), 4)
+    kept = [light for group in groups for light in group.values[:, 0].tolist()]
+    assert kept == [1000.0, *(1000.0 + k for k in range(5, 60))]
+    assert decoder.counters.malformed == 2
+
+
 def column(groups: list[Samples], name: str) -> np.ndarray:
     return np.concatenate([g.values[:, g.layout.channels.index(name)] for g in groups])
 

@@ -38,7 +38,8 @@ def write_report(run: Running, stopped: str = "") -> None:
     if not run.states:
         return
     with run.progress.stage("report", expected_s=10.0):
-        pictures = charts.pictures(run)
+        # They take most of the time: a run that was asked to stop leaves them out.
+        pictures = {} if run.context.hurried else charts.pictures(run)
         for name, picture in pictures.items():
             write_bytes(run.folder / f"{name}.png", picture.png)
         warnings = list(run.warnings)

@@ -7,7 +7,7 @@ from html import escape
 import attrs
 import numpy as np
 
-from ...design.gripper import SECTIONS
+from ...design.gripper import SECTIONS, GripperSolid
 from ...design.quantity import describe
 from ...files import write_bytes, write_text
 from ...report.charts import label, signed
@@ -40,20 +40,27 @@ def write_report(run: Gripping, stopped: str = "") -> None:
         return
     with run.progress.stage("report", expected_s=20.0):
         versions = run.context.summary["versions"] = package_versions()
-        part = pictures.part_picture(run.job.gripper, run.solid)
-        write_bytes(run.folder / "gripper.png", part.png)
-        frames: dict[float, list[Picture]] = {}
-        for side, found in run.grasps.items():
-            assert run.mesh is not None
-            frames[side] = pictures.frames(run.job.gripper, run.mesh, found)
-            for name, picture in zip(MEANING, frames[side], strict=True):
-                write_bytes(run.folder / f"frame_{side:g}_{name}.png", picture.png)
+        # Pictures take most of the time: a run that was asked to stop leaves them out.
+        part, frames = (None, {}) if run.context.hurried else _write_pictures(run, run.solid)
         write_text(run.folder / "report.html", report(run, part, frames, versions, stopped))
+
+
+def _write_pictures(run: Gripping, solid: GripperSolid) -> tuple[Picture, dict[float, list[Picture]]]:
+    """Draw and write the part, and the phases of each grasp by the cube's side in mm."""
+    part = pictures.part_picture(run.job.gripper, solid)
+    write_bytes(run.folder / "gripper.png", part.png)
+    frames = {}
+    for side, found in run.grasps.items():
+        assert run.mesh is not None
+        frames[side] = pictures.frames(run.job.gripper, run.mesh, found)
+        for name, picture in zip(MEANING, frames[side], strict=True):
+            write_bytes(run.folder / f"frame_{side:g}_{name}.png", picture.png)
+    return part, frames
 
 
 def report(
     run: Gripping,
-    part: Picture,
+    part: Picture | None,
     frames: dict[float, list[Picture]],
     versions: dict[str, str],
     stopped: str = "",
@@ -75,7 +82,7 @@ def report(
     ]
     gap = job.gripper.fingers.gap_mm
     subtitle = f"Two {job.gripper.unit.name} {gap:g} mm apart, {label(job.gripper.path)} in each"
-    lead = f'<div class="lead"><div>{_headline(run)}</div>{picture_figure(part)}</div>'
+    lead = f'<div class="lead"><div>{_headline(run)}</div>{picture_figure(part) if part else ""}</div>'
     return page(f"Gripper: {job.gripper.name}", subtitle, note(warnings), lead, sections)
 
 

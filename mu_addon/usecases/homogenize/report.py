@@ -7,7 +7,9 @@ from html import escape
 import numpy as np
 
 from ...files import write_bytes, write_text
+from ...homogenize.elasticity import Elasticity
 from ...homogenize.modulus import DEFAULT, moduli
+from ...meshing.mesh import Mesh
 from ...report.html import cards, facts_table, figure, note, page, picture_figure, table
 from ...report.results import Picture
 from ...report.unit_pictures import skin
@@ -102,14 +104,7 @@ def _moduli(study: Homogenisation) -> str:
     e, mesh = study.elasticity, study.mesh
     if e is None or mesh is None:
         return ""
-    faces = skin(mesh.tets)
-    made = {
-        "cell.png": pictures.cell_picture(mesh.nodes, faces, study.job.cell.size_mm, e.relative_density),
-        "modulus.png": pictures.modulus_surface(e.C),
-    }
-    for name, picture in made.items():
-        write_bytes(study.folder / name, picture.png)
-    shown = "".join(picture_figure(picture) for picture in made.values())
+    shown = "".join(picture_figure(picture) for picture in _cell_pictures(study, mesh, e))
     names = ("xx", "yy", "zz", "yz", "xz", "xy")
     rows = [
         ([a, *(f"{1e3 * c:.4g}" if c else "0" for c in row)], False)
@@ -123,6 +118,19 @@ def _moduli(study: Homogenisation) -> str:
         + f"<p>A cubic tensor has three constants; this one is cubic to {e.cubic_error:.2%}, which is mesh "
         "error unless the print offset differs along z.</p>"
     )
+
+
+def _cell_pictures(study: Homogenisation, mesh: Mesh, e: Elasticity) -> list[Picture]:
+    if study.context.hurried:
+        return []
+    size = study.job.cell.size_mm
+    made = {
+        "cell.png": pictures.cell_picture(mesh.nodes, skin(mesh.tets), size, e.relative_density),
+        "modulus.png": pictures.modulus_surface(e.C),
+    }
+    for name, picture in made.items():
+        write_bytes(study.folder / name, picture.png)
+    return list(made.values())
 
 
 def _test(study: Homogenisation) -> str:
@@ -173,6 +181,9 @@ def _test(study: Homogenisation) -> str:
 
 
 def _specimen_pictures(study: Homogenisation) -> list[Picture]:
+    # Pictures take most of the time: a run that was asked to stop leaves them out.
+    if study.context.hurried:
+        return []
     found = study.tests.get("stick") or next(iter(study.tests.values()))
     mesh = found.specimen.mesh
     last = found.states[-1]

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from .named_effects import NamedEffects
     from .study import Study
 
+NO_PICTURES = "This report has no pictures: they take most of its time, and this run was asked to stop."
 # What the lattice's law stands in for.
 REPLACED = ("material.lattice_modulus_kPa", "material.lattice_poisson")
 FILES = {
@@ -60,7 +61,8 @@ FILES = {
 def write_report(study: Study, stopped: str = "") -> None:
     """Write report.html (and unit.png); `stopped` says why a study that is not complete stopped.
 
-    A report that tells of more stages than were run now, from the same inputs, is left as it is.
+    Pictures take most of the time: a run that was asked to stop leaves them out. A report that tells of more
+    stages than were run now, from the same inputs, is left as it is.
     """
     from .report import write_html
 
@@ -80,7 +82,7 @@ def _panel_pictures(study: Study) -> None:
     """The study's answers as pictures beside its motion, as far as the study came."""
     from .panel_pictures import write_angle, write_delta
 
-    if study.trajectory is None or study.mesh is None:
+    if study.trajectory is None or study.mesh is None or study.context.hurried:
         return
     write_angle(study.folder, *study.motion_in_order())
     rule = study.job.headline_rule
@@ -109,7 +111,7 @@ def report_data(
         unit=f"Monolithic Unit, scale {d.scale:g}, cell {d.cell:g} mm, {d.count} chambers",
         status="partial" if stopped else "complete",
         reason=stopped,
-        warnings=tuple(study.warnings),
+        warnings=(*study.warnings, *([NO_PICTURES] if study.context.hurried else [])),
         view=view,
         pictures=tuple(pictures),
         paths=tuple(Path(w.name, w.start, w.length) for w in windows),
@@ -262,7 +264,7 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
     from ...report.render import png
     from ...report.unit_pictures import motion, portrait, side_view, unit_parts
 
-    if study.solid is None:
+    if study.solid is None or study.context.hurried:
         return None, []
     d = study.job.unit.dimensions
     parts = unit_parts(d, study.solid.vertices, study.solid.triangles)
@@ -299,7 +301,7 @@ def _painted(study: Study, field: str, low: float, least: float, word: str) -> P
     from ...report.charts import field_colors
     from ...report.unit_pictures import motion
 
-    if study.trajectory is None:
+    if study.trajectory is None or study.context.hurried:
         return None
     try:
         played = read_motion(study.folder)
@@ -337,7 +339,7 @@ def _search_picture(study: Study) -> Picture | None:
     from ...report.render import png
     from ...report.unit_pictures import portrait, unit_parts
 
-    if study.search is None or study.solid is None:
+    if study.search is None or study.solid is None or study.context.hurried:
         return None
     d = study.job.unit.dimensions
     best = study.search.solved[0]
