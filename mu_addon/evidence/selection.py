@@ -348,6 +348,12 @@ def at_a_bound(fit: Fit) -> bool:
     )
 
 
+def size_at_bound(fit: Fit) -> bool:
+    """Whether the size of the last effect, its first parameter, lies at a bound that is not its null."""
+    last = fit.effects[-1]
+    return _bounded(last.parameters[0], fit.values[last.keys[0]])
+
+
 def _bounded(p: Parameter, value: float) -> bool:
     near = 1e-3 * (p.high - p.low)
     return any(abs(value - b) < near and b != p.null for b in (p.low, p.high))
@@ -572,7 +578,7 @@ def causes_of(
     """
     found = []
     for e in chosen.effects:
-        others = [o for o in chosen.effects if o.name != e.name]
+        others = [o for o in chosen.effects if o.keys != e.keys]
         tried = [f for f in levels[0] if f.names != chosen.names]
         if others:
             tried = [
