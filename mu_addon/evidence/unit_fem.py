@@ -37,8 +37,8 @@ Progress = Callable[[str, float], None]
 ANGLE, VOLUME, FORCE = "angle_deg", "volume_mm3", "force_N"
 # Kinds of a unit that bends freely.
 FREE = (KIND, step.KIND, pose.KIND)
-# Of the pressures' range: the most that a step to which its ends are rounded may be, so that the quarter of it
-# that rounding may take away lies well within the margin. Steps are 1 and 5 times powers of ten.
+# Of the pressures' range: the most that a step to which its ends are rounded may be. The quarter of it that
+# rounding may take away lies well within the margin. Steps are 1 and 5 times powers of ten.
 ROUND = 0.06
 # Fewer pressures make no cubic spline.
 FEWEST = 4
@@ -128,7 +128,7 @@ def pressures(readings_kPa: Array, count: int, margin: float) -> tuple[float, ..
     # A gauge's noise moves the ends of a protocol to either side of a round number: its runs stay the same.
     whole = 10.0 ** math.floor(math.log10(ROUND * (high - low)))
     step = 5.0 * whole if 5.0 * whole <= ROUND * (high - low) else whole
-    # Protocols end at steps and half way between them: both are far from where rounding changes, at a quarter.
+    # Protocols end at steps and half way between them: both far from a quarter, where rounding changes.
     low, high = (math.copysign(step * math.floor(abs(end) / step + 0.75), end) for end in (low, high))
     beyond = margin * (high - low)
     low, high = _outward(low, -beyond), _outward(high, beyond)
