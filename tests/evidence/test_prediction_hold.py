@@ -177,7 +177,7 @@ def test_creep_and_cooling_differ_over_two_decades_of_time():
 
 
 def test_warmth_of_compression_grows_with_the_pressure():
-    """Compression without loss to 2 and 4 atmospheres warms by 64.8 and 143.9 K; then the gas cools shut in."""
+    """Compression without loss to 2 and 4 atmospheres warms gas by 64.8 and 143.9 K; then it cools."""
     time = np.array([0.0, 20.0, 200.0])
     for ratio, kelvin in ((2.0, 64.83), (4.0, 143.86)):
         first = (ratio - 1.0) * 101.325
