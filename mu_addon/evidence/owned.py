@@ -164,7 +164,7 @@ def further_owners(
         return found
     own = [e for e in fitter.record.experiments if e.kind in first.kinds]
     others = [w for w in _owners(first.name, own) if w.startswith(kind) and w != first.whose]
-    causes, chance = list(found.causes), len(others)
+    causes, tried = list(found.causes), len(others)
     while others:
         progress(first.name)
         pool = []
@@ -175,7 +175,7 @@ def further_owners(
             )
         best = min(pool, key=cost)
         gain = gain_of(fitter, chosen, best)
-        p = min(1.0, chance * float(chi2.sf(max(gain, 0.0), len(first.keys))))
+        p = min(1.0, tried * float(chi2.sf(max(gain, 0.0), len(first.keys))))
         if p >= FALSE_ALARM_RATE or size_at_bound(best) or loss(fitter, chosen, best) <= 0.0:
             break
         table = tuple(strict_table(fitter, best))
